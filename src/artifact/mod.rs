@@ -1,0 +1,1 @@
+//! The model file `romc-model/1`.

@@ -1,0 +1,1 @@
+//! From programs and equations to text: C, Rust, LaTeX.

@@ -1,0 +1,1 @@
+//! Programs: what is computed, in which order.

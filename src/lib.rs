@@ -1,0 +1,15 @@
+//! romc, the reduced-order model compiler.
+
+pub mod artifact;
+pub mod backend;
+pub mod cli;
+pub mod evaluate;
+pub mod ir;
+pub mod lower;
+pub mod model;
+pub mod mpc;
+pub mod recording;
+pub mod robot;
+pub mod sim;
+pub mod symbolic;
+pub mod train;

@@ -1,0 +1,1 @@
+//! The reduced-order model: encoder, decoder, library, coefficients, phases.

@@ -1,0 +1,1 @@
+//! Recorded jumps: reading, checking, preprocessing.

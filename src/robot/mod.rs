@@ -1,0 +1,1 @@
+//! Joints, legs and limits of the quadrupeds that romc knows.
