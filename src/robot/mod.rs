@@ -1,1 +1,35 @@
-//! Joints, legs and limits of the quadrupeds that romc knows.
+//! Joints, legs, geometry and limits of the quadrupeds that romc knows.
+//!
+//! Enters: joint angles, joint torques and contact flags. Leaves: foot
+//! positions, leg Jacobians, the force and moment that the legs put on the
+//! body (equations 4 to 8, 22 and 23), and the limits a command has to keep.
+//! Read [`joints`] for names and order first, then [`kinematics`] for one leg
+//! and [`wrench`] for all four; [`registry`] holds the robots themselves.
+//!
+//! ```
+//! use romc::robot::{Leg, Robot};
+//!
+//! let go1 = Robot::by_name("go1")?;
+//! let q = [0.0, 0.7, -1.4];
+//! let foot = go1.foot_position(Leg::FrontRight, &q);
+//! assert!((foot.x).abs() < 1e-12 && foot.y == -0.08 && foot.z < -0.3);
+//!
+//! // A leg that extends its knee (positive torque) pushes the body up.
+//! let force = go1.foot_force(Leg::FrontRight, &q, &[0.0, 0.0, 5.0])?;
+//! assert!(force.z > 0.0);
+//! # Ok::<(), romc::robot::RobotError>(())
+//! ```
+
+pub mod joints;
+pub mod kinematics;
+pub mod registry;
+pub mod wrench;
+
+mod error;
+
+pub use error::RobotError;
+pub use joints::{
+    BODY_DIM, BODY_NAMES, ContactFlags, FOOT_DIM, JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM,
+};
+pub use kinematics::LegGeometry;
+pub use registry::Robot;

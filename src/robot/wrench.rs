@@ -1,0 +1,227 @@
+//! From joint torques to the force and moment on the body.
+//!
+//! Equation 4 with the sign of a reaction: the feet push the ground with
+//! `J^-T tau`, the ground pushes the body with `F_k = -J_k^-T tau_k`. Forces are
+//! expressed in axes parallel to the body's, and the arm `x_k` of the moment is
+//! the foot in its own hip frame, as in the recordings the method was published
+//! with; the moment is `x_k x F_k` (the paper prints `F_k x x_k`).
+
+use nalgebra::{Matrix3, SMatrix, Vector3, Vector6};
+
+use super::error::RobotError;
+use super::joints::{ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg};
+use super::kinematics::SINGULAR_BOUND;
+use super::registry::Robot;
+
+impl Robot {
+    /// Force of a leg in contact on the body, in N: `F = -J^-T tau` (equation 4).
+    ///
+    /// `q` in rad, `tau` in N m: abduction, flexion, knee.
+    ///
+    /// # Errors
+    /// [`RobotError::SingularLeg`] at full extension (see
+    /// [`SINGULAR_BOUND`](super::kinematics::SINGULAR_BOUND)),
+    /// [`RobotError::NotFinite`] for NaN or infinite arguments.
+    pub fn foot_force(
+        &self,
+        leg: Leg,
+        q: &[f64; 3],
+        tau: &[f64; 3],
+    ) -> Result<Vector3<f64>, RobotError> {
+        let map = self.foot_force_map(leg, q)?;
+        self.require_finite(leg, "torque", tau)?;
+        Ok(map * Vector3::from(*tau))
+    }
+
+    /// The matrix `-J^-T` that takes a leg's torques (N m) to its force on the
+    /// body (N).
+    ///
+    /// # Errors
+    /// As [`Robot::foot_force`].
+    pub fn foot_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
+        self.require_finite(leg, "joint angle", q)?;
+        let singular = |determinant| RobotError::SingularLeg {
+            robot: self.name().to_owned(),
+            leg,
+            joints_rad: *q,
+            determinant,
+            bound: SINGULAR_BOUND,
+        };
+        let determinant = self.geometry().manipulability(q);
+        if determinant < SINGULAR_BOUND {
+            return Err(singular(determinant));
+        }
+        match self.foot_jacobian(leg, q).transpose().try_inverse() {
+            Some(inverse) => Ok(-inverse),
+            None => Err(singular(determinant)),
+        }
+    }
+
+    /// Force and moment on the body `[F_lin; F_ang]`, in N and N m (equations 5
+    /// to 7, 22): sums of `F_k` and of `x_k x F_k` over the feet in contact.
+    ///
+    /// # Errors
+    /// As [`Robot::foot_force`], for a leg in contact; the others do not count.
+    pub fn body_wrench(
+        &self,
+        joints: &[f64; JOINT_DIM],
+        torque: &[f64; JOINT_DIM],
+        contact: ContactFlags,
+    ) -> Result<Vector6<f64>, RobotError> {
+        let mut wrench = Vector6::zeros();
+        for leg in Leg::ALL.into_iter().filter(|leg| contact[leg.index()]) {
+            let q = leg.of_joints(joints);
+            let force = self.foot_force(leg, &q, &leg.of_joints(torque))?;
+            let moment = self.foot_position(leg, &q).cross(&force);
+            for axis in 0..3 {
+                wrench[axis] += force[axis];
+                wrench[3 + axis] += moment[axis];
+            }
+        }
+        Ok(wrench)
+    }
+
+    /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau` at a posture and
+    /// contact; columns of legs in the air are zero.
+    ///
+    /// # Errors
+    /// As [`Robot::foot_force`].
+    pub fn wrench_map(
+        &self,
+        joints: &[f64; JOINT_DIM],
+        contact: ContactFlags,
+    ) -> Result<SMatrix<f64, 6, JOINT_DIM>, RobotError> {
+        let mut map = SMatrix::<f64, 6, JOINT_DIM>::zeros();
+        for leg in Leg::ALL.into_iter().filter(|leg| contact[leg.index()]) {
+            let q = leg.of_joints(joints);
+            let force = self.foot_force_map(leg, &q)?;
+            let moment = self.foot_position(leg, &q).cross_matrix() * force;
+            let first = LEG_JOINT_DIM * leg.index();
+            map.fixed_view_mut::<3, 3>(0, first).copy_from(&force);
+            map.fixed_view_mut::<3, 3>(3, first).copy_from(&moment);
+        }
+        Ok(map)
+    }
+
+    fn require_finite(
+        &self,
+        leg: Leg,
+        quantity: &'static str,
+        values: &[f64; 3],
+    ) -> Result<(), RobotError> {
+        match values.iter().find(|value| !value.is_finite()) {
+            None => Ok(()),
+            Some(found) => Err(RobotError::NotFinite {
+                robot: self.name().to_owned(),
+                leg,
+                quantity,
+                found: *found,
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::SVector;
+
+    fn go1() -> &'static Robot {
+        Robot::by_name("go1").unwrap()
+    }
+
+    fn stand() -> [f64; JOINT_DIM] {
+        std::array::from_fn(|i| [0.05, 0.7, -1.3][i % 3] + 0.01 * i as f64)
+    }
+
+    fn torques() -> [f64; JOINT_DIM] {
+        std::array::from_fn(|i| 3.0 - 0.7 * i as f64 + 0.2 * (i * i) as f64)
+    }
+
+    #[test]
+    fn foot_force_does_the_work_of_its_torques() {
+        // Virtual work: tau . dq = -F . dp for every joint motion dq.
+        let (q, tau) = ([0.1, 0.8, -1.6], [2.0, -3.0, 7.0]);
+        for leg in Leg::ALL {
+            let force = go1().foot_force(leg, &q, &tau).unwrap();
+            let back = -go1().foot_jacobian(leg, &q).transpose() * force;
+            assert!((back - Vector3::from(tau)).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn foot_force_stretched_knee_is_an_error_with_leg_and_angles() {
+        let error = go1()
+            .foot_force(Leg::RearLeft, &[0.0, 0.2, 0.0], &[1.0, 1.0, 1.0])
+            .unwrap_err();
+        let RobotError::SingularLeg {
+            leg, joints_rad, ..
+        } = &error
+        else {
+            panic!("{error:?}");
+        };
+        assert_eq!((*leg, *joints_rad), (Leg::RearLeft, [0.0, 0.2, 0.0]));
+        let text = error.to_string();
+        assert!(text.contains("go1: leg rl is singular"), "{text}");
+        assert!(text.contains("kn 0.0000"), "{text}");
+    }
+
+    #[test]
+    fn foot_force_near_extension_is_bounded_by_the_singular_bound() {
+        let error = go1().foot_force(Leg::FrontLeft, &[0.0, 0.0, -1e-4], &[1.0; 3]);
+        assert!(matches!(error, Err(RobotError::SingularLeg { .. })));
+        assert!(
+            go1()
+                .foot_force(Leg::FrontLeft, &[0.0, 0.0, -2e-2], &[1.0; 3])
+                .is_ok()
+        );
+    }
+
+    #[test]
+    fn foot_force_not_finite_argument_is_an_error() {
+        let error = go1()
+            .foot_force(Leg::FrontRight, &[0.0, 0.7, -1.4], &[0.0, f64::NAN, 0.0])
+            .unwrap_err();
+        assert!(error.to_string().contains("leg fr has the torque NaN"));
+        let error = go1()
+            .foot_force(Leg::FrontRight, &[f64::INFINITY, 0.7, -1.4], &[0.0; 3])
+            .unwrap_err();
+        assert!(error.to_string().contains("joint angle inf"));
+    }
+
+    #[test]
+    fn body_wrench_is_the_wrench_map_times_torques() {
+        for contact in [
+            [true; 4],
+            [false, false, true, true],
+            [true, false, false, true],
+        ] {
+            let wrench = go1().body_wrench(&stand(), &torques(), contact).unwrap();
+            let map = go1().wrench_map(&stand(), contact).unwrap();
+            let product = map * SVector::<f64, 12>::from(torques());
+            assert!((wrench - product).norm() < 1e-10 * wrench.norm());
+        }
+    }
+
+    #[test]
+    fn body_wrench_without_contact_is_zero_even_at_a_singular_posture() {
+        let wrench = go1()
+            .body_wrench(&[0.0; 12], &torques(), [false; 4])
+            .unwrap();
+        assert_eq!(wrench, Vector6::zeros());
+        let map = go1().wrench_map(&[0.0; 12], [false; 4]).unwrap();
+        assert!(map.iter().all(|entry| *entry == 0.0));
+    }
+
+    #[test]
+    fn body_wrench_moment_is_arm_cross_force() {
+        let contact = [false, true, false, false];
+        let wrench = go1().body_wrench(&stand(), &torques(), contact).unwrap();
+        let q = Leg::FrontLeft.of_joints(&stand());
+        let arm = go1().foot_position(Leg::FrontLeft, &q);
+        let force = Vector3::new(wrench[0], wrench[1], wrench[2]);
+        let moment = Vector3::new(wrench[3], wrench[4], wrench[5]);
+        assert!((moment - arm.cross(&force)).norm() < 1e-12 * moment.norm());
+        assert!(moment.norm() > 1.0);
+    }
+}
