@@ -1,0 +1,390 @@
+//! The one adapter to clarabel, the interior-point solver.
+//!
+//! A [`ConeProgram`] is
+//!
+//! ```text
+//! minimise   ½ xᵀ P x + qᵀ x
+//! subject to A x + s = b,   s ∈ K = K₁ × K₂ × …
+//! ```
+//!
+//! with `K` a product of zero, nonnegative and second-order cones. A [`QpSolver`] is built once
+//! for a pattern of `P` and `A`; afterwards only values change. What a solve returns is a value,
+//! [`Outcome`], and it is `Solved` only if the optimality conditions hold for the returned point
+//! by [`QpSolver::residuals`], which is computed here from the problem's own data.
+
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{
+    DefaultSettings, DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT,
+};
+
+use super::error::MpcError;
+use super::sparse::SparseColumns;
+
+/// One factor of the cone that holds the slack `s = b − A x`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cone {
+    /// `s = 0`, this many rows.
+    Zero(usize),
+    /// `s ≥ 0`, this many rows.
+    Nonnegative(usize),
+    /// `s₀ ≥ ‖(s₁, s₂, …)‖₂`, this many rows.
+    SecondOrder(usize),
+}
+
+impl Cone {
+    /// Number of rows.
+    pub fn dim(self) -> usize {
+        match self {
+            Cone::Zero(dim) | Cone::Nonnegative(dim) | Cone::SecondOrder(dim) => dim,
+        }
+    }
+}
+
+/// A convex quadratic program over cones; see the module for its mathematics.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConeProgram {
+    /// Upper triangle of the cost's quadratic part.
+    pub p: SparseColumns,
+    /// Linear part of the cost.
+    pub q: Vec<f64>,
+    /// Constraint matrix.
+    pub a: SparseColumns,
+    /// Right-hand side of the constraints.
+    pub b: Vec<f64>,
+    /// Cones of the rows, in order.
+    pub cones: Vec<Cone>,
+}
+
+/// How clarabel is set up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SolverProfile {
+    /// For a problem whose rows and variables are already scaled and which is solved over and
+    /// over: no equilibration, no iterative refinement, no presolve.
+    Tuned,
+    /// The solver's own defaults: what a user gets who sets nothing. Data updates may be refused.
+    AsShipped,
+}
+
+/// Settings of a [`QpSolver`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct QpSettings {
+    /// Which of clarabel's settings are used.
+    pub profile: SolverProfile,
+    /// Cap on interior-point iterations: the deterministic deadline.
+    pub max_iterations: u32,
+    /// Feasibility and gap tolerance handed to the solver (`Tuned` only).
+    pub tolerance: f64,
+    /// Largest relative residual with which a point counts as solved.
+    pub accepted_residual: f64,
+}
+
+impl Default for QpSettings {
+    fn default() -> Self {
+        Self {
+            profile: SolverProfile::Tuned,
+            max_iterations: 40,
+            tolerance: 1e-6,
+            accepted_residual: 2e-5,
+        }
+    }
+}
+
+/// How a solve ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// The optimality conditions hold to the accepted residual.
+    Solved,
+    /// The solver stopped content or without progress, but the residuals are too large.
+    Inaccurate,
+    /// No point satisfies the constraints.
+    Infeasible,
+    /// The cost has no lower bound.
+    Unbounded,
+    /// The iteration cap was reached first.
+    IterationCap,
+    /// The factorisation broke down, or the result is not finite.
+    NumericalFailure,
+}
+
+/// How far a point is from satisfying the optimality conditions, each relative to the size of the
+/// terms it is made of (never less than one).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residuals {
+    /// Distance of `b − A x` from its cone.
+    pub primal: f64,
+    /// `‖P x + q + Aᵀ y‖∞`, or the distance of the multipliers `y` from the dual cone if larger.
+    pub dual: f64,
+    /// `|xᵀ P x + qᵀ x + bᵀ y|`, the gap between primal and dual cost.
+    pub gap: f64,
+}
+
+impl Residuals {
+    /// The largest of the three; infinite if any is not a number.
+    pub fn worst(&self) -> f64 {
+        let values = [self.primal, self.dual, self.gap];
+        if values.iter().any(|value| value.is_nan()) {
+            return f64::INFINITY;
+        }
+        values.into_iter().fold(0.0, f64::max)
+    }
+}
+
+/// A solver that keeps its factorisation pattern and memory from solve to solve.
+pub struct QpSolver {
+    program: ConeProgram,
+    solver: DefaultSolver<f64>,
+    settings: QpSettings,
+    residuals: Residuals,
+    row_work: Vec<f64>,
+    column_work: Vec<f64>,
+}
+
+impl std::fmt::Debug for QpSolver {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("QpSolver")
+            .field("variables", &self.program.q.len())
+            .field("rows", &self.program.b.len())
+            .field("settings", &self.settings)
+            .finish_non_exhaustive()
+    }
+}
+
+impl QpSolver {
+    /// Builds a solver for the program's pattern; its values are the first data.
+    ///
+    /// # Errors
+    /// [`MpcError::Solver`] if the sizes of the program's parts disagree or clarabel refuses it.
+    pub fn new(program: ConeProgram, settings: QpSettings) -> Result<Self, MpcError> {
+        let cones: Vec<SupportedConeT<f64>> =
+            program.cones.iter().map(|&cone| supported(cone)).collect();
+        let solver = DefaultSolver::new(
+            &to_csc(&program.p),
+            &program.q,
+            &to_csc(&program.a),
+            &program.b,
+            &cones,
+            clarabel_settings(&settings),
+        )
+        .map_err(|error| MpcError::Solver {
+            reason: error.to_string(),
+        })?;
+        Ok(Self {
+            row_work: vec![0.0; program.b.len()],
+            column_work: vec![0.0; program.q.len()],
+            residuals: Residuals {
+                primal: f64::INFINITY,
+                dual: f64::INFINITY,
+                gap: f64::INFINITY,
+            },
+            program,
+            solver,
+            settings,
+        })
+    }
+
+    /// The data of the next solve.
+    pub fn program(&self) -> &ConeProgram {
+        &self.program
+    }
+
+    /// The data of the next solve, to be overwritten: values only, sizes and patterns stay.
+    pub fn program_mut(&mut self) -> &mut ConeProgram {
+        &mut self.program
+    }
+
+    /// The settings the solver was built with.
+    pub fn settings(&self) -> &QpSettings {
+        &self.settings
+    }
+
+    /// Solves the program with its present values.
+    pub fn solve(&mut self) -> Outcome {
+        if !self.data_is_finite() {
+            return Outcome::NumericalFailure;
+        }
+        let updated = self.solver.update_q(&self.program.q).is_ok()
+            && self.solver.update_b(&self.program.b).is_ok()
+            && self.update_matrices();
+        if !updated {
+            return Outcome::NumericalFailure;
+        }
+        self.solver.solve();
+        self.residuals = self.check();
+        self.outcome()
+    }
+
+    /// The primal point `x` of the last solve.
+    pub fn solution(&self) -> &[f64] {
+        &self.solver.solution.x
+    }
+
+    /// The multipliers of the rows at the last solve.
+    pub fn multipliers(&self) -> &[f64] {
+        &self.solver.solution.z
+    }
+
+    /// Interior-point iterations of the last solve.
+    pub fn iterations(&self) -> u32 {
+        self.solver.solution.iterations
+    }
+
+    /// How well the last solution satisfies the optimality conditions.
+    pub fn residuals(&self) -> Residuals {
+        self.residuals
+    }
+
+    fn data_is_finite(&self) -> bool {
+        let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+        finite(&self.program.q)
+            && finite(&self.program.b)
+            && finite(self.program.p.values())
+            && finite(self.program.a.values())
+    }
+
+    fn update_matrices(&mut self) -> bool {
+        // An iterator of all positions would do without the two vectors, at the price of a
+        // division per entry inside clarabel: whole-vector updates are copied as they are.
+        self.solver.update_P(self.program.p.values_vec()).is_ok()
+            && self.solver.update_A(self.program.a.values_vec()).is_ok()
+    }
+
+    fn outcome(&self) -> Outcome {
+        let accurate = self.residuals.worst() <= self.settings.accepted_residual;
+        match self.solver.solution.status {
+            SolverStatus::Solved
+            | SolverStatus::AlmostSolved
+            | SolverStatus::InsufficientProgress => {
+                if accurate {
+                    Outcome::Solved
+                } else {
+                    Outcome::Inaccurate
+                }
+            }
+            SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
+                Outcome::Infeasible
+            }
+            SolverStatus::DualInfeasible | SolverStatus::AlmostDualInfeasible => Outcome::Unbounded,
+            SolverStatus::MaxIterations | SolverStatus::MaxTime => Outcome::IterationCap,
+            SolverStatus::Unsolved
+            | SolverStatus::NumericalError
+            | SolverStatus::CallbackTerminated => Outcome::NumericalFailure,
+        }
+    }
+
+    /// The optimality conditions at the returned point, from the program's data alone.
+    fn check(&mut self) -> Residuals {
+        let (x, y) = (&self.solver.solution.x, &self.solver.solution.z);
+        let program = &self.program;
+
+        self.row_work.fill(0.0);
+        program.a.multiply_add(x, &mut self.row_work);
+        let ax_size = norm_inf(&self.row_work);
+        for (slack, b) in self.row_work.iter_mut().zip(&program.b) {
+            *slack = b - *slack;
+        }
+        let primal = cone_violation(&program.cones, &self.row_work, Side::Primal)
+            / ax_size.max(norm_inf(&program.b)).max(1.0);
+
+        self.column_work.fill(0.0);
+        program.p.symmetric_multiply_add(x, &mut self.column_work);
+        let px_size = norm_inf(&self.column_work);
+        let xpx = dot(x, &self.column_work);
+        for (gradient, q) in self.column_work.iter_mut().zip(&program.q) {
+            *gradient += q;
+        }
+        program.a.transpose_multiply_add(y, &mut self.column_work);
+        let dual_size = px_size.max(norm_inf(&program.q)).max(norm_inf(y)).max(1.0);
+        let dual = norm_inf(&self.column_work).max(cone_violation(&program.cones, y, Side::Dual))
+            / dual_size;
+
+        let (qx, by) = (dot(&program.q, x), dot(&program.b, y));
+        let (primal_cost, dual_cost) = (0.5 * xpx + qx, -0.5 * xpx - by);
+        let gap = (primal_cost - dual_cost).abs() / primal_cost.abs().min(dual_cost.abs()).max(1.0);
+        Residuals { primal, dual, gap }
+    }
+}
+
+/// Which of the two cones a vector is measured against.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Primal,
+    Dual,
+}
+
+/// Largest violation of any cone; not a number if any entry is not.
+fn cone_violation(cones: &[Cone], values: &[f64], side: Side) -> f64 {
+    let mut worst = 0.0_f64;
+    let mut start = 0;
+    for &cone in cones {
+        let part = &values[start..start + cone.dim()];
+        start += cone.dim();
+        let violation = match (cone, side) {
+            (Cone::Zero(_), Side::Primal) => norm_inf(part),
+            (Cone::Zero(_), Side::Dual) => 0.0,
+            (Cone::Nonnegative(_), _) => {
+                part.iter().fold(0.0, |worst, &value| larger(worst, -value))
+            }
+            (Cone::SecondOrder(_), _) => match part.split_first() {
+                Some((head, tail)) => dot(tail, tail).sqrt() - head,
+                None => 0.0,
+            },
+        };
+        worst = larger(worst, violation);
+    }
+    worst
+}
+
+/// The larger of two numbers, or not a number if either is (unlike `f64::max`).
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
+}
+
+fn norm_inf(values: &[f64]) -> f64 {
+    values
+        .iter()
+        .fold(0.0, |worst, value| larger(worst, value.abs()))
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn supported(cone: Cone) -> SupportedConeT<f64> {
+    match cone {
+        Cone::Zero(dim) => SupportedConeT::ZeroConeT(dim),
+        Cone::Nonnegative(dim) => SupportedConeT::NonnegativeConeT(dim),
+        Cone::SecondOrder(dim) => SupportedConeT::SecondOrderConeT(dim),
+    }
+}
+
+fn to_csc(matrix: &SparseColumns) -> CscMatrix<f64> {
+    CscMatrix::new(
+        matrix.n_rows(),
+        matrix.n_cols(),
+        matrix.column_start().to_vec(),
+        matrix.row_index().to_vec(),
+        matrix.values().to_vec(),
+    )
+}
+
+fn clarabel_settings(settings: &QpSettings) -> DefaultSettings<f64> {
+    let mut builder = DefaultSettingsBuilder::<f64>::default();
+    builder
+        .verbose(false)
+        .max_iter(settings.max_iterations)
+        .direct_solve_method("qdldl".to_string());
+    match settings.profile {
+        SolverProfile::AsShipped => {}
+        SolverProfile::Tuned => {
+            builder
+                .presolve_enable(false)
+                .input_sparse_dropzeros(false)
+                .equilibrate_enable(false)
+                .iterative_refinement_enable(false)
+                .tol_feas(settings.tolerance)
+                .tol_gap_abs(settings.tolerance)
+                .tol_gap_rel(settings.tolerance);
+        }
+    }
+    builder.build().expect("every setting has a legal value")
+}
