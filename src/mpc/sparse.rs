@@ -96,8 +96,7 @@ impl SparseColumns {
 
     /// `out += A x`.
     pub fn multiply_add(&self, x: &[f64], out: &mut [f64]) {
-        for col in 0..self.n_cols {
-            let factor = x[col];
+        for (col, factor) in x.iter().enumerate() {
             for entry in self.column_start[col]..self.column_start[col + 1] {
                 out[self.row_index[entry]] += self.values[entry] * factor;
             }
@@ -106,12 +105,12 @@ impl SparseColumns {
 
     /// `out += Aᵀ y`.
     pub fn transpose_multiply_add(&self, y: &[f64], out: &mut [f64]) {
-        for col in 0..self.n_cols {
+        for (col, total) in out.iter_mut().enumerate() {
             let mut sum = 0.0;
             for entry in self.column_start[col]..self.column_start[col + 1] {
                 sum += self.values[entry] * y[self.row_index[entry]];
             }
-            out[col] += sum;
+            *total += sum;
         }
     }
 
