@@ -1,0 +1,94 @@
+"""Records simulated quadruped jumps as CSV, for training and testing reduced-order models."""
+
+import argparse
+import pathlib
+import sys
+
+import numpy as np
+
+from assessment import assess, table
+from jump_controller import JumpController
+from jump_sets import SETS, WARMUP_S, jumps_of
+from recording_format import write_recording
+from robot_model import RobotModel
+from simulation import Simulation
+
+LONGEST_S = 1.6
+RECORDINGS = pathlib.Path(__file__).resolve().parent.parent / "recordings"
+EXAMPLE = """example:
+  python record_jumps.py --set go1
+writes ../recordings/go1/train_01.csv.gz and so on and prints a table of the jumps.
+The same command writes the same bytes."""
+
+
+def record(jump_set, jump):
+    """Simulates one jump; returns its log from the moment the robot stands still.
+
+    The robot first stands for `WARMUP_S`, unrecorded, so that its feet have
+    settled; the recording ends when the landing motion has come to rest.
+    """
+    robot = RobotModel(jump_set.robot)
+    plan = jump.plan
+    leg_m = plan.stand_height_m - robot.foot_radius_m
+    stand = [
+        robot.joints_for_foot(leg, (0.0, robot.hip_offset_m[leg], -leg_m)) for leg in range(4)
+    ]
+    simulation = Simulation(robot, jump_set.noise, jump.seed, jump.push)
+    simulation.reset(np.concatenate(stand) + jump.start_offset_rad, plan.stand_height_m)
+    controller = JumpController(robot, plan, start_s=WARMUP_S)
+    log = simulation.run(controller, WARMUP_S + LONGEST_S)
+    end_s = controller.rest_s(LONGEST_S + WARMUP_S)
+    return log.between(WARMUP_S, end_s)
+
+
+def main():
+    arguments = parse_arguments()
+    jump_set = SETS[arguments.set]
+    folder = arguments.out_dir or RECORDINGS / arguments.set
+    jumps = jumps_of(jump_set)
+    refuse_foreign_files(folder, {f"{jump.stem}.csv.gz" for jump in jumps}, arguments.force)
+    folder.mkdir(parents=True, exist_ok=True)
+
+    rows = []
+    for jump in jumps:
+        log = record(jump_set, jump)
+        path = folder / f"{jump.stem}.csv.gz"
+        write_recording(path, log.time_s, log.x, log.dx, log.torque_nm, log.feet())
+        result = assess(jump_set.robot, log.time_s, log.x, log.dx, log.torque_nm, log.feet())
+        rows.append((jump.stem, result))
+        print(f"{path.name}: {result.summary()}", file=sys.stderr)
+        if log.other_contact.any():
+            raise SystemExit(f"{path.name}: something other than the feet touched the floor")
+    print(table(rows))
+
+
+def parse_arguments():
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog=EXAMPLE, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--set", required=True, choices=SETS, help="which data set to record")
+    parser.add_argument(
+        "--out-dir", type=pathlib.Path, help="folder to write (default: ../recordings/SET)"
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="write even into a folder that holds other files"
+    )
+    return parser.parse_args()
+
+
+def refuse_foreign_files(folder, ours, force):
+    """Stops if the folder holds anything this set does not write."""
+    if force or not folder.exists():
+        return
+    if not folder.is_dir():
+        raise SystemExit(f"{folder} is not a folder")
+    foreign = sorted(p.name for p in folder.iterdir() if p.name not in ours | {"README.md"})
+    if foreign:
+        raise SystemExit(
+            f"{folder} holds files of another origin ({', '.join(foreign[:3])}); "
+            "choose another --out-dir or give --force"
+        )
+
+
+if __name__ == "__main__":
+    main()
