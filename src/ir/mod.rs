@@ -1,1 +1,31 @@
 //! Programs: what is computed, in which order.
+//!
+//! A [`Program`] enters from `lower` (through [`ProgramBuilder`]) and leaves to
+//! the interpreter and to every backend: C, Rust and the interpreter run the
+//! same statements in the same order with the same association, so that their
+//! results agree bit for bit. Read `program` first, then `interpret`.
+//!
+//! ```
+//! use romc::ir::{Binary, Interpreter, ProgramBuilder};
+//!
+//! let mut builder = ProgramBuilder::new("area");
+//! let sides = builder.input("sides", 2);
+//! let area = builder.binary(Binary::Mul, sides[0], sides[1]);
+//! builder.output("area", &[area]);
+//! let program = builder.finish().expect("both outputs are set");
+//!
+//! let mut area = [0.0];
+//! Interpreter::new(&program).run(&[&[3.0, 4.0]], &mut [&mut area]);
+//! assert_eq!(area, [12.0]);
+//! ```
+
+mod build;
+mod interpret;
+pub mod kernel;
+mod program;
+mod validate;
+
+pub use build::ProgramBuilder;
+pub use interpret::Interpreter;
+pub use program::{Binary, Program, ResultEntry, Slot, Statement, Table, TableId, Unary, ValueId};
+pub use validate::IrError;

@@ -1,0 +1,202 @@
+//! Builds programs; equal computations become one value.
+
+use std::collections::HashMap;
+
+use super::program::{
+    Binary, Program, ResultEntry, Slot, Statement, Table, TableId, Unary, ValueId,
+};
+use super::validate::{IrError, validate};
+
+/// What makes two scalar statements the same computation.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Key {
+    Constant(u64),
+    Unary(Unary, ValueId),
+    Binary(Binary, ValueId, ValueId),
+}
+
+/// Appends statements in order of evaluation and numbers values, so that a scalar
+/// computation which is asked for twice is made once.
+#[derive(Debug)]
+pub struct ProgramBuilder {
+    program: Program,
+    known: HashMap<Key, ValueId>,
+}
+
+impl std::fmt::Debug for Key {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Constant(bits) => write!(f, "{}", f64::from_bits(*bits)),
+            Self::Unary(op, a) => write!(f, "{op:?}({a:?})"),
+            Self::Binary(op, a, b) => write!(f, "{op:?}({a:?}, {b:?})"),
+        }
+    }
+}
+
+impl ProgramBuilder {
+    /// An empty program.
+    pub fn new(name: &str) -> Self {
+        Self {
+            program: Program {
+                name: name.to_owned(),
+                inputs: Vec::new(),
+                outputs: Vec::new(),
+                statements: Vec::new(),
+                first: vec![0],
+                tables: Vec::new(),
+                callees: Vec::new(),
+                results: Vec::new(),
+            },
+            known: HashMap::new(),
+        }
+    }
+
+    /// Declares an input array and returns its elements.
+    pub fn input(&mut self, name: &str, len: usize) -> Vec<ValueId> {
+        let slot = self.program.inputs.len();
+        self.program.inputs.push(Slot {
+            name: name.to_owned(),
+            len,
+        });
+        (0..len)
+            .map(|index| self.push(Statement::Input { slot, index }, 1))
+            .collect()
+    }
+
+    /// A constant.
+    pub fn constant(&mut self, value: f64) -> ValueId {
+        self.numbered(Key::Constant(value.to_bits()), Statement::Constant(value))
+    }
+
+    /// A scalar operation on one value.
+    pub fn unary(&mut self, op: Unary, a: ValueId) -> ValueId {
+        self.numbered(Key::Unary(op, a), Statement::Unary(op, a))
+    }
+
+    /// A scalar operation on two values.
+    pub fn binary(&mut self, op: Binary, a: ValueId, b: ValueId) -> ValueId {
+        let (low, high) = match op {
+            Binary::Add | Binary::Mul => (a.min(b), a.max(b)),
+            Binary::Sub | Binary::Div => (a, b),
+        };
+        self.numbered(Key::Binary(op, low, high), Statement::Binary(op, a, b))
+    }
+
+    /// Sines and cosines of all arguments.
+    pub fn sin_cos(&mut self, arguments: &[ValueId]) -> (Vec<ValueId>, Vec<ValueId>) {
+        let n = arguments.len();
+        let statement = Statement::SinCos {
+            arguments: arguments.to_vec(),
+        };
+        let values = self.push_array(statement, 2 * n);
+        (values[..n].to_vec(), values[n..].to_vec())
+    }
+
+    /// A constant table for the array statements.
+    pub fn table(&mut self, table: Table) -> TableId {
+        let tables = &mut self.program.tables;
+        let position = tables.iter().position(|known| *known == table);
+        let position = position.unwrap_or_else(|| {
+            tables.push(table);
+            tables.len() - 1
+        });
+        TableId(position as u32)
+    }
+
+    /// Matrix-vector accumulation, see [`Statement::Accumulate`].
+    pub fn accumulate(&mut self, table: TableId, weights: &[ValueId]) -> Vec<ValueId> {
+        let cols = self.program.tables[table.index()].cols;
+        let statement = Statement::Accumulate {
+            table,
+            weights: weights.to_vec(),
+        };
+        self.push_array(statement, cols)
+    }
+
+    /// Sum of column-scaled tables, see [`Statement::ScaleColumns`].
+    pub fn scale_columns(
+        &mut self,
+        offset: TableId,
+        scaled: Vec<(TableId, Vec<ValueId>)>,
+    ) -> Vec<ValueId> {
+        let n = self.program.tables[offset.index()].entries.len();
+        self.push_array(Statement::ScaleColumns { offset, scaled }, n)
+    }
+
+    /// Evaluates another program; returns the values of each of its outputs.
+    pub fn call(&mut self, callee: &Program, arguments: &[ValueId]) -> Vec<Vec<ValueId>> {
+        let callees = &mut self.program.callees;
+        let position = callees.iter().position(|known| known == callee);
+        let position = position.unwrap_or_else(|| {
+            callees.push(callee.clone());
+            callees.len() - 1
+        });
+        let n = callee.outputs.iter().map(|slot| slot.len).sum();
+        let statement = Statement::Call {
+            callee: position,
+            arguments: arguments.to_vec(),
+        };
+        let values = self.push_array(statement, n);
+        let mut rest = values.as_slice();
+        let mut outputs = Vec::with_capacity(callee.outputs.len());
+        for slot in &callee.outputs {
+            let (these, others) = rest.split_at(slot.len);
+            outputs.push(these.to_vec());
+            rest = others;
+        }
+        outputs
+    }
+
+    /// Declares an output array that takes the given values.
+    pub fn output(&mut self, name: &str, values: &[ValueId]) {
+        let slot = self.program.outputs.len();
+        self.program.outputs.push(Slot {
+            name: name.to_owned(),
+            len: values.len(),
+        });
+        let entries = values.iter().enumerate();
+        self.program
+            .results
+            .extend(entries.map(|(index, &value)| ResultEntry { slot, index, value }));
+    }
+
+    /// The value of a constant, `None` for anything computed.
+    pub fn constant_of(&self, value: ValueId) -> Option<f64> {
+        let (statement, _) = self.program.definition(value);
+        match self.program.statements[statement] {
+            Statement::Constant(constant) => Some(constant),
+            _ => None,
+        }
+    }
+
+    /// The finished program.
+    ///
+    /// # Errors
+    /// What [`validate`] finds: a value used before its definition, a non-finite
+    /// constant, a table whose shape does not fit its statement, a slot without elements.
+    pub fn finish(self) -> Result<Program, IrError> {
+        validate(&self.program)?;
+        Ok(self.program)
+    }
+
+    fn numbered(&mut self, key: Key, statement: Statement) -> ValueId {
+        if let Some(&value) = self.known.get(&key) {
+            return value;
+        }
+        let value = self.push(statement, 1);
+        self.known.insert(key, value);
+        value
+    }
+
+    fn push(&mut self, statement: Statement, n_values: usize) -> ValueId {
+        let first = self.program.n_values() as u32;
+        self.program.statements.push(statement);
+        self.program.first.push(first + n_values as u32);
+        ValueId(first)
+    }
+
+    fn push_array(&mut self, statement: Statement, n_values: usize) -> Vec<ValueId> {
+        let first = self.push(statement, n_values).0;
+        (first..first + n_values as u32).map(ValueId).collect()
+    }
+}

@@ -1,0 +1,277 @@
+//! The program itself: statements in static single assignment form.
+
+use std::ops::Range;
+
+/// A named, contiguous array of scalars that enters or leaves a program.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Slot {
+    /// Name of the array, as the generated function's parameter.
+    pub name: String,
+    /// Number of scalars.
+    pub len: usize,
+}
+
+/// One scalar computed by a program; numbered in schedule order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ValueId(pub(super) u32);
+
+impl ValueId {
+    /// Position of the value in schedule order.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// One constant table of a program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TableId(pub(super) u32);
+
+impl TableId {
+    /// Position of the table in [`Program::tables`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// A constant matrix, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    pub(super) rows: usize,
+    pub(super) cols: usize,
+    pub(super) entries: Vec<f64>,
+}
+
+impl Table {
+    /// A table of `rows` x `cols` from its row-major entries.
+    ///
+    /// # Panics
+    /// If the number of entries is not `rows * cols`; a caller's defect.
+    pub fn new(rows: usize, cols: usize, entries: Vec<f64>) -> Self {
+        assert_eq!(entries.len(), rows * cols, "table entries fill the shape");
+        Self {
+            rows,
+            cols,
+            entries,
+        }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    pub fn cols(&self) -> usize {
+        self.cols
+    }
+
+    /// One row, `cols` entries.
+    pub fn row(&self, row: usize) -> &[f64] {
+        &self.entries[row * self.cols..(row + 1) * self.cols]
+    }
+
+    /// All entries, row-major.
+    pub fn entries(&self) -> &[f64] {
+        &self.entries
+    }
+}
+
+/// Operations on one scalar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Unary {
+    /// `-a`
+    Neg,
+    /// Square root, correctly rounded.
+    Sqrt,
+    /// Absolute value.
+    Abs,
+    /// `1`, `-1` or `0` as `a` is positive, negative or neither (zero, NaN).
+    Sign,
+    /// Tangent of the target's library.
+    Tan,
+    /// Hyperbolic tangent of the target's library.
+    Tanh,
+    /// Exponential of the target's library.
+    Exp,
+    /// Natural logarithm of the target's library.
+    Log,
+}
+
+/// Operations on two scalars, each rounded once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Binary {
+    /// `a + b`
+    Add,
+    /// `a - b`
+    Sub,
+    /// `a * b`
+    Mul,
+    /// `a / b`
+    Div,
+}
+
+/// One step of the schedule; defines one or several values.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Statement {
+    /// A finite constant.
+    Constant(f64),
+    /// Element `index` of input `slot`.
+    Input {
+        /// Which input.
+        slot: usize,
+        /// Which element of it.
+        index: usize,
+    },
+    /// A scalar operation on one value.
+    Unary(Unary, ValueId),
+    /// A scalar operation on two values.
+    Binary(Binary, ValueId, ValueId),
+    /// Sine and cosine of all arguments by [`super::kernel::sin_cos`]:
+    /// defines the n sines, then the n cosines.
+    SinCos {
+        /// The n arguments, in rad.
+        arguments: Vec<ValueId>,
+    },
+    /// Matrix-vector accumulation `y_j = t_0j + sum_i t_(i+1)j w_i`: the first row
+    /// of the table is the offset, each later row is scaled by one weight.
+    ///
+    /// Association: the accumulator starts at the offset and takes four rows at a
+    /// time, `y += (t_1 w_1 + t_2 w_2) + (t_3 w_3 + t_4 w_4)`; the rows that
+    /// remain are added one by one. Defines `cols` values.
+    Accumulate {
+        /// Table of `weights.len() + 1` rows.
+        table: TableId,
+        /// One weight a row after the first.
+        weights: Vec<ValueId>,
+    },
+    /// Sum of column-scaled tables, `y_ri = t0_ri + t1_ri w1_i + t2_ri w2_i + ...`,
+    /// added in that order. Defines `rows x cols` values, row-major.
+    ScaleColumns {
+        /// The table that is not scaled.
+        offset: TableId,
+        /// Tables of the same shape, each with one weight a column.
+        scaled: Vec<(TableId, Vec<ValueId>)>,
+    },
+    /// Evaluation of another program; the arguments fill its input slots in order.
+    /// Defines the values of its output slots in order.
+    Call {
+        /// Position in [`Program::callees`].
+        callee: usize,
+        /// The elements of all input slots of the callee, one after the other.
+        arguments: Vec<ValueId>,
+    },
+}
+
+impl Statement {
+    /// The values that the statement reads, in order.
+    pub fn operands(&self) -> Vec<ValueId> {
+        match self {
+            Self::Constant(_) | Self::Input { .. } => Vec::new(),
+            Self::Unary(_, a) => vec![*a],
+            Self::Binary(_, a, b) => vec![*a, *b],
+            Self::SinCos { arguments } | Self::Call { arguments, .. } => arguments.clone(),
+            Self::Accumulate { weights, .. } => weights.clone(),
+            Self::ScaleColumns { scaled, .. } => scaled
+                .iter()
+                .flat_map(|(_, weights)| weights.iter().copied())
+                .collect(),
+        }
+    }
+}
+
+/// One element of an output slot and the value that it takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ResultEntry {
+    /// Which output.
+    pub slot: usize,
+    /// Which element of it.
+    pub index: usize,
+    /// The value stored there.
+    pub value: ValueId,
+}
+
+/// A validated, scheduled computation of named output arrays from named input
+/// arrays; made by [`super::ProgramBuilder`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Program {
+    pub(super) name: String,
+    pub(super) inputs: Vec<Slot>,
+    pub(super) outputs: Vec<Slot>,
+    pub(super) statements: Vec<Statement>,
+    /// First value of each statement, and the number of values at the end.
+    pub(super) first: Vec<u32>,
+    pub(super) tables: Vec<Table>,
+    pub(super) callees: Vec<Program>,
+    pub(super) results: Vec<ResultEntry>,
+}
+
+impl Program {
+    /// Name of the computation.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Arrays that enter.
+    pub fn inputs(&self) -> &[Slot] {
+        &self.inputs
+    }
+
+    /// Arrays that leave.
+    pub fn outputs(&self) -> &[Slot] {
+        &self.outputs
+    }
+
+    /// All statements, in order of evaluation.
+    pub fn statements(&self) -> &[Statement] {
+        &self.statements
+    }
+
+    /// Constant tables of the array statements.
+    pub fn tables(&self) -> &[Table] {
+        &self.tables
+    }
+
+    /// Programs that this one evaluates.
+    pub fn callees(&self) -> &[Program] {
+        &self.callees
+    }
+
+    /// What is stored where: each output element once, ordered by slot and index.
+    pub fn results(&self) -> &[ResultEntry] {
+        &self.results
+    }
+
+    /// Number of scalar values.
+    pub fn n_values(&self) -> usize {
+        self.first.last().map_or(0, |&count| count as usize)
+    }
+
+    /// Values that statement `statement` defines.
+    pub fn values_of(&self, statement: usize) -> Range<usize> {
+        self.first[statement] as usize..self.first[statement + 1] as usize
+    }
+
+    /// Statement that defines a value, and the value's position among those that
+    /// the statement defines.
+    pub fn definition(&self, value: ValueId) -> (usize, usize) {
+        let statement = self.first.partition_point(|&first| first <= value.0) - 1;
+        (statement, (value.0 - self.first[statement]) as usize)
+    }
+
+    /// Whether the program calls the target's mathematics library or the
+    /// sine-and-cosine kernel, itself or through a callee.
+    pub fn is_transcendental(&self) -> bool {
+        self.statements.iter().any(|statement| match statement {
+            Statement::SinCos { .. } => true,
+            Statement::Unary(op, _) => {
+                matches!(op, Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log)
+            }
+            Statement::Constant(_)
+            | Statement::Input { .. }
+            | Statement::Binary(..)
+            | Statement::Accumulate { .. }
+            | Statement::ScaleColumns { .. }
+            | Statement::Call { .. } => false,
+        }) || self.callees.iter().any(Program::is_transcendental)
+    }
+}

@@ -1,0 +1,258 @@
+//! What every program promises, checked once when it is built.
+
+use super::program::{Program, Statement, TableId, ValueId};
+
+/// Why a program is refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum IrError {
+    /// A statement reads a value that is not defined before it.
+    #[error("program `{program}`: statement {statement} reads value {value}, defined only later")]
+    UndefinedValue {
+        /// Name of the program.
+        program: String,
+        /// Position of the statement.
+        statement: usize,
+        /// The value that it reads.
+        value: usize,
+    },
+    /// A statement reads an input element that does not exist.
+    #[error("program `{program}`: statement {statement} reads element {index} of input {slot}")]
+    UndefinedInput {
+        /// Name of the program.
+        program: String,
+        /// Position of the statement.
+        statement: usize,
+        /// Input slot.
+        slot: usize,
+        /// Element of the slot.
+        index: usize,
+    },
+    /// A constant is infinite or not a number.
+    #[error("program `{program}`: statement {statement} holds the non-finite constant {value}")]
+    NonFinite {
+        /// Name of the program.
+        program: String,
+        /// Position of the statement.
+        statement: usize,
+        /// The constant.
+        value: f64,
+    },
+    /// An array statement whose operands do not fit its table or callee.
+    #[error("program `{program}`: statement {statement} has {found} operands, expected {expected}")]
+    OperandCount {
+        /// Name of the program.
+        program: String,
+        /// Position of the statement.
+        statement: usize,
+        /// Operands of the statement.
+        found: usize,
+        /// Operands that its table or callee asks for.
+        expected: usize,
+    },
+    /// An input or output without elements, or two with the same name.
+    #[error("program `{program}`: the array `{slot}` is empty or named twice")]
+    Slot {
+        /// Name of the program.
+        program: String,
+        /// Name of the array.
+        slot: String,
+    },
+    /// The results do not cover the outputs.
+    #[error("program `{program}`: {found} results for {expected} output elements")]
+    Results {
+        /// Name of the program.
+        program: String,
+        /// Number of results.
+        found: usize,
+        /// Number of output elements.
+        expected: usize,
+    },
+}
+
+/// Checks definitions before uses, finite constants, table shapes and slots.
+///
+/// # Errors
+/// The first promise that is broken, in schedule order.
+pub fn validate(program: &Program) -> Result<(), IrError> {
+    check_slots(program)?;
+    for (position, statement) in program.statements.iter().enumerate() {
+        check_operands(program, position, statement)?;
+        check_shape(program, position, statement)?;
+    }
+    let expected = program.outputs.iter().map(|slot| slot.len).sum();
+    if program.results.len() != expected {
+        return Err(IrError::Results {
+            program: program.name.clone(),
+            found: program.results.len(),
+            expected,
+        });
+    }
+    let end = program.statements.len();
+    for entry in &program.results {
+        check_value(program, end, entry.value)?;
+    }
+    Ok(())
+}
+
+fn check_slots(program: &Program) -> Result<(), IrError> {
+    for slots in [&program.inputs, &program.outputs] {
+        for (position, slot) in slots.iter().enumerate() {
+            let twice = slots[..position]
+                .iter()
+                .any(|other| other.name == slot.name);
+            if slot.len == 0 || twice {
+                return Err(IrError::Slot {
+                    program: program.name.clone(),
+                    slot: slot.name.clone(),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_value(program: &Program, position: usize, value: ValueId) -> Result<(), IrError> {
+    if value.0 < program.first[position] {
+        return Ok(());
+    }
+    Err(IrError::UndefinedValue {
+        program: program.name.clone(),
+        statement: position,
+        value: value.index(),
+    })
+}
+
+fn check_operands(
+    program: &Program,
+    position: usize,
+    statement: &Statement,
+) -> Result<(), IrError> {
+    for value in statement.operands() {
+        check_value(program, position, value)?;
+    }
+    if let &Statement::Input { slot, index } = statement
+        && program
+            .inputs
+            .get(slot)
+            .is_none_or(|input| index >= input.len)
+    {
+        return Err(IrError::UndefinedInput {
+            program: program.name.clone(),
+            statement: position,
+            slot,
+            index,
+        });
+    }
+    Ok(())
+}
+
+fn check_shape(program: &Program, position: usize, statement: &Statement) -> Result<(), IrError> {
+    let count = |found: usize, expected: usize| {
+        if found == expected {
+            return Ok(());
+        }
+        Err(IrError::OperandCount {
+            program: program.name.clone(),
+            statement: position,
+            found,
+            expected,
+        })
+    };
+    let finite = |values: &[f64]| match values.iter().find(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(&value) => Err(IrError::NonFinite {
+            program: program.name.clone(),
+            statement: position,
+            value,
+        }),
+    };
+    let table = |id: &TableId| &program.tables[id.index()];
+    match statement {
+        Statement::Constant(value) => finite(&[*value]),
+        Statement::Accumulate { table: id, weights } => {
+            finite(&table(id).entries)?;
+            count(weights.len() + 1, table(id).rows)
+        }
+        Statement::ScaleColumns { offset, scaled } => {
+            finite(&table(offset).entries)?;
+            for (id, weights) in scaled {
+                finite(&table(id).entries)?;
+                count(table(id).rows, table(offset).rows)?;
+                count(table(id).cols, table(offset).cols)?;
+                count(weights.len(), table(id).cols)?;
+            }
+            Ok(())
+        }
+        Statement::Call { callee, arguments } => {
+            let inputs = &program.callees[*callee].inputs;
+            count(arguments.len(), inputs.iter().map(|slot| slot.len).sum())
+        }
+        Statement::Input { .. }
+        | Statement::Unary(..)
+        | Statement::Binary(..)
+        | Statement::SinCos { .. } => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Binary, ProgramBuilder, Table};
+    use super::*;
+
+    #[test]
+    fn program_with_non_finite_constant_is_refused() {
+        let mut builder = ProgramBuilder::new("p");
+        let value = builder.constant(f64::INFINITY);
+        builder.output("y", &[value]);
+        assert!(matches!(
+            builder.finish(),
+            Err(IrError::NonFinite { statement: 0, .. })
+        ));
+    }
+
+    #[test]
+    fn program_with_value_of_another_program_is_refused() {
+        let mut other = ProgramBuilder::new("other");
+        let values = other.input("x", 3);
+        let mut builder = ProgramBuilder::new("p");
+        builder.input("x", 1);
+        let sum = builder.binary(Binary::Add, values[0], values[2]);
+        builder.output("y", &[sum]);
+        let found = builder.finish();
+        assert!(
+            matches!(
+                found,
+                Err(IrError::UndefinedValue {
+                    statement: 1,
+                    value: 2,
+                    ..
+                })
+            ),
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn table_with_too_few_weights_is_refused() {
+        let mut builder = ProgramBuilder::new("p");
+        let x = builder.input("x", 1);
+        let table = builder.table(Table::new(3, 2, vec![1.0; 6]));
+        let y = builder.accumulate(table, &x);
+        builder.output("y", &y);
+        let found = builder.finish();
+        let expected = IrError::OperandCount {
+            program: "p".to_owned(),
+            statement: 1,
+            found: 2,
+            expected: 3,
+        };
+        assert_eq!(found, Err(expected));
+    }
+
+    #[test]
+    fn output_without_elements_is_refused() {
+        let mut builder = ProgramBuilder::new("p");
+        builder.output("y", &[]);
+        assert!(matches!(builder.finish(), Err(IrError::Slot { .. })));
+    }
+}
