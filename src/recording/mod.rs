@@ -1,1 +1,52 @@
-//! Recorded jumps: reading, checking, preprocessing.
+//! Recorded jumps: reading, checking, phases, preprocessing, writing.
+//!
+//! Enters: CSV files of one or several jumps, plain or gzip. Leaves: segments
+//! of consecutive samples in SI units, samples as columns; the spans of each
+//! contact phase; a report of what is implausible. Read [`segment`] for the
+//! data first, then [`columns`] and [`csv`] for the format, [`check`],
+//! [`phases`] and [`preprocess`] for what is done with it, and [`mod@write`].
+//!
+//! ```
+//! use romc::recording::{self, phases::PhaseRule};
+//! use romc::robot::Robot;
+//!
+//! # let folder = std::env::temp_dir().join(format!("romc-doc-{}", std::process::id()));
+//! # std::fs::create_dir_all(&folder)?;
+//! # let path = folder.join("hop.csv");
+//! # let feet = |i: usize| [!(3..6).contains(&i); 4];
+//! # let constant = |rows: usize, value: f64| nalgebra::DMatrix::from_element(rows, 8, value);
+//! # recording::write(&path, &recording::Recording { path: path.clone(), ignored_columns: vec![],
+//! #     segments: vec![recording::Segment { path: path.clone(), first_row: 2, row_stride: 1.0,
+//! #     time_s: (0..8).map(|i| 0.002 * i as f64).collect(),
+//! #     x: nalgebra::DMatrix::from_fn(18, 8, |i, _| if i < 12 { [0.0, 0.7, -1.4][i % 3] } else { 0.3 }),
+//! #     dx: constant(18, 0.0), ddx: constant(18, 0.0),
+//! #     torque_nm: constant(12, 1.0), feet: (0..8).map(feet).collect(), body_wrench: None }] })?;
+//! let jump = recording::read(&path)?;
+//! let segment = &jump.segments[0];
+//! let u = segment.input(Robot::by_name("go1")?)?; // 18 x samples: [tau; F]
+//! assert_eq!(u.shape(), (18, segment.len()));
+//! let spans = PhaseRule::two_phase().spans(segment)?;
+//! assert_eq!(spans[1].range, 3..6); // the flight
+//! # std::fs::remove_dir_all(&folder)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod check;
+pub mod columns;
+pub mod csv;
+pub mod phases;
+pub mod preprocess;
+pub mod segment;
+pub mod smoothing;
+pub mod write;
+
+mod error;
+mod lines;
+mod number;
+mod table;
+
+pub use self::csv::{read, read_from_bytes};
+pub use self::write::{WriteOptions, write, write_with};
+pub use error::RecordingError;
+pub use phases::{PhaseRule, PhaseSpan, Stance};
+pub use segment::{Recording, Segment};

@@ -1,0 +1,383 @@
+//! Plausibility: what a recording says that a robot cannot have done.
+//!
+//! Numbers that are not finite never get here: reading refuses them. What is
+//! found is reported with row and column; samples are left out only by
+//! [`without`], when asked.
+
+use std::fmt;
+use std::ops::Range;
+
+use super::columns::Column;
+use super::error::RecordingError;
+use super::segment::{Recording, Segment};
+use crate::robot::{JOINT_DIM, Robot, STATE_DIM};
+
+/// How far a sample may go before it is reported.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckOptions {
+    /// Torque over the robot's limit that is still accepted.
+    pub torque_factor: f64,
+    /// Angle beyond a joint's limits that is still accepted, in rad.
+    pub joint_margin_rad: f64,
+    /// Speed over a joint's limit that is still accepted.
+    pub speed_factor: f64,
+    /// Largest speed of the body along an axis, in m/s.
+    pub body_speed_m_s: f64,
+    /// Largest rate of a body angle, in rad/s.
+    pub body_rate_rad_s: f64,
+    /// Disagreement of a rate with differences, as a share of the 95th
+    /// percentile of that rate, that is still accepted on top of the floor.
+    pub consistency_share: f64,
+    /// Floor of that disagreement for velocities: joints, body linear, body angular.
+    pub velocity_floor: [f64; 3],
+    /// The same for accelerations.
+    pub acceleration_floor: [f64; 3],
+    /// Equal consecutive velocities at an extreme that count as clipped.
+    pub clipped_samples: usize,
+    /// Departure of a time step from the median, as a share of it.
+    pub step_share: f64,
+}
+
+impl Default for CheckOptions {
+    fn default() -> Self {
+        CheckOptions {
+            torque_factor: 1.1,
+            joint_margin_rad: 0.05,
+            speed_factor: 1.1,
+            body_speed_m_s: 10.0,
+            body_rate_rad_s: 30.0,
+            consistency_share: 0.3,
+            velocity_floor: [1.0, 0.2, 0.5],
+            acceleration_floor: [100.0, 10.0, 50.0],
+            clipped_samples: 5,
+            step_share: 0.5,
+        }
+    }
+}
+
+/// What is wrong with a run of samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Implausible {
+    /// Torque above the joint's limit; `bound` is the limit with its margin.
+    Torque,
+    /// Angle outside the joint's limits; `bound` is the limit with its margin.
+    JointAngle,
+    /// Velocity above what the joint or body can have; `bound` is that.
+    Speed,
+    /// Position moves faster between samples than it can; `value` is the speed.
+    Jump,
+    /// Velocity and differences of the position disagree; `bound` is the latter.
+    Velocity,
+    /// Acceleration and differences of the velocity disagree.
+    Acceleration,
+    /// Velocity stays at one extreme value: the sensor clips.
+    Clipped,
+    /// A time step far from the median, which is `bound`.
+    TimeStep,
+}
+
+impl Implausible {
+    /// The finding in words.
+    pub const fn description(self) -> &'static str {
+        match self {
+            Implausible::Torque => "torque above the joint's limit",
+            Implausible::JointAngle => "angle outside the joint's limits",
+            Implausible::Speed => "speed above what is possible",
+            Implausible::Jump => "position jumps faster than is possible",
+            Implausible::Velocity => "velocity disagrees with differences of the position",
+            Implausible::Acceleration => "acceleration disagrees with differences of the velocity",
+            Implausible::Clipped => "velocity clips at an extreme",
+            Implausible::TimeStep => "time step differs from the median",
+        }
+    }
+}
+
+/// A run of implausible samples in one column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// What is wrong.
+    pub kind: Implausible,
+    /// Index of the segment.
+    pub segment: usize,
+    /// Samples of the segment.
+    pub samples: Range<usize>,
+    /// First line of the file.
+    pub first_row: usize,
+    /// Line of the worst sample.
+    pub worst_row: usize,
+    /// The column.
+    pub column: String,
+    /// The worst value, in the column's unit.
+    pub value: f64,
+    /// What it is measured against.
+    pub bound: f64,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let count = self.samples.len();
+        write!(f, "row {}", self.first_row)?;
+        if count > 1 {
+            write!(f, " and {} more", count - 1)?;
+        }
+        write!(
+            f,
+            ", column `{}`: {}: {:.6} against {:.6}",
+            self.column,
+            self.kind.description(),
+            self.value,
+            self.bound
+        )?;
+        if self.worst_row != self.first_row {
+            write!(f, " at row {}", self.worst_row)?;
+        }
+        Ok(())
+    }
+}
+
+/// Everything implausible in a recording, in the order of its rows.
+///
+/// Neighbouring samples with the same fault in the same column are one finding.
+pub fn check(recording: &Recording, robot: &Robot, options: &CheckOptions) -> Vec<Finding> {
+    let mut out = Vec::new();
+    for (index, segment) in recording.segments.iter().enumerate() {
+        let mut scan = Scan {
+            segment,
+            index,
+            options,
+            found: &mut out,
+        };
+        scan.limits(robot);
+        scan.consistency();
+        scan.clipping();
+        scan.time_steps();
+    }
+    out.sort_by(|a, b| (a.segment, a.first_row, a.kind).cmp(&(b.segment, b.first_row, b.kind)));
+    out
+}
+
+/// The recording without the samples of these findings, and how many that
+/// leaves out. Segments are divided where samples are missing; a remainder of
+/// a single sample goes too.
+///
+/// # Errors
+/// [`RecordingError::TooShort`] if nothing remains.
+pub fn without(
+    recording: &Recording,
+    findings: &[Finding],
+) -> Result<(Recording, usize), RecordingError> {
+    let mut segments = Vec::new();
+    for (index, segment) in recording.segments.iter().enumerate() {
+        let mut keep = vec![true; segment.len()];
+        for finding in findings.iter().filter(|f| f.segment == index) {
+            let end = finding.samples.end.min(keep.len());
+            keep[finding.samples.start.min(end)..end].fill(false);
+        }
+        let mut start = 0;
+        while start < keep.len() {
+            let kept = keep[start..].iter().take_while(|k| **k).count();
+            if kept >= 2 {
+                segments.push(segment.slice(start..start + kept));
+            }
+            start += kept + 1;
+        }
+    }
+    if segments.is_empty() {
+        return Err(RecordingError::TooShort {
+            path: recording.path.clone(),
+            row: recording.segments.first().map_or(1, |s| s.first_row),
+            found: 0,
+            expected: 2,
+        });
+    }
+    let out = Recording {
+        path: recording.path.clone(),
+        segments,
+        ignored_columns: recording.ignored_columns.clone(),
+    };
+    let dropped = recording.sample_count() - out.sample_count();
+    Ok((out, dropped))
+}
+
+struct Scan<'a> {
+    segment: &'a Segment,
+    index: usize,
+    options: &'a CheckOptions,
+    found: &'a mut Vec<Finding>,
+}
+
+/// A value and the bound it breaks.
+type Breach = Option<(f64, f64)>;
+
+impl Scan<'_> {
+    /// Joins neighbouring breaches of a column into findings.
+    fn column(&mut self, kind: Implausible, column: Column, breach: impl Fn(usize) -> Breach) {
+        let mut last_end = None;
+        for sample in 0..self.segment.len() {
+            let Some((value, bound)) = breach(sample) else {
+                continue;
+            };
+            let row = self.segment.row(sample);
+            match self.found.last_mut() {
+                Some(open) if last_end == Some(sample) => {
+                    open.samples.end = sample + 1;
+                    if (value - bound).abs() > (open.value - open.bound).abs() {
+                        (open.value, open.bound, open.worst_row) = (value, bound, row);
+                    }
+                }
+                _ => self.found.push(Finding {
+                    kind,
+                    segment: self.index,
+                    samples: sample..sample + 1,
+                    first_row: row,
+                    worst_row: row,
+                    column: column.name(),
+                    value,
+                    bound,
+                }),
+            }
+            last_end = Some(sample + 1);
+        }
+    }
+
+    fn limits(&mut self, robot: &Robot) {
+        let (segment, options) = (self.segment, self.options);
+        for i in 0..JOINT_DIM {
+            let bound = robot.torque_limit_nm()[i] * options.torque_factor;
+            self.column(Implausible::Torque, Column::Torque(i), |j| {
+                above(segment.torque_nm[(i, j)], bound)
+            });
+            let (low, high) = robot.joint_limit_rad()[i];
+            let margin = options.joint_margin_rad;
+            self.column(Implausible::JointAngle, Column::Position(i), |j| {
+                outside(segment.x[(i, j)], low - margin, high + margin)
+            });
+        }
+        for i in 0..STATE_DIM {
+            let bound = match group(i) {
+                0 => robot.joint_speed_limit_rad_s()[i] * options.speed_factor,
+                1 => options.body_speed_m_s,
+                _ => options.body_rate_rad_s,
+            };
+            self.column(Implausible::Speed, Column::Velocity(i), |j| {
+                above(segment.dx[(i, j)], bound)
+            });
+            self.column(Implausible::Jump, Column::Position(i), |j| {
+                let before = j.checked_sub(1)?;
+                let rise = segment.x[(i, j)] - segment.x[(i, before)];
+                above(rise / (segment.time_s[j] - segment.time_s[before]), bound)
+            });
+        }
+    }
+
+    fn consistency(&mut self) {
+        let (segment, options) = (self.segment, self.options);
+        let share = options.consistency_share;
+        for i in 0..STATE_DIM {
+            let slack =
+                options.velocity_floor[group(i)] + share * typical(segment.dx.row(i).iter());
+            self.column(Implausible::Velocity, Column::Velocity(i), |j| {
+                let value = |j| segment.x[(i, j)];
+                disagrees(segment, j, value, |j| segment.dx[(i, j)], slack)
+            });
+            let slack =
+                options.acceleration_floor[group(i)] + share * typical(segment.ddx.row(i).iter());
+            self.column(Implausible::Acceleration, Column::Acceleration(i), |j| {
+                let value = |j| segment.dx[(i, j)];
+                disagrees(segment, j, value, |j| segment.ddx[(i, j)], slack)
+            });
+        }
+    }
+
+    fn clipping(&mut self) {
+        let (segment, n) = (self.segment, self.segment.len());
+        for i in 0..STATE_DIM {
+            let extreme = segment
+                .dx
+                .row(i)
+                .iter()
+                .fold(0.0, |m: f64, v| m.max(v.abs()));
+            if extreme == 0.0 {
+                continue;
+            }
+            let at_extreme = |j: usize| segment.dx[(i, j)].abs() == extreme;
+            let mut start = 0;
+            let mut clipped = vec![false; n];
+            while start < n {
+                let run = (start..n).take_while(|j| at_extreme(*j)).count();
+                if run >= self.options.clipped_samples {
+                    clipped[start..start + run].fill(true);
+                }
+                start += run + 1;
+            }
+            self.column(Implausible::Clipped, Column::Velocity(i), |j| {
+                clipped[j].then_some((segment.dx[(i, j)], extreme))
+            });
+        }
+    }
+
+    fn time_steps(&mut self) {
+        let (segment, share) = (self.segment, self.options.step_share);
+        let mut steps: Vec<f64> = segment.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        let Some(median) = steps.get(steps.len() / 2).copied() else {
+            return;
+        };
+        self.column(Implausible::TimeStep, Column::Time, |j| {
+            let step = segment.time_s[j] - segment.time_s[j.checked_sub(1)?];
+            ((step - median).abs() > share * median).then_some((step, median))
+        });
+    }
+}
+
+/// 0 for a joint, 1 for the body's position, 2 for its angles.
+fn group(coordinate: usize) -> usize {
+    match coordinate.checked_sub(JOINT_DIM) {
+        None => 0,
+        Some(body) => 1 + body / 3,
+    }
+}
+
+fn above(value: f64, bound: f64) -> Breach {
+    (value.abs() > bound).then_some((value, bound.copysign(value)))
+}
+
+fn outside(value: f64, low: f64, high: f64) -> Breach {
+    if value < low {
+        Some((value, low))
+    } else {
+        (value > high).then_some((value, high))
+    }
+}
+
+/// 95th percentile of the magnitudes: the scale of a column without its spikes.
+fn typical<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
+    let mut magnitudes: Vec<f64> = values.map(|v| v.abs()).collect();
+    magnitudes.sort_by(f64::total_cmp);
+    let place = (magnitudes.len().saturating_sub(1) as f64 * 0.95) as usize;
+    magnitudes.get(place).copied().unwrap_or(0.0)
+}
+
+/// Compares the rate recorded at a sample with the slopes of `value` before and
+/// after it: a rate lies between the two unless it turns within the steps.
+fn disagrees(
+    segment: &Segment,
+    sample: usize,
+    value: impl Fn(usize) -> f64,
+    rate: impl Fn(usize) -> f64,
+    slack: f64,
+) -> Breach {
+    let (before, after) = (sample.checked_sub(1)?, sample + 1);
+    if after >= segment.len() {
+        return None;
+    }
+    let slope =
+        |a: usize, b: usize| (value(b) - value(a)) / (segment.time_s[b] - segment.time_s[a]);
+    let (left, right) = (slope(before, sample), slope(sample, after));
+    let (low, high) = (left.min(right), left.max(right));
+    let found = rate(sample);
+    outside(found, low - slack, high + slack).map(|_| (found, found.clamp(low, high)))
+}
+
+#[cfg(test)]
+mod tests;

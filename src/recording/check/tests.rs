@@ -1,0 +1,187 @@
+use super::*;
+use nalgebra::DMatrix;
+use std::path::PathBuf;
+
+fn go1() -> &'static Robot {
+    Robot::by_name("go1").unwrap()
+}
+
+/// A smooth motion whose rates are exact.
+fn smooth(n: usize) -> Recording {
+    let time_s: Vec<f64> = (0..n).map(|j| 0.002 * j as f64).collect();
+    let centre = |i: usize| {
+        if i < JOINT_DIM {
+            [0.0, 0.8, -1.6][i % 3]
+        } else {
+            0.2
+        }
+    };
+    let wave = |j: usize, derivative: u32| {
+        let omega = 9.0_f64;
+        let phase = omega * time_s[j] + f64::from(derivative) * std::f64::consts::FRAC_PI_2;
+        0.2 * omega.powi(derivative as i32) * phase.sin()
+    };
+    let segment = Segment {
+        path: PathBuf::from("wave.csv"),
+        first_row: 2,
+        row_stride: 1.0,
+        x: DMatrix::from_fn(STATE_DIM, n, |i, j| centre(i) + wave(j, 0)),
+        dx: DMatrix::from_fn(STATE_DIM, n, |_, j| wave(j, 1)),
+        ddx: DMatrix::from_fn(STATE_DIM, n, |_, j| wave(j, 2)),
+        torque_nm: DMatrix::from_element(JOINT_DIM, n, 10.0),
+        feet: vec![[true; 4]; n],
+        body_wrench: None,
+        time_s,
+    };
+    Recording {
+        path: PathBuf::from("wave.csv"),
+        segments: vec![segment],
+        ignored_columns: Vec::new(),
+    }
+}
+
+fn findings(recording: &Recording) -> Vec<Finding> {
+    check(recording, go1(), &CheckOptions::default())
+}
+
+#[test]
+fn check_smooth_motion_within_limits_finds_nothing() {
+    assert_eq!(findings(&smooth(200)), []);
+}
+
+#[test]
+fn check_huge_torques_are_one_finding_with_worst_row_and_bound() {
+    let mut recording = smooth(100);
+    recording.segments[0].torque_nm[(2, 40)] = 50.0;
+    recording.segments[0].torque_nm[(2, 41)] = -1e5;
+    recording.segments[0].torque_nm[(2, 42)] = 60.0;
+    let found = findings(&recording);
+    assert_eq!(found.len(), 1, "{found:?}");
+    let finding = &found[0];
+    assert_eq!(finding.kind, Implausible::Torque);
+    assert_eq!((finding.first_row, finding.worst_row), (42, 43));
+    assert_eq!((finding.samples.clone(), finding.value), (40..43, -1e5));
+    assert!((finding.bound + 35.55 * 1.1).abs() < 1e-12);
+    assert_eq!(
+        finding.to_string(),
+        "row 42 and 2 more, column `fr.kn Torque`: torque above the joint's limit: \
+         -100000.000000 against -39.105000 at row 43"
+    );
+}
+
+#[test]
+fn check_joint_outside_its_limits_is_found() {
+    let mut recording = smooth(100);
+    recording.segments[0].x.row_mut(5).fill(-0.7);
+    recording.segments[0].dx.row_mut(5).fill(0.0);
+    recording.segments[0].ddx.row_mut(5).fill(0.0);
+    let found = findings(&recording);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].kind, Implausible::JointAngle);
+    assert_eq!(found[0].column, "fl.kn Position");
+    assert_eq!(found[0].samples, 0..100);
+    assert!((found[0].bound - (-0.888 + 0.05)).abs() < 1e-12);
+}
+
+#[test]
+fn check_jump_of_a_position_is_found_at_its_row() {
+    let mut recording = smooth(100);
+    for j in 60..100 {
+        recording.segments[0].x[(17, j)] -= 6.0;
+    }
+    let found = findings(&recording);
+    let jump = found.iter().find(|f| f.kind == Implausible::Jump).unwrap();
+    assert_eq!((jump.first_row, jump.samples.len()), (62, 1));
+    assert_eq!(jump.column, "Body angular Position z");
+    assert!(jump.value < -2900.0);
+}
+
+#[test]
+fn check_rates_that_disagree_with_differences_are_found() {
+    let mut recording = smooth(100);
+    recording.segments[0].dx.row_mut(14).scale_mut(2.0);
+    let kinds: Vec<_> = findings(&recording).iter().map(|f| f.kind).collect();
+    assert!(kinds.contains(&Implausible::Velocity), "{kinds:?}");
+    let mut recording = smooth(100);
+    recording.segments[0].ddx[(3, 50)] = 4000.0;
+    let found = findings(&recording);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].kind, Implausible::Acceleration);
+    assert_eq!((found[0].first_row, found[0].value), (52, 4000.0));
+}
+
+#[test]
+fn check_speed_above_the_joints_limit_is_found() {
+    let mut recording = smooth(100);
+    recording.segments[0].dx[(2, 10)] = -25.0;
+    let found = findings(&recording);
+    let speed = found.iter().find(|f| f.kind == Implausible::Speed).unwrap();
+    assert_eq!((speed.value, speed.first_row), (-25.0, 12));
+    assert!((speed.bound + 20.06 * 1.1).abs() < 1e-12);
+}
+
+#[test]
+fn check_clipped_velocity_is_found() {
+    let mut recording = smooth(400);
+    let dx = &mut recording.segments[0].dx;
+    for j in 0..400 {
+        dx[(16, j)] = dx[(16, j)].clamp(-2.0, 1.6);
+    }
+    dx[(16, 399)] = 1.6;
+    let found = findings(&recording);
+    let clipped: Vec<_> = found
+        .iter()
+        .filter(|f| f.kind == Implausible::Clipped)
+        .collect();
+    assert!(clipped.is_empty(), "1.6 is not the extreme: {clipped:?}");
+    for j in 0..400 {
+        let dx = &mut recording.segments[0].dx;
+        dx[(16, j)] = dx[(16, j)].clamp(-1.6, 1.6);
+    }
+    let found = findings(&recording);
+    let clipped = found.iter().find(|f| f.kind == Implausible::Clipped);
+    assert_eq!(clipped.unwrap().value.abs(), 1.6);
+}
+
+#[test]
+fn check_lost_sample_is_found_as_a_time_step() {
+    let mut recording = smooth(100);
+    for time in &mut recording.segments[0].time_s[70..] {
+        *time += 0.002;
+    }
+    let found = findings(&recording);
+    assert_eq!(found[0].kind, Implausible::TimeStep);
+    assert_eq!(found[0].first_row, 72);
+    assert!((found[0].value - 0.004).abs() < 1e-12 && (found[0].bound - 0.002).abs() < 1e-12);
+}
+
+#[test]
+fn without_divides_segments_and_counts_what_it_left_out() {
+    let mut recording = smooth(100);
+    recording.segments[0].torque_nm[(0, 30)] = 1e5;
+    recording.segments[0].torque_nm[(7, 32)] = 1e5;
+    let found = findings(&recording);
+    let (rest, dropped) = without(&recording, &found).unwrap();
+    // Sample 31 stands alone between the two and goes as well.
+    assert_eq!(dropped, 3);
+    let lengths: Vec<_> = rest.segments.iter().map(Segment::len).collect();
+    assert_eq!(lengths, [30, 67]);
+    assert_eq!(rest.segments[1].first_row, 35);
+    assert_eq!(findings(&rest), []);
+}
+
+#[test]
+fn without_nothing_left_is_an_error() {
+    let mut recording = smooth(10);
+    recording.segments[0].torque_nm.fill(1e5);
+    let found = findings(&recording);
+    let error = without(&recording, &found).unwrap_err();
+    assert!(matches!(
+        error,
+        RecordingError::TooShort {
+            row: 2,
+            found: 0,
+            ..
+        }
+    ));
+}

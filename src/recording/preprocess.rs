@@ -1,0 +1,418 @@
+//! From segments to phases ready for training: accelerations by differences,
+//! smoothing, resampling of each phase to whole batches (section IV-C4).
+//!
+//! Nothing crosses the border of a segment. Scaling belongs to the model.
+
+use nalgebra::DMatrix;
+
+use super::error::RecordingError;
+use super::phases::{PhaseRule, PhaseSpan};
+use super::segment::{Recording, Segment};
+use super::smoothing::SavitzkyGolay;
+
+/// How values between samples are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Interpolation {
+    /// Straight lines.
+    #[default]
+    Linear,
+    /// Cubic Hermite curves with slopes by differences.
+    Cubic,
+}
+
+/// What a filter is applied to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SmoothedRows {
+    /// Accelerations only: the targets of the regression.
+    #[default]
+    Accelerations,
+    /// State, rates, accelerations, torques and recorded wrench.
+    All,
+}
+
+/// The steps of [`prepare`]; by default the paper's two phases, without contact
+/// chatter under 5 samples, in batches of 100 rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PreprocessOptions {
+    /// Assignment of samples to phases.
+    pub rule: PhaseRule,
+    /// Whether accelerations are recomputed from velocities.
+    pub recompute_accelerations: bool,
+    /// Filter, applied to whole segments before they are divided.
+    pub smoothing: Option<(SavitzkyGolay, SmoothedRows)>,
+    /// Rows that each phase becomes a multiple of; `None` leaves samples alone.
+    pub batch: Option<usize>,
+    /// Interpolation between samples when resampling.
+    pub interpolation: Interpolation,
+}
+
+impl Default for PreprocessOptions {
+    fn default() -> Self {
+        PreprocessOptions {
+            rule: PhaseRule::two_phase().with_min_samples(5),
+            recompute_accelerations: false,
+            smoothing: None,
+            batch: Some(100),
+            interpolation: Interpolation::Linear,
+        }
+    }
+}
+
+/// One phase of one segment, as training takes it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PhaseData {
+    /// Phase, place in the jump, and the samples it was taken from.
+    pub span: PhaseSpan,
+    /// Index of the recording's segment.
+    pub segment: usize,
+    /// The samples.
+    pub samples: Segment,
+}
+
+/// The phases of every segment of a recording.
+///
+/// # Errors
+/// [`RecordingError::TooShort`] for a span of one sample that has to be
+/// resampled or a segment shorter than the filter, [`RecordingError::NoPhase`],
+/// [`RecordingError::Batch`].
+pub fn prepare(
+    recording: &Recording,
+    options: &PreprocessOptions,
+) -> Result<Vec<PhaseData>, RecordingError> {
+    let mut out = Vec::new();
+    for (index, segment) in recording.segments.iter().enumerate() {
+        let mut segment = segment.clone();
+        if options.recompute_accelerations {
+            segment.ddx = differences(&segment.time_s, &segment.dx);
+        }
+        if let Some((filter, rows)) = &options.smoothing {
+            segment = smoothed(&segment, filter, *rows)?;
+        }
+        for span in options.rule.spans(&segment)? {
+            let part = segment.slice(span.range.clone());
+            let samples = match options.batch {
+                None => part,
+                Some(batch) => {
+                    let rows = batch_rows(part.len(), batch)?;
+                    resampled(&part, rows, options.interpolation)?
+                }
+            };
+            out.push(PhaseData {
+                span,
+                segment: index,
+                samples,
+            });
+        }
+    }
+    Ok(out)
+}
+
+/// The smallest multiple of `batch` that holds `samples`.
+///
+/// # Errors
+/// [`RecordingError::Batch`] for a batch below 2.
+pub fn batch_rows(samples: usize, batch: usize) -> Result<usize, RecordingError> {
+    if batch < 2 {
+        return Err(RecordingError::Batch { found: batch });
+    }
+    Ok(samples.div_ceil(batch).max(1) * batch)
+}
+
+/// Slopes of each row over time: second-order differences inside, also for
+/// unequal steps, first-order at the two ends (equation 21).
+///
+/// `rows` has one column a time; a single sample has slope 0.
+pub fn differences(time_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = time_s.len().min(rows.ncols());
+    let mut out = DMatrix::zeros(rows.nrows(), rows.ncols());
+    if n < 2 {
+        return out;
+    }
+    let slope = |a: usize, b: usize, row: usize| {
+        (rows[(row, b)] - rows[(row, a)]) / (time_s[b] - time_s[a])
+    };
+    for row in 0..rows.nrows() {
+        out[(row, 0)] = slope(0, 1, row);
+        out[(row, n - 1)] = slope(n - 2, n - 1, row);
+        for j in 1..n - 1 {
+            // The parabola through three samples, at the middle one.
+            let (before, after) = (time_s[j] - time_s[j - 1], time_s[j + 1] - time_s[j]);
+            let share = before / (before + after);
+            let (left, right) = (slope(j - 1, j, row), slope(j, j + 1, row));
+            out[(row, j)] = left + share * (right - left);
+        }
+    }
+    out
+}
+
+/// A segment smoothed along time.
+///
+/// # Errors
+/// [`RecordingError::TooShort`] if it has fewer samples than the window.
+pub fn smoothed(
+    segment: &Segment,
+    filter: &SavitzkyGolay,
+    rows: SmoothedRows,
+) -> Result<Segment, RecordingError> {
+    let smooth = |m: &DMatrix<f64>| {
+        filter.smooth(m).ok_or_else(|| RecordingError::TooShort {
+            path: segment.path.clone(),
+            row: segment.row(0),
+            found: segment.len(),
+            expected: filter.window(),
+        })
+    };
+    let mut out = segment.clone();
+    out.ddx = smooth(&segment.ddx)?;
+    match rows {
+        SmoothedRows::Accelerations => {}
+        SmoothedRows::All => {
+            out.x = smooth(&segment.x)?;
+            out.dx = smooth(&segment.dx)?;
+            out.torque_nm = smooth(&segment.torque_nm)?;
+            out.body_wrench = segment.body_wrench.as_ref().map(smooth).transpose()?;
+        }
+    }
+    Ok(out)
+}
+
+/// A segment at `rows` equally spaced times over the same duration.
+///
+/// Contact flags are those of the nearest sample.
+///
+/// # Errors
+/// [`RecordingError::TooShort`] if it has one sample or `rows` is below 2.
+pub fn resampled(
+    segment: &Segment,
+    rows: usize,
+    interpolation: Interpolation,
+) -> Result<Segment, RecordingError> {
+    let n = segment.len();
+    if n < 2 || rows < 2 {
+        return Err(RecordingError::TooShort {
+            path: segment.path.clone(),
+            row: segment.row(0),
+            found: n.min(rows),
+            expected: 2,
+        });
+    }
+    let places = places(&segment.time_s, rows);
+    let along = |m: &DMatrix<f64>| interpolate(&segment.time_s, m, &places, interpolation);
+    Ok(Segment {
+        path: segment.path.clone(),
+        first_row: segment.first_row,
+        row_stride: segment.row_stride * (n - 1) as f64 / (rows - 1) as f64,
+        time_s: places.iter().map(|place| place.time_s).collect(),
+        x: along(&segment.x),
+        dx: along(&segment.dx),
+        ddx: along(&segment.ddx),
+        torque_nm: along(&segment.torque_nm),
+        feet: places
+            .iter()
+            .map(|p| segment.feet[if p.share < 0.5 { p.left } else { p.left + 1 }])
+            .collect(),
+        body_wrench: segment.body_wrench.as_ref().map(along),
+    })
+}
+
+/// A time between the samples `left` and `left + 1`.
+struct Place {
+    time_s: f64,
+    left: usize,
+    share: f64,
+}
+
+fn places(time_s: &[f64], rows: usize) -> Vec<Place> {
+    let last = time_s.len() - 1;
+    let (start, end) = (time_s[0], time_s[last]);
+    let mut left = 0;
+    (0..rows)
+        .map(|i| {
+            let part = i as f64 / (rows - 1) as f64;
+            let time = (start + (end - start) * part).clamp(start, end);
+            while left + 1 < last && time_s[left + 1] <= time {
+                left += 1;
+            }
+            let share = (time - time_s[left]) / (time_s[left + 1] - time_s[left]);
+            Place {
+                time_s: time,
+                left,
+                share,
+            }
+        })
+        .collect()
+}
+
+fn interpolate(
+    time_s: &[f64],
+    rows: &DMatrix<f64>,
+    places: &[Place],
+    interpolation: Interpolation,
+) -> DMatrix<f64> {
+    let slopes = match interpolation {
+        Interpolation::Linear => None,
+        Interpolation::Cubic => Some(differences(time_s, rows)),
+    };
+    DMatrix::from_fn(rows.nrows(), places.len(), |row, i| {
+        let Place { left, share: s, .. } = places[i];
+        let (a, b) = (rows[(row, left)], rows[(row, left + 1)]);
+        let line = a + s * (b - a);
+        let Some(slopes) = &slopes else {
+            return line;
+        };
+        // Hermite: the line plus what the end slopes add, which vanishes at both ends.
+        let step = time_s[left + 1] - time_s[left];
+        let (from, to) = (slopes[(row, left)] * step, slopes[(row, left + 1)] * step);
+        let rise = b - a;
+        line + s * (1.0 - s) * ((1.0 - s) * (from - rise) - s * (to - rise))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::segment::tests::sample_segment;
+    use std::path::PathBuf;
+
+    fn unequal_times(n: usize) -> Vec<f64> {
+        (0..n)
+            .map(|i| 0.002 * i as f64 + 0.0004 * (i as f64).sin())
+            .collect()
+    }
+
+    #[test]
+    fn differences_parabola_is_exact_inside_for_unequal_steps() {
+        let time = unequal_times(20);
+        let rows = DMatrix::from_fn(1, 20, |_, j| 3.0 * time[j] * time[j] - time[j]);
+        let slopes = differences(&time, &rows);
+        for j in 1..19 {
+            assert!((slopes[j] - (6.0 * time[j] - 1.0)).abs() < 1e-10, "{j}");
+        }
+        assert!((slopes[0] - (rows[1] - rows[0]) / (time[1] - time[0])).abs() < 1e-12);
+    }
+
+    #[test]
+    fn differences_single_sample_is_zero() {
+        assert_eq!(
+            differences(&[0.0], &DMatrix::from_element(2, 1, 5.0)),
+            DMatrix::zeros(2, 1)
+        );
+    }
+
+    #[test]
+    fn resampled_same_count_returns_the_samples() {
+        let segment = sample_segment(50);
+        for kind in [Interpolation::Linear, Interpolation::Cubic] {
+            let same = resampled(&segment, 50, kind).unwrap();
+            assert!((&same.x - &segment.x).amax() < 1e-12);
+            assert!((&same.torque_nm - &segment.torque_nm).amax() < 1e-12);
+            assert_eq!(same.feet, segment.feet);
+        }
+    }
+
+    #[test]
+    fn resampled_polynomials_are_exact_to_the_interpolations_degree() {
+        let mut segment = sample_segment(40);
+        segment.time_s = unequal_times(40);
+        let time = segment.time_s.clone();
+        segment.x = DMatrix::from_fn(18, 40, |i, j| i as f64 + time[j]);
+        segment.dx = DMatrix::from_fn(18, 40, |i, j| i as f64 * time[j] * time[j]);
+        let linear = resampled(&segment, 173, Interpolation::Linear).unwrap();
+        let cubic = resampled(&segment, 173, Interpolation::Cubic).unwrap();
+        for (j, t) in cubic.time_s.iter().enumerate() {
+            assert!((linear.x[(3, j)] - (3.0 + t)).abs() < 1e-12);
+            // The end slopes are first order, so the outermost steps are not exact.
+            let inside = *t > time[1] && *t < time[38];
+            let error = (cubic.dx[(17, j)] - 17.0 * t * t).abs();
+            assert!(error < if inside { 1e-12 } else { 1e-4 }, "{j}: {error:e}");
+        }
+        assert_eq!(cubic.time_s[0], time[0]);
+        assert_eq!(cubic.time_s[172], time[39]);
+    }
+
+    #[test]
+    fn resampled_rows_point_into_the_file() {
+        let segment = sample_segment(119);
+        let out = resampled(&segment, 200, Interpolation::Linear).unwrap();
+        assert_eq!((out.row(0), out.row(199)), (2, 120));
+        assert!((out.mean_step_s() - 0.002 * 118.0 / 199.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn resampled_single_sample_is_an_error_with_its_row() {
+        let one = sample_segment(5).slice(3..4);
+        let error = resampled(&one, 100, Interpolation::Linear).unwrap_err();
+        assert!(matches!(
+            error,
+            RecordingError::TooShort {
+                row: 5,
+                found: 1,
+                expected: 2,
+                ..
+            }
+        ));
+    }
+
+    #[test]
+    fn prepare_keeps_segments_apart_and_fills_batches() {
+        let mut jump = sample_segment(300);
+        jump.feet[150..240].fill([false; 4]);
+        let second = sample_segment(120);
+        let recording = Recording {
+            path: PathBuf::from("two.csv"),
+            segments: vec![jump, second],
+            ignored_columns: Vec::new(),
+        };
+        let phases = prepare(&recording, &PreprocessOptions::default()).unwrap();
+        let found: Vec<_> = phases
+            .iter()
+            .map(|p| (p.segment, p.span.phase, p.samples.len()))
+            .collect();
+        assert_eq!(found, [(0, 0, 200), (0, 1, 100), (0, 0, 100), (1, 0, 200)]);
+        assert!(
+            phases[1]
+                .samples
+                .feet
+                .iter()
+                .all(|feet| *feet == [false; 4])
+        );
+        assert_eq!(
+            phases[1].samples.x.column(0),
+            recording.segments[0].x.column(150)
+        );
+    }
+
+    #[test]
+    fn prepare_smoothing_longer_than_a_segment_is_an_error() {
+        let recording = Recording {
+            path: PathBuf::from("short.csv"),
+            segments: vec![sample_segment(5)],
+            ignored_columns: Vec::new(),
+        };
+        let filter = SavitzkyGolay::new(11, 2).unwrap();
+        let options = PreprocessOptions {
+            smoothing: Some((filter, SmoothedRows::All)),
+            ..PreprocessOptions::default()
+        };
+        let error = prepare(&recording, &options).unwrap_err();
+        assert!(matches!(
+            error,
+            RecordingError::TooShort {
+                found: 5,
+                expected: 11,
+                ..
+            }
+        ));
+    }
+
+    #[test]
+    fn batch_rows_rounds_up_and_refuses_tiny_batches() {
+        assert_eq!(batch_rows(118, 100).unwrap(), 200);
+        assert_eq!(batch_rows(100, 100).unwrap(), 100);
+        assert_eq!(batch_rows(1, 100).unwrap(), 100);
+        assert!(matches!(
+            batch_rows(5, 1),
+            Err(RecordingError::Batch { found: 1 })
+        ));
+    }
+}

@@ -1,0 +1,134 @@
+//! Savitzky-Golay smoothing: a polynomial through each window by least squares.
+//!
+//! Inside, each sample takes the value of the polynomial fitted to the window
+//! centred on it; at the ends, the first and last window's polynomial is
+//! evaluated off centre, so no sample is lost and polynomials up to the order
+//! pass unchanged everywhere. Samples count as equally spaced.
+
+use nalgebra::DMatrix;
+
+use super::error::RecordingError;
+
+/// A smoothing filter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SavitzkyGolay {
+    window: usize,
+    order: usize,
+    /// Row `r`: weights of the window's samples for the value at its place `r`.
+    values: DMatrix<f64>,
+}
+
+impl SavitzkyGolay {
+    /// A filter over an odd `window` of samples with polynomials of degree `order`.
+    ///
+    /// # Errors
+    /// [`RecordingError::Smoothing`] for an even window or one not above the order.
+    pub fn new(window: usize, order: usize) -> Result<Self, RecordingError> {
+        const LARGEST: usize = 1001;
+        if window.is_multiple_of(2) || window <= order || window > LARGEST || order > 12 {
+            return Err(RecordingError::Smoothing { window, order });
+        }
+        let half = (window / 2) as f64;
+        // Places scaled to -1..1 keep the powers well conditioned.
+        let place = |r: usize| (r as f64 - half) / half.max(1.0);
+        let powers = DMatrix::from_fn(window, order + 1, |r, k| place(r).powi(k as i32));
+        let q = powers.qr().q();
+        Ok(SavitzkyGolay {
+            window,
+            order,
+            values: &q * q.transpose(),
+        })
+    }
+
+    /// Samples of the window.
+    pub fn window(&self) -> usize {
+        self.window
+    }
+
+    /// Degree of the polynomial.
+    pub fn order(&self) -> usize {
+        self.order
+    }
+
+    /// Each row of `rows` smoothed along its samples (columns).
+    ///
+    /// `None` if there are fewer samples than the window has.
+    pub fn smooth(&self, rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let n = rows.ncols();
+        if n < self.window {
+            return None;
+        }
+        let half = self.window / 2;
+        let mut out = DMatrix::zeros(rows.nrows(), n);
+        for sample in 0..n {
+            let first = sample.saturating_sub(half).min(n - self.window);
+            let weights = self.values.row(sample - first);
+            let window = rows.columns(first, self.window);
+            out.column_mut(sample)
+                .gemv(1.0, &window, &weights.transpose(), 0.0);
+        }
+        Some(out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn new_even_window_or_order_too_high_is_refused() {
+        for (window, order) in [(10, 2), (3, 3), (0, 0), (5, 13), (1 << 40, 1)] {
+            let error = SavitzkyGolay::new(window, order).unwrap_err();
+            assert!(
+                matches!(error, RecordingError::Smoothing { window: w, order: o } if (w, o) == (window, order))
+            );
+        }
+    }
+
+    #[test]
+    fn smooth_five_point_quadratic_has_the_classical_weights() {
+        let filter = SavitzkyGolay::new(5, 2).unwrap();
+        for (place, expected) in [-3.0, 12.0, 17.0, 12.0, -3.0].iter().enumerate() {
+            assert!((filter.values[(2, place)] - expected / 35.0).abs() < 1e-14);
+        }
+        for (place, expected) in [31.0, 9.0, -3.0, -5.0, 3.0].iter().enumerate() {
+            assert!((filter.values[(0, place)] - expected / 35.0).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn smooth_polynomial_of_its_order_is_unchanged_up_to_the_ends() {
+        let cubic = |t: f64| 1.0 - 2.0 * t + 0.3 * t * t + 0.01 * t * t * t;
+        let rows = DMatrix::from_fn(2, 40, |i, j| cubic(j as f64 * 0.1) * (i + 1) as f64);
+        for (window, order) in [(11, 3), (7, 4), (5, 3)] {
+            let smooth = SavitzkyGolay::new(window, order)
+                .unwrap()
+                .smooth(&rows)
+                .unwrap();
+            assert!((&smooth - &rows).amax() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn smooth_noise_is_reduced() {
+        let rows = DMatrix::from_fn(1, 101, |_, j| if j % 2 == 0 { 1.0 } else { -1.0 });
+        let smooth = SavitzkyGolay::new(11, 2).unwrap().smooth(&rows).unwrap();
+        assert!(smooth.norm() < 0.3 * rows.norm());
+    }
+
+    #[test]
+    fn smooth_fewer_samples_than_the_window_is_none() {
+        let filter = SavitzkyGolay::new(11, 2).unwrap();
+        assert!(filter.smooth(&DMatrix::zeros(3, 10)).is_none());
+        assert!(filter.smooth(&DMatrix::zeros(3, 11)).is_some());
+    }
+
+    #[test]
+    fn smooth_window_of_one_returns_the_samples() {
+        let rows = DMatrix::from_fn(1, 5, |_, j| j as f64);
+        assert_eq!(
+            SavitzkyGolay::new(1, 0).unwrap().smooth(&rows).unwrap(),
+            rows
+        );
+    }
+}

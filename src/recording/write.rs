@@ -1,0 +1,277 @@
+//! Writer of the recordings' CSV format.
+//!
+//! Numbers are written with the fewest digits that read back to the same
+//! bits. Files appear whole or not at all: they are written beside their
+//! place and then renamed.
+
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
+use super::columns::Column;
+use super::error::RecordingError;
+use super::segment::{Recording, Segment};
+
+/// Cell separator and decimal mark.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Notation {
+    /// `;` and decimal comma, as published.
+    #[default]
+    Semicolon,
+    /// `,` and decimal point.
+    Comma,
+}
+
+/// What a file looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WriteOptions {
+    /// Cell separator and decimal mark.
+    pub notation: Notation,
+    /// Whether accelerations are written.
+    pub accelerations: bool,
+}
+
+impl Default for WriteOptions {
+    fn default() -> Self {
+        WriteOptions {
+            notation: Notation::Semicolon,
+            accelerations: true,
+        }
+    }
+}
+
+/// Writes a recording as published files are; gzip if the name ends in `.gz`.
+///
+/// # Errors
+/// [`RecordingError::Io`]. An existing file is replaced.
+pub fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
+    write_with(path, recording, &WriteOptions::default())
+}
+
+/// [`write`] with a choice of notation and columns.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_with(
+    path: &Path,
+    recording: &Recording,
+    options: &WriteOptions,
+) -> Result<(), RecordingError> {
+    let beside = match path.file_name() {
+        Some(name) => {
+            let mut part = std::ffi::OsString::from(".");
+            part.push(name);
+            part.push(format!(".{}.part", std::process::id()));
+            path.with_file_name(part)
+        }
+        None => path.to_owned(),
+    };
+    let outcome =
+        write_file(&beside, path, recording, options).and_then(|()| fs::rename(&beside, path));
+    outcome.map_err(|source| {
+        // The rest of a failed attempt; the fault itself is what is reported.
+        let _ = fs::remove_file(&beside);
+        RecordingError::Io {
+            path: path.to_owned(),
+            action: "write",
+            source,
+        }
+    })
+}
+
+fn write_file(
+    beside: &Path,
+    path: &Path,
+    recording: &Recording,
+    options: &WriteOptions,
+) -> io::Result<()> {
+    let mut file = BufWriter::new(File::create(beside)?);
+    if path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("gz"))
+    {
+        let mut packed = GzEncoder::new(&mut file, Compression::best());
+        write_to(&mut packed, recording, options)?;
+        packed.finish()?;
+    } else {
+        write_to(&mut file, recording, options)?;
+    }
+    file.into_inner()?.sync_all()
+}
+
+/// Writes a recording as text.
+///
+/// The wrench is written if every segment carries one.
+///
+/// # Errors
+/// Those of the destination.
+pub fn write_to(
+    destination: &mut impl Write,
+    recording: &Recording,
+    options: &WriteOptions,
+) -> io::Result<()> {
+    let with_force = recording.segments.iter().all(|s| s.body_wrench.is_some());
+    let columns: Vec<Column> = Column::all()
+        .into_iter()
+        .filter(|column| match column {
+            Column::Acceleration(_) => options.accelerations,
+            Column::Force(_) => with_force,
+            Column::Time
+            | Column::Position(_)
+            | Column::Velocity(_)
+            | Column::Torque(_)
+            | Column::Foot(_) => true,
+        })
+        .collect();
+    let separator = match options.notation {
+        Notation::Semicolon => ";",
+        Notation::Comma => ",",
+    };
+    let names: Vec<String> = columns.iter().map(|column| column.name()).collect();
+    writeln!(destination, "{}", names.join(separator))?;
+    let (mut line, mut number) = (String::new(), String::new());
+    for segment in &recording.segments {
+        for sample in 0..segment.len() {
+            line.clear();
+            for (place, column) in columns.iter().enumerate() {
+                if place > 0 {
+                    line.push_str(separator);
+                }
+                number.clear();
+                push_cell(&mut number, segment, *column, sample);
+                match options.notation {
+                    Notation::Semicolon => line.push_str(&number.replace('.', ",")),
+                    Notation::Comma => line.push_str(&number),
+                }
+            }
+            line.push('\n');
+            destination.write_all(line.as_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+fn push_cell(out: &mut String, segment: &Segment, column: Column, sample: usize) {
+    let value = match column {
+        Column::Time => segment.time_s[sample],
+        Column::Position(i) => segment.x[(i, sample)],
+        Column::Velocity(i) => segment.dx[(i, sample)],
+        Column::Acceleration(i) => segment.ddx[(i, sample)],
+        Column::Torque(i) => segment.torque_nm[(i, sample)],
+        Column::Force(i) => segment.body_wrench.as_ref().map_or(0.0, |w| w[(i, sample)]),
+        Column::Foot(i) => {
+            out.push(if segment.feet[sample][i] { '1' } else { '0' });
+            return;
+        }
+    };
+    // Debug has an exponent where Display would print hundreds of zeros.
+    write!(out, "{value:?}").expect("a String takes any text");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::read_from_bytes;
+    use crate::recording::segment::tests::sample_segment;
+    use nalgebra::DMatrix;
+    use std::path::PathBuf;
+
+    fn awkward() -> Recording {
+        let mut first = sample_segment(7);
+        first.x[(0, 0)] = 1.0 / 3.0;
+        first.x[(1, 1)] = -5e-324;
+        first.dx[(2, 2)] = f64::MAX;
+        first.ddx[(3, 3)] = -0.0;
+        first.torque_nm[(4, 4)] = 1e-7;
+        first.feet[5] = [true, false, true, false];
+        let mut second = sample_segment(3);
+        second.first_row = 9;
+        Recording {
+            path: PathBuf::from("sample.csv"),
+            segments: vec![first, second],
+            ignored_columns: Vec::new(),
+        }
+    }
+
+    fn text(recording: &Recording, options: &WriteOptions) -> Vec<u8> {
+        let mut out = Vec::new();
+        write_to(&mut out, recording, options).unwrap();
+        out
+    }
+
+    fn bits(m: &DMatrix<f64>) -> Vec<u64> {
+        m.iter().map(|v| v.to_bits()).collect()
+    }
+
+    #[test]
+    fn write_then_read_returns_the_same_bits_in_both_notations() {
+        let recording = awkward();
+        for notation in [Notation::Semicolon, Notation::Comma] {
+            let options = WriteOptions {
+                notation,
+                ..WriteOptions::default()
+            };
+            let back = read_from_bytes("sample.csv", &text(&recording, &options)).unwrap();
+            assert_eq!(back, recording);
+            for (a, b) in back.segments.iter().zip(&recording.segments) {
+                assert_eq!(bits(&a.x), bits(&b.x));
+                assert_eq!(bits(&a.ddx), bits(&b.ddx));
+            }
+        }
+    }
+
+    #[test]
+    fn write_wrench_of_every_segment_is_kept() {
+        let mut recording = awkward();
+        for segment in &mut recording.segments {
+            let n = segment.len();
+            segment.body_wrench = Some(DMatrix::from_fn(6, n, |i, j| i as f64 - 0.1 * j as f64));
+        }
+        let bytes = text(&recording, &WriteOptions::default());
+        assert_eq!(read_from_bytes("sample.csv", &bytes).unwrap(), recording);
+    }
+
+    #[test]
+    fn write_without_accelerations_reads_back_as_differences() {
+        let mut recording = awkward();
+        recording.segments.remove(0);
+        let options = WriteOptions {
+            accelerations: false,
+            ..WriteOptions::default()
+        };
+        let bytes = text(&recording, &options);
+        let back = read_from_bytes("sample.csv", &bytes).unwrap();
+        // The velocities of the sample rise by 0.001 in 2 ms.
+        assert!(back.segments[0].ddx.iter().all(|a| (a - 0.5).abs() < 1e-9));
+    }
+
+    #[test]
+    fn write_to_a_missing_folder_is_an_error_and_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("no/such/place.csv");
+        let error = write(&path, &awkward()).unwrap_err();
+        assert!(matches!(
+            error,
+            RecordingError::Io {
+                action: "write",
+                ..
+            }
+        ));
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn write_gzip_by_extension_is_packed_and_reads_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("jump.csv.gz");
+        write(&path, &awkward()).unwrap();
+        assert_eq!(fs::read(&path).unwrap()[..2], [0x1f, 0x8b]);
+        let back = crate::recording::read(&path).unwrap();
+        assert_eq!(back.segments[0].x, awkward().segments[0].x);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}
