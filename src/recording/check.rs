@@ -152,7 +152,7 @@ pub fn check(recording: &Recording, robot: &Robot, options: &CheckOptions) -> Ve
         scan.clipping();
         scan.time_steps();
     }
-    out.sort_by(|a, b| (a.segment, a.first_row, a.kind).cmp(&(b.segment, b.first_row, b.kind)));
+    out.sort_by_key(|finding| (finding.segment, finding.first_row, finding.kind));
     out
 }
 
