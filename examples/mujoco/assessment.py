@@ -6,6 +6,10 @@ import numpy as np
 
 from robot_model import TORQUE_LIMIT_NM
 
+MAX_TILT_RAD = 0.7
+MIN_FINAL_HEIGHT_M = 0.2
+MAX_FINAL_SPEED = 0.15
+
 
 @dataclass(frozen=True)
 class Assessment:
@@ -27,6 +31,21 @@ class Assessment:
             f"{self.distance_m:.3f} m, flight {self.flight_s:.3f} s, apex +{self.apex_rise_m:.3f} m, "
             f"torque {100 * self.torque_share:.0f} % of the limit"
         )
+
+    def faults(self, min_flight_s):
+        """What keeps this from being a jump that ends standing upright; empty if nothing does."""
+        faults = []
+        if self.flight_s < min_flight_s:
+            faults.append(f"flight lasts {self.flight_s:.3f} s, less than {min_flight_s} s")
+        if self.torque_share > 1.0:
+            faults.append(f"torque reaches {100 * self.torque_share:.1f} % of its limit")
+        if self.largest_tilt_rad > MAX_TILT_RAD:
+            faults.append(f"roll or pitch reaches {self.largest_tilt_rad:.2f} rad")
+        if self.final_height_m < MIN_FINAL_HEIGHT_M:
+            faults.append(f"the trunk ends {self.final_height_m:.3f} m high")
+        if self.final_speed > MAX_FINAL_SPEED:
+            faults.append(f"the trunk still moves at {self.final_speed:.2f} m/s")
+        return faults
 
 
 def longest_flight(feet):

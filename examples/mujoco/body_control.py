@@ -13,17 +13,17 @@ from scipy.optimize import nnls
 from simulation import write_state
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
-PYRAMID_MARGIN = 0.65
 FORCE_REGULARISATION = 2e-3
+WRENCH_WEIGHTS = (1, 1, 1, 8, 8, 8)
 
 
 class BodyControl:
     """Kinematics and force distribution for one robot, fed with measured states."""
 
-    def __init__(self, robot):
+    def __init__(self, robot, friction_share=0.65):
         self.robot = robot
         self.data = mujoco.MjData(robot.mj)
-        slope = PYRAMID_MARGIN * robot.friction
+        slope = friction_share * robot.friction
         self.edges = np.array([[slope, 0, 1], [-slope, 0, 1], [0, slope, 1], [0, -slope, 1]]).T
 
     def update(self, x, dx):
@@ -43,14 +43,24 @@ class BodyControl:
         self.feet = data.geom_xpos[robot.foot_geom].copy()
         self.inertia = _inertia(data.crb[robot.trunk_body])
 
+    def joint_inertia(self):
+        """(12, 12) mass matrix of the joints, the trunk held."""
+        full = np.zeros((self.robot.mj.nv, self.robot.mj.nv))
+        mujoco.mj_fullM(self.robot.mj, self.data, full)
+        return full[np.ix_(self.robot.dof_index, self.robot.dof_index)]
+
     def wrench_for(self, acceleration, angular_acceleration):
         """Force and moment about the centre of mass that the floor must give (6,)."""
         force = self.robot.mass_kg * (acceleration - GRAVITY)
         moment = self.inertia @ angular_acceleration
         return np.concatenate([force, moment])
 
-    def foot_forces(self, wrench, stance, weights=(1, 1, 1, 8, 8, 8)):
-        """(4, 3) floor forces of the standing feet that give the wrench, inside the pyramids."""
+    def foot_forces(self, wrench, stance, weights=WRENCH_WEIGHTS, effort=(1, 1, 1, 1)):
+        """(4, 3) floor forces of the standing feet that give the wrench, inside the pyramids.
+
+        What cannot be met exactly is missed according to `weights`; feet of
+        greater `effort` are used less.
+        """
         legs = np.flatnonzero(stance)
         if len(legs) == 0:
             return np.zeros((4, 3))
@@ -61,8 +71,9 @@ class BodyControl:
                 columns.append(np.concatenate([edge, np.cross(arm, edge)]))
         weight = np.array(weights, dtype=float)
         matrix = weight[:, None] * np.array(columns).T
-        scale = np.sqrt(FORCE_REGULARISATION) * np.eye(matrix.shape[1])
-        share, _ = nnls(np.vstack([matrix, scale]), np.concatenate([weight * wrench, np.zeros(matrix.shape[1])]))
+        scale = np.sqrt(FORCE_REGULARISATION) * np.diag(np.repeat(np.array(effort, float)[legs], 4))
+        target = np.concatenate([weight * wrench, np.zeros(len(scale))])
+        share, _ = nnls(np.vstack([matrix, scale]), target)
         forces = np.zeros((4, 3))
         for index, leg in enumerate(legs):
             forces[leg] = self.edges @ share[4 * index : 4 * index + 4]

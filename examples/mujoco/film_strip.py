@@ -40,7 +40,7 @@ def render(robot, states):
     """One picture (height, width, 3) per state (18,), seen from the right, camera at rest."""
     data = mujoco.MjData(robot.mj)
     camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation, camera.distance = 90, -6, 1.15
+    camera.azimuth, camera.elevation, camera.distance = 90, -6, 1.35
     camera.lookat[:] = (states[:, 12].mean(), 0.0, 0.22)
     pictures = []
     with mujoco.Renderer(robot.mj, *FRAME) as renderer:

@@ -18,9 +18,10 @@ FLIGHT_GAINS = (50.0, 1.5)
 TOUCHDOWN_AFTER_S = 0.08
 LOADING_S = 0.03
 REST_S = 0.08
+ALL_FEET = (True, True, True, True)
 
 
-@dataclass
+@dataclass(frozen=True)
 class JumpPlan:
     """What one jump looks like; heights are of the trunk (m)."""
 
@@ -44,9 +45,14 @@ class JumpPlan:
 class JumpController:
     """Torques of a synchronous jump (all feet leave the floor together)."""
 
+    FRICTION_SHARE = 0.65
+    TUCK_SHARE = 0.5
+    TUCK_MOTION = Quintic
+    SWING_FEED_FORWARD = 0.0
+
     def __init__(self, robot, plan, start_s=0.0):
         self.robot, self.plan, self.start_s = robot, plan, start_s
-        self.body = BodyControl(robot)
+        self.body = BodyControl(robot, self.FRICTION_SHARE)
         self.stage = "start"
         self.stage_start_s = 0.0
         self.touched_s = np.full(4, np.nan)
@@ -58,9 +64,9 @@ class JumpController:
         self._advance(time_s, feet)
         elapsed = time_s - self.stage_start_s
         if self.stage == "crouch":
-            return self._stand_on(self.crouch.at(elapsed), self._lean(self.crouch.progress(elapsed)), np.ones(4, bool))
+            return self._stand_on(self.crouch.at(elapsed), self._lean(self.crouch.progress(elapsed)))
         if self.stage == "thrust":
-            return self._stand_on(self.thrust.at(elapsed), self._thrust_attitude(elapsed), np.ones(4, bool))
+            return self._push_off(elapsed)
         if self.stage == "flight":
             return self._fly(elapsed)
         return self._land(time_s, elapsed)
@@ -84,8 +90,7 @@ class JumpController:
             self.crouch = Quintic(self.body.com, np.zeros(3), goal, plan.crouch_duration_s, self.wait_s)
         elif self.stage == "crouch" and elapsed >= self.wait_s + plan.crouch_duration_s + plan.hold_s:
             self._enter("thrust", time_s)
-            rise = self._com_with_trunk_at(0.0, plan.takeoff_height_m)[2] - self.crouch.goal[2]
-            self.thrust = Thrust(self.crouch.goal, np.array(plan.takeoff_velocity), rise)
+            self._plan_thrust()
         elif self.stage == "thrust" and (elapsed >= self.thrust.duration_s or not feet.any()):
             self._enter("flight", time_s)
             self._plan_swing()
@@ -117,13 +122,21 @@ class JumpController:
         angles = np.array([plan.roll_rad, 0.0, plan.yaw_rad])
         return progress * angles, np.zeros(3)
 
+    def _plan_thrust(self):
+        plan = self.plan
+        rise = self._com_with_trunk_at(0.0, plan.takeoff_height_m)[2] - self.crouch.goal[2]
+        self.thrust = Thrust(self.crouch.goal, np.array(plan.takeoff_velocity), rise)
+
+    def _push_off(self, elapsed):
+        return self._stand_on(self.thrust.at(elapsed), self._thrust_attitude(elapsed))
+
     def _thrust_attitude(self, elapsed):
         plan, duration = self.plan, self.thrust.duration_s
         rate = plan.takeoff_pitch_rate * elapsed / duration
         pitch = 0.5 * plan.takeoff_pitch_rate * elapsed**2 / duration
         return np.array([plan.roll_rad, pitch, plan.yaw_rad]), np.array([0.0, rate, 0.0])
 
-    def _stand_on(self, com_reference, attitude_reference, stance):
+    def _stand_on(self, com_reference, attitude_reference, stance=ALL_FEET, **distribution):
         position, velocity, acceleration = com_reference
         body = self.body
         stiffness, damping = COM_GAINS
@@ -132,7 +145,7 @@ class JumpController:
         stiffness, damping = ATTITUDE_GAINS
         turn = stiffness * (angles - body.rpy) + damping * (rates - body.omega)
         wrench = body.wrench_for(wanted, turn)
-        return body.torques_for(body.foot_forces(wrench, stance))
+        return body.torques_for(body.foot_forces(wrench, stance, **distribution))
 
     def _plan_swing(self):
         """Joint references from the take-off posture over a tuck to the landing posture."""
@@ -147,21 +160,29 @@ class JumpController:
             landing[3 * leg : 3 * leg + 3] = robot.joints_for_foot(leg, foot)
             foot = foot + np.array([-0.5 * reach[0], 0.0, plan.tuck_m])
             tucked[3 * leg : 3 * leg + 3] = robot.joints_for_foot(leg, foot)
-        half = 0.5 * self.flight_s
+        tuck_s = self.TUCK_SHARE * self.flight_s
+        extend_s = 0.8 * (self.flight_s - tuck_s)
         self.swing = (
-            Quintic(body.joints, body.joint_rates, tucked, half),
-            Quintic(tucked, np.zeros(12), landing, 0.8 * half),
-            half,
+            self.TUCK_MOTION(body.joints, body.joint_rates, tucked, tuck_s),
+            Quintic(tucked, np.zeros(12), landing, extend_s),
+            tuck_s,
         )
 
     def _swing_reference(self, elapsed):
-        tuck, extend, half = self.swing
-        return tuck.at(elapsed) if elapsed < half else extend.at(elapsed - half)
+        tuck, extend, tuck_s = self.swing
+        return tuck.at(elapsed) if elapsed < tuck_s else extend.at(elapsed - tuck_s)
 
     def _fly(self, elapsed):
-        position, velocity, _ = self._swing_reference(elapsed)
+        return self._follow(self._swing_reference(elapsed))
+
+    def _follow(self, joint_reference):
+        position, velocity, acceleration = joint_reference
+        body = self.body
         stiffness, damping = FLIGHT_GAINS
-        return stiffness * (position - self.body.joints) + damping * (velocity - self.body.joint_rates)
+        torque = stiffness * (position - body.joints) + damping * (velocity - body.joint_rates)
+        if self.SWING_FEED_FORWARD == 0.0:
+            return torque
+        return torque + self.SWING_FEED_FORWARD * (body.joint_inertia() @ acceleration)
 
     def _plan_landing(self):
         plan, body = self.plan, self.body
@@ -175,7 +196,7 @@ class JumpController:
         fade = np.clip(1.0 - elapsed / 0.15, 0.0, 1.0)
         angles = fade * self.touchdown_angles
         angles[2] = self.landing_yaw
-        standing = self._stand_on(self.landing.at(elapsed), (angles, np.zeros(3)), np.ones(4, bool))
+        standing = self._stand_on(self.landing.at(elapsed), (angles, np.zeros(3)))
         since = np.nan_to_num(time_s - self.touched_s, nan=0.0)
         loaded = np.repeat(np.clip(since / LOADING_S, 0.0, 1.0), 3)
         return loaded * standing + (1.0 - loaded) * self._fly(self.flight_s)

@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from jump_controller import JumpPlan
+from asynchronous import AsynchronousController, AsynchronousPlan
+from jump_controller import JumpController, JumpPlan
 from simulation import Push, SensorNoise
 
 # The robot stands this long, unrecorded, before each recording starts.
@@ -27,11 +28,33 @@ SYNCHRONOUS = {
     "roll_rad": (-0.02, 0.02),
     "yaw_rad": (-0.02, 0.02),
 }
+ASYNCHRONOUS = {
+    "stand_height_m": (0.262, 0.285),
+    "crouch_height_m": (0.180, 0.196),
+    "crouch_shift_m": (-0.085, -0.060),
+    "front_duration_s": (0.160, 0.180),
+    "front_pitch_rate": (-3.5, -2.9),
+    "rear_duration_s": (0.172, 0.192),
+    "rear_acceleration": (1.0, 2.2),
+    "takeoff_pitch_rad": (-0.22, -0.16),
+    "takeoff_pitch_rate": (-2.0, -0.5),
+    "crouch_duration_s": (0.30, 0.42),
+    "hold_s": (0.02, 0.06),
+    "front_tuck_m": (0.05, 0.08),
+    "landing_leg_m": (0.275, 0.290),
+    "landing_reach_s": (0.11, 0.12),
+    "roll_rad": (-0.02, 0.02),
+    "yaw_rad": (-0.02, 0.02),
+}
 
 
 @dataclass(frozen=True)
 class JumpSet:
-    """A data set: `splits` counts its jumps, `seed` fixes every draw in it."""
+    """A data set: `splits` counts its jumps, `seed` fixes every draw in it.
+
+    `base` is the plan that the draws complete; the velocities go into the field
+    `velocity_field` of it. `to_touchdown` ends recordings before feet land.
+    """
 
     robot: str
     seed: int
@@ -40,6 +63,10 @@ class JumpSet:
     upward_velocity: tuple
     sideways_velocity: float
     ranges: dict
+    base: JumpPlan = JumpPlan()
+    controller: type = JumpController
+    velocity_field: str = "takeoff_velocity"
+    to_touchdown: bool = False
     noise: SensorNoise | None = None
     start_noise_rad: float = 0.0
     push_n: float = 0.0
@@ -57,10 +84,10 @@ SETS = {
     ),
     "go1-noisy": JumpSet(
         robot="go1",
-        seed=2025,
+        seed=2027,
         splits=(("train", 4), ("test", 1)),
         forward_velocity=(0.45, 1.00),
-        upward_velocity=(1.25, 1.55),
+        upward_velocity=(1.42, 1.60),
         sideways_velocity=0.04,
         ranges=SYNCHRONOUS,
         noise=SensorNoise(
@@ -73,6 +100,19 @@ SETS = {
         ),
         start_noise_rad=0.04,
         push_n=25.0,
+    ),
+    "go2-asynchronous": JumpSet(
+        robot="go2",
+        seed=2026,
+        splits=(("train", 6), ("validation", 2), ("test", 2)),
+        forward_velocity=(-0.10, 0.20),
+        upward_velocity=(0.74, 0.82),
+        sideways_velocity=0.03,
+        ranges=ASYNCHRONOUS,
+        base=AsynchronousPlan(),
+        controller=AsynchronousController,
+        velocity_field="front_velocity",
+        to_touchdown=True,
     ),
 }
 
@@ -104,7 +144,7 @@ def jumps_of(jump_set):
         vz = random.uniform(*jump_set.upward_velocity)
         vy = random.uniform(-jump_set.sideways_velocity, jump_set.sideways_velocity)
         drawn = {name: random.uniform(*span) for name, span in jump_set.ranges.items()}
-        plan = replace(JumpPlan(), takeoff_velocity=(vx, vy, vz), **drawn)
+        plan = replace(jump_set.base, **{jump_set.velocity_field: (vx, vy, vz)}, **drawn)
         seed = int(random.integers(2**31))
         offset = jump_set.start_noise_rad * random.uniform(-1, 1, 12)
         jumps.append(Jump(stem, plan, seed, offset, _push(jump_set.push_n, random)))

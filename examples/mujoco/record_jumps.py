@@ -6,14 +6,14 @@ import sys
 
 import numpy as np
 
-from assessment import assess, table
-from jump_controller import JumpController
+from assessment import assess, longest_flight, table
 from jump_sets import SETS, WARMUP_S, jumps_of
 from recording_format import write_recording
 from robot_model import RobotModel
 from simulation import Simulation
 
 LONGEST_S = 1.6
+MIN_FLIGHT_S = 0.2
 RECORDINGS = pathlib.Path(__file__).resolve().parent.parent / "recordings"
 EXAMPLE = """example:
   python record_jumps.py --set go1
@@ -25,7 +25,7 @@ def record(jump_set, jump):
     """Simulates one jump; returns its log from the moment the robot stands still.
 
     The robot first stands for `WARMUP_S`, unrecorded, so that its feet have
-    settled; the recording ends when the landing motion has come to rest.
+    settled; the log ends when the landing motion has come to rest.
     """
     robot = RobotModel(jump_set.robot)
     plan = jump.plan
@@ -35,10 +35,9 @@ def record(jump_set, jump):
     ]
     simulation = Simulation(robot, jump_set.noise, jump.seed, jump.push)
     simulation.reset(np.concatenate(stand) + jump.start_offset_rad, plan.stand_height_m)
-    controller = JumpController(robot, plan, start_s=WARMUP_S)
+    controller = jump_set.controller(robot, plan, start_s=WARMUP_S)
     log = simulation.run(controller, WARMUP_S + LONGEST_S)
-    end_s = controller.rest_s(LONGEST_S + WARMUP_S)
-    return log.between(WARMUP_S, end_s)
+    return log.between(WARMUP_S, controller.rest_s(WARMUP_S + LONGEST_S))
 
 
 def main():
@@ -51,15 +50,26 @@ def main():
 
     rows = []
     for jump in jumps:
-        log = record(jump_set, jump)
         path = folder / f"{jump.stem}.csv.gz"
+        log = record(jump_set, jump)
+        whole = assess(jump_set.robot, log.time_s, log.x, log.dx, log.torque_nm, log.feet())
+        refuse_failed_jump(path.name, whole, log)
+        if jump_set.to_touchdown:
+            log = log.before(longest_flight(log.feet())[1])
         write_recording(path, log.time_s, log.x, log.dx, log.torque_nm, log.feet())
-        result = assess(jump_set.robot, log.time_s, log.x, log.dx, log.torque_nm, log.feet())
-        rows.append((jump.stem, result))
-        print(f"{path.name}: {result.summary()}", file=sys.stderr)
-        if log.other_contact.any():
-            raise SystemExit(f"{path.name}: something other than the feet touched the floor")
+        rows.append((jump.stem, whole))
+        print(f"{path.name}: {whole.summary()}", file=sys.stderr)
     print(table(rows))
+
+
+def refuse_failed_jump(name, whole, log):
+    """Stops unless the robot jumped, landed on its feet and stands."""
+    faults = whole.faults(MIN_FLIGHT_S)
+    if log.other_contact.any():
+        at_s = log.time_s[log.other_contact][0]
+        faults.append(f"something other than the feet touched the floor at {at_s:.3f} s")
+    if faults:
+        raise SystemExit(f"{name}: {'; '.join(faults)}")
 
 
 def parse_arguments():

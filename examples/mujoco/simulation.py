@@ -72,6 +72,10 @@ class Log:
         cut.x[:, 12:14] -= cut.x[0, 12:14]
         return cut
 
+    def before(self, row):
+        """The rows before `row`."""
+        return Log(**{name: values[:row] for name, values in vars(self).items()})
+
     def feet(self):
         """(rows, 4) contact flags: normal force above 1 N."""
         return self.foot_force_n[:, :, 2] > CONTACT_THRESHOLD_N

@@ -37,6 +37,24 @@ class Quintic:
         return position, velocity, acceleration
 
 
+class Cubic:
+    """From (start, velocity) to rest at `goal`; turns round at once, unlike the quintic."""
+
+    def __init__(self, start, velocity, goal, duration_s):
+        self.start, self.velocity, self.goal = (np.array(v, float) for v in (start, velocity, goal))
+        self.duration_s = duration_s
+
+    def at(self, time_s):
+        """Position, velocity, acceleration."""
+        T = self.duration_s
+        t = np.clip(time_s / T, 0.0, 1.0)
+        way, pull = self.goal - self.start, self.velocity * T
+        position = self.start + way * t * t * (3 - 2 * t) + pull * t * (1 - t) ** 2
+        velocity = (6 * way * t * (1 - t) + pull * (1 - t) * (1 - 3 * t)) / T
+        acceleration = (6 * way * (1 - 2 * t) + pull * (6 * t - 4)) / T**2
+        return position, velocity, acceleration
+
+
 RAMP_UP, RAMP_DOWN = 0.25, 0.85
 GRID = np.linspace(0.0, 1.0, 2001)
 
