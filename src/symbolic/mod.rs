@@ -1,1 +1,43 @@
 //! The computer algebra system: hash-consed expressions and what can be asked of them.
+//!
+//! Texts and coefficients enter, canonical expressions ([`ExprId`]) live in an [`ExprPool`], and
+//! derivatives, rewritten forms, values and texts leave. Nothing of the crate is imported here.
+//! Read [`pool`](ExprPool) first for the invariants, then `build.rs` and `power.rs`, the
+//! constructors that keep them; `order.rs` says why equal sums print alike.
+//!
+//! ```
+//! use romc::symbolic::ExprPool;
+//!
+//! let mut pool = ExprPool::new();
+//! let ddz1 = pool.parse("0.36 - 0.91*dz2 - 0.16*dz1 - 0.75*sin(dz1)", &|_| true)?;
+//! assert_eq!(
+//!     pool.display(ddz1).to_string(),
+//!     "0.36 - 0.16*dz1 - 0.91*dz2 - 0.75*sin(dz1)"
+//! );
+//!
+//! let dz1 = pool.symbol_id("dz1");
+//! let slope = pool.derivative(ddz1, dz1);
+//! assert_eq!(pool.display(slope).to_string(), "-0.16 - 0.75*cos(dz1)");
+//! assert_eq!(pool.evaluate(slope, &|_| 0.0), -0.91);
+//! # Ok::<(), romc::symbolic::ParseError>(())
+//! ```
+
+mod build;
+mod diff;
+mod display;
+mod eval;
+mod intern;
+mod lexer;
+mod node;
+mod number;
+mod order;
+mod parse;
+mod pool;
+mod power;
+mod substitute;
+
+pub use display::Display;
+pub use node::{ExprId, Function, Node, Parity, SymbolId};
+pub use number::Number;
+pub use parse::{ParseError, ParseLimits};
+pub use pool::ExprPool;

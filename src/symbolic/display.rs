@@ -1,0 +1,282 @@
+//! Prints expressions in the grammar they are read from.
+
+use std::fmt;
+
+use super::node::{ExprId, Node};
+use super::number::Number;
+use super::order::Exponent;
+use super::pool::ExprPool;
+
+/// The text of an expression; made by [`ExprPool::display`].
+pub struct Display<'p> {
+    pool: &'p ExprPool,
+    expr: ExprId,
+}
+
+impl ExprPool {
+    /// The text of `expr` in the grammar of [`parse`](ExprPool::parse), which reads it back to
+    /// the same id: terms and factors in canonical order, signs folded, floats in full.
+    pub fn display(&self, expr: ExprId) -> Display<'_> {
+        Display { pool: self, expr }
+    }
+}
+
+/// A piece of text still to be written. The printer keeps its own stack of these, so that deep
+/// expressions need no deep recursion.
+enum Piece {
+    Text(&'static str),
+    Number(Number),
+    Expr(ExprId),
+    /// `coefficient * rest`, with the sign written in front.
+    Term(Number, ExprId),
+    /// A base raised to a positive power, or a constant raised to any.
+    Power(ExprId, Exponent),
+    /// An expression in parentheses unless it is a single word.
+    Operand(ExprId),
+}
+
+impl fmt::Display for Display<'_> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut printer = Printer {
+            pool: self.pool,
+            stack: vec![Piece::Expr(self.expr)],
+        };
+        while let Some(piece) = printer.stack.pop() {
+            match piece {
+                Piece::Text(text) => formatter.write_str(text)?,
+                Piece::Number(number) => write!(formatter, "{number}")?,
+                Piece::Expr(expr) => match self.pool.node(expr) {
+                    Node::Symbol(symbol) => {
+                        formatter.write_str(self.pool.symbol_name(*symbol))?;
+                    }
+                    _ => printer.push_expr(expr),
+                },
+                Piece::Term(coefficient, rest) => printer.push_term(coefficient, rest),
+                Piece::Power(base, exponent) => printer.push_power(base, exponent),
+                Piece::Operand(expr) => printer.push_operand(expr),
+            }
+        }
+        Ok(())
+    }
+}
+
+struct Printer<'p> {
+    pool: &'p ExprPool,
+    /// Pieces in reverse order.
+    stack: Vec<Piece>,
+}
+
+impl Printer<'_> {
+    fn push_all(&mut self, pieces: Vec<Piece>) {
+        self.stack.extend(pieces.into_iter().rev());
+    }
+
+    fn push_expr(&mut self, expr: ExprId) {
+        match self.pool.node(expr) {
+            Node::Number(number) => self.stack.push(Piece::Number(*number)),
+            Node::Sum(_) => self.push_sum(expr),
+            Node::Apply(function, argument) if !self.is_root(expr) => {
+                let (function, argument) = (function.name(), *argument);
+                self.push_all(vec![
+                    Piece::Text(function),
+                    Piece::Text("("),
+                    Piece::Expr(argument),
+                    Piece::Text(")"),
+                ]);
+            }
+            Node::Symbol(_) | Node::Product(_) | Node::Power(..) | Node::Apply(..) => {
+                let (coefficient, rest) = self.pool.split(expr);
+                self.stack.push(Piece::Term(coefficient, rest));
+            }
+        }
+    }
+
+    fn push_sum(&mut self, expr: ExprId) {
+        let mut pieces = Vec::new();
+        for (index, (coefficient, rest)) in self.pool.terms_of(expr).into_iter().enumerate() {
+            match (index, coefficient.is_negative()) {
+                (0, _) => pieces.push(Piece::Term(coefficient, rest)),
+                (_, false) => pieces.extend([Piece::Text(" + "), Piece::Term(coefficient, rest)]),
+                (_, true) => pieces.extend([Piece::Text(" - "), Piece::Term(-coefficient, rest)]),
+            }
+        }
+        self.push_all(pieces);
+    }
+
+    /// A product as one fraction: `-0.5*x*y/(z*w^2)`.
+    fn push_term(&mut self, coefficient: Number, rest: ExprId) {
+        let mut numerator = Vec::new();
+        let mut denominator = Vec::new();
+        for &factor in self.pool.factors_of(rest) {
+            if factor == ExprId::ONE {
+                continue;
+            }
+            let (base, exponent) = self.pool.base_and_exponent(factor);
+            match exponent {
+                // `1/0^2` would read as `1/0`: powers of constants keep a negative exponent.
+                Exponent::Number(number)
+                    if number.is_negative() && self.pool.as_number(base).is_none() =>
+                {
+                    denominator.push(Piece::Power(base, Exponent::Number(-number)));
+                }
+                _ => numerator.push(Piece::Power(base, exponent)),
+            }
+        }
+        let mut pieces = Vec::new();
+        if coefficient == Number::MINUS_ONE && !numerator.is_empty() {
+            pieces.push(Piece::Text("-"));
+        } else if !coefficient.is_one() || numerator.is_empty() {
+            numerator.insert(0, Piece::Number(coefficient));
+        }
+        join(&mut pieces, numerator);
+        if denominator.len() == 1 {
+            pieces.push(Piece::Text("/"));
+            pieces.extend(denominator);
+        } else if denominator.len() > 1 {
+            pieces.push(Piece::Text("/("));
+            join(&mut pieces, denominator);
+            pieces.push(Piece::Text(")"));
+        }
+        self.push_all(pieces);
+    }
+
+    fn push_power(&mut self, base: ExprId, exponent: Exponent) {
+        let number = match exponent {
+            Exponent::Expr(exponent) => {
+                return self.push_all(vec![
+                    Piece::Operand(base),
+                    Piece::Text("^"),
+                    Piece::Operand(exponent),
+                ]);
+            }
+            Exponent::Number(number) => number,
+        };
+        let exponent = match number.as_rational() {
+            Some((1, 1)) => return self.stack.push(self.factor_piece(base)),
+            Some((halves, 2)) => {
+                let root = [Piece::Text("sqrt("), Piece::Expr(base), Piece::Text(")")];
+                let mut pieces = Vec::from(root);
+                if halves != 1 {
+                    pieces.extend([Piece::Text("^"), Piece::Number(Number::integer(halves))]);
+                }
+                return self.push_all(pieces);
+            }
+            Some((_, 1)) => vec![Piece::Number(number)],
+            None if !number.is_negative() => vec![Piece::Number(number)],
+            Some(_) | None => vec![Piece::Text("("), Piece::Number(number), Piece::Text(")")],
+        };
+        let mut pieces = vec![Piece::Operand(base), Piece::Text("^")];
+        pieces.extend(exponent);
+        self.push_all(pieces);
+    }
+
+    /// A factor with exponent one: only sums need parentheses between other factors.
+    fn factor_piece(&self, base: ExprId) -> Piece {
+        match self.pool.node(base) {
+            Node::Apply(..) | Node::Symbol(_) => Piece::Expr(base),
+            Node::Number(_) | Node::Sum(_) | Node::Product(_) | Node::Power(..) => {
+                Piece::Operand(base)
+            }
+        }
+    }
+
+    fn push_operand(&mut self, expr: ExprId) {
+        let is_word = match self.pool.node(expr) {
+            Node::Symbol(_) | Node::Apply(..) => true,
+            Node::Number(number) => {
+                !number.is_negative() && (number.as_integer().is_some() || !number.is_exact())
+            }
+            Node::Sum(_) | Node::Product(_) | Node::Power(..) => false,
+        };
+        if is_word {
+            self.stack.push(Piece::Expr(expr));
+        } else {
+            self.push_all(vec![Piece::Text("("), Piece::Expr(expr), Piece::Text(")")]);
+        }
+    }
+
+    fn is_root(&self, expr: ExprId) -> bool {
+        self.pool.base_and_exponent(expr).0 != expr
+    }
+}
+
+/// Appends factors with `*` between them.
+fn join(pieces: &mut Vec<Piece>, factors: Vec<Piece>) {
+    for (index, factor) in factors.into_iter().enumerate() {
+        if index > 0 {
+            pieces.push(Piece::Text("*"));
+        }
+        pieces.push(factor);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::symbolic::Function;
+
+    /// Texts that are their own canonical form.
+    const CANONICAL: &[&str] = &[
+        "0.36 - 0.16*dz1 - 0.91*dz2 - 0.75*sin(dz1)",
+        "-x",
+        "-2/3",
+        "-2/3*x",
+        "2/3/x",
+        "-1/x",
+        "x/(y*z^2)",
+        "0.5*z*(x + y)",
+        "-z*(x + y)",
+        "(x + y)^2/sqrt(z)^3",
+        "1/sqrt(x*y)",
+        "x^(2/3)",
+        "x^0.3",
+        "x^a",
+        "x^(-a)",
+        "x^(1 + a)",
+        "(x^a)^0.3",
+        "2.5^0.3",
+        "2.5^(-0.3)",
+        "2^(1/3)",
+        "(-8)^(1/3)",
+        "(2/3)^x",
+        "(-2)^x",
+        "0^-1",
+        "0^-2*x",
+        "sqrt(-1)",
+        "sqrt(-1)^-1",
+        "10^400",
+        "1e200*1e200*x",
+        "(-1e200)*1e200*x",
+        "1e-7*x + 1.5e+300*y",
+        "9007199254740993",
+        "9007199254740994.0",
+        "exp(-x^2)",
+        "sin(cos(x) + tan(y)^2)",
+        "sqrt(x)",
+        "fr.hx*body.x",
+    ];
+
+    #[test]
+    fn display_of_canonical_text_reads_back_to_the_same_id() {
+        for text in CANONICAL {
+            let mut pool = ExprPool::new();
+            let expr = pool
+                .parse(text, &|_| true)
+                .unwrap_or_else(|error| panic!("{text}: {error}"));
+            let printed = pool.display(expr).to_string();
+            assert_eq!(printed.replace("e+", "e"), text.replace("e+", "e"));
+            assert_eq!(pool.parse(&printed, &|_| true), Ok(expr), "{text}");
+        }
+    }
+
+    #[test]
+    fn display_of_deep_expression_needs_no_stack() {
+        let mut pool = ExprPool::new();
+        let mut deep = pool.symbol("x");
+        for _ in 0..50_000 {
+            deep = pool.apply(Function::Tanh, deep);
+        }
+        let text = pool.display(deep).to_string();
+        assert_eq!(text.len(), 50_000 * "tanh()".len() + 1);
+    }
+}

@@ -1,0 +1,404 @@
+//! Numbers of the algebra: exact rationals, and floats where exactness has ended.
+//!
+//! A learned coefficient is a float and keeps its bits; an integer exponent or the `1/2` of a
+//! derivative is exact. Sums and products of both follow the usual rule: one float makes the
+//! result a float, and a rational that outgrows `i64` becomes the nearest float.
+//!
+//! Only correctly rounded operations are folded (`+ - * /`, square roots, integer powers as
+//! multiplication chains), so that folding gives the same bits on every machine. An operation
+//! whose result would be infinite, undefined or denormal is refused ([`None`]) and stays symbolic.
+
+use std::cmp::Ordering;
+use std::fmt;
+
+/// Largest magnitude below which every integer is a float: `2^53`.
+const EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
+
+/// A finite real constant: exact, or a float with its bits.
+///
+/// Integral floats up to `2^53` are stored as exact integers, and there is no negative zero:
+/// equal values of that range have one representation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Number(Repr);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Repr {
+    /// In lowest terms, with a positive denominator and neither part equal to `i64::MIN`.
+    Rational { numerator: i64, denominator: i64 },
+    /// The bits of a finite float which is not an integer of magnitude up to `2^53`.
+    Float(u64),
+}
+
+impl Number {
+    /// The exact `0`.
+    pub const ZERO: Number = Number::integer(0);
+    /// The exact `1`.
+    pub const ONE: Number = Number::integer(1);
+    /// The exact `-1`.
+    pub const MINUS_ONE: Number = Number::integer(-1);
+    /// The exact `1/2`.
+    pub const HALF: Number = Number(Repr::Rational {
+        numerator: 1,
+        denominator: 2,
+    });
+
+    /// The exact integer `value` (`i64::MIN` is taken one higher, the range being symmetric).
+    pub const fn integer(value: i64) -> Number {
+        let numerator = if value == i64::MIN { -i64::MAX } else { value };
+        Number(Repr::Rational {
+            numerator,
+            denominator: 1,
+        })
+    }
+
+    /// `numerator / denominator` in lowest terms; `None` for a zero denominator.
+    pub fn rational(numerator: i64, denominator: i64) -> Option<Number> {
+        Number::from_ratio(i128::from(numerator), i128::from(denominator))
+    }
+
+    /// The number of a finite float; `None` for NaN and infinities.
+    pub fn from_f64(value: f64) -> Option<Number> {
+        if !value.is_finite() {
+            None
+        } else if value.fract() == 0.0 && value.abs() <= EXACT_INTEGER {
+            Some(Number::integer(value as i64))
+        } else {
+            Some(Number(Repr::Float(value.to_bits())))
+        }
+    }
+
+    /// Reduces a ratio; what does not fit becomes a float, a zero denominator `None`.
+    fn from_ratio(numerator: i128, denominator: i128) -> Option<Number> {
+        if denominator == 0 {
+            return None;
+        }
+        let divisor = gcd(numerator.unsigned_abs(), denominator.unsigned_abs());
+        let divisor = i128::try_from(divisor).ok()? * denominator.signum();
+        let (numerator, denominator) = (numerator / divisor, denominator / divisor);
+        match (i64::try_from(numerator), i64::try_from(denominator)) {
+            (Ok(n), Ok(d)) if n != i64::MIN => Some(Number(Repr::Rational {
+                numerator: n,
+                denominator: d,
+            })),
+            _ => Number::from_f64(numerator as f64 / denominator as f64),
+        }
+    }
+
+    /// The value as a float: the nearest one for an exact integer, the quotient of numerator and
+    /// denominator for an exact fraction.
+    pub fn to_f64(self) -> f64 {
+        match self.0 {
+            Repr::Rational {
+                numerator,
+                denominator,
+            } => numerator as f64 / denominator as f64,
+            Repr::Float(bits) => f64::from_bits(bits),
+        }
+    }
+
+    /// Whether the value is known exactly (an integer or a fraction).
+    pub fn is_exact(self) -> bool {
+        matches!(self.0, Repr::Rational { .. })
+    }
+
+    /// Whether this is the exact zero; no other number has that value.
+    pub fn is_zero(self) -> bool {
+        self == Number::ZERO
+    }
+
+    /// Whether this is one.
+    pub fn is_one(self) -> bool {
+        self == Number::ONE
+    }
+
+    /// Whether the value is below zero.
+    pub fn is_negative(self) -> bool {
+        match self.0 {
+            Repr::Rational { numerator, .. } => numerator < 0,
+            Repr::Float(bits) => f64::from_bits(bits) < 0.0,
+        }
+    }
+
+    /// The exact fraction in lowest terms, `(numerator, denominator)`.
+    pub fn as_rational(self) -> Option<(i64, i64)> {
+        match self.0 {
+            Repr::Rational {
+                numerator,
+                denominator,
+            } => Some((numerator, denominator)),
+            Repr::Float(_) => None,
+        }
+    }
+
+    /// The value if it is an exact integer.
+    pub fn as_integer(self) -> Option<i64> {
+        match self.as_rational() {
+            Some((numerator, 1)) => Some(numerator),
+            _ => None,
+        }
+    }
+
+    /// Whether this is an exact even integer.
+    pub fn is_even(self) -> bool {
+        self.as_integer().is_some_and(|value| value % 2 == 0)
+    }
+
+    /// The magnitude.
+    pub fn abs(self) -> Number {
+        if self.is_negative() { -self } else { self }
+    }
+
+    /// `self + other`, exactly if both are exact and the result fits; `None` on overflow.
+    pub fn checked_add(self, other: Number) -> Option<Number> {
+        match (self.as_rational(), other.as_rational()) {
+            (Some((a, b)), Some((c, d))) => {
+                let (a, b, c, d) = (i128::from(a), i128::from(b), i128::from(c), i128::from(d));
+                // |a d|, |c b| and b d stay below 2^126: their sum fits an i128.
+                Number::from_ratio(a * d + c * b, b * d)
+            }
+            _ => Number::from_f64(self.to_f64() + other.to_f64()),
+        }
+    }
+
+    /// `self * other`; `None` when a float result overflows or loses digits to underflow.
+    pub fn checked_mul(self, other: Number) -> Option<Number> {
+        match (self.as_rational(), other.as_rational()) {
+            (Some((a, b)), Some((c, d))) => {
+                Number::from_ratio(i128::from(a) * i128::from(c), i128::from(b) * i128::from(d))
+            }
+            _ if self.is_zero() || other.is_zero() => Some(Number::ZERO),
+            _ => normal(self.to_f64() * other.to_f64()),
+        }
+    }
+
+    /// `self / other`; `None` for a zero divisor, overflow or underflow.
+    pub fn checked_div(self, other: Number) -> Option<Number> {
+        match (self.as_rational(), other.as_rational()) {
+            (Some((a, b)), Some((c, d))) => {
+                Number::from_ratio(i128::from(a) * i128::from(d), i128::from(b) * i128::from(c))
+            }
+            _ if other.is_zero() => None,
+            _ if self.is_zero() => Some(Number::ZERO),
+            _ => normal(self.to_f64() / other.to_f64()),
+        }
+    }
+
+    /// `self ^ exponent` as a multiplication chain (`0^0 = 1`); `None` for zero to a negative
+    /// power, overflow or underflow.
+    pub fn checked_powi(self, exponent: i64) -> Option<Number> {
+        let mut remaining = exponent.unsigned_abs();
+        if self.abs().is_one() {
+            return Some(if remaining.is_multiple_of(2) {
+                Number::ONE
+            } else {
+                self
+            });
+        }
+        let mut result = Number::ONE;
+        let mut square = self;
+        loop {
+            if remaining % 2 == 1 {
+                result = result.checked_mul(square)?;
+            }
+            remaining /= 2;
+            if remaining == 0 {
+                break;
+            }
+            square = square.checked_mul(square)?;
+        }
+        if exponent < 0 {
+            Number::ONE.checked_div(result)
+        } else {
+            Some(result)
+        }
+    }
+
+    /// The non-negative `root`-th root if it is exact, or correctly rounded (square root of a
+    /// float); `None` otherwise.
+    pub fn checked_root(self, root: u32) -> Option<Number> {
+        if self.is_negative() || root == 0 {
+            return None;
+        }
+        match self.as_rational() {
+            Some((numerator, denominator)) => {
+                let numerator = exact_root(numerator, root)?;
+                Number::rational(numerator, exact_root(denominator, root)?)
+            }
+            None if root == 2 => normal(self.to_f64().sqrt()),
+            None => None,
+        }
+    }
+}
+
+/// The number of a float that is zero or has all its digits; `None` for anything else.
+fn normal(value: f64) -> Option<Number> {
+    if value.is_normal() {
+        Number::from_f64(value)
+    } else {
+        None
+    }
+}
+
+/// Greatest common divisor; `gcd(0, n) = n`.
+fn gcd(mut a: u128, mut b: u128) -> u128 {
+    while b != 0 {
+        // Division of 128-bit integers is slow and the operands are nearly always short.
+        if let (Ok(short_a), Ok(short_b)) = (u64::try_from(a), u64::try_from(b)) {
+            return u128::from(gcd_short(short_a, short_b));
+        }
+        (a, b) = (b, a % b);
+    }
+    a
+}
+
+fn gcd_short(mut a: u64, mut b: u64) -> u64 {
+    while b != 0 {
+        (a, b) = (b, a % b);
+    }
+    a
+}
+
+/// The integer whose `root`-th power is `value`, for a non-negative `value`.
+fn exact_root(value: i64, root: u32) -> Option<i64> {
+    let estimate = (value as f64).powf(1.0 / f64::from(root)).round() as i64;
+    (estimate.saturating_sub(1)..=estimate.saturating_add(1))
+        .find(|candidate| *candidate >= 0 && candidate.checked_pow(root) == Some(value))
+}
+
+impl std::ops::Neg for Number {
+    type Output = Number;
+
+    fn neg(self) -> Number {
+        match self.0 {
+            Repr::Rational {
+                numerator,
+                denominator,
+            } => Number(Repr::Rational {
+                numerator: -numerator,
+                denominator,
+            }),
+            Repr::Float(bits) => Number(Repr::Float((-f64::from_bits(bits)).to_bits())),
+        }
+    }
+}
+
+impl PartialOrd for Number {
+    fn partial_cmp(&self, other: &Number) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// By value; of an exact number and a float that is its nearest, the exact one comes first.
+impl Ord for Number {
+    fn cmp(&self, other: &Number) -> Ordering {
+        self.to_f64().total_cmp(&other.to_f64()).then_with(|| {
+            match (self.as_rational(), other.as_rational()) {
+                (Some((a, b)), Some((c, d))) => {
+                    (i128::from(a) * i128::from(d)).cmp(&(i128::from(c) * i128::from(b)))
+                }
+                (exact, other_exact) => other_exact.is_some().cmp(&exact.is_some()),
+            }
+        })
+    }
+}
+
+/// An integer, `numerator/denominator`, or the shortest decimal that reads back to the same bits.
+impl fmt::Display for Number {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Repr::Rational {
+                numerator,
+                denominator: 1,
+            } => write!(formatter, "{numerator}"),
+            Repr::Rational {
+                numerator,
+                denominator,
+            } => write!(formatter, "{numerator}/{denominator}"),
+            Repr::Float(bits) => write!(formatter, "{:?}", f64::from_bits(bits)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn float(value: f64) -> Number {
+        Number::from_f64(value).expect("test value is finite")
+    }
+
+    #[test]
+    fn from_f64_integral_value_becomes_exact_and_loses_the_sign_of_zero() {
+        assert_eq!(float(3.0), Number::integer(3));
+        assert_eq!(float(-0.0), Number::ZERO);
+        assert!(!float(0.36).is_exact());
+        assert!(!float(1e300).is_exact());
+        assert_eq!(Number::from_f64(f64::NAN), None);
+        assert_eq!(Number::from_f64(f64::INFINITY), None);
+    }
+
+    #[test]
+    fn rational_arithmetic_is_exact_and_reduced() {
+        let third = Number::rational(2, 6).expect("denominator is not zero");
+        assert_eq!(third.as_rational(), Some((1, 3)));
+        assert_eq!(third.checked_add(third), Number::rational(2, 3));
+        assert_eq!(third.checked_mul(Number::integer(3)), Some(Number::ONE));
+        assert_eq!(third.checked_powi(-2), Some(Number::integer(9)));
+        assert_eq!(Number::rational(1, -2), Some(-Number::HALF));
+        assert_eq!(Number::rational(1, 0), None);
+    }
+
+    #[test]
+    fn rational_overflow_falls_back_to_the_nearest_float() {
+        let large = Number::integer(i64::MAX);
+        let square = large.checked_mul(large).expect("fits a float");
+        assert!(!square.is_exact());
+        assert_eq!(square.to_f64(), (i64::MAX as f64) * (i64::MAX as f64));
+        assert_eq!(-Number::integer(i64::MIN), Number::integer(i64::MAX));
+    }
+
+    #[test]
+    fn folding_refuses_overflow_underflow_and_division_by_zero() {
+        assert_eq!(float(1e200).checked_mul(float(1e200)), None);
+        assert_eq!(float(1e-200).checked_mul(float(1e-200)), None);
+        assert_eq!(float(1.7e308).checked_add(float(1.7e308)), None);
+        assert_eq!(Number::ZERO.checked_powi(-1), None);
+        assert_eq!(Number::ONE.checked_div(Number::ZERO), None);
+        assert_eq!(Number::ZERO.checked_powi(0), Some(Number::ONE));
+        assert_eq!(Number::integer(10).checked_powi(400), None);
+    }
+
+    #[test]
+    fn root_is_folded_only_when_exact_or_correctly_rounded() {
+        let ratio = Number::rational(9, 16).expect("denominator is not zero");
+        assert_eq!(ratio.checked_root(2), Number::rational(3, 4));
+        assert_eq!(
+            Number::integer(27).checked_root(3),
+            Some(Number::integer(3))
+        );
+        assert_eq!(Number::integer(2).checked_root(2), None);
+        assert_eq!(float(2.5).checked_root(2), Some(float(2.5f64.sqrt())));
+        assert_eq!(Number::integer(-4).checked_root(2), None);
+    }
+
+    #[test]
+    fn order_is_by_value_with_exact_before_float() {
+        let mut numbers = [float(0.5), Number::HALF, float(-1.5), Number::ONE];
+        numbers.sort();
+        assert_eq!(
+            numbers,
+            [float(-1.5), Number::HALF, float(0.5), Number::ONE]
+        );
+    }
+
+    #[test]
+    fn display_is_the_shortest_text_that_reads_back() {
+        assert_eq!(float(0.36).to_string(), "0.36");
+        assert_eq!(float(1e-7).to_string(), "1e-7");
+        assert_eq!(
+            Number::rational(-2, 3).map(|n| n.to_string()),
+            Some("-2/3".into())
+        );
+        assert_eq!(float(7.0).to_string(), "7");
+    }
+}

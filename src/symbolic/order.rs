@@ -1,0 +1,256 @@
+//! The structural order that makes canonical forms independent of how they were built.
+//!
+//! Sums list the constant first, then polynomial terms by degree (`z1`, `z2`, `dz1`, `z1^2`,
+//! `z1*z2`, ...), then everything else (`sin(z1)`, ...), as a library of candidate terms does.
+//! Coefficients do not matter, so that a term keeps its place when its sign changes.
+
+use std::cmp::Ordering;
+
+use super::node::{ExprId, Function, Node};
+use super::number::Number;
+use super::pool::ExprPool;
+
+/// Grades from here on are not polynomial.
+const NOT_POLYNOMIAL: u32 = 1 << 31;
+
+/// Sorting key of a symbol's name: `z2` before `z10`, and `z1` before `dz1`.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct SymbolKey {
+    prefix_len: usize,
+    prefix: String,
+    /// The number at the end of the name.
+    index: Option<u64>,
+    name: String,
+}
+
+impl SymbolKey {
+    pub(super) fn of(name: &str) -> SymbolKey {
+        let prefix = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        SymbolKey {
+            prefix_len: prefix.chars().count(),
+            prefix: prefix.to_owned(),
+            index: name[prefix.len()..].parse().ok(),
+            name: name.to_owned(),
+        }
+    }
+}
+
+/// Exponent of a factor; numeric ones need no expression.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Exponent {
+    Number(Number),
+    Expr(ExprId),
+}
+
+/// One step of a comparison: decided, or the same question about a pair of operands.
+enum Step {
+    Decided(Ordering),
+    Compare(ExprId, ExprId),
+}
+
+impl ExprPool {
+    /// The canonical order of two expressions; equal only for the same expression.
+    ///
+    /// It depends on structure and symbol names, never on the order of creation.
+    pub fn compare(&self, a: ExprId, b: ExprId) -> Ordering {
+        let (mut a, mut b) = (a, b);
+        // Distinct ids are distinct structures: the first differing pair of operands decides, so
+        // the comparison walks down one path and needs no stack.
+        loop {
+            if a == b {
+                return Ordering::Equal;
+            }
+            match self.compare_step(a, b) {
+                Step::Decided(ordering) => return ordering,
+                Step::Compare(next_a, next_b) => (a, b) = (next_a, next_b),
+            }
+        }
+    }
+
+    fn compare_step(&self, a: ExprId, b: ExprId) -> Step {
+        let by_grade = self.grade(a).cmp(&self.grade(b));
+        if by_grade.is_ne() {
+            return Step::Decided(by_grade);
+        }
+        let ((coefficient_a, rest_a), (coefficient_b, rest_b)) = (self.split(a), self.split(b));
+        if rest_a == rest_b {
+            return Step::Decided(coefficient_a.cmp(&coefficient_b));
+        }
+        if rest_a != a || rest_b != b {
+            return Step::Compare(rest_a, rest_b);
+        }
+        let is_atom = |expr| !matches!(self.node(expr), Node::Product(_)) && self.is_base(expr);
+        if is_atom(a) && is_atom(b) {
+            return self.compare_atoms(a, b);
+        }
+        self.compare_factors(self.factors_of(a), self.factors_of(b))
+    }
+
+    /// Lexicographic by base, then higher exponents first: `x^2*y` before `x*y^2`.
+    fn compare_factors(&self, a: &[ExprId], b: &[ExprId]) -> Step {
+        for (&factor_a, &factor_b) in a.iter().zip(b) {
+            let (base_a, exponent_a) = self.base_and_exponent(factor_a);
+            let (base_b, exponent_b) = self.base_and_exponent(factor_b);
+            if base_a != base_b {
+                return Step::Compare(base_a, base_b);
+            }
+            match (exponent_a, exponent_b) {
+                (Exponent::Number(m), Exponent::Number(n)) if m == n => {}
+                (Exponent::Number(m), Exponent::Number(n)) => return Step::Decided(n.cmp(&m)),
+                (Exponent::Number(_), Exponent::Expr(_)) => return Step::Decided(Ordering::Less),
+                (Exponent::Expr(_), Exponent::Number(_)) => {
+                    return Step::Decided(Ordering::Greater);
+                }
+                (Exponent::Expr(m), Exponent::Expr(n)) if m == n => {}
+                (Exponent::Expr(m), Exponent::Expr(n)) => return Step::Compare(m, n),
+            }
+        }
+        Step::Decided(a.len().cmp(&b.len()))
+    }
+
+    /// Numbers, then symbols, then functions, then sums.
+    fn compare_atoms(&self, a: ExprId, b: ExprId) -> Step {
+        let rank = |node: &Node| match node {
+            Node::Number(_) => 0,
+            Node::Symbol(_) => 1,
+            Node::Apply(..) => 2,
+            Node::Power(..) => 3,
+            Node::Product(_) => 4,
+            Node::Sum(_) => 5,
+        };
+        match (self.node(a), self.node(b)) {
+            (Node::Number(m), Node::Number(n)) => Step::Decided(m.cmp(n)),
+            (Node::Symbol(s), Node::Symbol(t)) => {
+                Step::Decided(self.symbol_key(*s).cmp(self.symbol_key(*t)))
+            }
+            (Node::Apply(f, x), Node::Apply(g, y)) if f == g => Step::Compare(*x, *y),
+            (Node::Apply(f, _), Node::Apply(g, _)) => Step::Decided(f.cmp(g)),
+            (Node::Sum(x), Node::Sum(y)) => match x.iter().zip(y).find(|(x, y)| x != y) {
+                Some((x, y)) => Step::Compare(*x, *y),
+                None => Step::Decided(x.len().cmp(&y.len())),
+            },
+            (a, b) => Step::Decided(rank(a).cmp(&rank(b))),
+        }
+    }
+
+    fn is_base(&self, expr: ExprId) -> bool {
+        self.base_and_exponent(expr).0 == expr
+    }
+
+    /// A factor as `base ^ exponent`, with square roots read as powers of a half.
+    pub(super) fn base_and_exponent(&self, factor: ExprId) -> (ExprId, Exponent) {
+        match *self.node(factor) {
+            Node::Apply(Function::Sqrt, argument) => (argument, Exponent::Number(Number::HALF)),
+            Node::Power(base, exponent) => {
+                let Some(exponent) = self.as_number(exponent) else {
+                    return (base, Exponent::Expr(exponent));
+                };
+                if let (Node::Apply(Function::Sqrt, argument), Some(halves)) =
+                    (self.node(base), exponent.as_integer())
+                    && let Some(exponent) = Number::rational(halves, 2)
+                {
+                    return (*argument, Exponent::Number(exponent));
+                }
+                (base, Exponent::Number(exponent))
+            }
+            _ => (factor, Exponent::Number(Number::ONE)),
+        }
+    }
+
+    /// The first sorting key of a node: its degree, with non-polynomials after all polynomials.
+    pub(super) fn grade_of(&self, node: &Node) -> u32 {
+        match node {
+            Node::Number(_) => 0,
+            Node::Symbol(_) => 1,
+            Node::Sum(_) | Node::Apply(..) => NOT_POLYNOMIAL + 1,
+            Node::Product(factors) => factors
+                .iter()
+                .map(|factor| self.grade(*factor))
+                .fold(0, combine_grades),
+            Node::Power(base, exponent) => {
+                let degree = self
+                    .as_number(*exponent)
+                    .and_then(Number::as_integer)
+                    .and_then(|n| u32::try_from(n).ok())
+                    .filter(|_| self.as_symbol(*base).is_some());
+                match degree {
+                    Some(degree) => degree.min(NOT_POLYNOMIAL - 1),
+                    None => NOT_POLYNOMIAL + 1,
+                }
+            }
+        }
+    }
+}
+
+/// Degrees add (and saturate); one factor that is not polynomial makes the product so.
+fn combine_grades(a: u32, b: u32) -> u32 {
+    let degree = (a % NOT_POLYNOMIAL) + (b % NOT_POLYNOMIAL);
+    (degree.min(NOT_POLYNOMIAL - 1)) | ((a | b) & NOT_POLYNOMIAL)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The texts of the terms of a sum, in canonical order.
+    fn sorted(terms: &[&str]) -> Vec<String> {
+        let mut pool = ExprPool::new();
+        let ids: Vec<ExprId> = terms
+            .iter()
+            .map(|text| pool.parse(text, &|_| true).expect("test term parses"))
+            .collect();
+        let sum = pool.sum(&ids);
+        let terms = pool.terms_of(sum);
+        terms
+            .into_iter()
+            .map(|(_, rest)| pool.display(rest).to_string())
+            .collect()
+    }
+
+    #[test]
+    fn sum_terms_follow_the_order_of_a_library() {
+        let library = [
+            "1",
+            "u1",
+            "z1",
+            "z2",
+            "z10",
+            "dz1",
+            "z1^2",
+            "z1*z2",
+            "z1*dz1",
+            "z2^2",
+            "z1^3",
+            "sin(z1)",
+            "sin(dz1)",
+            "cos(z1)",
+            "z1*sin(z1)",
+        ];
+        let mut shuffled = library;
+        shuffled.reverse();
+        shuffled.swap(2, 9);
+        assert_eq!(sorted(&shuffled), library);
+    }
+
+    #[test]
+    fn order_ignores_coefficients_and_creation() {
+        let mut pool = ExprPool::new();
+        let (b, a) = (pool.symbol("b"), pool.symbol("a"));
+        let minus_b = pool.neg(b);
+        assert_eq!(pool.compare(a, b), Ordering::Less);
+        assert_eq!(pool.compare(a, minus_b), Ordering::Less);
+        assert_eq!(pool.compare(minus_b, b), Ordering::Less);
+        assert_eq!(pool.compare(b, b), Ordering::Equal);
+    }
+
+    #[test]
+    fn order_of_deep_expressions_needs_no_stack() {
+        let mut pool = ExprPool::new();
+        let (mut a, mut b) = (pool.symbol("a"), pool.symbol("b"));
+        for _ in 0..100_000 {
+            a = pool.apply(Function::Tan, a);
+            b = pool.apply(Function::Tan, b);
+        }
+        assert_eq!(pool.compare(a, b), Ordering::Less);
+    }
+}

@@ -1,0 +1,423 @@
+//! Reads candidate terms: `+ - * / ^`, unary signs, parentheses, numbers, names, functions.
+//!
+//! ```text
+//! expression = term { ("+" | "-") term }
+//! term       = signed { ("*" | "/") signed }
+//! signed     = { "+" | "-" } power
+//! power      = atom [ "^" signed ]
+//! atom       = number | name | function "(" expression ")" | "(" expression ")"
+//! ```
+//!
+//! `^` binds to the right and more tightly than a sign: `-x^2 = -(x^2)`. The parser keeps its own
+//! stack, so nesting is limited by [`ParseLimits`] and never by the machine's; chains of sums and
+//! products are handed over whole, so time is near linear in the length of the text.
+
+use super::lexer::{Token, TokenKind, tokenize};
+use super::node::{ExprId, Function};
+use super::order::Exponent;
+use super::pool::ExprPool;
+
+/// How large a text may be and become.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParseLimits {
+    /// Longest text, in bytes.
+    pub length: usize,
+    /// Most open parentheses and pending exponents.
+    pub depth: usize,
+    /// Largest magnitude of a constant exponent.
+    pub exponent: u32,
+}
+
+impl Default for ParseLimits {
+    fn default() -> ParseLimits {
+        ParseLimits {
+            length: 65_536,
+            depth: 200,
+            exponent: 1_000,
+        }
+    }
+}
+
+/// Why a text is not a term. Positions count characters from 1.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ParseError {
+    /// A character that the grammar does not have.
+    #[error("character {position}: {found:?} does not belong in an expression")]
+    Character {
+        /// Where.
+        position: usize,
+        /// The character.
+        found: char,
+    },
+    /// A number that cannot be read or is too large for a float.
+    #[error("character {position}: `{found}` is not a finite number")]
+    Number {
+        /// Where it starts.
+        position: usize,
+        /// Its text.
+        found: String,
+    },
+    /// A token in the wrong place.
+    #[error("character {position}: found {found}, expected {expected}")]
+    Unexpected {
+        /// Where it starts.
+        position: usize,
+        /// The token in quotes, or `end of text`.
+        found: String,
+        /// What could stand there.
+        expected: &'static str,
+    },
+    /// A variable that is not allowed here.
+    #[error("character {position}: unknown name `{found}`")]
+    UnknownName {
+        /// Where it starts.
+        position: usize,
+        /// The name.
+        found: String,
+    },
+    /// A call of something that is not a function.
+    #[error(
+        "character {position}: unknown function `{found}`, expected sin, cos, tan, tanh, exp, log, sqrt, abs or sign"
+    )]
+    UnknownFunction {
+        /// Where its name starts.
+        position: usize,
+        /// The name.
+        found: String,
+    },
+    /// The text is longer than allowed.
+    #[error("the text has {found} bytes, at most {limit} are allowed")]
+    TooLong {
+        /// Length in bytes.
+        found: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// Too many open parentheses and exponents.
+    #[error("character {position}: nested more than {limit} deep")]
+    TooDeep {
+        /// Where the limit was passed.
+        position: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// A constant exponent is larger than allowed.
+    #[error("character {position}: exponent {found} is beyond {limit}")]
+    Exponent {
+        /// Where the power ends.
+        position: usize,
+        /// The exponent.
+        found: String,
+        /// The limit on its magnitude.
+        limit: u32,
+    },
+}
+
+impl ExprPool {
+    /// Reads an expression over the names that `allowed` accepts, within the default limits.
+    ///
+    /// Function names are never variables. What [`display`](ExprPool::display) prints reads back
+    /// to the same id.
+    ///
+    /// # Errors
+    /// [`ParseError`] with the position, what was found and what was expected.
+    pub fn parse(
+        &mut self,
+        text: &str,
+        allowed: &dyn Fn(&str) -> bool,
+    ) -> Result<ExprId, ParseError> {
+        self.parse_within(text, allowed, ParseLimits::default())
+    }
+
+    /// As [`parse`](ExprPool::parse), within given limits.
+    ///
+    /// # Errors
+    /// As [`parse`](ExprPool::parse).
+    pub fn parse_within(
+        &mut self,
+        text: &str,
+        allowed: &dyn Fn(&str) -> bool,
+        limits: ParseLimits,
+    ) -> Result<ExprId, ParseError> {
+        if text.len() > limits.length {
+            return Err(ParseError::TooLong {
+                found: text.len(),
+                limit: limits.length,
+            });
+        }
+        let tokens = tokenize(text)?;
+        let mut parser = Parser {
+            pool: self,
+            allowed,
+            limits,
+            groups: vec![Group::new(Opener::Text)],
+            depth: 0,
+        };
+        parser.run(&tokens)
+    }
+}
+
+/// What a group of terms was opened by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Opener {
+    Text,
+    Parenthesis,
+    Call(Function),
+}
+
+/// An expression being read: finished terms, the factors of the current term, and the operand
+/// being read, which may be an exponent of pending powers.
+struct Group {
+    opener: Opener,
+    terms: Vec<ExprId>,
+    factors: Vec<ExprId>,
+    /// The current term is subtracted.
+    subtract: bool,
+    /// The current operand divides.
+    divide: bool,
+    /// The current operand has a minus before it.
+    negative: bool,
+    /// Bases whose exponent is being read, each with its own sign.
+    powers: Vec<(ExprId, bool)>,
+}
+
+impl Group {
+    fn new(opener: Opener) -> Group {
+        Group {
+            opener,
+            terms: Vec::new(),
+            factors: Vec::new(),
+            subtract: false,
+            divide: false,
+            negative: false,
+            powers: Vec::new(),
+        }
+    }
+}
+
+struct Parser<'p> {
+    pool: &'p mut ExprPool,
+    allowed: &'p dyn Fn(&str) -> bool,
+    limits: ParseLimits,
+    groups: Vec<Group>,
+    /// Open groups and pending powers.
+    depth: usize,
+}
+
+impl Parser<'_> {
+    fn run(&mut self, tokens: &[Token]) -> Result<ExprId, ParseError> {
+        let mut next = 0;
+        loop {
+            let operand = match self.read_operand(tokens, &mut next)? {
+                Some(operand) => operand,
+                None => continue,
+            };
+            if let Some(result) = self.after_operand(tokens, &mut next, operand)? {
+                return Ok(result);
+            }
+        }
+    }
+
+    /// Reads signs and one atom; `None` if it opened a group instead.
+    fn read_operand(
+        &mut self,
+        tokens: &[Token],
+        next: &mut usize,
+    ) -> Result<Option<ExprId>, ParseError> {
+        let token = &tokens[*next];
+        *next += 1;
+        match token.kind {
+            TokenKind::Plus => Ok(None),
+            TokenKind::Minus => {
+                let group = self.group();
+                group.negative = !group.negative;
+                Ok(None)
+            }
+            TokenKind::Number(number) => Ok(Some(self.pool.constant(number))),
+            TokenKind::Open => self.open(Opener::Parenthesis, token).map(|()| None),
+            TokenKind::Name(name) => {
+                let called = tokens[*next].kind == TokenKind::Open;
+                match Function::by_name(name) {
+                    Some(function) if called => {
+                        *next += 1;
+                        self.open(Opener::Call(function), token).map(|()| None)
+                    }
+                    Some(_) => Err(unexpected(&tokens[*next], "`(` after a function")),
+                    None if called => Err(ParseError::UnknownFunction {
+                        position: token.position,
+                        found: name.to_owned(),
+                    }),
+                    None if (self.allowed)(name) => Ok(Some(self.pool.symbol(name))),
+                    None => Err(ParseError::UnknownName {
+                        position: token.position,
+                        found: name.to_owned(),
+                    }),
+                }
+            }
+            TokenKind::Times
+            | TokenKind::Divide
+            | TokenKind::Caret
+            | TokenKind::Close
+            | TokenKind::End => Err(unexpected(token, "a number, a name, `(` or a sign")),
+        }
+    }
+
+    /// Reads what follows an operand, closing groups as long as they end; the finished
+    /// expression at the end of the text.
+    fn after_operand(
+        &mut self,
+        tokens: &[Token],
+        next: &mut usize,
+        mut operand: ExprId,
+    ) -> Result<Option<ExprId>, ParseError> {
+        loop {
+            let token = &tokens[*next];
+            *next += 1;
+            if token.kind == TokenKind::Caret {
+                self.deepen(token)?;
+                let group = self.group();
+                let negative = std::mem::take(&mut group.negative);
+                group.powers.push((operand, negative));
+                return Ok(None);
+            }
+            self.finish_operand(operand, token)?;
+            let group = self.group();
+            match (token.kind, group.opener) {
+                (TokenKind::Times, _) => return Ok(None),
+                (TokenKind::Divide, _) => {
+                    group.divide = true;
+                    return Ok(None);
+                }
+                (TokenKind::Plus | TokenKind::Minus, _) => {
+                    self.finish_term();
+                    self.group().subtract = token.kind == TokenKind::Minus;
+                    return Ok(None);
+                }
+                (TokenKind::Close, Opener::Parenthesis | Opener::Call(_)) => {
+                    operand = self.close();
+                }
+                (TokenKind::End, Opener::Text) => {
+                    self.finish_term();
+                    let terms = std::mem::take(&mut self.group().terms);
+                    return Ok(Some(self.pool.sum(&terms)));
+                }
+                (_, Opener::Text) => return Err(unexpected(token, "an operator or the end")),
+                (_, _) => return Err(unexpected(token, "an operator or `)`")),
+            }
+        }
+    }
+
+    fn group(&mut self) -> &mut Group {
+        self.groups
+            .last_mut()
+            .expect("the outermost group is never closed")
+    }
+
+    fn deepen(&mut self, token: &Token) -> Result<(), ParseError> {
+        self.depth += 1;
+        if self.depth > self.limits.depth {
+            return Err(ParseError::TooDeep {
+                position: token.position,
+                limit: self.limits.depth,
+            });
+        }
+        Ok(())
+    }
+
+    fn open(&mut self, opener: Opener, token: &Token) -> Result<(), ParseError> {
+        self.deepen(token)?;
+        self.groups.push(Group::new(opener));
+        Ok(())
+    }
+
+    /// Ends the innermost group and gives its value.
+    fn close(&mut self) -> ExprId {
+        self.finish_term();
+        let group = self.groups.pop().expect("a group with an opener is open");
+        self.depth -= 1;
+        let sum = self.pool.sum(&group.terms);
+        match group.opener {
+            Opener::Call(function) => self.pool.apply(function, sum),
+            Opener::Parenthesis | Opener::Text => sum,
+        }
+    }
+
+    /// Applies pending powers and signs, and puts the operand among the factors.
+    fn finish_operand(&mut self, atom: ExprId, token: &Token) -> Result<(), ParseError> {
+        let mut value = atom;
+        loop {
+            if std::mem::take(&mut self.group().negative) {
+                value = self.pool.neg(value);
+            }
+            let Some((base, negative)) = self.group().powers.pop() else {
+                break;
+            };
+            self.depth -= 1;
+            value = self.checked_pow(base, value, token)?;
+            self.group().negative = negative;
+        }
+        if std::mem::take(&mut self.group().divide) {
+            let dividend = self.group().factors.pop();
+            let dividend = dividend.expect("a divisor follows a factor");
+            value = self.pool.div(dividend, value);
+        }
+        self.group().factors.push(value);
+        Ok(())
+    }
+
+    fn checked_pow(
+        &mut self,
+        base: ExprId,
+        exponent: ExprId,
+        token: &Token,
+    ) -> Result<ExprId, ParseError> {
+        let limit = self.limits.exponent;
+        let too_large = |found: super::Number| {
+            if found.to_f64().abs() > f64::from(limit) {
+                return Err(ParseError::Exponent {
+                    position: token.position,
+                    found: found.to_string(),
+                    limit,
+                });
+            }
+            Ok(())
+        };
+        if let Some(number) = self.pool.as_number(exponent) {
+            too_large(number)?;
+        }
+        let power = self.pool.pow(base, exponent);
+        for factor in self.pool.factors_of(power) {
+            if let (_, Exponent::Number(number)) = self.pool.base_and_exponent(*factor) {
+                too_large(number)?;
+            }
+        }
+        Ok(power)
+    }
+
+    fn finish_term(&mut self) {
+        let group = self.group();
+        let factors = std::mem::take(&mut group.factors);
+        let subtract = std::mem::take(&mut group.subtract);
+        let mut term = self.pool.product(&factors);
+        if subtract {
+            term = self.pool.neg(term);
+        }
+        self.group().terms.push(term);
+    }
+}
+
+fn unexpected(token: &Token, expected: &'static str) -> ParseError {
+    let found = match token.kind {
+        TokenKind::End => "end of text".to_owned(),
+        _ => format!("`{}`", token.text),
+    };
+    ParseError::Unexpected {
+        position: token.position,
+        found,
+        expected,
+    }
+}
+
+#[cfg(test)]
+#[path = "parse_tests.rs"]
+mod tests;

@@ -1,0 +1,181 @@
+use super::*;
+
+fn is_latent(name: &str) -> bool {
+    matches!(name, "z1" | "z2" | "dz1" | "dz2" | "u1")
+}
+
+fn value(text: &str) -> f64 {
+    let mut pool = ExprPool::new();
+    let expr = pool
+        .parse(text, &is_latent)
+        .unwrap_or_else(|error| panic!("{text}: {error}"));
+    let two = pool.symbol_id("z1");
+    pool.evaluate(expr, &|symbol| if symbol == two { 2.0 } else { 3.0 })
+}
+
+fn error(text: &str) -> ParseError {
+    let mut pool = ExprPool::new();
+    match pool.parse(text, &is_latent) {
+        Ok(expr) => panic!("{text} was read as {}", pool.display(expr)),
+        Err(error) => error,
+    }
+}
+
+#[test]
+fn operators_bind_as_in_mathematics() {
+    assert_eq!(value("1 + 2*3"), 7.0);
+    assert_eq!(value("-z1^2"), -4.0);
+    assert_eq!(value("(-z1)^2"), 4.0);
+    assert_eq!(value("2^3^2"), 512.0);
+    assert_eq!(value("8/2/2"), 2.0);
+    assert_eq!(value("8/(2*2)"), 2.0);
+    assert_eq!(value("8 - 2 - 2"), 4.0);
+    assert_eq!(value("z1^-1"), 0.5);
+    assert_eq!(value("2*-z1"), -4.0);
+    assert_eq!(value("--z1 + +z1"), 4.0);
+    assert_eq!(value("2^-z1^2"), 0.0625);
+    assert_eq!(value("z1*z2/z1"), 3.0);
+}
+
+#[test]
+fn functions_apply_to_their_argument_alone() {
+    assert_eq!(value("sqrt(z1 + z1)*3"), 6.0);
+    assert_eq!(value("sin(z1)^2"), 2f64.sin().powi(2));
+    assert_eq!(value("abs(-(z1))"), 2.0);
+    assert_eq!(
+        value("exp(tanh(log(tan(cos(z1)^2))))"),
+        2f64.cos().powi(2).tan().ln().tanh().exp()
+    );
+}
+
+#[test]
+fn smuggled_code_or_tex_is_refused_by_its_character() {
+    for (text, found, position) in [
+        ("x; system(\"x\")", ';', 2),
+        ("\\input{x}", '\\', 1),
+        ("z1 /* c */ \u{0}", '\u{0}', 12),
+        ("z1 = 2", '=', 4),
+        ("z1 # note", '#', 4),
+        ("z1\u{202e}", '\u{202e}', 3),
+    ] {
+        assert_eq!(
+            error(text),
+            ParseError::Character { position, found },
+            "{text}"
+        );
+    }
+    assert_eq!(
+        error("x; system(\"x\")").to_string(),
+        "character 2: ';' does not belong in an expression"
+    );
+}
+
+#[test]
+fn unknown_names_and_functions_are_told_apart() {
+    assert_eq!(
+        error("z1 + z9"),
+        ParseError::UnknownName {
+            position: 6,
+            found: "z9".into()
+        }
+    );
+    assert_eq!(
+        error("system(z1)"),
+        ParseError::UnknownFunction {
+            position: 1,
+            found: "system".into()
+        }
+    );
+    assert_eq!(
+        error("sin + 1"),
+        ParseError::Unexpected {
+            position: 5,
+            found: "`+`".into(),
+            expected: "`(` after a function"
+        }
+    );
+}
+
+#[test]
+fn misplaced_tokens_name_what_was_found_and_expected() {
+    let operand = "a number, a name, `(` or a sign";
+    for (text, position, found, expected) in [
+        ("", 1, "end of text", operand),
+        ("z1 +", 5, "end of text", operand),
+        ("z1 * / z2", 6, "`/`", operand),
+        ("()", 2, "`)`", operand),
+        ("2 z1", 3, "`z1`", "an operator or the end"),
+        ("z1)", 3, "`)`", "an operator or the end"),
+        ("(z1", 4, "end of text", "an operator or `)`"),
+        ("sin(z1 z2)", 8, "`z2`", "an operator or `)`"),
+    ] {
+        let found = found.to_owned();
+        assert_eq!(
+            error(text),
+            ParseError::Unexpected {
+                position,
+                found,
+                expected
+            },
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn hostile_nesting_and_length_are_refused_without_recursion() {
+    for (open, close) in [("(", ")"), ("sin(", ")"), ("z1^", "")] {
+        let text = format!("{}z1{}", open.repeat(5_000), close.repeat(5_000));
+        assert!(
+            matches!(error(&text), ParseError::TooDeep { limit: 200, .. }),
+            "{open}"
+        );
+    }
+    let text = "-".repeat(60_000) + "z1";
+    assert_eq!(value(&text), 2.0);
+    let text = "z1 + ".repeat(20_000) + "z1";
+    assert_eq!(
+        error(&text),
+        ParseError::TooLong {
+            found: 100_002,
+            limit: 65_536
+        }
+    );
+}
+
+#[test]
+fn huge_exponents_are_refused_also_when_nested() {
+    assert!(matches!(
+        error("z1^1001"),
+        ParseError::Exponent { limit: 1_000, .. }
+    ));
+    assert!(matches!(
+        error("(z1^1000)^1000"),
+        ParseError::Exponent { .. }
+    ));
+    assert!(matches!(
+        error("(z1*z2^500)^-3"),
+        ParseError::Exponent { .. }
+    ));
+    assert!(matches!(error("z1^1e300"), ParseError::Exponent { .. }));
+}
+
+#[test]
+fn long_sums_are_read_in_near_linear_time() {
+    let mut pool = ExprPool::new();
+    let text: Vec<String> = (0..6_000).map(|i| format!("0.5*x{i}")).collect();
+    let text = text.join(" + ");
+    let limits = ParseLimits {
+        length: 1 << 20,
+        ..ParseLimits::default()
+    };
+    let expr = pool
+        .parse_within(&text, &|_| true, limits)
+        .expect("text is within its limits");
+    assert_eq!(pool.terms_of(expr).len(), 6_000);
+    assert!(
+        pool.len() < 20_000,
+        "partial sums were kept: {}",
+        pool.len()
+    );
+}

@@ -1,0 +1,379 @@
+//! The pool that owns all expressions: storage, symbols and traversal.
+
+use std::collections::{BTreeSet, HashMap};
+
+use super::intern::{BuildIdHasher, InternTable};
+use super::node::{ExprId, Node, SymbolId};
+use super::number::Number;
+use super::order::SymbolKey;
+
+/// Owner of hash-consed, canonical expressions.
+///
+/// Expressions are made only by constructors ([`sum`](ExprPool::sum),
+/// [`product`](ExprPool::product), [`pow`](ExprPool::pow), [`apply`](ExprPool::apply) and what is
+/// built on them), which keep these invariants:
+///
+/// - sums and products are flat and sorted by [`compare`](ExprPool::compare), whatever the order
+///   of the operands given; constants are folded, like terms and like factors collected;
+/// - a product has at most one number, in front (two only where folding would overflow);
+/// - a sum raised to an integer power, or a factor, has a positive first coefficient, and the
+///   argument of an even or odd function does not start with a minus;
+/// - `x^(k/2)` is stored as `sqrt(x)^k`.
+///
+/// # Which rewritings are allowed
+///
+/// Wherever the expression as written has a finite real value, the canonical one has the same
+/// value up to rounding. The reverse need not hold: a rewriting may remove singularities, as in
+/// `x/x = 1`, `0 * log(x) = 0`, `sqrt(x)^2 = x` or `exp(log(x)) = x`, but never adds one. Constants
+/// without a value (`1/0`, `log(0)`, `sqrt(-1)`) are kept as they are; folding never produces an
+/// infinity or NaN.
+#[derive(Clone, Debug)]
+pub struct ExprPool {
+    nodes: Vec<Node>,
+    facts: Vec<Facts>,
+    table: InternTable,
+    symbols: Vec<Symbol>,
+    symbol_ids: HashMap<String, SymbolId>,
+    /// Derivatives found so far; expressions never change, so entries stay valid.
+    pub(super) derivatives: HashMap<(ExprId, SymbolId), ExprId, BuildIdHasher>,
+}
+
+#[derive(Clone, Debug)]
+struct Symbol {
+    name: String,
+    key: SymbolKey,
+    expr: ExprId,
+}
+
+/// What is known about a node without looking at its children.
+#[derive(Clone, Copy, Debug)]
+struct Facts {
+    /// The node's own id, to lend it as a list of one.
+    itself: ExprId,
+    /// The node without its numeric factor.
+    rest: ExprId,
+    /// First sorting key, see [`super::order`].
+    grade: u32,
+    /// The symbols that occur: bit `i` for symbol `i`, the last bit for all from 63 on.
+    symbols: u64,
+}
+
+impl Default for ExprPool {
+    fn default() -> ExprPool {
+        ExprPool::new()
+    }
+}
+
+impl ExprPool {
+    /// An empty pool: it holds `0` and `1`.
+    pub fn new() -> ExprPool {
+        let mut pool = ExprPool {
+            nodes: Vec::new(),
+            facts: Vec::new(),
+            table: InternTable::new(),
+            symbols: Vec::new(),
+            symbol_ids: HashMap::new(),
+            derivatives: HashMap::default(),
+        };
+        let zero = pool.intern(Node::Number(Number::ZERO));
+        let one = pool.intern(Node::Number(Number::ONE));
+        debug_assert_eq!((zero, one), (ExprId::ZERO, ExprId::ONE));
+        pool
+    }
+
+    /// The number of distinct expressions made so far.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Never: every pool holds `0` and `1`.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// The variable of that name, made at its first mention.
+    pub fn symbol_id(&mut self, name: &str) -> SymbolId {
+        if let Some(&id) = self.symbol_ids.get(name) {
+            return id;
+        }
+        let id = SymbolId(
+            u32::try_from(self.symbols.len()).expect("a pool holds fewer than 2^32 symbols"),
+        );
+        self.symbol_ids.insert(name.to_owned(), id);
+        self.symbols.push(Symbol {
+            name: name.to_owned(),
+            key: SymbolKey::of(name),
+            expr: ExprId::ZERO,
+        });
+        self.symbols[id.index()].expr = self.intern(Node::Symbol(id));
+        id
+    }
+
+    /// The variable of that name as an expression.
+    pub fn symbol(&mut self, name: &str) -> ExprId {
+        let id = self.symbol_id(name);
+        self.symbol_expr(id)
+    }
+
+    /// The variable of that name if the pool has it.
+    pub fn find_symbol(&self, name: &str) -> Option<SymbolId> {
+        self.symbol_ids.get(name).copied()
+    }
+
+    /// A variable as an expression.
+    pub fn symbol_expr(&self, symbol: SymbolId) -> ExprId {
+        self.symbols[symbol.index()].expr
+    }
+
+    /// The name of a variable.
+    pub fn symbol_name(&self, symbol: SymbolId) -> &str {
+        &self.symbols[symbol.index()].name
+    }
+
+    /// The number of variables.
+    pub fn symbol_count(&self) -> usize {
+        self.symbols.len()
+    }
+
+    pub(super) fn symbol_key(&self, symbol: SymbolId) -> &SymbolKey {
+        &self.symbols[symbol.index()].key
+    }
+
+    /// The top level of an expression.
+    pub fn node(&self, expr: ExprId) -> &Node {
+        &self.nodes[expr.index()]
+    }
+
+    /// The value of a constant number.
+    pub fn as_number(&self, expr: ExprId) -> Option<Number> {
+        match self.node(expr) {
+            Node::Number(number) => Some(*number),
+            _ => None,
+        }
+    }
+
+    /// The variable that `expr` is.
+    pub fn as_symbol(&self, expr: ExprId) -> Option<SymbolId> {
+        match self.node(expr) {
+            Node::Symbol(symbol) => Some(*symbol),
+            _ => None,
+        }
+    }
+
+    /// Splits `expr` into `coefficient * rest`, where `rest` has no numeric factor.
+    ///
+    /// A number is `number * 1`. The product of two numbers too large to fold is left whole.
+    pub fn split(&self, expr: ExprId) -> (Number, ExprId) {
+        match self.node(expr) {
+            Node::Number(number) => (*number, ExprId::ONE),
+            Node::Product(factors) => {
+                let rest = self.facts[expr.index()].rest;
+                match self.as_number(factors[0]) {
+                    Some(coefficient) if rest != expr => (coefficient, rest),
+                    _ => (Number::ONE, expr),
+                }
+            }
+            Node::Symbol(_) | Node::Sum(_) | Node::Power(..) | Node::Apply(..) => {
+                (Number::ONE, expr)
+            }
+        }
+    }
+
+    /// The terms of a sum in canonical order, each as `(coefficient, rest)`; anything else is a
+    /// sum of one term, and zero of none.
+    pub fn terms_of(&self, expr: ExprId) -> Vec<(Number, ExprId)> {
+        match self.node(expr) {
+            Node::Sum(terms) => terms.iter().map(|term| self.split(*term)).collect(),
+            _ if expr == ExprId::ZERO => Vec::new(),
+            _ => vec![self.split(expr)],
+        }
+    }
+
+    /// The factors of a product in canonical order; anything else is its own only factor.
+    pub fn factors_of(&self, expr: ExprId) -> &[ExprId] {
+        match &self.nodes[expr.index()] {
+            Node::Product(factors) => factors,
+            _ => std::slice::from_ref(&self.facts[expr.index()].itself),
+        }
+    }
+
+    /// The operands of the top level, left to right.
+    pub fn children(&self, expr: ExprId) -> impl Iterator<Item = ExprId> + '_ {
+        let (pair, list): ([Option<ExprId>; 2], &[ExprId]) = match self.node(expr) {
+            Node::Number(_) | Node::Symbol(_) => ([None, None], &[]),
+            Node::Sum(operands) | Node::Product(operands) => ([None, None], operands),
+            Node::Power(base, exponent) => ([Some(*base), Some(*exponent)], &[]),
+            Node::Apply(_, argument) => ([Some(*argument), None], &[]),
+        };
+        pair.into_iter().flatten().chain(list.iter().copied())
+    }
+
+    /// Every expression that `roots` are made of, each once, operands before what uses them.
+    pub fn reachable(&self, roots: &[ExprId]) -> Vec<ExprId> {
+        self.reachable_where(roots, |_| true)
+    }
+
+    /// As [`reachable`](ExprPool::reachable), without what fails `wanted` and is not reached
+    /// otherwise. Ids rise from operands to users, so sorting them is a topological order.
+    pub(super) fn reachable_where(
+        &self,
+        roots: &[ExprId],
+        mut wanted: impl FnMut(ExprId) -> bool,
+    ) -> Vec<ExprId> {
+        let mut seen = std::collections::HashSet::with_hasher(BuildIdHasher::default());
+        let mut found = Vec::new();
+        let mut stack: Vec<ExprId> = roots.to_vec();
+        while let Some(expr) = stack.pop() {
+            if wanted(expr) && seen.insert(expr) {
+                found.push(expr);
+                stack.extend(self.children(expr));
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+
+    /// The number of distinct nodes of an expression.
+    pub fn node_count(&self, expr: ExprId) -> usize {
+        self.reachable(&[expr]).len()
+    }
+
+    /// The variables that occur in an expression.
+    pub fn symbols_of(&self, expr: ExprId) -> BTreeSet<SymbolId> {
+        self.reachable_where(&[expr], |node| self.facts[node.index()].symbols != 0)
+            .into_iter()
+            .filter_map(|node| self.as_symbol(node))
+            .collect()
+    }
+
+    /// Whether no variable occurs.
+    pub fn is_constant(&self, expr: ExprId) -> bool {
+        self.facts[expr.index()].symbols == 0
+    }
+
+    /// Whether `symbol` may occur in `expr`: exact for the pool's first 63 symbols.
+    pub(super) fn may_contain(&self, expr: ExprId, symbol: SymbolId) -> bool {
+        self.facts[expr.index()].symbols & symbol_bit(symbol) != 0
+    }
+
+    pub(super) fn grade(&self, expr: ExprId) -> u32 {
+        self.facts[expr.index()].grade
+    }
+
+    /// The id of a node that is canonical already.
+    pub(super) fn intern(&mut self, node: Node) -> ExprId {
+        let slot = match self.table.find(&self.nodes, &node) {
+            Ok(id) => return id,
+            Err(slot) => slot,
+        };
+        // Interning the rest first keeps operands at smaller ids; it may move the free slot.
+        let rest = self.rest_of(&node);
+        let slot = match rest {
+            Some(_) => match self.table.find(&self.nodes, &node) {
+                Ok(id) => return id,
+                Err(slot) => slot,
+            },
+            None => slot,
+        };
+        let id = ExprId(
+            u32::try_from(self.nodes.len()).expect("a pool holds fewer than 2^32 expressions"),
+        );
+        let facts = Facts {
+            rest: rest.unwrap_or(id),
+            itself: id,
+            grade: self.grade_of(&node),
+            symbols: self.symbols_in(&node),
+        };
+        self.nodes.push(node);
+        self.facts.push(facts);
+        self.table.fill(slot, id, &self.nodes);
+        id
+    }
+
+    /// The product without its number, if it has exactly one.
+    fn rest_of(&mut self, node: &Node) -> Option<ExprId> {
+        let Node::Product(factors) = node else {
+            return None;
+        };
+        self.as_number(factors[0])?;
+        if self.as_number(factors[1]).is_some() {
+            return None;
+        }
+        Some(match &factors[1..] {
+            [only] => *only,
+            several => self.intern(Node::Product(several.into())),
+        })
+    }
+
+    fn symbols_in(&self, node: &Node) -> u64 {
+        let of = |expr: &ExprId| self.facts[expr.index()].symbols;
+        match node {
+            Node::Number(_) => 0,
+            Node::Symbol(symbol) => symbol_bit(*symbol),
+            Node::Sum(operands) | Node::Product(operands) => {
+                operands.iter().fold(0, |mask, operand| mask | of(operand))
+            }
+            Node::Power(base, exponent) => of(base) | of(exponent),
+            Node::Apply(_, argument) => of(argument),
+        }
+    }
+}
+
+fn symbol_bit(symbol: SymbolId) -> u64 {
+    1 << symbol.index().min(63)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn symbol_of_same_name_is_the_same_expression() {
+        let mut pool = ExprPool::new();
+        let first = pool.symbol("z1");
+        assert_eq!(pool.symbol("z1"), first);
+        assert_ne!(pool.symbol("z2"), first);
+        let id = pool.find_symbol("z1").expect("z1 was made");
+        assert_eq!(pool.symbol_name(id), "z1");
+        assert_eq!(pool.as_symbol(first), Some(id));
+        assert_eq!(pool.find_symbol("z3"), None);
+    }
+
+    #[test]
+    fn split_of_weighted_monomial_gives_coefficient_and_rest() {
+        let mut pool = ExprPool::new();
+        let (x, y) = (pool.symbol("x"), pool.symbol("y"));
+        let xy = pool.mul(x, y);
+        let weight = pool.number(-0.16);
+        let term = pool.mul(weight, xy);
+        let coefficient = Number::from_f64(-0.16).expect("finite");
+        assert_eq!(pool.split(term), (coefficient, xy));
+        assert_eq!(pool.split(xy), (Number::ONE, xy));
+        assert_eq!(pool.split(weight), (coefficient, ExprId::ONE));
+        assert_eq!(pool.factors_of(xy), [x, y]);
+        assert_eq!(pool.factors_of(x), [x]);
+    }
+
+    #[test]
+    fn reachable_lists_operands_before_users_and_each_once() {
+        let mut pool = ExprPool::new();
+        let x = pool.symbol("x");
+        let sine = pool.apply(crate::symbolic::Function::Sin, x);
+        let root = pool.mul(x, sine);
+        let order = pool.reachable(&[root, sine]);
+        assert_eq!(order, [x, sine, root]);
+        assert_eq!(pool.node_count(root), 3);
+    }
+
+    #[test]
+    fn symbols_of_many_symbols_is_exact_beyond_the_mask() {
+        let mut pool = ExprPool::new();
+        let symbols: Vec<ExprId> = (0..200).map(|i| pool.symbol(&format!("x{i}"))).collect();
+        let root = pool.sum(&symbols[100..]);
+        let found = pool.symbols_of(root);
+        assert_eq!(found.len(), 100);
+        assert!(found.iter().all(|symbol| symbol.index() >= 100));
+        assert!(!pool.is_constant(root));
+        assert!(pool.is_constant(ExprId::ONE));
+    }
+}

@@ -1,0 +1,296 @@
+//! Canonical constructors of powers and functions.
+
+use super::node::{ExprId, Function, Node, Parity};
+use super::number::Number;
+use super::order::Exponent;
+use super::pool::ExprPool;
+
+/// Trial divisors for square factors under a root: `sqrt(8) = 2*sqrt(2)`.
+const SQUARE_FACTOR_LIMIT: i64 = 1_000;
+
+impl ExprPool {
+    /// `base ^ exponent` for an integer exponent.
+    pub fn powi(&mut self, base: ExprId, exponent: i32) -> ExprId {
+        self.pow_number(base, Number::integer(i64::from(exponent)))
+    }
+
+    /// `base ^ exponent`. Powers that are not integers are those of a non-negative base.
+    pub fn pow(&mut self, base: ExprId, exponent: ExprId) -> ExprId {
+        if let Some(number) = self.as_number(exponent) {
+            return self.pow_number(base, number);
+        }
+        if base == ExprId::ONE {
+            return ExprId::ONE;
+        }
+        self.intern(Node::Power(base, exponent))
+    }
+
+    /// `base ^ exponent` for a constant exponent.
+    pub fn pow_number(&mut self, base: ExprId, exponent: Number) -> ExprId {
+        let exponent = half_integer(exponent);
+        if exponent.is_zero() {
+            return ExprId::ONE;
+        }
+        if exponent.is_one() {
+            return base;
+        }
+        if let Some(number) = self.as_number(base) {
+            return self.pow_of_number(number, exponent);
+        }
+        let is_integer = exponent.as_integer().is_some();
+        let (inner, inner_exponent) = self.base_and_exponent(base);
+        match (inner_exponent, self.node(base)) {
+            (Exponent::Number(m), _) if !m.is_one() => {
+                if let Some(combined) = m.checked_mul(exponent) {
+                    // (x^2)^(1/2) = |x|: only even integers lose the sign of the base.
+                    let inner = if m.is_even() && !is_integer {
+                        self.apply(Function::Abs, inner)
+                    } else {
+                        inner
+                    };
+                    return self.pow_number(inner, combined);
+                }
+            }
+            (Exponent::Expr(m), _) if is_integer => {
+                let combined = self.scale(exponent, m);
+                return self.pow(inner, combined);
+            }
+            (_, Node::Product(factors)) => {
+                let factors = factors.to_vec();
+                return self.pow_of_product(&factors, exponent);
+            }
+            (_, Node::Sum(_)) if is_integer && self.starts_negative(base) => {
+                let positive = self.neg(base);
+                let power = self.pow_number(positive, exponent);
+                return if exponent.is_even() {
+                    power
+                } else {
+                    self.neg(power)
+                };
+            }
+            (_, &Node::Apply(Function::Abs, argument)) if exponent.is_even() => {
+                return self.pow_number(argument, exponent);
+            }
+            _ => {}
+        }
+        self.raw_power(base, exponent)
+    }
+
+    /// A power that no rule applies to: `x^(k/2)` becomes `sqrt(x)^k`.
+    fn raw_power(&mut self, base: ExprId, exponent: Number) -> ExprId {
+        if let Some((halves, 2)) = exponent.as_rational() {
+            let root = self.intern(Node::Apply(Function::Sqrt, base));
+            if halves == 1 {
+                return root;
+            }
+            let halves = self.integer(halves);
+            return self.intern(Node::Power(root, halves));
+        }
+        let exponent = self.constant(exponent);
+        self.intern(Node::Power(base, exponent))
+    }
+
+    /// Integer powers go to every factor; of others only a number with an exact root leaves.
+    fn pow_of_product(&mut self, factors: &[ExprId], exponent: Number) -> ExprId {
+        if exponent.as_integer().is_some() {
+            let powers: Vec<ExprId> = factors
+                .iter()
+                .map(|factor| self.pow_number(*factor, exponent))
+                .collect();
+            return self.product(&powers);
+        }
+        let (coefficient, rest) = match self.as_number(factors[0]) {
+            Some(number) if self.as_number(factors[1]).is_none() => {
+                (number, self.product(&factors[1..]))
+            }
+            _ => {
+                let base = self.intern(Node::Product(factors.into()));
+                return self.raw_power(base, exponent);
+            }
+        };
+        match exact_power(coefficient, exponent) {
+            Some(outside) => {
+                let rest = self.pow_number(rest, exponent);
+                self.scale(outside, rest)
+            }
+            None => {
+                let base = self.intern(Node::Product(factors.into()));
+                self.raw_power(base, exponent)
+            }
+        }
+    }
+
+    /// A power of a constant: folded where that is exact or correctly rounded; otherwise the
+    /// whole part of the exponent is folded and a root remains, as in `2^(3/2) = 2*sqrt(2)`.
+    fn pow_of_number(&mut self, base: Number, exponent: Number) -> ExprId {
+        if base.is_one() {
+            return ExprId::ONE;
+        }
+        if base.is_zero() && !exponent.is_negative() {
+            return ExprId::ZERO;
+        }
+        if let Some(integer) = exponent.as_integer() {
+            if let Some(value) = base.checked_powi(integer) {
+                return self.constant(value);
+            }
+            // Only a positive base is left under a power: (-x)^n = +-(x^n).
+            let magnitude = self.constant(base.abs());
+            let power = self.raw_power(magnitude, exponent);
+            return if base.is_negative() && !exponent.is_even() {
+                self.neg(power)
+            } else {
+                power
+            };
+        }
+        if let Some(value) = exact_power(base, exponent) {
+            return self.constant(value);
+        }
+        if base.is_exact()
+            && !base.is_negative()
+            && !base.is_zero()
+            && let Some((numerator, denominator)) = exponent.as_rational()
+            && let Some(power) = self.pow_of_rational(base, numerator, denominator)
+        {
+            return power;
+        }
+        let base = self.constant(base);
+        self.raw_power(base, exponent)
+    }
+
+    /// `base ^ (numerator/denominator)` as a number times a root of an integer or fraction.
+    fn pow_of_rational(
+        &mut self,
+        base: Number,
+        numerator: i64,
+        denominator: i64,
+    ) -> Option<ExprId> {
+        let outside = base.checked_powi(numerator.div_euclid(denominator))?;
+        let fraction = Number::rational(numerator.rem_euclid(denominator), denominator)?;
+        let (factor, radicand) = if denominator == 2 {
+            square_free(base)?
+        } else {
+            (Number::ONE, base)
+        };
+        let outside = outside.checked_mul(factor)?;
+        let radicand = self.constant(radicand);
+        let root = self.raw_power(radicand, fraction);
+        Some(self.scale(outside, root))
+    }
+
+    /// `function(argument)`, with the values and symmetries that need no rounding:
+    /// `sin(0) = 0`, `cos(-x) = cos(x)`, `log(exp(x)) = x`, `abs(-2) = 2`.
+    ///
+    /// `sin(1)` and `sin(0.5)` stay symbolic: sines are not the same to the last bit everywhere.
+    pub fn apply(&mut self, function: Function, argument: ExprId) -> ExprId {
+        if function == Function::Sqrt {
+            return self.pow_number(argument, Number::HALF);
+        }
+        if let Some(value) = self.special_value(function, argument) {
+            return value;
+        }
+        if function.parity() != Parity::Neither && self.starts_negative(argument) {
+            let positive = self.neg(argument);
+            let value = self.apply(function, positive);
+            return match function.parity() {
+                Parity::Odd => self.neg(value),
+                Parity::Even | Parity::Neither => value,
+            };
+        }
+        self.intern(Node::Apply(function, argument))
+    }
+
+    fn special_value(&mut self, function: Function, argument: ExprId) -> Option<ExprId> {
+        let number = self.as_number(argument);
+        let is_zero = argument == ExprId::ZERO;
+        match (function, self.node(argument)) {
+            (Function::Sin | Function::Tan | Function::Tanh, _) if is_zero => Some(ExprId::ZERO),
+            (Function::Cos | Function::Exp, _) if is_zero => Some(ExprId::ONE),
+            (Function::Log, _) if argument == ExprId::ONE => Some(ExprId::ZERO),
+            (Function::Log, &Node::Apply(Function::Exp, inner))
+            | (Function::Exp, &Node::Apply(Function::Log, inner)) => Some(inner),
+            (Function::Abs, _) if self.is_non_negative(argument) => Some(argument),
+            (Function::Abs, _) => {
+                let (coefficient, rest) = self.split(argument);
+                if coefficient.is_one() {
+                    return None;
+                }
+                let magnitude = self.apply(Function::Abs, rest);
+                Some(self.scale(coefficient.abs(), magnitude))
+            }
+            (Function::Sign, _) => match number {
+                Some(number) if number.is_zero() => Some(ExprId::ZERO),
+                Some(number) if number.is_negative() => Some(self.integer(-1)),
+                Some(_) => Some(ExprId::ONE),
+                None => match self.node(argument) {
+                    Node::Apply(Function::Exp, _) => Some(ExprId::ONE),
+                    Node::Apply(Function::Sign, _) => Some(argument),
+                    _ => {
+                        let (coefficient, rest) = self.split(argument);
+                        if coefficient.is_one() || coefficient.is_negative() {
+                            return None;
+                        }
+                        Some(self.apply(Function::Sign, rest))
+                    }
+                },
+            },
+            _ => None,
+        }
+    }
+
+    /// Whether an expression obviously has no negative values: its top level says so.
+    pub(super) fn is_non_negative(&self, expr: ExprId) -> bool {
+        match self.node(expr) {
+            Node::Number(number) => !number.is_negative(),
+            Node::Apply(Function::Abs | Function::Exp | Function::Sqrt, _) => true,
+            Node::Power(base, exponent) => match self.as_number(*exponent) {
+                Some(number) => {
+                    number.is_even()
+                        || number.as_integer().is_none()
+                        || matches!(
+                            self.node(*base),
+                            Node::Apply(Function::Abs | Function::Exp | Function::Sqrt, _)
+                        )
+                }
+                None => false,
+            },
+            Node::Symbol(_) | Node::Sum(_) | Node::Product(_) | Node::Apply(..) => false,
+        }
+    }
+}
+
+/// Floats that are multiples of a half become exact, so that `x^0.5` is `sqrt(x)`.
+fn half_integer(exponent: Number) -> Number {
+    let twice = exponent.to_f64() * 2.0;
+    match Number::from_f64(twice).and_then(Number::as_integer) {
+        Some(halves) if !exponent.is_exact() => Number::rational(halves, 2).unwrap_or(exponent),
+        _ => exponent,
+    }
+}
+
+/// `base ^ exponent` if that is a number which can be folded, for an exponent that is a fraction.
+fn exact_power(base: Number, exponent: Number) -> Option<Number> {
+    let (numerator, denominator) = exponent.as_rational()?;
+    let root = base.checked_root(u32::try_from(denominator).ok()?)?;
+    root.checked_powi(numerator)
+}
+
+/// `sqrt(base) = factor * sqrt(radicand)` with an integer radicand freed of small squares;
+/// `None` if the numbers grow too large.
+fn square_free(base: Number) -> Option<(Number, Number)> {
+    let (numerator, denominator) = base.as_rational()?;
+    let mut radicand = numerator.checked_mul(denominator)?;
+    let mut outside = 1;
+    let mut divisor = 2;
+    while divisor <= SQUARE_FACTOR_LIMIT && divisor * divisor <= radicand {
+        if radicand % (divisor * divisor) == 0 {
+            radicand /= divisor * divisor;
+            outside *= divisor;
+        } else {
+            divisor += 1;
+        }
+    }
+    Some((
+        Number::rational(outside, denominator)?,
+        Number::integer(radicand),
+    ))
+}

@@ -1,0 +1,112 @@
+//! Simultaneous substitution.
+
+use std::collections::HashMap;
+
+use super::intern::BuildIdHasher;
+use super::node::{ExprId, Node, SymbolId};
+use super::pool::ExprPool;
+
+impl ExprPool {
+    /// `expr` with every symbol of `replacements` replaced, all at once: replacements are not
+    /// searched for symbols again, so `x` and `y` can be exchanged. The first entry of a symbol
+    /// counts.
+    pub fn substitute(&mut self, expr: ExprId, replacements: &[(SymbolId, ExprId)]) -> ExprId {
+        self.substitute_all(&[expr], replacements)[0]
+    }
+
+    /// As [`substitute`](ExprPool::substitute) for several expressions with common parts.
+    pub fn substitute_all(
+        &mut self,
+        exprs: &[ExprId],
+        replacements: &[(SymbolId, ExprId)],
+    ) -> Vec<ExprId> {
+        let affected = |pool: &ExprPool, expr: ExprId| {
+            replacements
+                .iter()
+                .any(|(symbol, _)| pool.may_contain(expr, *symbol))
+        };
+        let order = self.reachable_where(exprs, |expr| affected(self, expr));
+        let mut replaced: HashMap<ExprId, ExprId, BuildIdHasher> = HashMap::default();
+        for expr in order {
+            let symbol = self.as_symbol(expr);
+            let known = replacements.iter().find(|(old, _)| Some(*old) == symbol);
+            let new = match known {
+                Some((_, new)) => *new,
+                None => self.rebuild(expr, |child| replaced.get(&child).copied().unwrap_or(child)),
+            };
+            replaced.insert(expr, new);
+        }
+        exprs
+            .iter()
+            .map(|expr| replaced.get(expr).copied().unwrap_or(*expr))
+            .collect()
+    }
+
+    /// The node of `expr` built again from other operands.
+    pub(super) fn rebuild(
+        &mut self,
+        expr: ExprId,
+        mut operand: impl FnMut(ExprId) -> ExprId,
+    ) -> ExprId {
+        match self.node(expr).clone() {
+            Node::Number(_) | Node::Symbol(_) => expr,
+            Node::Sum(terms) => {
+                let terms: Vec<ExprId> = terms.iter().map(|term| operand(*term)).collect();
+                self.sum(&terms)
+            }
+            Node::Product(factors) => {
+                let factors: Vec<ExprId> = factors.iter().map(|factor| operand(*factor)).collect();
+                self.product(&factors)
+            }
+            Node::Power(base, exponent) => {
+                let (base, exponent) = (operand(base), operand(exponent));
+                self.pow(base, exponent)
+            }
+            Node::Apply(function, argument) => {
+                let argument = operand(argument);
+                self.apply(function, argument)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(pool: &mut ExprPool, text: &str) -> ExprId {
+        pool.parse(text, &|_| true).expect("test text parses")
+    }
+
+    #[test]
+    fn substitution_is_simultaneous() {
+        let mut pool = ExprPool::new();
+        let expr = parse(&mut pool, "x - 2*sin(y)");
+        let (x, y) = (pool.symbol_id("x"), pool.symbol_id("y"));
+        let swapped = [(x, pool.symbol_expr(y)), (y, pool.symbol_expr(x))];
+        let result = pool.substitute(expr, &swapped);
+        assert_eq!(pool.display(result).to_string(), "y - 2*sin(x)");
+    }
+
+    #[test]
+    fn substitution_of_a_map_into_robot_coordinates() {
+        let mut pool = ExprPool::new();
+        let expr = parse(&mut pool, "0.36 + z1^2*sin(z1)");
+        let encoder = parse(&mut pool, "0.5*body.x - 0.1");
+        let z1 = pool.symbol_id("z1");
+        let result = pool.substitute(expr, &[(z1, encoder)]);
+        let expected = parse(
+            &mut pool,
+            "0.36 + (0.5*body.x - 0.1)^2*sin(0.5*body.x - 0.1)",
+        );
+        assert_eq!(result, expected);
+    }
+
+    #[test]
+    fn substitution_of_absent_symbol_changes_nothing() {
+        let mut pool = ExprPool::new();
+        let expr = parse(&mut pool, "x + y");
+        let z = pool.symbol_id("z");
+        assert_eq!(pool.substitute(expr, &[(z, ExprId::ONE)]), expr);
+    }
+}
