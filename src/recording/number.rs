@@ -8,10 +8,25 @@ pub(super) enum DecimalMark {
     Comma,
 }
 
-impl DecimalMark {
+/// Reads cells, and learns the file's decimal mark from them.
+#[derive(Debug)]
+pub(super) struct NumberReader {
+    mark: DecimalMark,
+    /// A cell with its comma replaced, kept to spare an allocation a cell.
+    pointed: String,
+}
+
+impl NumberReader {
+    pub fn new(mark: DecimalMark) -> Self {
+        NumberReader {
+            mark,
+            pointed: String::new(),
+        }
+    }
+
     /// What a number looks like, for messages.
-    pub fn expected(self) -> &'static str {
-        match self {
+    pub fn expected(&self) -> &'static str {
+        match self.mark {
             DecimalMark::Unknown => "a number",
             DecimalMark::Point => "a number with a decimal point",
             DecimalMark::Comma => "a number with a decimal comma",
@@ -19,29 +34,30 @@ impl DecimalMark {
     }
 
     /// The value of a cell, or `None` if it is no number in this notation.
-    /// May be infinite or NaN. Learns the mark from the first cell that has one.
+    /// May be infinite or NaN.
     pub fn parse(&mut self, cell: &str) -> Option<f64> {
-        let Some(place) = cell.bytes().position(|b| b == b',') else {
-            if *self == DecimalMark::Comma && cell.contains('.') {
-                return None;
-            }
-            let value = cell.parse().ok()?;
-            if cell.contains('.') {
-                *self = DecimalMark::Point;
-            }
-            return Some(value);
+        let Some(place) = cell.bytes().position(|b| b == b'.' || b == b',') else {
+            return cell.parse().ok();
         };
-        // The longest decimal text that a double needs is far below this.
-        const LONGEST: usize = 400;
-        if *self == DecimalMark::Point || cell.len() > LONGEST || cell.contains('.') {
+        let found = match cell.as_bytes()[place] {
+            b',' => DecimalMark::Comma,
+            _ => DecimalMark::Point,
+        };
+        if self.mark != found && self.mark != DecimalMark::Unknown {
             return None;
         }
-        let mut buffer = [0_u8; LONGEST];
-        let text = &mut buffer[..cell.len()];
-        text.copy_from_slice(cell.as_bytes());
-        text[place] = b'.';
-        let value = std::str::from_utf8(text).ok()?.parse().ok()?;
-        *self = DecimalMark::Comma;
+        let value = match found {
+            DecimalMark::Comma => {
+                // A second mark of either kind fails to parse.
+                self.pointed.clear();
+                self.pointed.push_str(&cell[..place]);
+                self.pointed.push('.');
+                self.pointed.push_str(&cell[place + 1..]);
+                self.pointed.parse().ok()?
+            }
+            DecimalMark::Point | DecimalMark::Unknown => cell.parse().ok()?,
+        };
+        self.mark = found;
         Some(value)
     }
 }
@@ -50,35 +66,36 @@ impl DecimalMark {
 mod tests {
     use super::*;
 
+    fn unknown() -> NumberReader {
+        NumberReader::new(DecimalMark::Unknown)
+    }
+
     #[test]
     fn parse_reads_either_mark_and_keeps_to_the_first() {
-        let mut mark = DecimalMark::Unknown;
-        assert_eq!(mark.parse("3"), Some(3.0));
-        assert_eq!(mark, DecimalMark::Unknown);
-        assert_eq!(mark.parse("-1,5e-3"), Some(-0.0015));
-        assert_eq!(mark, DecimalMark::Comma);
-        assert_eq!(mark.parse("1.5"), None);
-        let mut mark = DecimalMark::Unknown;
-        assert_eq!(mark.parse("1.5"), Some(1.5));
-        assert_eq!(mark.parse("1,5"), None);
+        let mut reader = unknown();
+        assert_eq!(reader.parse("3"), Some(3.0));
+        assert_eq!(reader.expected(), "a number");
+        assert_eq!(reader.parse("-1,5e-3"), Some(-0.0015));
+        assert_eq!(reader.expected(), "a number with a decimal comma");
+        assert_eq!(reader.parse("1.5"), None);
+        let mut reader = unknown();
+        assert_eq!(reader.parse("1.5"), Some(1.5));
+        assert_eq!(reader.parse("1,5"), None);
+        assert_eq!(reader.parse("2"), Some(2.0));
     }
 
     #[test]
     fn parse_text_thousands_and_two_marks_are_no_numbers() {
         for cell in [
-            "", "x", "1.234,5", "1,234,5", "1 2", "0x10", "--1", ",", "1,é",
+            "", "x", "1.234,5", "1,234.5", "1,234,5", "1 2", "0x10", "--1", ",", "1,é",
         ] {
-            assert_eq!(DecimalMark::Unknown.parse(cell), None, "{cell}");
+            assert_eq!(unknown().parse(cell), None, "{cell}");
         }
-        assert_eq!(
-            DecimalMark::Unknown.parse(&format!("1,{}", "0".repeat(500))),
-            None
-        );
     }
 
     #[test]
     fn parse_not_finite_text_is_returned_for_the_caller_to_refuse() {
-        assert!(DecimalMark::Unknown.parse("NaN").unwrap().is_nan());
-        assert_eq!(DecimalMark::Unknown.parse("1e999"), Some(f64::INFINITY));
+        assert!(unknown().parse("NaN").unwrap().is_nan());
+        assert_eq!(unknown().parse("1e999"), Some(f64::INFINITY));
     }
 }

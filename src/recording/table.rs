@@ -8,7 +8,7 @@ use super::columns::{Column, Layout};
 use super::csv::delimiter_error;
 use super::error::{RecordingError, shortened};
 use super::lines::split_cells;
-use super::number::DecimalMark;
+use super::number::{DecimalMark, NumberReader};
 use super::preprocess::differences;
 use super::segment::Segment;
 use crate::robot::{BODY_DIM, ContactFlags, JOINT_DIM, STATE_DIM};
@@ -50,7 +50,7 @@ pub(super) struct Table<'a> {
     path: &'a Path,
     delimiter: char,
     layout: &'a Layout,
-    mark: DecimalMark,
+    numbers: NumberReader,
     rows: usize,
     open: Open,
     segments: Vec<Segment>,
@@ -66,7 +66,7 @@ impl<'a> Table<'a> {
             path,
             delimiter,
             layout,
-            mark,
+            numbers: NumberReader::new(mark),
             rows: 0,
             open: Open::default(),
             segments: Vec::new(),
@@ -153,7 +153,7 @@ impl<'a> Table<'a> {
 
     fn number(&mut self, row: usize, place: usize, cell: &str) -> Result<f64, RecordingError> {
         let (path, column) = (|| self.path.to_owned(), || self.layout.names[place].clone());
-        match self.mark.parse(cell) {
+        match self.numbers.parse(cell) {
             Some(value) if value.is_finite() => Ok(value),
             Some(_) => Err(RecordingError::NotFinite {
                 path: path(),
@@ -166,7 +166,7 @@ impl<'a> Table<'a> {
                 row,
                 column: column(),
                 found: shortened(cell),
-                expected: self.mark.expected(),
+                expected: self.numbers.expected(),
             }),
         }
     }

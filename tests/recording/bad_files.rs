@@ -1,0 +1,453 @@
+//! Files that are no recordings: each error names place, found and expected.
+
+use std::path::Path;
+
+use romc::recording::{self, RecordingError, read_from_bytes};
+use romc::robot::{Robot, RobotError};
+
+use crate::sheet::{Sheet, gzip};
+
+/// The error's text after the file's name, checking that it starts with it.
+fn message(error: &RecordingError) -> String {
+    let text = error.to_string();
+    match text.strip_prefix("landing.csv: ") {
+        Some(rest) => rest.to_owned(),
+        None => panic!("no file name in `{text}`"),
+    }
+}
+
+fn fault(sheet: &Sheet) -> RecordingError {
+    sheet.read().unwrap_err()
+}
+
+#[test]
+fn missing_file_is_told_with_its_path() {
+    let error = recording::read(Path::new("no/such/jump.csv")).unwrap_err();
+    assert!(matches!(error, RecordingError::Missing { .. }));
+    assert_eq!(error.to_string(), "no/such/jump.csv: no such file");
+}
+
+#[test]
+fn folder_instead_of_a_file_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = recording::read(folder.path()).unwrap_err();
+    assert!(
+        matches!(error, RecordingError::Io { action: "read", .. }),
+        "{error:?}"
+    );
+    assert!(error.to_string().ends_with(": cannot read"));
+}
+
+#[test]
+fn empty_and_blank_files_are_told_apart_from_headers() {
+    for text in ["", "\n\n", "\u{feff}", "\r\n  \r\n"] {
+        let error = read_from_bytes("landing.csv", text.as_bytes()).unwrap_err();
+        assert!(matches!(error, RecordingError::Empty { .. }), "{error:?}");
+        assert!(message(&error).starts_with("empty file, expected a header"));
+    }
+    let error = read_from_bytes("landing.csv", &gzip(b"")).unwrap_err();
+    assert!(matches!(error, RecordingError::Empty { .. }), "{error:?}");
+}
+
+#[test]
+fn header_without_samples_is_told() {
+    let mut sheet = Sheet::landing();
+    sheet.rows.truncate(1);
+    let error = fault(&sheet);
+    assert!(matches!(
+        error,
+        RecordingError::HeaderOnly { columns: 71, .. }
+    ));
+    assert_eq!(message(&error), "header of 71 columns but no sample");
+}
+
+#[test]
+fn header_after_a_blank_line_is_told() {
+    let text = format!("\n{}", Sheet::landing().text());
+    let error = read_from_bytes("landing.csv", text.as_bytes()).unwrap_err();
+    assert!(
+        matches!(error, RecordingError::Delimiter { row: 1, .. }),
+        "{error:?}"
+    );
+}
+
+#[test]
+fn single_sample_is_too_short() {
+    let mut sheet = Sheet::landing();
+    sheet.rows.truncate(2);
+    let error = fault(&sheet);
+    assert!(matches!(
+        error,
+        RecordingError::TooShort {
+            row: 2,
+            found: 1,
+            expected: 2,
+            ..
+        }
+    ));
+    assert_eq!(
+        message(&error),
+        "row 2: found 1 consecutive samples, expected at least 2"
+    );
+}
+
+#[test]
+fn truncated_row_names_the_first_column_without_a_cell() {
+    let mut sheet = Sheet::landing();
+    sheet.rows[24].truncate(60);
+    let error = fault(&sheet);
+    assert!(matches!(
+        error,
+        RecordingError::RowLength {
+            row: 25,
+            found: 60,
+            expected: 71,
+            ..
+        }
+    ));
+    assert_eq!(
+        message(&error),
+        "row 25, column `fl.kn Torque`: found 60 cells, expected 71"
+    );
+}
+
+#[test]
+fn extra_cell_names_row_and_counts() {
+    let mut sheet = Sheet::landing();
+    sheet.rows[7].push("0".to_owned());
+    let error = fault(&sheet);
+    assert!(matches!(
+        error,
+        RecordingError::RowLength {
+            row: 8,
+            found: 72,
+            expected: 71,
+            ..
+        }
+    ));
+    assert_eq!(
+        message(&error),
+        "row 8, column `rl Foot`: found 72 cells, expected 71"
+    );
+}
+
+#[test]
+fn blank_line_between_samples_is_told() {
+    let mut sheet = Sheet::landing();
+    sheet.rows.insert(9, vec![String::new()]);
+    let error = fault(&sheet);
+    assert!(
+        matches!(
+            error,
+            RecordingError::RowLength {
+                row: 10,
+                found: 0,
+                ..
+            }
+        ),
+        "{error:?}"
+    );
+}
+
+#[test]
+fn text_in_a_number_names_row_column_and_cell() {
+    let mut sheet = Sheet::landing();
+    sheet.set(5, "rr.hy Velocity", "fast");
+    let error = fault(&sheet);
+    assert!(matches!(error, RecordingError::Number { row: 5, .. }));
+    assert_eq!(
+        message(&error),
+        "row 5, column `rr.hy Velocity`: found `fast`, expected a number with a decimal comma"
+    );
+}
+
+#[test]
+fn empty_cell_and_two_decimal_marks_are_no_numbers() {
+    for cell in ["", "1.234,5", "1,2,3", "0x1F", "1 000"] {
+        let mut sheet = Sheet::landing();
+        sheet.set(9, "rl.kn Torque", cell);
+        let error = fault(&sheet);
+        let RecordingError::Number {
+            row, column, found, ..
+        } = &error
+        else {
+            panic!("{error:?}");
+        };
+        assert_eq!(
+            (*row, column.as_str(), found.as_str()),
+            (9, "rl.kn Torque", cell)
+        );
+    }
+}
+
+#[test]
+fn decimal_point_among_decimal_commas_is_told() {
+    let mut sheet = Sheet::landing();
+    sheet.set(3, "fr.hy Position", "1.234");
+    let error = fault(&sheet);
+    assert!(message(&error).ends_with("found `1.234`, expected a number with a decimal comma"));
+}
+
+#[test]
+fn long_cell_is_cut_in_the_message() {
+    let mut sheet = Sheet::landing();
+    sheet.set(3, "Time", &"x".repeat(5000));
+    let text = message(&fault(&sheet));
+    assert!(text.len() < 150, "{text}");
+}
+
+#[test]
+fn nan_infinite_and_overflowing_numbers_are_told() {
+    for cell in ["NaN", "nan", "inf", "-Infinity", "1e999"] {
+        let mut sheet = Sheet::landing();
+        sheet.set(12, "Body angular Velocity y", cell);
+        let error = fault(&sheet);
+        assert!(
+            matches!(error, RecordingError::NotFinite { row: 12, .. }),
+            "{error:?}"
+        );
+        assert_eq!(
+            message(&error),
+            format!(
+                "row 12, column `Body angular Velocity y`: found `{cell}`, expected a finite number"
+            )
+        );
+    }
+}
+
+#[test]
+fn differences_that_overflow_are_told() {
+    let mut sheet = Sheet::landing();
+    sheet.remove_columns(|name| name.contains("Acceleration"));
+    sheet.set(6, "fl.hx Velocity", "1e308");
+    let error = fault(&sheet);
+    let RecordingError::NotFinite {
+        row, column, found, ..
+    } = &error
+    else {
+        panic!("{error:?}");
+    };
+    assert_eq!((*row, column.as_str()), (5, "fl.hx Acceleration"));
+    assert!(found.ends_with("from differences"), "{found}");
+}
+
+#[test]
+fn missing_columns_are_listed() {
+    let mut sheet = Sheet::landing();
+    sheet.remove_columns(|name| name == "rr.kn Torque" || name == "Body linear Position z");
+    let error = fault(&sheet);
+    let RecordingError::MissingColumns { columns, .. } = &error else {
+        panic!("{error:?}");
+    };
+    assert_eq!(columns, &["Body linear Position z", "rr.kn Torque"]);
+    assert_eq!(
+        message(&error),
+        "row 1: missing `Body linear Position z`, `rr.kn Torque`; \
+         the header starts with `Time`, `fr.hx Position`, `fr.hx Velocity` and 66 more"
+    );
+}
+
+#[test]
+fn some_accelerations_missing_are_listed() {
+    let mut sheet = Sheet::landing();
+    sheet.remove_columns(|name| name == "fl.kn Acceleration");
+    let error = fault(&sheet);
+    assert!(message(&error).starts_with("row 1: missing `fl.kn Acceleration`;"));
+}
+
+#[test]
+fn numbers_instead_of_a_header_are_told() {
+    let mut sheet = Sheet::landing();
+    sheet.rows.remove(0);
+    let text = message(&fault(&sheet));
+    assert!(
+        text.starts_with("row 1: missing `Time`, `fr.hx Position`"),
+        "{text}"
+    );
+    assert!(text.contains("the header starts with `0,"), "{text}");
+}
+
+#[test]
+fn duplicate_column_names_both_places() {
+    let mut sheet = Sheet::landing();
+    sheet.rows[0][8] = "fr.hx Velocity".to_owned();
+    let error = fault(&sheet);
+    assert!(matches!(
+        error,
+        RecordingError::DuplicateColumn {
+            first: 3,
+            second: 9,
+            ..
+        }
+    ));
+    assert_eq!(
+        message(&error),
+        "row 1: column `fr.hx Velocity` occurs twice, as number 3 and 9"
+    );
+}
+
+#[test]
+fn contact_flag_that_is_neither_0_nor_1_is_told() {
+    for (cell, value) in [("2", 2.0), ("0,5", 0.5), ("-1", -1.0)] {
+        let mut sheet = Sheet::landing();
+        sheet.set(7, "fl Foot", cell);
+        let error = fault(&sheet);
+        assert!(matches!(error, RecordingError::Contact { row: 7, .. }));
+        assert_eq!(
+            message(&error),
+            format!("row 7, column `fl Foot`: found {value}, expected contact 0 or 1")
+        );
+    }
+}
+
+#[test]
+fn other_delimiters_are_told() {
+    let mut sheet = Sheet::landing();
+    for cell in sheet.rows.iter_mut().flatten() {
+        *cell = cell.replace(',', ".");
+    }
+    for separator in ["\t", "|", " "] {
+        sheet.separator = separator;
+        let error = fault(&sheet);
+        assert!(
+            matches!(error, RecordingError::Delimiter { row: 1, .. }),
+            "{error:?}"
+        );
+        assert!(message(&error).contains("expected cells separated by `;` or `,`"));
+    }
+}
+
+#[test]
+fn row_with_another_delimiter_than_the_header_is_told() {
+    let text = Sheet::landing().text().replace(',', ".");
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    lines[4] = lines[4].replace(';', ",");
+    let error = read_from_bytes("landing.csv", lines.join("\n").as_bytes()).unwrap_err();
+    assert!(
+        matches!(error, RecordingError::Delimiter { row: 5, .. }),
+        "{error:?}"
+    );
+    assert!(message(&error).ends_with("expected cells separated by `;`"));
+}
+
+#[test]
+fn text_that_is_not_utf8_names_row_byte_and_value() {
+    let mut bytes = Sheet::landing().text().into_bytes();
+    let row_3 = bytes.iter().enumerate().filter(|(_, b)| **b == b'\n');
+    let start = row_3.map(|(place, _)| place).nth(1).unwrap() + 1;
+    bytes[start + 4] = 0xe9;
+    let error = read_from_bytes("landing.csv", &bytes).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            RecordingError::Encoding {
+                row: 3,
+                byte: 5,
+                found: 0xe9,
+                ..
+            }
+        ),
+        "{error:?}"
+    );
+    assert_eq!(
+        message(&error),
+        "row 3, byte 5: found 0xe9, expected UTF-8 text"
+    );
+    let utf16: Vec<u8> = "\u{feff}Time;fr"
+        .encode_utf16()
+        .flat_map(u16::to_le_bytes)
+        .collect();
+    let error = read_from_bytes("landing.csv", &utf16).unwrap_err();
+    assert!(matches!(
+        error,
+        RecordingError::Encoding {
+            row: 1,
+            byte: 1,
+            ..
+        }
+    ));
+}
+
+#[test]
+fn damaged_and_truncated_gzip_are_told() {
+    let packed = gzip(Sheet::landing().text().as_bytes());
+    let error = read_from_bytes("landing.csv", &packed[..packed.len() - 20]).unwrap_err();
+    assert!(matches!(error, RecordingError::Gzip { .. }), "{error:?}");
+    assert!(message(&error).ends_with("damaged gzip stream"));
+    let mut flipped = packed.clone();
+    let last = flipped.len() - 6;
+    flipped[last] ^= 0x55;
+    let error = read_from_bytes("landing.csv", &flipped).unwrap_err();
+    assert!(matches!(error, RecordingError::Gzip { .. }), "{error:?}");
+    let error = read_from_bytes("landing.csv", &[0x1f, 0x8b, 9, 9, 9]).unwrap_err();
+    assert!(
+        matches!(error, RecordingError::Gzip { row: 1, .. }),
+        "{error:?}"
+    );
+}
+
+#[test]
+fn absurdly_long_line_is_refused_also_when_packed() {
+    let endless = vec![b'1'; 50_000_000];
+    let error = read_from_bytes("landing.csv", &endless).unwrap_err();
+    assert!(matches!(error, RecordingError::LineTooLong { row: 1, .. }));
+    assert!(message(&error).starts_with("row 1: found a line of more than 65536 bytes"));
+    let error = read_from_bytes("landing.csv", &gzip(&endless)).unwrap_err();
+    assert!(matches!(error, RecordingError::LineTooLong { row: 1, .. }));
+}
+
+#[test]
+fn time_that_stands_still_or_steps_back_is_told() {
+    let mut sheet = Sheet::landing();
+    let before = sheet.rows[9][0].clone();
+    sheet.set(11, "Time", &before);
+    let error = fault(&sheet);
+    assert!(
+        matches!(error, RecordingError::Time { row: 11, .. }),
+        "{error:?}"
+    );
+    assert!(message(&error).contains("expected a later time or a new segment"));
+    let mut sheet = Sheet::landing();
+    sheet.rows.swap(10, 11);
+    let error = fault(&sheet);
+    assert!(
+        matches!(error, RecordingError::Time { row: 12, .. }),
+        "{error:?}"
+    );
+}
+
+#[test]
+fn unknown_robot_lists_the_known_ones() {
+    let error = Robot::by_name("spot").unwrap_err();
+    assert!(matches!(&error, RobotError::UnknownRobot { found, .. } if found == "spot"));
+    assert!(
+        error
+            .to_string()
+            .starts_with("unknown robot `spot`; known: go1")
+    );
+}
+
+#[test]
+fn stretched_knee_in_contact_names_row_leg_and_angles() {
+    let mut sheet = Sheet::landing();
+    sheet.set(20, "rl.kn Position", "0");
+    let recording = sheet.read().unwrap();
+    let go1 = Robot::by_name("go1").unwrap();
+    let error = recording.segments[0].input(go1).unwrap_err();
+    assert_eq!(message(&error), "row 20: no body wrench");
+    let RecordingError::Wrench {
+        row: 20, source, ..
+    } = &error
+    else {
+        panic!("{error:?}");
+    };
+    assert!(
+        source
+            .to_string()
+            .starts_with("go1: leg rl is singular at hx")
+    );
+    // The same posture in the air carries no force.
+    let mut sheet = Sheet::landing();
+    sheet.set(3, "rl.kn Position", "0");
+    assert!(sheet.read().unwrap().segments[0].input(go1).is_ok());
+}

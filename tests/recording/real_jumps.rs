@@ -1,0 +1,170 @@
+//! Recorded jumps: the repository's own, and a hardware jump if it is there.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use romc::recording::check::{CheckOptions, Implausible, check, without};
+use romc::recording::preprocess::{PreprocessOptions, prepare};
+use romc::recording::{self, PhaseRule, Recording, Stance};
+use romc::robot::Robot;
+
+fn go1() -> &'static Robot {
+    Robot::by_name("go1").unwrap()
+}
+
+fn own_jumps() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/recordings/go1");
+    let entries = fs::read_dir(&folder).unwrap();
+    let mut out: Vec<PathBuf> = entries
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.to_string_lossy().ends_with(".csv.gz"))
+        .collect();
+    out.sort();
+    assert!(
+        out.len() >= 10,
+        "{} holds {} jumps",
+        folder.display(),
+        out.len()
+    );
+    out
+}
+
+/// The hardware jump, which is not part of the repository.
+fn hardware_jump() -> Option<Recording> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/go1_hardware_jump.csv");
+    if !path.exists() {
+        eprintln!("skipped: {} is not there", path.display());
+        return None;
+    }
+    Some(recording::read(&path).unwrap())
+}
+
+#[test]
+fn own_jumps_are_one_segment_of_launch_flight_and_landing() {
+    for path in own_jumps() {
+        let jump = recording::read(&path).unwrap();
+        assert_eq!(jump.segments.len(), 1, "{}", path.display());
+        assert!(jump.ignored_columns.is_empty());
+        let segment = &jump.segments[0];
+        assert!((segment.mean_step_s() - 0.002).abs() < 1e-9);
+        let spans = PhaseRule::two_phase()
+            .with_min_samples(5)
+            .spans(segment)
+            .unwrap();
+        let kinds: Vec<Stance> = spans.iter().map(|span| span.kind).collect();
+        let expected = [Stance::Launch, Stance::Flight, Stance::Landing];
+        assert_eq!(kinds, expected, "{}", path.display());
+        let flight = segment.slice(spans[1].range.clone());
+        assert!((0.15..0.40).contains(&flight.duration_s()));
+    }
+}
+
+#[test]
+fn own_jumps_carry_their_weight_while_standing() {
+    for path in own_jumps() {
+        let jump = recording::read(&path).unwrap();
+        let u = jump.segments[0].input(go1()).unwrap();
+        let weight = 9.81 * go1().mass_kg();
+        let lift = u[(14, 0)];
+        // The torques carry the body and the thighs, not the feet.
+        assert!(
+            (0.93..1.02).contains(&(lift / weight)),
+            "{}: {lift:.1} N of {weight:.1} N",
+            path.display()
+        );
+        assert!(u[(13, 0)].abs() < 0.05 * weight);
+    }
+}
+
+#[test]
+fn own_jumps_are_plausible() {
+    for path in own_jumps() {
+        let jump = recording::read(&path).unwrap();
+        let found = check(&jump, go1(), &CheckOptions::default());
+        let text: Vec<String> = found.iter().map(ToString::to_string).collect();
+        assert!(found.is_empty(), "{}: {text:#?}", path.display());
+    }
+}
+
+#[test]
+fn own_jumps_are_prepared_in_batches_of_100() {
+    for path in own_jumps() {
+        let jump = recording::read(&path).unwrap();
+        let phases = prepare(&jump, &PreprocessOptions::default()).unwrap();
+        assert_eq!(phases.len(), 3);
+        for phase in &phases {
+            let span = phase.span.range.len();
+            assert_eq!(phase.samples.len(), span.div_ceil(100) * 100);
+            let ends = |z: f64, at: usize| (z - jump.segments[0].x[(14, at)]).abs();
+            assert!(ends(phase.samples.x[(14, 0)], phase.span.range.start) < 1e-12);
+            let last = phase.samples.len() - 1;
+            assert!(ends(phase.samples.x[(14, last)], phase.span.range.end - 1) < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn hardware_jump_is_read_and_divided() {
+    let Some(jump) = hardware_jump() else { return };
+    let segment = &jump.segments[0];
+    assert_eq!((jump.segments.len(), segment.len()), (1, 800));
+    let spans = PhaseRule::two_phase().spans(segment).unwrap();
+    let ranges: Vec<_> = spans.iter().map(|span| span.range.clone()).collect();
+    assert_eq!(ranges, [0..256, 256..378, 378..800]);
+    assert!(segment.input(go1()).is_ok());
+}
+
+#[test]
+fn hardware_jump_recorded_accelerations_are_differences() {
+    let Some(jump) = hardware_jump() else { return };
+    let segment = &jump.segments[0];
+    let derived = recording::preprocess::differences(&segment.time_s, &segment.dx);
+    assert!((&derived - &segment.ddx).amax() < 1e-9);
+}
+
+#[test]
+fn hardware_jump_clipped_rate_and_lost_packets_are_found() {
+    let Some(jump) = hardware_jump() else { return };
+    let found = check(&jump, go1(), &CheckOptions::default());
+    let clipped: Vec<_> = found
+        .iter()
+        .filter(|finding| finding.kind == Implausible::Clipped)
+        .collect();
+    assert_eq!(clipped.len(), 1);
+    assert_eq!(clipped[0].column, "Body angular Velocity y");
+    assert_eq!((clipped[0].first_row, clipped[0].samples.len()), (395, 19));
+    let jumped = |f: &&_| {
+        matches!(
+            f,
+            &&recording::check::Finding {
+                kind: Implausible::Jump,
+                ..
+            }
+        )
+    };
+    assert!(found.iter().filter(jumped).count() >= 3);
+    assert!(
+        found
+            .iter()
+            .all(|finding| finding.kind != Implausible::Torque)
+    );
+    let (rest, dropped) = without(&jump, &found).unwrap();
+    assert!(dropped > 0 && rest.segments.len() > 1);
+}
+
+#[test]
+fn reading_a_jump_takes_far_less_than_a_control_second() {
+    let path = &own_jumps()[0];
+    let best = (0..20)
+        .map(|_| {
+            let start = Instant::now();
+            recording::read(path).unwrap();
+            start.elapsed()
+        })
+        .min()
+        .unwrap();
+    // Unoptimised builds are several times slower.
+    let most = if cfg!(debug_assertions) { 400 } else { 20 };
+    assert!(best < Duration::from_millis(most), "{best:?}");
+}
