@@ -1,1 +1,44 @@
 //! The model file `romc-model/1`.
+//!
+//! What enters: a path or bytes; what leaves: a checked [`ReducedModel`], or an error which names
+//! file, tensor, index, what was found and what was expected. The other way, [`write`] makes files
+//! that are equal byte for byte for equal models, and that appear whole or not at all.
+//! Read `manifest.rs` first: it is the file's grammar.
+//!
+//! ```
+//! use romc::artifact;
+//!
+//! let text = r#"{ "schema": "romc-model/1", "name": "spring", "latent_dim": 1,
+//!     "library": ["z1", "dz1", "u1"],
+//!     "phases": [ { "name": "contact", "feet": "any", "xi": [[-4.0], [-0.1], [2.0]] } ] }"#;
+//! let model = artifact::read_from_bytes("spring.json", text.as_bytes())?;
+//! assert_eq!(model.phases()[0].active_count(), 3);
+//!
+//! let again = artifact::read_from_bytes("again", artifact::to_text(&model).as_bytes())?;
+//! assert_eq!(model, again);
+//!
+//! let one_row_short = text.replace(", [2.0]", "");
+//! let error = artifact::read_from_bytes("spring.json", one_row_short.as_bytes()).unwrap_err();
+//! assert_eq!(
+//!     artifact::describe(&error),
+//!     "spring.json: not a usable model: `phases[0].xi`: found 2 x 1, expected 3 x 1 (rows x columns)"
+//! );
+//! # Ok::<(), romc::artifact::ArtifactError>(())
+//! ```
+//!
+//! [`ReducedModel`]: crate::model::ReducedModel
+
+mod digest;
+mod error;
+mod export;
+mod manifest;
+mod matrices;
+mod print;
+mod read;
+mod write;
+
+pub use digest::{Digest, digest};
+pub use error::{ArtifactError, describe};
+pub use manifest::SCHEMA;
+pub use read::{MAX_FILE_BYTES, read, read_from_bytes};
+pub use write::{Overwrite, to_text, write, write_with};

@@ -1,1 +1,64 @@
 //! The reduced-order model: encoder, decoder, library, coefficients, phases.
+//!
+//! What enters: matrices, candidate terms as text, phases; what leaves: a [`ReducedModel`] whose
+//! every shape, rank, name and number has been checked, so that no later stage has to doubt it.
+//! Read `rom.rs` first: it states the equations and the units.
+//!
+//! ```
+//! use nalgebra::{DMatrix, DVector};
+//! use romc::model::{FeetRule, Library, Phase, ReducedModel};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // A mass on a spring, pushed by u1: ddz1 = -4 z1 - 0.1 dz1 + 2 u1.
+//! let library = Library::from_terms(1, &["z1".into(), "dz1".into(), "u1".into()])?;
+//! let model = ReducedModel::builder("spring", library)
+//!     .phase(Phase {
+//!         name: "contact".into(),
+//!         feet: FeetRule::Any,
+//!         xi: DMatrix::from_column_slice(3, 1, &[-4.0, -0.1, 2.0]),
+//!     })
+//!     .build()?;
+//! let ddz = model.ddz(
+//!     0,
+//!     &DVector::from_element(1, 0.5),
+//!     &DVector::from_element(1, 1.0),
+//!     &DVector::from_element(1, 0.25),
+//! )?;
+//! assert_eq!(ddz[0], -4.0 * 0.5 - 0.1 * 1.0 + 2.0 * 0.25);
+//!
+//! // What a latent-only model cannot do, it says.
+//! assert!(model.encode(&DVector::zeros(18)).is_err());
+//! # Ok(())
+//! # }
+//! ```
+
+mod affine;
+mod builder;
+mod error;
+mod evaluation;
+mod identifier;
+mod library;
+mod phase;
+mod rom;
+mod scaling;
+mod signals;
+mod standard;
+mod statistics;
+
+#[cfg(test)]
+mod tests;
+
+pub use affine::AffineMap;
+pub use builder::{ModelBuilder, RANK_TOLERANCE};
+pub use error::{Dimensions, ModelError, SignalPart};
+pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN};
+pub use library::{
+    CandidateTerm, LatentVariable, Library, LibraryError, LibrarySource, MAX_LATENT_DIM,
+    MAX_LIBRARY_DIM, MAX_TERM_LEN, TermId,
+};
+pub use phase::{FeetRule, Phase};
+pub use rom::{LatentEquations, ReducedModel};
+pub use scaling::{ScaleFactors, Scaling};
+pub use signals::Signals;
+pub use standard::{MAX_DEGREE, StandardLibrary};
+pub use statistics::{InputStatistics, LatentInputStatistics};

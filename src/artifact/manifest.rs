@@ -1,0 +1,280 @@
+//! The grammar of the model file, as serde types.
+//!
+//! Only types and spelling are settled here; shapes, ranks and names are checked when the parts
+//! become a [`ReducedModel`](crate::model::ReducedModel).
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Map, Value};
+
+use crate::robot::ContactFlags;
+
+/// Name and version of the format.
+pub const SCHEMA: &str = "romc-model/1";
+
+/// Rows of a matrix.
+pub(super) type Rows = Vec<Vec<f64>>;
+
+/// The whole file.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Manifest {
+    pub schema: String,
+    pub name: String,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub description: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state: Option<SignalsEntry>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub input: Option<SignalsEntry>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scaling: Option<ScalingEntry>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub encoder: Option<AffineEntry>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decoder: Option<AffineEntry>,
+    pub latent_dim: usize,
+    pub library: LibraryEntry,
+    pub phases: Vec<PhaseEntry>,
+    #[serde(default, skip_serializing_if = "Pairs::is_empty")]
+    pub input_statistics: Pairs<StatisticsEntry>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample_time_s: Option<f64>,
+    #[serde(default, skip_serializing_if = "Map::is_empty")]
+    pub provenance: Map<String, Value>,
+}
+
+/// Only the schema; everything else is passed over.
+#[derive(Deserialize)]
+pub(super) struct SchemaProbe {
+    pub schema: Option<Value>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SignalsEntry {
+    pub names: Vec<String>,
+    pub units: Vec<String>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ScalingEntry {
+    pub state: FactorsEntry,
+    pub input: FactorsEntry,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AffineEntry {
+    pub weights: Rows,
+    pub bias: Vec<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PhaseEntry {
+    pub name: String,
+    pub feet: FeetEntry,
+    pub xi: Rows,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StatisticsEntry {
+    pub mean: Vec<f64>,
+    pub covariance: Rows,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StandardEntry {
+    pub degree: u32,
+    pub trigonometric: bool,
+    pub inputs: bool,
+}
+
+/// A number for all coordinates, or one number a coordinate.
+pub(super) enum FactorsEntry {
+    Uniform(f64),
+    PerCoordinate(Vec<f64>),
+}
+
+/// A list of terms, or the shorthand.
+pub(super) enum LibraryEntry {
+    Terms(Vec<String>),
+    Standard(StandardEntry),
+}
+
+/// `"any"`, `"none"`, or a list of patterns of four flags (0 or 1) in the order fr, fl, rr, rl.
+pub(super) enum FeetEntry {
+    Any,
+    None,
+    Patterns(Vec<ContactFlags>),
+}
+
+impl Serialize for FactorsEntry {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            FactorsEntry::Uniform(factor) => factor.serialize(serializer),
+            FactorsEntry::PerCoordinate(factors) => factors.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for FactorsEntry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Factors;
+        impl<'de> Visitor<'de> for Factors {
+            type Value = FactorsEntry;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number or a list of numbers")
+            }
+            fn visit_f64<E>(self, value: f64) -> Result<FactorsEntry, E> {
+                Ok(FactorsEntry::Uniform(value))
+            }
+            fn visit_u64<E>(self, value: u64) -> Result<FactorsEntry, E> {
+                Ok(FactorsEntry::Uniform(value as f64))
+            }
+            fn visit_i64<E>(self, value: i64) -> Result<FactorsEntry, E> {
+                Ok(FactorsEntry::Uniform(value as f64))
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<FactorsEntry, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(seq)).map(FactorsEntry::PerCoordinate)
+            }
+        }
+        deserializer.deserialize_any(Factors)
+    }
+}
+
+impl Serialize for LibraryEntry {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            LibraryEntry::Terms(terms) => terms.serialize(serializer),
+            LibraryEntry::Standard(standard) => standard.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for LibraryEntry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Terms;
+        impl<'de> Visitor<'de> for Terms {
+            type Value = LibraryEntry;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a list of terms, or an object with degree, trigonometric and inputs")
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<LibraryEntry, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(seq)).map(LibraryEntry::Terms)
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<LibraryEntry, A::Error> {
+                StandardEntry::deserialize(MapAccessDeserializer::new(map))
+                    .map(LibraryEntry::Standard)
+            }
+        }
+        deserializer.deserialize_any(Terms)
+    }
+}
+
+impl Serialize for FeetEntry {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            FeetEntry::Any => "any".serialize(serializer),
+            FeetEntry::None => "none".serialize(serializer),
+            FeetEntry::Patterns(patterns) => {
+                serializer.collect_seq(patterns.iter().map(|feet| feet.map(u8::from)))
+            }
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for FeetEntry {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Feet;
+        impl<'de> Visitor<'de> for Feet {
+            type Value = FeetEntry;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("\"any\", \"none\" or a list of patterns such as [1, 1, 0, 0]")
+            }
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<FeetEntry, E> {
+                match text {
+                    "any" => Ok(FeetEntry::Any),
+                    "none" => Ok(FeetEntry::None),
+                    _ => Err(E::invalid_value(serde::de::Unexpected::Str(text), &self)),
+                }
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<FeetEntry, A::Error> {
+                let rows: Vec<[Flag; 4]> = Vec::deserialize(SeqAccessDeserializer::new(seq))?;
+                let patterns = rows.into_iter().map(|row| row.map(|flag| flag.0));
+                Ok(FeetEntry::Patterns(patterns.collect()))
+            }
+        }
+        deserializer.deserialize_any(Feet)
+    }
+}
+
+/// 0 or 1, as recordings write the contact of a foot.
+struct Flag(bool);
+
+impl<'de> Deserialize<'de> for Flag {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match u8::deserialize(deserializer)? {
+            0 => Ok(Flag(false)),
+            1 => Ok(Flag(true)),
+            other => Err(D::Error::invalid_value(
+                serde::de::Unexpected::Unsigned(other.into()),
+                &"0 or 1",
+            )),
+        }
+    }
+}
+
+/// A JSON object as pairs in the order of the file, in which no key comes twice.
+pub(super) struct Pairs<T>(pub Vec<(String, T)>);
+
+impl<T> Default for Pairs<T> {
+    fn default() -> Self {
+        Pairs(Vec::new())
+    }
+}
+
+impl<T> Pairs<T> {
+    fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl<T: Serialize> Serialize for Pairs<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(key, value)| (key, value)))
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Pairs<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Object<T>(PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> Visitor<'de> for Object<T> {
+            type Value = Pairs<T>;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("an object with one entry a phase")
+            }
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Pairs<T>, A::Error> {
+                let mut pairs: Vec<(String, T)> = Vec::new();
+                while let Some(key) = map.next_key::<String>()? {
+                    if pairs.iter().any(|(earlier, _)| *earlier == key) {
+                        return Err(A::Error::custom(format_args!("duplicate key {key:?}")));
+                    }
+                    pairs.push((key, map.next_value()?));
+                }
+                Ok(Pairs(pairs))
+            }
+        }
+        deserializer.deserialize_map(Object(PhantomData))
+    }
+}

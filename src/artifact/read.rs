@@ -1,0 +1,239 @@
+//! From bytes to a checked model.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use nalgebra::DVector;
+use serde_json::Value;
+
+use super::error::ArtifactError;
+use super::manifest::{
+    AffineEntry, FactorsEntry, FeetEntry, LibraryEntry, Manifest, PhaseEntry, SCHEMA, SchemaProbe,
+    SignalsEntry, StatisticsEntry,
+};
+use super::matrices::from_rows;
+use crate::model::{
+    AffineMap, FeetRule, InputStatistics, Library, ModelError, Phase, ReducedModel, ScaleFactors,
+    Scaling, Signals, StandardLibrary,
+};
+use crate::robot::{Robot, STATE_DIM};
+
+/// Largest model file; all of the largest model fits.
+pub const MAX_FILE_BYTES: u64 = 32 << 20;
+
+/// Reads and checks a model file.
+///
+/// # Errors
+/// [`ArtifactError`], except [`ArtifactError::Exists`].
+pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
+    let io_error = |source| ArtifactError::Io {
+        path: path.to_owned(),
+        action: "read",
+        source,
+    };
+    let file = File::open(path).map_err(io_error)?;
+    let mut bytes = Vec::new();
+    // One byte more than allowed tells a file that is too large from one that just fits.
+    file.take(MAX_FILE_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(io_error)?;
+    read_from_bytes(&path.display().to_string(), &bytes)
+}
+
+/// Reads and checks a model file that is in memory; `file` names it in errors.
+///
+/// # Errors
+/// As [`read`]. Never panics, whatever the bytes are.
+pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, ArtifactError> {
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        return Err(ArtifactError::TooLarge {
+            file: file.to_owned(),
+            max: MAX_FILE_BYTES,
+        });
+    }
+    check_schema(file, bytes)?;
+    let manifest: Manifest = parse(file, bytes)?;
+    to_model(file, manifest)
+}
+
+fn parse<'de, T: serde::Deserialize<'de>>(
+    file: &str,
+    bytes: &'de [u8],
+) -> Result<T, ArtifactError> {
+    let syntax = |place: String, error: &serde_json::Error| ArtifactError::Syntax {
+        file: file.to_owned(),
+        place,
+        line: error.line(),
+        column: error.column(),
+        message: message_without_position(error),
+    };
+    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
+    let value = serde_path_to_error::deserialize(&mut deserializer)
+        .map_err(|error| syntax(error.path().to_string(), error.inner()))?;
+    deserializer
+        .end()
+        .map_err(|error| syntax(".".to_owned(), &error))?;
+    Ok(value)
+}
+
+/// serde_json ends its messages with line and column, which [`ArtifactError::Syntax`] tells anyway.
+fn message_without_position(error: &serde_json::Error) -> String {
+    let message = error.to_string();
+    match message.rfind(" at line ") {
+        Some(end) => message[..end].to_owned(),
+        None => message,
+    }
+}
+
+/// Looks at the schema first, so that a file of a later version is not told that its keys are
+/// unknown.
+fn check_schema(file: &str, bytes: &[u8]) -> Result<(), ArtifactError> {
+    if bytes.trim_ascii_start().first() == Some(&b'[') {
+        // serde would take an array for an object whose keys are left out.
+        return Err(ArtifactError::Syntax {
+            file: file.to_owned(),
+            place: ".".to_owned(),
+            line: 1,
+            column: 1,
+            message: "found an array, expected an object".to_owned(),
+        });
+    }
+    let Ok(probe) = parse::<SchemaProbe>(file, bytes) else {
+        // No JSON at all: reading the whole grammar meets the same fault, and knows its place.
+        return Ok(());
+    };
+    let found = match probe.schema {
+        Some(Value::String(schema)) if schema == SCHEMA => return Ok(()),
+        Some(other) => other.to_string().chars().take(80).collect(),
+        None => "none".to_owned(),
+    };
+    Err(ArtifactError::Schema {
+        file: file.to_owned(),
+        found,
+    })
+}
+
+fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactError> {
+    let refused = |source: ModelError| ArtifactError::Model {
+        file: file.to_owned(),
+        source: Box::new(source),
+    };
+    let latent_dim = manifest.latent_dim;
+    let library = library_of(manifest.library, latent_dim).map_err(refused)?;
+    let mut builder = ReducedModel::builder(manifest.name, library)
+        .description(manifest.description)
+        .provenance(manifest.provenance);
+    let robot = manifest.robot.as_deref().map(Robot::by_name).transpose();
+    let robot = robot.map_err(|error| refused(error.into()))?;
+    let known_dim = robot
+        .map(|_| STATE_DIM)
+        .or(manifest.state.as_ref().map(|state| state.names.len()));
+    if let Some(robot) = robot {
+        builder = builder.robot(robot);
+    }
+    if let Some(entry) = manifest.state {
+        builder = builder.state(signals_of(entry));
+    }
+    if let Some(entry) = manifest.input {
+        builder = builder.input(signals_of(entry));
+    }
+    if let Some(entry) = manifest.scaling {
+        builder = builder.scaling(Scaling {
+            state: factors_of(entry.state),
+            input: factors_of(entry.input),
+        });
+    }
+    if let Some(entry) = &manifest.encoder {
+        builder = builder.encoder(affine_of(file, "encoder", entry, known_dim)?);
+    }
+    if let Some(entry) = &manifest.decoder {
+        builder = builder.decoder(affine_of(file, "decoder", entry, Some(latent_dim))?);
+    }
+    for (index, entry) in manifest.phases.into_iter().enumerate() {
+        builder = builder.phase(phase_of(file, index, entry, latent_dim)?);
+    }
+    for (name, entry) in manifest.input_statistics.0 {
+        let statistics = statistics_of(file, &name, &entry)?;
+        builder = builder.input_statistics(name, statistics);
+    }
+    if let Some(sample_time_s) = manifest.sample_time_s {
+        builder = builder.sample_time_s(sample_time_s);
+    }
+    builder.build().map_err(refused)
+}
+
+fn library_of(entry: LibraryEntry, latent_dim: usize) -> Result<Library, ModelError> {
+    Ok(match entry {
+        LibraryEntry::Terms(texts) => Library::from_terms(latent_dim, &texts)?,
+        LibraryEntry::Standard(standard) => Library::standard(
+            latent_dim,
+            StandardLibrary {
+                degree: standard.degree,
+                trigonometric: standard.trigonometric,
+                inputs: standard.inputs,
+            },
+        )?,
+    })
+}
+
+fn signals_of(entry: SignalsEntry) -> Signals {
+    Signals {
+        names: entry.names,
+        units: entry.units,
+    }
+}
+
+fn factors_of(entry: FactorsEntry) -> ScaleFactors {
+    match entry {
+        FactorsEntry::Uniform(factor) => ScaleFactors::Uniform(factor),
+        FactorsEntry::PerCoordinate(factors) => {
+            ScaleFactors::PerCoordinate(DVector::from_vec(factors))
+        }
+    }
+}
+
+fn affine_of(
+    file: &str,
+    tensor: &str,
+    entry: &AffineEntry,
+    columns: Option<usize>,
+) -> Result<AffineMap, ArtifactError> {
+    let weights = from_rows(file, &format!("{tensor}.weights"), &entry.weights, columns)?;
+    let bias = DVector::from_column_slice(&entry.bias);
+    AffineMap::new(tensor, weights, bias).map_err(|source| ArtifactError::Model {
+        file: file.to_owned(),
+        source: Box::new(source),
+    })
+}
+
+fn phase_of(
+    file: &str,
+    index: usize,
+    entry: PhaseEntry,
+    latent_dim: usize,
+) -> Result<Phase, ArtifactError> {
+    let tensor = format!("phases[{index}].xi");
+    Ok(Phase {
+        xi: from_rows(file, &tensor, &entry.xi, Some(latent_dim))?,
+        name: entry.name,
+        feet: match entry.feet {
+            FeetEntry::Any => FeetRule::Any,
+            FeetEntry::None => FeetRule::None,
+            FeetEntry::Patterns(patterns) => FeetRule::Patterns(patterns),
+        },
+    })
+}
+
+fn statistics_of(
+    file: &str,
+    phase: &str,
+    entry: &StatisticsEntry,
+) -> Result<InputStatistics, ArtifactError> {
+    let phase: String = phase.chars().take(80).collect();
+    let tensor = format!("input_statistics.{}.covariance", phase.escape_debug());
+    Ok(InputStatistics {
+        mean: DVector::from_column_slice(&entry.mean),
+        covariance: from_rows(file, &tensor, &entry.covariance, Some(entry.mean.len()))?,
+    })
+}

@@ -1,0 +1,426 @@
+//! The checked constructor of [`ReducedModel`].
+
+use std::collections::HashMap;
+
+use nalgebra::DMatrix;
+use serde_json::{Map, Value};
+
+use super::affine::AffineMap;
+use super::error::{ModelError, check_finite, check_shape};
+use super::identifier::Identifier;
+use super::library::Library;
+use super::phase::{FeetRule, Phase, all_patterns};
+use super::rom::ReducedModel;
+use super::scaling::Scaling;
+use super::signals::Signals;
+use super::statistics::InputStatistics;
+use crate::robot::Robot;
+
+/// An encoder has full row rank if its smallest singular value is above this share of the largest.
+pub const RANK_TOLERANCE: f64 = 1e-10;
+
+const MAX_PHASES: usize = 16;
+const MAX_STATE_DIM: usize = 256;
+const MAX_DESCRIPTION_LEN: usize = 10_000;
+const MAX_SAMPLE_TIME_S: f64 = 1.0;
+
+/// Collects the parts of a model; [`ModelBuilder::build`] checks them against each other.
+#[derive(Clone, Debug)]
+pub struct ModelBuilder {
+    name: String,
+    description: String,
+    library: Library,
+    phases: Vec<Phase>,
+    statistics: Vec<(String, InputStatistics)>,
+    state: Option<Signals>,
+    input: Option<Signals>,
+    scaling: Option<Scaling>,
+    encoder: Option<AffineMap>,
+    decoder: Option<AffineMap>,
+    robot: Option<&'static Robot>,
+    sample_time_s: Option<f64>,
+    provenance: Map<String, Value>,
+}
+
+impl ModelBuilder {
+    pub(super) fn new(name: String, library: Library) -> Self {
+        Self {
+            name,
+            description: String::new(),
+            library,
+            phases: Vec::new(),
+            statistics: Vec::new(),
+            state: None,
+            input: None,
+            scaling: None,
+            encoder: None,
+            decoder: None,
+            robot: None,
+            sample_time_s: None,
+            provenance: Map::new(),
+        }
+    }
+
+    pub(super) fn from_model(model: ReducedModel) -> Self {
+        let statistics = model
+            .phases
+            .iter()
+            .zip(model.statistics)
+            .filter_map(|(phase, statistics)| Some((phase.name.clone(), statistics?)))
+            .collect();
+        Self {
+            name: model.name,
+            description: model.description,
+            library: model.library,
+            phases: model.phases,
+            statistics,
+            state: model.state,
+            input: model.input,
+            scaling: model.scaling,
+            encoder: model.encoder,
+            decoder: model.decoder,
+            robot: model.robot,
+            sample_time_s: model.sample_time_s,
+            provenance: model.provenance,
+        }
+    }
+
+    /// Sets the name.
+    pub fn name(mut self, name: impl Into<String>) -> Self {
+        self.name = name.into();
+        self
+    }
+
+    /// Sets the free text about the model.
+    pub fn description(mut self, description: impl Into<String>) -> Self {
+        self.description = description.into();
+        self
+    }
+
+    /// Appends a phase; rules are tried in the order of appending.
+    pub fn phase(mut self, phase: Phase) -> Self {
+        self.phases.push(phase);
+        self
+    }
+
+    /// Replaces all phases.
+    pub fn phases(mut self, phases: Vec<Phase>) -> Self {
+        self.phases = phases;
+        self
+    }
+
+    /// Adds the statistics of the training inputs of the phase with this name (SI units).
+    pub fn input_statistics(
+        mut self,
+        phase: impl Into<String>,
+        statistics: InputStatistics,
+    ) -> Self {
+        self.statistics.push((phase.into(), statistics));
+        self
+    }
+
+    /// Sets names and units of the state.
+    pub fn state(mut self, state: Signals) -> Self {
+        self.state = Some(state);
+        self
+    }
+
+    /// Sets names and units of the input.
+    pub fn input(mut self, input: Signals) -> Self {
+        self.input = Some(input);
+        self
+    }
+
+    /// Sets the scale factors.
+    pub fn scaling(mut self, scaling: Scaling) -> Self {
+        self.scaling = Some(scaling);
+        self
+    }
+
+    /// Sets the encoder (scaled units, `latent_dim x state_dim`).
+    pub fn encoder(mut self, encoder: AffineMap) -> Self {
+        self.encoder = Some(encoder);
+        self
+    }
+
+    /// Sets the decoder (scaled units, `state_dim x latent_dim`).
+    pub fn decoder(mut self, decoder: AffineMap) -> Self {
+        self.decoder = Some(decoder);
+        self
+    }
+
+    /// Sets the robot.
+    pub fn robot(mut self, robot: &'static Robot) -> Self {
+        self.robot = Some(robot);
+        self
+    }
+
+    /// Sets the sampling period of the recordings, s.
+    pub fn sample_time_s(mut self, sample_time_s: f64) -> Self {
+        self.sample_time_s = Some(sample_time_s);
+        self
+    }
+
+    /// Sets where the model comes from.
+    pub fn provenance(mut self, provenance: Map<String, Value>) -> Self {
+        self.provenance = provenance;
+        self
+    }
+
+    /// Checks all parts and makes the model.
+    ///
+    /// # Errors
+    /// The first of the [`ModelError`]s that applies: names, shapes, finite values, scale factors,
+    /// rank of the encoder (singular values, [`RANK_TOLERANCE`]), reachable phases, covariances.
+    pub fn build(self) -> Result<ReducedModel, ModelError> {
+        let identifier = identifier_of("model name", &self.name)?;
+        let phase_identifiers = self.check_phase_names()?;
+        self.check_phases()?;
+        self.check_texts()?;
+        let state_dim = self.check_maps()?;
+        self.check_signals(state_dim)?;
+        if let Some(scaling) = &self.scaling {
+            scaling.state.check("state", state_dim)?;
+            scaling.input.check("input", state_dim)?;
+        }
+        let input_projection = match &self.encoder {
+            Some(encoder) => Some(pinv_of_transpose(encoder.weights())?),
+            None => None,
+        };
+        let statistics = self.check_statistics(state_dim)?;
+        Ok(ReducedModel {
+            name: self.name,
+            identifier,
+            description: self.description,
+            library: self.library,
+            phases: self.phases,
+            phase_identifiers,
+            statistics,
+            state: self.state,
+            input: self.input,
+            scaling: self.scaling,
+            encoder: self.encoder,
+            decoder: self.decoder,
+            input_projection,
+            robot: self.robot,
+            sample_time_s: self.sample_time_s,
+            provenance: self.provenance,
+        })
+    }
+
+    fn check_phase_names(&self) -> Result<Vec<Identifier>, ModelError> {
+        if !(1..=MAX_PHASES).contains(&self.phases.len()) {
+            return Err(ModelError::PhaseCount {
+                found: self.phases.len(),
+                max: MAX_PHASES,
+            });
+        }
+        let mut first_use = HashMap::new();
+        let mut identifiers = Vec::with_capacity(self.phases.len());
+        for (second, phase) in self.phases.iter().enumerate() {
+            let identifier = identifier_of(&format!("phases[{second}].name"), &phase.name)?;
+            if let Some(first) = first_use.insert(identifier.upper(), second) {
+                return Err(ModelError::DuplicatePhase {
+                    first,
+                    second,
+                    name: phase.name.clone(),
+                    identifier: identifier.to_string(),
+                });
+            }
+            identifiers.push(identifier);
+        }
+        Ok(identifiers)
+    }
+
+    fn check_phases(&self) -> Result<(), ModelError> {
+        let expected = (self.library.len(), self.library.latent_dim());
+        for (index, phase) in self.phases.iter().enumerate() {
+            let tensor = format!("phases[{index}].xi");
+            check_shape(&tensor, phase.xi.shape(), expected)?;
+            check_finite(&tensor, &phase.xi)?;
+            if let FeetRule::Patterns(patterns) = &phase.feet {
+                let repeated = (1..patterns.len())
+                    .find(|&second| patterns[..second].contains(&patterns[second]));
+                if let Some(second) = repeated {
+                    return Err(ModelError::DuplicatePattern {
+                        phase: index,
+                        index: second,
+                    });
+                }
+            }
+        }
+        for (index, phase) in self.phases.iter().enumerate() {
+            let selects = |feet| {
+                let first = self.phases.iter().position(|p| p.feet.matches(feet));
+                first == Some(index)
+            };
+            if !all_patterns().any(selects) {
+                return Err(ModelError::UnreachablePhase {
+                    phase: index,
+                    name: phase.name.clone(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_texts(&self) -> Result<(), ModelError> {
+        let printable = |c: char| !c.is_control() || c == '\n';
+        if self.description.len() > MAX_DESCRIPTION_LEN || !self.description.chars().all(printable)
+        {
+            return Err(ModelError::Description {
+                found: self.description.len(),
+                max: MAX_DESCRIPTION_LEN,
+            });
+        }
+        match self.sample_time_s {
+            Some(found) if !(found > 0.0 && found <= MAX_SAMPLE_TIME_S) => {
+                Err(ModelError::SampleTime {
+                    found,
+                    max: MAX_SAMPLE_TIME_S,
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks shapes of encoder and decoder; returns the number of robot coordinates if known.
+    fn check_maps(&self) -> Result<Option<usize>, ModelError> {
+        let latent_dim = self.library.latent_dim();
+        let named = |signals: &Option<Signals>| signals.as_ref().map(Signals::dim);
+        let state_dim = self
+            .robot
+            .map(|_| crate::robot::STATE_DIM)
+            .or(named(&self.state))
+            .or(named(&self.input))
+            .or(self.encoder.as_ref().map(AffineMap::input_dim))
+            .or(self.decoder.as_ref().map(AffineMap::output_dim));
+        if (self.encoder.is_some() || self.decoder.is_some()) && self.scaling.is_none() {
+            let part = if self.encoder.is_some() {
+                "encoder"
+            } else {
+                "decoder"
+            };
+            return Err(ModelError::Incomplete {
+                part,
+                needs: "scaling",
+            });
+        }
+        let Some(dim) = state_dim else {
+            return Ok(None);
+        };
+        if let Some(encoder) = &self.encoder {
+            let expected = (latent_dim, dim.clamp(latent_dim, MAX_STATE_DIM));
+            check_shape("encoder.weights", encoder.weights().shape(), expected)?;
+        }
+        if let Some(decoder) = &self.decoder {
+            let expected = (dim.clamp(1, MAX_STATE_DIM), latent_dim);
+            check_shape("decoder.weights", decoder.weights().shape(), expected)?;
+        }
+        Ok(Some(dim))
+    }
+
+    fn check_signals(&self, state_dim: Option<usize>) -> Result<(), ModelError> {
+        if let Some(state) = &self.state {
+            state.check("state", state_dim)?;
+        }
+        if let Some(input) = &self.input {
+            input.check("input", state_dim)?;
+        }
+        let Some(robot) = self.robot else {
+            return Ok(());
+        };
+        check_robot_names("state", &self.state, &Robot::state_names(), robot)?;
+        check_robot_names("input", &self.input, &Robot::input_names(), robot)
+    }
+
+    /// Checks the statistics and puts them in the order of the phases.
+    fn check_statistics(
+        &self,
+        state_dim: Option<usize>,
+    ) -> Result<Vec<Option<InputStatistics>>, ModelError> {
+        let mut ordered = vec![None; self.phases.len()];
+        for (name, statistics) in &self.statistics {
+            let slot = self
+                .phases
+                .iter()
+                .position(|phase| phase.name == *name)
+                .map(|phase| &mut ordered[phase])
+                .filter(|slot| slot.is_none())
+                .ok_or_else(|| ModelError::StatisticsPhase { name: name.clone() })?;
+            let dim = state_dim.ok_or(ModelError::Incomplete {
+                part: "input_statistics",
+                needs: "encoder",
+            })?;
+            statistics.check(name, dim)?;
+            *slot = Some(statistics.clone());
+        }
+        Ok(ordered)
+    }
+}
+
+fn identifier_of(what: &str, name: &str) -> Result<Identifier, ModelError> {
+    Identifier::from_name(name).map_err(|source| ModelError::Name {
+        what: what.to_owned(),
+        name: name.chars().take(80).collect(),
+        source,
+    })
+}
+
+fn check_robot_names(
+    signals: &'static str,
+    given: &Option<Signals>,
+    expected: &[String],
+    robot: &Robot,
+) -> Result<(), ModelError> {
+    let Some(given) = given else {
+        return Ok(());
+    };
+    for (index, (found, expected)) in given.names.iter().zip(expected).enumerate() {
+        if found != expected {
+            return Err(ModelError::RobotSignal {
+                signals,
+                index,
+                found: found.clone(),
+                expected: expected.clone(),
+                robot: robot.name().to_owned(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// `pinv(W_e^T)`, `latent_dim x state_dim`, from the singular values of `W_e = U S V^T`:
+/// `pinv(W_e^T) = U S^-1 V^T`.
+fn pinv_of_transpose(weights: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
+    let expected = weights.nrows();
+    let deficient = |smallest, largest| ModelError::RankDeficient {
+        smallest,
+        largest,
+        expected,
+        tolerance: RANK_TOLERANCE,
+    };
+    let largest_entry = weights.amax();
+    if largest_entry == 0.0 {
+        return Err(deficient(0.0, 0.0));
+    }
+    // Divided by the largest entry first, so that no intermediate product overflows.
+    let normalised = weights / largest_entry;
+    let max_iterations = 1_000 * weights.ncols();
+    let svd = nalgebra::SVD::try_new(normalised, true, true, f64::EPSILON, max_iterations)
+        .filter(|svd| svd.singular_values.iter().all(|value| value.is_finite()))
+        .ok_or_else(|| ModelError::Decomposition {
+            tensor: "encoder.weights".to_owned(),
+        })?;
+    let smallest = svd.singular_values.min();
+    let largest = svd.singular_values.max();
+    if smallest <= RANK_TOLERANCE * largest {
+        return Err(deficient(smallest * largest_entry, largest * largest_entry));
+    }
+    let u = svd.u.expect("asked for the left singular vectors");
+    let v_t = svd.v_t.expect("asked for the right singular vectors");
+    let inverse = svd.singular_values.map(|value| 1.0 / value);
+    let projection = u * DMatrix::from_diagonal(&inverse) * v_t / largest_entry;
+    check_finite("pinv(encoder.weights^T)", &projection)?;
+    Ok(projection)
+}

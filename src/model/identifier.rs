@@ -1,0 +1,439 @@
+//! Names that are safe in generated C, C++ and Rust.
+
+use std::fmt;
+
+use thiserror::Error;
+
+/// Longest identifier in bytes. With prefix and suffix of a generated function it stays below the
+/// 127 characters that C compilers promise to tell apart in practice.
+pub const MAX_IDENTIFIER_LEN: usize = 40;
+
+/// A name which is an identifier in C, C++ and Rust, and neither a keyword nor reserved there.
+///
+/// ```
+/// use romc::model::Identifier;
+///
+/// assert_eq!(Identifier::from_name("go1-d4").unwrap().as_str(), "go1_d4");
+/// assert!(Identifier::from_name("while").is_err());
+/// assert!(Identifier::from_name("x; system(\"x\")").is_err());
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Identifier(String);
+
+/// Why a name cannot be an identifier.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum IdentifierError {
+    /// The name has no character.
+    #[error("it is empty")]
+    Empty,
+    /// The name is too long.
+    #[error("it has {found} bytes, expected at most {MAX_IDENTIFIER_LEN}")]
+    TooLong {
+        /// Its length.
+        found: usize,
+    },
+    /// A character is not allowed.
+    #[error(
+        "found {found:?} at byte {position}, expected ASCII letters, digits, `_`, `-`, `.` or space"
+    )]
+    Character {
+        /// Byte offset.
+        position: usize,
+        /// The character.
+        found: char,
+    },
+    /// It does not begin with a letter.
+    #[error("it begins with {found:?}, expected an ASCII letter")]
+    Start {
+        /// The first character.
+        found: char,
+    },
+    /// C and C++ reserve it for the implementation.
+    #[error("`{identifier}` has two underscores in a row, which C++ reserves for itself")]
+    Reserved {
+        /// The name as an identifier.
+        identifier: String,
+    },
+    /// It is a keyword.
+    #[error("`{identifier}` is a keyword of {language}")]
+    Keyword {
+        /// The name as an identifier.
+        identifier: String,
+        /// Where it is one.
+        language: &'static str,
+    },
+    /// A header, a crate or a device file has this name already.
+    #[error("`{identifier}` is the name of {owner}")]
+    Taken {
+        /// The name as an identifier.
+        identifier: String,
+        /// Whose name it is.
+        owner: &'static str,
+    },
+}
+
+impl Identifier {
+    /// The identifier that a name of the model file stands for: `-`, `.` and space become `_`.
+    ///
+    /// # Errors
+    /// Each variant of [`IdentifierError`]; keywords and taken names are compared without case.
+    pub fn from_name(name: &str) -> Result<Self, IdentifierError> {
+        let first = name.chars().next().ok_or(IdentifierError::Empty)?;
+        if name.len() > MAX_IDENTIFIER_LEN {
+            return Err(IdentifierError::TooLong { found: name.len() });
+        }
+        let allowed = |c: char| c.is_ascii_alphanumeric() || "_-. ".contains(c);
+        if let Some((position, found)) = name.char_indices().find(|&(_, c)| !allowed(c)) {
+            return Err(IdentifierError::Character { position, found });
+        }
+        if !first.is_ascii_alphabetic() {
+            return Err(IdentifierError::Start { found: first });
+        }
+        let identifier = name.replace(['-', '.', ' '], "_");
+        if identifier.contains("__") {
+            return Err(IdentifierError::Reserved { identifier });
+        }
+        let lower = identifier.to_ascii_lowercase();
+        for (language, words) in KEYWORDS {
+            if words.contains(&lower.as_str()) {
+                return Err(IdentifierError::Keyword {
+                    identifier,
+                    language,
+                });
+            }
+        }
+        for (owner, words) in TAKEN {
+            if words.contains(&lower.as_str()) {
+                return Err(IdentifierError::Taken { identifier, owner });
+            }
+        }
+        Ok(Self(identifier))
+    }
+
+    /// The identifier as text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// The identifier in upper case, as macros are written.
+    pub fn upper(&self) -> String {
+        self.0.to_ascii_uppercase()
+    }
+}
+
+impl fmt::Display for Identifier {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl AsRef<str> for Identifier {
+    fn as_ref(&self) -> &str {
+        &self.0
+    }
+}
+
+/// Keywords, lower case (`_Bool` and its like cannot begin a name anyway).
+const KEYWORDS: [(&str, &[&str]); 3] = [
+    (
+        "C",
+        &[
+            "auto",
+            "break",
+            "case",
+            "char",
+            "const",
+            "continue",
+            "default",
+            "do",
+            "double",
+            "else",
+            "enum",
+            "extern",
+            "float",
+            "for",
+            "goto",
+            "if",
+            "inline",
+            "int",
+            "long",
+            "register",
+            "restrict",
+            "return",
+            "short",
+            "signed",
+            "sizeof",
+            "static",
+            "struct",
+            "switch",
+            "typedef",
+            "union",
+            "unsigned",
+            "void",
+            "volatile",
+            "while",
+            "asm",
+            "fortran",
+            "typeof",
+            "constexpr",
+            "nullptr",
+            "bool",
+            "true",
+            "false",
+            "alignas",
+            "alignof",
+            "static_assert",
+            "thread_local",
+            "typeof_unqual",
+        ],
+    ),
+    (
+        "C++",
+        &[
+            "and",
+            "and_eq",
+            "bitand",
+            "bitor",
+            "catch",
+            "char8_t",
+            "char16_t",
+            "char32_t",
+            "class",
+            "co_await",
+            "co_return",
+            "co_yield",
+            "compl",
+            "concept",
+            "consteval",
+            "constinit",
+            "const_cast",
+            "decltype",
+            "delete",
+            "dynamic_cast",
+            "explicit",
+            "export",
+            "friend",
+            "mutable",
+            "namespace",
+            "new",
+            "noexcept",
+            "not",
+            "not_eq",
+            "operator",
+            "or",
+            "or_eq",
+            "private",
+            "protected",
+            "public",
+            "reinterpret_cast",
+            "requires",
+            "static_cast",
+            "template",
+            "this",
+            "throw",
+            "try",
+            "typeid",
+            "typename",
+            "using",
+            "virtual",
+            "wchar_t",
+            "xor",
+            "xor_eq",
+            "import",
+            "module",
+        ],
+    ),
+    (
+        "Rust",
+        &[
+            "abstract",
+            "as",
+            "async",
+            "await",
+            "become",
+            "box",
+            "crate",
+            "dyn",
+            "final",
+            "fn",
+            "gen",
+            "impl",
+            "in",
+            "let",
+            "loop",
+            "macro",
+            "match",
+            "mod",
+            "move",
+            "mut",
+            "override",
+            "priv",
+            "pub",
+            "ref",
+            "self",
+            "super",
+            "trait",
+            "type",
+            "unsafe",
+            "unsized",
+            "use",
+            "virtual",
+            "where",
+            "yield",
+            "raw",
+            "safe",
+            "macro_rules",
+        ],
+    ),
+];
+
+/// Names of files, crates and devices that a generated file must not shadow, lower case.
+const TAKEN: [(&str, &[&str]); 4] = [
+    (
+        "a standard C header",
+        &[
+            "assert",
+            "complex",
+            "ctype",
+            "errno",
+            "fenv",
+            "inttypes",
+            "iso646",
+            "limits",
+            "locale",
+            "math",
+            "setjmp",
+            "signal",
+            "stdalign",
+            "stdarg",
+            "stdatomic",
+            "stdbit",
+            "stdbool",
+            "stdckdint",
+            "stddef",
+            "stdint",
+            "stdio",
+            "stdlib",
+            "stdnoreturn",
+            "string",
+            "tgmath",
+            "threads",
+            "time",
+            "uchar",
+            "wchar",
+            "wctype",
+        ],
+    ),
+    (
+        "a standard function or macro of C",
+        &[
+            "main", "null", "eof", "errno", "sin", "cos", "tan", "tanh", "exp", "log", "sqrt",
+            "abs", "fabs", "pow", "isfinite", "isnan", "system",
+        ],
+    ),
+    (
+        "a crate that generated Rust builds on",
+        &[
+            "std",
+            "core",
+            "alloc",
+            "proc_macro",
+            "test",
+            "libm",
+            "clarabel",
+            "romc",
+        ],
+    ),
+    (
+        "a device file of Windows",
+        &[
+            "con", "prn", "aux", "nul", "com1", "com2", "com3", "com4", "com5", "com6", "com7",
+            "com8", "com9", "lpt1", "lpt2", "lpt3", "lpt4", "lpt5", "lpt6", "lpt7", "lpt8", "lpt9",
+        ],
+    ),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn identifier_of_usual_names_replaces_punctuation() {
+        for (name, expected) in [
+            ("paper-2d", "paper_2d"),
+            ("go1.d6", "go1_d6"),
+            ("rear stance", "rear_stance"),
+            ("A1", "A1"),
+        ] {
+            assert_eq!(Identifier::from_name(name).unwrap().as_str(), expected);
+        }
+    }
+
+    #[test]
+    fn identifier_from_smuggled_text_is_refused_at_its_place() {
+        for (name, position, found) in [
+            ("x; system(\"x\")", 1, ';'),
+            ("a\nb", 1, '\n'),
+            ("a\u{0}", 1, '\u{0}'),
+            ("z\u{301}", 1, '\u{301}'),
+            ("\\input{x}", 0, '\\'),
+            ("../x", 2, '/'),
+        ] {
+            assert_eq!(
+                Identifier::from_name(name),
+                Err(IdentifierError::Character { position, found }),
+                "{name:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn identifier_from_keyword_of_any_language_is_refused_whatever_its_case() {
+        for (name, language) in [
+            ("double", "C"),
+            ("template", "C++"),
+            ("loop", "Rust"),
+            ("LOOP", "Rust"),
+            ("and-eq", "C++"),
+        ] {
+            match Identifier::from_name(name) {
+                Err(IdentifierError::Keyword { language: l, .. }) => assert_eq!(l, language),
+                other => panic!("{name}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn identifier_that_shadows_header_crate_or_device_is_refused() {
+        for name in ["math", "core", "main", "nul", "Stdint"] {
+            assert!(
+                matches!(
+                    Identifier::from_name(name),
+                    Err(IdentifierError::Taken { .. })
+                ),
+                "{name}"
+            );
+        }
+    }
+
+    #[test]
+    fn identifier_with_bad_start_length_or_underscores_is_refused() {
+        assert_eq!(Identifier::from_name(""), Err(IdentifierError::Empty));
+        assert_eq!(
+            Identifier::from_name("2d"),
+            Err(IdentifierError::Start { found: '2' })
+        );
+        assert_eq!(
+            Identifier::from_name("_x"),
+            Err(IdentifierError::Start { found: '_' })
+        );
+        assert_eq!(
+            Identifier::from_name(&"a".repeat(41)),
+            Err(IdentifierError::TooLong { found: 41 })
+        );
+        assert!(matches!(
+            Identifier::from_name("a-_b"),
+            Err(IdentifierError::Reserved { .. })
+        ));
+    }
+}

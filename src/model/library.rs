@@ -1,0 +1,588 @@
+//! The library Theta: ordered candidate terms over `z`, `dz` and `u`.
+
+use std::fmt;
+
+use nalgebra::{DMatrix, DVector};
+use thiserror::Error;
+
+use super::error::{ModelError, check_shape};
+use super::evaluation::Tape;
+use super::standard::{MAX_DEGREE, StandardLibrary};
+use crate::symbolic::{ExprId, ExprPool, ParseError, SymbolId};
+
+/// Largest number of latent coordinates.
+pub const MAX_LATENT_DIM: usize = 64;
+/// Largest number of candidate terms.
+pub const MAX_LIBRARY_DIM: usize = 20_000;
+/// Longest candidate term in bytes.
+pub const MAX_TERM_LEN: usize = 1_000;
+
+/// Index of a candidate term: a row of Xi.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TermId(usize);
+
+impl TermId {
+    pub(super) fn new(index: usize) -> Self {
+        Self(index)
+    }
+
+    /// The row of Xi.
+    pub fn index(self) -> usize {
+        self.0
+    }
+}
+
+/// A variable of candidate terms; indices count from 0, names in files from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LatentVariable {
+    /// Latent coordinate, `z1` for index 0.
+    Z(usize),
+    /// Latent velocity, `dz1` for index 0.
+    Dz(usize),
+    /// Latent input, `u1` for index 0.
+    U(usize),
+}
+
+impl LatentVariable {
+    /// The variable with this name, if there is one at `latent_dim`.
+    pub fn from_name(name: &str, latent_dim: usize) -> Option<Self> {
+        let digits_at = name.find(|c: char| c.is_ascii_digit())?;
+        let (kind, digits) = name.split_at(digits_at);
+        let canonical = !digits.starts_with('0') && digits.bytes().all(|b| b.is_ascii_digit());
+        let number: usize = digits.parse().ok().filter(|_| canonical)?;
+        let index = number.checked_sub(1).filter(|&index| index < latent_dim)?;
+        match kind {
+            "z" => Some(LatentVariable::Z(index)),
+            "dz" => Some(LatentVariable::Dz(index)),
+            "u" => Some(LatentVariable::U(index)),
+            _ => None,
+        }
+    }
+
+    /// All variables at `latent_dim`: z, then dz, then u.
+    pub fn all(latent_dim: usize) -> impl Iterator<Item = Self> {
+        let indices = move || 0..latent_dim;
+        indices()
+            .map(LatentVariable::Z)
+            .chain(indices().map(LatentVariable::Dz))
+            .chain(indices().map(LatentVariable::U))
+    }
+}
+
+impl fmt::Display for LatentVariable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LatentVariable::Z(index) => write!(f, "z{}", index + 1),
+            LatentVariable::Dz(index) => write!(f, "dz{}", index + 1),
+            LatentVariable::U(index) => write!(f, "u{}", index + 1),
+        }
+    }
+}
+
+/// One column of Theta.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CandidateTerm {
+    text: String,
+    expr: ExprId,
+}
+
+impl CandidateTerm {
+    /// The term as the model file writes it.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The term in the library's pool.
+    pub fn expr(&self) -> ExprId {
+        self.expr
+    }
+}
+
+/// How a library was given; the model file keeps the form.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LibrarySource {
+    /// A list of terms.
+    Terms,
+    /// The shorthand.
+    Standard(StandardLibrary),
+}
+
+/// Why a library was refused.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum LibraryError {
+    /// Too few or too many latent coordinates.
+    #[error("`latent_dim`: found {found}, expected 1 to {MAX_LATENT_DIM}")]
+    LatentDim {
+        /// The number given.
+        found: usize,
+    },
+    /// No term at all.
+    #[error("`library`: found no term, expected at least one")]
+    Empty,
+    /// More terms than can be handled.
+    #[error("`library`: found {found} terms, expected at most {MAX_LIBRARY_DIM}")]
+    TooManyTerms {
+        /// How many there are or would be.
+        found: usize,
+    },
+    /// The shorthand asks for a polynomial degree beyond the bound.
+    #[error("`library.degree`: found {found}, expected at most {MAX_DEGREE}")]
+    Degree {
+        /// The degree.
+        found: u32,
+    },
+    /// A term is too long or has control characters.
+    #[error(
+        "`library`[{index}]: found {found} bytes or a control character, expected one line of at most {MAX_TERM_LEN} bytes"
+    )]
+    TermText {
+        /// Index of the term, from 0.
+        index: usize,
+        /// Its length.
+        found: usize,
+    },
+    /// A term is no expression over the model's variables.
+    #[error("`library`[{index}]: {text:?} is not a candidate term")]
+    Parse {
+        /// Index of the term, from 0.
+        index: usize,
+        /// The term.
+        text: String,
+        /// Position, found, expected.
+        #[source]
+        source: Box<ParseError>,
+    },
+    /// A term equals an earlier one.
+    #[error("`library`[{second}]: {text:?} equals [{first}] {earlier:?}")]
+    Duplicate {
+        /// Index of the earlier term.
+        first: usize,
+        /// Index of the later term.
+        second: usize,
+        /// The later term.
+        text: String,
+        /// The earlier term.
+        earlier: String,
+    },
+    /// A part of a term without variables has no finite value, such as `1/0`.
+    #[error("`library`[{index}]: a constant part of {text:?} has no finite value")]
+    NotFinite {
+        /// Index of the term, from 0.
+        index: usize,
+        /// The term.
+        text: String,
+    },
+    /// A term vanishes for all arguments.
+    #[error("`library`[{index}]: {text:?} is zero everywhere")]
+    Zero {
+        /// Index of the term, from 0.
+        index: usize,
+        /// The term.
+        text: String,
+    },
+}
+
+/// Candidate terms in order, over `z1..zd`, `dz1..dzd`, `u1..ud`.
+#[derive(Clone)]
+pub struct Library {
+    latent_dim: usize,
+    source: LibrarySource,
+    pool: ExprPool,
+    symbols: Vec<SymbolId>,
+    terms: Vec<CandidateTerm>,
+    tape: Tape,
+}
+
+impl Library {
+    /// The library with these terms, in the expression syntax of the model file.
+    ///
+    /// # Errors
+    /// Each variant of [`LibraryError`] except [`LibraryError::Degree`].
+    pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self, LibraryError> {
+        Self::build(latent_dim, texts.to_vec(), LibrarySource::Terms)
+    }
+
+    /// The standard library, in the order of the published arrays.
+    ///
+    /// # Errors
+    /// [`LibraryError::LatentDim`], [`LibraryError::Degree`], [`LibraryError::TooManyTerms`].
+    pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self, LibraryError> {
+        check_latent_dim(latent_dim)?;
+        let texts = standard.texts(latent_dim)?;
+        Self::build(latent_dim, texts, LibrarySource::Standard(standard))
+    }
+
+    fn build(
+        latent_dim: usize,
+        texts: Vec<String>,
+        source: LibrarySource,
+    ) -> Result<Self, LibraryError> {
+        check_latent_dim(latent_dim)?;
+        if texts.is_empty() {
+            return Err(LibraryError::Empty);
+        }
+        if texts.len() > MAX_LIBRARY_DIM {
+            return Err(LibraryError::TooManyTerms { found: texts.len() });
+        }
+        let mut pool = ExprPool::new();
+        let symbols: Vec<SymbolId> = LatentVariable::all(latent_dim)
+            .map(|variable| pool.symbol_id(&variable.to_string()))
+            .collect();
+        let zero = pool.number(0.0);
+        let mut first_use = std::collections::HashMap::new();
+        let mut terms: Vec<CandidateTerm> = Vec::with_capacity(texts.len());
+        for (index, text) in texts.into_iter().enumerate() {
+            let expr = parse_term(&mut pool, latent_dim, index, &text)?;
+            if expr == zero {
+                return Err(LibraryError::Zero { index, text });
+            }
+            if !constants_are_finite(&pool, expr) {
+                return Err(LibraryError::NotFinite { index, text });
+            }
+            if let Some(first) = first_use.insert(expr, index) {
+                return Err(LibraryError::Duplicate {
+                    first,
+                    second: index,
+                    text,
+                    earlier: terms[first].text.clone(),
+                });
+            }
+            terms.push(CandidateTerm { text, expr });
+        }
+        let exprs: Vec<ExprId> = terms.iter().map(CandidateTerm::expr).collect();
+        let tape = Tape::new(&pool, &exprs, &symbols);
+        Ok(Self {
+            latent_dim,
+            source,
+            pool,
+            symbols,
+            terms,
+            tape,
+        })
+    }
+
+    /// Number of latent coordinates, `d`.
+    pub fn latent_dim(&self) -> usize {
+        self.latent_dim
+    }
+
+    /// Number of terms: the rows of Xi.
+    pub fn len(&self) -> usize {
+        self.terms.len()
+    }
+
+    /// Whether there is no term; never true of a library that was built.
+    pub fn is_empty(&self) -> bool {
+        self.terms.is_empty()
+    }
+
+    /// Whether the library was given as a list or by the shorthand.
+    pub fn source(&self) -> LibrarySource {
+        self.source
+    }
+
+    /// The terms in order.
+    pub fn terms(&self) -> &[CandidateTerm] {
+        &self.terms
+    }
+
+    /// One term.
+    pub fn term(&self, id: TermId) -> &CandidateTerm {
+        &self.terms[id.index()]
+    }
+
+    /// The pool in which the terms live. Clone it to build on them: ids stay valid in the clone.
+    pub fn pool(&self) -> &ExprPool {
+        &self.pool
+    }
+
+    /// The symbol of a variable in the library's pool, and in clones of it.
+    ///
+    /// `None` if its index is not below `latent_dim`.
+    pub fn symbol(&self, variable: LatentVariable) -> Option<SymbolId> {
+        let (block, index) = match variable {
+            LatentVariable::Z(index) => (0, index),
+            LatentVariable::Dz(index) => (1, index),
+            LatentVariable::U(index) => (2, index),
+        };
+        (index < self.latent_dim).then(|| self.symbols[block * self.latent_dim + index])
+    }
+
+    /// The variable that a symbol of the library's pool stands for.
+    pub fn variable(&self, symbol: SymbolId) -> Option<LatentVariable> {
+        let position = self.symbols.binary_search(&symbol).ok()?;
+        let index = position % self.latent_dim;
+        Some(match position / self.latent_dim {
+            0 => LatentVariable::Z(index),
+            1 => LatentVariable::Dz(index),
+            _ => LatentVariable::U(index),
+        })
+    }
+
+    /// Theta at one point: the value of each term, in order.
+    ///
+    /// # Errors
+    /// [`ModelError::Dimension`] if an argument is not `latent_dim` long.
+    pub fn evaluate(
+        &self,
+        z: &DVector<f64>,
+        dz: &DVector<f64>,
+        u_lat: &DVector<f64>,
+    ) -> Result<DVector<f64>, ModelError> {
+        let d = self.latent_dim;
+        ModelError::check_dimension("latent state z", z.len(), d)?;
+        ModelError::check_dimension("latent velocity dz", dz.len(), d)?;
+        ModelError::check_dimension("latent input u_lat", u_lat.len(), d)?;
+        let variables: Vec<f64> = z.iter().chain(dz).chain(u_lat).copied().collect();
+        let mut values = vec![0.0; self.tape.step_count()];
+        let mut theta = DVector::zeros(self.len());
+        self.tape.run(&variables, &mut values, theta.as_mut_slice());
+        Ok(theta)
+    }
+
+    /// Theta at many points: one row a point, one column a term.
+    ///
+    /// `z`, `dz` and `u_lat` hold one point a column (`latent_dim x n`), as recordings do.
+    ///
+    /// # Errors
+    /// [`ModelError::Shape`] if an argument has not `latent_dim` rows, or not as many columns as
+    /// `z`.
+    pub fn evaluate_points(
+        &self,
+        z: &DMatrix<f64>,
+        dz: &DMatrix<f64>,
+        u_lat: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>, ModelError> {
+        let expected = (self.latent_dim, z.ncols());
+        check_shape("z", z.shape(), expected)?;
+        check_shape("dz", dz.shape(), expected)?;
+        check_shape("u_lat", u_lat.shape(), expected)?;
+        let mut variables = vec![0.0; 3 * self.latent_dim];
+        let mut values = vec![0.0; self.tape.step_count()];
+        let mut theta = vec![0.0; self.len()];
+        let mut all = DMatrix::zeros(z.ncols(), self.len());
+        for point in 0..z.ncols() {
+            let blocks = [z, dz, u_lat].map(|block| block.column(point));
+            let of_point = blocks.iter().flat_map(|block| block.iter());
+            for (variable, value) in variables.iter_mut().zip(of_point) {
+                *variable = *value;
+            }
+            self.tape.run(&variables, &mut values, &mut theta);
+            for (term, value) in theta.iter().enumerate() {
+                all[(point, term)] = *value;
+            }
+        }
+        Ok(all)
+    }
+}
+
+impl PartialEq for Library {
+    /// Equal as given: same dimension, form and texts.
+    fn eq(&self, other: &Self) -> bool {
+        self.latent_dim == other.latent_dim
+            && self.source == other.source
+            && self.terms.len() == other.terms.len()
+            && self
+                .terms
+                .iter()
+                .zip(&other.terms)
+                .all(|(a, b)| a.text == b.text)
+    }
+}
+
+impl fmt::Debug for Library {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Library")
+            .field("latent_dim", &self.latent_dim)
+            .field("source", &self.source)
+            .field("terms", &self.terms)
+            .finish_non_exhaustive()
+    }
+}
+
+fn check_latent_dim(latent_dim: usize) -> Result<(), LibraryError> {
+    if (1..=MAX_LATENT_DIM).contains(&latent_dim) {
+        Ok(())
+    } else {
+        Err(LibraryError::LatentDim { found: latent_dim })
+    }
+}
+
+fn parse_term(
+    pool: &mut ExprPool,
+    latent_dim: usize,
+    index: usize,
+    text: &str,
+) -> Result<ExprId, LibraryError> {
+    if text.len() > MAX_TERM_LEN || text.chars().any(char::is_control) {
+        return Err(LibraryError::TermText {
+            index,
+            found: text.len(),
+        });
+    }
+    let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
+    pool.parse(text, &known)
+        .map_err(|source| LibraryError::Parse {
+            index,
+            text: text.to_owned(),
+            source: Box::new(source),
+        })
+}
+
+/// Whether every part without variables has a finite value.
+fn constants_are_finite(pool: &ExprPool, expr: ExprId) -> bool {
+    let constants: Vec<ExprId> = pool
+        .reachable(&[expr])
+        .into_iter()
+        .filter(|&part| pool.is_constant(part))
+        .collect();
+    let no_symbol = |_| f64::NAN;
+    let values = pool.evaluate_all(&constants, &no_symbol);
+    values.into_iter().all(f64::is_finite)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn terms(texts: &[&str]) -> Vec<String> {
+        texts.iter().map(|&text| text.to_owned()).collect()
+    }
+
+    #[test]
+    fn variable_names_are_read_and_written_alike() {
+        for variable in LatentVariable::all(12) {
+            assert_eq!(
+                LatentVariable::from_name(&variable.to_string(), 12),
+                Some(variable)
+            );
+        }
+        for name in [
+            "z0",
+            "z13",
+            "z01",
+            "z",
+            "z1x",
+            "ddz1",
+            "1",
+            "u99999999999999999999",
+        ] {
+            assert_eq!(LatentVariable::from_name(name, 12), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn library_symbols_map_to_variables_and_back() {
+        let library = Library::from_terms(3, &terms(&["u3*dz2", "z1"])).unwrap();
+        for variable in LatentVariable::all(3) {
+            let symbol = library.symbol(variable).unwrap();
+            assert_eq!(library.variable(symbol), Some(variable));
+        }
+        assert_eq!(library.symbol(LatentVariable::U(3)), None);
+    }
+
+    #[test]
+    fn library_with_terms_equal_after_canonicalisation_is_refused() {
+        let error = Library::from_terms(2, &terms(&["1", "z1*z2", "u1", "z2*z1"])).unwrap_err();
+        assert!(matches!(
+            error,
+            LibraryError::Duplicate {
+                first: 1,
+                second: 3,
+                ..
+            }
+        ));
+    }
+
+    #[test]
+    fn library_with_term_that_does_not_parse_is_refused_with_its_place() {
+        for text in [
+            "z1 +",
+            "z3",
+            "sin z1",
+            "sinh(z1)",
+            "\\input{x}",
+            "x; system(\"x\")",
+            "",
+        ] {
+            let error = Library::from_terms(2, &terms(&["1", text])).unwrap_err();
+            match error {
+                LibraryError::Parse { index, .. } => assert_eq!(index, 1, "{text}"),
+                other => panic!("{text}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn library_with_vanishing_oversized_or_missing_terms_is_refused() {
+        assert!(matches!(
+            Library::from_terms(1, &terms(&["z1 - z1"])),
+            Err(LibraryError::Zero { index: 0, .. })
+        ));
+        for text in ["z1/0", "log(0)*z1", "z1^(1/0)", "sqrt(-1) + z1"] {
+            let error = Library::from_terms(1, &terms(&[text])).unwrap_err();
+            assert!(
+                matches!(error, LibraryError::NotFinite { index: 0, .. }),
+                "{text}: {error:?}"
+            );
+        }
+        assert!(matches!(
+            Library::from_terms(1, &["z1+".repeat(400) + "z1"]),
+            Err(LibraryError::TermText { index: 0, .. })
+        ));
+        assert!(matches!(
+            Library::from_terms(1, &terms(&["z1\n+1"])),
+            Err(LibraryError::TermText { index: 0, .. })
+        ));
+        assert_eq!(Library::from_terms(1, &[]), Err(LibraryError::Empty));
+        assert_eq!(
+            Library::from_terms(0, &terms(&["1"])),
+            Err(LibraryError::LatentDim { found: 0 })
+        );
+        assert_eq!(
+            Library::from_terms(65, &terms(&["1"])),
+            Err(LibraryError::LatentDim { found: 65 })
+        );
+    }
+
+    #[test]
+    fn library_values_agree_with_the_pool_for_every_node() {
+        let texts = [
+            "z1^7 - 2/z1^3",
+            "abs(z1)^dz1",
+            "tanh(log(2 + u1^2))^1.5",
+            "cos(tan(z1)*sqrt(2))",
+            "0.1*z1*dz1*u1",
+        ];
+        let library = Library::from_terms(1, &terms(&texts)).unwrap();
+        let points = [[0.3, -0.7, 2.0], [-1.25, 0.5, -0.1], [2.0, 3.0, 0.0]];
+        let block = |row: usize| DMatrix::from_fn(1, 3, |_, point| points[point][row]);
+        let all = library
+            .evaluate_points(&block(0), &block(1), &block(2))
+            .unwrap();
+        for (point, values) in points.iter().enumerate() {
+            let exprs: Vec<ExprId> = library.terms().iter().map(CandidateTerm::expr).collect();
+            let expected = library
+                .pool()
+                .evaluate_all(&exprs, &|symbol| values[symbol.index()]);
+            for (term, expected) in expected.iter().enumerate() {
+                assert_eq!(all[(point, term)], *expected, "{}", texts[term]);
+            }
+        }
+    }
+
+    #[test]
+    fn library_values_are_those_of_the_terms() {
+        let library = Library::from_terms(
+            1,
+            &terms(&["1", "z1*dz1", "sin(dz1)", "exp(-z1^2)", "u1/2"]),
+        )
+        .unwrap();
+        let at = |value| DVector::from_element(1, value);
+        let theta = library.evaluate(&at(0.5), &at(-2.0), &at(3.0)).unwrap();
+        let expected = [1.0, -1.0, (-2.0f64).sin(), (-0.25f64).exp(), 1.5];
+        for (value, expected) in theta.iter().zip(expected) {
+            assert!((value - expected).abs() < 1e-15, "{value} {expected}");
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! Phases: regimes of the dynamics and the foot patterns that select them.
+
+use nalgebra::DMatrix;
+
+use super::library::TermId;
+use crate::robot::ContactFlags;
+
+/// Which foot patterns select a phase.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FeetRule {
+    /// At least one foot in contact.
+    Any,
+    /// No foot in contact.
+    None,
+    /// Exactly one of these patterns (order fr, fl, rr, rl).
+    Patterns(Vec<ContactFlags>),
+}
+
+impl FeetRule {
+    /// Whether the rule names this pattern.
+    ///
+    /// ```
+    /// use romc::model::FeetRule;
+    ///
+    /// let rear_pair = FeetRule::Patterns(vec![[false, false, true, true]]);
+    /// assert!(rear_pair.matches([false, false, true, true]));
+    /// assert!(!rear_pair.matches([true; 4]));
+    /// assert!(FeetRule::Any.matches([true, false, false, false]));
+    /// assert!(FeetRule::None.matches([false; 4]));
+    /// ```
+    pub fn matches(&self, feet: ContactFlags) -> bool {
+        match self {
+            FeetRule::Any => feet.contains(&true),
+            FeetRule::None => !feet.contains(&true),
+            FeetRule::Patterns(patterns) => patterns.contains(&feet),
+        }
+    }
+}
+
+/// All foot patterns, from no foot to four feet.
+pub(super) fn all_patterns() -> impl Iterator<Item = ContactFlags> {
+    (0u8..16).map(|bits| std::array::from_fn(|foot| bits >> foot & 1 == 1))
+}
+
+/// One dynamics regime: `ddz = Xi^T Theta(z, dz, u_lat)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Phase {
+    /// Name, such as `contact`.
+    pub name: String,
+    /// Foot patterns that select it; the first phase that matches wins.
+    pub feet: FeetRule,
+    /// Coefficients, `library_dim x latent_dim`, in scaled units.
+    pub xi: DMatrix<f64>,
+}
+
+impl Phase {
+    /// Number of coefficients that are not zero.
+    pub fn active_count(&self) -> usize {
+        self.xi.iter().filter(|&&value| value != 0.0).count()
+    }
+
+    /// Terms with a coefficient other than zero for one output, in library order.
+    pub fn support(&self, output: usize) -> Vec<TermId> {
+        self.active_terms(output).map(|(term, _)| term).collect()
+    }
+
+    /// Active terms of one output with their coefficients, in library order.
+    pub fn active_terms(&self, output: usize) -> impl Iterator<Item = (TermId, f64)> + '_ {
+        (0..self.xi.nrows())
+            .map(move |row| (TermId::new(row), self.xi[(row, output)]))
+            .filter(|&(_, value)| value != 0.0)
+    }
+}

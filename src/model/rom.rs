@@ -1,0 +1,408 @@
+//! The hybrid reduced-order model.
+//!
+//! Robot state `x` and generalised input `u = [tau; F_lin; F_ang]` are in SI units; `z`, `dz` and
+//! `u_lat` in scaled units. With the scale factors `s_x`, `s_u` (scaled = factor times SI):
+//!
+//! - `z = W_e (s_x x) + b_e`, `dz = W_e (s_x dx)`: positions take the bias, velocities do not;
+//! - `x = (W_d z + b_d) / s_x`, `dx = (W_d dz) / s_x`;
+//! - `u_lat = pinv(W_e^T) (s_u u)` (project), `u = (W_e^T u_lat) / s_u` (lift);
+//! - `ddz = Xi^T Theta(z, dz, u_lat)` with the Xi of the phase that the feet select.
+//!
+//! `project(lift(u_lat)) == u_lat`, because an encoder has full row rank; the reverse does not hold.
+
+use nalgebra::{DMatrix, DVector};
+use serde_json::{Map, Value};
+
+use super::affine::AffineMap;
+use super::builder::ModelBuilder;
+use super::error::ModelError;
+use super::identifier::Identifier;
+use super::library::{CandidateTerm, Library};
+use super::phase::Phase;
+use super::scaling::Scaling;
+use super::signals::Signals;
+use super::statistics::{InputStatistics, LatentInputStatistics};
+use crate::robot::{ContactFlags, Robot};
+use crate::symbolic::{ExprId, ExprPool};
+
+/// A checked reduced-order model; made by [`ReducedModel::builder`] or read from a model file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReducedModel {
+    pub(super) name: String,
+    pub(super) identifier: Identifier,
+    pub(super) description: String,
+    pub(super) library: Library,
+    pub(super) phases: Vec<Phase>,
+    pub(super) phase_identifiers: Vec<Identifier>,
+    pub(super) statistics: Vec<Option<InputStatistics>>,
+    pub(super) state: Option<Signals>,
+    pub(super) input: Option<Signals>,
+    pub(super) scaling: Option<Scaling>,
+    pub(super) encoder: Option<AffineMap>,
+    pub(super) decoder: Option<AffineMap>,
+    /// `pinv(W_e^T)`, `latent_dim x input_dim`; there when the encoder is.
+    pub(super) input_projection: Option<DMatrix<f64>>,
+    pub(super) robot: Option<&'static Robot>,
+    pub(super) sample_time_s: Option<f64>,
+    pub(super) provenance: Map<String, Value>,
+}
+
+/// The accelerations of one phase as expressions.
+#[derive(Clone)]
+pub struct LatentEquations {
+    /// A clone of the library's pool, with the sums added.
+    pub pool: ExprPool,
+    /// `ddz`, one expression a latent coordinate.
+    pub ddz: Vec<ExprId>,
+}
+
+impl ReducedModel {
+    /// Starts a model; the builder's `build` checks it.
+    pub fn builder(name: impl Into<String>, library: Library) -> ModelBuilder {
+        ModelBuilder::new(name.into(), library)
+    }
+
+    /// Takes the model apart for a change; `build` checks the result again.
+    pub fn into_builder(self) -> ModelBuilder {
+        ModelBuilder::from_model(self)
+    }
+
+    /// Name as in the model file.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The name as it appears in generated code.
+    pub fn identifier(&self) -> &Identifier {
+        &self.identifier
+    }
+
+    /// Free text about the model; may hold any printable character, so never paste it into code.
+    pub fn description(&self) -> &str {
+        &self.description
+    }
+
+    /// Where the model comes from: free JSON.
+    pub fn provenance(&self) -> &Map<String, Value> {
+        &self.provenance
+    }
+
+    /// Number of latent coordinates, `d`.
+    pub fn latent_dim(&self) -> usize {
+        self.library.latent_dim()
+    }
+
+    /// Number of robot coordinates, `n`; `None` for a latent-only model.
+    pub fn state_dim(&self) -> Option<usize> {
+        let encoder = self.encoder.as_ref().map(AffineMap::input_dim);
+        let decoder = self.decoder.as_ref().map(AffineMap::output_dim);
+        encoder
+            .or(decoder)
+            .or(self.state.as_ref().map(Signals::dim))
+            .or(self.input.as_ref().map(Signals::dim))
+    }
+
+    /// The candidate terms.
+    pub fn library(&self) -> &Library {
+        &self.library
+    }
+
+    /// The phases in the order in which their foot rules are tried.
+    pub fn phases(&self) -> &[Phase] {
+        &self.phases
+    }
+
+    /// A phase's name as it appears in generated code.
+    pub fn phase_identifier(&self, phase: usize) -> &Identifier {
+        &self.phase_identifiers[phase]
+    }
+
+    /// Index of the first phase whose rule matches the feet.
+    pub fn phase_for(&self, feet: ContactFlags) -> Option<usize> {
+        self.phases
+            .iter()
+            .position(|phase| phase.feet.matches(feet))
+    }
+
+    /// Index of the phase with this name.
+    pub fn phase_named(&self, name: &str) -> Option<usize> {
+        self.phases.iter().position(|phase| phase.name == name)
+    }
+
+    /// Names and units of the state, if the file has them.
+    pub fn state(&self) -> Option<&Signals> {
+        self.state.as_ref()
+    }
+
+    /// Names and units of the input, if the file has them.
+    pub fn input(&self) -> Option<&Signals> {
+        self.input.as_ref()
+    }
+
+    /// The encoder, in scaled units: `W_e` is `latent_dim x state_dim`.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] for a latent-only model.
+    pub fn encoder(&self) -> Result<&AffineMap, ModelError> {
+        self.require(
+            &self.encoder,
+            "encoder",
+            "going from robot to latent coordinates",
+        )
+    }
+
+    /// The decoder, in scaled units: `W_d` is `state_dim x latent_dim`.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] if the model has none.
+    pub fn decoder(&self) -> Result<&AffineMap, ModelError> {
+        self.require(
+            &self.decoder,
+            "decoder",
+            "going from latent to robot coordinates",
+        )
+    }
+
+    /// The scale factors.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] if the model has none.
+    pub fn scaling(&self) -> Result<&Scaling, ModelError> {
+        self.require(
+            &self.scaling,
+            "scaling",
+            "going between SI and scaled units",
+        )
+    }
+
+    /// `s_x`, one factor a robot coordinate.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] if the model has no scaling, or neither encoder nor decoder.
+    pub fn state_factors(&self) -> Result<DVector<f64>, ModelError> {
+        Ok(self.scaling()?.state.expand(self.require_state_dim()?))
+    }
+
+    /// `s_u`, one factor an input coordinate.
+    ///
+    /// # Errors
+    /// As [`ReducedModel::state_factors`].
+    pub fn input_factors(&self) -> Result<DVector<f64>, ModelError> {
+        Ok(self.scaling()?.input.expand(self.require_state_dim()?))
+    }
+
+    /// `pinv(W_e^T)`, `latent_dim x state_dim`, in scaled units.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] for a latent-only model.
+    pub fn input_projection(&self) -> Result<&DMatrix<f64>, ModelError> {
+        self.require(&self.input_projection, "encoder", "projecting inputs")
+    }
+
+    /// The robot whose coordinates the model speaks of.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] if the file names none.
+    pub fn robot(&self) -> Result<&'static Robot, ModelError> {
+        self.require(&self.robot, "robot", "kinematics and limits")
+            .copied()
+    }
+
+    /// Sampling period of the recordings behind the model, s.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] if the file does not tell.
+    pub fn sample_time_s(&self) -> Result<f64, ModelError> {
+        self.require(&self.sample_time_s, "sample_time_s", "sampling")
+            .copied()
+    }
+
+    /// Mean and covariance of the training inputs of one phase, SI units.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] if the file has none for the phase, [`ModelError::PhaseIndex`].
+    pub fn input_statistics(&self, phase: usize) -> Result<&InputStatistics, ModelError> {
+        self.phase(phase)?;
+        self.require(
+            &self.statistics[phase],
+            "input_statistics",
+            "weighing inputs",
+        )
+    }
+
+    /// Mean and covariance of `u_lat` in one phase: those of `u` through `pinv(W_e^T) s_u`.
+    ///
+    /// # Errors
+    /// As [`ReducedModel::input_statistics`] and [`ReducedModel::project_input`].
+    pub fn latent_input_statistics(
+        &self,
+        phase: usize,
+    ) -> Result<LatentInputStatistics, ModelError> {
+        let statistics = self.input_statistics(phase)?;
+        let projection = self.input_projection()? * DMatrix::from_diagonal(&self.input_factors()?);
+        Ok(LatentInputStatistics {
+            mean: &projection * &statistics.mean,
+            covariance: &projection * &statistics.covariance * projection.transpose(),
+        })
+    }
+
+    /// `z = W_e (s_x x) + b_e`; `x` in SI units.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] for a latent-only model, [`ModelError::Dimension`].
+    pub fn encode(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        self.encoder()?.apply(&self.scaled_state(x)?)
+    }
+
+    /// `dz = W_e (s_x dx)`, and the same for accelerations; `dx` in SI units.
+    ///
+    /// # Errors
+    /// As [`ReducedModel::encode`].
+    pub fn encode_velocity(&self, dx: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        self.encoder()?.apply_linear(&self.scaled_state(dx)?)
+    }
+
+    /// `x = (W_d z + b_d) / s_x`, SI units.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] if the model has no decoder or scaling, [`ModelError::Dimension`].
+    pub fn decode(&self, z: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        let scaled = self.decoder()?.apply(z)?;
+        Ok(scaled.component_div(&self.state_factors()?))
+    }
+
+    /// `dx = (W_d dz) / s_x`, SI units, and the same for accelerations.
+    ///
+    /// # Errors
+    /// As [`ReducedModel::decode`].
+    pub fn decode_velocity(&self, dz: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        let scaled = self.decoder()?.apply_linear(dz)?;
+        Ok(scaled.component_div(&self.state_factors()?))
+    }
+
+    /// Projects a generalised input: `u_lat = pinv(W_e^T) (s_u u)`; `u` in SI units.
+    ///
+    /// # Errors
+    /// As [`ReducedModel::encode`].
+    pub fn project_input(&self, u: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        let projection = self.input_projection()?;
+        ModelError::check_dimension("generalised input u", u.len(), projection.ncols())?;
+        Ok(projection * u.component_mul(&self.input_factors()?))
+    }
+
+    /// Lifts a latent input to a generalised input: `u = (W_e^T u_lat) / s_u`, SI units.
+    ///
+    /// From the power balance under `dz = W_e dx`; joint torques (N m) are the leading entries.
+    ///
+    /// # Errors
+    /// As [`ReducedModel::encode`].
+    pub fn lift_input(&self, u_lat: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        let weights = self.encoder()?.weights();
+        ModelError::check_dimension("latent input u_lat", u_lat.len(), weights.nrows())?;
+        Ok(weights.tr_mul(u_lat).component_div(&self.input_factors()?))
+    }
+
+    /// Latent acceleration `ddz = Xi^T Theta(z, dz, u_lat)` of one phase, term by term in library
+    /// order: the slow and plain evaluation which compiled programs are tested against.
+    ///
+    /// # Errors
+    /// [`ModelError::PhaseIndex`], [`ModelError::Dimension`].
+    pub fn ddz(
+        &self,
+        phase: usize,
+        z: &DVector<f64>,
+        dz: &DVector<f64>,
+        u_lat: &DVector<f64>,
+    ) -> Result<DVector<f64>, ModelError> {
+        let xi = &self.phase(phase)?.xi;
+        let theta = self.library.evaluate(z, dz, u_lat)?;
+        Ok(DVector::from_fn(self.latent_dim(), |output, _| {
+            let mut sum = 0.0;
+            for (&coefficient, &value) in xi.column(output).iter().zip(theta.iter()) {
+                if coefficient != 0.0 {
+                    sum += coefficient * value;
+                }
+            }
+            sum
+        }))
+    }
+
+    /// Active terms of one output of a phase with their coefficients, in library order (the order
+    /// in which the paper prints them).
+    ///
+    /// # Errors
+    /// [`ModelError::PhaseIndex`]; [`ModelError::Dimension`] if `output` is not below `latent_dim`.
+    pub fn active_terms(
+        &self,
+        phase: usize,
+        output: usize,
+    ) -> Result<Vec<(f64, &CandidateTerm)>, ModelError> {
+        let phase = self.phase(phase)?;
+        if output >= self.latent_dim() {
+            return Err(ModelError::Dimension {
+                what: "index of a latent coordinate",
+                found: output,
+                expected: self.latent_dim(),
+            });
+        }
+        Ok(phase
+            .active_terms(output)
+            .map(|(term, coefficient)| (coefficient, self.library.term(term)))
+            .collect())
+    }
+
+    /// The accelerations of one phase as canonical sums, in a clone of the library's pool.
+    ///
+    /// # Errors
+    /// [`ModelError::PhaseIndex`].
+    pub fn equations(&self, phase: usize) -> Result<LatentEquations, ModelError> {
+        let phase = self.phase(phase)?;
+        let mut pool = self.library.pool().clone();
+        let mut ddz = Vec::with_capacity(self.latent_dim());
+        for output in 0..self.latent_dim() {
+            let mut summands = Vec::new();
+            for (term, coefficient) in phase.active_terms(output) {
+                let factor = pool.number(coefficient);
+                summands.push(pool.mul(factor, self.library.term(term).expr()));
+            }
+            ddz.push(pool.sum(&summands));
+        }
+        Ok(LatentEquations { pool, ddz })
+    }
+
+    /// The phase with this index.
+    ///
+    /// # Errors
+    /// [`ModelError::PhaseIndex`].
+    pub fn phase(&self, phase: usize) -> Result<&Phase, ModelError> {
+        self.phases.get(phase).ok_or(ModelError::PhaseIndex {
+            found: phase,
+            count: self.phases.len(),
+        })
+    }
+
+    fn scaled_state(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        let factors = self.state_factors()?;
+        ModelError::check_dimension("robot state", x.len(), factors.len())?;
+        Ok(x.component_mul(&factors))
+    }
+
+    fn require_state_dim(&self) -> Result<usize, ModelError> {
+        let dim = self.state_dim();
+        self.require(&dim, "encoder", "a vector in robot coordinates")
+            .copied()
+    }
+
+    fn require<'a, T>(
+        &self,
+        part: &'a Option<T>,
+        name: &'static str,
+        purpose: &'static str,
+    ) -> Result<&'a T, ModelError> {
+        part.as_ref().ok_or_else(|| ModelError::Missing {
+            model: self.name.clone(),
+            part: name,
+            purpose,
+        })
+    }
+}

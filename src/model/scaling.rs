@@ -1,0 +1,70 @@
+//! Scale factors between SI units and the units in which a model was trained.
+
+use nalgebra::DVector;
+
+use super::error::{ModelError, check_shape};
+
+/// Factors of one kind of quantity: `scaled value = factor * SI value`.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ScaleFactors {
+    /// One factor for all coordinates.
+    Uniform(f64),
+    /// One factor a coordinate.
+    PerCoordinate(DVector<f64>),
+}
+
+impl ScaleFactors {
+    /// One factor a coordinate, whichever way they are stored.
+    pub fn expand(&self, dim: usize) -> DVector<f64> {
+        match self {
+            ScaleFactors::Uniform(factor) => DVector::from_element(dim, *factor),
+            ScaleFactors::PerCoordinate(factors) => factors.clone(),
+        }
+    }
+
+    /// Complains unless there are `dim` positive factors (or one) with finite reciprocals.
+    pub(super) fn check(&self, tensor: &'static str, dim: Option<usize>) -> Result<(), ModelError> {
+        let one;
+        let factors = match self {
+            ScaleFactors::Uniform(factor) => {
+                one = [*factor];
+                &one[..]
+            }
+            ScaleFactors::PerCoordinate(factors) => {
+                let expected = dim.unwrap_or(factors.len());
+                check_shape(&format!("scaling.{tensor}"), factors.shape(), (expected, 1))?;
+                factors.as_slice()
+            }
+        };
+        let usable = |f: f64| f.is_finite() && f > 0.0 && (1.0 / f).is_finite();
+        match factors.iter().position(|&f| !usable(f)) {
+            None => Ok(()),
+            Some(index) => Err(ModelError::ScaleFactor {
+                tensor,
+                index,
+                found: factors[index],
+            }),
+        }
+    }
+}
+
+/// Scale factors of state and input.
+///
+/// The paper trains on all quantities times 0.1 (its "normalisation 1/10"): factor 0.1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scaling {
+    /// `s_x`, for `x`, `dx`, `ddx`.
+    pub state: ScaleFactors,
+    /// `s_u`, for `u`.
+    pub input: ScaleFactors,
+}
+
+impl Scaling {
+    /// One factor for everything.
+    pub fn uniform(factor: f64) -> Self {
+        Self {
+            state: ScaleFactors::Uniform(factor),
+            input: ScaleFactors::Uniform(factor),
+        }
+    }
+}

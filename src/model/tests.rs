@@ -1,0 +1,257 @@
+//! Laws of the whole model: maps in SI units, phases, equations.
+
+use nalgebra::{DMatrix, DVector, SVD};
+use proptest::prelude::*;
+
+use super::*;
+use crate::robot::ContactFlags;
+
+const FOUR_FEET: ContactFlags = [true; 4];
+const REAR_PAIR: ContactFlags = [false, false, true, true];
+const NO_FOOT: ContactFlags = [false; 4];
+
+fn texts(terms: &[&str]) -> Vec<String> {
+    terms.iter().map(|&term| term.to_owned()).collect()
+}
+
+fn phase(name: &str, feet: FeetRule, xi: DMatrix<f64>) -> Phase {
+    Phase {
+        name: name.into(),
+        feet,
+        xi,
+    }
+}
+
+/// A model over `n` coordinates with one term and one phase.
+fn linear_model(
+    encoder: DMatrix<f64>,
+    decoder: DMatrix<f64>,
+    scaling: Scaling,
+) -> Result<ReducedModel, ModelError> {
+    let (d, n) = encoder.shape();
+    let library = Library::from_terms(d, &texts(&["1"]))?;
+    let bias = |dim: usize| DVector::from_fn(dim, |i, _| 0.5 - 0.25 * i as f64);
+    ReducedModel::builder("linear", library)
+        .phase(phase("contact", FeetRule::Any, DMatrix::zeros(1, d)))
+        .scaling(scaling)
+        .encoder(AffineMap::new("encoder", encoder, bias(d))?)
+        .decoder(AffineMap::new("decoder", decoder, bias(n))?)
+        .build()
+}
+
+fn example() -> ReducedModel {
+    linear_model(
+        DMatrix::from_row_slice(2, 3, &[1.0, 2.0, -1.0, 0.5, 0.0, 3.0]),
+        DMatrix::from_row_slice(3, 2, &[0.2, 0.1, 0.3, -0.4, 0.0, 1.5]),
+        Scaling {
+            state: ScaleFactors::PerCoordinate(DVector::from_row_slice(&[0.1, 0.2, 0.5])),
+            input: ScaleFactors::Uniform(0.25),
+        },
+    )
+    .expect("the example is sound")
+}
+
+fn assert_close(found: &DVector<f64>, expected: &[f64]) {
+    assert_eq!(found.len(), expected.len());
+    for (found, expected) in found.iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    }
+}
+
+#[test]
+fn encoder_scales_multiplies_and_adds_bias_to_positions_only() {
+    let x = DVector::from_row_slice(&[10.0, -5.0, 2.0]);
+    // Scaled: 1, -1, 1.
+    assert_close(&example().encode(&x).unwrap(), &[-2.0 + 0.5, 3.5 + 0.25]);
+    assert_close(&example().encode_velocity(&x).unwrap(), &[-2.0, 3.5]);
+}
+
+#[test]
+fn decoder_adds_bias_before_it_unscales() {
+    let z = DVector::from_row_slice(&[1.0, -2.0]);
+    let linear = [0.0, 1.1, -3.0];
+    let bias = [0.5, 0.25, 0.0];
+    let factors = [0.1, 0.2, 0.5];
+    let expected: Vec<f64> = (0..3).map(|i| (linear[i] + bias[i]) / factors[i]).collect();
+    assert_close(&example().decode(&z).unwrap(), &expected);
+    let expected: Vec<f64> = (0..3).map(|i| linear[i] / factors[i]).collect();
+    assert_close(&example().decode_velocity(&z).unwrap(), &expected);
+}
+
+#[test]
+fn lift_is_the_transposed_encoder_in_si_units() {
+    let u_lat = DVector::from_row_slice(&[2.0, -1.0]);
+    let expected = [1.5 / 0.25, 4.0 / 0.25, -5.0 / 0.25];
+    assert_close(&example().lift_input(&u_lat).unwrap(), &expected);
+}
+
+#[test]
+fn maps_refuse_vectors_of_the_wrong_length() {
+    let model = example();
+    let three = DVector::zeros(3);
+    let two = DVector::zeros(2);
+    let four = DVector::zeros(4);
+    for error in [
+        model.encode(&four).unwrap_err(),
+        model.encode_velocity(&two).unwrap_err(),
+        model.decode(&three).unwrap_err(),
+        model.decode_velocity(&three).unwrap_err(),
+        model.project_input(&two).unwrap_err(),
+        model.lift_input(&three).unwrap_err(),
+        model.ddz(0, &two, &two, &three).unwrap_err(),
+    ] {
+        assert!(matches!(error, ModelError::Dimension { .. }), "{error}");
+    }
+    assert_eq!(
+        model.ddz(1, &two, &two, &two),
+        Err(ModelError::PhaseIndex { found: 1, count: 1 })
+    );
+}
+
+#[test]
+fn latent_input_statistics_follow_the_projection() {
+    let model = example();
+    let n = 3;
+    let statistics = InputStatistics {
+        mean: DVector::from_row_slice(&[1.0, 2.0, -3.0]),
+        covariance: DMatrix::from_diagonal(&DVector::from_row_slice(&[4.0, 1.0, 0.25])),
+    };
+    let mean = statistics.mean.clone();
+    let model = model
+        .into_builder()
+        .input_statistics("contact", statistics.clone())
+        .build()
+        .unwrap();
+    let latent = model.latent_input_statistics(0).unwrap();
+    let projected = model.project_input(&mean).unwrap();
+    assert_close(&latent.mean, projected.as_slice());
+    // Independent directions add up: covariance = sum of s_i^2 p_i p_i^T.
+    let mut expected = DMatrix::zeros(2, 2);
+    for i in 0..n {
+        let mut axis = DVector::zeros(n);
+        axis[i] = statistics.covariance[(i, i)].sqrt();
+        let p = model.project_input(&axis).unwrap();
+        expected += &p * p.transpose();
+    }
+    assert!((latent.covariance - expected).amax() < 1e-12);
+}
+
+#[test]
+fn first_phase_whose_rule_matches_the_feet_wins() {
+    let library = Library::from_terms(1, &texts(&["1"])).unwrap();
+    let one = DMatrix::zeros(1, 1);
+    let model = ReducedModel::builder("hybrid", library)
+        .phase(phase(
+            "rear",
+            FeetRule::Patterns(vec![REAR_PAIR]),
+            one.clone(),
+        ))
+        .phase(phase("stance", FeetRule::Any, one.clone()))
+        .phase(phase("flight", FeetRule::None, one))
+        .build()
+        .unwrap();
+    assert_eq!(model.phase_for(REAR_PAIR), Some(0));
+    assert_eq!(model.phase_for(FOUR_FEET), Some(1));
+    assert_eq!(model.phase_for([true, false, false, false]), Some(1));
+    assert_eq!(model.phase_for(NO_FOOT), Some(2));
+    assert_eq!(model.phase_named("stance"), Some(1));
+    assert_eq!(model.phase_identifier(1).as_str(), "stance");
+}
+
+#[test]
+fn feet_that_no_phase_names_select_none() {
+    let library = Library::from_terms(1, &texts(&["1"])).unwrap();
+    let model = ReducedModel::builder("partial", library)
+        .phase(phase("stance", FeetRule::Any, DMatrix::zeros(1, 1)))
+        .build()
+        .unwrap();
+    assert_eq!(model.phase_for(NO_FOOT), None);
+}
+
+#[test]
+fn active_terms_come_in_library_order_without_zeros() {
+    let library = Library::from_terms(2, &texts(&["1", "u1", "z1*dz2"])).unwrap();
+    let xi = DMatrix::from_row_slice(3, 2, &[0.0, 1.5, -2.0, 0.0, 3.0, 0.0]);
+    let model = ReducedModel::builder("sparse", library)
+        .phase(phase("contact", FeetRule::Any, xi))
+        .build()
+        .unwrap();
+    let phase = &model.phases()[0];
+    assert_eq!(phase.active_count(), 3);
+    let rows = |output| -> Vec<usize> { phase.support(output).iter().map(|t| t.index()).collect() };
+    assert_eq!((rows(0), rows(1)), (vec![1, 2], vec![0]));
+    let terms = model.active_terms(0, 0).unwrap();
+    let texts: Vec<(f64, &str)> = terms.iter().map(|&(c, t)| (c, t.text())).collect();
+    assert_eq!(texts, [(-2.0, "u1"), (3.0, "z1*dz2")]);
+    assert!(model.active_terms(0, 2).is_err());
+}
+
+#[test]
+fn builder_of_a_model_gives_the_same_model_back() {
+    let model = example();
+    assert_eq!(model.clone().into_builder().build().unwrap(), model);
+}
+
+/// A well-conditioned random encoder with its factors and a latent input.
+fn arbitrary_lift() -> impl Strategy<Value = (DMatrix<f64>, Vec<f64>, Vec<f64>)> {
+    (1usize..6, 0usize..12).prop_flat_map(|(d, more)| {
+        let n = d + more;
+        (
+            proptest::collection::vec(-2.0..2.0f64, d * n),
+            proptest::collection::vec(0.01..10.0f64, n),
+            proptest::collection::vec(-50.0..50.0f64, d),
+        )
+            .prop_map(move |(weights, factors, u_lat)| {
+                (DMatrix::from_vec(d, n, weights), factors, u_lat)
+            })
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+
+    #[test]
+    fn projection_of_a_lifted_input_is_that_input(
+        (encoder, factors, u_lat) in arbitrary_lift()
+    ) {
+        let values = SVD::new(encoder.clone(), false, false).singular_values;
+        let condition = values.max() / values.min();
+        prop_assume!(condition < 1e6);
+        let scaling = Scaling {
+            state: ScaleFactors::Uniform(0.1),
+            input: ScaleFactors::PerCoordinate(DVector::from_vec(factors)),
+        };
+        let decoder = encoder.transpose();
+        let model = linear_model(encoder, decoder, scaling).unwrap();
+        let u_lat = DVector::from_vec(u_lat);
+        let again = model.project_input(&model.lift_input(&u_lat).unwrap()).unwrap();
+        let error = (&again - &u_lat).amax();
+        prop_assert!(error <= 1e-14 * condition * condition.max(100.0) * (1.0 + u_lat.amax()), "{error}");
+    }
+
+    #[test]
+    fn equations_have_the_value_of_theta_times_xi(
+        xi in proptest::collection::vec(prop_oneof![Just(0.0), -3.0..3.0f64], 15 * 2),
+        point in proptest::collection::vec(-2.0..2.0f64, 6),
+    ) {
+        let library = Library::standard(2, StandardLibrary::default()).unwrap();
+        let model = ReducedModel::builder("random", library)
+            .phase(phase("contact", FeetRule::Any, DMatrix::from_vec(15, 2, xi)))
+            .build()
+            .unwrap();
+        let part = |from: usize| DVector::from_row_slice(&point[from..from + 2]);
+        let (z, dz, u_lat) = (part(0), part(2), part(4));
+        let expected = model.ddz(0, &z, &dz, &u_lat).unwrap();
+        let equations = model.equations(0).unwrap();
+        for (expr, expected) in equations.ddz.iter().zip(expected.iter()) {
+            let value = equations.pool.evaluate(*expr, &|symbol| {
+                match model.library().variable(symbol).unwrap() {
+                    LatentVariable::Z(i) => z[i],
+                    LatentVariable::Dz(i) => dz[i],
+                    LatentVariable::U(i) => u_lat[i],
+                }
+            });
+            prop_assert!((value - expected).abs() < 1e-12, "{value} {expected}");
+        }
+    }
+}

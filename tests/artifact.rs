@@ -1,0 +1,952 @@
+//! The model file: what is accepted, what is refused, and how the refusal reads.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use romc::artifact::{self, ArtifactError, Overwrite};
+use romc::model::{Dimensions, IdentifierError, LibraryError, ModelError, ReducedModel};
+use serde_json::{Value, json};
+
+fn fixture_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/models")
+}
+
+/// All model files of the repository.
+fn model_files() -> Vec<PathBuf> {
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
+    let mut files: Vec<PathBuf> = [fixture_folder(), shipped]
+        .iter()
+        .flat_map(|folder| fs::read_dir(folder).expect("the folder is checked in"))
+        .map(|entry| entry.expect("the folder can be listed").path())
+        .filter(|path| {
+            path.extension()
+                .is_some_and(|extension| extension == "json")
+        })
+        .collect();
+    files.sort();
+    assert!(files.len() >= 8, "{files:?}");
+    files
+}
+
+fn fixture(name: &str) -> Value {
+    let path = fixture_folder().join(name).with_extension("json");
+    serde_json::from_slice(&fs::read(path).expect("fixture")).expect("fixture is JSON")
+}
+
+fn read_value(value: &Value) -> Result<ReducedModel, ArtifactError> {
+    artifact::read_from_bytes("file.json", value.to_string().as_bytes())
+}
+
+/// Reads the fixture after a change, which must be refused.
+fn refusal(name: &str, change: impl Fn(&mut Value)) -> ArtifactError {
+    let mut value = fixture(name);
+    change(&mut value);
+    let error = read_value(&value).expect_err("the change makes the model unusable");
+    assert!(artifact::describe(&error).starts_with("file.json: "));
+    error
+}
+
+fn model_refusal(name: &str, change: impl Fn(&mut Value)) -> ModelError {
+    match refusal(name, change) {
+        ArtifactError::Model { source, .. } => *source,
+        other => panic!("{}", artifact::describe(&other)),
+    }
+}
+
+/// `(place, message)` of a refused syntax.
+fn syntax_refusal(name: &str, change: impl Fn(&mut Value)) -> (String, String) {
+    match refusal(name, change) {
+        ArtifactError::Syntax { place, message, .. } => (place, message),
+        other => panic!("{}", artifact::describe(&other)),
+    }
+}
+
+/// The array that a JSON pointer names.
+fn array<'a>(value: &'a mut Value, pointer: &str) -> &'a mut Vec<Value> {
+    value
+        .pointer_mut(pointer)
+        .and_then(Value::as_array_mut)
+        .unwrap_or_else(|| panic!("{pointer} is an array"))
+}
+
+#[test]
+fn every_model_file_reads_back_from_its_own_text() {
+    for path in model_files() {
+        let model = artifact::read(&path).unwrap_or_else(|e| panic!("{}", artifact::describe(&e)));
+        let text = artifact::to_text(&model);
+        let again = artifact::read_from_bytes("again", text.as_bytes()).expect("own text");
+        assert_eq!(again, model, "{}", path.display());
+        assert_eq!(artifact::to_text(&again), text);
+    }
+}
+
+#[test]
+fn every_model_file_is_in_the_form_that_write_gives() {
+    for path in model_files() {
+        let model = artifact::read(&path).unwrap_or_else(|e| panic!("{}", artifact::describe(&e)));
+        let text = fs::read_to_string(&path).expect("readable");
+        assert!(text == artifact::to_text(&model), "{}", path.display());
+    }
+}
+
+#[test]
+fn written_numbers_read_back_bit_for_bit() {
+    let numbers = [
+        5e-324,
+        f64::MIN_POSITIVE,
+        f64::MAX,
+        -0.0,
+        0.1 + 0.2,
+        1.0 / 3.0,
+        9007199254740993.0,
+        -2.225_073_858_507_201e-308,
+        123456.789e-12,
+    ];
+    for number in numbers {
+        let mut value = fixture("one-dimensional");
+        value["phases"][0]["xi"][0][0] = json!(number);
+        let model = read_value(&value).expect("finite numbers are accepted");
+        let text = artifact::to_text(&model);
+        let again = artifact::read_from_bytes("again", text.as_bytes()).expect("own text");
+        let xi = again.phases()[0].xi[(0, 0)];
+        assert_eq!(xi.to_bits(), f64::to_bits(number), "{number:e}");
+    }
+}
+
+#[test]
+fn paper_model_has_the_printed_equations() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/paper-2d.json");
+    let model = artifact::read(&path).expect("shipped");
+    let printed = |phase: usize, output: usize| -> Vec<(f64, String)> {
+        let terms = model.active_terms(phase, output).expect("in range");
+        terms
+            .into_iter()
+            .map(|(coefficient, term)| (coefficient, term.text().to_owned()))
+            .collect()
+    };
+    let expected = |terms: &[(f64, &str)]| -> Vec<(f64, String)> {
+        terms.iter().map(|&(c, t)| (c, t.to_owned())).collect()
+    };
+    assert_eq!(model.phases()[0].name, "contact");
+    assert_eq!(
+        printed(0, 0),
+        expected(&[
+            (0.36, "1"),
+            (-0.16, "dz1"),
+            (-0.91, "dz2"),
+            (-0.75, "sin(dz1)"),
+            (0.11, "u1"),
+            (-0.05, "u2")
+        ])
+    );
+    assert_eq!(
+        printed(0, 1),
+        expected(&[
+            (-0.16, "1"),
+            (-0.23, "dz1"),
+            (-0.75, "dz2"),
+            (-0.96, "sin(dz2)"),
+            (0.14, "u2")
+        ])
+    );
+    assert_eq!(
+        printed(1, 0),
+        expected(&[
+            (0.29, "1"),
+            (-1.22, "dz1"),
+            (-1.0, "sin(dz1)"),
+            (51.05, "u1")
+        ])
+    );
+    assert_eq!(
+        printed(1, 1),
+        expected(&[(0.42, "dz1"), (0.52, "sin(dz1)")])
+    );
+}
+
+// --- Files that are no model file at all ---------------------------------------------------------
+
+#[test]
+fn missing_file_is_refused_with_its_name() {
+    let error = artifact::read(Path::new("no/such/model.json")).unwrap_err();
+    assert!(matches!(error, ArtifactError::Io { action: "read", .. }));
+    assert!(artifact::describe(&error).starts_with("no/such/model.json: cannot read"));
+}
+
+#[test]
+fn empty_truncated_and_foreign_files_are_refused_with_line_and_column() {
+    let whole = fixture("three-phases").to_string();
+    for (bytes, expected) in [
+        ("", "EOF"),
+        (&whole[..whole.len() / 2], "EOF"),
+        ("\u{1f}\u{8b}", "expected value"),
+        ("[1, 2]", "found an array"),
+        (&format!("{whole} x"), "trailing characters"),
+    ] {
+        match artifact::read_from_bytes("f", bytes.as_bytes()) {
+            Err(ArtifactError::Syntax { message, line, .. }) => {
+                assert!(message.contains(expected), "{message}");
+                assert!(!message.contains(" at line "), "{message}");
+                assert!(line <= 1);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn deeply_nested_file_is_refused() {
+    let nested = "[".repeat(100_000);
+    let error = artifact::read_from_bytes("f", nested.as_bytes()).unwrap_err();
+    assert!(matches!(error, ArtifactError::Syntax { .. }));
+    let balanced = "[".repeat(1_000) + &"]".repeat(1_000);
+    let inside = format!("{{\"schema\": \"romc-model/1\", \"provenance\": {{\"x\": {balanced}}}}}");
+    let error = artifact::read_from_bytes("f", inside.as_bytes()).unwrap_err();
+    assert!(artifact::describe(&error).contains("recursion limit"));
+}
+
+#[test]
+fn file_beyond_the_size_bound_is_refused() {
+    let bytes = vec![b' '; artifact::MAX_FILE_BYTES as usize + 1];
+    let error = artifact::read_from_bytes("f", &bytes).unwrap_err();
+    assert!(matches!(error, ArtifactError::TooLarge { .. }));
+}
+
+#[test]
+fn unknown_or_missing_schema_is_refused_before_anything_else() {
+    for (schema, found) in [
+        (json!("romc-model/2"), "\"romc-model/2\""),
+        (json!(1), "1"),
+        (Value::Null, "none"),
+    ] {
+        let error = refusal("three-phases", |value| {
+            value["schema"] = schema.clone();
+            value["key_of_the_future"] = json!(true);
+        });
+        match error {
+            ArtifactError::Schema { found: f, .. } => assert_eq!(f, found),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn unknown_keys_are_refused_at_every_level() {
+    for pointer in [
+        "",
+        "/state",
+        "/scaling",
+        "/encoder",
+        "/decoder",
+        "/library",
+        "/phases/0",
+        "/input_statistics/contact",
+    ] {
+        let (place, message) = syntax_refusal("robot-degree-2", |value| {
+            value.pointer_mut(pointer).expect("there")["extra"] = json!(1);
+        });
+        assert!(message.contains("unknown field `extra`"), "{message}");
+        assert!(place.ends_with("extra"), "{pointer}: {place}");
+    }
+}
+
+#[test]
+fn missing_and_duplicate_keys_are_refused() {
+    let (_, message) = syntax_refusal("three-phases", |value| {
+        value.as_object_mut().unwrap().remove("phases");
+    });
+    assert!(message.contains("missing field `phases`"));
+    let text = fixture("three-phases").to_string();
+    let doubled = text.replacen('{', "{\"name\": \"other\",", 1);
+    match artifact::read_from_bytes("f", doubled.as_bytes()) {
+        Err(ArtifactError::Syntax { message, .. }) => {
+            assert!(message.contains("duplicate field `name`"), "{message}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+// --- Numbers -------------------------------------------------------------------------------------
+
+#[test]
+fn numbers_that_are_not_finite_are_refused_at_their_place() {
+    let text = fixture("one-dimensional").to_string();
+    for bad in [
+        "NaN", "Infinity", "1e999", "-1e999", "null", "\"0.5\"", "true",
+    ] {
+        for (tensor, good, place) in [
+            ("\"xi\":[[", "0.5", "phases[0].xi[0][0]"),
+            (
+                "\"encoder\":{\"weights\":[[",
+                "0.5",
+                "encoder.weights[0][0]",
+            ),
+            ("\"scaling\":{\"state\":", "0.1", "scaling.state"),
+        ] {
+            let with = |number: &str| format!("{tensor}{number}");
+            let changed = text.replace(&with(good), &with(bad));
+            assert_ne!(changed, text, "{tensor} is in the fixture");
+            match artifact::read_from_bytes("f", changed.as_bytes()) {
+                Err(ArtifactError::Syntax { place: found, .. }) => {
+                    assert_eq!(found, place, "{bad}");
+                }
+                other => panic!("{bad} in {tensor}: {other:?}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn scale_factors_that_are_zero_negative_or_tiny_are_refused() {
+    for factor in [0.0, -0.1, 1e-310] {
+        let error = model_refusal("robot-degree-2", |value| {
+            value["scaling"]["input"][7] = json!(factor);
+        });
+        assert_eq!(
+            error,
+            ModelError::ScaleFactor {
+                tensor: "input",
+                index: 7,
+                found: factor
+            }
+        );
+    }
+    let error = model_refusal("three-phases", |value| value["scaling"]["state"] = json!(0));
+    assert!(matches!(
+        error,
+        ModelError::ScaleFactor {
+            tensor: "state",
+            index: 0,
+            ..
+        }
+    ));
+}
+
+#[test]
+fn sample_time_that_is_not_a_short_positive_time_is_refused() {
+    for time in [0.0, -0.002, 1.5] {
+        let error = model_refusal("robot-degree-2", |value| {
+            value["sample_time_s"] = json!(time)
+        });
+        assert!(matches!(error, ModelError::SampleTime { found, .. } if found == time));
+    }
+}
+
+#[test]
+fn latent_dim_of_zero_or_beyond_bound_is_refused() {
+    for latent_dim in [0usize, 65, 1 << 40] {
+        let error = model_refusal("degree-3", |value| value["latent_dim"] = json!(latent_dim));
+        assert_eq!(
+            error,
+            ModelError::Library(LibraryError::LatentDim { found: latent_dim })
+        );
+    }
+    let (place, _) = syntax_refusal("degree-3", |value| value["latent_dim"] = json!(-1));
+    assert_eq!(place, "latent_dim");
+}
+
+// --- Shapes --------------------------------------------------------------------------------------
+
+#[test]
+fn each_tensor_with_one_row_too_few_or_many_is_refused() {
+    let shape = |rows, columns| Dimensions(rows, columns);
+    for (pointer, tensor, expected) in [
+        ("/encoder/weights", "encoder.weights", shape(3, 18)),
+        ("/encoder/bias", "encoder.bias", shape(3, 1)),
+        ("/decoder/weights", "decoder.weights", shape(18, 3)),
+        ("/decoder/bias", "decoder.bias", shape(18, 1)),
+        ("/phases/0/xi", "phases[0].xi", shape(43, 3)),
+        ("/phases/1/xi", "phases[1].xi", shape(43, 3)),
+        ("/scaling/state", "scaling.state", shape(18, 1)),
+        ("/scaling/input", "scaling.input", shape(18, 1)),
+        ("/state/units", "state.units", shape(18, 1)),
+        ("/input/names", "input.names", shape(18, 1)),
+        ("/input/units", "input.units", shape(18, 1)),
+        (
+            "/input_statistics/flight/covariance",
+            "input_statistics.flight.covariance",
+            shape(18, 18),
+        ),
+    ] {
+        for grow in [false, true] {
+            let error = model_refusal("robot-degree-2", |value| {
+                let rows = array(value, pointer);
+                let last = rows.pop().expect("not empty");
+                if grow {
+                    rows.push(last.clone());
+                    rows.push(last);
+                }
+            });
+            match error {
+                ModelError::Shape {
+                    tensor: t,
+                    found,
+                    expected: e,
+                } => {
+                    // A bias is compared with its weights first: either may be told.
+                    let rows = if grow { expected.0 + 1 } else { expected.0 - 1 };
+                    let told_itself = t == tensor && e == expected && found.0 == rows;
+                    let told_bias = tensor.ends_with(".weights")
+                        && t == tensor.replace("weights", "bias")
+                        && e.0 == rows;
+                    assert!(told_itself || told_bias, "{t}: {found}, {e}");
+                }
+                other => panic!("{pointer}: {other:?}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn state_names_off_by_one_are_refused() {
+    for grow in [false, true] {
+        let error = model_refusal("robot-degree-2", |value| {
+            for key in ["/state/names", "/state/units"] {
+                let texts = array(value, key);
+                let last = texts.pop().expect("not empty");
+                if grow {
+                    texts.push(last.clone());
+                    texts.push(last);
+                }
+            }
+        });
+        match error {
+            ModelError::Shape {
+                tensor, expected, ..
+            } => {
+                assert_eq!(tensor, "state.names");
+                assert_eq!(expected, Dimensions(18, 1));
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn each_matrix_with_one_column_too_few_or_many_is_refused_with_its_row() {
+    for (pointer, tensor, expected) in [
+        ("/encoder/weights", "encoder.weights", 18),
+        ("/decoder/weights", "decoder.weights", 3),
+        ("/phases/0/xi", "phases[0].xi", 3),
+        ("/phases/1/xi", "phases[1].xi", 3),
+        (
+            "/input_statistics/contact/covariance",
+            "input_statistics.contact.covariance",
+            18,
+        ),
+    ] {
+        for grow in [false, true] {
+            let error = refusal("robot-degree-2", |value| {
+                let row = array(value, &format!("{pointer}/2"));
+                let last = row.pop().expect("not empty");
+                if grow {
+                    row.push(last.clone());
+                    row.push(last);
+                }
+            });
+            match error {
+                ArtifactError::RowLength {
+                    tensor: t,
+                    row,
+                    found,
+                    expected: e,
+                    ..
+                } => {
+                    assert_eq!((t.as_str(), row, e), (tensor, 2, expected));
+                    assert_eq!(found, if grow { expected + 1 } else { expected - 1 });
+                }
+                other => panic!("{pointer}: {other:?}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn encoder_with_one_column_less_in_all_rows_is_refused_for_a_known_robot() {
+    let error = refusal("robot-degree-2", |value| {
+        for row in array(value, "/encoder/weights") {
+            row.as_array_mut().expect("row").pop();
+        }
+    });
+    assert_eq!(
+        artifact::describe(&error),
+        "file.json: `encoder.weights`[0]: found 17 numbers, expected 18"
+    );
+}
+
+#[test]
+fn mean_off_by_one_is_refused() {
+    let error = refusal("robot-degree-2", |value| {
+        array(value, "/input_statistics/contact/mean").pop();
+    });
+    assert!(artifact::describe(&error).contains("input_statistics.contact"));
+}
+
+#[test]
+fn library_longer_or_shorter_by_one_than_xi_is_refused() {
+    for grow in [false, true] {
+        let error = model_refusal("three-phases", |value| {
+            let terms = array(value, "/library");
+            if grow {
+                terms.push(json!("z1^2"));
+            } else {
+                terms.pop();
+            }
+        });
+        let rows = if grow { 10 } else { 8 };
+        assert_eq!(
+            error,
+            ModelError::Shape {
+                tensor: "phases[0].xi".into(),
+                found: Dimensions(9, 2),
+                expected: Dimensions(rows, 2)
+            }
+        );
+    }
+}
+
+// --- Rank and covariance -------------------------------------------------------------------------
+
+#[test]
+fn encoder_with_dependent_rows_is_refused() {
+    let sum_of_others = model_refusal("robot-degree-2", |value| {
+        let rows = array(value, "/encoder/weights");
+        let sum: Vec<f64> = (0..18)
+            .map(|i| rows[0][i].as_f64().unwrap() - 2.0 * rows[1][i].as_f64().unwrap())
+            .collect();
+        rows[2] = json!(sum);
+    });
+    let zero = model_refusal("robot-degree-2", |value| {
+        for row in array(value, "/encoder/weights") {
+            *row = json!(vec![0.0; 18]);
+        }
+    });
+    for error in [sum_of_others, zero] {
+        match error {
+            ModelError::RankDeficient {
+                smallest,
+                largest,
+                expected,
+                ..
+            } => {
+                assert_eq!(expected, 3);
+                assert!(smallest <= 1e-10 * largest);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn encoder_with_more_rows_than_columns_is_refused() {
+    let error = model_refusal("one-dimensional", |value| {
+        value["encoder"]["weights"] = json!([[1.0], [2.0]]);
+        value["encoder"]["bias"] = json!([0.0, 0.0]);
+        value["decoder"] = json!({ "weights": [[1.0, 2.0]], "bias": [0.0] });
+        value["latent_dim"] = json!(2);
+        value["phases"][0]["xi"] = json!(vec![[0.0, 1.0]; 15]);
+    });
+    assert!(matches!(
+        error,
+        ModelError::Shape { tensor, .. } if tensor == "encoder.weights"
+    ));
+}
+
+#[test]
+fn encoder_with_huge_or_tiny_entries_keeps_its_rank() {
+    for factor in [1e150, 1e-150] {
+        let mut value = fixture("robot-degree-2");
+        for row in array(&mut value, "/encoder/weights") {
+            for number in row.as_array_mut().expect("row") {
+                *number = json!(number.as_f64().unwrap() * factor);
+            }
+        }
+        assert!(read_value(&value).is_ok(), "{factor:e}");
+    }
+}
+
+#[test]
+fn covariance_that_is_not_symmetric_or_positive_is_refused() {
+    let error = model_refusal("robot-degree-2", |value| {
+        let cell = &mut value["input_statistics"]["contact"]["covariance"][5][2];
+        *cell = json!(cell.as_f64().unwrap() + 0.5);
+    });
+    assert!(matches!(
+        error,
+        ModelError::NotSymmetric {
+            row: 5,
+            column: 2,
+            ..
+        }
+    ));
+    let error = model_refusal("robot-degree-2", |value| {
+        value["input_statistics"]["flight"]["covariance"][4][4] = json!(-3.0);
+    });
+    assert!(matches!(error, ModelError::NotPositive { smallest, .. } if smallest <= -3.0));
+}
+
+#[test]
+fn statistics_of_an_unknown_or_repeated_phase_are_refused() {
+    let error = model_refusal("robot-degree-2", |value| {
+        let entry = value["input_statistics"]["contact"].clone();
+        value["input_statistics"]["stance"] = entry;
+    });
+    assert_eq!(
+        error,
+        ModelError::StatisticsPhase {
+            name: "stance".into()
+        }
+    );
+    let text = fixture("robot-degree-2").to_string();
+    let (statistics, contact) = ("\"input_statistics\":{", "\"contact\":{\"mean\":[]},");
+    let doubled = text.replace(statistics, &format!("{statistics}{contact}"));
+    assert_ne!(doubled, text);
+    assert!(artifact::read_from_bytes("f", doubled.as_bytes()).is_err());
+}
+
+#[test]
+fn statistics_without_robot_coordinates_are_refused() {
+    let error = model_refusal("degree-3", |value| {
+        value["input_statistics"] = json!({ "contact": { "mean": [0.0], "covariance": [[1.0]] } });
+    });
+    assert!(matches!(
+        error,
+        ModelError::Incomplete {
+            part: "input_statistics",
+            ..
+        }
+    ));
+}
+
+#[test]
+fn encoder_without_scaling_is_refused() {
+    let error = model_refusal("three-phases", |value| {
+        value.as_object_mut().unwrap().remove("scaling");
+    });
+    assert_eq!(
+        error,
+        ModelError::Incomplete {
+            part: "encoder",
+            needs: "scaling"
+        }
+    );
+}
+
+// --- Library -------------------------------------------------------------------------------------
+
+#[test]
+fn library_terms_that_do_not_parse_are_refused_with_index_and_text() {
+    for text in [
+        "z1 +",
+        "z3",
+        "dz0",
+        "foo(z1)",
+        "sin z1",
+        "z1; z2",
+        "x; system(\"x\")",
+        "\\input{x}",
+    ] {
+        match model_refusal("three-phases", |value| value["library"][3] = json!(text)) {
+            ModelError::Library(LibraryError::Parse { index, text: t, .. }) => {
+                assert_eq!((index, t.as_str()), (3, text));
+            }
+            other => panic!("{text}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn library_terms_nested_beyond_any_use_are_refused_or_read_without_a_panic() {
+    for text in [
+        "(".repeat(500) + "z1" + &")".repeat(499),
+        "(".repeat(490) + "z1" + &")".repeat(490),
+        "-".repeat(999) + "z1",
+        "z1^".repeat(330) + "2",
+        "sin(".repeat(190) + "z1" + &")".repeat(190),
+        "(".repeat(150) + "z1" + &"^9)".repeat(150),
+        "z1^999999999999999999999".to_owned(),
+        "1e308*1e308*z1".to_owned(),
+        "z1/0".to_owned(),
+        "log(0)*z1".to_owned(),
+        "0^-1".to_owned(),
+    ] {
+        let mut value = fixture("three-phases");
+        value["library"][3] = json!(text);
+        if let Err(error) = read_value(&value) {
+            assert!(
+                artifact::describe(&error).contains("`library`[3]"),
+                "{text}"
+            );
+        }
+    }
+}
+
+#[test]
+fn library_with_equal_terms_is_refused() {
+    let error = model_refusal("three-phases", |value| {
+        value["library"][6] = json!("dz2*z1")
+    });
+    assert_eq!(
+        error,
+        ModelError::Library(LibraryError::Duplicate {
+            first: 5,
+            second: 6,
+            text: "dz2*z1".into(),
+            earlier: "z1*dz2".into()
+        })
+    );
+}
+
+#[test]
+fn library_shorthand_beyond_bounds_is_refused_before_it_is_made() {
+    let error = model_refusal("degree-3", |value| {
+        value["library"]["degree"] = json!(1_000_000)
+    });
+    assert_eq!(
+        error,
+        ModelError::Library(LibraryError::Degree { found: 1_000_000 })
+    );
+    let error = model_refusal("degree-3", |value| {
+        value["latent_dim"] = json!(64);
+        value["library"]["degree"] = json!(8);
+    });
+    assert!(matches!(
+        error,
+        ModelError::Library(LibraryError::TooManyTerms { .. })
+    ));
+}
+
+// --- Names and phases ----------------------------------------------------------------------------
+
+#[test]
+fn names_that_are_keywords_or_smuggle_are_refused() {
+    for name in [
+        "while",
+        "namespace",
+        "fn",
+        "math",
+        "",
+        "x; system(\"x\")",
+        "\\input{x}",
+        "a\u{0}b",
+        "a\nb",
+        "*/ int x; /*",
+        "%s",
+        "../../etc/passwd",
+        "zwei\u{e4}",
+        "2d",
+        &"n".repeat(100),
+    ] {
+        for pointer in ["/name", "/phases/1/name"] {
+            let error = model_refusal("degree-3", |value| {
+                *value.pointer_mut(pointer).expect("there") = json!(name);
+            });
+            assert!(
+                matches!(error, ModelError::Name { .. }),
+                "{name:?}: {error}"
+            );
+            assert!(!error.to_string().contains(['\n', '\u{0}']), "{error}");
+        }
+    }
+}
+
+#[test]
+fn refused_name_tells_the_character_and_its_place() {
+    let error = model_refusal("degree-3", |value| value["name"] = json!("ab\\input{x}"));
+    match error {
+        ModelError::Name { what, source, .. } => {
+            assert_eq!(what, "model name");
+            assert_eq!(
+                source,
+                IdentifierError::Character {
+                    position: 2,
+                    found: '\\'
+                }
+            );
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn phase_names_that_collide_as_identifiers_are_refused() {
+    for (first, second) in [
+        ("contact", "contact"),
+        ("rear-stance", "rear stance"),
+        ("contact", "Contact"),
+    ] {
+        let error = model_refusal("degree-3", |value| {
+            value["phases"][0]["name"] = json!(first);
+            value["phases"][1]["name"] = json!(second);
+        });
+        assert!(matches!(
+            error,
+            ModelError::DuplicatePhase {
+                first: 0,
+                second: 1,
+                ..
+            }
+        ));
+    }
+}
+
+#[test]
+fn phase_that_no_foot_pattern_selects_is_refused() {
+    for feet in [json!("any"), json!([]), json!([[1, 0, 0, 0]])] {
+        let error = model_refusal("degree-3", |value| {
+            value["phases"][1]["feet"] = feet.clone()
+        });
+        assert!(matches!(
+            error,
+            ModelError::UnreachablePhase { phase: 1, .. }
+        ));
+    }
+}
+
+#[test]
+fn feet_in_another_spelling_are_refused() {
+    for feet in [
+        json!("all"),
+        json!([[1, 1, 1]]),
+        json!([[1, 1, 1, 2]]),
+        json!([[1, 1, 1, 1, 1]]),
+        json!(4),
+    ] {
+        let (place, _) = syntax_refusal("degree-3", |value| {
+            value["phases"][0]["feet"] = feet.clone();
+        });
+        assert!(place.starts_with("phases[0].feet"), "{place}");
+    }
+    let error = model_refusal("three-phases", |value| {
+        value["phases"][1]["feet"] = json!([[0, 0, 1, 1], [0, 0, 1, 1]]);
+    });
+    assert_eq!(error, ModelError::DuplicatePattern { phase: 1, index: 1 });
+}
+
+#[test]
+fn model_without_phases_is_refused() {
+    let error = model_refusal("degree-3", |value| value["phases"] = json!([]));
+    assert!(matches!(error, ModelError::PhaseCount { found: 0, .. }));
+}
+
+#[test]
+fn signal_names_and_units_that_smuggle_or_repeat_are_refused() {
+    for (pointer, text) in [
+        ("/state/names/1", "x; system(\"x\")"),
+        ("/state/names/1", ""),
+        ("/state/names/1", "a,b"),
+        ("/state/units/0", "*/ int x; /*"),
+        ("/state/units/0", "m // x"),
+        ("/state/units/0", "\\input{x}"),
+        ("/state/units/0", "m\n"),
+    ] {
+        let error = model_refusal("three-phases", |value| {
+            *value.pointer_mut(pointer).expect("there") = json!(text);
+        });
+        assert!(
+            matches!(error, ModelError::SignalText { .. }),
+            "{text:?}: {error}"
+        );
+    }
+    let error = model_refusal("three-phases", |value| {
+        value["state"]["names"][4] = json!("b")
+    });
+    assert!(matches!(
+        error,
+        ModelError::DuplicateSignal {
+            first: 1,
+            second: 4,
+            ..
+        }
+    ));
+}
+
+#[test]
+fn unknown_robot_and_foreign_coordinates_are_refused() {
+    let error = model_refusal("robot-degree-2", |value| value["robot"] = json!("rex"));
+    assert!(matches!(error, ModelError::Robot(_)), "{error}");
+    let error = model_refusal("robot-degree-2", |value| {
+        array(value, "/state/names").swap(3, 6);
+    });
+    assert!(matches!(error, ModelError::RobotSignal { index: 3, .. }));
+}
+
+#[test]
+fn description_with_control_characters_is_refused() {
+    for text in ["a\u{7}b".to_owned(), "x".repeat(20_000)] {
+        let error = model_refusal("degree-3", |value| value["description"] = json!(text));
+        assert!(matches!(error, ModelError::Description { .. }));
+    }
+}
+
+// --- Latent-only models --------------------------------------------------------------------------
+
+#[test]
+fn latent_only_model_says_what_it_lacks() {
+    let model = read_value(&fixture("degree-3")).expect("fixture");
+    let x = nalgebra::DVector::zeros(18);
+    let z = nalgebra::DVector::zeros(2);
+    for error in [
+        model.encode(&x).unwrap_err(),
+        model.encode_velocity(&x).unwrap_err(),
+        model.decode(&z).unwrap_err(),
+        model.decode_velocity(&z).unwrap_err(),
+        model.project_input(&x).unwrap_err(),
+        model.lift_input(&z).unwrap_err(),
+        model.robot().unwrap_err(),
+        model.sample_time_s().unwrap_err(),
+        model.input_statistics(0).unwrap_err(),
+    ] {
+        assert!(matches!(error, ModelError::Missing { .. }), "{error}");
+        assert!(error.to_string().starts_with("model degree-3 has no `"));
+    }
+    assert_eq!(model.state_dim(), None);
+}
+
+// --- Writing -------------------------------------------------------------------------------------
+
+#[test]
+fn written_file_is_whole_and_leaves_nothing_beside_it() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("model.json");
+    let model = read_value(&fixture("robot-degree-2")).expect("fixture");
+    artifact::write(&path, &model).expect("written");
+    assert_eq!(artifact::read(&path).expect("readable"), model);
+    assert_eq!(fs::read_dir(folder.path()).expect("folder").count(), 1);
+    // The digest is that of the file's bytes, whatever the layout of the file that was read.
+    let compact = read_value(&serde_json::from_slice(&fs::read(&path).unwrap()).unwrap());
+    let digest = artifact::digest(&compact.expect("same model"));
+    assert_eq!(digest, artifact::digest(&model));
+    assert_eq!(digest.to_string().len(), 64);
+    assert!(digest.to_string().starts_with(&digest.short()));
+}
+
+#[test]
+fn different_file_is_replaced_only_when_asked() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("model.json");
+    fs::write(&path, "notes").expect("written");
+    let model = read_value(&fixture("degree-3")).expect("fixture");
+    let error = artifact::write(&path, &model).unwrap_err();
+    assert!(matches!(error, ArtifactError::Exists { .. }));
+    assert_eq!(fs::read_to_string(&path).expect("readable"), "notes");
+    artifact::write_with(&path, &model, Overwrite::Replace).expect("replaced");
+    artifact::write(&path, &model).expect("the same bytes are no conflict");
+    assert_eq!(artifact::read(&path).expect("readable"), model);
+}
+
+#[test]
+fn file_in_a_missing_folder_is_refused_and_leaves_nothing() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("no/model.json");
+    let model = read_value(&fixture("degree-3")).expect("fixture");
+    let error = artifact::write(&path, &model).unwrap_err();
+    assert!(matches!(
+        error,
+        ArtifactError::Io {
+            action: "write",
+            ..
+        }
+    ));
+    assert_eq!(fs::read_dir(folder.path()).expect("folder").count(), 0);
+}
