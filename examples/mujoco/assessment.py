@@ -28,8 +28,8 @@ class Assessment:
 
     def summary(self):
         return (
-            f"{self.distance_m:.3f} m, flight {self.flight_s:.3f} s, apex +{self.apex_rise_m:.3f} m, "
-            f"torque {100 * self.torque_share:.0f} % of the limit"
+            f"{self.distance_m:.3f} m, flight {self.flight_s:.3f} s, "
+            f"apex +{self.apex_rise_m:.3f} m, torque {100 * self.torque_share:.0f} % of the limit"
         )
 
     def faults(self, min_flight_s):
@@ -84,13 +84,15 @@ def assess(robot, time_s, x, dx, torque_nm, feet):
 def table(rows):
     """Markdown table of (name, Assessment) pairs."""
     lines = [
-        "| jump | duration s | distance m | apex rise m | flight s | peak torque hx / hy / kn N m | of limit | largest tilt rad |",
+        "| jump | duration s | distance m | apex rise m | flight s "
+        "| peak torque hx / hy / kn N m | of limit | largest tilt rad |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for name, a in rows:
         peak = " / ".join(f"{v:.1f}" for v in a.peak_torque_nm)
         lines.append(
-            f"| {name} | {a.duration_s:.3f} | {a.distance_m:.3f} | {a.apex_rise_m:.3f} | {a.flight_s:.3f} "
-            f"| {peak} | {100 * a.torque_share:.0f} % | {a.largest_tilt_rad:.3f} |"
+            f"| {name} | {a.duration_s:.3f} | {a.distance_m:.3f} | {a.apex_rise_m:.3f} "
+            f"| {a.flight_s:.3f} | {peak} | {100 * a.torque_share:.0f} % "
+            f"| {a.largest_tilt_rad:.3f} |"
         )
     return "\n".join(lines)

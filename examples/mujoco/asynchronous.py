@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from body_control import WRENCH_WEIGHTS
-from jump_controller import FLIGHT_GAINS, JumpController, JumpPlan
+from jump_controller import JumpController, JumpPlan
 from trajectories import Cubic, Quintic
 
 FRONT = np.array([True, True, False, False])
@@ -50,7 +50,7 @@ class SplitThrust:
             (0, y, y, 0, 0, 0),
             (0, z, z, plan.rear_acceleration, plan.rear_acceleration, -9.81),
         ]
-        self.acceleration = np.array([np.interp(self.time_s, knots, l) for l in level])
+        self.acceleration = np.array([np.interp(self.time_s, knots, values) for values in level])
         self.velocity = self.STEP_S * np.cumsum(self.acceleration, axis=1)
         self.position = np.array(start)[:, None] + self.STEP_S * np.cumsum(self.velocity, axis=1)
         self.plan = plan
@@ -76,9 +76,7 @@ class SplitThrust:
             + c * (3 * t**2 - 2 * t**3)
             + d * (t**3 - t**2)
         )
-        speed = (
-            (c - a) * (6 * t - 6 * t**2) + b * (1 - 4 * t + 3 * t**2) + d * (3 * t**2 - 2 * t)
-        )
+        speed = (c - a) * (6 * t - 6 * t**2) + b * (1 - 4 * t + 3 * t**2) + d * (3 * t**2 - 2 * t)
         return angle, speed / rear
 
 
@@ -97,12 +95,17 @@ class AsynchronousController(JumpController):
     def _push_off(self, elapsed):
         reference = self.thrust.at(elapsed)
         angle, rate = self.thrust.pitch(elapsed)
-        attitude = (np.array([self.plan.roll_rad, angle, self.plan.yaw_rad]), np.array([0.0, rate, 0.0]))
+        attitude = (
+            np.array([self.plan.roll_rad, angle, self.plan.yaw_rad]),
+            np.array([0.0, rate, 0.0]),
+        )
         before = self.thrust.release_s - elapsed
         if before > 0.0:
             unloaded = np.clip(1.0 - before / UNLOADING_S, 0.0, 1.0)
             effort = np.where(FRONT, FRONT_EFFORT**unloaded, 1.0)
-            weights = np.array(WRENCH_WEIGHTS) ** (1 - unloaded) * np.array(REAR_WEIGHTS) ** unloaded
+            weights = (
+                np.array(WRENCH_WEIGHTS) ** (1 - unloaded) * np.array(REAR_WEIGHTS) ** unloaded
+            )
             return self._stand_on(reference, attitude, weights=weights, effort=effort)
         pushing = self._stand_on(reference, attitude, ~FRONT, weights=REAR_WEIGHTS)
         return np.where(np.repeat(FRONT, 3), self._lift_front(-before), pushing)

@@ -82,7 +82,10 @@ class BodyControl:
     def torques_for(self, forces):
         """(12,) joint torques that press the feet on the floor with minus `forces`."""
         robot, data = self.robot, self.data
-        torque = data.qfrc_bias[robot.dof_index] + robot.mj.dof_damping[robot.dof_index] * self.joint_rates
+        torque = (
+            data.qfrc_bias[robot.dof_index]
+            + robot.mj.dof_damping[robot.dof_index] * self.joint_rates
+        )
         jacobian = np.zeros((3, robot.mj.nv))
         for leg in range(4):
             if not forces[leg].any():

@@ -5,6 +5,7 @@ import pathlib
 
 import mujoco
 import numpy as np
+from PIL import Image
 
 from recording_format import read_recording, states_of
 from robot_model import TORQUE_LIMIT_NM, RobotModel
@@ -24,8 +25,8 @@ def main():
     parser.add_argument("--robot", choices=TORQUE_LIMIT_NM, default="go1")
     parser.add_argument("--frames", type=int, default=12)
     arguments = parser.parse_args()
-
-    from PIL import Image
+    if not arguments.recording.is_file():
+        parser.error(f"no such file: {arguments.recording}")
 
     x = states_of(read_recording(arguments.recording))[0]
     rows = np.linspace(0, len(x) - 1, arguments.frames).astype(int)

@@ -64,7 +64,9 @@ class JumpController:
         self._advance(time_s, feet)
         elapsed = time_s - self.stage_start_s
         if self.stage == "crouch":
-            return self._stand_on(self.crouch.at(elapsed), self._lean(self.crouch.progress(elapsed)))
+            return self._stand_on(
+                self.crouch.at(elapsed), self._lean(self.crouch.progress(elapsed))
+            )
         if self.stage == "thrust":
             return self._push_off(elapsed)
         if self.stage == "flight":
@@ -72,7 +74,7 @@ class JumpController:
         return self._land(time_s, elapsed)
 
     def rest_s(self, otherwise_s):
-        """When the landing motion is over and the robot stands (s); `otherwise_s` if it never landed."""
+        """When the landing motion is over (s); `otherwise_s` if the robot never landed."""
         if self.stage != "landing":
             return otherwise_s
         return min(self.stage_start_s + self.plan.landing_duration_s + REST_S, otherwise_s)
@@ -87,8 +89,12 @@ class JumpController:
             self._enter("crouch", time_s)
             self.wait_s = plan.hold_s + self.start_s
             goal = self._com_with_trunk_at(plan.crouch_shift_m, plan.crouch_height_m)
-            self.crouch = Quintic(self.body.com, np.zeros(3), goal, plan.crouch_duration_s, self.wait_s)
-        elif self.stage == "crouch" and elapsed >= self.wait_s + plan.crouch_duration_s + plan.hold_s:
+            self.crouch = Quintic(
+                self.body.com, np.zeros(3), goal, plan.crouch_duration_s, self.wait_s
+            )
+        elif (
+            self.stage == "crouch" and elapsed >= self.wait_s + plan.crouch_duration_s + plan.hold_s
+        ):
             self._enter("thrust", time_s)
             self._plan_thrust()
         elif self.stage == "thrust" and (elapsed >= self.thrust.duration_s or not feet.any()):
@@ -140,7 +146,11 @@ class JumpController:
         position, velocity, acceleration = com_reference
         body = self.body
         stiffness, damping = COM_GAINS
-        wanted = acceleration + stiffness * (position - body.com) + damping * (velocity - body.com_velocity)
+        wanted = (
+            acceleration
+            + stiffness * (position - body.com)
+            + damping * (velocity - body.com_velocity)
+        )
         angles, rates = attitude_reference
         stiffness, damping = ATTITUDE_GAINS
         turn = stiffness * (angles - body.rpy) + damping * (rates - body.omega)
@@ -190,7 +200,6 @@ class JumpController:
         self.landing = Quintic(body.com, body.com_velocity, goal, plan.landing_duration_s)
         self.landing_yaw = body.rpy[2]
         self.touchdown_angles = body.rpy.copy()
-        self.flight_elapsed = self.stage_start_s
 
     def _land(self, time_s, elapsed):
         fade = np.clip(1.0 - elapsed / 0.15, 0.0, 1.0)

@@ -63,7 +63,7 @@ class JumpSet:
     upward_velocity: tuple
     sideways_velocity: float
     ranges: dict
-    base: JumpPlan = JumpPlan()
+    base: JumpPlan
     controller: type = JumpController
     velocity_field: str = "takeoff_velocity"
     to_touchdown: bool = False
@@ -81,6 +81,7 @@ SETS = {
         upward_velocity=(1.32, 1.60),
         sideways_velocity=0.04,
         ranges=SYNCHRONOUS,
+        base=JumpPlan(),
     ),
     "go1-noisy": JumpSet(
         robot="go1",
@@ -90,6 +91,7 @@ SETS = {
         upward_velocity=(1.42, 1.60),
         sideways_velocity=0.04,
         ranges=SYNCHRONOUS,
+        base=JumpPlan(),
         noise=SensorNoise(
             joint_rad=0.001,
             joint_rate=0.02,
@@ -140,7 +142,7 @@ def jumps_of(jump_set):
     for rank, index in enumerate(order):
         forward[index] = slots[rank]
     jumps = []
-    for stem, vx in zip(stems, forward):
+    for stem, vx in zip(stems, forward, strict=True):
         vz = random.uniform(*jump_set.upward_velocity)
         vy = random.uniform(-jump_set.sideways_velocity, jump_set.sideways_velocity)
         drawn = {name: random.uniform(*span) for name, span in jump_set.ranges.items()}

@@ -4,8 +4,6 @@ import argparse
 import pathlib
 import sys
 
-import numpy as np
-
 from assessment import assess, longest_flight, table
 from jump_sets import SETS, WARMUP_S, jumps_of
 from recording_format import write_recording
@@ -29,12 +27,9 @@ def record(jump_set, jump):
     """
     robot = RobotModel(jump_set.robot)
     plan = jump.plan
-    leg_m = plan.stand_height_m - robot.foot_radius_m
-    stand = [
-        robot.joints_for_foot(leg, (0.0, robot.hip_offset_m[leg], -leg_m)) for leg in range(4)
-    ]
     simulation = Simulation(robot, jump_set.noise, jump.seed, jump.push)
-    simulation.reset(np.concatenate(stand) + jump.start_offset_rad, plan.stand_height_m)
+    joints = robot.standing_joints(plan.stand_height_m) + jump.start_offset_rad
+    simulation.reset(joints, plan.stand_height_m)
     controller = jump_set.controller(robot, plan, start_s=WARMUP_S)
     log = simulation.run(controller, WARMUP_S + LONGEST_S)
     return log.between(WARMUP_S, controller.rest_s(WARMUP_S + LONGEST_S))
@@ -44,12 +39,16 @@ def main():
     arguments = parse_arguments()
     jump_set = SETS[arguments.set]
     folder = arguments.out_dir or RECORDINGS / arguments.set
-    jumps = jumps_of(jump_set)
-    refuse_foreign_files(folder, {f"{jump.stem}.csv.gz" for jump in jumps}, arguments.force)
+    ours = {f"{jump.stem}.csv.gz" for jump in jumps_of(jump_set)}
+    refuse_foreign_files(folder, ours, arguments.force)
     folder.mkdir(parents=True, exist_ok=True)
+    print(table(write_set(jump_set, folder)))
 
+
+def write_set(jump_set, folder):
+    """Records every jump of the set; returns (stem, Assessment) pairs, landings included."""
     rows = []
-    for jump in jumps:
+    for jump in jumps_of(jump_set):
         path = folder / f"{jump.stem}.csv.gz"
         log = record(jump_set, jump)
         whole = assess(jump_set.robot, log.time_s, log.x, log.dx, log.torque_nm, log.feet())
@@ -59,7 +58,7 @@ def main():
         write_recording(path, log.time_s, log.x, log.dx, log.torque_nm, log.feet())
         rows.append((jump.stem, whole))
         print(f"{path.name}: {whole.summary()}", file=sys.stderr)
-    print(table(rows))
+    return rows
 
 
 def refuse_failed_jump(name, whole, log):

@@ -49,7 +49,7 @@ def write_recording(path, time_s, x, dx, torque_nm, feet):
     texts = [[_decimal(value, digits) for value in column] for column, digits in columns]
     texts += [[str(int(flag)) for flag in feet[:, k]] for k in range(feet.shape[1])]
 
-    lines = [";".join(column_names())] + [";".join(row) for row in zip(*texts)]
+    lines = [";".join(column_names())] + [";".join(row) for row in zip(*texts, strict=True)]
     raw = io.BytesIO()
     with gzip.GzipFile(filename="", fileobj=raw, mode="wb", compresslevel=9, mtime=0) as packed:
         packed.write(("\n".join(lines) + "\n").encode("ascii"))
@@ -66,7 +66,7 @@ def read_recording(path):
         rows = [[float(v.replace(",", ".")) for v in line.split(";")] for line in file]
     if header != column_names():
         raise ValueError(f"{path}: not the 71 columns of a recording")
-    return dict(zip(header, np.array(rows).T))
+    return dict(zip(header, np.array(rows).T, strict=True))
 
 
 def states_of(columns):

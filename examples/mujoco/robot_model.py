@@ -52,11 +52,13 @@ class RobotModel:
         self.qpos_index = np.array([joint.qposadr[0] for joint in joints])
         self.dof_index = np.array([joint.dofadr[0] for joint in joints])
         self.joint_limit_rad = np.array([joint.range for joint in joints])
-        self.actuator_index = np.array([
-            self.mj.actuator(f"{leg}_{joint}").id
-            for leg in upper
-            for joint in ("hip", "thigh", "calf")
-        ])
+        self.actuator_index = np.array(
+            [
+                self.mj.actuator(f"{leg}_{joint}").id
+                for leg in upper
+                for joint in ("hip", "thigh", "calf")
+            ]
+        )
         self.foot_geom = np.array([self.mj.geom(leg).id for leg in upper])
         self.foot_body = self.mj.geom_bodyid[self.foot_geom]
         self.trunk_body = self.mj.body(f"{upper[0]}_hip").parentid[0]
@@ -72,7 +74,7 @@ class RobotModel:
     def foot_position(self, leg, joints):
         """Foot of leg 0..3 in the hip frame (m): trunk axes, origin on the abduction axis.
 
-        p = Rx(hx) [ -l sin(hy) .. ]: the abduction turns about x, hip and knee
+        The abduction turns about x, hip and knee
         about y; a straight leg points along -z, the hip offset along +y (left)
         or -y (right).
         """
@@ -81,26 +83,36 @@ class RobotModel:
         x = -self.thigh_m * np.sin(hy) - calf * np.sin(hy + kn) + forward * np.cos(hy + kn)
         z = -self.thigh_m * np.cos(hy) - calf * np.cos(hy + kn) - forward * np.sin(hy + kn)
         y = self.hip_offset_m[leg]
-        return np.array([
-            x,
-            y * np.cos(hx) - z * np.sin(hx),
-            y * np.sin(hx) + z * np.cos(hx),
-        ])
+        return np.array(
+            [
+                x,
+                y * np.cos(hx) - z * np.sin(hx),
+                y * np.sin(hx) + z * np.cos(hx),
+            ]
+        )
 
     def foot_jacobian(self, leg, joints):
         """d foot_position / d (hx, hy, kn), 3 x 3 (m/rad), hip frame."""
         hx, hy, kn = joints
         forward, calf = self.foot_in_calf_m
-        x, y, z = self.foot_position(leg, joints)
+        _, y, z = self.foot_position(leg, joints)
         knee_x = -calf * np.cos(hy + kn) - forward * np.sin(hy + kn)
         knee_z = calf * np.sin(hy + kn) - forward * np.cos(hy + kn)
         hip_x = -self.thigh_m * np.cos(hy) + knee_x
         hip_z = self.thigh_m * np.sin(hy) + knee_z
-        return np.array([
-            [0.0, hip_x, knee_x],
-            [-z, -np.sin(hx) * hip_z, -np.sin(hx) * knee_z],
-            [y, np.cos(hx) * hip_z, np.cos(hx) * knee_z],
-        ])
+        return np.array(
+            [
+                [0.0, hip_x, knee_x],
+                [-z, -np.sin(hx) * hip_z, -np.sin(hx) * knee_z],
+                [y, np.cos(hx) * hip_z, np.cos(hx) * knee_z],
+            ]
+        )
+
+    def standing_joints(self, height_m):
+        """(12,) joint angles with the feet below the hips and a level trunk this high."""
+        down = height_m - self.foot_radius_m
+        feet = [(0.0, offset, -down) for offset in self.hip_offset_m]
+        return np.concatenate([self.joints_for_foot(leg, foot) for leg, foot in enumerate(feet)])
 
     def joints_for_foot(self, leg, foot):
         """Joint angles (hx, hy, kn) that put the foot at `foot` (hip frame, m), knee backwards.
@@ -116,9 +128,7 @@ class RobotModel:
         reach = np.clip(np.hypot(x, down), 0.08, 0.99 * (self.thigh_m + calf))
         cosine = (reach**2 - self.thigh_m**2 - calf**2) / (2 * self.thigh_m * calf)
         kn = -np.arccos(np.clip(cosine, -1.0, 1.0))
-        hy = np.arctan2(-x, down) + np.arctan2(
-            -calf * np.sin(kn), self.thigh_m + calf * np.cos(kn)
-        )
+        hy = np.arctan2(-x, down) + np.arctan2(-calf * np.sin(kn), self.thigh_m + calf * np.cos(kn))
         angles = np.array([hx, hy, kn + tilt])
         limits = self.joint_limit_rad[3 * leg : 3 * leg + 3]
         return np.clip(angles, limits[:, 0], limits[:, 1])

@@ -19,8 +19,10 @@ pub struct LegGeometry {
     pub hip_m: f64,
     /// From hip flexion to knee, in m.
     pub thigh_m: f64,
-    /// From knee to foot, in m.
+    /// From knee to foot along the calf, in m.
     pub calf_m: f64,
+    /// Offset of the foot in front of the calf, in m.
+    pub foot_forward_m: f64,
 }
 
 impl LegGeometry {
@@ -65,20 +67,21 @@ impl LegGeometry {
     }
 
     /// `|det J| / volume`: 0 at full extension or with the foot on the axis of
-    /// abduction, at most 1.
+    /// abduction, at most about 1.
     ///
-    /// `|det J| = thigh calf |sin kn| |up|`, with `up` the height of the foot in
-    /// the plane of the leg; the hip offset does not enter.
+    /// `|det J|` is the area that thigh and calf span times the height of the
+    /// foot in the plane of the leg; the hip offset does not enter.
     pub fn manipulability(&self, q: &[f64; 3]) -> f64 {
-        let determinant = self.thigh_m * self.calf_m * q[2].sin() * self.in_plane(q).up;
-        determinant.abs() / self.volume_m3()
+        let plane = self.in_plane(q);
+        let area = plane.forward * plane.calf_up - plane.up * plane.calf_forward;
+        (area * plane.up).abs() / self.volume_m3()
     }
 
     fn in_plane(&self, q: &[f64; 3]) -> InPlane {
         let (thigh_sin, thigh_cos) = q[1].sin_cos();
         let (calf_sin, calf_cos) = (q[1] + q[2]).sin_cos();
-        let calf_forward = -self.calf_m * calf_sin;
-        let calf_up = -self.calf_m * calf_cos;
+        let calf_forward = -self.calf_m * calf_sin + self.foot_forward_m * calf_cos;
+        let calf_up = -self.calf_m * calf_cos - self.foot_forward_m * calf_sin;
         InPlane {
             forward: -self.thigh_m * thigh_sin + calf_forward,
             up: -self.thigh_m * thigh_cos + calf_up,
@@ -104,6 +107,11 @@ mod tests {
         hip_m: 0.08,
         thigh_m: 0.213,
         calf_m: 0.21,
+        foot_forward_m: 0.0,
+    };
+    const BENT: LegGeometry = LegGeometry {
+        foot_forward_m: -0.03,
+        ..LEG
     };
 
     fn postures() -> Vec<[f64; 3]> {
@@ -145,14 +153,18 @@ mod tests {
     #[test]
     fn foot_jacobian_agrees_with_central_differences() {
         let step = 1e-6;
-        for leg in Leg::ALL {
+        for (leg, geometry) in Leg::ALL
+            .into_iter()
+            .flat_map(|leg| [(leg, LEG), (leg, BENT)])
+        {
             for q in postures() {
-                let exact = LEG.foot_jacobian(leg, &q);
+                let exact = geometry.foot_jacobian(leg, &q);
                 for joint in 0..3 {
                     let (mut lower, mut upper) = (q, q);
                     lower[joint] -= step;
                     upper[joint] += step;
-                    let slope = (LEG.foot_position(leg, &upper) - LEG.foot_position(leg, &lower))
+                    let slope = (geometry.foot_position(leg, &upper)
+                        - geometry.foot_position(leg, &lower))
                         / (2.0 * step);
                     let error = (exact.column(joint) - slope).norm();
                     assert!(error < 1e-9, "{leg} {q:?} joint {joint}: {error:e}");
@@ -163,10 +175,17 @@ mod tests {
 
     #[test]
     fn manipulability_is_the_normalised_determinant() {
-        for leg in Leg::ALL {
+        for (leg, geometry) in Leg::ALL
+            .into_iter()
+            .flat_map(|leg| [(leg, LEG), (leg, BENT)])
+        {
             for q in postures() {
-                let expected = LEG.foot_jacobian(leg, &q).determinant().abs() / LEG.volume_m3();
-                assert!((LEG.manipulability(&q) - expected).abs() < 1e-13, "{q:?}");
+                let determinant = geometry.foot_jacobian(leg, &q).determinant();
+                let expected = determinant.abs() / geometry.volume_m3();
+                assert!(
+                    (geometry.manipulability(&q) - expected).abs() < 1e-13,
+                    "{q:?}"
+                );
             }
         }
     }

@@ -21,7 +21,7 @@ pub struct Robot {
 }
 
 /// Every registered robot, by name.
-static ROBOTS: [Robot; 1] = [GO1];
+static ROBOTS: [Robot; 3] = [GO1, GO2, A1];
 
 /// Unitree Go1: link lengths, effort, speed and position limits of the maker's
 /// URDF; the mass is that of body and legs together.
@@ -32,6 +32,7 @@ const GO1: Robot = Robot {
         hip_m: 0.08,
         thigh_m: 0.213,
         calf_m: 0.213,
+        foot_forward_m: 0.0,
     },
     hip_position_m: hips(0.1881, 0.04675),
     torque_limit_nm: each_leg([23.7, 23.7, 35.55]),
@@ -39,10 +40,71 @@ const GO1: Robot = Robot {
     joint_speed_limit_rad_s: each_leg([30.1, 30.1, 20.06]),
 };
 
+/// Unitree Go2: the maker's geometry and limits; its rear thighs swing further
+/// back than the front ones.
+const GO2: Robot = Robot {
+    name: "go2",
+    mass_kg: 15.21,
+    geometry: LegGeometry {
+        hip_m: 0.0955,
+        thigh_m: 0.213,
+        calf_m: 0.213,
+        foot_forward_m: -0.002,
+    },
+    hip_position_m: hips(0.1934, 0.0465),
+    torque_limit_nm: each_leg([23.7, 23.7, 45.43]),
+    joint_limit_rad: front_and_rear(
+        [
+            degrees(-60.0, 60.0),
+            degrees(-90.0, 200.0),
+            degrees(-156.0, -48.0),
+        ],
+        [
+            degrees(-60.0, 60.0),
+            degrees(-30.0, 260.0),
+            degrees(-156.0, -48.0),
+        ],
+    ),
+    joint_speed_limit_rad_s: each_leg([30.1, 30.1, 15.7]),
+};
+
+/// Unitree A1: the maker's geometry, limits and sum of masses.
+const A1: Robot = Robot {
+    name: "a1",
+    mass_kg: 12.78,
+    geometry: LegGeometry {
+        hip_m: 0.0838,
+        thigh_m: 0.2,
+        calf_m: 0.2,
+        foot_forward_m: 0.0,
+    },
+    hip_position_m: hips(0.1805, 0.047),
+    torque_limit_nm: each_leg([33.5; 3]),
+    joint_limit_rad: each_leg([
+        degrees(-46.0, 46.0),
+        degrees(-60.0, 240.0),
+        degrees(-154.5, -52.5),
+    ]),
+    joint_speed_limit_rad_s: each_leg([21.0; 3]),
+};
+
 /// The same three values for every leg.
 const fn each_leg<T: Copy>(leg: [T; LEG_JOINT_DIM]) -> [T; JOINT_DIM] {
-    let [a, b, c] = leg;
-    [a, b, c, a, b, c, a, b, c, a, b, c]
+    front_and_rear(leg, leg)
+}
+
+/// Three values for each front leg and three for each rear leg.
+const fn front_and_rear<T: Copy>(
+    front: [T; LEG_JOINT_DIM],
+    rear: [T; LEG_JOINT_DIM],
+) -> [T; JOINT_DIM] {
+    let ([a, b, c], [d, e, f]) = (front, rear);
+    [a, b, c, a, b, c, d, e, f, d, e, f]
+}
+
+/// A range given in degrees, in rad.
+const fn degrees(low: f64, high: f64) -> (f64, f64) {
+    (low.to_radians(), high.to_radians())
 }
 
 /// Hips symmetric about the body's centre.
@@ -189,6 +251,42 @@ mod tests {
             }
             assert!(robot.geometry().manipulability(&[0.0, 0.8, -1.5]) > 0.3);
             assert!(robot.torque_limit_nm().iter().all(|limit| *limit > 0.0));
+        }
+    }
+
+    #[test]
+    fn foot_positions_agree_with_a_physics_engine() {
+        // Foot sphere minus hip body in MuJoCo's Go1 and Go2, trunk upright.
+        let (front, rear) = ([0.31, 0.72, -1.43], [-0.2, 1.1, -2.0]);
+        for (name, leg, q, expected) in [
+            (
+                "go1",
+                Leg::FrontRight,
+                front,
+                [-0.001608342, 0.021940214, -0.330737735],
+            ),
+            (
+                "go1",
+                Leg::RearLeft,
+                rear,
+                [-0.022978536, 0.032906295, -0.240347313],
+            ),
+            (
+                "go2",
+                Leg::FrontRight,
+                front,
+                [-0.003125066, 0.007576739, -0.33670767],
+            ),
+            (
+                "go2",
+                Leg::RearLeft,
+                rear,
+                [-0.024221756, 0.047786081, -0.244962113],
+            ),
+        ] {
+            let foot = Robot::by_name(name).unwrap().foot_position(leg, &q);
+            let error = (foot - Vector3::from(expected)).norm();
+            assert!(error < 2e-9, "{name} {leg}: {error:e}");
         }
     }
 

@@ -1,1 +1,37 @@
-//! Learning a model from recordings.
+//! Learning: recordings in, a reduced-order model with its figures out.
+//!
+//! Enters: recordings of jumps, a robot, [`TrainOptions`]. Leaves: a [`Trained`] model, whose provenance says how to
+//! repeat it, and a [`TrainReport`]. Read [`closed_form`] first: it walks from the dataset over the encoder's row
+//! space ([`subspace`], [`varimax`]) and the decoder ([`latent`]) to the dynamics ([`weak`], [`sparse`], [`select`]),
+//! judged by [`rollout`]s.
+
+pub mod closed_form;
+pub mod dataset;
+pub mod features;
+pub mod latent;
+pub mod metrics;
+pub mod progress;
+pub mod rollout;
+pub mod select;
+pub mod sparse;
+pub mod subspace;
+pub mod varimax;
+pub mod weak;
+
+mod assemble;
+mod error;
+mod options;
+#[cfg(test)]
+mod oscillator;
+mod random;
+mod report;
+mod smooth;
+
+pub use assemble::{Origin, SourceFile};
+pub use closed_form::{Recordings, closed_form};
+pub use dataset::ScaleOptions;
+pub use error::TrainError;
+pub use metrics::{SetMetrics, assess};
+pub use options::{EncoderOptions, LibraryChoice, RegressionOptions, TrainOptions};
+pub use progress::{Progress, Watch};
+pub use report::{PhaseTerms, TrainReport, Trained};

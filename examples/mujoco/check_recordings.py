@@ -1,0 +1,161 @@
+"""Checks the checked-in recordings and the leg kinematics they rest on; exits 1 on any fault."""
+
+import argparse
+import pathlib
+import sys
+import tempfile
+
+import numpy as np
+
+from assessment import assess, longest_flight, table
+from jump_sets import SETS, jumps_of
+from kinematics_check import kinematics_report
+from record_jumps import MIN_FLIGHT_S, RECORDINGS, write_set
+from recording_format import read_recording, states_of
+from robot_model import RobotModel
+from simulation import CONTROL_STEP_S
+
+EXAMPLE = """example:
+  python check_recordings.py              figures and checks of ../recordings
+  python check_recordings.py --reproduce  also records all sets again and compares bytes"""
+MAX_TOTAL_BYTES = 5_000_000
+DURATION_S = (0.8, 1.6)
+DISTANCE_M = (0.14, 0.60)
+REAR_LEAD_S = (0.15, 0.23)
+MIN_HEIGHT_M = 0.15
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog=EXAMPLE, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--recordings", type=pathlib.Path, default=RECORDINGS)
+    parser.add_argument("--reproduce", action="store_true", help="record again, compare bytes")
+    arguments = parser.parse_args()
+
+    faults = []
+    for name, jump_set in SETS.items():
+        folder = arguments.recordings / name
+        found, rows = check_set(folder, jump_set)
+        faults += found
+        readme = folder / "README.md"
+        if not readme.exists() or table(rows) not in readme.read_text(encoding="utf-8"):
+            faults.append(f"{name}/README.md does not hold the table of its jumps")
+        print(f"\n{name} ({jump_set.robot}, seed {jump_set.seed})\n\n{table(rows)}")
+    for robot in sorted({jump_set.robot for jump_set in SETS.values()}):
+        found, report = kinematics_report(RobotModel(robot))
+        faults += found
+        print(f"\n{report}")
+    size = sum(path.stat().st_size for path in arguments.recordings.rglob("*.csv.gz"))
+    print(f"\nall recordings: {size / 1e6:.2f} MB")
+    if size > MAX_TOTAL_BYTES:
+        faults.append(f"recordings take {size} bytes, more than {MAX_TOTAL_BYTES}")
+    if arguments.reproduce:
+        faults += compare_with_new(arguments.recordings)
+
+    for fault in faults:
+        print(f"FAULT {fault}", file=sys.stderr)
+    print(f"{len(faults)} faults")
+    sys.exit(1 if faults else 0)
+
+
+def check_set(folder, jump_set):
+    """(faults, table rows) of one folder."""
+    expected = {f"{jump.stem}.csv.gz" for jump in jumps_of(jump_set)}
+    present = {path.name for path in folder.glob("*.csv.gz")}
+    faults = [f"{folder.name}/{name} is missing" for name in sorted(expected - present)]
+    faults += [f"{folder.name}/{name} is of no set" for name in sorted(present - expected)]
+    robot = RobotModel(jump_set.robot)
+    rows = []
+    for jump in jumps_of(jump_set):
+        path = folder / f"{jump.stem}.csv.gz"
+        if path.name not in present:
+            continue
+        columns = read_recording(path)
+        states = states_of(columns)
+        found = recording_faults(columns["Time"], states, robot, jump_set)
+        faults += [f"{folder.name}/{path.name}: {fault}" for fault in found]
+        x, dx, _, torque, feet = states
+        rows.append((jump.stem, assess(jump_set.robot, columns["Time"], x, dx, torque, feet)))
+    return faults, rows
+
+
+def recording_faults(time_s, states, robot, jump_set):
+    """What is wrong with one recording."""
+    x, dx, ddx, torque, feet = states
+    whole = assess(robot.name, time_s, x, dx, torque, feet)
+    faults = format_faults(time_s, x, dx, ddx)
+    if jump_set.to_touchdown:
+        faults += [f for f in whole.faults(MIN_FLIGHT_S) if not f.startswith("the trunk")]
+    else:
+        faults += whole.faults(MIN_FLIGHT_S)
+    faults += phase_faults(feet, jump_set.to_touchdown)
+    if not DURATION_S[0] <= whole.duration_s <= DURATION_S[1]:
+        faults.append(f"lasts {whole.duration_s:.3f} s")
+    if not jump_set.to_touchdown and not DISTANCE_M[0] <= whole.distance_m <= DISTANCE_M[1]:
+        faults.append(f"goes {whole.distance_m:.3f} m far")
+    if whole.lowest_height_m < MIN_HEIGHT_M:
+        faults.append(f"the trunk sinks to {whole.lowest_height_m:.3f} m")
+    slack = 5 * jump_set.noise.joint_rad if jump_set.noise else 0.0
+    low, high = robot.joint_limit_rad.T
+    if (x[:, :12] < low - slack).any() or (x[:, :12] > high + slack).any():
+        faults.append("a joint leaves its limits")
+    if jump_set.noise is None:
+        # The physics step is a quarter of the recording's, so the mean rate is not quite the
+        # trapezium's; rounding of positions adds 1e-6 m / 2 ms.
+        drift = np.abs(np.diff(x, axis=0) / CONTROL_STEP_S - 0.5 * (dx[1:] + dx[:-1]))
+        if (drift > 0.3 * np.abs(np.diff(dx, axis=0)) + 0.05).any():
+            faults.append("velocities are not the rates of the positions")
+    return faults
+
+
+def format_faults(time_s, x, dx, ddx):
+    faults = []
+    if not np.isfinite(np.hstack([x, dx, ddx])).all():
+        faults.append("holds a value that is not finite")
+    if np.abs(time_s - CONTROL_STEP_S * np.arange(len(time_s))).max() > 1e-9:
+        faults.append("time does not start at 0 in steps of 2 ms")
+    if np.abs(x[0, 12:14]).max() > 0.0:
+        faults.append("body x and y do not start at 0")
+    if np.abs(np.diff(dx, axis=0) / CONTROL_STEP_S - ddx[:-1]).max() > 2e-3:
+        faults.append("accelerations are not the differences of the velocities")
+    return faults
+
+
+def phase_faults(feet, to_touchdown):
+    """The order of contacts: all feet, (rear feet alone,) none, and all feet again at the end."""
+    faults = []
+    count = feet.sum(axis=1)
+    if count[0] != 4:
+        faults.append("does not start on four feet")
+    first, last = longest_flight(feet)
+    if to_touchdown and last != len(feet):
+        faults.append("does not end in flight")
+    if not to_touchdown and count[-1] != 4:
+        faults.append("does not end on four feet")
+    rear_alone = (~feet[:first, :2].any(axis=1) & feet[:first, 2:].all(axis=1)).sum()
+    lead_s = rear_alone * CONTROL_STEP_S
+    if to_touchdown and not REAR_LEAD_S[0] <= lead_s <= REAR_LEAD_S[1]:
+        faults.append(f"the rear feet stand alone for {lead_s:.3f} s")
+    if not to_touchdown and (count[:first] < 4).sum() * CONTROL_STEP_S > 0.05:
+        faults.append("the feet do not leave together")
+    return faults
+
+
+def compare_with_new(recordings):
+    """Faults for files that the recorder does not make again byte for byte."""
+    faults = []
+    with tempfile.TemporaryDirectory() as temporary:
+        for name, jump_set in SETS.items():
+            folder = pathlib.Path(temporary) / name
+            folder.mkdir()
+            write_set(jump_set, folder)
+            for path in sorted(folder.iterdir()):
+                old = recordings / name / path.name
+                if not old.exists() or old.read_bytes() != path.read_bytes():
+                    faults.append(f"{name}/{path.name} does not come out the same again")
+    return faults
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,170 @@
+//! From trained numbers to a model that carries where it comes from.
+
+use nalgebra::{DMatrix, DVector};
+use serde_json::{Map, Value, json};
+use sha2::{Digest, Sha256};
+
+use super::dataset::{Dataset, Quantity};
+use super::error::TrainError;
+use super::options::TrainOptions;
+use super::report::TrainReport;
+use crate::model::{
+    AffineMap, FeetRule, InputStatistics, Library, Phase, ReducedModel, ScaleFactors, Scaling,
+    Signals,
+};
+use crate::recording::Recording;
+use crate::recording::phases::FeetPattern;
+use crate::robot::Robot;
+
+/// The trained parts of a model.
+pub(super) struct Parts {
+    pub library: Library,
+    pub encoder: AffineMap,
+    pub decoder: AffineMap,
+    pub xi: Vec<DMatrix<f64>>,
+}
+
+/// Where a training's numbers come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Origin {
+    /// The command line that repeats the training.
+    pub command: String,
+    /// Recordings with their digests, in the order of use.
+    pub recordings: Vec<SourceFile>,
+}
+
+/// A recording and what it contained.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceFile {
+    /// Path as on the command line.
+    pub path: String,
+    /// Digest of its bytes, with the name of the algorithm in front.
+    pub digest: String,
+}
+
+impl Origin {
+    /// The origin of a training on these recordings; files that can no longer be read have an empty digest.
+    pub fn new(command: impl Into<String>, recordings: &[Recording]) -> Self {
+        let files = recordings.iter().map(|recording| SourceFile {
+            path: recording.path.display().to_string(),
+            digest: std::fs::read(&recording.path)
+                .map(|bytes| sha256(&bytes))
+                .unwrap_or_default(),
+        });
+        Self {
+            command: command.into(),
+            recordings: files.collect(),
+        }
+    }
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes)
+        .iter()
+        .fold(String::from("sha256:"), |text, byte| {
+            text + &format!("{byte:02x}")
+        })
+}
+
+/// Puts the parts together.
+pub(super) fn assemble(
+    parts: Parts,
+    dataset: &Dataset,
+    robot: &'static Robot,
+    options: &TrainOptions,
+    method: &str,
+    origin: &Origin,
+    report: &TrainReport,
+) -> Result<ReducedModel, TrainError> {
+    let mut builder = ReducedModel::builder(options.name.clone(), parts.library)
+        .description(description(options, robot))
+        .robot(robot)
+        .state(signals(Robot::state_names(), Robot::state_units()))
+        .input(signals(Robot::input_names(), Robot::input_units()))
+        .scaling(Scaling {
+            state: ScaleFactors::Uniform(options.scaling.state),
+            input: ScaleFactors::PerCoordinate(options.scaling.factors().input),
+        })
+        .encoder(parts.encoder)
+        .decoder(parts.decoder)
+        .sample_time_s(median_step_s(dataset))
+        .provenance(provenance(options, method, origin, report)?);
+    for (index, (pattern, xi)) in dataset.phases.patterns.iter().zip(parts.xi).enumerate() {
+        let feet = match &pattern.feet {
+            FeetPattern::Any => FeetRule::Any,
+            FeetPattern::None => FeetRule::None,
+            FeetPattern::OneOf(patterns) => FeetRule::Patterns(patterns.clone()),
+        };
+        builder = builder
+            .phase(Phase {
+                name: pattern.name.clone(),
+                feet,
+                xi,
+            })
+            .input_statistics(pattern.name.clone(), input_statistics(dataset, index));
+    }
+    Ok(builder.build()?)
+}
+
+fn description(options: &TrainOptions, robot: &Robot) -> String {
+    format!(
+        "{} latent coordinates of {} jumps",
+        options.latent_dim,
+        robot.name()
+    )
+}
+
+fn signals<const N: usize>(names: [String; N], units: [String; N]) -> Signals {
+    Signals {
+        names: names.into(),
+        units: units.into(),
+    }
+}
+
+/// Mean and covariance of the SI inputs of one phase.
+fn input_statistics(dataset: &Dataset, phase: usize) -> InputStatistics {
+    let mut u = dataset.gather(Quantity::U, Some(phase));
+    for (mut row, factor) in u.row_iter_mut().zip(dataset.scaling.input.iter()) {
+        row /= *factor;
+    }
+    let mean: DVector<f64> = u.column_mean();
+    u.column_iter_mut().for_each(|mut column| column -= &mean);
+    let covariance = &u * u.transpose() / u.ncols().max(1) as f64;
+    let covariance = (&covariance + covariance.transpose()) * 0.5;
+    InputStatistics { mean, covariance }
+}
+
+fn median_step_s(dataset: &Dataset) -> f64 {
+    let mut steps: Vec<f64> = dataset
+        .jumps
+        .iter()
+        .flat_map(|jump| jump.time_s.windows(2).map(|pair| pair[1] - pair[0]))
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    // Recorded times carry rounding; a microsecond is below every sampling.
+    steps
+        .get(steps.len() / 2)
+        .map_or(0.002, |step| (step * 1e6).round() / 1e6)
+}
+
+fn provenance(
+    options: &TrainOptions,
+    method: &str,
+    origin: &Origin,
+    report: &TrainReport,
+) -> Result<Map<String, Value>, TrainError> {
+    let recordings: Vec<Value> = origin
+        .recordings
+        .iter()
+        .map(|file| json!({ "path": file.path, "digest": file.digest }))
+        .collect();
+    let mut map = Map::new();
+    map.insert("command".into(), json!(origin.command));
+    map.insert("romc_version".into(), json!(env!("CARGO_PKG_VERSION")));
+    map.insert("method".into(), json!(method));
+    map.insert("seed".into(), json!(options.seed));
+    map.insert("encoder_options".into(), json!(options.encoder));
+    map.insert("recordings".into(), Value::Array(recordings));
+    map.insert("report".into(), json!(report));
+    Ok(map)
+}

@@ -1,0 +1,89 @@
+//! What can keep a model from being trained.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use crate::model::ModelError;
+use crate::recording::RecordingError;
+use crate::robot::RobotError;
+
+/// Why training stopped without a model.
+#[derive(Debug, Error)]
+pub enum TrainError {
+    /// No recording was given.
+    #[error("no {set} recording was given")]
+    NoRecording {
+        /// `training` or `validation`.
+        set: &'static str,
+    },
+    /// A recording is too short to learn from.
+    #[error(
+        "{path}: {found} samples in a segment starting at row {row}, expected at least {expected}"
+    )]
+    TooFewSamples {
+        /// File.
+        path: PathBuf,
+        /// First row of the segment (1 = header line).
+        row: usize,
+        /// Samples found.
+        found: usize,
+        /// Samples needed.
+        expected: usize,
+    },
+    /// A phase of the model has too few samples over all training recordings.
+    #[error(
+        "phase `{phase}` has {found} samples in the training recordings, expected at least {expected}: \
+         record jumps in which {needed}"
+    )]
+    PhaseSamples {
+        /// Name of the phase.
+        phase: String,
+        /// Samples found.
+        found: usize,
+        /// Samples needed.
+        expected: usize,
+        /// What the recordings would have to show.
+        needed: &'static str,
+    },
+    /// More latent coordinates than the encoder may look at, or none.
+    #[error(
+        "latent dimension {requested}, expected 1 to {active} (the number of coordinates that move or are actuated)"
+    )]
+    LatentDim {
+        /// What was asked for.
+        requested: usize,
+        /// Coordinates that pass the mask.
+        active: usize,
+    },
+    /// An option is outside its range.
+    #[error("{option} is {found}, expected {expected}")]
+    Option {
+        /// Name of the option as on the command line.
+        option: &'static str,
+        /// Value given.
+        found: String,
+        /// Range.
+        expected: &'static str,
+    },
+    /// Every candidate model left the range of finite numbers on the validation recordings.
+    #[error(
+        "all {candidates} candidate models diverge on the validation recordings: try a larger ridge or more data"
+    )]
+    NoStableModel {
+        /// Candidates tried.
+        candidates: usize,
+    },
+    /// The training was cancelled before there was a model to keep.
+    #[error("training was cancelled before the first complete model")]
+    Cancelled,
+    /// A recording could not be turned into inputs.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The robot refused.
+    #[error(transparent)]
+    Robot(#[from] RobotError),
+    /// The trained numbers do not form a model.
+    #[error("the trained model is refused")]
+    Model(#[from] ModelError),
+}

@@ -1,0 +1,378 @@
+//! The candidate library over whole batches of samples, forwards and backwards.
+//!
+//! Every term of the library becomes a few steps of one straight-line tape with shared subexpressions; each step is
+//! computed for all samples of a batch before the next one starts. The reverse sweep turns the gradient with respect
+//! to the terms into the gradient with respect to `z`, `dz` and `u_lat`, exactly.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DMatrixView};
+
+use crate::model::{LatentVariable, Library};
+use crate::symbolic::{ExprId, Function, Node, SymbolId};
+
+/// A library compiled for batches.
+#[derive(Clone, Debug)]
+pub struct Features {
+    steps: Vec<Step>,
+    terms: Vec<usize>, // step of every term
+    latent_dim: usize,
+}
+
+/// One elementwise operation; operands are earlier steps.
+#[derive(Clone, Debug, PartialEq)]
+enum Step {
+    Number(f64),
+    Variable(usize), // index into [z; dz; u_lat]
+    Sum(Vec<usize>),
+    Product(Vec<usize>),
+    Integer(usize, i32),
+    Power(usize, usize),
+    Apply(Function, usize),
+}
+
+/// Values of all steps on one batch, reused between batches.
+#[derive(Clone, Debug, Default)]
+pub struct FeatureValues {
+    values: Vec<Vec<f64>>,
+    adjoints: Vec<Vec<f64>>,
+}
+
+impl Features {
+    /// Compiles the terms of `library`.
+    pub fn new(library: &Library) -> Self {
+        let latent_dim = library.latent_dim();
+        let mut builder = Builder {
+            library,
+            seen: BTreeMap::new(),
+            steps: vec![],
+        };
+        let terms = library
+            .terms()
+            .iter()
+            .map(|term| builder.step(term.expr()))
+            .collect();
+        Self {
+            steps: builder.steps,
+            terms,
+            latent_dim,
+        }
+    }
+
+    /// Number of terms.
+    pub fn library_dim(&self) -> usize {
+        self.terms.len()
+    }
+
+    /// Number of latent coordinates.
+    pub fn latent_dim(&self) -> usize {
+        self.latent_dim
+    }
+
+    /// `Theta` (`n x library_dim`) from `variables` (`3 latent_dim x n`, rows z, dz, u_lat).
+    pub fn evaluate(
+        &self,
+        variables: DMatrixView<'_, f64>,
+        values: &mut FeatureValues,
+    ) -> DMatrix<f64> {
+        let n = variables.ncols();
+        self.forward(variables, values);
+        let mut theta = DMatrix::zeros(n, self.terms.len());
+        for (mut column, &step) in theta.column_iter_mut().zip(&self.terms) {
+            column.copy_from_slice(&values.values[step]);
+        }
+        theta
+    }
+
+    /// Terms at one point: `variables` holds z, dz, u_lat one after the other.
+    pub fn evaluate_point(&self, variables: &[f64], values: &mut FeatureValues, theta: &mut [f64]) {
+        let view = DMatrixView::from_slice(variables, variables.len(), 1);
+        self.forward(view, values);
+        for (slot, &step) in theta.iter_mut().zip(&self.terms) {
+            *slot = values.values[step][0];
+        }
+    }
+
+    /// Adds to `gradient` (`3 latent_dim x n`) what `theta_gradient` (`n x library_dim`) means for the variables.
+    ///
+    /// `values` must hold the forward pass of the same batch.
+    pub fn backward(
+        &self,
+        theta_gradient: &DMatrix<f64>,
+        values: &mut FeatureValues,
+        gradient: &mut DMatrix<f64>,
+    ) {
+        let n = theta_gradient.nrows();
+        values.adjoints.resize(self.steps.len(), Vec::new());
+        for adjoint in &mut values.adjoints {
+            adjoint.clear();
+            adjoint.resize(n, 0.0);
+        }
+        for (column, &step) in theta_gradient.column_iter().zip(&self.terms) {
+            values.adjoints[step]
+                .iter_mut()
+                .zip(column.iter())
+                .for_each(|(a, g)| *a += g);
+        }
+        for index in (0..self.steps.len()).rev() {
+            let (earlier, rest) = values.adjoints.split_at_mut(index);
+            self.steps[index].pull_back(&values.values, index, &rest[0], earlier);
+            if let Step::Variable(row) = self.steps[index] {
+                gradient
+                    .row_mut(row)
+                    .iter_mut()
+                    .zip(&rest[0])
+                    .for_each(|(g, a)| *g += a);
+            }
+        }
+    }
+
+    fn forward(&self, variables: DMatrixView<'_, f64>, values: &mut FeatureValues) {
+        let n = variables.ncols();
+        values.values.resize(self.steps.len(), Vec::new());
+        for (index, step) in self.steps.iter().enumerate() {
+            let (earlier, rest) = values.values.split_at_mut(index);
+            let out = &mut rest[0];
+            out.clear();
+            match step {
+                Step::Number(value) => out.resize(n, *value),
+                Step::Variable(row) => out.extend(variables.row(*row).iter()),
+                Step::Sum(parts) => fold(out, earlier, parts, n, 0.0, |a, b| a + b),
+                Step::Product(parts) => fold(out, earlier, parts, n, 1.0, |a, b| a * b),
+                Step::Integer(base, exponent) => {
+                    out.extend(earlier[*base].iter().map(|v| v.powi(*exponent)))
+                }
+                Step::Power(base, exponent) => {
+                    out.extend(
+                        earlier[*base]
+                            .iter()
+                            .zip(&earlier[*exponent])
+                            .map(|(b, e)| b.powf(*e)),
+                    );
+                }
+                Step::Apply(function, argument) => {
+                    out.extend(earlier[*argument].iter().map(|v| function.evaluate(*v)))
+                }
+            }
+        }
+    }
+}
+
+fn fold(
+    out: &mut Vec<f64>,
+    earlier: &[Vec<f64>],
+    parts: &[usize],
+    n: usize,
+    start: f64,
+    join: fn(f64, f64) -> f64,
+) {
+    out.resize(n, start);
+    for &part in parts {
+        out.iter_mut()
+            .zip(&earlier[part])
+            .for_each(|(o, v)| *o = join(*o, *v));
+    }
+}
+
+impl Step {
+    /// Adds this step's adjoint, times its derivatives, to the adjoints of its operands.
+    fn pull_back(
+        &self,
+        values: &[Vec<f64>],
+        own: usize,
+        adjoint: &[f64],
+        earlier: &mut [Vec<f64>],
+    ) {
+        match self {
+            Step::Number(_) | Step::Variable(_) => {}
+            Step::Sum(parts) => {
+                for &part in parts {
+                    earlier[part]
+                        .iter_mut()
+                        .zip(adjoint)
+                        .for_each(|(e, a)| *e += a);
+                }
+            }
+            Step::Product(parts) => {
+                for (position, &part) in parts.iter().enumerate() {
+                    for (i, a) in adjoint.iter().enumerate() {
+                        let others: f64 = parts
+                            .iter()
+                            .enumerate()
+                            .filter(|(other, _)| *other != position)
+                            .map(|(_, &other)| values[other][i])
+                            .product();
+                        earlier[part][i] += a * others;
+                    }
+                }
+            }
+            Step::Integer(base, exponent) => {
+                for (i, a) in adjoint.iter().enumerate() {
+                    earlier[*base][i] +=
+                        a * f64::from(*exponent) * values[*base][i].powi(exponent - 1);
+                }
+            }
+            Step::Power(base, exponent) => {
+                for (i, a) in adjoint.iter().enumerate() {
+                    let (b, e) = (values[*base][i], values[*exponent][i]);
+                    earlier[*base][i] += a * e * b.powf(e - 1.0);
+                    if b > 0.0 {
+                        earlier[*exponent][i] += a * values[own][i] * b.ln();
+                    }
+                }
+            }
+            Step::Apply(function, argument) => {
+                for (i, a) in adjoint.iter().enumerate() {
+                    earlier[*argument][i] +=
+                        a * slope(*function, values[*argument][i], values[own][i]);
+                }
+            }
+        }
+    }
+}
+
+/// Derivative of `function` at `argument`, where it has the value `value`.
+fn slope(function: Function, argument: f64, value: f64) -> f64 {
+    match function {
+        Function::Sin => argument.cos(),
+        Function::Cos => -argument.sin(),
+        Function::Tan => 1.0 + value * value,
+        Function::Tanh => 1.0 - value * value,
+        Function::Exp => value,
+        Function::Log => 1.0 / argument,
+        Function::Sqrt => 0.5 / value,
+        Function::Abs => {
+            if argument == 0.0 {
+                0.0
+            } else {
+                argument.signum()
+            }
+        }
+        Function::Sign => 0.0,
+    }
+}
+
+struct Builder<'a> {
+    library: &'a Library,
+    seen: BTreeMap<ExprId, usize>,
+    steps: Vec<Step>,
+}
+
+impl Builder<'_> {
+    fn step(&mut self, expression: ExprId) -> usize {
+        if let Some(&known) = self.seen.get(&expression) {
+            return known;
+        }
+        let step = match self.library.pool().node(expression).clone() {
+            Node::Number(number) => Step::Number(number.to_f64()),
+            Node::Symbol(symbol) => Step::Variable(self.variable(symbol)),
+            Node::Sum(parts) => Step::Sum(parts.iter().map(|&part| self.step(part)).collect()),
+            Node::Product(parts) => {
+                Step::Product(parts.iter().map(|&part| self.step(part)).collect())
+            }
+            Node::Power(base, exponent) => self.power(base, exponent),
+            Node::Apply(function, argument) => Step::Apply(function, self.step(argument)),
+        };
+        self.steps.push(step);
+        self.seen.insert(expression, self.steps.len() - 1);
+        self.steps.len() - 1
+    }
+
+    fn variable(&self, symbol: SymbolId) -> usize {
+        let d = self.library.latent_dim();
+        match self
+            .library
+            .variable(symbol)
+            .expect("a library holds latent variables only")
+        {
+            LatentVariable::Z(index) => index,
+            LatentVariable::Dz(index) => d + index,
+            LatentVariable::U(index) => 2 * d + index,
+        }
+    }
+
+    fn power(&mut self, base: ExprId, exponent: ExprId) -> Step {
+        let base = self.step(base);
+        if let Node::Number(number) = self.library.pool().node(exponent) {
+            let value = number.to_f64();
+            if value.fract() == 0.0 && value.abs() <= 64.0 {
+                return Step::Integer(base, value as i32);
+            }
+        }
+        Step::Power(base, self.step(exponent))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::random::Random;
+    use nalgebra::DVector;
+
+    fn library() -> Library {
+        let terms = [
+            "1",
+            "z1",
+            "dz2",
+            "z1*dz1*u2",
+            "sin(z1 + 2*z2)",
+            "cos(dz1)*z2",
+            "exp(-z1^2)",
+            "tanh(u1)/(2 + z2)",
+            "sqrt(2 + z1)",
+            "abs(z2)",
+            "log(3 + dz2)",
+            "tan(0.3*z1)",
+            "(2 + z1)^z2",
+        ];
+        Library::from_terms(2, &terms.map(String::from)).expect("terms parse")
+    }
+
+    #[test]
+    fn batch_values_equal_the_library_at_every_sample() {
+        let library = library();
+        let variables = Random::new(4).matrix(6, 7, 0.9);
+        let theta =
+            Features::new(&library).evaluate(variables.as_view(), &mut FeatureValues::default());
+        for sample in 0..7 {
+            let block =
+                |i: usize| DVector::from(variables.column(sample).rows(2 * i, 2).into_owned());
+            let expected = library
+                .evaluate(&block(0), &block(1), &block(2))
+                .expect("dimensions fit");
+            for term in 0..library.len() {
+                assert!(
+                    (theta[(sample, term)] - expected[term]).abs() < 1e-14,
+                    "{}",
+                    library.terms()[term].text()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn backward_pass_agrees_with_finite_differences_for_every_function() {
+        let features = Features::new(&library());
+        let variables = Random::new(8).matrix(6, 3, 0.9);
+        let weights = Random::new(9).matrix(3, features.library_dim(), 1.0);
+        let mut values = FeatureValues::default();
+        let loss = |at: &DMatrix<f64>| {
+            features
+                .evaluate(at.as_view(), &mut FeatureValues::default())
+                .dot(&weights)
+        };
+        features.evaluate(variables.as_view(), &mut values);
+        let mut gradient = DMatrix::zeros(6, 3);
+        features.backward(&weights, &mut values, &mut gradient);
+        for index in 0..variables.len() {
+            let (mut above, mut below) = (variables.clone(), variables.clone());
+            above[index] += 1e-6;
+            below[index] -= 1e-6;
+            let difference = (loss(&above) - loss(&below)) / 2e-6;
+            assert!(
+                (difference - gradient[index]).abs() < 1e-7 * difference.abs().max(1.0),
+                "{index}"
+            );
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! How good a model is on a set of jumps.
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use super::dataset::{Dataset, Scaling};
+use super::error::TrainError;
+use super::features::Features;
+use super::latent::{Latent, affine};
+use super::rollout::{Candidate, Window, predict, restarted, whole};
+use crate::model::{AffineMap, FeetRule, ReducedModel};
+use crate::recording::phases::{FeetPattern, PhasePattern};
+use crate::recording::{PhaseRule, Recording};
+use crate::robot::JOINT_DIM;
+
+/// Row of body x in the state; y and z follow.
+pub(super) const BODY_X: usize = JOINT_DIM;
+/// Row of body z in the state.
+pub(super) const BODY_Z: usize = JOINT_DIM + 2;
+/// Length of the short predictions.
+const SHORT_S: f64 = 0.1;
+/// Window over which the accelerations behind `ddz_r2` are averaged, in samples.
+const SMOOTHING: usize = 11;
+
+/// Figures of one model on one set of jumps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SetMetrics {
+    /// Mean square of `x - decode(encode(x))` over samples and coordinates, scaled units.
+    pub decoder_mse: f64,
+    /// Coefficient of determination of `ddz` a phase, over all latent coordinates together.
+    pub ddz_r2: Vec<f64>,
+    /// Coefficient of determination of the 12 joint torques of `W_e^T pinv(W_e^T) u` against the recorded ones.
+    pub torque_r2: f64,
+    /// Root mean square error of body x over predictions of 0.1 s.
+    pub prediction_x_m: f64,
+    /// The same of body z.
+    pub prediction_z_m: f64,
+    /// Root mean square error of body x over rollouts of whole jumps; `None` when one diverges.
+    pub rollout_x_m: Option<f64>,
+    /// The same of body z.
+    pub rollout_z_m: Option<f64>,
+}
+
+/// Everything that [`measure`] needs of a model.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Assessed<'a> {
+    /// Library and coefficients.
+    pub candidate: Candidate<'a>,
+    /// Encoder, scaled units.
+    pub encoder: &'a AffineMap,
+    /// Decoder, scaled units.
+    pub decoder: &'a AffineMap,
+}
+
+/// Measures a finished model on recordings.
+///
+/// # Errors
+/// [`TrainError`] if the model has no encoder, decoder, scaling or robot, or the recordings do not fit it.
+pub fn assess(model: &ReducedModel, recordings: &[Recording]) -> Result<SetMetrics, TrainError> {
+    let scaling = Scaling {
+        state: model.state_factors()?,
+        input: model.input_factors()?,
+    };
+    let patterns = model.phases().iter().map(|phase| PhasePattern {
+        name: phase.name.clone(),
+        feet: pattern(&phase.feet),
+    });
+    let phases = PhaseRule::new(patterns.collect());
+    let dataset = Dataset::new(recordings, model.robot()?, &phases, &scaling, SMOOTHING)?;
+    let features = Features::new(model.library());
+    let xi: Vec<_> = model
+        .phases()
+        .iter()
+        .map(|phase| phase.xi.clone())
+        .collect();
+    let assessed = Assessed {
+        candidate: Candidate {
+            features: &features,
+            xi: &xi,
+        },
+        encoder: model.encoder()?,
+        decoder: model.decoder()?,
+    };
+    Ok(measure(assessed, &dataset))
+}
+
+fn pattern(rule: &FeetRule) -> FeetPattern {
+    match rule {
+        FeetRule::Any => FeetPattern::Any,
+        FeetRule::None => FeetPattern::None,
+        FeetRule::Patterns(patterns) => FeetPattern::OneOf(patterns.clone()),
+    }
+}
+
+/// Measures a model on a dataset.
+pub(super) fn measure(model: Assessed<'_>, dataset: &Dataset) -> SetMetrics {
+    let latent = Latent::of(dataset, model.encoder);
+    let [prediction_x_m, prediction_z_m] =
+        body_rms(model, dataset, &latent, &restarted(dataset, SHORT_S));
+    let [rollout_x_m, rollout_z_m] = body_rms(model, dataset, &latent, &whole(dataset));
+    SetMetrics {
+        decoder_mse: decoder_mse(model, dataset, &latent),
+        ddz_r2: (0..dataset.phases.patterns.len())
+            .map(|phase| ddz_r2(model.candidate, dataset, &latent, phase))
+            .collect(),
+        torque_r2: torque_r2(model.encoder, dataset, &latent),
+        prediction_x_m,
+        prediction_z_m,
+        rollout_x_m: rollout_x_m.is_finite().then_some(rollout_x_m),
+        rollout_z_m: rollout_z_m.is_finite().then_some(rollout_z_m),
+    }
+}
+
+/// Root mean square errors of decoded body x and z, in metres, over all predicted samples of the windows.
+fn body_rms(
+    model: Assessed<'_>,
+    dataset: &Dataset,
+    latent: &[Latent],
+    windows: &[Window],
+) -> [f64; 2] {
+    let predictions = predict(model.candidate, dataset, latent, windows);
+    let mut squares = [0.0; 2];
+    let mut count = 0;
+    for (window, prediction) in windows.iter().zip(&predictions) {
+        let decoded = affine(model.decoder, prediction);
+        let truth = dataset.jumps[window.jump]
+            .x
+            .columns(window.start + 1, window.steps);
+        for (square, row) in squares.iter_mut().zip([BODY_X, BODY_Z]) {
+            *square += (decoded.row(row) - truth.row(row)).norm_squared();
+        }
+        count += window.steps;
+    }
+    let rms = squares.map(|square| (square / count.max(1) as f64).sqrt());
+    [
+        rms[0] / dataset.scaling.state[BODY_X],
+        rms[1] / dataset.scaling.state[BODY_Z],
+    ]
+}
+
+fn decoder_mse(model: Assessed<'_>, dataset: &Dataset, latent: &[Latent]) -> f64 {
+    let (mut square, mut count) = (0.0, 0);
+    for (jump, samples) in dataset.jumps.iter().zip(latent) {
+        square += (affine(model.decoder, &samples.z) - &jump.x).norm_squared();
+        count += jump.x.len();
+    }
+    square / count.max(1) as f64
+}
+
+fn ddz_r2(candidate: Candidate<'_>, dataset: &Dataset, latent: &[Latent], phase: usize) -> f64 {
+    let (variables, target) = Latent::regression_samples(dataset, latent, phase);
+    let theta = candidate
+        .features
+        .evaluate(variables.as_view(), &mut Default::default());
+    r_squared(
+        &(theta * &candidate.xi[phase]).transpose(),
+        &target.transpose(),
+    )
+}
+
+fn torque_r2(encoder: &AffineMap, dataset: &Dataset, latent: &[Latent]) -> f64 {
+    let lifted: Vec<_> = latent
+        .iter()
+        .map(|samples| encoder.weights().tr_mul(&samples.u_lat))
+        .collect();
+    let total = dataset.samples(None);
+    let (mut predicted, mut recorded) = (
+        DMatrix::zeros(JOINT_DIM, total),
+        DMatrix::zeros(JOINT_DIM, total),
+    );
+    let mut at = 0;
+    for (jump, u) in dataset.jumps.iter().zip(&lifted) {
+        predicted
+            .columns_mut(at, jump.len())
+            .copy_from(&u.rows(0, JOINT_DIM));
+        recorded
+            .columns_mut(at, jump.len())
+            .copy_from(&jump.u.rows(0, JOINT_DIM));
+        at += jump.len();
+    }
+    r_squared(&predicted, &recorded)
+}
+
+/// `1 - sum of squared errors / sum of squares about each row's mean`, over all rows together.
+fn r_squared(predicted: &DMatrix<f64>, truth: &DMatrix<f64>) -> f64 {
+    let mean = truth.column_mean();
+    let spread: f64 = truth
+        .column_iter()
+        .map(|column| (column - &mean).norm_squared())
+        .sum();
+    1.0 - (predicted - truth).norm_squared() / spread.max(f64::MIN_POSITIVE)
+}

@@ -1,0 +1,203 @@
+//! What to train and how.
+
+use serde::{Deserialize, Serialize};
+
+use super::dataset::ScaleOptions;
+use super::error::TrainError;
+use super::sparse::Pruning;
+use crate::model::StandardLibrary;
+use crate::recording::PhaseRule;
+
+/// Candidate terms to choose from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LibraryChoice {
+    /// Polynomials, sines and cosines, inputs.
+    Standard(StandardLibrary),
+    /// Expressions over `z1..zd`, `dz1..dzd`, `u1..ud`.
+    Terms(Vec<String>),
+}
+
+/// Settings of the training; [`TrainOptions::new`] gives the defaults for a latent dimension.
+#[derive(Clone, Debug)]
+pub struct TrainOptions {
+    /// Name of the model.
+    pub name: String,
+    /// Number of latent coordinates.
+    pub latent_dim: usize,
+    /// Candidate terms.
+    pub library: LibraryChoice,
+    /// Which foot patterns form which phase.
+    pub phases: PhaseRule,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Factors from SI to scaled units.
+    pub scaling: ScaleOptions,
+    /// Which coordinates the encoder looks at, and what it is to carry.
+    pub encoder: EncoderOptions,
+    /// How Xi is fitted and chosen.
+    pub regression: RegressionOptions,
+}
+
+/// Settings of the encoder.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EncoderOptions {
+    /// Weight of the input energy which the latent input cannot carry, against the reconstruction error in scaled
+    /// units (the lift loss); 0 leaves the lift to chance.
+    pub lift_weight: f64,
+    /// Weight of the three body positions in the reconstruction error; the other coordinates have 1.
+    pub body_weight: f64,
+    /// Coordinates with a smaller standard deviation (rad or m) are masked unless they are actuated.
+    pub least_std: f64,
+    /// Coordinates with a larger share of the input's energy count as actuated.
+    pub least_input_share: f64,
+    /// Whether the latent basis is rotated by varimax.
+    pub rotate: bool,
+    /// Random starting points of the search.
+    pub restarts: usize,
+}
+
+/// Settings of the regression for Xi.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RegressionOptions {
+    /// Window of the moving average over accelerations, in samples.
+    pub smoothing: usize,
+    /// Windows (samples) over which the dynamics are integrated before regression; 0 means the accelerations.
+    pub windows: Vec<usize>,
+    /// Ridges on the normalised columns.
+    pub ridges: Vec<f64>,
+    /// Prunings.
+    pub prunings: Vec<Pruning>,
+    /// Of all candidates within this share of the best validation score, the one with fewest terms is taken.
+    pub slack: f64,
+    /// Weight of whole-jump rollouts against predictions of 0.1 s in the validation score.
+    pub rollout_weight: f64,
+}
+
+impl TrainOptions {
+    /// The defaults for a latent dimension.
+    pub fn new(name: impl Into<String>, latent_dim: usize) -> Self {
+        Self {
+            name: name.into(),
+            latent_dim,
+            library: LibraryChoice::Standard(StandardLibrary {
+                degree: 1,
+                trigonometric: false,
+                inputs: true,
+            }),
+            phases: PhaseRule::two_phase().with_min_samples(5),
+            seed: 1,
+            scaling: ScaleOptions::default(),
+            encoder: EncoderOptions::default(),
+            regression: RegressionOptions::default(),
+        }
+    }
+
+    /// Complains about settings outside their range.
+    ///
+    /// # Errors
+    /// [`TrainError::Option`] naming the first one.
+    pub fn check(&self) -> Result<(), TrainError> {
+        let EncoderOptions {
+            lift_weight,
+            body_weight,
+            least_std,
+            least_input_share,
+            ..
+        } = self.encoder;
+        at_least_zero("lift-weight", lift_weight)?;
+        above_zero("body-weight", body_weight)?;
+        at_least_zero("mask-std", least_std)?;
+        at_least_zero("mask-input-share", least_input_share)?;
+        at_least_zero("slack", self.regression.slack)?;
+        at_least_zero("rollout-weight", self.regression.rollout_weight)?;
+        for ridge in &self.regression.ridges {
+            above_zero("ridge", *ridge)?;
+        }
+        for pruning in &self.regression.prunings {
+            let (Pruning::Threshold(value) | Pruning::Elimination(value)) = pruning;
+            at_least_zero("threshold", *value)?;
+        }
+        let ScaleOptions {
+            state,
+            torque,
+            force,
+            moment,
+        } = self.scaling;
+        for factor in [state, torque, force, moment] {
+            above_zero("scaling", factor)?;
+        }
+        let RegressionOptions {
+            windows,
+            ridges,
+            prunings,
+            ..
+        } = &self.regression;
+        if windows.is_empty() || ridges.is_empty() || prunings.is_empty() {
+            return Err(TrainError::Option {
+                option: "windows, ridges and prunings",
+                found: format!(
+                    "{}, {} and {} values",
+                    windows.len(),
+                    ridges.len(),
+                    prunings.len()
+                ),
+                expected: "at least one each",
+            });
+        }
+        Ok(())
+    }
+}
+
+impl Default for EncoderOptions {
+    /// Lift weight 1e-3, body weight 300, mask under 0.015 rad or m and 0.5 % of the input's energy, varimax.
+    fn default() -> Self {
+        Self {
+            lift_weight: 1e-3,
+            body_weight: 300.0,
+            least_std: 0.015,
+            least_input_share: 0.005,
+            rotate: true,
+            restarts: 4,
+        }
+    }
+}
+
+impl Default for RegressionOptions {
+    fn default() -> Self {
+        let eliminations = [1e-3, 3e-3, 1e-2, 2e-2, 3e-2, 5e-2].map(Pruning::Elimination);
+        let thresholds = [0.0, 0.03, 0.1, 0.2].map(Pruning::Threshold);
+        Self {
+            smoothing: 11,
+            windows: vec![0, 25, 50],
+            ridges: vec![1e-4, 1e-3, 1e-2],
+            prunings: eliminations.into_iter().chain(thresholds).collect(),
+            slack: 0.3,
+            rollout_weight: 0.2,
+        }
+    }
+}
+
+fn at_least_zero(option: &'static str, value: f64) -> Result<(), TrainError> {
+    in_range(option, value, value >= 0.0, "a finite number of at least 0")
+}
+
+fn above_zero(option: &'static str, value: f64) -> Result<(), TrainError> {
+    in_range(option, value, value > 0.0, "a finite number above 0")
+}
+
+fn in_range(
+    option: &'static str,
+    value: f64,
+    inside: bool,
+    expected: &'static str,
+) -> Result<(), TrainError> {
+    if inside && value.is_finite() {
+        Ok(())
+    } else {
+        Err(TrainError::Option {
+            option,
+            found: value.to_string(),
+            expected,
+        })
+    }
+}

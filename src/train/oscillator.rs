@@ -1,0 +1,97 @@
+//! A known system for tests: two latents, a driven oscillator in contact, a falling body in flight.
+
+use std::path::PathBuf;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::dataset::{Dataset, Jump, ScaleOptions};
+use super::latent::Latent;
+use crate::recording::PhaseRule;
+use crate::robot::STATE_DIM;
+
+/// Samples between contact and flight.
+const LIFT_OFF: usize = 120;
+const STEP_S: f64 = 0.002;
+
+/// `ddz` of the known system.
+pub(super) fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] {
+    match phase {
+        0 => [
+            -40.0 * z[0] - 3.0 * dz[0] + 5.0 * u[0],
+            8.0 * u[1] - 2.0 * z[0],
+        ],
+        _ => [-0.5 * dz[0], -0.981],
+    }
+}
+
+/// `n_jumps` jumps of the known system, integrated with fine steps, and their latent samples.
+pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
+    let latent: Vec<Latent> = (0..n_jumps).map(simulate).collect();
+    let jumps = latent.iter().map(|samples| {
+        let n = samples.z.ncols();
+        let lift = |block: &DMatrix<f64>| {
+            let mut full = DMatrix::zeros(STATE_DIM, n);
+            full.set_row(12, &block.row(0));
+            full.set_row(14, &block.row(1));
+            full
+        };
+        Jump {
+            path: PathBuf::from("oscillator.csv"),
+            time_s: (0..n).map(|i| i as f64 * STEP_S).collect(),
+            x: lift(&samples.z),
+            dx: lift(&samples.dz),
+            ddx: lift(&samples.ddz),
+            u: lift(&samples.u_lat),
+            phase: (0..n).map(|i| usize::from(i >= LIFT_OFF)).collect(),
+            spans: vec![(0, 0..LIFT_OFF), (1, LIFT_OFF..n)],
+        }
+    });
+    let scaling = ScaleOptions::uniform(1.0).factors();
+    (
+        Dataset {
+            jumps: jumps.collect(),
+            phases: PhaseRule::two_phase(),
+            scaling,
+        },
+        latent,
+    )
+}
+
+fn simulate(seed: usize) -> Latent {
+    let n = 200;
+    let (mut z, mut dz) = (
+        [0.1 + 0.02 * seed as f64, -0.05],
+        [0.3, 0.2 - 0.1 * seed as f64],
+    );
+    let blank = DMatrix::zeros(2, n);
+    let mut samples = Latent {
+        z: blank.clone(),
+        dz: blank.clone(),
+        ddz: blank.clone(),
+        u_lat: blank,
+    };
+    let fine = 50;
+    for i in 0..n {
+        let phase = usize::from(i >= LIFT_OFF);
+        let input = |time: f64| [(9.0 * time + seed as f64).sin(), (5.0 * time).cos()];
+        let start = i as f64 * STEP_S;
+        samples.z.set_column(i, &DVector::from_row_slice(&z));
+        samples.dz.set_column(i, &DVector::from_row_slice(&dz));
+        samples.ddz.set_column(
+            i,
+            &DVector::from_row_slice(&truth(phase, &z, &dz, &input(start))),
+        );
+        samples
+            .u_lat
+            .set_column(i, &DVector::from_row_slice(&input(start)));
+        for k in 0..fine {
+            let h = STEP_S / fine as f64;
+            let acceleration = truth(phase, &z, &dz, &input(start + k as f64 * h));
+            for j in 0..2 {
+                z[j] += h * dz[j] + 0.5 * h * h * acceleration[j];
+                dz[j] += h * acceleration[j];
+            }
+        }
+    }
+    samples
+}

@@ -1,0 +1,50 @@
+//! News from a running training, and how to end it early.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What a training reports while it runs.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Progress {
+    /// A stage began.
+    Stage {
+        /// What it does.
+        name: &'static str,
+        /// Steps it will take, if it is known.
+        steps: usize,
+    },
+    /// Candidates or epochs of the stage that are done.
+    Done {
+        /// Steps done since the stage began.
+        steps: usize,
+        /// Figures of the moment, ready to print.
+        text: String,
+    },
+}
+
+/// Listens to a training and may stop it.
+pub struct Watch<'a> {
+    listener: &'a mut dyn FnMut(Progress),
+    cancel: &'a AtomicBool,
+}
+
+impl<'a> Watch<'a> {
+    /// Sends news to `listener` and stops soon after `cancel` becomes true.
+    pub fn new(listener: &'a mut dyn FnMut(Progress), cancel: &'a AtomicBool) -> Self {
+        Self { listener, cancel }
+    }
+
+    /// Whether the training should end with what it has.
+    pub fn cancelled(&self) -> bool {
+        self.cancel.load(Ordering::Relaxed)
+    }
+
+    /// Announces a stage.
+    pub fn stage(&mut self, name: &'static str, steps: usize) {
+        (self.listener)(Progress::Stage { name, steps });
+    }
+
+    /// Tells how far the stage is.
+    pub fn done(&mut self, steps: usize, text: String) {
+        (self.listener)(Progress::Done { steps, text });
+    }
+}

@@ -1,0 +1,26 @@
+//! Seeded random numbers: the same on every machine and in every release.
+
+use nalgebra::DMatrix;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+/// A seeded source of uniform numbers.
+#[derive(Clone, Debug)]
+pub struct Random(ChaCha8Rng);
+
+impl Random {
+    /// The source with this seed.
+    pub fn new(seed: u64) -> Self {
+        Self(ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    /// Uniform in `-1 .. 1`.
+    pub fn signed(&mut self) -> f64 {
+        2.0 * ((self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64) - 1.0
+    }
+
+    /// Entries uniform in `-bound .. bound`.
+    pub fn matrix(&mut self, n_rows: usize, n_columns: usize, bound: f64) -> DMatrix<f64> {
+        DMatrix::from_fn(n_rows, n_columns, |_, _| bound * self.signed())
+    }
+}

@@ -1,0 +1,279 @@
+//! Light rollouts of candidate models, many at once, for choosing between them.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::dataset::Dataset;
+use super::features::{FeatureValues, Features};
+use super::latent::Latent;
+
+/// Latent dynamics under trial: `ddz = Xi_phase^T theta(z, dz, u_lat)`.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate<'a> {
+    /// The library.
+    pub features: &'a Features,
+    /// Coefficients a phase, `library_dim x latent_dim`.
+    pub xi: &'a [DMatrix<f64>],
+}
+
+/// Where a rollout starts and how many steps it takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Index of the jump.
+    pub jump: usize,
+    /// First sample; the rollout starts at its true latent state.
+    pub start: usize,
+    /// Steps to take; the window covers samples `start ..= start + steps`.
+    pub steps: usize,
+}
+
+/// Windows of `duration_s` one behind the other over every jump (the last one may be shorter).
+pub fn restarted(dataset: &Dataset, duration_s: f64) -> Vec<Window> {
+    let mut windows = Vec::new();
+    for (jump, samples) in dataset.jumps.iter().enumerate() {
+        let mut start = 0;
+        while start + 1 < samples.len() {
+            let stop = samples.time_s[start] + duration_s - 1e-9;
+            let steps = samples.time_s[start + 1..]
+                .iter()
+                .take_while(|time| **time < stop)
+                .count()
+                + 1;
+            let steps = steps.min(samples.len() - 1 - start);
+            windows.push(Window { jump, start, steps });
+            start += steps;
+        }
+    }
+    windows
+}
+
+/// One window a jump, from its first to its last sample.
+pub fn whole(dataset: &Dataset) -> Vec<Window> {
+    dataset
+        .jumps
+        .iter()
+        .enumerate()
+        .map(|(jump, samples)| Window {
+            jump,
+            start: 0,
+            steps: samples.len() - 1,
+        })
+        .collect()
+}
+
+/// Latent positions predicted in every window, `latent_dim x steps` (samples `start + 1 ..= start + steps`).
+///
+/// RK4 with the recorded sampling; the latent input is interpolated linearly between samples, the phase is the
+/// recorded one of the sample a step starts from. Values beyond 1e6 are set to infinity and stay there.
+pub fn predict(
+    candidate: Candidate<'_>,
+    dataset: &Dataset,
+    latent: &[Latent],
+    windows: &[Window],
+) -> Vec<DMatrix<f64>> {
+    let d = candidate.features.latent_dim();
+    let longest = windows.iter().map(|window| window.steps).max().unwrap_or(0);
+    let mut predictions: Vec<_> = windows
+        .iter()
+        .map(|window| DMatrix::zeros(d, window.steps))
+        .collect();
+    let mut state = DMatrix::zeros(2 * d, windows.len());
+    for (column, window) in windows.iter().enumerate() {
+        state
+            .view_mut((0, column), (d, 1))
+            .copy_from(&latent[window.jump].z.column(window.start));
+        state
+            .view_mut((d, column), (d, 1))
+            .copy_from(&latent[window.jump].dz.column(window.start));
+    }
+    let mut stepper = Stepper::new(candidate, windows.len());
+    for step in 0..longest {
+        stepper.load_inputs(dataset, latent, windows, step);
+        stepper.advance(&mut state);
+        for (column, _) in windows
+            .iter()
+            .enumerate()
+            .filter(|(_, window)| step < window.steps)
+        {
+            predictions[column].set_column(step, &state.view((0, column), (d, 1)).column(0));
+        }
+    }
+    predictions
+}
+
+/// RK4 over a batch of windows.
+struct Stepper<'a> {
+    candidate: Candidate<'a>,
+    values: FeatureValues,
+    phase: Vec<usize>,
+    step_s: DVector<f64>,
+    input: [DMatrix<f64>; 3], // at the start, middle and end of the step
+}
+
+impl<'a> Stepper<'a> {
+    fn new(candidate: Candidate<'a>, n_windows: usize) -> Self {
+        let input = DMatrix::zeros(candidate.features.latent_dim(), n_windows);
+        Self {
+            candidate,
+            values: FeatureValues::default(),
+            phase: vec![0; n_windows],
+            step_s: DVector::zeros(n_windows),
+            input: [input.clone(), input.clone(), input],
+        }
+    }
+
+    /// Inputs, phases and step lengths of step `step`; finished windows stand still.
+    fn load_inputs(
+        &mut self,
+        dataset: &Dataset,
+        latent: &[Latent],
+        windows: &[Window],
+        step: usize,
+    ) {
+        for (column, window) in windows.iter().enumerate() {
+            let sample = window.start + step;
+            if step >= window.steps {
+                self.step_s[column] = 0.0;
+                continue;
+            }
+            let jump = &dataset.jumps[window.jump];
+            let u = &latent[window.jump].u_lat;
+            self.phase[column] = jump.phase[sample];
+            self.step_s[column] = jump.time_s[sample + 1] - jump.time_s[sample];
+            let (first, last) = (u.column(sample), u.column(sample + 1));
+            self.input[0].set_column(column, &first);
+            self.input[1].set_column(column, &((first + last) * 0.5));
+            self.input[2].set_column(column, &last);
+        }
+    }
+
+    fn advance(&mut self, state: &mut DMatrix<f64>) {
+        let k1 = self.rate(state, 0);
+        let k2 = self.rate(&self.moved(state, &k1, 0.5), 1);
+        let k3 = self.rate(&self.moved(state, &k2, 0.5), 1);
+        let k4 = self.rate(&self.moved(state, &k3, 1.0), 2);
+        for column in 0..state.ncols() {
+            for row in 0..state.nrows() {
+                let at = (row, column);
+                let mean = (k1[at] + 2.0 * k2[at] + 2.0 * k3[at] + k4[at]) / 6.0;
+                let next = state[at] + self.step_s[column] * mean;
+                state[at] = if next.abs() < 1e6 {
+                    next
+                } else {
+                    f64::INFINITY
+                };
+            }
+        }
+    }
+
+    fn moved(&self, state: &DMatrix<f64>, rate: &DMatrix<f64>, share: f64) -> DMatrix<f64> {
+        let mut moved = rate.clone();
+        for (mut column, step_s) in moved.column_iter_mut().zip(self.step_s.iter()) {
+            column *= share * step_s;
+        }
+        moved + state
+    }
+
+    /// `[dz; ddz]` of every window.
+    fn rate(&mut self, state: &DMatrix<f64>, stage: usize) -> DMatrix<f64> {
+        let d = self.candidate.features.latent_dim();
+        let n = state.ncols();
+        let mut variables = DMatrix::zeros(3 * d, n);
+        variables.rows_mut(0, 2 * d).copy_from(state);
+        variables.rows_mut(2 * d, d).copy_from(&self.input[stage]);
+        let theta = self
+            .candidate
+            .features
+            .evaluate(variables.as_view(), &mut self.values);
+        let mut rate = DMatrix::zeros(2 * d, n);
+        rate.rows_mut(0, d).copy_from(&state.rows(d, d));
+        for column in 0..n {
+            let xi = &self.candidate.xi[self.phase[column]];
+            for output in 0..d {
+                rate[(d + output, column)] = (0..xi.nrows())
+                    .map(|term| theta[(column, term)] * xi[(term, output)])
+                    .sum();
+            }
+        }
+        rate
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Library, StandardLibrary};
+    use crate::train::oscillator;
+
+    fn known() -> (Features, Vec<DMatrix<f64>>) {
+        let standard = StandardLibrary {
+            degree: 1,
+            trigonometric: false,
+            inputs: true,
+        };
+        let features = Features::new(&Library::standard(2, standard).expect("small library"));
+        let mut contact = DMatrix::zeros(7, 2); // rows: 1, z1, z2, dz1, dz2, u1, u2
+        let mut flight = contact.clone();
+        (contact[(1, 0)], contact[(3, 0)], contact[(5, 0)]) = (-40.0, -3.0, 5.0);
+        (contact[(6, 1)], contact[(1, 1)]) = (8.0, -2.0);
+        (flight[(3, 0)], flight[(0, 1)]) = (-0.5, -0.981);
+        (features, vec![contact, flight])
+    }
+
+    #[test]
+    fn predictions_of_the_true_dynamics_follow_the_samples_through_both_phases() {
+        let (dataset, latent) = oscillator::jumps(2);
+        let (features, xi) = known();
+        let candidate = Candidate {
+            features: &features,
+            xi: &xi,
+        };
+        for windows in [whole(&dataset), restarted(&dataset, 0.1)] {
+            for (window, prediction) in windows
+                .iter()
+                .zip(predict(candidate, &dataset, &latent, &windows))
+            {
+                let truth = latent[window.jump]
+                    .z
+                    .columns(window.start + 1, window.steps);
+                assert!((prediction - truth).amax() < 2e-4, "{window:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn restarted_windows_cover_every_sample_once() {
+        let (dataset, _) = oscillator::jumps(1);
+        let windows = restarted(&dataset, 0.1);
+        assert_eq!(
+            windows
+                .iter()
+                .map(|window| window.steps)
+                .collect::<Vec<_>>(),
+            [50, 50, 50, 49]
+        );
+        assert_eq!(
+            windows
+                .iter()
+                .map(|window| window.start)
+                .collect::<Vec<_>>(),
+            [0, 50, 100, 150]
+        );
+    }
+
+    #[test]
+    fn diverging_dynamics_predict_infinity() {
+        let (dataset, latent) = oscillator::jumps(1);
+        let (features, mut xi) = known();
+        xi[0][(1, 0)] = 1e7;
+        let prediction = &predict(
+            Candidate {
+                features: &features,
+                xi: &xi,
+            },
+            &dataset,
+            &latent,
+            &whole(&dataset),
+        )[0];
+        assert!(!prediction.iter().all(|value| value.is_finite()));
+    }
+}

@@ -1,0 +1,361 @@
+//! The encoder's row space: which directions of the state the latent state sees and the lift can push.
+//!
+//! Reconstruction and lift depend on `W_e` only through the space its rows span, so the search runs over
+//! orthonormal bases `Q` (`state_dim x latent_dim`, `W_e = Q^T`); the basis inside the space is chosen later
+//! (see [`super::varimax`]).
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use super::error::TrainError;
+use super::random::Random;
+
+/// Second moments of the training samples, in scaled units.
+#[derive(Clone, Debug)]
+pub struct Moments {
+    /// Covariance of the state, `state_dim x state_dim`.
+    pub state: DMatrix<f64>,
+    /// Second moment of the input about zero, `state_dim x state_dim`.
+    pub input: DMatrix<f64>,
+}
+
+impl Moments {
+    /// Moments of samples in columns.
+    pub fn new(x: &DMatrix<f64>, u: &DMatrix<f64>) -> Self {
+        let n = x.ncols().max(1) as f64;
+        let mean = x.column_mean();
+        let mut centred = x.clone();
+        centred
+            .column_iter_mut()
+            .for_each(|mut column| column -= &mean);
+        Self {
+            state: &centred * centred.transpose() / n,
+            input: u * u.transpose() / n,
+        }
+    }
+
+    /// Coordinates that the encoder may look at: they move (standard deviation of at least `least_std`, scaled), or
+    /// they are actuated (at least `least_share` of the input's energy).
+    ///
+    /// A coordinate that neither moves nor is actuated would only bring noise into the latent space. One that rests
+    /// because a torque holds it (hip abduction) must stay, else the lift cannot return that torque.
+    pub fn active_coordinates(&self, least_std: f64, least_share: f64) -> Vec<usize> {
+        let energy = self.input.trace();
+        (0..self.state.nrows())
+            .filter(|&i| {
+                self.state[(i, i)].sqrt() >= least_std || self.input[(i, i)] > least_share * energy
+            })
+            .collect()
+    }
+}
+
+/// How the row space is searched.
+#[derive(Clone, Debug)]
+pub struct SubspaceOptions {
+    /// Weight of the input energy that the latent input cannot carry, against the reconstruction error.
+    pub lift_weight: f64,
+    /// Weight of every coordinate in the reconstruction error, `state_dim`.
+    pub coordinate_weights: DVector<f64>,
+    /// Iterations of one descent.
+    pub iterations: usize,
+    /// Random starting points besides the principal ones.
+    pub restarts: usize,
+    /// Seed of the random starting points.
+    pub seed: u64,
+}
+
+/// A row space and what it costs.
+#[derive(Clone, Debug)]
+pub struct Subspace {
+    /// Orthonormal basis, `state_dim x latent_dim`; rows of resting coordinates are zero.
+    pub basis: DMatrix<f64>,
+    /// Weighted reconstruction error of the best affine decoder, mean a coordinate, scaled units squared.
+    pub reconstruction: f64,
+    /// Share of the input's energy outside the space, 0 to 1.
+    pub lift_loss: f64,
+}
+
+/// Finds the row space of least `reconstruction + lift_weight * lift_loss`.
+///
+/// With the state covariance `C`, the coordinate weights `D` (diagonal), the input second moment `U` and an
+/// orthonormal basis `Q` of the active coordinates: `reconstruction = (tr DC - tr((Q^T C Q)^-1 Q^T C D C Q)) / n` is
+/// the weighted mean square error of the least-squares decoder and `lift_loss = 1 - tr(Q^T U Q) / tr U` is `||u - W_e^T pinv(W_e^T) u||^2 / ||u||^2`.
+/// Descent along the exact gradient on the Stiefel manifold from several starting points; the best is kept.
+///
+/// # Errors
+/// [`TrainError::LatentDim`] if fewer coordinates move than the space has dimensions.
+pub fn find_subspace(
+    moments: &Moments,
+    active: &[usize],
+    latent_dim: usize,
+    options: &SubspaceOptions,
+) -> Result<Subspace, TrainError> {
+    if latent_dim == 0 || latent_dim > active.len() {
+        return Err(TrainError::LatentDim {
+            requested: latent_dim,
+            active: active.len(),
+        });
+    }
+    let objective = Objective::new(moments, active, options);
+    let mut best: Option<(f64, DMatrix<f64>)> = None;
+    for start in starting_points(&objective, latent_dim, options) {
+        let (value, basis) = objective.descend(start, options.iterations);
+        if best.as_ref().is_none_or(|(least, _)| value < *least) {
+            best = Some((value, basis));
+        }
+    }
+    let (_, reduced) = best.expect("at least one starting point");
+    let mut basis = DMatrix::zeros(moments.state.nrows(), latent_dim);
+    for (row, &coordinate) in active.iter().enumerate() {
+        basis.set_row(coordinate, &reduced.row(row));
+    }
+    Ok(Subspace {
+        reconstruction: objective.reconstruction(&reduced),
+        lift_loss: objective.lift_loss(&reduced),
+        basis,
+    })
+}
+
+/// The objective restricted to the active coordinates.
+struct Objective {
+    state: DMatrix<f64>,         // m x m covariance of the active coordinates
+    state_squared: DMatrix<f64>, // m x m, C_xm^T D C_xm with all coordinates as targets
+    input: DMatrix<f64>,         // m x m
+    total_state: f64,
+    total_input: f64,
+    state_dim: f64,
+    lift_weight: f64,
+}
+
+impl Objective {
+    fn new(moments: &Moments, active: &[usize], options: &SubspaceOptions) -> Self {
+        let columns = moments.state.select_columns(active);
+        let mut weighted = columns.clone();
+        for (mut row, weight) in weighted
+            .row_iter_mut()
+            .zip(options.coordinate_weights.iter())
+        {
+            row *= *weight;
+        }
+        Self {
+            state: columns.select_rows(active),
+            state_squared: columns.transpose() * weighted,
+            input: moments.input.select_columns(active).select_rows(active),
+            total_state: moments.state.diagonal().dot(&options.coordinate_weights),
+            total_input: moments.input.trace().max(f64::MIN_POSITIVE),
+            state_dim: moments.state.nrows() as f64,
+            lift_weight: options.lift_weight,
+        }
+    }
+
+    /// `(Q^T C Q)^-1`; directions without variance count as not seen.
+    fn inverse_latent_covariance(&self, basis: &DMatrix<f64>) -> DMatrix<f64> {
+        let covariance = basis.transpose() * &self.state * basis;
+        let floor = 1e-12 * self.total_state.max(f64::MIN_POSITIVE);
+        covariance
+            .pseudo_inverse(floor)
+            .expect("the tolerance is positive")
+    }
+
+    fn reconstruction(&self, basis: &DMatrix<f64>) -> f64 {
+        let seen = basis.transpose() * &self.state_squared * basis;
+        (self.total_state - (self.inverse_latent_covariance(basis) * seen).trace()) / self.state_dim
+    }
+
+    fn lift_loss(&self, basis: &DMatrix<f64>) -> f64 {
+        1.0 - (basis.transpose() * &self.input * basis).trace() / self.total_input
+    }
+
+    fn value(&self, basis: &DMatrix<f64>) -> f64 {
+        self.reconstruction(basis) + self.lift_weight * self.lift_loss(basis)
+    }
+
+    /// Gradient of [`Self::value`] with respect to an orthonormal `Q`.
+    fn gradient(&self, basis: &DMatrix<f64>) -> DMatrix<f64> {
+        let inverse = self.inverse_latent_covariance(basis);
+        let seen = basis.transpose() * &self.state_squared * basis;
+        let reconstruction = (&self.state_squared * basis * &inverse
+            - &self.state * basis * &inverse * seen * &inverse)
+            * (-2.0 / self.state_dim);
+        reconstruction - &self.input * basis * (2.0 * self.lift_weight / self.total_input)
+    }
+
+    /// Gradient descent with Barzilai-Borwein steps, QR retraction and backtracking.
+    fn descend(&self, start: DMatrix<f64>, iterations: usize) -> (f64, DMatrix<f64>) {
+        let mut basis = start;
+        let mut value = self.value(&basis);
+        let mut step = 1.0 / self.gradient(&basis).norm().max(f64::MIN_POSITIVE);
+        for _ in 0..iterations {
+            let direction = tangent(&basis, &self.gradient(&basis));
+            let slope = direction.norm_squared();
+            if slope <= f64::MIN_POSITIVE {
+                break;
+            }
+            let mut accepted = None;
+            for _ in 0..40 {
+                let candidate = orthonormal(&basis - &direction * step);
+                let next = self.value(&candidate);
+                if next <= value - 1e-4 * step * slope {
+                    accepted = Some((next, candidate));
+                    break;
+                }
+                step *= 0.5;
+            }
+            let Some((next, candidate)) = accepted else {
+                break;
+            };
+            let moved = &candidate - &basis;
+            let turned = tangent(&candidate, &self.gradient(&candidate)) - direction;
+            let converged = value - next <= 1e-13 * value.abs();
+            (basis, value) = (candidate, next);
+            if converged {
+                break;
+            }
+            let curvature = moved.dot(&turned).abs();
+            step = if curvature > 0.0 {
+                moved.norm_squared() / curvature
+            } else {
+                2.0 * step
+            };
+        }
+        (value, basis)
+    }
+}
+
+/// The part of `gradient` that is tangent to the Stiefel manifold at `basis`.
+fn tangent(basis: &DMatrix<f64>, gradient: &DMatrix<f64>) -> DMatrix<f64> {
+    gradient - basis * (basis.transpose() * gradient)
+}
+
+fn orthonormal(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    matrix.qr().q()
+}
+
+/// Leading eigenvectors of blends of state and input energy, then random bases.
+fn starting_points(
+    objective: &Objective,
+    latent_dim: usize,
+    options: &SubspaceOptions,
+) -> Vec<DMatrix<f64>> {
+    let state = &objective.state / objective.total_state.max(f64::MIN_POSITIVE);
+    let input = &objective.input / objective.total_input;
+    let mut starts: Vec<DMatrix<f64>> = [0.0, 0.3, 0.6, 1.0]
+        .iter()
+        .map(|share| leading(&state * (1.0 - share) + &input * *share, latent_dim))
+        .collect();
+    let mut random = Random::new(options.seed);
+    for _ in 0..options.restarts {
+        starts.push(orthonormal(random.matrix(
+            objective.state.nrows(),
+            latent_dim,
+            1.0,
+        )));
+    }
+    starts
+}
+
+fn leading(symmetric: DMatrix<f64>, count: usize) -> DMatrix<f64> {
+    let eigen = SymmetricEigen::new(symmetric);
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|&a, &b| {
+        eigen.eigenvalues[b]
+            .total_cmp(&eigen.eigenvalues[a])
+            .then(a.cmp(&b))
+    });
+    eigen.eigenvectors.select_columns(&order[..count])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moments() -> Moments {
+        let mut random = Random::new(3);
+        let x = random.matrix(6, 3, 1.0) * random.matrix(3, 400, 1.0) + random.matrix(6, 400, 0.01);
+        let u = random.matrix(6, 400, 1.0);
+        Moments::new(&x, &u)
+    }
+
+    fn options(lift_weight: f64) -> SubspaceOptions {
+        let coordinate_weights = DVector::from_vec(vec![1.0, 2.0, 0.5, 1.0, 1.0, 3.0]);
+        SubspaceOptions {
+            lift_weight,
+            coordinate_weights,
+            iterations: 3000,
+            restarts: 3,
+            seed: 1,
+        }
+    }
+
+    #[test]
+    fn gradient_agrees_with_finite_differences() {
+        let objective = Objective::new(&moments(), &[0, 1, 2, 4, 5], &options(0.3));
+        let basis = orthonormal(Random::new(5).matrix(5, 2, 1.0));
+        let gradient = tangent(&basis, &objective.gradient(&basis));
+        let direction = tangent(&basis, &Random::new(6).matrix(5, 2, 1.0));
+        // The value depends on the space only, so any orthonormal basis of the moved space will do.
+        let at = |step: f64| objective.value(&orthonormal(&basis + &direction * step));
+        let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
+        assert!((difference - gradient.dot(&direction)).abs() < 1e-7 * difference.abs().max(1.0));
+    }
+
+    #[test]
+    fn without_lift_and_weights_the_space_is_that_of_the_principal_components() {
+        let moments = moments();
+        let mut options = options(0.0);
+        options.coordinate_weights.fill(1.0);
+        let found =
+            find_subspace(&moments, &[0, 1, 2, 3, 4, 5], 3, &options).expect("six coordinates");
+        let mut eigenvalues: Vec<f64> = SymmetricEigen::new(moments.state)
+            .eigenvalues
+            .iter()
+            .copied()
+            .collect();
+        eigenvalues.sort_by(f64::total_cmp);
+        let least = eigenvalues[..3].iter().sum::<f64>() / 6.0;
+        assert!(
+            (found.reconstruction - least).abs() < 1e-9 * least.max(1e-3),
+            "{} {least}",
+            found.reconstruction
+        );
+    }
+
+    #[test]
+    fn lift_weight_turns_the_space_towards_the_inputs() {
+        let moments = moments();
+        let active = [0, 1, 2, 3, 4, 5];
+        let blind = find_subspace(&moments, &active, 2, &options(0.0)).expect("six coordinates");
+        let lifted = find_subspace(&moments, &active, 2, &options(10.0)).expect("six coordinates");
+        assert!(
+            lifted.lift_loss < blind.lift_loss
+                && lifted.reconstruction >= blind.reconstruction - 1e-12
+        );
+    }
+
+    #[test]
+    fn masked_coordinates_get_no_weight() {
+        let found =
+            find_subspace(&moments(), &[1, 4, 5], 2, &options(0.1)).expect("three coordinates");
+        for masked in [0, 2, 3] {
+            assert_eq!(found.basis.row(masked).amax(), 0.0);
+        }
+    }
+
+    #[test]
+    fn more_latents_than_active_coordinates_are_refused() {
+        let error = find_subspace(&moments(), &[1, 4], 3, &options(0.1)).expect_err("too many");
+        assert!(matches!(
+            error,
+            TrainError::LatentDim {
+                requested: 3,
+                active: 2
+            }
+        ));
+    }
+
+    #[test]
+    fn resting_coordinate_is_active_only_if_it_is_actuated() {
+        let x = DMatrix::from_fn(3, 50, |i, j| if i == 0 { (j as f64).sin() } else { 0.0 });
+        let u = DMatrix::from_fn(3, 50, |i, _| if i == 1 { 2.0 } else { 0.0 });
+        assert_eq!(Moments::new(&x, &u).active_coordinates(0.1, 0.01), [0, 1]);
+    }
+}

@@ -1,0 +1,162 @@
+//! Regression targets over windows: what an acceleration does in the time that a prediction takes.
+
+use nalgebra::DMatrix;
+
+use super::dataset::Dataset;
+use super::features::{FeatureValues, Features};
+use super::latent::Latent;
+
+/// Samples between the starts of two windows.
+const STRIDE: usize = 5;
+
+/// Rows of `theta` and `target` of one phase, averaged over windows of `window` samples.
+///
+/// Integrating `ddz = theta Xi` once and twice over a window of length `T` gives two equations a window,
+/// `(dz(T) - dz(0)) / T = mean of theta Xi` and `2 (z(T) - z(0) - T dz(0)) / T^2 = weighted mean of theta Xi`
+/// (the integral form of Schaeffer and McCalla 2017, here of second order). They need no accelerations and weigh
+/// coefficients by what they do to a prediction. A `window` of 0 gives the smoothed accelerations themselves.
+pub fn windowed_samples(
+    dataset: &Dataset,
+    latent: &[Latent],
+    features: &Features,
+    phase: usize,
+    window: usize,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    if window == 0 {
+        let (variables, target) = Latent::regression_samples(dataset, latent, phase);
+        return (
+            features.evaluate(variables.as_view(), &mut FeatureValues::default()),
+            target,
+        );
+    }
+    let (p, d) = (features.library_dim(), features.latent_dim());
+    let (mut theta_rows, mut target_rows) = (Vec::new(), Vec::new());
+    for (jump, samples) in dataset.jumps.iter().zip(latent) {
+        for (_, range) in jump
+            .spans
+            .iter()
+            .filter(|(index, range)| *index == phase && range.len() > 4)
+        {
+            let span = Span::new(samples, &jump.time_s, range.clone(), features);
+            let window = window.min(range.len() - 1);
+            for start in (0..range.len() - window).step_by(STRIDE) {
+                span.equations(start, start + window, &mut theta_rows, &mut target_rows);
+            }
+        }
+    }
+    let n = theta_rows.len() / p.max(1);
+    (
+        DMatrix::from_row_slice(n, p, &theta_rows),
+        DMatrix::from_row_slice(n, d, &target_rows),
+    )
+}
+
+/// Running integrals of the library along one phase span.
+struct Span {
+    time_s: Vec<f64>,
+    z: DMatrix<f64>,
+    dz: DMatrix<f64>,
+    once: DMatrix<f64>,  // n x library_dim
+    twice: DMatrix<f64>, // n x library_dim
+}
+
+impl Span {
+    fn new(
+        latent: &Latent,
+        time_s: &[f64],
+        range: std::ops::Range<usize>,
+        features: &Features,
+    ) -> Self {
+        let (start, n, d) = (range.start, range.len(), features.latent_dim());
+        let mut variables = DMatrix::zeros(3 * d, n);
+        for (block, source) in [&latent.z, &latent.dz, &latent.u_lat]
+            .into_iter()
+            .enumerate()
+        {
+            variables
+                .rows_mut(block * d, d)
+                .copy_from(&source.columns(start, n));
+        }
+        let theta = features.evaluate(variables.as_view(), &mut FeatureValues::default());
+        let (mut once, mut twice) = (
+            DMatrix::zeros(n, theta.ncols()),
+            DMatrix::zeros(n, theta.ncols()),
+        );
+        for i in 1..n {
+            let h = time_s[start + i] - time_s[start + i - 1];
+            for j in 0..theta.ncols() {
+                let (before, after) = (theta[(i - 1, j)], theta[(i, j)]);
+                once[(i, j)] = once[(i - 1, j)] + h * (before + after) / 2.0;
+                twice[(i, j)] =
+                    twice[(i - 1, j)] + h * once[(i - 1, j)] + h * h * (2.0 * before + after) / 6.0;
+            }
+        }
+        Self {
+            time_s: time_s[range].to_vec(),
+            z: latent.z.columns(start, n).into_owned(),
+            dz: latent.dz.columns(start, n).into_owned(),
+            once,
+            twice,
+        }
+    }
+
+    /// Appends the velocity and the position equation of the window `from ..= to`.
+    fn equations(&self, from: usize, to: usize, theta: &mut Vec<f64>, target: &mut Vec<f64>) {
+        let duration = self.time_s[to] - self.time_s[from];
+        let scale = 2.0 / (duration * duration);
+        for j in 0..self.once.ncols() {
+            theta.push((self.once[(to, j)] - self.once[(from, j)]) / duration);
+        }
+        for k in 0..self.z.nrows() {
+            target.push((self.dz[(k, to)] - self.dz[(k, from)]) / duration);
+        }
+        for j in 0..self.once.ncols() {
+            theta.push(
+                (self.twice[(to, j)] - self.twice[(from, j)] - duration * self.once[(from, j)])
+                    * scale,
+            );
+        }
+        for k in 0..self.z.nrows() {
+            target.push(
+                (self.z[(k, to)] - self.z[(k, from)] - duration * self.dz[(k, from)]) * scale,
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Library, StandardLibrary};
+    use crate::train::oscillator;
+    use crate::train::sparse::{Pruning, Regression};
+
+    #[test]
+    fn windows_and_accelerations_recover_the_same_known_coefficients() {
+        let (dataset, latent) = oscillator::jumps(4);
+        let standard = StandardLibrary {
+            degree: 1,
+            trigonometric: false,
+            inputs: true,
+        };
+        let features = Features::new(&Library::standard(2, standard).expect("small library"));
+        for window in [0, 20, 60] {
+            let (theta, target) = windowed_samples(&dataset, &latent, &features, 0, window);
+            let xi = Regression::new(&theta, &target).fit(1e-9, Pruning::Threshold(1e-3));
+            // rows: 1, z1, z2, dz1, dz2, u1, u2
+            for (row, column, expected) in [
+                (1, 0, -40.0),
+                (3, 0, -3.0),
+                (5, 0, 5.0),
+                (6, 1, 8.0),
+                (1, 1, -2.0),
+            ] {
+                let found: f64 = xi[(row, column)];
+                assert!(
+                    (found - expected).abs() < 0.02 * f64::abs(expected),
+                    "{window} {row} {column}: {found}"
+                );
+            }
+        }
+    }
+}

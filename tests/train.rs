@@ -1,0 +1,183 @@
+//! Training on the checked-in jumps, and on input that cannot be trained on.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use romc::recording::{self, Recording};
+use romc::robot::Robot;
+use romc::train::{self, Origin, Progress, Recordings, TrainError, TrainOptions, Trained, Watch};
+
+fn jumps(set: &str, count: usize) -> Vec<Recording> {
+    (1..=count)
+        .map(|i| {
+            let path = format!(
+                "{}/examples/recordings/go1/{set}_{i:02}.csv.gz",
+                env!("CARGO_MANIFEST_DIR")
+            );
+            recording::read(Path::new(&path)).expect("checked-in recording")
+        })
+        .collect()
+}
+
+fn go1() -> &'static Robot {
+    Robot::by_name("go1").expect("known robot")
+}
+
+fn train_with(
+    training: &[Recording],
+    validation: &[Recording],
+    options: &TrainOptions,
+) -> Result<Trained, TrainError> {
+    let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
+    let origin = Origin::new("romc train", training);
+    let recordings = Recordings {
+        training,
+        validation,
+    };
+    train::closed_form(
+        recordings,
+        go1(),
+        options,
+        &origin,
+        &mut Watch::new(&mut listener, &cancel),
+    )
+}
+
+fn trained(latent_dim: usize) -> Trained {
+    let options = TrainOptions::new(format!("go1-d{latent_dim}"), latent_dim);
+    train_with(&jumps("train", 14), &jumps("validation", 3), &options).expect("trains")
+}
+
+#[test]
+fn closed_form_d4_meets_its_lines_on_jumps_it_never_saw() {
+    let Trained { model, report } = trained(4);
+    let test = train::assess(&model, &jumps("test", 3)).expect("the model fits the recordings");
+    assert!(test.decoder_mse <= 1.2e-5, "{test:?}");
+    assert!(test.torque_r2 >= 0.75, "{test:?}");
+    assert!(test.prediction_z_m <= 0.004, "{test:?}");
+    assert!(test.rollout_x_m.is_some_and(|x| x <= 0.10), "{test:?}");
+    assert!(test.rollout_z_m.is_some_and(|z| z <= 0.07), "{test:?}");
+    assert_eq!(report.encoded.len(), 15, "{:?}", report.encoded);
+}
+
+#[test]
+fn closed_form_d6_is_sparse_and_accurate() {
+    let Trained { model, report } = trained(6);
+    let test = train::assess(&model, &jumps("test", 3)).expect("the model fits the recordings");
+    assert!(
+        test.decoder_mse <= 7e-6 && test.torque_r2 >= 0.80,
+        "{test:?}"
+    );
+    assert!(
+        test.prediction_x_m <= 0.004 && test.prediction_z_m <= 0.004,
+        "{test:?}"
+    );
+    let active: Vec<usize> = report
+        .active_terms
+        .iter()
+        .map(|phase| phase.active)
+        .collect();
+    assert!(active[0] <= 60 && active[1] <= 45, "{active:?}");
+}
+
+#[test]
+fn first_latents_are_body_x_and_z() {
+    let model = trained(4).model;
+    let weights = model.encoder().expect("trained").weights().clone();
+    let dominant: Vec<usize> = (0..2)
+        .map(|row| weights.row(row).transpose().icamax())
+        .collect();
+    assert_eq!(dominant, [12, 14]);
+}
+
+#[test]
+fn training_twice_gives_the_same_file() {
+    let text = |trained: &Trained| romc::artifact::to_text(&trained.model);
+    assert_eq!(text(&trained(2)), text(&trained(2)));
+}
+
+#[test]
+fn hardware_jump_is_reconstructed_and_lifted() {
+    let path =
+        PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data/go1_hardware_jump.csv");
+    if !path.exists() {
+        return;
+    }
+    let jump = recording::read(&path).expect("hardware jump");
+    let figures = train::assess(&trained(4).model, &[jump]).expect("the model fits the recording");
+    assert!(
+        figures.decoder_mse <= 8e-5 && figures.torque_r2 >= 0.4,
+        "{figures:?}"
+    );
+}
+
+#[test]
+fn training_without_flight_is_refused_with_what_is_missing() {
+    let mut training = jumps("train", 1);
+    for segment in &mut training[0].segments {
+        segment.feet.fill([true; 4]);
+    }
+    let error = train_with(&training, &[], &TrainOptions::new("m", 2)).expect_err("no flight");
+    assert!(
+        matches!(&error, TrainError::PhaseSamples { phase, found: 0, .. } if phase == "flight"),
+        "{error}"
+    );
+}
+
+#[test]
+fn training_without_recordings_is_refused() {
+    let error = train_with(&[], &[], &TrainOptions::new("m", 2)).expect_err("nothing to learn");
+    assert!(matches!(error, TrainError::NoRecording { set: "training" }));
+}
+
+#[test]
+fn training_on_a_stub_is_refused_with_its_place() {
+    let mut training = jumps("train", 1);
+    let stub = training[0].segments[0].slice(0..20);
+    training[0].segments = vec![stub];
+    let error = train_with(&training, &[], &TrainOptions::new("m", 2)).expect_err("too short");
+    assert!(
+        matches!(&error, TrainError::TooFewSamples { path, row: 2, found: 20, .. } if path.ends_with("train_01.csv.gz")),
+        "{error}"
+    );
+}
+
+#[test]
+fn training_with_more_latents_than_coordinates_is_refused() {
+    for latent_dim in [0, 16] {
+        let error = train_with(&jumps("train", 1), &[], &TrainOptions::new("m", latent_dim));
+        let error = error.expect_err("impossible latent dimension").to_string();
+        assert!(error.contains(&latent_dim.to_string()), "{error}");
+    }
+}
+
+#[test]
+fn training_with_a_negative_lift_weight_is_refused() {
+    let mut options = TrainOptions::new("m", 2);
+    options.encoder.lift_weight = -1.0;
+    let error = train_with(&jumps("train", 1), &[], &options).expect_err("negative weight");
+    assert!(matches!(
+        error,
+        TrainError::Option {
+            option: "lift-weight",
+            ..
+        }
+    ));
+}
+
+#[test]
+fn cancelled_training_ends_without_a_model_when_none_is_complete() {
+    let (cancel, mut listener) = (AtomicBool::new(true), |_: Progress| ());
+    let training = jumps("train", 1);
+    let result = train::closed_form(
+        Recordings {
+            training: &training,
+            validation: &[],
+        },
+        go1(),
+        &TrainOptions::new("m", 2),
+        &Origin::new("romc train", &training),
+        &mut Watch::new(&mut listener, &cancel),
+    );
+    assert!(matches!(result, Err(TrainError::Cancelled)));
+}
