@@ -1,7 +1,7 @@
 //! The model file `romc-model/1`.
 //!
 //! What enters: a path or bytes; what leaves: a checked [`ReducedModel`], or an error which names
-//! file, tensor, index, what was found and what was expected. The other way, [`write`] makes files
+//! file, tensor, index, what was found and what was expected. The other way, [`write()`] makes files
 //! that are equal byte for byte for equal models, and that appear whole or not at all.
 //! Read `manifest.rs` first: it is the file's grammar.
 //!

@@ -1,9 +1,10 @@
-//! JSON as people like to read and compare it: one key, or one row of a matrix, a line.
+//! JSON as people like to read and compare it: one key, or one row of a matrix, a line; lists of
+//! words fill lines.
 
 use serde_json::Value;
 
 const INDENT: &str = "  ";
-/// Lists of words and small objects stay on one line up to this width.
+/// Lists of words and small objects keep to this width, without indentation.
 const LINE_WIDTH: usize = 100;
 
 /// The value as text, with a newline at the end.
@@ -16,6 +17,14 @@ pub(super) fn print(value: &Value) -> String {
 
 fn push_value(out: &mut String, value: &Value, depth: usize) {
     match value {
+        Value::Array(words)
+            if words.iter().all(Value::is_string) && !on_one_line(words.iter(), value) =>
+        {
+            let lines = fill_lines(words);
+            push_lines(out, depth, ('[', ']'), lines.iter(), |out, line| {
+                out.push_str(line)
+            });
+        }
         Value::Array(items) if !on_one_line(items.iter(), value) => {
             push_lines(out, depth, ('[', ']'), items.iter(), |out, item| {
                 push_value(out, item, depth + 1);
@@ -54,6 +63,23 @@ fn on_one_line<'a>(mut items: impl Iterator<Item = &'a Value> + Clone, whole: &V
         push_compact(&mut text, whole);
         text.len() <= LINE_WIDTH
     }
+}
+
+/// Words with commas between them, as many on a line as fit; no comma at the end of a line.
+fn fill_lines(words: &[Value]) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in words {
+        let mut text = String::new();
+        push_compact(&mut text, word);
+        match lines.last_mut() {
+            Some(line) if line.len() + text.len() + 3 <= LINE_WIDTH => {
+                line.push_str(", ");
+                line.push_str(&text);
+            }
+            _ => lines.push(text),
+        }
+    }
+    lines
 }
 
 fn push_lines<T>(
@@ -112,6 +138,14 @@ mod tests {
         let expected = "{\n  \"name\": \"m\",\n  \"weights\": [\n    [1.0, -0.5],\n    \
                         [2.5e-7, 3.0]\n  ],\n  \"bias\": [0.0]\n}\n";
         assert_eq!(print(&value), expected);
+    }
+
+    #[test]
+    fn long_list_of_words_fills_lines() {
+        let words = vec!["x".repeat(38); 3];
+        let word = format!("\"{}\"", words[0]);
+        let expected = format!("{{\n  \"w\": [\n    {word}, {word},\n    {word}\n  ]\n}}\n");
+        assert_eq!(print(&json!({ "w": words })), expected);
     }
 
     #[test]

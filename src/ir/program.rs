@@ -246,6 +246,22 @@ impl Program {
         self.first.last().map_or(0, |&count| count as usize)
     }
 
+    /// Which statements compute something that an output depends on.
+    pub fn live(&self) -> Vec<bool> {
+        let mut live = vec![false; self.statements.len()];
+        for entry in &self.results {
+            live[self.definition(entry.value).0] = true;
+        }
+        for position in (0..self.statements.len()).rev() {
+            if live[position] {
+                for value in self.statements[position].operands() {
+                    live[self.definition(value).0] = true;
+                }
+            }
+        }
+        live
+    }
+
     /// Values that statement `statement` defines.
     pub fn values_of(&self, statement: usize) -> Range<usize> {
         self.first[statement] as usize..self.first[statement + 1] as usize

@@ -1,1 +1,20 @@
-//! From a model to programs and equations.
+//! From a model to programs.
+//!
+//! A [`ReducedModel`](crate::model::ReducedModel) and a phase enter, a
+//! [`Program`](crate::ir::Program) leaves: the accelerations, their Jacobian, a Runge-Kutta step, or
+//! one of the maps between robot and latent coordinates. Every decision that changes
+//! a rounding is made here: which subexpressions are shared, in which order sums are
+//! added, that a power is a chain of products. Read `dynamics` first, then `expression`.
+
+mod combination;
+mod dynamics;
+mod error;
+mod expression;
+mod maps;
+mod step;
+mod sums;
+
+pub use dynamics::{JacobianPattern, LowerOptions, dynamics, dynamics_jacobian};
+pub use error::LowerError;
+pub use maps::{decode, decode_velocity, encode, encode_velocity, lift_input, project_input};
+pub use step::rk4_step;

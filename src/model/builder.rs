@@ -309,13 +309,20 @@ impl ModelBuilder {
         let Some(dim) = state_dim else {
             return Ok(None);
         };
+        if !(latent_dim..=MAX_STATE_DIM).contains(&dim) {
+            return Err(ModelError::StateDim {
+                found: dim,
+                min: latent_dim,
+                max: MAX_STATE_DIM,
+            });
+        }
         if let Some(encoder) = &self.encoder {
-            let expected = (latent_dim, dim.clamp(latent_dim, MAX_STATE_DIM));
-            check_shape("encoder.weights", encoder.weights().shape(), expected)?;
+            let found = encoder.weights().shape();
+            check_shape("encoder.weights", found, (latent_dim, dim))?;
         }
         if let Some(decoder) = &self.decoder {
-            let expected = (dim.clamp(1, MAX_STATE_DIM), latent_dim);
-            check_shape("decoder.weights", decoder.weights().shape(), expected)?;
+            let found = decoder.weights().shape();
+            check_shape("decoder.weights", found, (dim, latent_dim))?;
         }
         Ok(Some(dim))
     }

@@ -92,6 +92,16 @@ pub enum ModelError {
         /// Index of the second occurrence.
         index: usize,
     },
+    /// There are fewer robot coordinates than latent ones, or more than can be handled.
+    #[error("found {found} robot coordinates, expected {min} (one a latent coordinate) to {max}")]
+    StateDim {
+        /// Coordinates of the state, as robot, names or maps have it.
+        found: usize,
+        /// Number of latent coordinates.
+        min: usize,
+        /// Largest number accepted.
+        max: usize,
+    },
     /// A tensor has the wrong number of rows or columns.
     #[error("`{tensor}`: found {found}, expected {expected} (rows x columns)")]
     Shape {

@@ -4,8 +4,7 @@ use std::fmt;
 
 use thiserror::Error;
 
-/// Longest identifier in bytes. With prefix and suffix of a generated function it stays below the
-/// 127 characters that C compilers promise to tell apart in practice.
+/// Longest identifier in bytes, so that names made of model, phase and function stay readable.
 pub const MAX_IDENTIFIER_LEN: usize = 40;
 
 /// A name which is an identifier in C, C++ and Rust, and neither a keyword nor reserved there.
@@ -413,6 +412,20 @@ mod tests {
                 ),
                 "{name}"
             );
+        }
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn identifier_of_any_text_is_plain_ascii_or_refused(
+            text in proptest::prop_oneof![".{0,50}", "[a-zA-Z0-9_. -]{0,45}"]
+        ) {
+            if let Ok(identifier) = Identifier::from_name(&text) {
+                let name = identifier.as_str();
+                assert!(name.starts_with(|c: char| c.is_ascii_alphabetic()));
+                assert!(name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_'));
+                assert!(!name.contains("__") && name.len() <= MAX_IDENTIFIER_LEN);
+            }
         }
     }
 

@@ -1,0 +1,178 @@
+//! The files of the LaTeX backend.
+
+use askama::Template;
+
+use crate::backend::typeset::{RoundingReport, Typeset, words};
+use crate::backend::{EmitError, EmittedFile};
+use crate::model::ReducedModel;
+
+use super::escape::{CommentText, TexText, label};
+use super::lines;
+use super::math::NumberStyle;
+use super::nomenclature::{self, Entry};
+use super::options::LatexOptions;
+use super::table::{self, TableBlock};
+
+/// The LaTeX files of `model`; NAME is its identifier:
+///
+/// - `NAME.tex`: the equations of each phase, to be taken in by `\input`;
+/// - `NAME-table.tex`: the coefficients as booktabs tables;
+/// - `NAME-nomenclature.tex`: what the symbols mean;
+/// - `NAME-preview.tex`: a document that shows all three.
+///
+/// The first lines of `NAME.tex` say how coefficients were rounded, the largest
+/// error that this made, and which terms vanished by it.
+///
+/// # Errors
+/// [`EmitError`] if a candidate term has a variable without a symbol.
+pub fn emit(model: &ReducedModel, options: &LatexOptions) -> Result<Vec<EmittedFile>, EmitError> {
+    let typeset = Typeset::new(model, &options.symbols, options.rounding)?;
+    let stem = model.identifier().as_str();
+    let header = Header { model, options };
+    let equations = Equations {
+        header: header.equations(&typeset.rounding),
+        systems: systems(model, &typeset, options),
+    };
+    let coefficients = Table {
+        header: header.short("Needs booktabs and, for more than 40 terms, longtable."),
+        blocks: table::blocks(&typeset.table, model.name(), options.numbers),
+    };
+    let nomenclature = Nomenclature {
+        header: header.short("A table as wide as the line; needs amsmath."),
+        entries: nomenclature::entries(model, &options.symbols, options.numbers),
+    };
+    let preview = Preview {
+        header: header.short("A document of its own; the files beside it are for \\input."),
+        name: TexText(model.name()).to_string(),
+        description: TexText(model.description()).to_string(),
+        stem: stem.to_owned(),
+        rounding: TexText(&words::rounding(options.rounding, &typeset.rounding)).to_string(),
+        siunitx: options.numbers == NumberStyle::Siunitx,
+    };
+    Ok(vec![
+        file(format!("{stem}.tex"), &equations)?,
+        file(format!("{stem}-table.tex"), &coefficients)?,
+        file(format!("{stem}-nomenclature.tex"), &nomenclature)?,
+        file(format!("{stem}-preview.tex"), &preview)?,
+    ])
+}
+
+#[derive(Template)]
+#[template(
+    path = "latex/equations.askama",
+    config = "templates/askama.toml",
+    syntax = "latex"
+)]
+struct Equations {
+    header: String,
+    systems: Vec<System>,
+}
+
+/// One phase in the template.
+struct System {
+    phase: String,
+    feet: String,
+    label: String,
+    aligned: bool,
+    lines: Vec<String>,
+}
+
+#[derive(Template)]
+#[template(
+    path = "latex/table.askama",
+    config = "templates/askama.toml",
+    syntax = "latex"
+)]
+struct Table {
+    header: String,
+    blocks: Vec<TableBlock>,
+}
+
+#[derive(Template)]
+#[template(
+    path = "latex/nomenclature.askama",
+    config = "templates/askama.toml",
+    syntax = "latex"
+)]
+struct Nomenclature {
+    header: String,
+    entries: Vec<Entry>,
+}
+
+#[derive(Template)]
+#[template(
+    path = "latex/preview.askama",
+    config = "templates/askama.toml",
+    syntax = "latex"
+)]
+struct Preview {
+    header: String,
+    name: String,
+    description: String,
+    stem: String,
+    rounding: String,
+    siunitx: bool,
+}
+
+fn systems(model: &ReducedModel, typeset: &Typeset, options: &LatexOptions) -> Vec<System> {
+    typeset
+        .systems
+        .iter()
+        .zip(model.phases())
+        .map(|(system, phase)| {
+            let label = format!("eq:{}:{}", label(model.name()), label(&system.phase));
+            let block = lines::block(system, &label, options);
+            System {
+                phase: CommentText(&system.phase).to_string(),
+                feet: words::feet(&phase.feet),
+                aligned: block.aligned,
+                lines: block.lines,
+                label,
+            }
+        })
+        .collect()
+}
+
+/// The comments at the top of each file.
+struct Header<'a> {
+    model: &'a ReducedModel,
+    options: &'a LatexOptions,
+}
+
+impl Header<'_> {
+    fn short(&self, note: &str) -> String {
+        let version = env!("CARGO_PKG_VERSION");
+        let name = CommentText(self.model.name());
+        let digest = match &self.options.digest {
+            Some(digest) => format!(", digest {}", CommentText(digest)),
+            None => String::new(),
+        };
+        format!("% romc {version}, model {name}{digest}.\n% {note}")
+    }
+
+    fn equations(&self, report: &RoundingReport) -> String {
+        let packages = match self.options.numbers {
+            NumberStyle::Plain => "amsmath",
+            NumberStyle::Siunitx => "amsmath and siunitx",
+        };
+        let mut header = self.short(&format!("For \\input; needs {packages}."));
+        header.push_str("\n% ");
+        header.push_str(&CommentText(&words::rounding(self.options.rounding, report)).to_string());
+        for place in &report.dropped {
+            let (phase, term) = (CommentText(&place.phase), CommentText(&place.term));
+            header.push_str(&format!(
+                "\n%   left out: {phase}, {}: {:e} * {term}",
+                place.output, place.coefficient
+            ));
+        }
+        header
+    }
+}
+
+/// Renders one file; a file ends with one line end.
+fn file(path: String, template: &impl Template) -> Result<EmittedFile, EmitError> {
+    let mut contents = template.render()?;
+    contents.truncate(contents.trim_end().len());
+    contents.push('\n');
+    Ok(EmittedFile::new(path, contents))
+}

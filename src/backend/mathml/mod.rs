@@ -1,0 +1,13 @@
+//! Equations for pages: the typeset tree as MathML Core, which browsers draw
+//! without scripts.
+//!
+//! A [`ReducedModel`](crate::model::ReducedModel) enters, `NAME.html` leaves;
+//! [`system`] gives the `math` element of one phase to pages made elsewhere.
+
+mod escape;
+mod math;
+mod page;
+
+pub use escape::HtmlText;
+pub use math::{Mathml, MathmlNumber, MathmlSymbol, MathmlTerms};
+pub use page::{MathmlOptions, emit, system};

@@ -1,0 +1,33 @@
+//! What backends have in common: the files they make and how they fail.
+
+use super::typeset::UnknownSymbol;
+
+/// A file that a backend made, not yet on disk.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EmittedFile {
+    /// Path relative to the output folder, with `/` between its parts.
+    pub path: String,
+    /// What the file holds.
+    pub contents: String,
+}
+
+impl EmittedFile {
+    /// A file at `path` with `contents`.
+    pub fn new(path: impl Into<String>, contents: impl Into<String>) -> Self {
+        Self {
+            path: path.into(),
+            contents: contents.into(),
+        }
+    }
+}
+
+/// Why a backend could not emit a model.
+#[derive(Debug, thiserror::Error)]
+pub enum EmitError {
+    /// A variable has no symbol in print.
+    #[error(transparent)]
+    Symbol(#[from] UnknownSymbol),
+    /// A template failed to render.
+    #[error("a template failed")]
+    Template(#[from] askama::Error),
+}

@@ -1,0 +1,266 @@
+//! Numbers as they are printed: how many digits, and what that costs.
+
+/// How coefficients are rounded for print.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Rounding {
+    /// At least `decimals` places, and as many more as keep each coefficient
+    /// within `relative_error` of its value. Never rounds a term away.
+    Adaptive {
+        /// Fewest places after the point.
+        decimals: usize,
+        /// Largest |printed - value| / |value| of any coefficient.
+        relative_error: f64,
+    },
+    /// Exactly this many places after the point, as the paper prints; small
+    /// coefficients can vanish.
+    Decimals(usize),
+    /// This many significant digits (at least one).
+    Significant(usize),
+    /// The shortest text that reads back as the same `f64`.
+    Exact,
+}
+
+impl Default for Rounding {
+    /// The paper's two decimals, with more for coefficients that would be off
+    /// by over 5 %: every coefficient of 0.1 and above has exactly two.
+    fn default() -> Self {
+        Rounding::Adaptive {
+            decimals: 2,
+            relative_error: 0.05,
+        }
+    }
+}
+
+impl Rounding {
+    /// Whether a coefficient of exactly one is left out before its term:
+    /// fixed decimals keep it, as the paper's `1.00 sin` does.
+    pub fn omits_one(self) -> bool {
+        match self {
+            Rounding::Adaptive { .. } | Rounding::Decimals(_) => false,
+            Rounding::Significant(_) | Rounding::Exact => true,
+        }
+    }
+}
+
+/// A decimal number in print: sign, digits and perhaps a power of ten.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decimal {
+    negative: bool,
+    digits: String,
+    exponent: Option<i32>,
+}
+
+/// Places after the point beyond which [`Rounding::Adaptive`] turns to powers of ten.
+const MOST_DECIMALS: usize = 6;
+/// Values from here on are printed with a power of ten.
+const LARGE: f64 = 1e7;
+/// Values below are printed with a power of ten where digits are not fixed.
+const SMALL: f64 = 1e-4;
+
+impl Decimal {
+    /// The shortest text that reads back as `value`, which must be finite.
+    pub fn exact(value: f64) -> Self {
+        debug_assert!(value.is_finite());
+        let size = value.abs();
+        if size != 0.0 && !(SMALL..LARGE).contains(&size) {
+            Self::scientific(value, format!("{size:e}"))
+        } else {
+            Self::plain(value, format!("{size}"))
+        }
+    }
+
+    /// An integer with all its digits.
+    pub fn integer(value: i64) -> Self {
+        Self {
+            negative: value < 0,
+            digits: value.unsigned_abs().to_string(),
+            exponent: None,
+        }
+    }
+
+    /// `value` rounded for print; the exact binary value is rounded, ties to even.
+    pub fn rounded(value: f64, rounding: Rounding) -> Self {
+        match rounding {
+            Rounding::Exact => Self::exact(value),
+            Rounding::Decimals(places) => Self::fixed(value, places),
+            Rounding::Significant(digits) => Self::significant(value, digits.max(1)),
+            Rounding::Adaptive {
+                decimals,
+                relative_error,
+            } => Self::adaptive(value, decimals, relative_error),
+        }
+    }
+
+    fn adaptive(value: f64, decimals: usize, relative_error: f64) -> Self {
+        let close =
+            |candidate: &Self| (candidate.value() - value).abs() <= relative_error * value.abs();
+        if value.abs() < LARGE {
+            for places in decimals..=MOST_DECIMALS.max(decimals) {
+                let candidate = Self::fixed(value, places);
+                if close(&candidate) {
+                    return candidate;
+                }
+            }
+        }
+        (1..17)
+            .map(|places| Self::scientific(value, format!("{:.places$e}", value.abs())))
+            .find(close)
+            .unwrap_or_else(|| Self::exact(value))
+    }
+
+    fn significant(value: f64, digits: usize) -> Self {
+        if value == 0.0 {
+            return Self::plain(value, "0".to_owned());
+        }
+        let text = format!("{:.*e}", digits - 1, value.abs());
+        let exponent = exponent_of(&text);
+        if exponent < -4 || exponent > 6.max(digits as i32) {
+            return Self::scientific(value, text);
+        }
+        let places = digits as i32 - 1 - exponent;
+        if places >= 0 {
+            return Self::fixed(value, places as usize);
+        }
+        // More places before the point than digits: read the rounded digits back.
+        let whole: f64 = text.parse().expect("formatted float reads back");
+        Self::plain(value, format!("{whole}"))
+    }
+
+    fn fixed(value: f64, places: usize) -> Self {
+        Self::plain(value, format!("{:.places$}", value.abs()))
+    }
+
+    fn plain(value: f64, digits: String) -> Self {
+        Self {
+            negative: value < 0.0,
+            digits,
+            exponent: None,
+        }
+    }
+
+    /// From Rust's `1.25e-7` form.
+    fn scientific(value: f64, text: String) -> Self {
+        let exponent = exponent_of(&text);
+        let digits = text.split('e').next().unwrap_or("0").to_owned();
+        Self {
+            negative: value < 0.0,
+            digits,
+            exponent: (exponent != 0).then_some(exponent),
+        }
+    }
+
+    /// What the printed text means.
+    pub fn value(&self) -> f64 {
+        let text = match self.exponent {
+            Some(exponent) => format!("{}e{exponent}", self.digits),
+            None => self.digits.clone(),
+        };
+        let size: f64 = text.parse().expect("digits and exponent form a number");
+        if self.negative { -size } else { size }
+    }
+
+    /// Whether it prints as nothing but zeros.
+    pub fn is_zero(&self) -> bool {
+        !self
+            .digits
+            .bytes()
+            .any(|byte| (b'1'..=b'9').contains(&byte))
+    }
+
+    /// Whether it prints as one.
+    pub fn is_one(&self) -> bool {
+        self.exponent.is_none() && self.value().abs() == 1.0
+    }
+
+    /// Whether it is below zero.
+    pub fn is_negative(&self) -> bool {
+        self.negative
+    }
+
+    /// The number without its sign.
+    pub fn magnitude(&self) -> Self {
+        Self {
+            negative: false,
+            ..self.clone()
+        }
+    }
+
+    /// The digits with their point, without sign and power of ten.
+    pub fn digits(&self) -> &str {
+        &self.digits
+    }
+
+    /// The power of ten that the digits are multiplied with, if one is printed.
+    pub fn exponent(&self) -> Option<i32> {
+        self.exponent
+    }
+}
+
+fn exponent_of(scientific: &str) -> i32 {
+    scientific
+        .split('e')
+        .nth(1)
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(value: f64, rounding: Rounding) -> String {
+        let decimal = Decimal::rounded(value, rounding);
+        let sign = if decimal.is_negative() { "-" } else { "" };
+        match decimal.exponent() {
+            Some(exponent) => format!("{sign}{}e{exponent}", decimal.digits()),
+            None => format!("{sign}{}", decimal.digits()),
+        }
+    }
+
+    #[test]
+    fn fixed_decimals_keep_trailing_zeros_and_may_vanish() {
+        assert_eq!(text(-1.0, Rounding::Decimals(2)), "-1.00");
+        assert_eq!(text(51.05, Rounding::Decimals(2)), "51.05");
+        assert_eq!(text(0.004, Rounding::Decimals(2)), "0.00");
+        assert!(Decimal::rounded(-0.004, Rounding::Decimals(2)).is_zero());
+    }
+
+    #[test]
+    fn adaptive_rounding_adds_decimals_only_where_two_mislead() {
+        let rounding = Rounding::default();
+        assert_eq!(text(0.36, rounding), "0.36");
+        assert_eq!(text(-1.0, rounding), "-1.00");
+        assert_eq!(text(0.05, rounding), "0.05");
+        assert_eq!(text(0.0537, rounding), "0.054");
+        assert_eq!(text(0.00612, rounding), "0.006");
+        assert_eq!(text(3.14e-9, rounding), "3.1e-9");
+        assert_eq!(text(123456789.0, rounding), "1.2e8");
+    }
+
+    #[test]
+    fn adaptive_rounding_keeps_the_promised_relative_error() {
+        let rounding = Rounding::default();
+        let mut value = 1.37e-12;
+        while value < 1e12 {
+            let printed = Decimal::rounded(value, rounding).value();
+            assert!((printed - value).abs() <= 0.05 * value, "{value} {printed}");
+            value *= 1.713;
+        }
+    }
+
+    #[test]
+    fn significant_digits_count_from_the_first_nonzero() {
+        assert_eq!(text(0.36, Rounding::Significant(3)), "0.360");
+        assert_eq!(text(51.05, Rounding::Significant(3)), "51.0");
+        assert_eq!(text(51234.0, Rounding::Significant(3)), "51200");
+        assert_eq!(text(9.996, Rounding::Significant(3)), "10.0");
+        assert_eq!(text(-1.25e-7, Rounding::Significant(2)), "-1.2e-7");
+    }
+
+    #[test]
+    fn exact_numbers_read_back_bit_for_bit() {
+        for value in [0.1, 1.0 / 3.0, -2.5e-300, 1e22, 5e-324, 12345.678, 0.0] {
+            assert_eq!(Decimal::exact(value).value().to_bits(), value.to_bits());
+        }
+    }
+}

@@ -1,0 +1,421 @@
+//! From canonical expressions to the typeset tree: fractions, roots, parentheses
+//! and the order in which readers expect factors and terms.
+
+use std::cmp::Ordering;
+
+use crate::symbolic::{ExprId, ExprPool, Function, Node, Number};
+
+use super::decimal::Decimal;
+use super::symbols::{SymbolTable, Variable};
+use super::tree::{FunctionName, Glyph, Math, Signed};
+
+/// A name in an expression that no symbol is known for.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{name}` has no symbol: expected z1, dz1, ddz1, u1 and so on")]
+pub struct UnknownSymbol {
+    /// The name as the expression has it.
+    pub name: String,
+}
+
+/// Lays out `expr`.
+///
+/// # Errors
+/// [`UnknownSymbol`] for a variable that is none of the latent model's.
+pub fn expression(
+    pool: &ExprPool,
+    expr: ExprId,
+    symbols: &SymbolTable,
+) -> Result<Signed, UnknownSymbol> {
+    Layout { pool, symbols }.signed(expr)
+}
+
+/// Puts a coefficient before a term: `0.36` and `sin(dz1)` to `0.36 sin(dz1)`.
+/// The coefficient takes the place of a term or numerator that is one.
+pub fn with_coefficient(coefficient: &Decimal, omit_one: bool, term: Signed) -> Signed {
+    let negative = coefficient.is_negative() != term.negative;
+    let number = Math::Number(coefficient.magnitude());
+    let math = match term.math {
+        Math::Number(one) if one.is_one() => number,
+        Math::Fraction(top, bottom) if is_one(&top) => Math::Fraction(Box::new(number), bottom),
+        Math::Sum(terms) => {
+            let group = Math::Group(Box::new(Math::Sum(terms)));
+            if omit_one && coefficient.is_one() {
+                group
+            } else {
+                product(vec![number, group])
+            }
+        }
+        math if omit_one && coefficient.is_one() => math,
+        Math::Product(mut factors) => {
+            factors.insert(0, number);
+            product(factors)
+        }
+        math => product(vec![number, math]),
+    };
+    Signed { negative, math }
+}
+
+struct Layout<'a> {
+    pool: &'a ExprPool,
+    symbols: &'a SymbolTable,
+}
+
+/// What a factor is sorted by: kind first, then variable, then exponent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum FactorKey {
+    Number,
+    Variable(Option<Variable>),
+    Group,
+    Function,
+}
+
+/// Numerator, denominator and sign of a product.
+#[derive(Default)]
+struct Quotient {
+    negative: bool,
+    numbers: Vec<Math>,
+    top: Vec<(FactorKey, Math)>,
+    bottom: Vec<(FactorKey, Math)>,
+}
+
+impl Layout<'_> {
+    fn signed(&self, expr: ExprId) -> Result<Signed, UnknownSymbol> {
+        match self.pool.node(expr) {
+            Node::Sum(terms) => self.sum(terms),
+            Node::Product(factors) => self.quotient(factors),
+            Node::Number(_) | Node::Symbol(_) | Node::Power(..) | Node::Apply(..) => {
+                self.quotient(&[expr])
+            }
+        }
+    }
+
+    fn sum(&self, terms: &[ExprId]) -> Result<Signed, UnknownSymbol> {
+        let mut order: Vec<ExprId> = terms.to_vec();
+        order.sort_by(|a, b| self.compare_terms(*a, *b));
+        let terms = order
+            .into_iter()
+            .map(|term| {
+                let signed = self.signed(term)?;
+                // A sum inside a sum does not occur in canonical form; brackets keep it right.
+                let math = match signed.math {
+                    sum @ Math::Sum(_) => Math::Group(Box::new(sum)),
+                    math => math,
+                };
+                Ok(Signed { math, ..signed })
+            })
+            .collect::<Result<_, UnknownSymbol>>()?;
+        Ok(Signed::plus(Math::Sum(terms)))
+    }
+
+    /// Constants first, then monomials by degree and variables, then the rest as the pool has it.
+    fn compare_terms(&self, a: ExprId, b: ExprId) -> Ordering {
+        match (self.monomial(a), self.monomial(b)) {
+            (Some(a), Some(b)) => a.len().cmp(&b.len()).then_with(|| a.cmp(&b)),
+            (Some(_), None) => Ordering::Less,
+            (None, Some(_)) => Ordering::Greater,
+            (None, None) => Ordering::Equal,
+        }
+    }
+
+    /// The variables of a monomial, each as often as its exponent says.
+    fn monomial(&self, expr: ExprId) -> Option<Vec<Variable>> {
+        let one = [expr];
+        let factors: &[ExprId] = match self.pool.node(expr) {
+            Node::Product(factors) => factors,
+            _other => &one,
+        };
+        let mut variables = Vec::new();
+        for factor in factors {
+            let (base, times) = match self.pool.node(*factor) {
+                Node::Number(_) => continue,
+                Node::Power(base, exponent) => (*base, self.small_power(*exponent)?),
+                _other => (*factor, 1),
+            };
+            let Node::Symbol(symbol) = self.pool.node(base) else {
+                return None;
+            };
+            let variable = Variable::parse(self.pool.symbol_name(*symbol))?;
+            variables.extend(std::iter::repeat_n(variable, times));
+        }
+        variables.sort();
+        Some(variables)
+    }
+
+    fn small_power(&self, exponent: ExprId) -> Option<usize> {
+        let integer = self.number(exponent)?.as_integer()?;
+        usize::try_from(integer).ok().filter(|power| *power <= 64)
+    }
+
+    fn quotient(&self, factors: &[ExprId]) -> Result<Signed, UnknownSymbol> {
+        let mut parts = Quotient::default();
+        for factor in factors {
+            match self.pool.node(*factor) {
+                Node::Number(number) => self.take_number(*number, &mut parts),
+                Node::Power(base, exponent) => self.take_power(*base, *exponent, &mut parts)?,
+                _other => {
+                    let factor = self.factor(*factor)?;
+                    parts.top.push(factor);
+                }
+            }
+        }
+        Ok(parts.assemble())
+    }
+
+    fn take_number(&self, number: Number, parts: &mut Quotient) {
+        parts.negative ^= number.is_negative();
+        let size = number.abs();
+        match size.as_rational() {
+            Some((top, bottom)) => {
+                if top != 1 {
+                    parts.numbers.push(integer(top));
+                }
+                if bottom != 1 {
+                    parts.bottom.push((FactorKey::Number, integer(bottom)));
+                }
+            }
+            None => parts
+                .numbers
+                .push(Math::Number(Decimal::exact(size.to_f64()))),
+        }
+    }
+
+    fn take_power(
+        &self,
+        base: ExprId,
+        exponent: ExprId,
+        parts: &mut Quotient,
+    ) -> Result<(), UnknownSymbol> {
+        match self.number(exponent) {
+            Some(number) if number.is_negative() => {
+                let factor = self.numeric_power(base, number.abs())?;
+                parts.bottom.push(factor);
+            }
+            Some(number) => {
+                let factor = self.numeric_power(base, number)?;
+                parts.top.push(factor);
+            }
+            None => {
+                let exponent = self.signed(exponent)?.into_math();
+                let (key, base) = self.base(base)?;
+                let power = Math::Power(Box::new(base), Box::new(exponent));
+                parts.top.push((key, power));
+            }
+        }
+        Ok(())
+    }
+
+    /// `base ^ exponent` for a positive number: a root, a power on the function's
+    /// name, or a plain power.
+    fn numeric_power(
+        &self,
+        base: ExprId,
+        exponent: Number,
+    ) -> Result<(FactorKey, Math), UnknownSymbol> {
+        if exponent.is_one() {
+            return self.factor(base);
+        }
+        let exponent = match exponent.as_rational() {
+            Some((1, index @ 2..=9)) => {
+                let inner = self.signed(base)?.into_math();
+                let index = (index != 2).then_some(index as u32);
+                return Ok((FactorKey::Function, Math::Root(Box::new(inner), index)));
+            }
+            Some((power, 1)) => match self.pool.node(base) {
+                // The pool keeps x^(3/2) as sqrt(x)^3.
+                Node::Apply(Function::Sqrt, radicand) => {
+                    let (key, base) = self.base(*radicand)?;
+                    let half = Math::Slash(Box::new(integer(power)), Box::new(integer(2)));
+                    return Ok((key, Math::Power(Box::new(base), Box::new(half))));
+                }
+                Node::Apply(function, argument) => {
+                    return self.powered_function(*function, *argument, power);
+                }
+                _other => integer(power),
+            },
+            Some((top, bottom)) => Math::Slash(Box::new(integer(top)), Box::new(integer(bottom))),
+            None => Math::Number(Decimal::exact(exponent.to_f64())),
+        };
+        let (key, base) = self.base(base)?;
+        Ok((key, Math::Power(Box::new(base), Box::new(exponent))))
+    }
+
+    /// `sin(x)^2` with the power on the name; on the whole for functions that do not allow it.
+    fn powered_function(
+        &self,
+        function: Function,
+        argument: ExprId,
+        power: i64,
+    ) -> Result<(FactorKey, Math), UnknownSymbol> {
+        let power = Box::new(integer(power));
+        let math = match powered_name(function) {
+            Some(name) => {
+                let argument = Box::new(self.signed(argument)?.into_math());
+                Math::Function(name, Some(power), argument)
+            }
+            None => Math::Power(Box::new(self.apply(function, argument)?), power),
+        };
+        Ok((FactorKey::Function, math))
+    }
+
+    /// `expr` as the base of a power, in parentheses where it needs them.
+    fn base(&self, expr: ExprId) -> Result<(FactorKey, Math), UnknownSymbol> {
+        let (key, math) = self.factor(expr)?;
+        let math = match math {
+            Math::Number(ref number) if number.exponent().is_some() => Math::Group(Box::new(math)),
+            Math::Product(_)
+            | Math::Sum(_)
+            | Math::Fraction(..)
+            | Math::Slash(..)
+            | Math::Power(..)
+            | Math::Root(..)
+            | Math::Function(_, Some(_), _) => Math::Group(Box::new(math)),
+            Math::Number(_)
+            | Math::Symbol(_)
+            | Math::Dot
+            | Math::Function(_, None, _)
+            | Math::Absolute(_)
+            | Math::Group(_) => math,
+        };
+        Ok((key, math))
+    }
+
+    /// One factor of a product, with parentheses around sums and signs.
+    fn factor(&self, expr: ExprId) -> Result<(FactorKey, Math), UnknownSymbol> {
+        Ok(match self.pool.node(expr) {
+            Node::Symbol(symbol) => {
+                let name = self.pool.symbol_name(*symbol);
+                let variable = Variable::parse(name).ok_or_else(|| UnknownSymbol {
+                    name: name.to_owned(),
+                })?;
+                let symbol = Math::Symbol(self.symbols.symbol(variable));
+                (FactorKey::Variable(Some(variable)), symbol)
+            }
+            Node::Apply(function, argument) => {
+                (FactorKey::Function, self.apply(*function, *argument)?)
+            }
+            Node::Number(_) | Node::Sum(_) | Node::Product(_) | Node::Power(..) => {
+                let signed = self.signed(expr)?;
+                match signed {
+                    Signed {
+                        negative: false,
+                        math: math @ Math::Number(_),
+                    } => (FactorKey::Number, math),
+                    Signed {
+                        negative: false,
+                        math,
+                    } if !matches!(math, Math::Sum(_)) => (FactorKey::Group, math),
+                    other => (FactorKey::Group, Math::Group(Box::new(other.into_math()))),
+                }
+            }
+        })
+    }
+
+    fn apply(&self, function: Function, argument: ExprId) -> Result<Math, UnknownSymbol> {
+        let argument = Box::new(self.signed(argument)?.into_math());
+        let named = |name| Math::Function(name, None, argument.clone());
+        Ok(match function {
+            Function::Sin => named(FunctionName::Sin),
+            Function::Cos => named(FunctionName::Cos),
+            Function::Tan => named(FunctionName::Tan),
+            Function::Tanh => named(FunctionName::Tanh),
+            Function::Exp => named(FunctionName::Exp),
+            Function::Log => named(FunctionName::Ln),
+            Function::Sign => named(FunctionName::Sgn),
+            Function::Sqrt => Math::Root(argument, None),
+            Function::Abs => Math::Absolute(argument),
+        })
+    }
+
+    fn number(&self, expr: ExprId) -> Option<Number> {
+        match self.pool.node(expr) {
+            Node::Number(number) => Some(*number),
+            _other => None,
+        }
+    }
+}
+
+impl Quotient {
+    fn assemble(mut self) -> Signed {
+        self.top.sort_by_key(|(key, _)| *key);
+        self.bottom.sort_by_key(|(key, _)| *key);
+        let mut top = self.numbers;
+        top.extend(self.top.into_iter().map(|(_, math)| math));
+        if top.is_empty() {
+            top.push(integer(1));
+        }
+        let top = product(top);
+        let math = if self.bottom.is_empty() {
+            top
+        } else {
+            let bottom = product(self.bottom.into_iter().map(|(_, math)| math).collect());
+            Math::Fraction(Box::new(bare(top)), Box::new(bare(bottom)))
+        };
+        Signed {
+            negative: self.negative,
+            math,
+        }
+    }
+}
+
+/// A numerator or denominator needs no parentheses of its own.
+fn bare(math: Math) -> Math {
+    match math {
+        Math::Group(inner) => *inner,
+        math => math,
+    }
+}
+
+/// Factors side by side, with a dot where digits or words would run together.
+fn product(factors: Vec<Math>) -> Math {
+    let mut laid_out: Vec<Math> = Vec::with_capacity(factors.len());
+    for factor in factors {
+        let runs_together = laid_out.last().is_some_and(|before| {
+            factor.starts_with_digit() || (ends_with_word(before) && starts_with_word(&factor))
+        });
+        if runs_together {
+            laid_out.push(Math::Dot);
+        }
+        laid_out.push(factor);
+    }
+    match laid_out.len() {
+        1 => laid_out.swap_remove(0),
+        _ => Math::Product(laid_out),
+    }
+}
+
+fn starts_with_word(math: &Math) -> bool {
+    match math {
+        Math::Symbol(symbol) => matches!(symbol.glyph, Glyph::Word(_)),
+        Math::Power(base, _) => starts_with_word(base),
+        _other => false,
+    }
+}
+
+fn ends_with_word(math: &Math) -> bool {
+    match math {
+        Math::Symbol(symbol) => {
+            matches!(symbol.glyph, Glyph::Word(_)) && symbol.subscript.is_empty()
+        }
+        _other => false,
+    }
+}
+
+/// Functions whose power is written on the name, as in `sin^2`.
+fn powered_name(function: Function) -> Option<FunctionName> {
+    match function {
+        Function::Sin => Some(FunctionName::Sin),
+        Function::Cos => Some(FunctionName::Cos),
+        Function::Tan => Some(FunctionName::Tan),
+        Function::Tanh => Some(FunctionName::Tanh),
+        Function::Log => Some(FunctionName::Ln),
+        Function::Exp | Function::Sqrt | Function::Abs | Function::Sign => None,
+    }
+}
+
+fn integer(value: i64) -> Math {
+    Math::Number(Decimal::integer(value))
+}
+
+fn is_one(math: &Math) -> bool {
+    matches!(math, Math::Number(number) if number.is_one())
+}

@@ -1,0 +1,24 @@
+//! Equations laid out for print, before they have a spelling.
+//!
+//! A [`ReducedModel`](crate::model::ReducedModel) enters; a [`Typeset`] leaves: one
+//! [`EquationSystem`] a phase, made of [`Math`] trees in which fractions, roots,
+//! parentheses, signs and rounded coefficients have their final place. The LaTeX,
+//! Markdown and MathML backends spell the same trees. Read [`tree`] first, then
+//! [`expression`] (from the algebra to the tree) and [`equations`].
+
+mod decimal;
+pub mod equations;
+pub mod expression;
+mod symbols;
+pub mod tree;
+mod width;
+pub mod words;
+
+pub use decimal::{Decimal, Rounding};
+pub use equations::{
+    CoefficientRow, CoefficientTable, Equation, EquationSystem, Place, RoundingReport, Typeset,
+};
+pub use expression::{UnknownSymbol, expression, with_coefficient};
+pub use symbols::{Quantity, RenameError, SymbolTable, Variable};
+pub use tree::{FunctionName, GREEK, Glyph, Math, Signed, Symbol};
+pub use width::{EQUALS, OPERATOR, break_lines, sum_width, symbol_width, width};

@@ -1,0 +1,63 @@
+//! Linear combinations of expressions with floating-point coefficients.
+
+use std::collections::HashMap;
+
+use crate::symbolic::{ExprId, ExprPool, SymbolId};
+
+/// `constant + sum_i coefficient_i expr_i`; the expressions are distinct, not sums and
+/// without numeric factor.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Combination {
+    pub constant: f64,
+    pub items: Vec<(f64, ExprId)>,
+}
+
+impl Combination {
+    /// Collects `sum_i coefficient_i expr_i`; sums are taken apart, equal expressions
+    /// merged in order of first appearance, and what cancels exactly is left out.
+    pub fn collect(pool: &ExprPool, summands: impl IntoIterator<Item = (f64, ExprId)>) -> Self {
+        let mut result = Self::default();
+        let mut position = HashMap::new();
+        for (coefficient, expr) in summands {
+            for (number, rest) in pool.terms_of(expr) {
+                let product = coefficient * number.to_f64();
+                if rest == ExprId::ONE {
+                    result.constant += product;
+                    continue;
+                }
+                let next = result.items.len();
+                let at = *position.entry(rest).or_insert(next);
+                if at == next {
+                    result.items.push((product, rest));
+                } else {
+                    result.items[at].0 += product;
+                }
+            }
+        }
+        result.items.retain(|&(coefficient, _)| coefficient != 0.0);
+        result
+    }
+
+    /// The derivative by one variable.
+    pub fn derivative(&self, pool: &mut ExprPool, by: SymbolId) -> Self {
+        let summands: Vec<_> = self
+            .items
+            .iter()
+            .map(|&(coefficient, expr)| (coefficient, pool.derivative(expr, by)))
+            .filter(|&(_, expr)| expr != ExprId::ZERO)
+            .collect();
+        Self::collect(pool, summands)
+    }
+
+    /// Whether the combination is the number zero.
+    pub fn is_zero(&self) -> bool {
+        self.items.is_empty() && self.constant == 0.0
+    }
+
+    /// The first number of the combination that is not finite.
+    pub fn non_finite(&self) -> Option<f64> {
+        std::iter::once(self.constant)
+            .chain(self.items.iter().map(|&(coefficient, _)| coefficient))
+            .find(|value| !value.is_finite())
+    }
+}

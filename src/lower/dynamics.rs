@@ -1,0 +1,167 @@
+//! The accelerations `ddz = Xi^T Theta(z, dz, u_lat)` of a phase and their Jacobian.
+
+use std::collections::HashMap;
+
+use super::combination::Combination;
+use super::error::LowerError;
+use super::expression::ExpressionLowering;
+use crate::ir::{Program, ProgramBuilder, ValueId};
+use crate::model::{LatentVariable, ReducedModel};
+use crate::symbolic::{ExprId, ExprPool, SymbolId};
+
+/// How programs are made from a model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LowerOptions {}
+
+/// Where the structural nonzeros of `d ddz / d (z, dz, u_lat)` stand, row-major.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JacobianPattern {
+    /// Row of each entry: the component of ddz.
+    pub rows: Vec<usize>,
+    /// Column of each entry: z in the first `latent_dim`, then dz, then u_lat.
+    pub cols: Vec<usize>,
+}
+
+impl JacobianPattern {
+    /// Number of entries.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether the accelerations are constant.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+}
+
+/// The program of the accelerations: inputs `z`, `dz`, `u_lat`, output `ddz`, each
+/// `latent_dim` long, in scaled units.
+///
+/// # Errors
+/// [`LowerError::Model`] if there is no such phase, [`LowerError::NonFinite`] if a
+/// coefficient overflows when folded.
+pub fn dynamics(
+    model: &ReducedModel,
+    phase: usize,
+    _options: &LowerOptions,
+) -> Result<Program, LowerError> {
+    let equations = accelerations(model, phase)?;
+    let mut lowering = start(model, model.library().pool(), "dynamics");
+    lowering.prepare(&expressions(&equations));
+    let ddz = values(&mut lowering, &equations);
+    let mut builder = lowering.builder;
+    builder.output("ddz", &ddz);
+    Ok(builder.finish()?)
+}
+
+/// The program of the accelerations and the structural nonzeros of their exact Jacobian
+/// by `(z, dz, u_lat)`: outputs `ddz` and `jacobian`, the latter absent if the
+/// accelerations are constant.
+///
+/// # Errors
+/// As [`dynamics`].
+pub fn dynamics_jacobian(
+    model: &ReducedModel,
+    phase: usize,
+    _options: &LowerOptions,
+) -> Result<(Program, JacobianPattern), LowerError> {
+    let equations = accelerations(model, phase)?;
+    let mut pool = model.library().pool().clone();
+    let mut entries = Vec::new();
+    let mut pattern = JacobianPattern {
+        rows: Vec::new(),
+        cols: Vec::new(),
+    };
+    for (row, equation) in equations.iter().enumerate() {
+        for (col, variable) in LatentVariable::all(model.latent_dim()).enumerate() {
+            let derivative = equation.derivative(&mut pool, symbol(model, variable));
+            check_finite(model, phase, row, &derivative)?;
+            if !derivative.is_zero() {
+                pattern.rows.push(row);
+                pattern.cols.push(col);
+                entries.push(derivative);
+            }
+        }
+    }
+    let mut lowering = start(model, &pool, "dynamics_jacobian");
+    let mut roots = expressions(&equations);
+    roots.extend(expressions(&entries));
+    lowering.prepare(&roots);
+    let ddz = values(&mut lowering, &equations);
+    let jacobian = values(&mut lowering, &entries);
+    let mut builder = lowering.builder;
+    builder.output("ddz", &ddz);
+    if !jacobian.is_empty() {
+        builder.output("jacobian", &jacobian);
+    }
+    Ok((builder.finish()?, pattern))
+}
+
+/// The right-hand sides with folded coefficients, one a latent coordinate.
+fn accelerations(model: &ReducedModel, phase: usize) -> Result<Vec<Combination>, LowerError> {
+    let coefficients = model.phase(phase)?;
+    let library = model.library();
+    (0..model.latent_dim())
+        .map(|row| {
+            let summands = coefficients
+                .active_terms(row)
+                .map(|(term, coefficient)| (coefficient, library.term(term).expr()));
+            let equation = Combination::collect(library.pool(), summands);
+            check_finite(model, phase, row, &equation)?;
+            Ok(equation)
+        })
+        .collect()
+}
+
+fn check_finite(
+    model: &ReducedModel,
+    phase: usize,
+    row: usize,
+    combination: &Combination,
+) -> Result<(), LowerError> {
+    match combination.non_finite() {
+        None => Ok(()),
+        Some(value) => Err(LowerError::NonFinite {
+            phase: model.phase(phase)?.name.clone(),
+            output: row + 1,
+            value,
+        }),
+    }
+}
+
+/// A lowering whose program has the inputs `z`, `dz` and `u_lat`.
+fn start<'a>(model: &ReducedModel, pool: &'a ExprPool, name: &str) -> ExpressionLowering<'a> {
+    let d = model.latent_dim();
+    let mut builder = ProgramBuilder::new(name);
+    let inputs = [
+        builder.input("z", d),
+        builder.input("dz", d),
+        builder.input("u_lat", d),
+    ];
+    let variables: HashMap<SymbolId, ValueId> = LatentVariable::all(d)
+        .zip(inputs.into_iter().flatten())
+        .map(|(variable, value)| (symbol(model, variable), value))
+        .collect();
+    ExpressionLowering::new(pool, builder, variables)
+}
+
+fn symbol(model: &ReducedModel, variable: LatentVariable) -> SymbolId {
+    model
+        .library()
+        .symbol(variable)
+        .expect("variables up to latent_dim are in the library's pool")
+}
+
+fn expressions(combinations: &[Combination]) -> Vec<ExprId> {
+    let items = combinations
+        .iter()
+        .flat_map(|combination| &combination.items);
+    items.map(|&(_, expr)| expr).collect()
+}
+
+fn values(lowering: &mut ExpressionLowering, combinations: &[Combination]) -> Vec<ValueId> {
+    combinations
+        .iter()
+        .map(|combination| lowering.combination(combination))
+        .collect()
+}

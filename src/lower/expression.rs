@@ -1,0 +1,245 @@
+//! Expressions to values: what is shared, how powers and functions are computed.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use super::combination::Combination;
+use super::sums::{Term, linear_combination, scaled};
+use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
+use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
+
+/// Turns expressions of one pool into values of one program; an expression that occurs
+/// again is the same value.
+pub(super) struct ExpressionLowering<'a> {
+    pub pool: &'a ExprPool,
+    pub builder: ProgramBuilder,
+    values: HashMap<ExprId, ValueId>,
+    /// Sine and cosine of an argument.
+    angles: HashMap<ExprId, (ValueId, ValueId)>,
+    variables: HashMap<SymbolId, ValueId>,
+    /// Expressions that wait for a function of the library or the kernel.
+    late: HashSet<ExprId>,
+}
+
+impl<'a> ExpressionLowering<'a> {
+    /// Starts with the values that the variables of the pool take.
+    pub fn new(
+        pool: &'a ExprPool,
+        builder: ProgramBuilder,
+        variables: HashMap<SymbolId, ValueId>,
+    ) -> Self {
+        Self {
+            pool,
+            builder,
+            values: HashMap::new(),
+            angles: HashMap::new(),
+            variables,
+            late: HashSet::new(),
+        }
+    }
+
+    /// Computes all sines and cosines that occur in the expressions, as few array
+    /// statements as their nesting allows.
+    pub fn prepare(&mut self, roots: &[ExprId]) {
+        let mut levels: BTreeMap<usize, Vec<ExprId>> = BTreeMap::new();
+        let mut nesting: HashMap<ExprId, usize> = HashMap::new();
+        let mut seen = HashSet::new();
+        for expr in self.pool.reachable(roots) {
+            let node = self.pool.node(expr);
+            let inner = self.pool.children(expr).map(|child| nesting[&child]).max();
+            let mut level = inner.unwrap_or(0);
+            let late = match node {
+                Node::Apply(Function::Sin | Function::Cos, argument) => {
+                    if seen.insert(*argument) {
+                        levels.entry(level).or_default().push(*argument);
+                    }
+                    level += 1;
+                    true
+                }
+                Node::Apply(function, _) => is_slow(*function),
+                Node::Power(_, exponent) => self.pool.as_number(*exponent).is_none(),
+                Node::Number(_) | Node::Symbol(_) | Node::Sum(_) | Node::Product(_) => false,
+            };
+            let waits = |child: ExprId| self.late.contains(&child);
+            if late || self.pool.children(expr).any(waits) {
+                self.late.insert(expr);
+            }
+            nesting.insert(expr, level);
+        }
+        for arguments in levels.into_values() {
+            self.sines_and_cosines(&arguments);
+        }
+    }
+
+    fn sines_and_cosines(&mut self, arguments: &[ExprId]) {
+        let mut arguments: Vec<(ExprId, ValueId)> = arguments
+            .iter()
+            .map(|&argument| (argument, self.value(argument)))
+            .collect();
+        // Arguments in the order of the inputs can be read in place by generated loops.
+        arguments.sort_by_key(|&(_, value)| value);
+        let values: Vec<ValueId> = arguments.iter().map(|&(_, value)| value).collect();
+        let (sines, cosines) = self.builder.sin_cos(&values);
+        for ((argument, _), pair) in arguments.into_iter().zip(sines.into_iter().zip(cosines)) {
+            self.angles.insert(argument, pair);
+        }
+    }
+
+    /// The value of an expression; its sines and cosines have been prepared.
+    pub fn value(&mut self, expr: ExprId) -> ValueId {
+        if let Some(&value) = self.values.get(&expr) {
+            return value;
+        }
+        let pool = self.pool;
+        let value = match pool.node(expr) {
+            Node::Number(number) => self.builder.constant(number.to_f64()),
+            Node::Symbol(symbol) => *self
+                .variables
+                .get(symbol)
+                .expect("every variable of a model's pool is an input"),
+            Node::Sum(_) => {
+                let combination = Combination::collect(pool, [(1.0, expr)]);
+                self.combination(&combination)
+            }
+            Node::Product(_) => self.product(expr),
+            Node::Power(base, exponent) => self.power(*base, *exponent),
+            Node::Apply(function, argument) => self.apply(*function, *argument),
+        };
+        self.values.insert(expr, value);
+        value
+    }
+
+    /// The value of a linear combination.
+    pub fn combination(&mut self, combination: &Combination) -> ValueId {
+        let terms: Vec<Term> = combination
+            .items
+            .iter()
+            .map(|&(coefficient, expr)| Term {
+                coefficient,
+                value: self.value(expr),
+                late: self.late.contains(&expr),
+            })
+            .collect();
+        linear_combination(&mut self.builder, combination.constant, &terms)
+    }
+
+    /// Factors with negative exponents form one divisor; the others multiply in
+    /// canonical order, so that monomials share their beginnings.
+    fn product(&mut self, expr: ExprId) -> ValueId {
+        let pool = self.pool;
+        let (number, rest) = pool.split(expr);
+        if number.to_f64() != 1.0 {
+            let value = self.value(rest);
+            return scaled(&mut self.builder, number.to_f64(), value);
+        }
+        let (mut over, mut under): (Option<ValueId>, Option<ValueId>) = (None, None);
+        for &factor in pool.factors_of(expr) {
+            let (side, value) = match reciprocal_power(pool, factor) {
+                Some((base, exponent)) => {
+                    let base = self.value(base);
+                    (&mut under, self.integer_power(base, exponent))
+                }
+                None => (&mut over, self.value(factor)),
+            };
+            *side = Some(match *side {
+                None => value,
+                Some(product) => self.builder.binary(Binary::Mul, product, value),
+            });
+        }
+        self.quotient(over, under)
+    }
+
+    fn quotient(&mut self, over: Option<ValueId>, under: Option<ValueId>) -> ValueId {
+        let over = over.unwrap_or_else(|| self.builder.constant(1.0));
+        match under {
+            None => over,
+            Some(under) => self.builder.binary(Binary::Div, over, under),
+        }
+    }
+
+    fn power(&mut self, base: ExprId, exponent: ExprId) -> ValueId {
+        let integer = self
+            .pool
+            .as_number(exponent)
+            .and_then(|number| number.as_integer());
+        match integer.map(|exponent| (exponent, u32::try_from(exponent.unsigned_abs()))) {
+            Some((exponent, Ok(magnitude))) => {
+                let base = self.value(base);
+                let power = self.integer_power(base, magnitude);
+                if exponent >= 0 {
+                    power
+                } else {
+                    self.quotient(None, Some(power))
+                }
+            }
+            _ => {
+                let (base, exponent) = (self.value(base), self.value(exponent));
+                let logarithm = self.builder.unary(Unary::Log, base);
+                let product = self.builder.binary(Binary::Mul, exponent, logarithm);
+                self.builder.unary(Unary::Exp, product)
+            }
+        }
+    }
+
+    /// A chain of squarings and products; never `pow`, whose rounding differs by platform.
+    fn integer_power(&mut self, base: ValueId, exponent: u32) -> ValueId {
+        match exponent {
+            0 => self.builder.constant(1.0),
+            1 => base,
+            _ => {
+                let half = self.integer_power(base, exponent / 2);
+                let square = self.builder.binary(Binary::Mul, half, half);
+                if exponent.is_multiple_of(2) {
+                    square
+                } else {
+                    self.builder.binary(Binary::Mul, square, base)
+                }
+            }
+        }
+    }
+
+    fn apply(&mut self, function: Function, argument: ExprId) -> ValueId {
+        let op = match function {
+            Function::Sin => return self.angle(argument).0,
+            Function::Cos => return self.angle(argument).1,
+            Function::Tan => Unary::Tan,
+            Function::Tanh => Unary::Tanh,
+            Function::Exp => Unary::Exp,
+            Function::Log => Unary::Log,
+            Function::Sqrt => Unary::Sqrt,
+            Function::Abs => Unary::Abs,
+            Function::Sign => Unary::Sign,
+        };
+        let argument = self.value(argument);
+        self.builder.unary(op, argument)
+    }
+
+    fn angle(&mut self, argument: ExprId) -> (ValueId, ValueId) {
+        if !self.angles.contains_key(&argument) {
+            self.sines_and_cosines(&[argument]);
+        }
+        self.angles[&argument]
+    }
+}
+
+/// `base^-n` as `(base, n)`.
+fn reciprocal_power(pool: &ExprPool, factor: ExprId) -> Option<(ExprId, u32)> {
+    let Node::Power(base, exponent) = pool.node(factor) else {
+        return None;
+    };
+    let exponent = pool.as_number(*exponent)?.as_integer()?;
+    let magnitude = u32::try_from(exponent.checked_neg()?).ok()?;
+    Some((*base, magnitude))
+}
+
+/// Whether a function takes many times longer than a product.
+fn is_slow(function: Function) -> bool {
+    match function {
+        Function::Sin
+        | Function::Cos
+        | Function::Tan
+        | Function::Tanh
+        | Function::Exp
+        | Function::Log => true,
+        Function::Sqrt | Function::Abs | Function::Sign => false,
+    }
+}

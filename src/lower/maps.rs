@@ -1,0 +1,130 @@
+//! The maps between robot and latent coordinates, with the scaling folded in.
+
+use nalgebra::DMatrix;
+
+use super::error::LowerError;
+use super::sums::{Term, linear_combination};
+use crate::ir::{Program, ProgramBuilder};
+use crate::model::ReducedModel;
+
+/// `z = W_e (s_x x) + b_e`: input `x` (SI units), output `z`.
+///
+/// # Errors
+/// [`LowerError::Model`] if the model has no encoder or scaling.
+pub fn encode(model: &ReducedModel) -> Result<Program, LowerError> {
+    let bias = model.encoder()?.bias().as_slice();
+    affine("encode", ("x", "z"), &encoder_weights(model)?, Some(bias))
+}
+
+/// `dz = W_e (s_x dx)`: input `dx` (SI units), output `dz`; velocities take no bias.
+///
+/// # Errors
+/// As [`encode`].
+pub fn encode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
+    affine(
+        "encode_velocity",
+        ("dx", "dz"),
+        &encoder_weights(model)?,
+        None,
+    )
+}
+
+/// `x = (W_d z + b_d) / s_x`: input `z`, output `x` (SI units).
+///
+/// # Errors
+/// [`LowerError::Model`] if the model has no decoder or scaling.
+pub fn decode(model: &ReducedModel) -> Result<Program, LowerError> {
+    let factors = model.state_factors()?;
+    let bias = model.decoder()?.bias().component_div(&factors);
+    affine(
+        "decode",
+        ("z", "x"),
+        &decoder_weights(model)?,
+        Some(bias.as_slice()),
+    )
+}
+
+/// `dx = (W_d dz) / s_x`: input `dz`, output `dx` (SI units); velocities take no bias.
+///
+/// # Errors
+/// As [`decode`].
+pub fn decode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
+    affine(
+        "decode_velocity",
+        ("dz", "dx"),
+        &decoder_weights(model)?,
+        None,
+    )
+}
+
+/// `u_lat = pinv(W_e^T) (s_u u)`: input `u` (SI units), output `u_lat`.
+///
+/// # Errors
+/// As [`encode`].
+pub fn project_input(model: &ReducedModel) -> Result<Program, LowerError> {
+    let factors = model.input_factors()?;
+    let projection = model.input_projection()?;
+    let weights = DMatrix::from_fn(projection.nrows(), projection.ncols(), |row, col| {
+        projection[(row, col)] * factors[col]
+    });
+    affine("project_input", ("u", "u_lat"), &weights, None)
+}
+
+/// `u = (W_e^T u_lat) / s_u`: input `u_lat`, output `u` (SI units).
+///
+/// # Errors
+/// As [`encode`].
+pub fn lift_input(model: &ReducedModel) -> Result<Program, LowerError> {
+    let factors = model.input_factors()?;
+    let encoder = model.encoder()?.weights();
+    let weights = DMatrix::from_fn(encoder.ncols(), encoder.nrows(), |row, col| {
+        encoder[(col, row)] / factors[row]
+    });
+    affine("lift_input", ("u_lat", "u"), &weights, None)
+}
+
+fn encoder_weights(model: &ReducedModel) -> Result<DMatrix<f64>, LowerError> {
+    let factors = model.state_factors()?;
+    let encoder = model.encoder()?.weights();
+    Ok(DMatrix::from_fn(
+        encoder.nrows(),
+        encoder.ncols(),
+        |row, col| encoder[(row, col)] * factors[col],
+    ))
+}
+
+fn decoder_weights(model: &ReducedModel) -> Result<DMatrix<f64>, LowerError> {
+    let factors = model.state_factors()?;
+    let decoder = model.decoder()?.weights();
+    Ok(DMatrix::from_fn(
+        decoder.nrows(),
+        decoder.ncols(),
+        |row, col| decoder[(row, col)] / factors[row],
+    ))
+}
+
+/// `output = weights input + bias`.
+fn affine(
+    name: &str,
+    (from, to): (&str, &str),
+    weights: &DMatrix<f64>,
+    bias: Option<&[f64]>,
+) -> Result<Program, LowerError> {
+    let mut builder = ProgramBuilder::new(name);
+    let input = builder.input(from, weights.ncols());
+    let mut output = Vec::with_capacity(weights.nrows());
+    for row in 0..weights.nrows() {
+        let terms: Vec<Term> = (0..weights.ncols())
+            .filter(|&col| weights[(row, col)] != 0.0)
+            .map(|col| Term {
+                coefficient: weights[(row, col)],
+                value: input[col],
+                late: false,
+            })
+            .collect();
+        let constant = bias.map_or(0.0, |bias| bias[row]);
+        output.push(linear_combination(&mut builder, constant, &terms));
+    }
+    builder.output(to, &output);
+    Ok(builder.finish()?)
+}
