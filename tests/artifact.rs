@@ -164,6 +164,34 @@ fn paper_model_has_the_printed_equations() {
     );
 }
 
+#[test]
+fn paper_model_accelerates_as_the_printed_equations_do() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/paper-2d.json");
+    let model = artifact::read(&path).expect("shipped");
+    let vector = |a: f64, b: f64| nalgebra::DVector::from_column_slice(&[a, b]);
+    for k in 0..50 {
+        let at = |i: i32| ((7 * k + 13 * i) % 31) as f64 / 8.0 - 2.0;
+        let (z1, z2, v1, v2, u1, u2) = (at(0), at(1), at(2), at(3), at(4), at(5));
+        let contact = [
+            0.36 - 0.16 * v1 - 0.91 * v2 - 0.75 * v1.sin() + 0.11 * u1 - 0.05 * u2,
+            -0.16 - 0.23 * v1 - 0.75 * v2 - 0.96 * v2.sin() + 0.14 * u2,
+        ];
+        let flight = [
+            0.29 - 1.22 * v1 - v1.sin() + 51.05 * u1,
+            0.42 * v1 + 0.52 * v1.sin(),
+        ];
+        for (feet, expected) in [([true; 4], contact), ([false; 4], flight)] {
+            let phase = model.phase_for(feet).expect("covered");
+            let found = model
+                .ddz(phase, &vector(z1, z2), &vector(v1, v2), &vector(u1, u2))
+                .expect("right lengths");
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((found - expected).abs() <= 1e-14 * expected.abs().max(10.0));
+            }
+        }
+    }
+}
+
 // --- Files that are no model file at all ---------------------------------------------------------
 
 #[test]
