@@ -7,6 +7,8 @@
 use std::fmt;
 use std::ops::Range;
 
+use nalgebra::DMatrix;
+
 use super::columns::Column;
 use super::error::RecordingError;
 use super::segment::{Recording, Segment};
@@ -26,7 +28,8 @@ pub struct CheckOptions {
     /// Largest rate of a body angle, in rad/s.
     pub body_rate_rad_s: f64,
     /// Disagreement of a rate with differences, as a share of the 95th
-    /// percentile of that rate, that is still accepted on top of the floor.
+    /// percentile of that rate, that is still accepted on top of the floor
+    /// and of what the noise of the differentiated column explains.
     pub consistency_share: f64,
     /// Floor of that disagreement for velocities: joints, body linear, body angular.
     pub velocity_floor: [f64; 3],
@@ -274,17 +277,22 @@ impl Scan<'_> {
         let (segment, options) = (self.segment, self.options);
         let share = options.consistency_share;
         for i in 0..STATE_DIM {
-            let slack =
-                options.velocity_floor[group(i)] + share * typical(segment.dx.row(i).iter());
+            let (x, dx, ddx) = (
+                row(&segment.x, i),
+                row(&segment.dx, i),
+                row(&segment.ddx, i),
+            );
+            let slack = options.velocity_floor[group(i)]
+                + share * quantile(dx.iter().map(|v| v.abs()), 0.95)
+                + noise(&segment.time_s, &x);
             self.column(Implausible::Velocity, Column::Velocity(i), |j| {
-                let value = |j| segment.x[(i, j)];
-                disagrees(segment, j, value, |j| segment.dx[(i, j)], slack)
+                disagrees(&segment.time_s, &x, &dx, j, slack)
             });
-            let slack =
-                options.acceleration_floor[group(i)] + share * typical(segment.ddx.row(i).iter());
+            let slack = options.acceleration_floor[group(i)]
+                + share * quantile(ddx.iter().map(|v| v.abs()), 0.95)
+                + noise(&segment.time_s, &dx);
             self.column(Implausible::Acceleration, Column::Acceleration(i), |j| {
-                let value = |j| segment.dx[(i, j)];
-                disagrees(segment, j, value, |j| segment.ddx[(i, j)], slack)
+                disagrees(&segment.time_s, &dx, &ddx, j, slack)
             });
         }
     }
@@ -350,33 +358,39 @@ fn outside(value: f64, low: f64, high: f64) -> Breach {
     }
 }
 
-/// 95th percentile of the magnitudes: the scale of a column without its spikes.
-fn typical<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
-    let mut magnitudes: Vec<f64> = values.map(|v| v.abs()).collect();
-    magnitudes.sort_by(f64::total_cmp);
-    let place = (magnitudes.len().saturating_sub(1) as f64 * 0.95) as usize;
-    magnitudes.get(place).copied().unwrap_or(0.0)
+fn row(matrix: &DMatrix<f64>, index: usize) -> Vec<f64> {
+    matrix.row(index).iter().copied().collect()
 }
 
-/// Compares the rate recorded at a sample with the slopes of `value` before and
-/// after it: a rate lies between the two unless it turns within the steps.
-fn disagrees(
-    segment: &Segment,
-    sample: usize,
-    value: impl Fn(usize) -> f64,
-    rate: impl Fn(usize) -> f64,
-    slack: f64,
-) -> Breach {
-    let (before, after) = (sample.checked_sub(1)?, sample + 1);
-    if after >= segment.len() {
+/// The value below which a share of the values lies; 0 if there are none.
+fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    let place = (sorted.len().saturating_sub(1) as f64 * share) as usize;
+    sorted.get(place).copied().unwrap_or(0.0)
+}
+
+/// Slope of `values` from the sample before `j`.
+fn slope(time_s: &[f64], values: &[f64], j: usize) -> f64 {
+    (values[j] - values[j - 1]) / (time_s[j] - time_s[j - 1])
+}
+
+/// Three times the median change of slope from step to step: what sensor noise
+/// puts between a rate and the differences of a noisy value.
+fn noise(time_s: &[f64], values: &[f64]) -> f64 {
+    let change = |j: usize| (slope(time_s, values, j + 1) - slope(time_s, values, j)).abs();
+    3.0 * quantile((1..values.len().saturating_sub(1)).map(change), 0.5)
+}
+
+/// Compares the rate recorded at a sample with the slopes of the values before
+/// and after it: a rate lies between the two unless it turns within the steps.
+fn disagrees(time_s: &[f64], values: &[f64], rates: &[f64], j: usize, slack: f64) -> Breach {
+    if j == 0 || j + 1 >= rates.len() {
         return None;
     }
-    let slope =
-        |a: usize, b: usize| (value(b) - value(a)) / (segment.time_s[b] - segment.time_s[a]);
-    let (left, right) = (slope(before, sample), slope(sample, after));
+    let (left, right) = (slope(time_s, values, j), slope(time_s, values, j + 1));
     let (low, high) = (left.min(right), left.max(right));
-    let found = rate(sample);
-    outside(found, low - slack, high + slack).map(|_| (found, found.clamp(low, high)))
+    outside(rates[j], low - slack, high + slack).map(|_| (rates[j], rates[j].clamp(low, high)))
 }
 
 #[cfg(test)]

@@ -14,7 +14,14 @@ fn go1() -> &'static Robot {
 }
 
 fn own_jumps() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/recordings/go1");
+    jumps_in("go1", 10)
+}
+
+/// The recordings of a folder, which holds at least so many.
+fn jumps_in(name: &str, least: usize) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("examples/recordings")
+        .join(name);
     let entries = fs::read_dir(&folder).unwrap();
     let mut out: Vec<PathBuf> = entries
         .map(|entry| entry.unwrap().path())
@@ -22,7 +29,7 @@ fn own_jumps() -> Vec<PathBuf> {
         .collect();
     out.sort();
     assert!(
-        out.len() >= 10,
+        out.len() >= least,
         "{} holds {} jumps",
         folder.display(),
         out.len()
@@ -78,12 +85,39 @@ fn own_jumps_carry_their_weight_while_standing() {
 }
 
 #[test]
-fn own_jumps_are_plausible() {
-    for path in own_jumps() {
+fn own_jumps_are_plausible_also_with_sensor_noise() {
+    let noisy = jumps_in("go1-noisy", 4);
+    for path in own_jumps().into_iter().chain(noisy) {
+        require_plausible(&path, go1());
+    }
+}
+
+fn require_plausible(path: &Path, robot: &Robot) {
+    let jump = recording::read(path).unwrap();
+    let found = check(&jump, robot, &CheckOptions::default());
+    let text: Vec<String> = found.iter().map(ToString::to_string).collect();
+    assert!(found.is_empty(), "{}: {text:#?}", path.display());
+}
+
+#[test]
+fn asynchronous_jumps_leave_the_ground_front_feet_first() {
+    let go2 = Robot::by_name("go2").unwrap();
+    let rule = PhaseRule::three_phase().with_min_samples(5);
+    assert_eq!(rule.names(), ["contact", "rear", "flight"]);
+    for path in jumps_in("go2-asynchronous", 4) {
+        require_plausible(&path, go2);
         let jump = recording::read(&path).unwrap();
-        let found = check(&jump, go1(), &CheckOptions::default());
-        let text: Vec<String> = found.iter().map(ToString::to_string).collect();
-        assert!(found.is_empty(), "{}: {text:#?}", path.display());
+        let segment = &jump.segments[0];
+        let spans = rule.spans(segment).unwrap();
+        let found: Vec<_> = spans.iter().map(|span| (span.phase, span.kind)).collect();
+        let expected = [
+            (0, Stance::Launch),
+            (1, Stance::Launch),
+            (2, Stance::Flight),
+        ];
+        assert_eq!(found, expected, "{}", path.display());
+        let lift = segment.input(go2).unwrap()[(14, 0)] / (9.81 * go2.mass_kg());
+        assert!((0.92..1.02).contains(&lift), "{}: {lift}", path.display());
     }
 }
 

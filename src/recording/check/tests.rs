@@ -185,3 +185,25 @@ fn without_nothing_left_is_an_error() {
         }
     ));
 }
+
+#[test]
+fn check_sensor_noise_is_accepted_but_a_spike_in_it_is_found() {
+    let mut recording = smooth(400);
+    // A fixed sequence without pattern stands for noise of 0.5 mm.
+    let mut state = 1_u64;
+    for value in recording.segments[0].x.iter_mut() {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        *value += 1e-3 * ((state >> 33) as f64 / (1_u64 << 31) as f64 - 0.5);
+    }
+    assert_eq!(findings(&recording), []);
+    recording.segments[0].dx[(13, 200)] = 9.0;
+    let found = findings(&recording);
+    assert!(!found.is_empty() && found.iter().all(|f| f.column == "Body linear Velocity y"));
+    assert!(
+        found
+            .iter()
+            .any(|f| (f.kind, f.first_row) == (Implausible::Velocity, 202))
+    );
+}
