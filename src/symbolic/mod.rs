@@ -23,21 +23,32 @@
 //! ```
 
 mod build;
+mod collect;
 mod diff;
 mod display;
 mod eval;
+mod expand;
+mod horner;
 mod intern;
+mod interval;
+mod interval_eval;
+mod jacobian;
 mod lexer;
 mod node;
 mod number;
 mod order;
 mod parse;
+mod poly;
 mod pool;
 mod power;
 mod substitute;
 
 pub use display::Display;
+pub use expand::ExpandLimits;
+pub use interval::Interval;
+pub use jacobian::MatrixEntry;
 pub use node::{ExprId, Function, Node, Parity, SymbolId};
 pub use number::Number;
 pub use parse::{ParseError, ParseLimits};
+pub use poly::Polynomial;
 pub use pool::ExprPool;

@@ -1,0 +1,193 @@
+//! Multiplying out, within a budget.
+
+use std::collections::HashMap;
+
+use super::intern::BuildIdHasher;
+use super::node::{ExprId, Node};
+use super::number::Number;
+use super::pool::ExprPool;
+
+/// How much work an expansion may do. What would exceed it stays a product or power.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExpandLimits {
+    /// Most terms of one expanded sum.
+    pub terms: usize,
+    /// Most products of two terms in one call.
+    pub products: usize,
+}
+
+impl Default for ExpandLimits {
+    fn default() -> ExpandLimits {
+        ExpandLimits {
+            terms: 10_000,
+            products: 1_000_000,
+        }
+    }
+}
+
+/// A sum taken apart: `coefficient * rest` each.
+pub(super) type Terms = Vec<(Number, ExprId)>;
+
+impl ExprPool {
+    /// `expr` with products and integer powers of sums multiplied out, also inside functions.
+    ///
+    /// Never fails: parts whose expansion exceeds the default [`ExpandLimits`] are left as they
+    /// are. The order of work is that of the pool, so the result is the same on every run.
+    pub fn expand(&mut self, expr: ExprId) -> ExprId {
+        self.expand_within(expr, ExpandLimits::default())
+    }
+
+    /// As [`expand`](ExprPool::expand), within given limits.
+    pub fn expand_within(&mut self, expr: ExprId, limits: ExpandLimits) -> ExprId {
+        let mut budget = limits.products;
+        self.expand_spending(expr, limits.terms, &mut budget)
+    }
+
+    /// Expands, taking products from a budget that several calls share.
+    pub(super) fn expand_spending(
+        &mut self,
+        expr: ExprId,
+        max_terms: usize,
+        budget: &mut usize,
+    ) -> ExprId {
+        let mut expanded: HashMap<ExprId, ExprId, BuildIdHasher> = HashMap::default();
+        for node in self.reachable(&[expr]) {
+            let rebuilt = self.rebuild(node, |child| expanded[&child]);
+            let result = self.expand_node(rebuilt, max_terms, budget);
+            expanded.insert(node, result);
+        }
+        expanded[&expr]
+    }
+
+    /// Multiplies out one product or power whose operands are expanded.
+    pub(super) fn expand_node(
+        &mut self,
+        expr: ExprId,
+        max_terms: usize,
+        budget: &mut usize,
+    ) -> ExprId {
+        if !matches!(self.node(expr), Node::Product(_) | Node::Power(..)) {
+            return expr;
+        }
+        let factors = self.factors_of(expr).to_vec();
+        let mut plain = Vec::new();
+        let mut sums: Vec<(ExprId, usize)> = Vec::new();
+        for factor in factors {
+            match self.as_sum_power(factor) {
+                Some(sum_power) => sums.push(sum_power),
+                None => plain.push(factor),
+            }
+        }
+        if sums.is_empty() {
+            return expr;
+        }
+        let plain = self.product(&plain);
+        let mut terms = vec![self.split(plain)];
+        for (sum, exponent) in sums {
+            let factor = self.terms_of(sum);
+            for _ in 0..exponent {
+                let n_products = terms.len().saturating_mul(factor.len());
+                if n_products > *budget {
+                    return expr;
+                }
+                *budget -= n_products;
+                terms = self.multiply(&terms, &factor);
+                if terms.len() > max_terms {
+                    return expr;
+                }
+            }
+        }
+        self.sum_of_terms(terms)
+    }
+
+    /// A factor as a sum raised to a positive integer.
+    fn as_sum_power(&self, factor: ExprId) -> Option<(ExprId, usize)> {
+        match *self.node(factor) {
+            Node::Sum(_) => Some((factor, 1)),
+            Node::Power(base, exponent) if matches!(self.node(base), Node::Sum(_)) => {
+                let exponent = self.as_number(exponent)?.as_integer()?;
+                Some((base, usize::try_from(exponent).ok()?))
+            }
+            _ => None,
+        }
+    }
+
+    /// All products of terms of `a` and `b`, like ones collected.
+    fn multiply(&mut self, a: &Terms, b: &Terms) -> Terms {
+        let mut products = Vec::with_capacity(a.len() * b.len());
+        for &(coefficient_a, rest_a) in a {
+            for &(coefficient_b, rest_b) in b {
+                let rest = self.product(&[rest_a, rest_b]);
+                let (extra, rest) = self.split(rest);
+                let folded = coefficient_a
+                    .checked_mul(coefficient_b)
+                    .and_then(|coefficient| coefficient.checked_mul(extra));
+                match folded {
+                    Some(coefficient) => products.push((coefficient, rest)),
+                    None => {
+                        let numbers = [coefficient_a, coefficient_b, extra];
+                        let numbers = numbers.map(|number| self.constant(number));
+                        let whole = self.product(&[numbers[0], numbers[1], numbers[2], rest]);
+                        products.push((Number::ONE, whole));
+                    }
+                }
+            }
+        }
+        let sum = self.sum_of_terms(products);
+        self.terms_of(sum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn expanded(text: &str) -> String {
+        let mut pool = ExprPool::new();
+        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let expanded = pool.expand(expr);
+        pool.display(expanded).to_string()
+    }
+
+    #[test]
+    fn expand_multiplies_products_and_powers_of_sums() {
+        assert_eq!(expanded("(x + y)*(x - y)"), "x^2 - y^2");
+        assert_eq!(expanded("(x + 1)^3"), "1 + 3*x + 3*x^2 + x^3");
+        assert_eq!(expanded("0.5*(x + y)"), "0.5*x + 0.5*y");
+        assert_eq!(expanded("x*(y + 1/x)"), "1 + x*y");
+        assert_eq!(expanded("(sqrt(x) + 1)*(sqrt(x) - 1)"), "-1 + x");
+        assert_eq!(expanded("sin((x + 1)^2 - x^2)"), "sin(1 + 2*x)");
+        assert_eq!(
+            expanded("((x + 1)^2 + 1)^2"),
+            "4 + 8*x + 8*x^2 + 4*x^3 + x^4"
+        );
+    }
+
+    #[test]
+    fn expand_leaves_other_powers_of_sums() {
+        assert_eq!(expanded("(x + y)^-2"), "1/(x + y)^2");
+        assert_eq!(expanded("sqrt(x + y)"), "sqrt(x + y)");
+        assert_eq!(expanded("(x + y)^0.3*(x + y)"), "(x + y)^1.3");
+    }
+
+    #[test]
+    fn expand_beyond_its_limits_leaves_the_power() {
+        assert_eq!(
+            expanded("(a + b + c + d + e + f)^900"),
+            "(a + b + c + d + e + f)^900"
+        );
+        let mut pool = ExprPool::new();
+        let expr = pool
+            .parse("(x + y)^2 + (x + y)^3", &|_| true)
+            .expect("parses");
+        let limits = ExpandLimits {
+            terms: 3,
+            products: 100,
+        };
+        let expanded = pool.expand_within(expr, limits);
+        assert_eq!(
+            pool.display(expanded).to_string(),
+            "x^2 + 2*x*y + y^2 + (x + y)^3"
+        );
+    }
+}

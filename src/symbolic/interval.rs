@@ -1,0 +1,502 @@
+//! Intervals of reals with outward rounding.
+//!
+//! Every operation returns an interval that contains the exact results for all points of its
+//! operands. Sums, products, quotients and square roots are rounded to the nearest float that
+//! errs outward; elementary functions are widened by [`FUNCTION_ULPS`], more than the error of
+//! any current mathematical library.
+
+use std::fmt;
+
+/// Steps by which the value of an elementary function is widened.
+const FUNCTION_ULPS: usize = 4;
+
+/// Arguments beyond this are not reduced: sines of them are only known to lie in `[-1, 1]`.
+const LARGEST_ANGLE: f64 = 1e9;
+
+/// A closed interval `[lo, hi]`; bounds may be infinite. No points if empty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    lo: f64,
+    hi: f64,
+}
+
+impl Interval {
+    /// All reals.
+    pub const ENTIRE: Interval = Interval {
+        lo: f64::NEG_INFINITY,
+        hi: f64::INFINITY,
+    };
+    /// No points: the value of an expression that is defined nowhere in its domain.
+    pub const EMPTY: Interval = Interval {
+        lo: f64::INFINITY,
+        hi: f64::NEG_INFINITY,
+    };
+
+    /// The interval from `lo` to `hi`; empty if `lo > hi`, all reals if a bound is NaN.
+    pub fn new(lo: f64, hi: f64) -> Interval {
+        if lo.is_nan() || hi.is_nan() {
+            Interval::ENTIRE
+        } else if lo > hi {
+            Interval::EMPTY
+        } else {
+            Interval { lo, hi }
+        }
+    }
+
+    /// The interval of one point.
+    pub fn point(value: f64) -> Interval {
+        Interval::new(value, value)
+    }
+
+    /// The lower bound; infinite for an empty interval.
+    pub fn lo(self) -> f64 {
+        self.lo
+    }
+
+    /// The upper bound; negative infinite for an empty interval.
+    pub fn hi(self) -> f64 {
+        self.hi
+    }
+
+    /// Whether there are no points.
+    pub fn is_empty(self) -> bool {
+        self.lo > self.hi
+    }
+
+    /// Whether `value` lies inside.
+    pub fn contains(self, value: f64) -> bool {
+        self.lo <= value && value <= self.hi
+    }
+
+    /// An upper bound of `hi - lo`; 0 for an empty interval.
+    pub fn width(self) -> f64 {
+        if self.is_empty() {
+            0.0
+        } else {
+            sub_up(self.hi, self.lo)
+        }
+    }
+
+    /// The largest magnitude of a point; 0 for an empty interval.
+    pub fn magnitude(self) -> f64 {
+        if self.is_empty() {
+            0.0
+        } else {
+            self.lo.abs().max(self.hi.abs())
+        }
+    }
+
+    /// The smallest interval that contains both.
+    pub fn hull(self, other: Interval) -> Interval {
+        Interval {
+            lo: self.lo.min(other.lo),
+            hi: self.hi.max(other.hi),
+        }
+    }
+
+    /// The points that lie in both.
+    pub fn intersection(self, other: Interval) -> Interval {
+        let (lo, hi) = (self.lo.max(other.lo), self.hi.min(other.hi));
+        if lo > hi {
+            Interval::EMPTY
+        } else {
+            Interval { lo, hi }
+        }
+    }
+
+    /// `1/x` for the points other than zero.
+    pub fn recip(self) -> Interval {
+        if self.is_empty() || (self.lo == 0.0 && self.hi == 0.0) {
+            return Interval::EMPTY;
+        }
+        match (self.lo < 0.0, self.hi > 0.0) {
+            (true, true) => Interval::ENTIRE,
+            (false, _) => Interval {
+                lo: recip_down(self.hi),
+                hi: if self.lo == 0.0 {
+                    f64::INFINITY
+                } else {
+                    recip_up(self.lo)
+                },
+            },
+            (true, false) => -(-self).recip(),
+        }
+    }
+
+    /// `|x|`.
+    pub fn abs(self) -> Interval {
+        if self.is_empty() || self.lo >= 0.0 {
+            self
+        } else if self.hi <= 0.0 {
+            -self
+        } else {
+            Interval {
+                lo: 0.0,
+                hi: self.magnitude(),
+            }
+        }
+    }
+
+    /// `-1`, `0` or `1`.
+    pub fn sign(self) -> Interval {
+        if self.is_empty() {
+            return self;
+        }
+        Interval {
+            lo: sign(self.lo),
+            hi: sign(self.hi),
+        }
+    }
+
+    /// `x^exponent`.
+    pub fn powi(self, exponent: i64) -> Interval {
+        if self.is_empty() {
+            return self;
+        }
+        if exponent < 0 {
+            let positive = exponent.checked_neg().unwrap_or(i64::MAX);
+            return self.powi(positive).recip();
+        }
+        if exponent % 2 == 0 {
+            let magnitude = self.abs();
+            let lo = power_down(magnitude.lo, exponent);
+            let hi = power_up(magnitude.hi, exponent);
+            return Interval { lo, hi };
+        }
+        let odd = |x: f64, down: bool| match (x < 0.0, down) {
+            (false, true) => power_down(x, exponent),
+            (false, false) => power_up(x, exponent),
+            (true, true) => -power_up(-x, exponent),
+            (true, false) => -power_down(-x, exponent),
+        };
+        Interval {
+            lo: odd(self.lo, true),
+            hi: odd(self.hi, false),
+        }
+    }
+
+    /// `x^exponent = exp(exponent log(x))` for the points of a positive base, and `0` at a base
+    /// of zero where the exponent is positive.
+    pub fn pow(self, exponent: Interval) -> Interval {
+        let positive = (exponent * self.log()).exp();
+        if self.contains(0.0) && exponent.hi > 0.0 {
+            positive.hull(Interval::point(0.0))
+        } else {
+            positive
+        }
+    }
+
+    /// Square roots of the points that are not negative.
+    pub fn sqrt(self) -> Interval {
+        let inside = self.intersection(Interval::new(0.0, f64::INFINITY));
+        if inside.is_empty() {
+            return inside;
+        }
+        let (lo, hi) = (inside.lo.sqrt(), inside.hi.sqrt());
+        Interval {
+            lo: if is_exact_root(lo, inside.lo) {
+                lo
+            } else {
+                lo.next_down().max(0.0)
+            },
+            hi: if is_exact_root(hi, inside.hi) {
+                hi
+            } else {
+                hi.next_up()
+            },
+        }
+    }
+
+    /// `exp(x)`.
+    pub fn exp(self) -> Interval {
+        self.increasing(f64::exp)
+            .intersection(Interval::new(0.0, f64::INFINITY))
+    }
+
+    /// Natural logarithms of the positive points.
+    pub fn log(self) -> Interval {
+        let inside = self.intersection(Interval::new(0.0, f64::INFINITY));
+        if inside.hi == 0.0 {
+            return Interval::EMPTY;
+        }
+        inside.increasing(f64::ln)
+    }
+
+    /// `tanh(x)`.
+    pub fn tanh(self) -> Interval {
+        self.increasing(f64::tanh)
+            .intersection(Interval::new(-1.0, 1.0))
+    }
+
+    /// `sin(x)`.
+    pub fn sin(self) -> Interval {
+        self.oscillation(f64::sin, 0.5)
+    }
+
+    /// `cos(x)`.
+    pub fn cos(self) -> Interval {
+        self.oscillation(f64::cos, 0.0)
+    }
+
+    /// `tan(x)`: all reals if a pole may lie inside.
+    pub fn tan(self) -> Interval {
+        if self.is_empty() {
+            return self;
+        }
+        if self.magnitude() > LARGEST_ANGLE || self.contains_half_turn(0.5) {
+            return Interval::ENTIRE;
+        }
+        self.increasing(f64::tan)
+    }
+
+    /// The image under an increasing function, widened.
+    fn increasing(self, function: impl Fn(f64) -> f64) -> Interval {
+        if self.is_empty() {
+            return self;
+        }
+        Interval::new(widen_down(function(self.lo)), widen_up(function(self.hi)))
+    }
+
+    /// The image under sine or cosine, whose maxima are at `(2k + offset) pi`.
+    fn oscillation(self, function: impl Fn(f64) -> f64, offset: f64) -> Interval {
+        if self.is_empty() {
+            return self;
+        }
+        if self.magnitude() > LARGEST_ANGLE {
+            return Interval { lo: -1.0, hi: 1.0 };
+        }
+        let (at_lo, at_hi) = (function(self.lo), function(self.hi));
+        let has_maximum = self.contains_turn(offset);
+        let has_minimum = self.contains_turn(offset + 1.0);
+        Interval {
+            lo: if has_minimum {
+                -1.0
+            } else {
+                widen_down(at_lo.min(at_hi)).max(-1.0)
+            },
+            hi: if has_maximum {
+                1.0
+            } else {
+                widen_up(at_lo.max(at_hi)).min(1.0)
+            },
+        }
+    }
+
+    /// Whether `(2k + offset) pi` may lie inside for an integer `k`.
+    fn contains_turn(self, offset: f64) -> bool {
+        let turns = (self / PI - Interval::point(offset)) * Interval::point(0.5);
+        turns.lo.ceil() <= turns.hi
+    }
+
+    /// Whether `(k + offset) pi` may lie inside for an integer `k`.
+    fn contains_half_turn(self, offset: f64) -> bool {
+        let turns = self / PI - Interval::point(offset);
+        turns.lo.ceil() <= turns.hi
+    }
+}
+
+/// The two floats around pi.
+const PI: Interval = Interval {
+    lo: std::f64::consts::PI,
+    hi: std::f64::consts::PI.next_up(),
+};
+
+impl fmt::Display for Interval {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_empty() {
+            formatter.write_str("[]")
+        } else {
+            write!(formatter, "[{:?}, {:?}]", self.lo, self.hi)
+        }
+    }
+}
+
+impl std::ops::Neg for Interval {
+    type Output = Interval;
+
+    fn neg(self) -> Interval {
+        Interval {
+            lo: -self.hi,
+            hi: -self.lo,
+        }
+    }
+}
+
+impl std::ops::Add for Interval {
+    type Output = Interval;
+
+    fn add(self, other: Interval) -> Interval {
+        if self.is_empty() || other.is_empty() {
+            return Interval::EMPTY;
+        }
+        Interval {
+            lo: -sub_up(-self.lo, other.lo),
+            hi: sub_up(self.hi, -other.hi),
+        }
+    }
+}
+
+impl std::ops::Sub for Interval {
+    type Output = Interval;
+
+    fn sub(self, other: Interval) -> Interval {
+        self + -other
+    }
+}
+
+impl std::ops::Mul for Interval {
+    type Output = Interval;
+
+    fn mul(self, other: Interval) -> Interval {
+        if self.is_empty() || other.is_empty() {
+            return Interval::EMPTY;
+        }
+        let corners = [
+            (self.lo, other.lo),
+            (self.lo, other.hi),
+            (self.hi, other.lo),
+            (self.hi, other.hi),
+        ];
+        Interval {
+            lo: corners
+                .map(|(a, b)| -mul_up(-a, b))
+                .into_iter()
+                .fold(f64::INFINITY, f64::min),
+            hi: corners
+                .map(|(a, b)| mul_up(a, b))
+                .into_iter()
+                .fold(f64::NEG_INFINITY, f64::max),
+        }
+    }
+}
+
+impl std::ops::Div for Interval {
+    type Output = Interval;
+
+    // A quotient is a product with the reciprocal: one more rounding, still outward.
+    #[allow(clippy::suspicious_arithmetic_impl)]
+    fn div(self, other: Interval) -> Interval {
+        self * other.recip()
+    }
+}
+
+fn sign(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
+}
+
+/// `a - b` rounded up; infinite for infinities of the same sign, of which nothing is known.
+fn sub_up(a: f64, b: f64) -> f64 {
+    let difference = a - b;
+    if difference.is_nan() {
+        return f64::INFINITY;
+    }
+    if !difference.is_finite() {
+        // A finite difference that overflows downward is still above the largest negative float.
+        return if difference == f64::NEG_INFINITY && a.is_finite() && b.is_finite() {
+            f64::MIN
+        } else {
+            difference
+        };
+    }
+    // The rounding error of a difference, exactly (Knuth's two-sum).
+    let b_rounded = a - difference;
+    let error = (a - (difference + b_rounded)) + (b_rounded - b);
+    if error > 0.0 || error.is_nan() {
+        difference.next_up()
+    } else {
+        difference
+    }
+}
+
+/// `a * b` rounded up, with `0 * inf = 0` as bounds of intervals need it.
+fn mul_up(a: f64, b: f64) -> f64 {
+    if a == 0.0 || b == 0.0 {
+        return 0.0;
+    }
+    let product = a * b;
+    if !product.is_finite() {
+        let overflowed = a.is_finite() && b.is_finite();
+        return if product < 0.0 && overflowed {
+            f64::MIN
+        } else {
+            product
+        };
+    }
+    // The error of a product is exact in one fused operation, except near underflow.
+    if product.abs() < 1e-290 || a.mul_add(b, -product) > 0.0 {
+        product.next_up()
+    } else {
+        product
+    }
+}
+
+/// `1/x` rounded up for a positive `x`.
+fn recip_up(x: f64) -> f64 {
+    let quotient = 1.0 / x;
+    if quotient.is_finite() && quotient * x == 1.0 && quotient.mul_add(x, -1.0) == 0.0 {
+        quotient
+    } else {
+        quotient.next_up()
+    }
+}
+
+/// `1/x` rounded down for a positive `x`.
+fn recip_down(x: f64) -> f64 {
+    let quotient = 1.0 / x;
+    if quotient.is_infinite() {
+        f64::MAX
+    } else if quotient.mul_add(x, -1.0) == 0.0 {
+        quotient
+    } else {
+        quotient.next_down().max(0.0)
+    }
+}
+
+/// `x^exponent` rounded up for `x >= 0`.
+fn power_up(x: f64, exponent: i64) -> f64 {
+    power(x, exponent, mul_up)
+}
+
+/// `x^exponent` rounded down for `x >= 0`.
+fn power_down(x: f64, exponent: i64) -> f64 {
+    power(x, exponent, |a, b| (-mul_up(-a, b)).max(0.0))
+}
+
+/// A power by squaring, all factors non-negative and `product` monotone.
+fn power(x: f64, exponent: i64, product: impl Fn(f64, f64) -> f64) -> f64 {
+    let (mut result, mut square, mut remaining) = (1.0, x, exponent);
+    loop {
+        if remaining % 2 == 1 {
+            result = product(result, square);
+        }
+        remaining /= 2;
+        if remaining == 0 {
+            return result;
+        }
+        square = product(square, square);
+    }
+}
+
+fn is_exact_root(root: f64, square: f64) -> bool {
+    root == f64::INFINITY
+        || (square > 1e-290 && root.mul_add(root, -square) == 0.0)
+        || square == 0.0
+}
+
+fn widen_down(value: f64) -> f64 {
+    if value == f64::INFINITY {
+        return f64::MAX;
+    }
+    (0..FUNCTION_ULPS).fold(value, |value, _| value.next_down())
+}
+
+fn widen_up(value: f64) -> f64 {
+    if value == f64::NEG_INFINITY {
+        return f64::MIN;
+    }
+    (0..FUNCTION_ULPS).fold(value, |value, _| value.next_up())
+}
+
+#[cfg(test)]
+#[path = "interval_tests.rs"]
+mod tests;
