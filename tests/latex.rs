@@ -157,7 +157,8 @@ fn one_term(term: &str, coefficient: f64) -> String {
         .find(|line| line.contains(r"\ddot{z}_1 = "))
         .unwrap();
     let (_, right) = line.split_once(" = ").unwrap();
-    right.trim_end_matches(r" \\").to_owned()
+    let (right, _) = right.split_once(r" \\").unwrap();
+    right.to_owned()
 }
 
 fn equations(files: &[EmittedFile], name: &str) -> String {

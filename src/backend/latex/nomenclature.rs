@@ -62,7 +62,7 @@ fn symbol(symbols: &SymbolTable, quantity: Quantity, index: usize) -> String {
 /// `$z_1, \dots, z_6$`, or all of up to three.
 fn range(symbols: &SymbolTable, quantity: Quantity, dim: usize) -> String {
     let show = |index| symbol(symbols, quantity, index);
-    if dim <= 3 || !symbols.is_empty() {
+    if dim <= 3 {
         (1..=dim).map(show).collect::<Vec<_>>().join(", ")
     } else {
         format!(r"{}, \dots, {}", show(1), show(dim))

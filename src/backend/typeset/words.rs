@@ -69,11 +69,11 @@ pub fn rounding(rule: Rounding, report: &RoundingReport) -> String {
     format!("{rule} {error}{dropped}")
 }
 
-/// Two significant digits that are not below `error`.
+/// Two significant digits that are not below `error`, but for its own last bits.
 fn at_most(error: f64) -> String {
     let text = format!("{error:.1e}");
     let rounded: f64 = text.parse().expect("formatted float reads back");
-    if rounded >= error {
+    if rounded * (1.0 + 1e-9) >= error {
         return text;
     }
     let step = 10f64.powi(error.log10().floor() as i32 - 1);
@@ -90,7 +90,7 @@ mod tests {
         while error < 1.0 {
             let stated: f64 = at_most(error).parse().unwrap();
             assert!(
-                stated >= error && stated <= 1.11 * error,
+                stated * (1.0 + 1e-9) >= error && stated <= 1.11 * error,
                 "{error} {stated}"
             );
             error *= 1.0173;
