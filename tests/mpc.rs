@@ -1,6 +1,16 @@
 //! The latent MPC: its solver, its problem, its lifts and what it does when things go wrong.
 
+#[path = "mpc/control.rs"]
+mod control;
+#[path = "mpc/failures.rs"]
+mod failures;
+#[path = "mpc/lifts.rs"]
+mod lifts;
 #[path = "mpc/qp.rs"]
 mod qp;
 #[path = "mpc/random.rs"]
 mod random;
+#[path = "mpc/recordings.rs"]
+mod recordings;
+#[path = "mpc/synthetic.rs"]
+mod synthetic;

@@ -1,0 +1,469 @@
+//! The controller: from a measurement to a command, whatever happens.
+
+use std::time::Instant;
+
+use nalgebra::{DMatrix, SVector};
+
+use super::command::{Command, Source, Status};
+use super::error::MpcError;
+use super::horizon::{Contact, Horizon, Scene};
+use super::lift::{ConsistentLift, Footing, LiftFailure};
+use super::plan::Plan;
+use super::plant::Plant;
+use super::problem::StageRows;
+use super::qp::{Outcome, QpSolver};
+use super::reference::{Reference, ReferenceSamples};
+use super::settings::{Lift, MpcSettings};
+use super::transcribe::{StepData, Transcription, Weights};
+use crate::model::ReducedModel;
+use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
+use crate::sim::CompiledModel;
+
+/// Slack, in half ranges of a joint, from which a plan counts as softened.
+const SLACK_TOLERANCE: f64 = 1e-4;
+/// Lifted force, N, below which its inconsistency means nothing.
+const SMALL_FORCE_N: f64 = 1.0;
+
+/// Latent model-predictive controller of one model on its robot.
+///
+/// Built once; [`Controller::set_reference`] gives it a trajectory, [`Controller::step_into`] turns
+/// each measurement into a [`Command`]. A step allocates nothing of its own and never fails: when
+/// there is no plan to trust, the last good one is shifted and used for a few stages, then the
+/// posture is held with fading torques and damped joints, and the status says why. As soon as
+/// measurements make sense again, so do commands.
+#[derive(Debug)]
+pub struct Controller {
+    plant: Plant,
+    dynamics: CompiledModel,
+    settings: MpcSettings,
+    transcription: Transcription,
+    solver: QpSolver,
+    roots: Vec<DMatrix<f64>>,
+    horizon: Horizon,
+    consistent: Option<ConsistentLift>,
+    reference: Option<Reference>,
+    plan: Plan,
+    memory: Memory,
+}
+
+/// What a fallback goes back to.
+#[derive(Debug, Clone)]
+struct Memory {
+    time_s: Option<f64>,
+    measured: Vec<f64>,
+    input: Vec<f64>,
+    footing: Option<Footing>,
+    joint_velocity: [f64; JOINT_DIM],
+    /// Feed-forward part of the last torques, without a hold's damping.
+    feed_forward_nm: [f64; JOINT_DIM],
+    joint_position: Option<[f64; JOINT_DIM]>,
+    /// Measurements in a row that were not believed.
+    disbelieved: usize,
+}
+
+impl Memory {
+    fn new(latent_dim: usize) -> Self {
+        Self {
+            time_s: None,
+            measured: vec![0.0; 2 * latent_dim],
+            input: vec![0.0; latent_dim],
+            footing: None,
+            joint_velocity: [0.0; JOINT_DIM],
+            feed_forward_nm: [0.0; JOINT_DIM],
+            joint_position: None,
+            disbelieved: 0,
+        }
+    }
+}
+
+/// One measurement.
+#[derive(Debug, Clone, Copy)]
+pub struct Measurement<'a> {
+    /// Time, s.
+    pub time_s: f64,
+    /// State, 18 values in SI units.
+    pub x: &'a [f64],
+    /// Its velocity, 18 values.
+    pub dx: &'a [f64],
+    /// Feet in contact.
+    pub feet: ContactFlags,
+}
+
+impl Controller {
+    /// Builds a controller.
+    ///
+    /// # Errors
+    /// [`MpcError::Setting`] for settings out of range, those of [`Plant::new`] if the model lacks
+    /// something, [`MpcError::Lower`] if its dynamics do not compile and [`MpcError::Solver`] if the
+    /// solver refuses the problem.
+    pub fn new(model: &ReducedModel, settings: MpcSettings) -> Result<Self, MpcError> {
+        settings.check()?;
+        let plant = Plant::new(model)?;
+        let d = plant.latent_dim();
+        let rows = StageRows::new(&plant, &settings);
+        let horizon = Horizon::new(d, settings.horizon, rows.friction.clone());
+        let (transcription, program) = Transcription::new(d, settings.horizon, rows);
+        let consistent = match settings.lift {
+            Lift::Transpose => None,
+            Lift::Consistent => Some(ConsistentLift::new(&plant, &settings)?),
+        };
+        Ok(Self {
+            dynamics: CompiledModel::new(model)?,
+            solver: QpSolver::new(program, settings.qp)?,
+            roots: plant
+                .phases()
+                .iter()
+                .map(|phase| phase.latent_root.clone())
+                .collect(),
+            plan: Plan::new(d, settings.horizon, settings.step_s),
+            memory: Memory::new(d),
+            reference: None,
+            transcription,
+            horizon,
+            consistent,
+            plant,
+            settings,
+        })
+    }
+
+    /// The model's numbers.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &MpcSettings {
+        &self.settings
+    }
+
+    /// The rows of each stage that were found to matter.
+    pub fn stage_rows(&self) -> &StageRows {
+        self.transcription.rows()
+    }
+
+    /// The solver with the program of the last step.
+    pub fn solver(&self) -> &QpSolver {
+        &self.solver
+    }
+
+    /// The last good plan.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The trajectory being followed.
+    pub fn reference(&self) -> Option<&Reference> {
+        self.reference.as_ref()
+    }
+
+    /// Takes a new trajectory to follow; a plan for an earlier one is forgotten.
+    ///
+    /// # Errors
+    /// As [`Reference::new`]; the old reference stays.
+    pub fn set_reference(&mut self, samples: ReferenceSamples<'_>) -> Result<(), MpcError> {
+        let reference = Reference::new(&self.plant, samples)?;
+        let d = self.plant.latent_dim();
+        let deviation = reference.deviation();
+        let state: Vec<f64> = (0..2 * d)
+            .map(|index| {
+                if index < d {
+                    1.0
+                } else {
+                    self.settings.velocity_weight
+                        * (deviation[index] / deviation[index - d]).powi(2)
+                }
+            })
+            .collect();
+        let weights = Weights {
+            state: &state,
+            terminal: self.settings.terminal_weight,
+            input: self.settings.input_weight,
+            joint_penalty: self.settings.joint_penalty,
+        };
+        self.transcription
+            .write_cost(&weights, self.solver.program_mut());
+        self.reference = Some(reference);
+        self.reset();
+        Ok(())
+    }
+
+    /// Torques, N m, that this controller's lift makes of a latent input on a footing; not clamped.
+    ///
+    /// # Errors
+    /// [`LiftFailure`] of the consistent lift; the transpose lift has none.
+    pub fn lift(
+        &mut self,
+        u_lat: &[f64],
+        footing: &Footing,
+    ) -> Result<[f64; JOINT_DIM], LiftFailure> {
+        match &mut self.consistent {
+            Some(lift) => lift.lift(&self.plant, u_lat, footing),
+            None => {
+                let input = self.plant.lift(u_lat);
+                Ok(std::array::from_fn(|joint| input[joint]))
+            }
+        }
+    }
+
+    /// Planned minus reference positions at the end of every stage of the last plan, in standard
+    /// deviations of the reference.
+    pub fn planned_deviations(&self) -> impl Iterator<Item = f64> {
+        let d = self.plant.latent_dim();
+        let deviation = self
+            .reference
+            .as_ref()
+            .map_or(&[][..], |reference| &reference.deviation()[..d]);
+        (0..self.settings.horizon).flat_map(move |stage| {
+            let pairs = self.plan.end(stage).iter().zip(self.horizon.end(stage));
+            pairs
+                .zip(deviation)
+                .map(|((planned, reference), scale)| (planned - reference) / scale)
+        })
+    }
+
+    /// Forgets plan and past measurements, but not the reference.
+    pub fn reset(&mut self) {
+        self.plan.clear();
+        self.horizon.forget();
+        self.memory = Memory::new(self.plant.latent_dim());
+    }
+
+    /// Like [`Controller::step_into`], with a command of its own.
+    pub fn step(&mut self, measurement: Measurement<'_>) -> Command {
+        let mut command = Command::zeros(self.plant.latent_dim());
+        self.step_into(measurement, &mut command);
+        command
+    }
+
+    /// Computes the command for a measurement.
+    pub fn step_into(&mut self, measurement: Measurement<'_>, command: &mut Command) {
+        let started = Instant::now();
+        command.iterations = 0;
+        command.slack = 0.0;
+        command.phase = None;
+        command.inconsistency = None;
+        let status = match self.take(&measurement) {
+            Ok(()) => self.plan_step(&measurement, command),
+            Err(status) => status,
+        };
+        command.status = status;
+        if !status.has_plan() {
+            self.fall_back(measurement.time_s, command);
+        }
+        self.memory.joint_position = Some(command.joint_position_rad);
+        self.memory.input.copy_from_slice(&command.u_lat);
+        command.solve_us = started.elapsed().as_secs_f64() * 1e6;
+    }
+
+    /// Screens a measurement and, if it can be believed, keeps it.
+    fn take(&mut self, measurement: &Measurement<'_>) -> Result<(), Status> {
+        if measurement.x.len() != STATE_DIM || measurement.dx.len() != STATE_DIM {
+            return Err(Status::WrongDimension);
+        }
+        let values = measurement.x.iter().chain(measurement.dx);
+        if !measurement.time_s.is_finite() || values.into_iter().any(|value| !value.is_finite()) {
+            return Err(Status::NotFinite);
+        }
+        self.memory.time_s = Some(measurement.time_s);
+        self.memory.joint_velocity = std::array::from_fn(|joint| measurement.dx[joint]);
+        let Some(reference) = &self.reference else {
+            return Err(Status::NoReference);
+        };
+        let (z, dz) = self.memory.measured.split_at_mut(self.plant.latent_dim());
+        self.plant.encode(measurement.x, z);
+        self.plant.encode_velocity(measurement.dx, dz);
+        let surprise = self.plan.surprise(
+            measurement.time_s,
+            &self.memory.measured,
+            reference.deviation(),
+        );
+        let fallback = &self.settings.fallback;
+        if surprise.is_some_and(|surprise| surprise.is_nan() || surprise > fallback.jump_deviations)
+        {
+            self.memory.disbelieved += 1;
+            if self.memory.disbelieved <= fallback.jump_patience {
+                return Err(Status::MeasurementJump);
+            }
+        }
+        self.memory.disbelieved = 0;
+        Ok(())
+    }
+
+    /// Solves for a plan and makes the command from it.
+    fn plan_step(&mut self, measurement: &Measurement<'_>, command: &mut Command) -> Status {
+        let Some(reference) = &self.reference else {
+            return Status::NoReference;
+        };
+        let scene = Scene {
+            plant: &self.plant,
+            settings: &self.settings,
+            reference,
+            plan: &self.plan,
+        };
+        let (time_s, feet) = (measurement.time_s, measurement.feet);
+        let contact = self
+            .horizon
+            .prepare(&scene, &mut self.dynamics, time_s, feet);
+        let last = self.settings.horizon - 1;
+        let step = StepData {
+            stages: self.horizon.stages(),
+            last_position: &self.horizon.end(last)[..self.plant.latent_dim()],
+            measured: &self.memory.measured,
+            last_input: &self.memory.input,
+            deviation: reference.deviation(),
+            roots: &self.roots,
+        };
+        self.transcription.write(&step, self.solver.program_mut());
+        let outcome = self.solver.solve();
+        command.iterations = self.solver.iterations();
+        match outcome {
+            Outcome::Solved => {}
+            Outcome::Inaccurate => return Status::Inaccurate,
+            Outcome::Infeasible => return Status::Infeasible,
+            Outcome::IterationCap => return Status::IterationCap,
+            Outcome::Unbounded | Outcome::NumericalFailure => return Status::NumericalFailure,
+        }
+        let solution = self.solver.solution();
+        let phase = step.stages[0].phase;
+        self.plan
+            .begin(measurement.time_s, phase, &self.memory.measured);
+        for stage in 0..=last {
+            self.transcription
+                .input(stage, solution, &step, self.plan.input_mut(stage));
+            let end = self.horizon.end(stage);
+            self.transcription.state(
+                stage,
+                solution,
+                end,
+                reference.deviation(),
+                self.plan.end_mut(stage),
+            );
+        }
+        command.slack = self.transcription.largest_slack(solution);
+        self.memory.footing = Some(Footing {
+            joints_rad: std::array::from_fn(|joint| measurement.x[joint]),
+            attitude_rad: [measurement.x[15], measurement.x[16]],
+            feet: measurement.feet,
+            phase,
+        });
+        if !self.write_plan(0, command) {
+            return Status::LiftFailed;
+        }
+        command.source = Source::Plan;
+        match contact {
+            Contact::Early => Status::ContactEarly,
+            Contact::Late => Status::ContactLate,
+            Contact::Unknown => Status::ContactUnknown,
+            Contact::AsScheduled if command.slack > SLACK_TOLERANCE => Status::Softened,
+            Contact::AsScheduled => Status::Solved,
+        }
+    }
+
+    /// Writes a stage of the plan into the command; false if its input cannot be lifted.
+    fn write_plan(&mut self, stage: usize, command: &mut Command) -> bool {
+        let (input, end) = (self.plan.input(stage), self.plan.end(stage));
+        let (z, dz) = end.split_at(self.plant.latent_dim());
+        command.u_lat.copy_from_slice(input);
+        command.phase = Some(self.plan.phase());
+        command.joint_position_rad = self.plant.clamp_joints(self.plant.decode_joints(z));
+        command.joint_velocity_rad_s = self.plant.decode_joint_velocities(dz);
+        let lifted = self.plant.lift(input);
+        let torque = match (&mut self.consistent, &self.memory.footing) {
+            (None, _) => std::array::from_fn(|joint| lifted[joint]),
+            (Some(lift), Some(footing)) => match lift.lift(&self.plant, input, footing) {
+                Ok(torque) => torque,
+                Err(_) => return false,
+            },
+            (Some(_), None) => return false,
+        };
+        command.torque_nm = self.plant.clamp_torque(torque);
+        self.memory.feed_forward_nm = command.torque_nm;
+        command.inconsistency = self.inconsistency(&lifted, &command.torque_nm);
+        true
+    }
+
+    /// `|F_lift − G τ| / |F_lift|`, with force and moment as they are lifted.
+    fn inconsistency(
+        &self,
+        lifted: &[f64; STATE_DIM],
+        torque_nm: &[f64; JOINT_DIM],
+    ) -> Option<f64> {
+        let footing = self.memory.footing.as_ref()?;
+        if !footing.feet.contains(&true) {
+            return None;
+        }
+        let map = self
+            .plant
+            .robot()
+            .wrench_map(&footing.joints_rad, footing.feet)
+            .ok()?;
+        let produced = map * SVector::<f64, JOINT_DIM>::from(*torque_nm);
+        let force = SVector::<f64, 6>::from_fn(|axis, _| lifted[JOINT_DIM + axis]);
+        (force.norm() > SMALL_FORCE_N).then(|| (force - produced).norm() / force.norm())
+    }
+
+    /// The command without a plan of this step.
+    fn fall_back(&mut self, time_s: f64, command: &mut Command) {
+        let now = if time_s.is_finite() {
+            Some(time_s)
+        } else {
+            self.memory.time_s
+        };
+        let stages = self
+            .settings
+            .fallback
+            .plan_stages
+            .min(self.settings.horizon);
+        let stage = now
+            .and_then(|now| self.plan.stage_at(now))
+            .filter(|&stage| stage < stages);
+        match stage {
+            Some(stage) if self.write_plan(stage, command) => command.source = Source::ShiftedPlan,
+            Some(_) | None => self.hold(now, command),
+        }
+    }
+
+    /// Posture held, torque fading, joints damped.
+    fn hold(&mut self, now: Option<f64>, command: &mut Command) {
+        let fallback = &self.settings.fallback;
+        let fade = (-self.settings.step_s / fallback.torque_decay_s).exp();
+        // Velocities of a measurement that was refused must not become torques.
+        let damping = match command.status {
+            Status::NotFinite | Status::WrongDimension | Status::MeasurementJump => 0.0,
+            _ => fallback.damping_nm_s,
+        };
+        self.memory
+            .feed_forward_nm
+            .iter_mut()
+            .for_each(|torque| *torque *= fade);
+        let torque = std::array::from_fn(|joint| {
+            self.memory.feed_forward_nm[joint] - damping * self.memory.joint_velocity[joint]
+        });
+        command.torque_nm = self.plant.clamp_torque(torque);
+        command.joint_position_rad = match self.memory.joint_position {
+            Some(position) => position,
+            None => self.posture(now),
+        };
+        command.joint_velocity_rad_s = [0.0; JOINT_DIM];
+        command.u_lat.fill(0.0);
+        command.source = Source::Hold;
+    }
+
+    /// A posture to hold when no command has been given yet: the reference's at the time.
+    fn posture(&mut self, now: Option<f64>) -> [f64; JOINT_DIM] {
+        let d = self.plant.latent_dim();
+        let middle = self
+            .plant
+            .robot()
+            .joint_limit_rad()
+            .map(|(lower, upper)| 0.5 * (lower + upper));
+        match (&self.reference, now) {
+            (Some(reference), Some(now)) => {
+                reference.state_at(now, &mut self.memory.measured);
+                self.plant
+                    .clamp_joints(self.plant.decode_joints(&self.memory.measured[..d]))
+            }
+            _ => middle,
+        }
+    }
+}

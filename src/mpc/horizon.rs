@@ -1,0 +1,271 @@
+//! The stages of the horizon at a control step: phases, reference, linearised dynamics.
+
+use super::linearise::{Lineariser, StageModel};
+use super::plan::Plan;
+use super::plant::Plant;
+use super::problem::BodyFriction;
+use super::reference::Reference;
+use super::settings::{Drift, Linearisation, MpcSettings};
+use super::transcribe::Stage;
+use crate::robot::ContactFlags;
+use crate::sim::CompiledModel;
+
+/// How the feet's phase relates to the reference's at a control step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Contact {
+    /// The same.
+    AsScheduled,
+    /// The feet are already in a phase that the reference enters later: it is entered now.
+    Early,
+    /// The feet are still in a phase that the reference has left: it lasts for one more stage.
+    Late,
+    /// The feet are in a phase that the reference is not near, or in none of the model's.
+    Unknown,
+}
+
+/// Stages that are kept from step to step.
+#[derive(Debug, Clone)]
+pub struct Horizon {
+    stages: Vec<Stage>,
+    /// Beginning of each stage and whether its linearisation belongs to it.
+    made_for: Vec<Option<f64>>,
+    /// Reference state at the end of each stage.
+    ends: Vec<Vec<f64>>,
+    phases: Vec<usize>,
+    lineariser: Lineariser,
+    nominal: StageModel,
+    friction: Option<BodyFriction>,
+}
+
+/// What the stages are prepared from.
+#[derive(Debug, Clone, Copy)]
+pub struct Scene<'a> {
+    /// The model's numbers.
+    pub plant: &'a Plant,
+    /// The settings.
+    pub settings: &'a MpcSettings,
+    /// What to follow.
+    pub reference: &'a Reference,
+    /// The last good plan.
+    pub plan: &'a Plan,
+}
+
+/// Times closer than this are the same control instant, s.
+const TIME_TOLERANCE_S: f64 = 1e-9;
+
+impl Horizon {
+    /// Memory for a horizon.
+    pub fn new(latent_dim: usize, length: usize, friction: Option<BodyFriction>) -> Self {
+        Self {
+            stages: vec![Stage::zeros(latent_dim); length],
+            made_for: vec![None; length],
+            ends: vec![vec![0.0; 2 * latent_dim]; length],
+            phases: vec![0; length],
+            lineariser: Lineariser::new(latent_dim),
+            nominal: StageModel::zeros(latent_dim),
+            friction,
+        }
+    }
+
+    /// Forgets all linearisations: the reference has changed.
+    pub fn forget(&mut self) {
+        self.made_for.fill(None);
+    }
+
+    /// The stages of the last preparation.
+    pub fn stages(&self) -> &[Stage] {
+        &self.stages
+    }
+
+    /// Reference state at the end of a stage.
+    pub fn end(&self, stage: usize) -> &[f64] {
+        &self.ends[stage]
+    }
+
+    /// Prepares all stages from a time on with the feet as measured then.
+    pub fn prepare(
+        &mut self,
+        scene: &Scene<'_>,
+        dynamics: &mut CompiledModel,
+        time_s: f64,
+        feet: ContactFlags,
+    ) -> Contact {
+        let contact = self.schedule(scene, time_s, feet);
+        self.reuse(scene.settings, time_s);
+        for index in 0..self.stages.len() {
+            let start_s = time_s + index as f64 * scene.settings.step_s;
+            let is_made = self.made_for[index]
+                .is_some_and(|made| (made - start_s).abs() < TIME_TOLERANCE_S)
+                && self.stages[index].phase == self.phases[index];
+            if !is_made {
+                self.make_reference(scene, index, start_s);
+                self.linearise(scene, dynamics, index, start_s);
+                self.made_for[index] = match scene.settings.linearisation {
+                    Linearisation::Reference => Some(start_s),
+                    Linearisation::LastPlan => None,
+                };
+            }
+        }
+        contact
+    }
+
+    /// Phases of all stages: the reference's, changed where the feet disagree.
+    fn schedule(&mut self, scene: &Scene<'_>, time_s: f64, feet: ContactFlags) -> Contact {
+        let Scene {
+            plant,
+            settings,
+            reference,
+            ..
+        } = *scene;
+        let scheduled = |time_s: f64| {
+            plant
+                .phase_for(reference.feet_at(time_s))
+                .expect("reference was checked for its phases")
+        };
+        let step_s = settings.step_s;
+        for (index, phase) in self.phases.iter_mut().enumerate() {
+            *phase = scheduled(time_s + (index as f64 + 0.5) * step_s);
+        }
+        let Some(measured) = plant.phase_for(feet) else {
+            return Contact::Unknown;
+        };
+        if measured == scheduled(time_s) || measured == self.phases[0] {
+            return Contact::AsScheduled;
+        }
+        let length = self.phases.len();
+        let next = self.phases.iter().position(|&phase| phase == measured);
+        let last = (1..=length).find(|&back| scheduled(time_s - back as f64 * step_s) == measured);
+        match (next, last) {
+            (None, None) => {
+                self.phases[0] = measured;
+                Contact::Unknown
+            }
+            (Some(next), last) if last.is_none_or(|last| next <= last) => {
+                self.phases[..next].fill(measured);
+                Contact::Early
+            }
+            (_, _) => {
+                self.phases[0] = measured;
+                Contact::Late
+            }
+        }
+    }
+
+    /// Moves stages that the last step made for the instants of this one to their new places.
+    fn reuse(&mut self, settings: &MpcSettings, time_s: f64) {
+        let Some(first) = self.made_for.first().copied().flatten() else {
+            return;
+        };
+        let passed = (time_s - first) / settings.step_s;
+        let shift = passed.round();
+        let is_whole = (passed - shift).abs() * settings.step_s < TIME_TOLERANCE_S;
+        if is_whole && shift >= 1.0 && shift < self.stages.len() as f64 {
+            let shift = shift as usize;
+            self.stages.rotate_left(shift);
+            self.made_for.rotate_left(shift);
+            self.ends.rotate_left(shift);
+        }
+    }
+
+    fn make_reference(&mut self, scene: &Scene<'_>, index: usize, start_s: f64) {
+        let Scene {
+            plant,
+            settings,
+            reference,
+            ..
+        } = *scene;
+        let stage = &mut self.stages[index];
+        stage.phase = self.phases[index];
+        reference.state_at(start_s, &mut stage.state);
+        reference.state_at(start_s + settings.step_s, &mut self.ends[index]);
+        if !reference.mean_input(start_s, settings.step_s, &mut stage.input) {
+            stage
+                .input
+                .copy_from_slice(plant.phases()[stage.phase].latent_mean.as_slice());
+        }
+        if let Some(friction) = &self.friction {
+            let middle_s = start_s + 0.5 * settings.step_s;
+            if plant.phases()[stage.phase].is_grounded {
+                friction.turned(reference.attitude_at(middle_s), &mut stage.force);
+            } else {
+                stage.force.fill(0.0);
+            }
+        }
+    }
+
+    fn linearise(
+        &mut self,
+        scene: &Scene<'_>,
+        dynamics: &mut CompiledModel,
+        index: usize,
+        start_s: f64,
+    ) {
+        let Scene {
+            settings,
+            reference,
+            plan,
+            ..
+        } = *scene;
+        let trusts_reference = match settings.drift {
+            Drift::Automatic => reference.has_input(),
+            Drift::Reference => true,
+            Drift::Model => false,
+        };
+        let point = match settings.linearisation {
+            Linearisation::Reference => None,
+            Linearisation::LastPlan => plan.at(start_s),
+        };
+        let stage = &mut self.stages[index];
+        let phase = stage.phase;
+        let mut evaluate = |z: &[f64], dz: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut _| {
+            dynamics.jacobian(phase, z, dz, u, ddz, jacobian);
+        };
+        let end = &self.ends[index];
+        if let Some((state, input)) = point {
+            self.lineariser.stage(
+                state,
+                input,
+                settings.step_s,
+                &mut evaluate,
+                &mut stage.model,
+            );
+            for (row, defect) in stage.defect.iter_mut().enumerate() {
+                *defect = stage.model.next[row] - end[row];
+                for (col, value) in state.iter().enumerate() {
+                    *defect += stage.model.a[(row, col)] * (stage.state[col] - value);
+                }
+                for (col, value) in input.iter().enumerate() {
+                    *defect += stage.model.b[(row, col)] * (stage.input[col] - value);
+                }
+            }
+            if trusts_reference {
+                let nominal = &mut self.nominal;
+                self.lineariser.stage(
+                    &stage.state,
+                    &stage.input,
+                    settings.step_s,
+                    &mut evaluate,
+                    nominal,
+                );
+                for (row, defect) in stage.defect.iter_mut().enumerate() {
+                    *defect += end[row] - self.nominal.next[row];
+                }
+            }
+        } else {
+            self.lineariser.stage(
+                &stage.state,
+                &stage.input,
+                settings.step_s,
+                &mut evaluate,
+                &mut stage.model,
+            );
+            for (row, defect) in stage.defect.iter_mut().enumerate() {
+                *defect = if trusts_reference {
+                    0.0
+                } else {
+                    stage.model.next[row] - end[row]
+                };
+            }
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! The last good plan, in latent units, and how long it may be trusted.
+
+/// Inputs and states of a solved horizon.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    latent_dim: usize,
+    step_s: f64,
+    start_s: Option<f64>,
+    phase: usize,
+    inputs: Vec<f64>,
+    /// States at the beginning of each stage and at the end of the last.
+    states: Vec<f64>,
+}
+
+impl Plan {
+    /// Memory for a plan; there is none yet.
+    pub(super) fn new(latent_dim: usize, horizon: usize, step_s: f64) -> Self {
+        Self {
+            latent_dim,
+            step_s,
+            start_s: None,
+            phase: 0,
+            inputs: vec![0.0; horizon * latent_dim],
+            states: vec![0.0; (horizon + 1) * 2 * latent_dim],
+        }
+    }
+
+    /// Forgets the plan.
+    pub(super) fn clear(&mut self) {
+        self.start_s = None;
+    }
+
+    /// Begins a new plan at a time with the state measured then; inputs and states follow through
+    /// [`Plan::input_mut`] and [`Plan::end_mut`].
+    pub(super) fn begin(&mut self, start_s: f64, phase: usize, state: &[f64]) {
+        self.start_s = Some(start_s);
+        self.phase = phase;
+        self.states[..2 * self.latent_dim].copy_from_slice(state);
+    }
+
+    /// Phase of the first stage.
+    pub fn phase(&self) -> usize {
+        self.phase
+    }
+
+    /// Input of a stage, to be overwritten.
+    pub(super) fn input_mut(&mut self, stage: usize) -> &mut [f64] {
+        &mut self.inputs[stage * self.latent_dim..][..self.latent_dim]
+    }
+
+    /// State at the end of a stage, to be overwritten.
+    pub(super) fn end_mut(&mut self, stage: usize) -> &mut [f64] {
+        &mut self.states[(stage + 1) * 2 * self.latent_dim..][..2 * self.latent_dim]
+    }
+
+    /// The stage that a time belongs to, counted from the plan's first; none before the plan or
+    /// without one.
+    pub fn stage_at(&self, time_s: f64) -> Option<usize> {
+        let passed = (time_s - self.start_s?) / self.step_s;
+        // A time that is a stage's beginning but for rounding belongs to that stage.
+        (passed > -0.5).then(|| (passed + 1e-6).floor().max(0.0) as usize)
+    }
+
+    /// Input of a stage.
+    pub fn input(&self, stage: usize) -> &[f64] {
+        &self.inputs[stage * self.latent_dim..][..self.latent_dim]
+    }
+
+    /// State at the end of a stage.
+    pub fn end(&self, stage: usize) -> &[f64] {
+        &self.states[(stage + 1) * 2 * self.latent_dim..][..2 * self.latent_dim]
+    }
+
+    /// State and input that the plan has at a time, beyond its end those of its last stage; none
+    /// without a plan.
+    pub fn at(&self, time_s: f64) -> Option<(&[f64], &[f64])> {
+        let stage = self
+            .stage_at(time_s)?
+            .min(self.inputs.len() / self.latent_dim - 1);
+        let state = &self.states[stage * 2 * self.latent_dim..][..2 * self.latent_dim];
+        Some((state, self.input(stage)))
+    }
+
+    /// Largest deviation of a state from the one that the plan predicts for a time, in multiples
+    /// of `deviation`; none if the plan does not reach that far.
+    pub fn surprise(&self, time_s: f64, state: &[f64], deviation: &[f64]) -> Option<f64> {
+        let passed = (time_s - self.start_s?) / self.step_s;
+        let stages = self.inputs.len() / self.latent_dim;
+        if !(passed >= 0.0 && passed <= stages as f64) {
+            return None;
+        }
+        let width = 2 * self.latent_dim;
+        let before = (passed as usize).min(stages - 1);
+        let share = passed - before as f64;
+        let (earlier, later) = (
+            &self.states[before * width..][..width],
+            &self.states[(before + 1) * width..][..width],
+        );
+        let predicted = earlier.iter().zip(later).map(|(a, b)| a + share * (b - a));
+        let deviations = state.iter().zip(predicted).zip(deviation);
+        Some(
+            deviations
+                .map(|((x, predicted), scale)| ((x - predicted) / scale).abs())
+                .fold(0.0, f64::max),
+        )
+    }
+}

@@ -1,0 +1,198 @@
+//! The optimal control problem and the rows of its constraints.
+//!
+//! At a control step at time `t` with measured latent state `x₀ = (z, dz)` the controller solves,
+//! over `N` stages of length `h` with reference `(x_r, u_r)`,
+//!
+//! ```text
+//! minimise   Σ_{k=1..N}   w_k/2 Σ_i [ (z_k,i − z_r,i)² + w_v (dz_k,i − dz_r,i)² ] / σ_i²
+//!          + Σ_{k=0..N-1} w_u/2 (u_k − u_r,k)ᵀ S_p⁻¹ (u_k − u_r,k)
+//!          + ρ Σ_{k=1..N} s_k
+//! subject to x_{k+1} = F̄_k + A_k (x_k − x̄_k) + B_k (u_k − ū_k) + e_k          dynamics
+//!            |T u_k| ≤ τ_max                                    lifted joint torques
+//!            |T (u_k − u_{k-1})| ≤ h r                          rate of the torques, if asked for
+//!            ‖(R F u_k)_{x,y}‖ ≤ μ (R F u_k)_z                  lifted body force in contact, if asked for
+//!            q_min − s_k q_half ≤ D z_k + d ≤ q_max + s_k q_half,   s_k ≥ 0   decoded joints, k ≥ 1
+//! ```
+//!
+//! - `σ_i` is the standard deviation of latent `i` over the reference, `w_v` the weight of
+//!   velocities, `w_k = 1` but `w_N` the terminal weight.
+//! - `S_p` is the covariance of the training inputs in the stage's phase, projected into latent
+//!   coordinates. Directions in which the training inputs hardly moved are those in which the model
+//!   knows least about what an input does; a scalar weight would let the controller use them freely.
+//! - `F̄, A, B` are the Runge-Kutta step of the stage's phase and its derivatives
+//!   ([`linearise`](super::linearise)) at `(x̄, ū)`: the reference or the last plan. `e_k` is zero if
+//!   the model is the drift; otherwise `e_k = x_r,k+1 − F(x_r,k, u_r,k)`, so that the reference is
+//!   itself a trajectory and the model answers for deviations only.
+//! - Without a recorded input `u_r` is the phase's mean training input.
+//! - `T` and `F` are the torque and force rows of `W_eᵀ / s_u`, `R` turns the body frame upright by
+//!   the reference's roll and pitch. With the consistent lift the torques are chosen afterwards
+//!   within their limits, so the rows of `T` are left out.
+//! - `ρ` is an exact penalty: above the sum of the multipliers of a stage's joint rows it changes
+//!   nothing where the limits can be kept. One `s_k` serves all joints of a stage. Joint limits are
+//!   the only rows that can contradict the measurement, `u = 0` satisfies all others, hence they
+//!   alone are soft, and from stage 1 on.
+//!
+//! All is written in deviations divided by their scale, `x_k = x_r,k + σ x̂_k` and
+//! `u_k = u_r,k + C_p û_k` with `C_p C_pᵀ = S_p`, and each row divided by its limit: then the cost is
+//! a constant diagonal and the solver needs no scaling of its own.
+
+use super::plant::Plant;
+use super::prune::needed_rows;
+use super::settings::{Lift, MpcSettings};
+use crate::robot::JOINT_DIM;
+
+/// Gravity, m/s², for the weight that scales rows of forces.
+const GRAVITY: f64 = 9.81;
+
+/// A row `row · v ≤ bound` on latent inputs or latent positions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The joint it belongs to.
+    pub joint: usize,
+    /// Coefficients, `latent_dim`.
+    pub row: Vec<f64>,
+    /// Right-hand side.
+    pub bound: f64,
+}
+
+/// The constraint rows that every stage has, decided once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageRows {
+    /// `± T_i u / τ_max,i ≤ 1`, those that can be active.
+    pub torque: Vec<Row>,
+    /// `± D_i z / q_half,i ≤ …`, those that can be active.
+    pub joint: Vec<Row>,
+    /// Torque rows of which the rate is limited, and by how much a stage; empty if it is not.
+    pub rate: Vec<Row>,
+    /// Friction of the body force, if it is constrained.
+    pub friction: Option<BodyFriction>,
+}
+
+/// Rows of the body force that a latent input is lifted to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodyFriction {
+    /// Friction coefficient.
+    pub coefficient: f64,
+    /// Force over the robot's weight along the body's x, y and z, `3 × latent_dim` row-major.
+    pub force: Vec<f64>,
+}
+
+impl BodyFriction {
+    fn new(plant: &Plant, coefficient: f64) -> Self {
+        let weight = plant.robot().mass_kg() * GRAVITY;
+        let lift = plant.lift_matrix();
+        let rows = JOINT_DIM..JOINT_DIM + 3;
+        Self {
+            coefficient,
+            force: rows
+                .flat_map(|row| lift.row(row).iter().map(|e| e / weight).collect::<Vec<_>>())
+                .collect(),
+        }
+    }
+
+    /// Writes the cone's rows `(μ F_z, F_x, F_y)` of the force turned upright into `out`.
+    pub fn turned(&self, attitude_rad: [f64; 2], out: &mut [f64]) {
+        let d = self.force.len() / 3;
+        let rotation = upright(attitude_rad);
+        for (row, (axis, factor)) in [(2, self.coefficient), (0, 1.0), (1, 1.0)]
+            .into_iter()
+            .enumerate()
+        {
+            for col in 0..d {
+                let turned: f64 = (0..3)
+                    .map(|k| rotation[axis][k] * self.force[k * d + col])
+                    .sum();
+                out[row * d + col] = factor * turned;
+            }
+        }
+    }
+}
+
+impl StageRows {
+    /// The rows for a model on its robot; rows that no input or state can make active while the
+    /// others hold are left out.
+    pub fn new(plant: &Plant, settings: &MpcSettings) -> Self {
+        let torque = match settings.lift {
+            Lift::Transpose => needed_rows(torque_rows(plant)),
+            Lift::Consistent => Vec::new(),
+        };
+        let rate = match settings.torque_rate_nm_s {
+            None => Vec::new(),
+            Some(rate) => rate_rows(plant, rate * settings.step_s),
+        };
+        Self {
+            torque,
+            joint: needed_rows(joint_rows(plant)),
+            rate,
+            friction: settings
+                .body_friction
+                .map(|coefficient| BodyFriction::new(plant, coefficient)),
+        }
+    }
+}
+
+/// Both sides of every torque limit; joints that the lift does not reach have none.
+pub(super) fn torque_rows(plant: &Plant) -> Vec<Row> {
+    let limits = plant.robot().torque_limit_nm();
+    both_sides(plant, |joint| limits[joint])
+}
+
+/// Both sides of every rate limit, `step_nm` per stage.
+fn rate_rows(plant: &Plant, step_nm: f64) -> Vec<Row> {
+    needed_rows(both_sides(plant, |_| step_nm))
+}
+
+fn both_sides(plant: &Plant, limit: impl Fn(usize) -> f64) -> Vec<Row> {
+    let lift = plant.lift_matrix();
+    let mut rows = Vec::new();
+    for joint in 0..JOINT_DIM {
+        for sign in [1.0, -1.0] {
+            let row: Vec<f64> = lift
+                .row(joint)
+                .iter()
+                .map(|entry| sign * entry / limit(joint))
+                .collect();
+            if row.iter().any(|entry| *entry != 0.0) {
+                rows.push(Row {
+                    joint,
+                    row,
+                    bound: 1.0,
+                });
+            }
+        }
+    }
+    rows
+}
+
+/// Both sides of every joint limit, divided by half the joint's range.
+pub(super) fn joint_rows(plant: &Plant) -> Vec<Row> {
+    let (decoder, bias) = (plant.decoder_matrix(), plant.decoder_bias());
+    let mut rows = Vec::new();
+    for (joint, (lower, upper)) in plant.robot().joint_limit_rad().iter().enumerate() {
+        let half = 0.5 * (upper - lower);
+        for (sign, limit) in [(1.0, upper), (-1.0, lower)] {
+            let row: Vec<f64> = decoder
+                .row(joint)
+                .iter()
+                .map(|entry| sign * entry / half)
+                .collect();
+            let bound = sign * (limit - bias[joint]) / half;
+            if row.iter().any(|entry| *entry != 0.0) {
+                rows.push(Row { joint, row, bound });
+            }
+        }
+    }
+    rows
+}
+
+/// Rotation from the body frame to an upright frame with the same heading, `R_y(pitch) R_x(roll)`,
+/// row-major.
+pub(super) fn upright(attitude: [f64; 2]) -> [[f64; 3]; 3] {
+    let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) =
+        (attitude[0].sin_cos(), attitude[1].sin_cos());
+    [
+        [cos_pitch, sin_pitch * sin_roll, sin_pitch * cos_roll],
+        [0.0, cos_roll, -sin_roll],
+        [-sin_pitch, cos_pitch * sin_roll, cos_pitch * cos_roll],
+    ]
+}

@@ -1,0 +1,290 @@
+//! The trajectory that the controller follows, in latent coordinates.
+
+use super::error::MpcError;
+use super::plant::{Plant, add_product};
+use crate::robot::{ContactFlags, FOOT_DIM, STATE_DIM};
+
+/// A trajectory in SI units as its user has it: samples one after the other.
+#[derive(Debug, Clone, Copy)]
+pub struct ReferenceSamples<'a> {
+    /// Time of each sample, s, increasing.
+    pub time_s: &'a [f64],
+    /// States, 18 values a sample.
+    pub x: &'a [f64],
+    /// Velocities, 18 values a sample.
+    pub dx: &'a [f64],
+    /// Generalised inputs (12 torques, force, moment), 18 values a sample, if they are known.
+    pub u: Option<&'a [f64]>,
+    /// Feet in contact.
+    pub feet: &'a [ContactFlags],
+}
+
+/// An encoded trajectory that can be sampled at any time.
+///
+/// Between samples positions and velocities are interpolated linearly; before the first sample and
+/// after the last the end is held at rest.
+#[derive(Debug, Clone)]
+pub struct Reference {
+    latent_dim: usize,
+    time_s: Vec<f64>,
+    /// `(z, dz)` a sample.
+    state: Vec<f64>,
+    /// Integral of the latent input from the first sample on, by the trapezoidal rule.
+    input_integral: Option<Vec<f64>>,
+    input_ends: [Vec<f64>; 2],
+    feet: Vec<ContactFlags>,
+    /// Roll and pitch a sample.
+    attitude: Vec<[f64; 2]>,
+    deviation: Vec<f64>,
+}
+
+/// Smallest standard deviation against the largest of the same kind.
+const DEVIATION_FLOOR: f64 = 1e-2;
+
+impl Reference {
+    /// Encodes a trajectory.
+    ///
+    /// # Errors
+    /// [`MpcError::ReferenceLen`] below two samples, [`MpcError::ReferenceShape`] if array lengths
+    /// disagree, [`MpcError::ReferenceValue`] for values that are not finite,
+    /// [`MpcError::ReferenceTime`] if time does not increase and [`MpcError::ReferencePhase`] if a
+    /// foot pattern selects no phase.
+    pub fn new(plant: &Plant, samples: ReferenceSamples<'_>) -> Result<Self, MpcError> {
+        check(plant, &samples)?;
+        let d = plant.latent_dim();
+        let count = samples.time_s.len();
+        let mut state = vec![0.0; count * 2 * d];
+        for (sample, encoded) in state.chunks_exact_mut(2 * d).enumerate() {
+            let (z, dz) = encoded.split_at_mut(d);
+            plant.encode(row(samples.x, sample), z);
+            plant.encode_velocity(row(samples.dx, sample), dz);
+        }
+        let inputs = samples.u.map(|u| project_all(plant, u));
+        let input_ends = match &inputs {
+            Some(u) => [u[..d].to_vec(), u[(count - 1) * d..].to_vec()],
+            None => [vec![0.0; d], vec![0.0; d]],
+        };
+        Ok(Self {
+            latent_dim: d,
+            deviation: deviations(&state, d),
+            state,
+            input_integral: inputs.map(|u| integrate(samples.time_s, &u, d)),
+            input_ends,
+            time_s: samples.time_s.to_vec(),
+            feet: samples.feet.to_vec(),
+            attitude: (0..count)
+                .map(|sample| [row(samples.x, sample)[15], row(samples.x, sample)[16]])
+                .collect(),
+        })
+    }
+
+    /// Whether the trajectory comes with its input.
+    pub fn has_input(&self) -> bool {
+        self.input_integral.is_some()
+    }
+
+    /// First and last time, s.
+    pub fn time_range_s(&self) -> (f64, f64) {
+        (self.time_s[0], self.time_s[self.time_s.len() - 1])
+    }
+
+    /// Standard deviation of each of `(z, dz)` over the trajectory, never below a hundredth of
+    /// the largest position's or velocity's.
+    pub fn deviation(&self) -> &[f64] {
+        &self.deviation
+    }
+
+    /// Writes `(z, dz)` at a time into `out`.
+    pub fn state_at(&self, time_s: f64, out: &mut [f64]) {
+        let width = 2 * self.latent_dim;
+        let (before, share) = self.locate(time_s);
+        let earlier = &self.state[before * width..(before + 1) * width];
+        if before + 1 == self.time_s.len() {
+            out.copy_from_slice(earlier);
+        } else {
+            let later = &self.state[(before + 1) * width..(before + 2) * width];
+            for ((out, earlier), later) in out.iter_mut().zip(earlier).zip(later) {
+                *out = earlier + share * (later - earlier);
+            }
+        }
+        let (first, last) = self.time_range_s();
+        if time_s < first || time_s > last {
+            out[self.latent_dim..].fill(0.0);
+        }
+    }
+
+    /// Writes the mean latent input over `[time_s, time_s + duration_s]` into `out`; false if the
+    /// trajectory has no input.
+    pub fn mean_input(&self, time_s: f64, duration_s: f64, out: &mut [f64]) -> bool {
+        let Some(integral) = &self.input_integral else {
+            return false;
+        };
+        out.fill(0.0);
+        self.add_integral(integral, time_s + duration_s, 1.0, out);
+        self.add_integral(integral, time_s, -1.0, out);
+        for out in out.iter_mut() {
+            *out /= duration_s;
+        }
+        true
+    }
+
+    /// Feet in contact: those of the last sample at or before the time.
+    pub fn feet_at(&self, time_s: f64) -> ContactFlags {
+        self.feet[self.locate(time_s).0]
+    }
+
+    /// Roll and pitch, rad, of the last sample at or before the time.
+    pub fn attitude_at(&self, time_s: f64) -> [f64; 2] {
+        self.attitude[self.locate(time_s).0]
+    }
+
+    /// `out += sign · ∫ u` from the first sample to `time_s`.
+    fn add_integral(&self, integral: &[f64], time_s: f64, sign: f64, out: &mut [f64]) {
+        let d = self.latent_dim;
+        let (first, last) = self.time_range_s();
+        let (before, share) = self.locate(time_s);
+        let at = |sample: usize| &integral[sample * d..(sample + 1) * d];
+        for (coordinate, out) in out.iter_mut().enumerate() {
+            *out += sign
+                * if time_s <= first {
+                    (time_s - first) * self.input_ends[0][coordinate]
+                } else if before + 1 == self.time_s.len() {
+                    at(before)[coordinate] + (time_s - last) * self.input_ends[1][coordinate]
+                } else {
+                    // Linear in between: exact at samples, and the mean over a held input spans
+                    // several of them.
+                    at(before)[coordinate]
+                        + share * (at(before + 1)[coordinate] - at(before)[coordinate])
+                };
+        }
+    }
+
+    /// The last sample at or before a time and how far the time is on the way to the next one.
+    fn locate(&self, time_s: f64) -> (usize, f64) {
+        // Times that differ from a sample's by rounding belong to that sample.
+        let tolerance = 1e-9;
+        let after = self
+            .time_s
+            .partition_point(|&sample| sample <= time_s + tolerance);
+        let before = after.saturating_sub(1);
+        if before + 1 == self.time_s.len() {
+            return (before, 0.0);
+        }
+        let span = self.time_s[before + 1] - self.time_s[before];
+        (
+            before,
+            ((time_s - self.time_s[before]) / span).clamp(0.0, 1.0),
+        )
+    }
+}
+
+fn row(values: &[f64], sample: usize) -> &[f64] {
+    &values[sample * STATE_DIM..(sample + 1) * STATE_DIM]
+}
+
+fn project_all(plant: &Plant, u: &[f64]) -> Vec<f64> {
+    let d = plant.latent_dim();
+    let mut latent = vec![0.0; u.len() / STATE_DIM * d];
+    for (u, latent) in u.chunks_exact(STATE_DIM).zip(latent.chunks_exact_mut(d)) {
+        add_product(plant.projection_matrix(), u, latent);
+    }
+    latent
+}
+
+fn integrate(time_s: &[f64], values: &[f64], width: usize) -> Vec<f64> {
+    let mut integral = vec![0.0; values.len()];
+    for sample in 1..time_s.len() {
+        let half_step = 0.5 * (time_s[sample] - time_s[sample - 1]);
+        for column in 0..width {
+            let (here, before) = (sample * width + column, (sample - 1) * width + column);
+            integral[here] = integral[before] + half_step * (values[here] + values[before]);
+        }
+    }
+    integral
+}
+
+fn deviations(state: &[f64], latent_dim: usize) -> Vec<f64> {
+    let width = 2 * latent_dim;
+    let count = (state.len() / width) as f64;
+    let mut deviation: Vec<f64> = (0..width)
+        .map(|column| {
+            let values = || state.iter().skip(column).step_by(width);
+            let mean = values().sum::<f64>() / count;
+            (values().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
+        })
+        .collect();
+    for half in deviation.chunks_exact_mut(latent_dim) {
+        let largest = half.iter().copied().fold(0.0, f64::max);
+        let floor = if largest > 0.0 {
+            DEVIATION_FLOOR * largest
+        } else {
+            1.0
+        };
+        for value in half {
+            *value = value.max(floor);
+        }
+    }
+    deviation
+}
+
+fn check(plant: &Plant, samples: &ReferenceSamples<'_>) -> Result<(), MpcError> {
+    let count = samples.time_s.len();
+    if count < 2 {
+        return Err(MpcError::ReferenceLen {
+            found: count,
+            expected: 2,
+        });
+    }
+    let arrays = [
+        ("x", Some(samples.x)),
+        ("dx", Some(samples.dx)),
+        ("u", samples.u),
+    ];
+    for (name, values) in arrays {
+        let Some(values) = values else { continue };
+        if values.len() != count * STATE_DIM {
+            return Err(MpcError::ReferenceShape {
+                name,
+                found: values.len(),
+                expected: count * STATE_DIM,
+            });
+        }
+        check_finite(name, values, STATE_DIM)?;
+    }
+    if samples.feet.len() != count {
+        let (found, expected) = (samples.feet.len() * FOOT_DIM, count * FOOT_DIM);
+        return Err(MpcError::ReferenceShape {
+            name: "feet",
+            found,
+            expected,
+        });
+    }
+    check_finite("time_s", samples.time_s, 1)?;
+    for (sample, pair) in samples.time_s.windows(2).enumerate() {
+        if pair[1] <= pair[0] {
+            return Err(MpcError::ReferenceTime {
+                sample,
+                before: pair[0],
+                after: pair[1],
+            });
+        }
+    }
+    for (sample, &feet) in samples.feet.iter().enumerate() {
+        if plant.phase_for(feet).is_none() {
+            return Err(MpcError::ReferencePhase { sample, feet });
+        }
+    }
+    Ok(())
+}
+
+fn check_finite(name: &'static str, values: &[f64], width: usize) -> Result<(), MpcError> {
+    match values.iter().position(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(index) => Err(MpcError::ReferenceValue {
+            name,
+            sample: index / width,
+            coordinate: index % width,
+            found: values[index],
+        }),
+    }
+}

@@ -1,0 +1,175 @@
+//! What a user can choose about the controller, with the values that it starts from.
+
+use super::error::MpcError;
+use super::qp::QpSettings;
+
+/// How a latent input becomes joint torques.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Lift {
+    /// The paper's `u = W_eᵀ u_lat`: the torques are its leading entries, the body force that it
+    /// holds as well need not be the one that these torques produce.
+    Transpose,
+    /// The torques whose own ground reaction forces come closest to the latent input, within
+    /// torque limits and the friction cones of the feet in contact; see
+    /// [`ConsistentLift`](super::ConsistentLift).
+    Consistent,
+}
+
+/// About what trajectory the dynamics are linearised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Linearisation {
+    /// The reference: each stage is linearised once and reused while the horizon passes over it.
+    Reference,
+    /// The last plan, shifted by one stage (real-time iteration).
+    LastPlan,
+}
+
+/// What stands for the dynamics of the reference itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Drift {
+    /// The reference's own finite differences if it comes with its input, otherwise the model.
+    Automatic,
+    /// The reference's own finite differences: the model is trusted for deviations only.
+    Reference,
+    /// The model.
+    Model,
+}
+
+/// What the controller does while it has no plan to trust.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FallbackSettings {
+    /// How many stages of the last good plan may be used after a failure.
+    pub plan_stages: usize,
+    /// Time constant with which the feed-forward torque of a hold decays, s.
+    pub torque_decay_s: f64,
+    /// Joint damping of a hold, N m s/rad, on measured joint velocities.
+    pub damping_nm_s: f64,
+    /// Deviation from the predicted latent state, in standard deviations of the reference, from
+    /// which a measurement is not believed at first.
+    pub jump_deviations: f64,
+    /// How many steps in a row a measurement is disbelieved before it is taken for true.
+    pub jump_patience: usize,
+}
+
+impl Default for FallbackSettings {
+    fn default() -> Self {
+        Self {
+            plan_stages: 5,
+            torque_decay_s: 0.05,
+            damping_nm_s: 1.0,
+            jump_deviations: 6.0,
+            jump_patience: 3,
+        }
+    }
+}
+
+/// Settings of the controller.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MpcSettings {
+    /// Stages of the horizon, `N`.
+    pub horizon: usize,
+    /// Duration of a stage, s; the input is held over it.
+    pub step_s: f64,
+    /// How torques are made from the latent input.
+    pub lift: Lift,
+    /// Weight `w_u` of the input deviation, measured by the inverse covariance of the training
+    /// inputs.
+    pub input_weight: f64,
+    /// Weight of velocities against positions, `w_v`.
+    pub velocity_weight: f64,
+    /// Factor on the state weights of the last stage.
+    pub terminal_weight: f64,
+    /// About what the dynamics are linearised.
+    pub linearisation: Linearisation,
+    /// What stands for the reference's own dynamics.
+    pub drift: Drift,
+    /// Price of leaving the joint limits by their whole half range at one stage.
+    pub joint_penalty: f64,
+    /// Friction coefficient of the lifted body force in contact; none leaves it free.
+    pub body_friction: Option<f64>,
+    /// Friction coefficient of each foot in the consistent lift.
+    pub foot_friction: f64,
+    /// Weight of the consistent lift's prior against its reproduction of the latent input.
+    pub lift_prior_weight: f64,
+    /// Largest change of a lifted torque, N m/s; none leaves it free.
+    pub torque_rate_nm_s: Option<f64>,
+    /// The conic solver.
+    pub qp: QpSettings,
+    /// What happens without a plan.
+    pub fallback: FallbackSettings,
+}
+
+impl Default for MpcSettings {
+    fn default() -> Self {
+        Self {
+            horizon: 20,
+            step_s: 0.01,
+            lift: Lift::Transpose,
+            input_weight: 0.1,
+            velocity_weight: 0.02,
+            terminal_weight: 1.0,
+            linearisation: Linearisation::Reference,
+            drift: Drift::Automatic,
+            joint_penalty: 100.0,
+            body_friction: None,
+            foot_friction: 0.6,
+            lift_prior_weight: 1e-4,
+            torque_rate_nm_s: None,
+            qp: QpSettings::default(),
+            fallback: FallbackSettings::default(),
+        }
+    }
+}
+
+/// Longest horizon that is accepted.
+pub const MAX_HORIZON: usize = 500;
+
+impl MpcSettings {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// [`MpcError::Setting`] names the first one that is out of its range.
+    pub fn check(&self) -> Result<(), MpcError> {
+        if self.horizon == 0 || self.horizon > MAX_HORIZON {
+            return Err(MpcError::Setting {
+                name: "horizon",
+                found: self.horizon as f64,
+                expected: "1 to 500 stages",
+            });
+        }
+        let positive = [
+            ("step_s", self.step_s),
+            ("input_weight", self.input_weight),
+            ("velocity_weight", self.velocity_weight),
+            ("terminal_weight", self.terminal_weight),
+            ("joint_penalty", self.joint_penalty),
+            ("foot_friction", self.foot_friction),
+            ("lift_prior_weight", self.lift_prior_weight),
+            ("body_friction", self.body_friction.unwrap_or(1.0)),
+            ("torque_rate_nm_s", self.torque_rate_nm_s.unwrap_or(1.0)),
+            ("qp.tolerance", self.qp.tolerance),
+            ("qp.accepted_residual", self.qp.accepted_residual),
+            ("qp.max_iterations", f64::from(self.qp.max_iterations)),
+            ("fallback.torque_decay_s", self.fallback.torque_decay_s),
+            ("fallback.jump_deviations", self.fallback.jump_deviations),
+        ];
+        for (name, found) in positive {
+            if !(found.is_finite() && found > 0.0) {
+                return Err(MpcError::Setting {
+                    name,
+                    found,
+                    expected: "a positive number",
+                });
+            }
+        }
+        let damping = self.fallback.damping_nm_s;
+        if !(damping.is_finite() && damping >= 0.0) {
+            return Err(MpcError::Setting {
+                name: "fallback.damping_nm_s",
+                found: damping,
+                expected: "zero or a positive number",
+            });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,501 @@
+//! From the optimal control problem to the solver's matrices, whose pattern is fixed once.
+//!
+//! Unknowns of stage `k`, one stage after the other: the input `û_k`, the state `x̂_{k+1}` it leads
+//! to and, if any joint row is left, its slack `s_{k+1}`. Rows: the dynamics of all stages (zero
+//! cone), then torque, rate, joint and slack rows stage by stage (nonnegative), then one
+//! second-order cone a stage if friction of the body force is constrained. [`Transcription::write`]
+//! overwrites values only, through positions that were looked up at construction.
+
+use nalgebra::DMatrix;
+
+use super::linearise::StageModel;
+use super::problem::{Row, StageRows};
+use super::qp::{Cone, ConeProgram};
+use super::sparse::SparseColumns;
+
+/// One stage as the transcription sees it, in latent units.
+#[derive(Debug, Clone)]
+pub struct Stage {
+    /// Linearised dynamics.
+    pub model: StageModel,
+    /// `F̄ + A (x_r − x̄) + B (u_r − ū) + e − x_r⁺`: what is left of the dynamics at the reference.
+    pub defect: Vec<f64>,
+    /// Reference state at the stage's beginning, `2 latent_dim`.
+    pub state: Vec<f64>,
+    /// Reference input over the stage, `latent_dim`.
+    pub input: Vec<f64>,
+    /// Phase of the stage.
+    pub phase: usize,
+    /// Friction cone rows `(μ F_z, F_x, F_y) / weight`, `3 × latent_dim` row-major; zero in flight.
+    pub force: Vec<f64>,
+}
+
+impl Stage {
+    /// A stage of zeros.
+    pub fn zeros(latent_dim: usize) -> Self {
+        Self {
+            model: StageModel::zeros(latent_dim),
+            defect: vec![0.0; 2 * latent_dim],
+            state: vec![0.0; 2 * latent_dim],
+            input: vec![0.0; latent_dim],
+            phase: 0,
+            force: vec![0.0; 3 * latent_dim],
+        }
+    }
+}
+
+/// What else a step needs to know.
+#[derive(Debug, Clone, Copy)]
+pub struct StepData<'a> {
+    /// The stages of the horizon.
+    pub stages: &'a [Stage],
+    /// Reference positions at the end of the last stage, `latent_dim`.
+    pub last_position: &'a [f64],
+    /// Measured latent state, `2 latent_dim`.
+    pub measured: &'a [f64],
+    /// Latent input of the command before, `latent_dim`.
+    pub last_input: &'a [f64],
+    /// Scale `σ` of the states, `2 latent_dim`.
+    pub deviation: &'a [f64],
+    /// Scale `C_p` of the inputs by phase.
+    pub roots: &'a [DMatrix<f64>],
+}
+
+/// Positions of one stage's entries in the values of `A`.
+#[derive(Debug, Clone)]
+struct StagePositions {
+    /// `B̂`, `2d × d` row-major.
+    input: Vec<usize>,
+    /// `Â`, `2d × 2d` row-major; empty at stage 0.
+    state: Vec<usize>,
+    /// Torque rows by `û_k`, row-major.
+    torque: Vec<usize>,
+    /// Rate rows by `û_k`, then by `û_{k-1}` (absent at stage 0).
+    rate: Vec<usize>,
+    rate_before: Vec<usize>,
+    /// Joint rows by the positions of `x̂_{k+1}`.
+    joint: Vec<usize>,
+    /// Cone rows by `û_k`.
+    force: Vec<usize>,
+}
+
+/// Layout of unknowns and rows, and where each number goes.
+#[derive(Debug, Clone)]
+pub struct Transcription {
+    latent_dim: usize,
+    horizon: usize,
+    rows: StageRows,
+    has_slack: bool,
+    positions: Vec<StagePositions>,
+    /// `T C_p` and the like, by phase, for the current roots.
+    work: Vec<f64>,
+}
+
+/// Weights of the transcribed cost.
+#[derive(Debug, Clone, Copy)]
+pub struct Weights<'a> {
+    /// Weight of each scaled state, `2 latent_dim`.
+    pub state: &'a [f64],
+    /// Factor on the last stage.
+    pub terminal: f64,
+    /// Weight of the scaled inputs.
+    pub input: f64,
+    /// Price of a slack.
+    pub joint_penalty: f64,
+}
+
+impl Transcription {
+    /// Lays out a problem; returns it with the program that its steps will fill.
+    pub fn new(latent_dim: usize, horizon: usize, rows: StageRows) -> (Self, ConeProgram) {
+        let mut layout = Self {
+            latent_dim,
+            horizon,
+            has_slack: !rows.joint.is_empty(),
+            rows,
+            positions: Vec::with_capacity(horizon),
+            work: vec![0.0; latent_dim],
+        };
+        let (n, m) = (layout.variables(), layout.row_count());
+        let mut a = SparseColumns::from_pattern(m, n, &layout.pattern());
+        for stage in 0..horizon {
+            let positions = layout.stage_positions(stage, &a);
+            layout.positions.push(positions);
+        }
+        layout.write_constants(&mut a);
+        let diagonal: Vec<(usize, usize)> = (0..n).map(|index| (index, index)).collect();
+        let mut cones = vec![
+            Cone::Zero(2 * latent_dim * horizon),
+            Cone::Nonnegative(layout.inequality_dim() * horizon),
+        ];
+        if layout.rows.friction.is_some() {
+            cones.extend(std::iter::repeat_n(Cone::SecondOrder(3), horizon));
+        }
+        cones.retain(|cone| cone.dim() > 0);
+        let program = ConeProgram {
+            p: SparseColumns::from_pattern(n, n, &diagonal),
+            q: vec![0.0; n],
+            a,
+            b: vec![0.0; m],
+            cones,
+        };
+        (layout, program)
+    }
+
+    /// The rows of each stage.
+    pub fn rows(&self) -> &StageRows {
+        &self.rows
+    }
+
+    /// Writes the cost, which does not change from step to step.
+    pub fn write_cost(&self, weights: &Weights<'_>, program: &mut ConeProgram) {
+        let d = self.latent_dim;
+        for stage in 0..self.horizon {
+            let factor = if stage + 1 == self.horizon {
+                weights.terminal
+            } else {
+                1.0
+            };
+            let (input, state) = (self.input_column(stage), self.state_column(stage));
+            for index in 0..d {
+                program.p.set(input + index, input + index, weights.input);
+            }
+            for index in 0..2 * d {
+                program
+                    .p
+                    .set(state + index, state + index, factor * weights.state[index]);
+            }
+            if self.has_slack {
+                program.q[self.slack_column(stage)] = weights.joint_penalty;
+            }
+        }
+    }
+
+    /// Writes a step's values.
+    pub fn write(&mut self, step: &StepData<'_>, program: &mut ConeProgram) {
+        for index in 0..self.horizon {
+            self.write_dynamics(index, step, program);
+            self.write_inputs(index, step, program);
+            self.write_joints(index, step, program);
+        }
+    }
+
+    /// Latent input of a stage in a solution: `u_r + C_p û`.
+    pub fn input(&self, index: usize, solution: &[f64], step: &StepData<'_>, out: &mut [f64]) {
+        let (d, stage) = (self.latent_dim, &step.stages[index]);
+        let scaled = &solution[self.input_column(index)..][..d];
+        for (row, out) in out.iter_mut().enumerate() {
+            let root = &step.roots[stage.phase];
+            *out = stage.input[row]
+                + (0..=row)
+                    .map(|col| root[(row, col)] * scaled[col])
+                    .sum::<f64>();
+        }
+    }
+
+    /// Latent state at the end of a stage in a solution: `x_r⁺ + σ x̂⁺`, with `reference` the
+    /// reference state there.
+    pub fn state(
+        &self,
+        index: usize,
+        solution: &[f64],
+        reference: &[f64],
+        deviation: &[f64],
+        out: &mut [f64],
+    ) {
+        let scaled = &solution[self.state_column(index)..][..2 * self.latent_dim];
+        for (((out, reference), scale), value) in
+            out.iter_mut().zip(reference).zip(deviation).zip(scaled)
+        {
+            *out = reference + scale * value;
+        }
+    }
+
+    /// Largest slack of a solution, in half ranges of a joint.
+    pub fn largest_slack(&self, solution: &[f64]) -> f64 {
+        if !self.has_slack {
+            return 0.0;
+        }
+        (0..self.horizon)
+            .map(|stage| solution[self.slack_column(stage)])
+            .fold(0.0, f64::max)
+    }
+
+    fn stage_width(&self) -> usize {
+        3 * self.latent_dim + usize::from(self.has_slack)
+    }
+
+    fn variables(&self) -> usize {
+        self.horizon * self.stage_width()
+    }
+
+    fn input_column(&self, stage: usize) -> usize {
+        stage * self.stage_width()
+    }
+
+    /// Of `x̂_{stage+1}`.
+    fn state_column(&self, stage: usize) -> usize {
+        self.input_column(stage) + self.latent_dim
+    }
+
+    fn slack_column(&self, stage: usize) -> usize {
+        self.input_column(stage) + 3 * self.latent_dim
+    }
+
+    fn inequality_dim(&self) -> usize {
+        self.rows.torque.len()
+            + self.rows.rate.len()
+            + self.rows.joint.len()
+            + usize::from(self.has_slack)
+    }
+
+    fn dynamics_row(&self, stage: usize) -> usize {
+        stage * 2 * self.latent_dim
+    }
+
+    fn torque_row(&self, stage: usize) -> usize {
+        2 * self.latent_dim * self.horizon + stage * self.inequality_dim()
+    }
+
+    fn rate_row(&self, stage: usize) -> usize {
+        self.torque_row(stage) + self.rows.torque.len()
+    }
+
+    fn joint_row(&self, stage: usize) -> usize {
+        self.rate_row(stage) + self.rows.rate.len()
+    }
+
+    fn slack_row(&self, stage: usize) -> usize {
+        self.joint_row(stage) + self.rows.joint.len()
+    }
+
+    fn force_row(&self, stage: usize) -> usize {
+        self.torque_row(self.horizon) + 3 * stage
+    }
+
+    fn row_count(&self) -> usize {
+        self.force_row(if self.rows.friction.is_some() {
+            self.horizon
+        } else {
+            0
+        })
+    }
+
+    fn pattern(&self) -> Vec<(usize, usize)> {
+        let d = self.latent_dim;
+        let mut entries = Vec::new();
+        for stage in 0..self.horizon {
+            let (input, state) = (self.input_column(stage), self.state_column(stage));
+            entries.extend(block(self.dynamics_row(stage), 2 * d, input, d));
+            entries
+                .extend((0..2 * d).map(|index| (self.dynamics_row(stage) + index, state + index)));
+            if stage > 0 {
+                entries.extend(block(
+                    self.dynamics_row(stage),
+                    2 * d,
+                    self.state_column(stage - 1),
+                    2 * d,
+                ));
+                entries.extend(block(
+                    self.rate_row(stage),
+                    self.rows.rate.len(),
+                    self.input_column(stage - 1),
+                    d,
+                ));
+            }
+            entries.extend(block(
+                self.torque_row(stage),
+                self.rows.torque.len(),
+                input,
+                d,
+            ));
+            entries.extend(block(self.rate_row(stage), self.rows.rate.len(), input, d));
+            entries.extend(block(
+                self.joint_row(stage),
+                self.rows.joint.len(),
+                state,
+                d,
+            ));
+            if self.has_slack {
+                let slack = self.slack_column(stage);
+                entries.extend(
+                    (self.joint_row(stage)..=self.slack_row(stage)).map(|row| (row, slack)),
+                );
+            }
+            if self.rows.friction.is_some() {
+                entries.extend(block(self.force_row(stage), 3, input, d));
+            }
+        }
+        entries
+    }
+
+    fn stage_positions(&self, stage: usize, a: &SparseColumns) -> StagePositions {
+        let d = self.latent_dim;
+        let find = |row: usize, n_rows: usize, col: usize, n_cols: usize| -> Vec<usize> {
+            block(row, n_rows, col, n_cols)
+                .map(|(row, col)| a.position(row, col).expect("block belongs to the pattern"))
+                .collect()
+        };
+        let (input, state) = (self.input_column(stage), self.state_column(stage));
+        let before = |row: usize, n_rows: usize, col: fn(&Self, usize) -> usize, n_cols: usize| {
+            match stage {
+                0 => Vec::new(),
+                _ => find(row, n_rows, col(self, stage - 1), n_cols),
+            }
+        };
+        let force_rows = if self.rows.friction.is_some() { 3 } else { 0 };
+        StagePositions {
+            input: find(self.dynamics_row(stage), 2 * d, input, d),
+            state: before(self.dynamics_row(stage), 2 * d, Self::state_column, 2 * d),
+            torque: find(self.torque_row(stage), self.rows.torque.len(), input, d),
+            rate: find(self.rate_row(stage), self.rows.rate.len(), input, d),
+            rate_before: before(
+                self.rate_row(stage),
+                self.rows.rate.len(),
+                Self::input_column,
+                d,
+            ),
+            joint: find(self.joint_row(stage), self.rows.joint.len(), state, d),
+            force: find(self.force_row(stage), force_rows, input, d),
+        }
+    }
+
+    fn write_constants(&self, a: &mut SparseColumns) {
+        for stage in 0..self.horizon {
+            for index in 0..2 * self.latent_dim {
+                a.set(
+                    self.dynamics_row(stage) + index,
+                    self.state_column(stage) + index,
+                    -1.0,
+                );
+            }
+            if self.has_slack {
+                for row in self.joint_row(stage)..=self.slack_row(stage) {
+                    a.set(row, self.slack_column(stage), -1.0);
+                }
+            }
+        }
+    }
+
+    /// `Â x̂_k + B̂ û_k − x̂_{k+1} = −σ⁻¹ defect`, with `x̂_0` on the right.
+    fn write_dynamics(&self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
+        let (d, stage) = (self.latent_dim, &step.stages[index]);
+        let positions = &self.positions[index];
+        let (root, deviation) = (&step.roots[stage.phase], step.deviation);
+        let values = program.a.values_mut();
+        for row in 0..2 * d {
+            let scale = 1.0 / deviation[row];
+            for col in 0..d {
+                let product: f64 = (col..d)
+                    .map(|k| stage.model.b[(row, k)] * root[(k, col)])
+                    .sum();
+                values[positions.input[row * d + col]] = scale * product;
+            }
+            let mut right = -scale * stage.defect[row];
+            for col in 0..2 * d {
+                let entry = scale * stage.model.a[(row, col)];
+                if index == 0 {
+                    right -= entry * (step.measured[col] - stage.state[col]);
+                } else {
+                    values[positions.state[row * 2 * d + col]] = entry * deviation[col];
+                }
+            }
+            program.b[self.dynamics_row(index) + row] = right;
+        }
+    }
+
+    /// Torque, rate and friction rows.
+    fn write_inputs(&mut self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
+        let d = self.latent_dim;
+        let stage = &step.stages[index];
+        let root = &step.roots[stage.phase];
+        for (number, row) in self.rows.torque.iter().enumerate() {
+            let positions = &self.positions[index].torque[number * d..][..d];
+            let at_reference = scaled_row(&row.row, root, &stage.input, &mut self.work);
+            scatter(&self.work, positions, program.a.values_mut());
+            program.b[self.torque_row(index) + number] = row.bound - at_reference;
+        }
+        for (number, row) in self.rows.rate.iter().enumerate() {
+            let positions = &self.positions[index].rate[number * d..][..d];
+            let at_reference = scaled_row(&row.row, root, &stage.input, &mut self.work);
+            scatter(&self.work, positions, program.a.values_mut());
+            let before = if index == 0 {
+                dot(&row.row, step.last_input)
+            } else {
+                let earlier = &step.stages[index - 1];
+                let before = scaled_row(
+                    &row.row,
+                    &step.roots[earlier.phase],
+                    &earlier.input,
+                    &mut self.work,
+                );
+                self.work.iter_mut().for_each(|entry| *entry = -*entry);
+                let positions = &self.positions[index].rate_before[number * d..][..d];
+                scatter(&self.work, positions, program.a.values_mut());
+                before
+            };
+            program.b[self.rate_row(index) + number] = row.bound - at_reference + before;
+        }
+        if self.rows.friction.is_some() {
+            for number in 0..3 {
+                let positions = &self.positions[index].force[number * d..][..d];
+                let row = &stage.force[number * d..][..d];
+                let at_reference = scaled_row(row, root, &stage.input, &mut self.work);
+                self.work.iter_mut().for_each(|entry| *entry = -*entry);
+                scatter(&self.work, positions, program.a.values_mut());
+                // A stage without contact has the cone's axis as its slack: strictly inside.
+                let is_free =
+                    row.iter().all(|entry| *entry == 0.0) && number == 0 && is_zero(&stage.force);
+                program.b[self.force_row(index) + number] =
+                    if is_free { 1.0 } else { at_reference };
+            }
+        }
+    }
+
+    /// `D_i σ ẑ − s ≤ bound − D_i z_r`, at the end of the stage.
+    fn write_joints(&self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
+        let d = self.latent_dim;
+        let reference = match step.stages.get(index + 1) {
+            Some(next) => &next.state[..d],
+            None => step.last_position,
+        };
+        for (number, Row { row, bound, .. }) in self.rows.joint.iter().enumerate() {
+            let positions = &self.positions[index].joint[number * d..][..d];
+            for (col, &position) in positions.iter().enumerate() {
+                program.a.values_mut()[position] = row[col] * step.deviation[col];
+            }
+            program.b[self.joint_row(index) + number] = bound - dot(row, reference);
+        }
+    }
+}
+
+/// `work = row C` for a lower triangular `C`; returns `row · input`.
+fn scaled_row(row: &[f64], root: &DMatrix<f64>, input: &[f64], work: &mut [f64]) -> f64 {
+    let d = row.len();
+    for (col, work) in work.iter_mut().enumerate() {
+        *work = (col..d).map(|k| row[k] * root[(k, col)]).sum();
+    }
+    dot(row, input)
+}
+
+fn scatter(from: &[f64], positions: &[usize], values: &mut [f64]) {
+    for (value, &position) in from.iter().zip(positions) {
+        values[position] = *value;
+    }
+}
+
+fn is_zero(values: &[f64]) -> bool {
+    values.iter().all(|value| *value == 0.0)
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn block(
+    row: usize,
+    n_rows: usize,
+    col: usize,
+    n_cols: usize,
+) -> impl Iterator<Item = (usize, usize)> {
+    (row..row + n_rows).flat_map(move |row| (col..col + n_cols).map(move |col| (row, col)))
+}

@@ -1,0 +1,466 @@
+//! What the controller commands when all is well.
+
+use nalgebra::DVector;
+use romc::model::ReducedModel;
+use romc::mpc::{
+    Command, Controller, Drift, Linearisation, Measurement, MpcError, MpcSettings,
+    ReferenceSamples, Source, Status,
+};
+use romc::robot::ContactFlags;
+use romc::sim::CompiledModel;
+
+use crate::synthetic::{D, Equations, STAND, Trajectory, decoded, model, trajectory};
+
+fn controller(
+    model: &ReducedModel,
+    settings: MpcSettings,
+    reference: ReferenceSamples<'_>,
+) -> Controller {
+    let mut controller = Controller::new(model, settings).expect("the model is complete");
+    controller
+        .set_reference(reference)
+        .expect("the reference is sound");
+    controller
+}
+
+pub fn measure(trajectory: &Trajectory, sample: usize, controller: &mut Controller) -> Command {
+    let (x, dx) = trajectory.state(sample);
+    let feet = trajectory.feet[sample];
+    controller.step(Measurement {
+        time_s: trajectory.time_s[sample],
+        x: &x,
+        dx: &dx,
+        feet,
+    })
+}
+
+pub fn assert_within_limits(command: &Command) {
+    let robot = romc::robot::Robot::by_name("go1").expect("known robot");
+    for joint in 0..12 {
+        assert!(
+            command.torque_nm[joint].abs() <= robot.torque_limit_nm()[joint],
+            "{command:?}"
+        );
+        let (lower, upper) = robot.joint_limit_rad()[joint];
+        assert!(
+            (lower..=upper).contains(&command.joint_position_rad[joint]),
+            "{command:?}"
+        );
+    }
+}
+
+#[test]
+fn on_a_reference_that_the_model_follows_the_reference_input_is_commanded() {
+    let model = model(Equations::Nonlinear);
+    let reference = trajectory(&model);
+    for drift in [Drift::Reference, Drift::Model] {
+        let settings = MpcSettings {
+            drift,
+            ..MpcSettings::default()
+        };
+        let mut controller = controller(&model, settings, reference.samples());
+        for sample in (0..300).step_by(5) {
+            let command = measure(&reference, sample, &mut controller);
+            assert_eq!(
+                (command.status, command.source),
+                (Status::Solved, Source::Plan),
+                "sample {sample}"
+            );
+            for joint in 0..12 {
+                // The reference's input over the hold is a mean over samples that are themselves held:
+                // its last interval ramps to the next value.
+                let expected = 0.9 * reference.u[sample * 18 + joint]
+                    + 0.1 * reference.u[(sample + 5) * 18 + joint];
+                let error = (command.torque_nm[joint] - expected).abs();
+                assert!(
+                    error < 0.15,
+                    "sample {sample}, joint {joint}: {error} N m of {expected}"
+                );
+            }
+        }
+    }
+}
+
+/// Runs the model itself under the controller from an offset; returns the distance from the
+/// reference, in latent units, at every step.
+fn closed_loop(model: &ReducedModel, settings: MpcSettings, with_input: bool) -> Vec<f64> {
+    let reference = trajectory(model);
+    let samples = if with_input {
+        reference.samples()
+    } else {
+        reference.without_input()
+    };
+    let mut controller = controller(model, settings, samples);
+    let mut dynamics = CompiledModel::new(model).expect("lowers");
+    let (mut z, mut dz) = ([0.02, -0.02, 0.02], [0.1, 0.0, -0.1]);
+    let mut distances = Vec::new();
+    for sample in (0..350).step_by(5) {
+        let (x, dx) = decoded(model, &z, &dz);
+        let feet = reference.feet[sample];
+        let time_s = reference.time_s[sample];
+        let command = controller.step(Measurement {
+            time_s,
+            x: &x,
+            dx: &dx,
+            feet,
+        });
+        assert!(command.status.has_plan(), "{:?}", command.status);
+        assert_within_limits(&command);
+        let target = DVector::from_iterator(18, (0..18).map(|i| reference.x[sample * 18 + i]));
+        let target = model.encode(&target).expect("has an encoder");
+        distances.push(
+            (0..D)
+                .map(|i| (z[i] - target[i]).powi(2))
+                .sum::<f64>()
+                .sqrt(),
+        );
+        for held in sample..sample + 5 {
+            let phase = model
+                .phase_for(reference.feet[held])
+                .expect("has both phases");
+            dynamics.rk4_step(phase, &mut z, &mut dz, &command.u_lat, 0.002);
+        }
+    }
+    distances
+}
+
+#[test]
+fn feedback_brings_the_model_back_to_the_reference_faster_than_its_own_damping() {
+    let model = model(Equations::Nonlinear);
+    let strong = MpcSettings {
+        input_weight: 1e-3,
+        ..MpcSettings::default()
+    };
+    let weak = MpcSettings {
+        input_weight: 1e6,
+        ..MpcSettings::default()
+    };
+    let sum = |settings| {
+        closed_loop(&model, settings, true)[5..30]
+            .iter()
+            .sum::<f64>()
+    };
+    let (with_feedback, without) = (sum(strong), sum(weak));
+    assert!(
+        with_feedback < 0.7 * without,
+        "{with_feedback} against {without}"
+    );
+}
+
+#[test]
+fn without_a_recorded_input_the_reference_is_still_tracked() {
+    let model = model(Equations::Nonlinear);
+    for linearisation in [Linearisation::Reference, Linearisation::LastPlan] {
+        let settings = MpcSettings {
+            input_weight: 1e-3,
+            linearisation,
+            ..MpcSettings::default()
+        };
+        let distances = closed_loop(&model, settings, false);
+        let late = distances[40..].iter().copied().fold(0.0, f64::max);
+        assert!(late < 0.2 * distances[0], "{late} of {}", distances[0]);
+    }
+}
+
+#[test]
+fn plan_of_a_linear_model_is_a_trajectory_of_its_runge_kutta_steps() {
+    let model = model(Equations::Linear);
+    let reference = trajectory(&model);
+    let settings = MpcSettings {
+        input_weight: 1e-2,
+        ..MpcSettings::default()
+    };
+    let mut dynamics = CompiledModel::new(&model).expect("lowers");
+    for linearisation in [Linearisation::Reference, Linearisation::LastPlan] {
+        let settings = MpcSettings {
+            linearisation,
+            drift: Drift::Model,
+            ..settings
+        };
+        let mut controller = controller(&model, settings, reference.without_input());
+        for sample in [150, 155, 160] {
+            let command = measure(&reference, sample, &mut controller);
+            assert_eq!(command.status, Status::Solved);
+        }
+        let plan = controller.plan();
+        let (x, dx) = reference.state(160);
+        let z = model
+            .encode(&DVector::from_column_slice(&x))
+            .expect("has an encoder");
+        let dz = model
+            .encode_velocity(&DVector::from_column_slice(&dx))
+            .expect("has an encoder");
+        let (mut z, mut dz): ([f64; D], [f64; D]) = (
+            std::array::from_fn(|i| z[i]),
+            std::array::from_fn(|i| dz[i]),
+        );
+        for stage in 0..settings.horizon {
+            // Stages 8 to 17 lie in the flight from 0.4 s to 0.5 s.
+            let phase = usize::from((8..18).contains(&stage));
+            dynamics.rk4_step(phase, &mut z, &mut dz, plan.input(stage), 0.01);
+            for (found, expected) in plan.end(stage).iter().zip(z.iter().chain(&dz)) {
+                assert!(
+                    (found - expected).abs() < 1e-5,
+                    "stage {stage}: {found} {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn torque_rate_is_kept_between_commands() {
+    let model = model(Equations::Nonlinear);
+    let reference = trajectory(&model);
+    let rate = 100.0;
+    let settings = MpcSettings {
+        torque_rate_nm_s: Some(rate),
+        input_weight: 1e-4,
+        ..MpcSettings::default()
+    };
+    let free = MpcSettings {
+        torque_rate_nm_s: None,
+        ..settings
+    };
+    let largest_change = |settings| {
+        let mut controller = controller(&model, settings, reference.without_input());
+        let mut before = [0.0; 12];
+        let mut largest = 0.0_f64;
+        for sample in (0..300).step_by(5) {
+            let (mut x, dx) = reference.state(sample);
+            x[14] += if sample >= 100 { 0.03 } else { 0.0 };
+            let feet = reference.feet[sample];
+            let command = controller.step(Measurement {
+                time_s: reference.time_s[sample],
+                x: &x,
+                dx: &dx,
+                feet,
+            });
+            assert!(command.status.has_plan(), "{:?}", command.status);
+            for (torque, before) in command.torque_nm.iter().zip(&before) {
+                largest = largest.max((torque - before).abs());
+            }
+            before = command.torque_nm;
+        }
+        largest
+    };
+    assert!(largest_change(free) > 1.5, "the limit would not be felt");
+    let limited = largest_change(settings);
+    assert!(limited < 1.0 + 1e-3, "{limited} N m in 10 ms");
+}
+
+#[test]
+fn lifted_body_force_stays_in_its_friction_cone() {
+    let model = model(Equations::Nonlinear);
+    let reference = trajectory(&model);
+    let violations = |body_friction| {
+        let settings = MpcSettings {
+            body_friction,
+            ..MpcSettings::default()
+        };
+        let mut controller = controller(&model, settings, reference.samples());
+        let mut count = 0;
+        for sample in (0..190).step_by(5) {
+            let command = measure(&reference, sample, &mut controller);
+            assert!(command.status.has_plan(), "{:?}", command.status);
+            let force = controller.plant().lift(&command.u_lat);
+            let pitch = reference.x[sample * 18 + 16];
+            let (sin, cos) = pitch.sin_cos();
+            let (along, up) = (
+                cos * force[12] + sin * force[14],
+                -sin * force[12] + cos * force[14],
+            );
+            count += usize::from(along.hypot(force[13]) > 0.6 * up + 0.1);
+        }
+        count
+    };
+    assert!(violations(None) > 5, "the cone would not be felt");
+    assert_eq!(violations(Some(0.6)), 0);
+}
+
+#[test]
+fn saturated_torques_reach_their_limit_and_never_pass_it() {
+    let model = model(Equations::Nonlinear);
+    let reference = trajectory(&model);
+    let settings = MpcSettings {
+        input_weight: 1e-9,
+        ..MpcSettings::default()
+    };
+    let mut controller = controller(&model, settings, reference.samples());
+    let mut saturated = 0;
+    for sample in (0..300).step_by(5) {
+        let (mut x, dx) = reference.state(sample);
+        x[12] += 0.1;
+        controller.reset();
+        let feet = reference.feet[sample];
+        let command = controller.step(Measurement {
+            time_s: reference.time_s[sample],
+            x: &x,
+            dx: &dx,
+            feet,
+        });
+        assert!(command.status.has_plan(), "{:?}", command.status);
+        assert_within_limits(&command);
+        let limits = controller.plant().robot().torque_limit_nm();
+        saturated += command
+            .torque_nm
+            .iter()
+            .zip(limits)
+            .filter(|(t, l)| t.abs() > 0.999 * **l)
+            .count();
+    }
+    assert!(saturated > 20, "only {saturated} torques at their limit");
+}
+
+#[test]
+fn same_measurements_give_the_same_bits() {
+    let model = model(Equations::Nonlinear);
+    let reference = trajectory(&model);
+    let run = || {
+        let mut controller = controller(&model, MpcSettings::default(), reference.samples());
+        let bits = |command: Command| command.torque_nm.map(f64::to_bits);
+        (0..300)
+            .step_by(5)
+            .map(|sample| bits(measure(&reference, sample, &mut controller)))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn stage_rows_keep_only_what_can_be_active() {
+    let controller =
+        Controller::new(&model(Equations::Linear), MpcSettings::default()).expect("complete");
+    let rows = controller.stage_rows();
+    assert!(
+        !rows.torque.is_empty() && rows.torque.len() < 16,
+        "{} of 16 torque rows",
+        rows.torque.len()
+    );
+    assert!(
+        !rows.joint.is_empty() && rows.joint.len() < 16,
+        "{} of 16 joint rows",
+        rows.joint.len()
+    );
+    for row in rows.torque.iter().chain(&rows.joint) {
+        assert_ne!(row.joint % 3, 0, "hip abduction is not in the encoder");
+    }
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    let model = model(Equations::Linear);
+    let refused = |settings| match Controller::new(&model, settings) {
+        Err(MpcError::Setting { name, .. }) => name,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(
+        refused(MpcSettings {
+            horizon: 0,
+            ..MpcSettings::default()
+        }),
+        "horizon"
+    );
+    assert_eq!(
+        refused(MpcSettings {
+            step_s: f64::NAN,
+            ..MpcSettings::default()
+        }),
+        "step_s"
+    );
+    assert_eq!(
+        refused(MpcSettings {
+            input_weight: -1.0,
+            ..MpcSettings::default()
+        }),
+        "input_weight"
+    );
+    assert_eq!(
+        refused(MpcSettings {
+            body_friction: Some(0.0),
+            ..MpcSettings::default()
+        }),
+        "body_friction"
+    );
+}
+
+#[test]
+fn references_that_do_not_fit_are_refused_and_the_old_one_stays() {
+    let model = model(Equations::Linear);
+    let good = trajectory(&model);
+    let mut controller = controller(&model, MpcSettings::default(), good.samples());
+    let mut bad_value = trajectory(&model);
+    bad_value.dx[18 * 7 + 4] = f64::INFINITY;
+    let error = controller
+        .set_reference(bad_value.samples())
+        .expect_err("infinite velocity");
+    assert!(
+        matches!(
+            error,
+            MpcError::ReferenceValue {
+                name: "dx",
+                sample: 7,
+                coordinate: 4,
+                ..
+            }
+        ),
+        "{error}"
+    );
+    let mut bad_time = trajectory(&model);
+    bad_time.time_s[10] = 0.0;
+    let error = controller
+        .set_reference(bad_time.samples())
+        .expect_err("time jumps back");
+    assert!(
+        matches!(error, MpcError::ReferenceTime { sample: 9, .. }),
+        "{error}"
+    );
+    let short = ReferenceSamples {
+        x: &good.x[1..],
+        ..good.samples()
+    };
+    let error = controller
+        .set_reference(short)
+        .expect_err("one value is missing");
+    assert!(
+        matches!(
+            error,
+            MpcError::ReferenceShape {
+                name: "x",
+                found: 7217,
+                expected: 7218
+            }
+        ),
+        "{error}"
+    );
+    let feet = ReferenceSamples {
+        feet: &good.feet[1..],
+        ..good.samples()
+    };
+    let error = controller
+        .set_reference(feet)
+        .expect_err("one sample of feet is missing");
+    assert!(
+        matches!(error, MpcError::ReferenceShape { name: "feet", .. }),
+        "{error}"
+    );
+    let single = ReferenceSamples {
+        time_s: &[0.0],
+        x: &STAND,
+        dx: &[0.0; 18],
+        u: None,
+        feet: &[[true; 4] as ContactFlags],
+    };
+    let error = controller.set_reference(single).expect_err("one sample");
+    assert!(
+        matches!(
+            error,
+            MpcError::ReferenceLen {
+                found: 1,
+                expected: 2
+            }
+        ),
+        "{error}"
+    );
+    assert_eq!(measure(&good, 0, &mut controller).status, Status::Solved);
+}

@@ -1,0 +1,418 @@
+//! What the controller commands when something is wrong, and that it comes back by itself.
+
+use romc::mpc::{
+    Command, Controller, FallbackSettings, Lift, Measurement, MpcSettings, QpSettings, Source,
+    Status,
+};
+use romc::robot::ContactFlags;
+
+use crate::control::{assert_within_limits, measure};
+use crate::random::Random;
+use crate::synthetic::{Equations, Trajectory, model, trajectory};
+
+struct Bench {
+    reference: Trajectory,
+    controller: Controller,
+}
+
+impl Bench {
+    fn new(settings: MpcSettings) -> Self {
+        let model = model(Equations::Nonlinear);
+        let reference = trajectory(&model);
+        let mut controller = Controller::new(&model, settings).expect("the model is complete");
+        controller
+            .set_reference(reference.samples())
+            .expect("the reference is sound");
+        Self {
+            reference,
+            controller,
+        }
+    }
+
+    fn nominal(&mut self, sample: usize) -> Command {
+        let command = measure(&self.reference, sample, &mut self.controller);
+        assert_within_limits(&command);
+        command
+    }
+
+    fn changed(
+        &mut self,
+        sample: usize,
+        change: impl Fn(&mut [f64; 18], &mut [f64; 18]),
+    ) -> Command {
+        let (mut x, mut dx) = self.reference.state(sample);
+        change(&mut x, &mut dx);
+        let feet = self.reference.feet[sample];
+        let time_s = self.reference.time_s[sample];
+        let command = self.controller.step(Measurement {
+            time_s,
+            x: &x,
+            dx: &dx,
+            feet,
+        });
+        assert_within_limits(&command);
+        command
+    }
+
+    fn with_feet(&mut self, sample: usize, feet: ContactFlags) -> Command {
+        let (x, dx) = self.reference.state(sample);
+        let time_s = self.reference.time_s[sample];
+        let command = self.controller.step(Measurement {
+            time_s,
+            x: &x,
+            dx: &dx,
+            feet,
+        });
+        assert_within_limits(&command);
+        command
+    }
+}
+
+#[test]
+fn measurement_that_is_not_a_number_uses_the_plan_then_holds_then_recovers() {
+    let mut bench = Bench::new(MpcSettings::default());
+    let good = bench.nominal(100);
+    let planned: Vec<f64> = bench.controller.plan().input(1).to_vec();
+    for step in 1..12 {
+        let command = bench.changed(100 + 5 * step, |x, _| x[3] = f64::NAN);
+        assert_eq!(command.status, Status::NotFinite);
+        let expected = if step < 5 {
+            Source::ShiftedPlan
+        } else {
+            Source::Hold
+        };
+        assert_eq!(command.source, expected, "step {step}");
+        if step == 1 {
+            assert_eq!(command.u_lat, planned);
+        }
+        if step >= 5 {
+            assert_eq!(command.joint_velocity_rad_s, [0.0; 12]);
+        }
+    }
+    let back = bench.nominal(160);
+    assert_eq!((back.status, back.source), (Status::Solved, Source::Plan));
+    assert_ne!(back.torque_nm, good.torque_nm);
+}
+
+#[test]
+fn hold_fades_its_torque_and_keeps_its_posture() {
+    let mut bench = Bench::new(MpcSettings::default());
+    bench.nominal(100);
+    let mut before: Option<Command> = None;
+    for step in 5..60 {
+        let command = bench.changed(100 + 5 * step, |_, dx| dx[0] = f64::INFINITY);
+        assert_eq!(command.source, Source::Hold);
+        if let Some(before) = before {
+            assert_eq!(command.joint_position_rad, before.joint_position_rad);
+            for (now, before) in command.torque_nm.iter().zip(before.torque_nm) {
+                assert!(now.abs() <= before.abs(), "{now} after {before}");
+            }
+        }
+        before = Some(command);
+    }
+    let last = before.expect("steps were made");
+    assert!(
+        last.torque_nm.iter().all(|torque| torque.abs() < 1e-3),
+        "{:?}",
+        last.torque_nm
+    );
+}
+
+#[test]
+fn hold_damps_measured_joint_velocities_without_piling_up() {
+    let settings = MpcSettings {
+        qp: QpSettings {
+            max_iterations: 1,
+            ..QpSettings::default()
+        },
+        fallback: FallbackSettings {
+            damping_nm_s: 2.0,
+            ..FallbackSettings::default()
+        },
+        ..MpcSettings::default()
+    };
+    let mut bench = Bench::new(settings);
+    for step in 0..30 {
+        let command = bench.changed(5 * step, |_, dx| dx[1] = 0.5);
+        assert_eq!(
+            (command.status, command.source),
+            (Status::IterationCap, Source::Hold)
+        );
+        assert!(
+            (command.torque_nm[1] + 1.0).abs() < 1e-12,
+            "{}",
+            command.torque_nm[1]
+        );
+        assert_eq!(command.iterations, 1);
+    }
+}
+
+#[test]
+fn time_that_is_not_a_number_is_refused_and_the_next_step_is_solved() {
+    let mut bench = Bench::new(MpcSettings::default());
+    bench.nominal(100);
+    let (x, dx) = bench.reference.state(105);
+    let command = bench.controller.step(Measurement {
+        time_s: f64::NAN,
+        x: &x,
+        dx: &dx,
+        feet: [true; 4],
+    });
+    assert_eq!(
+        (command.status, command.source),
+        (Status::NotFinite, Source::ShiftedPlan)
+    );
+    assert_eq!(bench.nominal(110).status, Status::Solved);
+}
+
+#[test]
+fn wrong_dimension_is_refused_and_the_next_step_is_solved() {
+    let mut bench = Bench::new(MpcSettings::default());
+    bench.nominal(100);
+    let (x, dx) = bench.reference.state(105);
+    for (x, dx) in [(&x[..17], &dx[..]), (&x[..], &dx[..0])] {
+        let command = bench.controller.step(Measurement {
+            time_s: 0.21,
+            x,
+            dx,
+            feet: [true; 4],
+        });
+        assert_eq!(
+            (command.status, command.source),
+            (Status::WrongDimension, Source::ShiftedPlan)
+        );
+        assert_within_limits(&command);
+    }
+    assert_eq!(bench.nominal(110).status, Status::Solved);
+}
+
+#[test]
+fn without_a_reference_the_joints_are_damped_and_nothing_else() {
+    let mut controller =
+        Controller::new(&model(Equations::Linear), MpcSettings::default()).expect("complete");
+    let mut dx = [0.0; 18];
+    dx[4] = 3.0;
+    let command = controller.step(Measurement {
+        time_s: 0.0,
+        x: &[0.0; 18],
+        dx: &dx,
+        feet: [true; 4],
+    });
+    assert_eq!(
+        (command.status, command.source),
+        (Status::NoReference, Source::Hold)
+    );
+    assert_eq!(command.torque_nm[4], -3.0);
+    assert_within_limits(&command);
+}
+
+#[test]
+fn jump_of_the_measurement_is_disbelieved_for_a_while_and_then_believed() {
+    let mut bench = Bench::new(MpcSettings::default());
+    bench.nominal(100);
+    for step in 1..=3 {
+        let command = bench.changed(100 + 5 * step, |x, _| x[12] += 5.0);
+        assert_eq!(
+            (command.status, command.source),
+            (Status::MeasurementJump, Source::ShiftedPlan)
+        );
+    }
+    let believed = bench.changed(120, |x, _| x[12] += 5.0);
+    assert!(believed.status.has_plan(), "{:?}", believed.status);
+    // And back again, the other way round.
+    let mut statuses = Vec::new();
+    for step in 0..6 {
+        statuses.push(bench.nominal(125 + 5 * step).status);
+    }
+    assert_eq!(statuses[0], Status::MeasurementJump);
+    assert!(
+        statuses[4].has_plan() && statuses[5].has_plan(),
+        "{statuses:?}"
+    );
+}
+
+#[test]
+fn single_outlier_costs_one_step() {
+    let mut bench = Bench::new(MpcSettings::default());
+    bench.nominal(100);
+    assert_eq!(
+        bench.changed(105, |x, _| x[14] -= 3.0).status,
+        Status::MeasurementJump
+    );
+    assert_eq!(bench.nominal(110).status, Status::Solved);
+}
+
+#[test]
+fn contradicting_constraints_are_infeasible_and_solved_again_when_they_agree() {
+    // Touchdown before schedule: the inputs of the flight, where friction is free, are outside the
+    // cone of the contact, and the rate is too small to bring them into it.
+    let settings = MpcSettings {
+        torque_rate_nm_s: Some(5.0),
+        body_friction: Some(0.3),
+        horizon: 5,
+        ..MpcSettings::default()
+    };
+    let mut bench = Bench::new(settings);
+    for sample in (205..235).step_by(5) {
+        assert_eq!(bench.nominal(sample).status, Status::Solved);
+    }
+    let early = bench.with_feet(235, [true; 4]);
+    assert_eq!(
+        (early.status, early.source),
+        (Status::Infeasible, Source::ShiftedPlan)
+    );
+    assert_eq!(bench.nominal(240).status, Status::Solved);
+}
+
+#[test]
+fn touchdown_before_schedule_is_planned_in_contact_at_once() {
+    let mut bench = Bench::new(MpcSettings::default());
+    bench.nominal(230);
+    let early = bench.with_feet(235, [true; 4]);
+    assert_eq!((early.status, early.phase), (Status::ContactEarly, Some(0)));
+    let on_time = bench.nominal(250);
+    assert_eq!((on_time.status, on_time.phase), (Status::Solved, Some(0)));
+}
+
+#[test]
+fn takeoff_after_schedule_is_planned_in_contact_for_one_more_stage() {
+    let mut bench = Bench::new(MpcSettings::default());
+    bench.nominal(195);
+    let late = bench.with_feet(205, [true, true, false, false]);
+    assert_eq!((late.status, late.phase), (Status::ContactLate, Some(0)));
+    let on_time = bench.nominal(210);
+    assert_eq!((on_time.status, on_time.phase), (Status::Solved, Some(1)));
+}
+
+#[test]
+fn flight_that_the_reference_is_not_near_is_told() {
+    let mut bench = Bench::new(MpcSettings::default());
+    let unknown = bench.with_feet(0, [false; 4]);
+    assert_eq!(
+        (unknown.status, unknown.phase),
+        (Status::ContactUnknown, Some(1))
+    );
+    assert_eq!(bench.nominal(5).status, Status::Solved);
+}
+
+#[test]
+fn posture_outside_the_joint_limits_softens_the_plan() {
+    let mut bench = Bench::new(MpcSettings::default());
+    let pseudo_knee = |x: &mut [f64; 18]| (0..4).for_each(|leg| x[3 * leg + 2] += 6.0);
+    let command = bench.changed(100, |x, _| pseudo_knee(x));
+    assert_eq!(command.status, Status::Softened);
+    assert!(command.slack > 1e-3);
+    bench.controller.reset();
+    let back = bench.nominal(105);
+    assert_eq!((back.status, back.slack < 1e-4), (Status::Solved, true));
+}
+
+#[test]
+fn huge_reference_never_leaves_the_limits_and_a_sane_one_is_followed_again() {
+    for size in [1e3, 1e9, 1e30, 1e160] {
+        let mut bench = Bench::new(MpcSettings::default());
+        let mut huge = trajectory(&model(Equations::Nonlinear));
+        huge.x.iter_mut().for_each(|value| *value *= size);
+        huge.dx.iter_mut().for_each(|value| *value *= size);
+        huge.u.iter_mut().for_each(|value| *value *= size);
+        bench
+            .controller
+            .set_reference(huge.samples())
+            .expect("finite");
+        for sample in (0..100).step_by(5) {
+            bench.nominal(sample);
+        }
+        let sane = trajectory(&model(Equations::Nonlinear));
+        bench
+            .controller
+            .set_reference(sane.samples())
+            .expect("sound");
+        assert_eq!(
+            bench.nominal(100).status,
+            Status::Solved,
+            "after a reference times {size}"
+        );
+    }
+}
+
+#[test]
+fn stretched_leg_in_contact_fails_the_consistent_lift_only_as_long_as_it_is_stretched() {
+    let believing = FallbackSettings {
+        jump_deviations: 1e9,
+        ..FallbackSettings::default()
+    };
+    let mut bench = Bench::new(MpcSettings {
+        lift: Lift::Consistent,
+        fallback: believing,
+        ..MpcSettings::default()
+    });
+    assert_eq!(bench.nominal(100).status, Status::Solved);
+    let stretched = bench.changed(105, |x, _| x[5] = 0.0);
+    assert_eq!(
+        (stretched.status, stretched.source),
+        (Status::LiftFailed, Source::Hold)
+    );
+    assert_eq!(bench.nominal(110).status, Status::Solved);
+}
+
+#[test]
+fn torques_stay_within_limits_under_any_measurement() {
+    let mut random = Random::new(77);
+    for lift in [Lift::Transpose, Lift::Consistent] {
+        let mut bench = Bench::new(MpcSettings {
+            lift,
+            ..MpcSettings::default()
+        });
+        let mut plans = 0;
+        for step in 0..400 {
+            let sample = 5 * (step % 60);
+            let size = 10f64.powf(5.0 * random.signed());
+            let (mut x, mut dx) = bench.reference.state(sample);
+            for value in x.iter_mut().chain(&mut dx) {
+                *value += size * random.normal();
+            }
+            if step % 17 == 0 {
+                x[step % 18] = f64::NAN;
+            }
+            let feet = std::array::from_fn(|_| random.signed() > 0.0);
+            let time_s = bench.reference.time_s[sample] + 1e-3 * random.signed();
+            let command = bench.controller.step(Measurement {
+                time_s,
+                x: &x,
+                dx: &dx,
+                feet,
+            });
+            assert_within_limits(&command);
+            assert!(command.torque_nm.iter().all(|torque| torque.is_finite()));
+            plans += usize::from(command.status.has_plan());
+        }
+        assert!(plans > 50, "{plans} plans with {lift:?}");
+    }
+}
+
+#[test]
+fn every_status_has_its_own_word_and_code() {
+    let all = [
+        Status::Solved,
+        Status::Softened,
+        Status::ContactEarly,
+        Status::ContactLate,
+        Status::ContactUnknown,
+        Status::Inaccurate,
+        Status::Infeasible,
+        Status::IterationCap,
+        Status::NumericalFailure,
+        Status::MeasurementJump,
+        Status::LiftFailed,
+        Status::NotFinite,
+        Status::WrongDimension,
+        Status::NoReference,
+    ];
+    for (index, status) in all.iter().enumerate() {
+        for other in &all[..index] {
+            assert_ne!(status.code(), other.code());
+            assert_ne!(status.word(), other.word());
+        }
+    }
+    assert_eq!(Status::Solved.code(), 0);
+}

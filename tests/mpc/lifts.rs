@@ -1,0 +1,227 @@
+//! Latent inputs to torques and back.
+
+use nalgebra::{DMatrix, DVector, SVector, Vector3};
+use romc::model::{InputStatistics, ReducedModel};
+use romc::mpc::{ConsistentLift, Footing, LiftFailure, MpcSettings, Plant};
+use romc::robot::{Leg, Robot};
+
+use crate::random::Random;
+use crate::synthetic::{D, Equations, STAND, model, model_with};
+
+const FOOTING: Footing = Footing {
+    joints_rad: [
+        0.0, 0.8, -1.6, 0.0, 0.8, -1.6, 0.0, 0.8, -1.6, 0.0, 0.8, -1.6,
+    ],
+    attitude_rad: [0.0, 0.0],
+    feet: [true; 4],
+    phase: 0,
+};
+
+fn go1() -> &'static Robot {
+    Robot::by_name("go1").expect("known robot")
+}
+
+/// Torques with which the standing legs push the body with these forces, N.
+fn torque_for(forces: [Vector3<f64>; 4]) -> [f64; 12] {
+    let mut torque = [0.0; 12];
+    for leg in Leg::ALL {
+        let map = go1()
+            .foot_force_map(leg, &[0.0, 0.8, -1.6])
+            .expect("bent legs");
+        let leg_torque = map.try_inverse().expect("bent legs") * forces[leg.index()];
+        torque[3 * leg.index()..][..3].copy_from_slice(leg_torque.as_slice());
+    }
+    torque
+}
+
+/// Weight, share of the rear legs and push forwards: three numbers make all torques.
+fn sample_torque(random: &mut Random) -> [f64; 12] {
+    let (lift, tilt, push) = (
+        30.0 + 8.0 * random.normal(),
+        4.0 * random.normal(),
+        2.0 * random.normal(),
+    );
+    torque_for([
+        Vector3::new(push, 0.0, lift - tilt),
+        Vector3::new(push, 0.0, lift - tilt),
+        Vector3::new(push, 0.0, lift + tilt),
+        Vector3::new(push, 0.0, lift + tilt),
+    ])
+}
+
+fn with_wrench(torque: &[f64; 12]) -> DVector<f64> {
+    let wrench = go1()
+        .body_wrench(&FOOTING.joints_rad, torque, FOOTING.feet)
+        .expect("bent legs");
+    DVector::from_iterator(18, torque.iter().chain(wrench.iter()).copied())
+}
+
+/// The synthetic model with the statistics of [`sample_torque`].
+fn informed_model() -> ReducedModel {
+    let mut random = Random::new(4);
+    let count = 500;
+    let samples: Vec<DVector<f64>> = (0..count)
+        .map(|_| with_wrench(&sample_torque(&mut random)))
+        .collect();
+    let mean = samples.iter().sum::<DVector<f64>>() / count as f64;
+    let covariance = samples
+        .iter()
+        .map(|u| (u - &mean) * (u - &mean).transpose())
+        .sum::<DMatrix<f64>>()
+        / count as f64;
+    // Products of sums round differently on both sides of the diagonal.
+    let covariance = 0.5 * (&covariance + covariance.transpose());
+    model_with(Equations::Linear, InputStatistics { mean, covariance })
+}
+
+fn projected(plant: &Plant, torque: &[f64; 12]) -> [f64; D] {
+    let mut u_lat = [0.0; D];
+    plant.project(with_wrench(torque).as_slice(), &mut u_lat);
+    u_lat
+}
+
+#[test]
+fn projecting_a_lifted_input_returns_it() {
+    let plant = Plant::new(&model(Equations::Linear)).expect("complete");
+    let mut random = Random::new(9);
+    for _ in 0..50 {
+        let u_lat: [f64; D] = std::array::from_fn(|_| random.normal());
+        let mut back = [0.0; D];
+        plant.project(&plant.lift(&u_lat), &mut back);
+        for (found, expected) in back.iter().zip(u_lat) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
+    }
+}
+
+#[test]
+fn consistent_lift_recovers_torques_that_obey_the_ground() {
+    let plant = Plant::new(&informed_model()).expect("complete");
+    let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
+    let mut random = Random::new(31);
+    let (mut error, mut size) = (0.0, 0.0);
+    let mean = plant.phases()[0].torque_mean;
+    for _ in 0..200 {
+        let torque = sample_torque(&mut random);
+        let found = lift
+            .lift(&plant, &projected(&plant, &torque), &FOOTING)
+            .expect("bent legs");
+        for joint in 0..12 {
+            error += (found[joint] - torque[joint]).powi(2);
+            size += (torque[joint] - mean[joint]).powi(2);
+        }
+    }
+    let r2 = 1.0 - error / size;
+    assert!(r2 > 0.98, "R² {r2}");
+}
+
+fn cone_violation(torque: &[f64; 12], friction: f64) -> f64 {
+    let mut worst = f64::NEG_INFINITY;
+    for leg in Leg::ALL {
+        let leg_torque = leg.of_joints(torque);
+        let force = go1()
+            .foot_force(leg, &leg.of_joints(&FOOTING.joints_rad), &leg_torque)
+            .expect("bent legs");
+        worst = worst.max(force.x.hypot(force.y) - friction * force.z);
+    }
+    worst
+}
+
+/// The cost of the lift as its documentation states it.
+fn cost(plant: &Plant, torque: &[f64; 12], u_lat: &[f64; D], weight: f64) -> f64 {
+    let reached = projected(plant, torque);
+    let phase = &plant.phases()[0];
+    let off = SVector::<f64, 12>::from(*torque) - phase.torque_mean;
+    let miss: f64 = reached
+        .iter()
+        .zip(u_lat)
+        .map(|(a, b)| (a - b).powi(2))
+        .sum();
+    miss + weight * (off.transpose() * phase.torque_precision * off)[0]
+}
+
+#[test]
+fn consistent_lift_of_a_slipping_push_stays_in_the_cones_and_nothing_near_is_better() {
+    let plant = Plant::new(&informed_model()).expect("complete");
+    let settings = MpcSettings {
+        foot_friction: 0.5,
+        ..MpcSettings::default()
+    };
+    let mut lift = ConsistentLift::new(&plant, &settings).expect("a sound program");
+    let mut random = Random::new(14);
+    let push = Vector3::new(45.0, 0.0, 30.0);
+    let wanted = projected(&plant, &torque_for([push; 4]));
+    let found = lift.lift(&plant, &wanted, &FOOTING).expect("bent legs");
+    assert!(lift.iterations() > 0, "no constraint was active");
+    let violation = cone_violation(&found, 0.5);
+    assert!(
+        violation.abs() < 0.02,
+        "an active cone is {violation} N away"
+    );
+    let best = cost(&plant, &found, &wanted, settings.lift_prior_weight);
+    let mut tried = 0;
+    for _ in 0..20_000 {
+        let size = 10f64.powf(2.0 * random.signed() - 2.0);
+        let near = found.map(|torque| torque + size * random.normal());
+        let within = near
+            .iter()
+            .zip(go1().torque_limit_nm())
+            .all(|(torque, limit)| torque.abs() <= *limit);
+        if within && cone_violation(&near, 0.5) <= 0.0 {
+            tried += 1;
+            let other = cost(&plant, &near, &wanted, settings.lift_prior_weight);
+            assert!(other > best * (1.0 - 3e-4), "{other} is better than {best}");
+        }
+    }
+    assert!(tried > 100, "only {tried} neighbours are feasible");
+}
+
+#[test]
+fn consistent_lift_of_a_giant_input_stays_within_the_torque_limits() {
+    let plant = Plant::new(&informed_model()).expect("complete");
+    let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
+    let wanted = projected(&plant, &torque_for([Vector3::new(0.0, 0.0, 900.0); 4]));
+    let found = lift.lift(&plant, &wanted, &FOOTING).expect("bent legs");
+    let shares = found
+        .iter()
+        .zip(go1().torque_limit_nm())
+        .map(|(torque, limit)| torque.abs() / limit);
+    let largest = shares.fold(0.0, f64::max);
+    assert!(
+        (0.999..=1.0).contains(&largest),
+        "largest share of a limit is {largest}"
+    );
+    assert!(cone_violation(&found, 0.6) < 0.05);
+}
+
+#[test]
+fn feet_in_the_air_have_no_cone() {
+    let plant = Plant::new(&informed_model()).expect("complete");
+    let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
+    let wanted = projected(&plant, &torque_for([Vector3::new(8.0, 0.0, -6.0); 4]));
+    let flying = Footing {
+        feet: [false; 4],
+        phase: 1,
+        ..FOOTING
+    };
+    let found = lift
+        .lift(&plant, &wanted, &flying)
+        .expect("nothing to be singular");
+    assert_eq!(lift.iterations(), 0);
+    assert!(cone_violation(&found, 0.6) > 1.0);
+}
+
+#[test]
+fn stretched_leg_is_a_failure_in_contact_only() {
+    let plant = Plant::new(&informed_model()).expect("complete");
+    let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
+    let mut stretched = FOOTING;
+    stretched.joints_rad[5] = 0.0;
+    assert_eq!(
+        lift.lift(&plant, &[0.1; D], &stretched),
+        Err(LiftFailure::SingularLeg)
+    );
+    stretched.feet[1] = false;
+    assert!(lift.lift(&plant, &[0.1; D], &stretched).is_ok());
+    assert_eq!(STAND[..12], FOOTING.joints_rad);
+}

@@ -1,0 +1,154 @@
+//! The controller along recordings.
+
+use std::path::Path;
+
+use nalgebra::DMatrix;
+use romc::mpc::{
+    Controller, Lift, MpcSettings, ReferenceInput, Source, along_recording, lift_comparison,
+};
+use romc::recording::{Recording, Segment};
+
+use crate::synthetic::{Equations, Trajectory, model, trajectory};
+
+fn recording(trajectory: &Trajectory) -> Recording {
+    let count = trajectory.time_s.len();
+    let input = DMatrix::from_column_slice(18, count, &trajectory.u);
+    let segment = Segment {
+        path: "synthetic.csv".into(),
+        first_row: 2,
+        row_stride: 1.0,
+        time_s: trajectory.time_s.clone(),
+        x: DMatrix::from_column_slice(18, count, &trajectory.x),
+        dx: DMatrix::from_column_slice(18, count, &trajectory.dx),
+        ddx: DMatrix::zeros(18, count),
+        torque_nm: input.rows(0, 12).into_owned(),
+        feet: trajectory.feet.clone(),
+        body_wrench: Some(input.rows(12, 6).into_owned()),
+    };
+    Recording {
+        path: "synthetic.csv".into(),
+        segments: vec![segment.slice(0..150), segment],
+        ignored_columns: vec![],
+    }
+}
+
+#[test]
+fn run_along_a_recording_that_the_model_follows_finds_its_torques() {
+    let model = model(Equations::Nonlinear);
+    let recording = recording(&trajectory(&model));
+    let mut controller = Controller::new(&model, MpcSettings::default()).expect("complete");
+    let mut told = Vec::new();
+    let run = along_recording(
+        &mut controller,
+        &recording,
+        ReferenceInput::Recorded,
+        |done, total| {
+            told.push((done, total));
+        },
+    )
+    .expect("a sound recording");
+    // Two segments of 0.298 s and 0.8 s: commands whose 10 ms end inside.
+    assert_eq!(run.rows.len(), 29 + 80);
+    assert_eq!(told.last(), Some(&(109, 109)));
+    assert_eq!(run.rows.iter().filter(|row| row.segment == 0).count(), 29);
+    let summary = &run.summary;
+    assert_eq!(
+        (summary.steps, summary.solved, summary.failed),
+        (109, 109, 0)
+    );
+    assert_eq!(
+        (
+            summary.limit_violations,
+            summary.friction_violations,
+            summary.implausible
+        ),
+        (0, None, 0)
+    );
+    assert!(
+        summary.torque_r2.contact.expect("contact") > 0.99,
+        "{summary:?}"
+    );
+    assert!(
+        summary.torque_r2.flight.expect("flight") > 0.9,
+        "{summary:?}"
+    );
+    assert!(summary.tracking_rms.expect("plans") < 0.05, "{summary:?}");
+    assert!(summary.step_us.p50 > 0.0 && summary.step_us.p50 <= summary.step_us.max);
+    for row in &run.rows {
+        assert_eq!(row.source, Source::Plan);
+        for joint in 0..12 {
+            assert!((row.input[joint] - row.torque_nm[joint]).abs() < 1e-9);
+        }
+        for (z, reference) in row.z.iter().zip(&row.z_reference) {
+            assert!((z - reference).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn torques_of_no_robot_are_left_out_and_counted() {
+    let model = model(Equations::Nonlinear);
+    let mut recording = recording(&trajectory(&model));
+    recording.segments.remove(0);
+    let mut controller = Controller::new(&model, MpcSettings::default()).expect("complete");
+    recording.segments[0].torque_nm[(2, 203)] = -2.7e5;
+    let run = along_recording(
+        &mut controller,
+        &recording,
+        ReferenceInput::Recorded,
+        |_, _| {},
+    )
+    .expect("a sound recording");
+    assert_eq!(
+        (run.summary.implausible, run.summary.limit_violations),
+        (1, 0)
+    );
+    assert!(
+        run.summary.torque_r2.contact.expect("contact") > 0.98,
+        "{:?}",
+        run.summary
+    );
+}
+
+#[test]
+fn lift_comparison_of_inputs_in_the_encoders_range_is_exact() {
+    let model = model(Equations::Nonlinear);
+    let recording = recording(&trajectory(&model));
+    let mut controller = Controller::new(&model, MpcSettings::default()).expect("complete");
+    let r2 = lift_comparison(&mut controller, &recording)
+        .expect("a sound recording")
+        .r2();
+    assert!(r2.contact.expect("contact") > 1.0 - 1e-9);
+    assert!(r2.flight.expect("flight") > 1.0 - 1e-9);
+}
+
+#[test]
+fn hardware_jump_gets_torques_within_the_limits_with_either_lift() {
+    let path = Path::new("../shared/data/go1_hardware_jump.csv");
+    if !path.exists() {
+        eprintln!("no hardware jump here");
+        return;
+    }
+    let recording = romc::recording::read(path).expect("the file is sound");
+    for lift in [Lift::Transpose, Lift::Consistent] {
+        let settings = MpcSettings {
+            lift,
+            ..MpcSettings::default()
+        };
+        let mut controller =
+            Controller::new(&model(Equations::Nonlinear), settings).expect("complete");
+        let run = along_recording(&mut controller, &recording, ReferenceInput::None, |_, _| {})
+            .expect("a sound recording");
+        assert!(run.summary.steps > 100);
+        assert_eq!(run.summary.limit_violations, 0);
+        assert!(
+            run.summary.failed * 10 < run.summary.steps,
+            "{:?}",
+            run.summary
+        );
+        match lift {
+            Lift::Transpose => assert_eq!(run.summary.friction_violations, None),
+            Lift::Consistent => assert_eq!(run.summary.friction_violations, Some(0)),
+        }
+    }
+}
