@@ -293,6 +293,28 @@ fn rounding_to_zero_is_told_with_the_term() {
 }
 
 #[test]
+fn coefficient_of_one_is_left_out_only_when_it_is_exactly_one() {
+    for (coefficient, expected) in [(1.0, "z_1"), (1.0000001, "1.00z_1"), (-1.0, "-z_1")] {
+        let library = Library::from_terms(1, &["z1".into()]).unwrap();
+        let model = ReducedModel::builder("one", library)
+            .phase(Phase {
+                name: "contact".into(),
+                feet: FeetRule::Any,
+                xi: DMatrix::from_element(1, 1, coefficient),
+            })
+            .build()
+            .unwrap();
+        let options = LatexOptions {
+            rounding: Rounding::Significant(3),
+            ..LatexOptions::default()
+        };
+        let text = equations(&latex::emit(&model, &options).unwrap(), "one.tex");
+        let expected = format!("\\ddot{{z}}_1 = {expected}\n");
+        assert!(text.contains(&expected), "{text}");
+    }
+}
+
+#[test]
 fn hostile_description_reaches_the_document_only_escaped() {
     let library = Library::from_terms(1, &["z1".into()]).unwrap();
     let hostile = r"100% \input{/etc/passwd} $x$ ^^5cinput #1 ~ a_b & c}";

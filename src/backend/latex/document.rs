@@ -46,6 +46,7 @@ pub fn emit(model: &ReducedModel, options: &LatexOptions) -> Result<Vec<EmittedF
         name: TexText(model.name()).to_string(),
         description: TexText(model.description()).to_string(),
         stem: stem.to_owned(),
+        phases: equations.systems.iter().map(System::sentence).collect(),
         rounding: TexText(&words::rounding(options.rounding, &typeset.rounding)).to_string(),
         siunitx: options.numbers == NumberStyle::Siunitx,
     };
@@ -75,6 +76,19 @@ struct System {
     label: String,
     aligned: bool,
     lines: Vec<String>,
+}
+
+impl System {
+    /// Which equation belongs to the phase and when it holds.
+    fn sentence(&self) -> String {
+        let label = &self.label;
+        let number = if self.aligned {
+            format!(r"Equations \eqref{{{label}:1}} and on")
+        } else {
+            format!(r"Equation \eqref{{{label}}}")
+        };
+        format!("{number}: {}, {}.", TexText(&self.phase), self.feet)
+    }
 }
 
 #[derive(Template)]
@@ -110,6 +124,7 @@ struct Preview {
     name: String,
     description: String,
     stem: String,
+    phases: Vec<String>,
     rounding: String,
     siunitx: bool,
 }

@@ -17,7 +17,13 @@ pub struct TexText<'a>(pub &'a str);
 
 impl fmt::Display for TexText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut previous = ' ';
         for character in self.0.chars() {
+            // Two of these in a row are a ligature.
+            if character == previous && "-,".contains(character) {
+                f.write_str("{}")?;
+            }
+            previous = character;
             match escaped(character) {
                 Some(text) => f.write_str(text)?,
                 None if is_plain(character) => write!(f, "{character}")?,
@@ -63,7 +69,6 @@ fn escaped(character: char) -> Option<&'static str> {
         '"' => r"\textquotedbl{}",
         '\'' => r"\textquotesingle{}",
         '`' => r"\textasciigrave{}",
-        '-' => r"-{}",
         '\u{2013}' => r"\textendash{}",
         '\u{2014}' => r"\textemdash{}",
         '\u{2018}' => r"\textquoteleft{}",
@@ -88,7 +93,7 @@ fn escaped(character: char) -> Option<&'static str> {
 /// default fonts of pdfTeX carry.
 fn is_plain(character: char) -> bool {
     character.is_ascii_alphanumeric()
-        || "!()*+,./:;=?@[] ".contains(character)
+        || "!()*+,-./:;=?@[] ".contains(character)
         || "ÀÁÂÃÄÅÆÇÈÉÊËÌÍÎÏÑÒÓÔÕÖØÙÚÛÜÝßàáâãäåæçèéêëìíîïñòóôõöøùúûüýÿČčĎďĚěŇňŘřŠšŤťŮůŽžŁłŃńŚśŹźŻżŐőŰű"
             .contains(character)
 }
@@ -157,7 +162,7 @@ mod tests {
 
     #[test]
     fn text_escape_breaks_ligatures() {
-        assert_eq!(TexText("a--b").to_string(), "a-{}-{}b");
+        assert_eq!(TexText("a--b-c").to_string(), "a-{}-b-c");
     }
 
     #[test]

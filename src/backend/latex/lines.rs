@@ -44,6 +44,7 @@ pub(super) fn block(system: &EquationSystem, label: &str, options: &LatexOptions
             sides,
             number: place + 1,
             is_last,
+            is_spaced: count > system.equations.len(),
         };
         if aligned {
             printer.align(&equation, &mut lines);
@@ -75,6 +76,8 @@ struct Row<'a> {
     sides: &'a [String],
     number: usize,
     is_last: bool,
+    /// Whether the equations of the phase stand apart, because one of them is broken.
+    is_spaced: bool,
 }
 
 impl Printer<'_> {
@@ -119,7 +122,7 @@ impl Printer<'_> {
             let is_tall = row.equation.is_tall();
             let end = match (ends_equation, row.is_last) {
                 (true, true) => "",
-                (true, false) if is_tall || row.sides.len() > 1 => r" \\[1ex]",
+                (true, false) if is_tall || row.is_spaced => r" \\[1ex]",
                 (false, _) if is_tall => r" \\[0.5ex]",
                 (_, _) => r" \\",
             };

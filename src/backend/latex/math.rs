@@ -49,9 +49,14 @@ pub struct TexNumber<'a> {
 
 impl fmt::Display for TexMath<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let inner = |math| TexMath {
-            math,
-            numbers: self.numbers,
+        let numbers = self.numbers;
+        let inner = |math| TexMath { math, numbers };
+        // Exponents are structure, not measured values: no siunitx.
+        let exponent_of = |math| {
+            script(&TexMath {
+                math,
+                numbers: NumberStyle::Plain,
+            })
         };
         match self.math {
             Math::Number(number) => TexNumber {
@@ -79,7 +84,7 @@ impl fmt::Display for TexMath<'_> {
             }
             Math::Slash(top, bottom) => write!(f, "{}/{}", inner(top), inner(bottom)),
             Math::Power(base, exponent) => {
-                write!(f, "{}^{}", inner(base), script(&inner(exponent)))
+                write!(f, "{}^{}", inner(base), exponent_of(exponent))
             }
             Math::Root(radicand, None) => write!(f, r"\sqrt{{{}}}", inner(radicand)),
             Math::Root(radicand, Some(index)) => {
@@ -88,7 +93,7 @@ impl fmt::Display for TexMath<'_> {
             Math::Function(name, power, argument) => {
                 f.write_str(function(*name))?;
                 if let Some(power) = power {
-                    write!(f, "^{}", script(&inner(power)))?;
+                    write!(f, "^{}", exponent_of(power))?;
                 }
                 delimited(f, "(", ")", &inner(argument))
             }

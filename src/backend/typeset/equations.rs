@@ -3,7 +3,7 @@
 use crate::model::{Phase, ReducedModel};
 
 use super::decimal::{Decimal, Rounding};
-use super::expression::{UnknownSymbol, expression, with_coefficient};
+use super::expression::{Leading, UnknownSymbol, expression, with_coefficient};
 use super::symbols::{Quantity, SymbolTable, Variable};
 use super::tree::{Math, Signed, Symbol};
 
@@ -61,6 +61,8 @@ pub struct Place {
 pub struct RoundingReport {
     /// Largest |printed - coefficient|, where it is not zero, and where it occurs.
     pub largest: Option<(f64, Place)>,
+    /// Largest |printed - coefficient| / |coefficient| of the terms that are printed.
+    pub largest_relative: f64,
     /// Active terms whose coefficient prints as zero, so that they are left out.
     pub dropped: Vec<Place>,
     /// How many coefficients are active in all.
@@ -169,8 +171,15 @@ impl Layout<'_> {
             if printed.is_zero() {
                 self.report.dropped.push(place());
             } else {
-                let omit_one = self.rounding.omits_one();
-                terms.push(with_coefficient(&printed, omit_one, term.clone()));
+                let relative = error / coefficient.abs();
+                self.report.largest_relative = self.report.largest_relative.max(relative);
+                // Only a true one: a rounded 1.00 says how well it is known.
+                let leading = if coefficient.abs() == 1.0 && self.rounding.omits_one() {
+                    Leading::Omitted
+                } else {
+                    Leading::Printed
+                };
+                terms.push(with_coefficient(&printed, leading, term.clone()));
             }
         }
         Equation {

@@ -30,22 +30,26 @@ pub fn expression(
 }
 
 /// Puts a coefficient before a term: `0.36` and `sin(dz1)` to `0.36 sin(dz1)`.
-/// The coefficient takes the place of a term or numerator that is one.
-pub fn with_coefficient(coefficient: &Decimal, omit_one: bool, term: Signed) -> Signed {
+/// The coefficient takes the place of a term or numerator that is one;
+/// [`Leading::Omitted`] prints its sign alone.
+pub fn with_coefficient(coefficient: &Decimal, leading: Leading, term: Signed) -> Signed {
+    let is_omitted = leading == Leading::Omitted;
     let negative = coefficient.is_negative() != term.negative;
     let number = Math::Number(coefficient.magnitude());
     let math = match term.math {
         Math::Number(one) if one.is_one() => number,
-        Math::Fraction(top, bottom) if is_one(&top) => Math::Fraction(Box::new(number), bottom),
+        Math::Fraction(top, bottom) if is_one(&top) && !is_omitted => {
+            Math::Fraction(Box::new(number), bottom)
+        }
         Math::Sum(terms) => {
             let group = Math::Group(Box::new(Math::Sum(terms)));
-            if omit_one && coefficient.is_one() {
+            if is_omitted {
                 group
             } else {
                 product(vec![number, group])
             }
         }
-        math if omit_one && coefficient.is_one() => math,
+        math if is_omitted => math,
         Math::Product(mut factors) => {
             factors.insert(0, number);
             product(factors)
@@ -53,6 +57,15 @@ pub fn with_coefficient(coefficient: &Decimal, omit_one: bool, term: Signed) -> 
         math => product(vec![number, math]),
     };
     Signed { negative, math }
+}
+
+/// Whether a coefficient stands before its term.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Leading {
+    /// It is printed.
+    Printed,
+    /// It is one and left out.
+    Omitted,
 }
 
 struct Layout<'a> {

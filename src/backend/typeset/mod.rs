@@ -18,7 +18,7 @@ pub use decimal::{Decimal, Rounding};
 pub use equations::{
     CoefficientRow, CoefficientTable, Equation, EquationSystem, Place, RoundingReport, Typeset,
 };
-pub use expression::{UnknownSymbol, expression, with_coefficient};
+pub use expression::{Leading, UnknownSymbol, expression, with_coefficient};
 pub use symbols::{Quantity, RenameError, SymbolTable, Variable};
 pub use tree::{FunctionName, GREEK, Glyph, Math, Signed, Symbol};
 pub use width::{EQUALS, OPERATOR, break_lines, sum_width, symbol_width, width};

@@ -51,12 +51,13 @@ pub fn rounding(rule: Rounding, report: &RoundingReport) -> String {
     let error = match &report.largest {
         None => "No coefficient is changed by rounding.".to_owned(),
         Some((error, place)) => format!(
-            "The largest rounding error is {} ({}, {}: {} * {}).",
+            "The largest rounding error is {} ({}, {}: {} * {}), the largest relative one {}.",
             at_most(*error),
             place.phase,
             place.output,
             place.coefficient,
-            place.term
+            place.term,
+            at_most(report.largest_relative)
         ),
     };
     let dropped = match report.dropped.len() {

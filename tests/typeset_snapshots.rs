@@ -1,0 +1,82 @@
+//! The emitted LaTeX, Markdown and MathML of the shipped models, as text.
+
+use std::path::Path;
+
+use romc::artifact;
+use romc::backend::latex::{self, LatexOptions, NumberStyle};
+use romc::backend::markdown::{self, MarkdownOptions};
+use romc::backend::mathml::{self, MathmlOptions};
+use romc::backend::typeset::{Rounding, SymbolTable};
+use romc::model::ReducedModel;
+
+fn model(path: &str) -> ReducedModel {
+    artifact::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
+}
+
+/// Version numbers change without the layout changing.
+fn without_version(text: &str) -> String {
+    text.replace(concat!("romc ", env!("CARGO_PKG_VERSION")), "romc VERSION")
+}
+
+#[test]
+fn latex_of_the_paper_model_is_stable() {
+    for file in latex::emit(&model("models/paper-2d.json"), &LatexOptions::default()).unwrap() {
+        insta::assert_snapshot!(
+            format!("latex__{}", file.path),
+            without_version(&file.contents)
+        );
+    }
+}
+
+#[test]
+fn latex_of_a_model_with_robot_is_stable() {
+    let model = model("tests/fixtures/models/robot-degree-2.json");
+    let options = LatexOptions {
+        rounding: Rounding::Significant(3),
+        numbers: NumberStyle::Siunitx,
+        width_em: 22.0,
+        symbols: SymbolTable::parse(&["z1=x", "z2=theta", "u1=F_x"], 3).unwrap(),
+        digest: Some("0123456789abcdef".to_owned()),
+        ..LatexOptions::default()
+    };
+    for file in latex::emit(&model, &options).unwrap() {
+        insta::assert_snapshot!(
+            format!("latex__{}", file.path),
+            without_version(&file.contents)
+        );
+    }
+}
+
+#[test]
+fn latex_of_every_function_is_stable() {
+    let model = model("tests/fixtures/models/every-function.json");
+    let files = latex::emit(&model, &LatexOptions::default()).unwrap();
+    insta::assert_snapshot!(
+        "latex__every_function.tex",
+        without_version(&files[0].contents)
+    );
+}
+
+#[test]
+fn markdown_is_stable() {
+    for name in [
+        "models/paper-2d.json",
+        "tests/fixtures/models/every-function.json",
+    ] {
+        let files = markdown::emit(&model(name), &MarkdownOptions::default()).unwrap();
+        let name = format!("markdown__{}", files[0].path);
+        insta::assert_snapshot!(name, without_version(&files[0].contents));
+    }
+}
+
+#[test]
+fn mathml_is_stable() {
+    for name in [
+        "models/paper-2d.json",
+        "tests/fixtures/models/every-function.json",
+    ] {
+        let files = mathml::emit(&model(name), &MathmlOptions::default()).unwrap();
+        let name = format!("mathml__{}", files[0].path);
+        insta::assert_snapshot!(name, without_version(&files[0].contents));
+    }
+}
