@@ -1,9 +1,32 @@
 //! From programs and equations to text: C, Rust, LaTeX, Markdown, MathML.
+//!
+//! A model enters [`emit`]; files in memory leave, which [`write_files`] puts into a folder.
+//! `entries` lists what is generated, `translate` turns programs into the statements of
+//! `code`, `printer` prints them with what a `dialect` spells, templates place them.
+//! Backends decide nothing mathematical. Read `emit` first.
 
+mod c;
+mod code;
+mod dialect;
+mod emit;
+mod entries;
+mod folder;
+mod functions;
+mod ident;
+mod kernel;
 pub mod latex;
+mod literal;
 pub mod markdown;
 pub mod mathml;
+mod printer;
+mod rust;
 mod target;
+mod translate;
 pub mod typeset;
+mod usage;
+mod vectors;
+mod wrap;
 
+pub use emit::{EmitOptions, Target, emit};
+pub use folder::{FolderError, Overwrite, write_files};
 pub use target::{EmitError, EmittedFile};

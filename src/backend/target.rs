@@ -1,6 +1,7 @@
 //! What backends have in common: the files they make and how they fail.
 
 use super::typeset::UnknownSymbol;
+use crate::lower::LowerError;
 
 /// A file that a backend made, not yet on disk.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,6 +28,17 @@ pub enum EmitError {
     /// A variable has no symbol in print.
     #[error(transparent)]
     Symbol(#[from] UnknownSymbol),
+    /// The model cannot be lowered.
+    #[error(transparent)]
+    Lower(#[from] LowerError),
+    /// There is no such target.
+    #[error("target `{found}`: expected one of {expected}")]
+    UnknownTarget {
+        /// The name given.
+        found: String,
+        /// The names that there are.
+        expected: String,
+    },
     /// A template failed to render.
     #[error("a template failed")]
     Template(#[from] askama::Error),

@@ -1,0 +1,255 @@
+//! How C99 spells statements.
+
+use crate::backend::code::{Argument, ConstTable, Function, MathFunction, Parameter, Role, Span};
+use crate::backend::dialect::Dialect;
+use crate::backend::literal::Literal;
+use crate::backend::wrap::{braced, comment_lines};
+
+/// C99 with the names of one model.
+#[derive(Clone, Debug)]
+pub struct CDialect {
+    /// Identifier of the model, the beginning of all external and helper names.
+    pub name: String,
+}
+
+/// Keywords of C and C++, and the library names that generated files use.
+const RESERVED: [&str; 107] = [
+    "auto",
+    "break",
+    "case",
+    "char",
+    "const",
+    "continue",
+    "default",
+    "do",
+    "double",
+    "else",
+    "enum",
+    "extern",
+    "float",
+    "for",
+    "goto",
+    "if",
+    "inline",
+    "int",
+    "long",
+    "register",
+    "restrict",
+    "return",
+    "short",
+    "signed",
+    "sizeof",
+    "static",
+    "struct",
+    "switch",
+    "typedef",
+    "union",
+    "unsigned",
+    "void",
+    "volatile",
+    "while",
+    "bool",
+    "true",
+    "false",
+    "catch",
+    "class",
+    "delete",
+    "explicit",
+    "export",
+    "friend",
+    "mutable",
+    "namespace",
+    "new",
+    "noexcept",
+    "nullptr",
+    "operator",
+    "private",
+    "protected",
+    "public",
+    "template",
+    "this",
+    "throw",
+    "try",
+    "typeid",
+    "typename",
+    "using",
+    "virtual",
+    "and",
+    "or",
+    "not",
+    "xor",
+    "main",
+    "sin",
+    "cos",
+    "tan",
+    "tanh",
+    "exp",
+    "log",
+    "sqrt",
+    "fabs",
+    "memcpy",
+    "size_t",
+    "uint64_t",
+    "y0",
+    "y1",
+    "yn",
+    "j0",
+    "j1",
+    "jn",
+    "gamma",
+    "signgam",
+    "abs",
+    "asm",
+    "typeof",
+    "constexpr",
+    "concept",
+    "requires",
+    "import",
+    "module",
+    "alignas",
+    "alignof",
+    "static_assert",
+    "thread_local",
+    "decltype",
+    "div",
+    "index",
+    "time",
+    "erf",
+    "I",
+    "NULL",
+    "errno",
+    "stdin",
+    "stdout",
+    "stderr",
+];
+
+impl Dialect for CDialect {
+    fn reserved(&self) -> &'static [&'static str] {
+        &RESERVED
+    }
+
+    fn apply(&self, function: MathFunction, argument: &str) -> String {
+        match function {
+            MathFunction::Sqrt => format!("sqrt({argument})"),
+            MathFunction::Abs => format!("fabs({argument})"),
+            MathFunction::Sign => format!("{}_sign({argument})", self.name),
+            MathFunction::Tan => format!("tan({argument})"),
+            MathFunction::Tanh => format!("tanh({argument})"),
+            MathFunction::Exp => format!("exp({argument})"),
+            MathFunction::Log => format!("log({argument})"),
+        }
+    }
+
+    fn let_scalar(&self, name: &str, value: &str) -> String {
+        format!("const double {name} = {value};")
+    }
+
+    fn let_array(&self, name: &str, elements: &[String]) -> String {
+        format!(
+            "const double {name}[{}] = {};",
+            elements.len(),
+            braced(elements, " ")
+        )
+    }
+
+    fn declare(&self, name: &str, len: usize) -> String {
+        format!("double {name}[{len}];")
+    }
+
+    fn for_loop(&self, variable: &str, count: usize) -> String {
+        format!("for (size_t {variable} = 0; {variable} < {count}; ++{variable})")
+    }
+
+    fn discard(&self, parameter: &str) -> String {
+        format!("(void){parameter};")
+    }
+
+    fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String {
+        let passed: Vec<String> = arguments
+            .iter()
+            .map(|argument| match argument {
+                Argument::Read(span) | Argument::Write(span) => pointer(span),
+            })
+            .collect();
+        match callee {
+            Some(callee) => format!("{callee}({});", passed.join(", ")),
+            None => {
+                let n = arguments.first().map_or(0, |argument| match argument {
+                    Argument::Read(span) | Argument::Write(span) => span.len,
+                });
+                format!("{}_sin_cos({n}, {});", self.name, passed.join(", "))
+            }
+        }
+    }
+
+    fn table_base(&self, prefix: &str) -> String {
+        format!("{prefix}table")
+    }
+
+    fn table(&self, table: &ConstTable) -> String {
+        let rows: Vec<String> = table
+            .entries
+            .chunks(table.cols)
+            .map(|row| {
+                let row: Vec<String> = row.iter().map(Literal::to_string).collect();
+                format!("    {}", braced(&row, "\n     "))
+            })
+            .collect();
+        format!(
+            "static const double {}[{}][{}] = {{\n{},\n}};",
+            table.name,
+            table.rows,
+            table.cols,
+            rows.join(",\n")
+        )
+    }
+
+    fn parameter(&self, parameter: &Parameter) -> String {
+        let name = &parameter.name;
+        match parameter.role {
+            Role::Input => format!("const double *restrict {name}"),
+            Role::Output | Role::InOut => format!("double *restrict {name}"),
+            Role::Scalar => format!("double {name}"),
+        }
+    }
+
+    fn signature(&self, function: &Function) -> String {
+        let parameters: Vec<String> = function
+            .parameters
+            .iter()
+            .map(|p| self.parameter(p))
+            .collect();
+        format!("void {}({})", function.name, parameters.join(", "))
+    }
+
+    fn docs(&self, _lines: &[String]) -> String {
+        // The header has the documentation.
+        String::new()
+    }
+}
+
+impl CDialect {
+    /// The documented prototype for the header; `restrict` is left to the definition, so
+    /// that C++ can include it.
+    pub fn prototype(&self, function: &Function) -> String {
+        let signature = self.signature(function).replace("*restrict ", "*");
+        format!("{}{signature};", documentation(&function.docs))
+    }
+}
+
+/// A documentation comment, one paragraph a line.
+pub fn documentation(lines: &[String]) -> String {
+    let body: Vec<String> = comment_lines(lines, 94)
+        .iter()
+        .map(|line| format!(" * {}", line.replace("*/", "* /")))
+        .collect();
+    format!("/**\n{}\n */\n", body.join("\n"))
+}
+
+fn pointer(span: &Span) -> String {
+    if span.offset == 0 {
+        span.array.to_string()
+    } else {
+        format!("&{}[{}]", span.array, span.offset)
+    }
+}

@@ -1,0 +1,207 @@
+//! C99: `NAME.h`, `NAME.c`, `NAME_selftest.c` and `CMakeLists.txt`.
+
+mod dialect;
+mod selftest;
+
+use askama::Template;
+
+use super::code::{Function, MathFunction};
+use super::entries::{ModelEntries, PhaseEntries};
+use super::functions::ModelFunctions;
+use super::kernel::KernelText;
+use super::printer::Printer;
+use super::target::{EmitError, EmittedFile};
+use super::usage::{calls_function, calls_kernel};
+use super::wrap::braced;
+use dialect::CDialect;
+
+#[derive(Template)]
+#[template(path = "c/header.askama", config = "templates/askama.toml")]
+struct Header<'a> {
+    banner: String,
+    model: &'a str,
+    upper: String,
+    latent_dim: usize,
+    state_dim: Option<usize>,
+    maps: Vec<String>,
+    phases: Vec<PhaseText>,
+}
+
+#[derive(Template)]
+#[template(path = "c/source.askama", config = "templates/askama.toml")]
+struct Source<'a> {
+    banner: String,
+    name: &'a str,
+    latent_dim: usize,
+    kernel: Option<String>,
+    sign: bool,
+    tables: Vec<String>,
+    maps: Vec<String>,
+    phases: Vec<PhaseText>,
+}
+
+#[derive(Template)]
+#[template(path = "c/kernel.askama", config = "templates/askama.toml")]
+struct Kernel<'a> {
+    name: &'a str,
+    upper: String,
+    limit: String,
+    two_over_pi: String,
+    round: String,
+    pi_2: Vec<String>,
+    sin: Vec<String>,
+    cos: Vec<String>,
+}
+
+#[derive(Template)]
+#[template(path = "c/cmake.askama", config = "templates/askama.toml")]
+struct CMake<'a> {
+    banner: String,
+    name: &'a str,
+}
+
+/// A phase in header and source.
+#[derive(Clone)]
+struct PhaseText {
+    identifier: String,
+    /// Beginning of its macros.
+    upper: String,
+    nnz: usize,
+    /// Length of the pattern's arrays, which cannot be empty in C.
+    stored: usize,
+    rows: String,
+    cols: String,
+    prototypes: Vec<String>,
+    functions: Vec<String>,
+}
+
+/// The C files of a model; `provenance` is the text of the first line.
+///
+/// # Errors
+/// [`EmitError::Template`] if a template fails.
+pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>, EmitError> {
+    let name = entries.identifier.as_str();
+    let dialect = CDialect {
+        name: name.to_owned(),
+    };
+    let functions = ModelFunctions::new(entries, &dialect, &format!("{name}_"));
+    let printer = Printer::new(&dialect);
+    let print = |function: &Function| printer.function(function);
+    let phases: Vec<PhaseText> = entries
+        .phases
+        .iter()
+        .zip(&functions.phases)
+        .map(|(phase, functions)| PhaseText::new(name, phase, functions, &dialect, &print))
+        .collect();
+    let banner = format!("/* {provenance} */");
+    let header = Header {
+        banner: banner.clone(),
+        model: &entries.name,
+        upper: name.to_ascii_uppercase(),
+        latent_dim: entries.latent_dim,
+        state_dim: entries.state_dim,
+        maps: functions
+            .maps
+            .iter()
+            .map(|map| dialect.prototype(map))
+            .collect(),
+        phases: phases.clone(),
+    };
+    let uses_kernel = functions.all().any(|function| calls_kernel(&function.body));
+    let source = Source {
+        banner: banner.clone(),
+        name,
+        latent_dim: entries.latent_dim,
+        kernel: uses_kernel.then(|| kernel(name)).transpose()?,
+        sign: functions
+            .all()
+            .any(|function| calls_function(&function.body, MathFunction::Sign)),
+        tables: functions
+            .tables
+            .iter()
+            .map(|table| printer.table(table))
+            .collect(),
+        maps: functions.maps.iter().map(print).collect(),
+        phases,
+    };
+    let cmake = CMake {
+        banner: format!("# {provenance}"),
+        name,
+    };
+    Ok(vec![
+        EmittedFile::new(format!("{name}.h"), finished(header.render()?)),
+        EmittedFile::new(format!("{name}.c"), finished(source.render()?)),
+        EmittedFile::new(
+            format!("{name}_selftest.c"),
+            finished(selftest::render(entries, &banner)?),
+        ),
+        EmittedFile::new("CMakeLists.txt", finished(cmake.render()?)),
+    ])
+}
+
+impl PhaseText {
+    fn new(
+        name: &str,
+        phase: &PhaseEntries,
+        functions: &[Function; 3],
+        dialect: &CDialect,
+        print: &dyn Fn(&Function) -> String,
+    ) -> Self {
+        let numbers = |values: &[usize]| {
+            let mut texts: Vec<String> = values.iter().map(usize::to_string).collect();
+            if texts.is_empty() {
+                texts.push("0".to_owned());
+            }
+            braced(&texts, "\n    ")
+        };
+        let mut prototypes: Vec<String> = functions
+            .iter()
+            .map(|function| dialect.prototype(function))
+            .collect();
+        prototypes.push(batch_prototype(name, &phase.identifier));
+        Self {
+            identifier: phase.identifier.clone(),
+            upper: format!("{name}_{}", phase.identifier).to_ascii_uppercase(),
+            nnz: phase.pattern.len(),
+            stored: phase.pattern.len().max(1),
+            rows: numbers(&phase.pattern.rows),
+            cols: numbers(&phase.pattern.cols),
+            prototypes,
+            functions: functions.iter().map(print).collect(),
+        }
+    }
+}
+
+fn batch_prototype(name: &str, phase: &str) -> String {
+    let docs = [
+        format!("{name}_{phase}_dynamics at `count` points."),
+        "Points are contiguous per variable: element k of point p is z[k * count + p], and alike \
+         for dz, u_lat and ddz. The arrays must not overlap."
+            .to_owned(),
+    ];
+    format!(
+        "{}void {name}_{phase}_dynamics_batch(size_t count, const double *z, const double *dz,\n    \
+         const double *u_lat, double *ddz);",
+        dialect::documentation(&docs)
+    )
+}
+
+fn kernel(name: &str) -> Result<String, EmitError> {
+    let text = KernelText::new();
+    let kernel = Kernel {
+        name,
+        upper: name.to_ascii_uppercase(),
+        limit: text.limit,
+        two_over_pi: text.two_over_pi,
+        round: text.round,
+        pi_2: text.pi_2,
+        sin: text.sin,
+        cos: text.cos,
+    };
+    Ok(kernel.render()?)
+}
+
+/// Ends with exactly one newline and has no blank lines in a row.
+fn finished(text: String) -> String {
+    super::wrap::tidy(&text)
+}

@@ -1,0 +1,209 @@
+//! Code as typed statements, before a dialect spells it.
+
+use super::ident::Ident;
+use super::literal::Literal;
+
+/// A subscript `offset + sum_i stride_i * name_i`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Index {
+    /// Strides and the variables that they multiply.
+    pub terms: Vec<(usize, Ident)>,
+    /// What is added.
+    pub offset: usize,
+}
+
+impl Index {
+    /// A constant subscript.
+    pub fn fixed(offset: usize) -> Self {
+        Self {
+            terms: Vec::new(),
+            offset,
+        }
+    }
+
+    /// A loop variable.
+    pub fn variable(name: &Ident) -> Self {
+        Self::fixed(0).plus(1, name)
+    }
+
+    /// With `stride * name` added.
+    pub fn plus(mut self, stride: usize, name: &Ident) -> Self {
+        self.terms.push((stride, name.clone()));
+        self
+    }
+
+    /// With a constant added.
+    pub fn shifted(mut self, by: usize) -> Self {
+        self.offset += by;
+        self
+    }
+}
+
+/// Operators between two operands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Infix {
+    /// `+`
+    Add,
+    /// `-`
+    Sub,
+    /// `*`
+    Mul,
+    /// `/`
+    Div,
+}
+
+/// Functions of one argument that every target has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MathFunction {
+    /// Square root.
+    Sqrt,
+    /// Absolute value.
+    Abs,
+    /// -1, 0 or 1.
+    Sign,
+    /// Tangent.
+    Tan,
+    /// Hyperbolic tangent.
+    Tanh,
+    /// Exponential.
+    Exp,
+    /// Natural logarithm.
+    Log,
+}
+
+/// An expression.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Expr {
+    /// A number.
+    Literal(Literal),
+    /// A scalar variable.
+    Name(Ident),
+    /// `array[index]`
+    Element(Ident, Index),
+    /// `table[row][col]`
+    Entry(Ident, Index, Index),
+    /// `-a`
+    Negate(Box<Expr>),
+    /// `a op b`
+    Infix(Infix, Box<Expr>, Box<Expr>),
+    /// `f(a)`
+    Apply(MathFunction, Box<Expr>),
+}
+
+impl Expr {
+    /// `a op b`
+    pub fn infix(op: Infix, a: Expr, b: Expr) -> Self {
+        Self::Infix(op, Box::new(a), Box::new(b))
+    }
+}
+
+/// `len` elements of an array from `offset` on, handed to a function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Span {
+    /// The array.
+    pub array: Ident,
+    /// First element.
+    pub offset: usize,
+    /// Number of elements.
+    pub len: usize,
+    /// Length of the whole array.
+    pub of: usize,
+    /// Whether the array is a parameter of the function rather than a local array.
+    pub is_parameter: bool,
+}
+
+impl Span {
+    /// Whether the span is the whole array.
+    pub fn is_whole(&self) -> bool {
+        self.offset == 0 && self.len == self.of
+    }
+}
+
+/// An argument of a call of a generated function.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Argument {
+    /// Elements that are read.
+    Read(Span),
+    /// Elements that are written.
+    Write(Span),
+}
+
+/// A statement.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stmt {
+    /// A named scalar that never changes.
+    Let(Ident, Expr),
+    /// A named array that never changes.
+    LetArray(Ident, Vec<Expr>),
+    /// An array whose elements are assigned later.
+    Declare(Ident, usize),
+    /// `target = value`
+    Assign(Expr, Expr),
+    /// `target += value`
+    AddAssign(Expr, Expr),
+    /// A loop of the variable from 0 to below the count.
+    For(Ident, usize, Vec<Stmt>),
+    /// Sines and cosines of a span by the kernel.
+    SinCos {
+        /// Arguments.
+        arguments: Span,
+        /// Where the sines go.
+        sines: Span,
+        /// Where the cosines go.
+        cosines: Span,
+    },
+    /// A call of another generated function.
+    Call(Ident, Vec<Argument>),
+}
+
+/// What a parameter of a generated function is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// An array that is read.
+    Input,
+    /// An array that is written.
+    Output,
+    /// An array that is read, then written.
+    InOut,
+    /// A scalar that is read.
+    Scalar,
+}
+
+/// A parameter of a generated function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its name.
+    pub name: Ident,
+    /// Number of elements.
+    pub len: usize,
+    /// What it is for.
+    pub role: Role,
+}
+
+/// A constant matrix with static storage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConstTable {
+    /// Its name.
+    pub name: Ident,
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub cols: usize,
+    /// Entries, row-major.
+    pub entries: Vec<Literal>,
+}
+
+/// A generated function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Function {
+    /// Its name.
+    pub name: Ident,
+    /// Lines of documentation.
+    pub docs: Vec<String>,
+    /// Parameters in order.
+    pub parameters: Vec<Parameter>,
+    /// Parameters that the body does not mention.
+    pub unused: Vec<Ident>,
+    /// What it does.
+    pub body: Vec<Stmt>,
+}

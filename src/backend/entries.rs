@@ -1,0 +1,300 @@
+//! What is generated for a model: programs, with names, roles and documentation.
+
+use super::code::Role;
+use crate::ir::{Program, Slot};
+use crate::lower::{self, JacobianPattern, LowerError, LowerOptions};
+use crate::model::{ModelError, ReducedModel, Signals};
+
+/// Longest equation that documentation spells out, in terms.
+const MOST_TERMS: usize = 40;
+
+/// A function to be generated from a program.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// Name without the model's, such as `contact_dynamics`.
+    pub name: String,
+    /// The program.
+    pub program: Program,
+    /// Parameters in order.
+    pub parameters: Vec<EntryParameter>,
+    /// Lines of documentation.
+    pub docs: Vec<String>,
+}
+
+/// A parameter of an entry.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EntryParameter {
+    /// Name of the slot.
+    pub name: String,
+    /// Number of elements; an output may have none.
+    pub len: usize,
+    /// What it is for.
+    pub role: Role,
+}
+
+/// The functions of one phase.
+#[derive(Clone, Debug)]
+pub struct PhaseEntries {
+    /// Name of the phase as an identifier.
+    pub identifier: String,
+    /// `ddz`.
+    pub dynamics: Entry,
+    /// `ddz` and its Jacobian.
+    pub jacobian: Entry,
+    /// Where the Jacobian's entries stand.
+    pub pattern: JacobianPattern,
+    /// One Runge-Kutta step.
+    pub step: Entry,
+}
+
+/// Everything that is generated for a model.
+#[derive(Clone, Debug)]
+pub struct ModelEntries {
+    /// Name of the model as an identifier.
+    pub identifier: String,
+    /// Name of the model.
+    pub name: String,
+    /// Number of latent coordinates.
+    pub latent_dim: usize,
+    /// Number of robot coordinates, if the model speaks of any.
+    pub state_dim: Option<usize>,
+    /// The maps that the model has the data for.
+    pub maps: Vec<Entry>,
+    /// Phases in the order of the model.
+    pub phases: Vec<PhaseEntries>,
+}
+
+impl ModelEntries {
+    /// Lowers all functions of a model.
+    ///
+    /// # Errors
+    /// [`LowerError`] if a phase cannot be lowered.
+    pub fn new(model: &ReducedModel, options: &LowerOptions) -> Result<Self, LowerError> {
+        let phases = (0..model.phases().len())
+            .map(|phase| phase_entries(model, phase, options))
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            identifier: model.identifier().to_string(),
+            name: model.name().to_owned(),
+            latent_dim: model.latent_dim(),
+            state_dim: model.state_dim(),
+            maps: map_entries(model)?,
+            phases,
+        })
+    }
+
+    /// All entries in the order in which they are generated.
+    pub fn all(&self) -> impl Iterator<Item = &Entry> {
+        let phases = self
+            .phases
+            .iter()
+            .flat_map(|phase| [&phase.dynamics, &phase.jacobian, &phase.step]);
+        self.maps.iter().chain(phases)
+    }
+}
+
+fn map_entries(model: &ReducedModel) -> Result<Vec<Entry>, LowerError> {
+    let (state, input) = (model.state(), model.input());
+    let n = "robot coordinates in SI units";
+    let candidates = [
+        (
+            lower::encode(model),
+            "Latent coordinates: z = W_e (s_x x) + b_e.".to_owned(),
+            format!(
+                "x: {n}. z: latent coordinates (scaled).{}",
+                elements("x", state)
+            ),
+        ),
+        (
+            lower::encode_velocity(model),
+            "Latent velocities: dz = W_e (s_x dx); velocities take no bias.".to_owned(),
+            format!("dx: velocities of the {n}. dz: latent velocities (scaled)."),
+        ),
+        (
+            lower::decode(model),
+            "Robot coordinates: x = (W_d z + b_d) / s_x.".to_owned(),
+            format!(
+                "z: latent coordinates (scaled). x: {n}.{}",
+                elements("x", state)
+            ),
+        ),
+        (
+            lower::decode_velocity(model),
+            "Robot velocities: dx = (W_d dz) / s_x; velocities take no bias.".to_owned(),
+            format!("dz: latent velocities (scaled). dx: velocities of the {n}."),
+        ),
+        (
+            lower::project_input(model),
+            "Latent inputs: u_lat = pinv(W_e^T) (s_u u).".to_owned(),
+            format!(
+                "u: generalised inputs in SI units. u_lat: latent inputs (scaled).{}",
+                elements("u", input)
+            ),
+        ),
+        (
+            lower::lift_input(model),
+            "Generalised inputs: u = (W_e^T u_lat) / s_u.".to_owned(),
+            format!(
+                "u_lat: latent inputs (scaled). u: generalised inputs in SI units.{}",
+                elements("u", input)
+            ),
+        ),
+    ];
+    let mut entries = Vec::new();
+    for (program, title, units) in candidates {
+        match program {
+            Ok(program) => {
+                let docs = vec![title, units, shapes(&program)];
+                entries.push(entry(program.name().to_owned(), program, docs));
+            }
+            Err(LowerError::Model(ModelError::Missing { .. })) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(entries)
+}
+
+fn phase_entries(
+    model: &ReducedModel,
+    phase: usize,
+    options: &LowerOptions,
+) -> Result<PhaseEntries, LowerError> {
+    let identifier = model.phase_identifier(phase).to_string();
+    let equations = equations(model, phase)?;
+    let name = &model.phase(phase)?.name;
+
+    let program = lower::dynamics(model, phase, options)?;
+    let mut docs = vec![format!(
+        "Latent accelerations of phase `{name}`: ddz = Xi^T Theta(z, dz, u_lat), scaled units."
+    )];
+    docs.extend(equations);
+    docs.push(shapes(&program));
+    let dynamics = entry(format!("{identifier}_dynamics"), program, docs);
+
+    let (program, pattern) = lower::dynamics_jacobian(model, phase, options)?;
+    let docs = vec![
+        format!(
+            "Latent accelerations of phase `{name}` and the structural nonzeros of their \
+             Jacobian d ddz / d (z, dz, u_lat), row-major."
+        ),
+        shapes(&program),
+    ];
+    let mut jacobian = entry(format!("{identifier}_dynamics_jacobian"), program, docs);
+    if pattern.is_empty() {
+        jacobian.parameters.push(EntryParameter {
+            name: "jacobian".to_owned(),
+            len: 0,
+            role: Role::Output,
+        });
+    }
+
+    let program = lower::rk4_step(model, phase, options)?;
+    let docs = vec![
+        format!(
+            "Advances the latent state of phase `{name}` by h seconds: one step of the classical \
+             Runge-Kutta method with u_lat held."
+        ),
+        shapes(&program),
+    ];
+    Ok(PhaseEntries {
+        step: entry(format!("{identifier}_step"), program, docs),
+        identifier,
+        dynamics,
+        jacobian,
+        pattern,
+    })
+}
+
+/// An entry whose outputs of the same name as an input are updated in place.
+fn entry(name: String, program: Program, docs: Vec<String>) -> Entry {
+    let is_in = |slots: &[Slot], name: &str| slots.iter().any(|slot| slot.name == name);
+    let mut parameters: Vec<EntryParameter> = program
+        .inputs()
+        .iter()
+        .map(|slot| EntryParameter {
+            name: slot.name.clone(),
+            len: slot.len,
+            role: if is_in(program.outputs(), &slot.name) {
+                Role::InOut
+            } else if slot.name == "h" {
+                Role::Scalar
+            } else {
+                Role::Input
+            },
+        })
+        .collect();
+    for slot in program.outputs() {
+        if !is_in(program.inputs(), &slot.name) {
+            parameters.push(EntryParameter {
+                name: slot.name.clone(),
+                len: slot.len,
+                role: Role::Output,
+            });
+        }
+    }
+    Entry {
+        name,
+        program,
+        parameters,
+        docs,
+    }
+}
+
+/// "Lengths: z 2, dz 2, u_lat 2, ddz 2. The arrays must not overlap."
+fn shapes(program: &Program) -> String {
+    let mut names: Vec<String> = Vec::new();
+    for slot in program.inputs().iter().chain(program.outputs()) {
+        let text = format!("{} {}", slot.name, slot.len);
+        if slot.name != "h" && !names.contains(&text) {
+            names.push(text);
+        }
+    }
+    format!(
+        "Lengths: {}. The arrays must not overlap.",
+        names.join(", ")
+    )
+}
+
+/// " x[0] fr.hx (rad), ..." if the model names its coordinates.
+fn elements(array: &str, signals: Option<&Signals>) -> String {
+    let Some(signals) = signals else {
+        return String::new();
+    };
+    let pairs = signals.names.iter().zip(&signals.units).enumerate();
+    let list: Vec<String> = pairs
+        .map(|(k, (name, unit))| format!("{array}[{k}] {name} ({unit})"))
+        .collect();
+    format!(" {}.", list.join(", "))
+}
+
+/// The equations of a phase, one line each; long ones only as a count of terms.
+fn equations(model: &ReducedModel, phase: usize) -> Result<Vec<String>, LowerError> {
+    let mut lines = Vec::new();
+    for row in 0..model.latent_dim() {
+        let terms = model.active_terms(phase, row)?;
+        let mut right = String::new();
+        for (coefficient, term) in terms.iter().take(MOST_TERMS) {
+            let sign = match (right.is_empty(), *coefficient < 0.0) {
+                (true, false) => "",
+                (true, true) => "-",
+                (false, false) => " + ",
+                (false, true) => " - ",
+            };
+            let text = term.text();
+            let factor = match text {
+                "1" => String::new(),
+                _ if text.contains(['+', '-']) => format!("*({text})"),
+                _ => format!("*{text}"),
+            };
+            right.push_str(&format!("{sign}{:?}{factor}", coefficient.abs()));
+        }
+        if terms.is_empty() {
+            right.push('0');
+        }
+        if terms.len() > MOST_TERMS {
+            right = format!("a sum of {} terms", terms.len());
+        }
+        lines.push(format!("ddz{} = {right}", row + 1));
+    }
+    Ok(lines)
+}

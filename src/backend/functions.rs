@@ -1,0 +1,109 @@
+//! Entries to functions of one target.
+
+use super::code::{Function, Parameter, Role};
+use super::dialect::Dialect;
+use super::entries::{Entry, ModelEntries};
+use super::ident::{Ident, Namer};
+use super::translate::{Names, Tables, translate};
+
+/// The functions of a model in one target, with the tables that they share.
+#[derive(Debug)]
+pub struct ModelFunctions {
+    /// Functions of the maps.
+    pub maps: Vec<Function>,
+    /// Per phase: dynamics, dynamics with Jacobian, step.
+    pub phases: Vec<[Function; 3]>,
+    /// Constant tables.
+    pub tables: Tables,
+}
+
+impl ModelFunctions {
+    /// Translates all entries; `prefix` begins each name.
+    pub fn new(entries: &ModelEntries, dialect: &dyn Dialect, prefix: &str) -> Self {
+        let mut globals = Namer::new(dialect.reserved());
+        let mut tables = Tables::new(Namer::new(dialect.reserved()), &dialect.table_base(prefix));
+        let mut generate = |entry: &Entry, callees: &[Ident]| {
+            let name = globals.mint(&format!("{prefix}{}", entry.name));
+            function(entry, name, dialect, callees, &mut tables)
+        };
+        let maps = entries.maps.iter().map(|map| generate(map, &[])).collect();
+        let phases = entries
+            .phases
+            .iter()
+            .map(|phase| {
+                let dynamics = generate(&phase.dynamics, &[]);
+                let jacobian = generate(&phase.jacobian, &[]);
+                let callees = std::slice::from_ref(&dynamics.name);
+                let step = generate(&phase.step, callees);
+                [dynamics, jacobian, step]
+            })
+            .collect();
+        Self {
+            maps,
+            phases,
+            tables,
+        }
+    }
+
+    /// All functions in the order of the file.
+    pub fn all(&self) -> impl Iterator<Item = &Function> {
+        self.maps.iter().chain(self.phases.iter().flatten())
+    }
+}
+
+fn function(
+    entry: &Entry,
+    name: Ident,
+    dialect: &dyn Dialect,
+    callees: &[Ident],
+    tables: &mut Tables,
+) -> Function {
+    let mut locals = Namer::new(dialect.reserved());
+    let parameters: Vec<Parameter> = entry
+        .parameters
+        .iter()
+        .map(|parameter| Parameter {
+            name: locals.mint(&parameter.name),
+            len: parameter.len,
+            role: parameter.role,
+        })
+        .collect();
+    let of_slot = |name: &str| {
+        let position = entry.parameters.iter().position(|p| p.name == name);
+        parameters[position.expect("every slot is a parameter")].clone()
+    };
+    let inputs: Vec<Parameter> = entry
+        .program
+        .inputs()
+        .iter()
+        .map(|s| of_slot(&s.name))
+        .collect();
+    let outputs: Vec<Parameter> = entry
+        .program
+        .outputs()
+        .iter()
+        .map(|s| of_slot(&s.name))
+        .collect();
+    let translation = translate(
+        &entry.program,
+        Names {
+            inputs: &inputs,
+            outputs: &outputs,
+            callees,
+            locals: &mut locals,
+            tables,
+        },
+    );
+    let mut unused = translation.unused;
+    let empty = parameters
+        .iter()
+        .filter(|p| p.role == Role::Output && p.len == 0);
+    unused.extend(empty.map(|p| p.name.clone()));
+    Function {
+        name,
+        docs: entry.docs.clone(),
+        parameters,
+        unused,
+        body: translation.body,
+    }
+}

@@ -1,0 +1,63 @@
+//! Names in generated code.
+
+use std::collections::BTreeSet;
+use std::fmt;
+
+/// A name that is an identifier of the target and unique in its scope; minted by [`Namer`].
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Ident(String);
+
+impl fmt::Display for Ident {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// Mints the names of one scope: identifiers, no keyword, none twice.
+#[derive(Clone, Debug)]
+pub struct Namer {
+    reserved: &'static [&'static str],
+    used: BTreeSet<String>,
+}
+
+impl Namer {
+    /// A scope in which the words of the target are taken.
+    pub fn new(reserved: &'static [&'static str]) -> Self {
+        Self {
+            reserved,
+            used: BTreeSet::new(),
+        }
+    }
+
+    /// The wanted name if it is free, otherwise the name with the first free number.
+    ///
+    /// Characters that no identifier may have become underscores.
+    pub fn mint(&mut self, wanted: &str) -> Ident {
+        let mut base: String = wanted
+            .chars()
+            .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })
+            .collect();
+        if !base.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            base.insert(0, 'v');
+        }
+        let mut name = base.clone();
+        let mut number = 1;
+        while self.reserved.contains(&name.as_str()) || !self.used.insert(name.clone()) {
+            number += 1;
+            name = format!("{base}{number}");
+        }
+        Ident(name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn namer_avoids_keywords_and_repetition() {
+        let mut namer = Namer::new(&["double"]);
+        let names = ["double", "t", "t", "t", "x; system(1)", "1a"].map(|n| namer.mint(n).0);
+        assert_eq!(names, ["double2", "t", "t2", "t3", "x__system_1_", "v1a"]);
+    }
+}

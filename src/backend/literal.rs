@@ -1,0 +1,48 @@
+//! Numbers in generated code.
+
+use std::fmt;
+
+/// A finite number, spelled with the fewest digits that read back to the same bits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Literal(f64);
+
+impl Literal {
+    /// The literal of a number; `None` if it is infinite or not a number.
+    pub fn new(value: f64) -> Option<Self> {
+        value.is_finite().then_some(Self(value))
+    }
+
+    /// Whether the literal begins with a minus.
+    pub fn is_negative(self) -> bool {
+        self.0.is_sign_negative()
+    }
+}
+
+impl fmt::Display for Literal {
+    /// Always with a point or an exponent, so that it is no integer in any target.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}", self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn literal_read_back_to_the_same_bits() {
+        for value in [0.36, -0.0, 1e-300, 5e-324, 1e16, 123_456_789.0, 0.1 + 0.2] {
+            let literal = Literal::new(value).expect("finite");
+            let text = literal.to_string();
+            let back: f64 = text.parse().expect("a number");
+            assert_eq!(back.to_bits(), value.to_bits(), "{text}");
+            assert!(text.contains(['.', 'e']), "{text} would be an integer in C");
+        }
+    }
+
+    #[test]
+    fn literal_of_non_finite_number_is_refused() {
+        assert_eq!(Literal::new(f64::NAN), None);
+        assert_eq!(Literal::new(f64::NEG_INFINITY), None);
+    }
+}

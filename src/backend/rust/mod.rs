@@ -1,0 +1,110 @@
+//! A Rust crate without `std` and without allocation: `NAME/Cargo.toml`, `NAME/src/lib.rs` and
+//! `NAME/tests/selftest.rs`.
+
+mod dialect;
+mod selftest;
+
+use askama::Template;
+
+use super::code::Function;
+use super::entries::{ModelEntries, PhaseEntries};
+use super::functions::ModelFunctions;
+use super::kernel::KernelText;
+use super::printer::Printer;
+use super::target::{EmitError, EmittedFile};
+use super::usage::calls_kernel;
+use super::wrap::{comment_lines, tidy};
+use dialect::RustDialect;
+
+#[derive(Template)]
+#[template(path = "rust/cargo.askama", config = "templates/askama.toml")]
+struct Cargo<'a> {
+    banner: String,
+    name: &'a str,
+}
+
+#[derive(Template)]
+#[template(path = "rust/lib.askama", config = "templates/askama.toml")]
+struct Lib<'a> {
+    banner: String,
+    model: &'a str,
+    latent_dim: usize,
+    state_dim: Option<usize>,
+    kernel: Option<KernelText>,
+    tables: Vec<String>,
+    maps: Vec<String>,
+    phases: Vec<PhaseText>,
+}
+
+struct PhaseText {
+    identifier: String,
+    /// Beginning of its constants.
+    upper: String,
+    nnz: usize,
+    rows: String,
+    cols: String,
+    functions: Vec<String>,
+}
+
+/// The crate of a model; `provenance` is the text of each file's first line.
+///
+/// # Errors
+/// [`EmitError::Template`] if a template fails.
+pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>, EmitError> {
+    let name = entries.identifier.as_str();
+    let dialect = RustDialect;
+    let functions = ModelFunctions::new(entries, &dialect, "");
+    let printer = Printer::new(&dialect);
+    let print = |function: &Function| printer.function(function);
+    let uses_kernel = functions.all().any(|function| calls_kernel(&function.body));
+    let lib = Lib {
+        banner: format!("// {provenance}"),
+        model: &entries.name,
+        latent_dim: entries.latent_dim,
+        state_dim: entries.state_dim,
+        kernel: uses_kernel.then(KernelText::new),
+        tables: functions
+            .tables
+            .iter()
+            .map(|table| printer.table(table))
+            .collect(),
+        maps: functions.maps.iter().map(print).collect(),
+        phases: entries
+            .phases
+            .iter()
+            .zip(&functions.phases)
+            .map(|(phase, functions)| PhaseText::new(phase, functions, &print))
+            .collect(),
+    };
+    let cargo = Cargo {
+        banner: format!("# {provenance}"),
+        name,
+    };
+    let selftest = selftest::render(entries, &format!("// {provenance}"))?;
+    Ok(vec![
+        EmittedFile::new(format!("{name}/Cargo.toml"), tidy(&cargo.render()?)),
+        EmittedFile::new(format!("{name}/src/lib.rs"), tidy(&lib.render()?)),
+        EmittedFile::new(format!("{name}/tests/selftest.rs"), tidy(&selftest)),
+    ])
+}
+
+impl PhaseText {
+    fn new(
+        phase: &PhaseEntries,
+        functions: &[Function; 3],
+        print: &dyn Fn(&Function) -> String,
+    ) -> Self {
+        let numbers = |values: &[usize]| {
+            let texts: Vec<String> = values.iter().map(usize::to_string).collect();
+            comment_lines(&[texts.join(", ")], 90).join("\n   ")
+        };
+        Self {
+            identifier: phase.identifier.clone(),
+            upper: phase.identifier.to_ascii_uppercase(),
+            nnz: phase.pattern.len(),
+            rows: numbers(&phase.pattern.rows),
+            cols: numbers(&phase.pattern.cols),
+            functions: functions.iter().map(print).collect(),
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! What statements need from outside.
+
+use super::code::{Expr, MathFunction, Stmt};
+
+/// Whether the statements call the sine-and-cosine kernel.
+pub fn calls_kernel(body: &[Stmt]) -> bool {
+    body.iter().any(|statement| match statement {
+        Stmt::SinCos { .. } => true,
+        Stmt::For(_, _, body) => calls_kernel(body),
+        Stmt::Let(..)
+        | Stmt::LetArray(..)
+        | Stmt::Declare(..)
+        | Stmt::Assign(..)
+        | Stmt::AddAssign(..)
+        | Stmt::Call(..) => false,
+    })
+}
+
+/// Whether the statements apply a function.
+pub fn calls_function(body: &[Stmt], function: MathFunction) -> bool {
+    body.iter().any(|statement| match statement {
+        Stmt::Let(_, value) => applies(value, function),
+        Stmt::LetArray(_, elements) => elements.iter().any(|value| applies(value, function)),
+        Stmt::Assign(_, value) | Stmt::AddAssign(_, value) => applies(value, function),
+        Stmt::For(_, _, body) => calls_function(body, function),
+        Stmt::Declare(..) | Stmt::SinCos { .. } | Stmt::Call(..) => false,
+    })
+}
+
+fn applies(expr: &Expr, function: MathFunction) -> bool {
+    match expr {
+        Expr::Apply(applied, a) => *applied == function || applies(a, function),
+        Expr::Negate(a) => applies(a, function),
+        Expr::Infix(_, a, b) => applies(a, function) || applies(b, function),
+        Expr::Literal(_) | Expr::Name(_) | Expr::Element(..) | Expr::Entry(..) => false,
+    }
+}

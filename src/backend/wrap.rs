@@ -1,0 +1,61 @@
+//! Breaking lists and comments into lines.
+
+/// `{a, b, c}`, broken with `indent` after every eight elements of a long list; an `indent`
+/// without a newline leaves breaking to the printer.
+pub fn braced(elements: &[String], indent: &str) -> String {
+    let lines: Vec<String> = elements.chunks(8).map(|line| line.join(", ")).collect();
+    format!("{{{}}}", lines.join(&format!(",{indent}")))
+}
+
+/// Each paragraph broken at spaces into lines of at most `width` bytes where possible;
+/// continued lines are indented by two spaces.
+pub fn comment_lines(paragraphs: &[String], width: usize) -> Vec<String> {
+    let mut lines = Vec::new();
+    for paragraph in paragraphs {
+        let mut line = String::new();
+        for word in paragraph.split_whitespace() {
+            if !line.is_empty() && line.len() + 1 + word.len() > width {
+                lines.push(std::mem::replace(&mut line, " ".to_owned()));
+            }
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+        lines.push(line);
+    }
+    lines
+}
+
+/// The text without trailing spaces or several blank lines in a row, ending with one newline.
+pub fn tidy(text: &str) -> String {
+    let mut result = String::with_capacity(text.len());
+    let mut blank = true;
+    for line in text.lines().map(str::trim_end) {
+        if line.is_empty() {
+            if !blank {
+                result.push('\n');
+            }
+            blank = true;
+        } else {
+            result.push_str(line);
+            result.push('\n');
+            blank = false;
+        }
+    }
+    while result.ends_with("\n\n") {
+        result.pop();
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comment_lines_keep_paragraphs_and_indent_what_continues() {
+        let lines = comment_lines(&["one two three".to_owned(), "four".to_owned()], 9);
+        assert_eq!(lines, ["one two", "  three", "four"]);
+    }
+}
