@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DMatrixView};
+use nalgebra::DMatrix;
 
 use crate::model::{LatentVariable, Library};
 use crate::symbolic::{ExprId, Function, Node, SymbolId};
@@ -69,31 +69,22 @@ impl Features {
         self.latent_dim
     }
 
-    /// `Theta` (`n x library_dim`) from `variables` (`3 latent_dim x n`, rows z, dz, u_lat).
-    pub fn evaluate(
-        &self,
-        variables: DMatrixView<'_, f64>,
-        values: &mut FeatureValues,
-    ) -> DMatrix<f64> {
-        let n = variables.ncols();
+    /// `Theta` (`n x library_dim`) from `variables` (`n x 3 latent_dim`, columns z, dz, u_lat).
+    pub fn evaluate(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) -> DMatrix<f64> {
         self.forward(variables, values);
-        let mut theta = DMatrix::zeros(n, self.terms.len());
+        let mut theta = DMatrix::zeros(variables.nrows(), self.terms.len());
         for (mut column, &step) in theta.column_iter_mut().zip(&self.terms) {
             column.copy_from_slice(&values.values[step]);
         }
         theta
     }
 
-    /// Terms at one point: `variables` holds z, dz, u_lat one after the other.
-    pub fn evaluate_point(&self, variables: &[f64], values: &mut FeatureValues, theta: &mut [f64]) {
-        let view = DMatrixView::from_slice(variables, variables.len(), 1);
-        self.forward(view, values);
-        for (slot, &step) in theta.iter_mut().zip(&self.terms) {
-            *slot = values.values[step][0];
-        }
+    /// Values of one term after [`Self::forward`], one a sample.
+    pub fn term<'a>(&self, values: &'a FeatureValues, term: usize) -> &'a [f64] {
+        &values.values[self.terms[term]]
     }
 
-    /// Adds to `gradient` (`3 latent_dim x n`) what `theta_gradient` (`n x library_dim`) means for the variables.
+    /// Adds to `gradient` (`n x 3 latent_dim`) what `theta_gradient` (`n x library_dim`) means for the variables.
     ///
     /// `values` must hold the forward pass of the same batch.
     pub fn backward(
@@ -117,9 +108,9 @@ impl Features {
         for index in (0..self.steps.len()).rev() {
             let (earlier, rest) = values.adjoints.split_at_mut(index);
             self.steps[index].pull_back(&values.values, index, &rest[0], earlier);
-            if let Step::Variable(row) = self.steps[index] {
+            if let Step::Variable(column) = self.steps[index] {
                 gradient
-                    .row_mut(row)
+                    .column_mut(column)
                     .iter_mut()
                     .zip(&rest[0])
                     .for_each(|(g, a)| *g += a);
@@ -127,8 +118,9 @@ impl Features {
         }
     }
 
-    fn forward(&self, variables: DMatrixView<'_, f64>, values: &mut FeatureValues) {
-        let n = variables.ncols();
+    /// Computes every step for all samples; see [`Self::evaluate`] for the shape of `variables`.
+    pub fn forward(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) {
+        let n = variables.nrows();
         values.values.resize(self.steps.len(), Vec::new());
         for (index, step) in self.steps.iter().enumerate() {
             let (earlier, rest) = values.values.split_at_mut(index);
@@ -136,7 +128,9 @@ impl Features {
             out.clear();
             match step {
                 Step::Number(value) => out.resize(n, *value),
-                Step::Variable(row) => out.extend(variables.row(*row).iter()),
+                Step::Variable(column) => {
+                    out.extend_from_slice(variables.column(*column).as_slice())
+                }
                 Step::Sum(parts) => fold(out, earlier, parts, n, 0.0, |a, b| a + b),
                 Step::Product(parts) => fold(out, earlier, parts, n, 1.0, |a, b| a * b),
                 Step::Integer(base, exponent) => {
@@ -331,12 +325,11 @@ mod tests {
     #[test]
     fn batch_values_equal_the_library_at_every_sample() {
         let library = library();
-        let variables = Random::new(4).matrix(6, 7, 0.9);
-        let theta =
-            Features::new(&library).evaluate(variables.as_view(), &mut FeatureValues::default());
+        let variables = Random::new(4).matrix(7, 6, 0.9);
+        let theta = Features::new(&library).evaluate(&variables, &mut FeatureValues::default());
         for sample in 0..7 {
             let block =
-                |i: usize| DVector::from(variables.column(sample).rows(2 * i, 2).into_owned());
+                |i: usize| DVector::from(variables.row(sample).columns(2 * i, 2).transpose());
             let expected = library
                 .evaluate(&block(0), &block(1), &block(2))
                 .expect("dimensions fit");
@@ -353,16 +346,16 @@ mod tests {
     #[test]
     fn backward_pass_agrees_with_finite_differences_for_every_function() {
         let features = Features::new(&library());
-        let variables = Random::new(8).matrix(6, 3, 0.9);
+        let variables = Random::new(8).matrix(3, 6, 0.9);
         let weights = Random::new(9).matrix(3, features.library_dim(), 1.0);
         let mut values = FeatureValues::default();
         let loss = |at: &DMatrix<f64>| {
             features
-                .evaluate(at.as_view(), &mut FeatureValues::default())
+                .evaluate(at, &mut FeatureValues::default())
                 .dot(&weights)
         };
-        features.evaluate(variables.as_view(), &mut values);
-        let mut gradient = DMatrix::zeros(6, 3);
+        features.evaluate(&variables, &mut values);
+        let mut gradient = DMatrix::zeros(3, 6);
         features.backward(&weights, &mut values, &mut gradient);
         for index in 0..variables.len() {
             let (mut above, mut below) = (variables.clone(), variables.clone());

@@ -1,6 +1,8 @@
 //! Latent samples of a dataset under an encoder, and the decoder that fits them best.
 
-use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DMatrixViewMut, DVector};
 
 use super::dataset::{Dataset, Jump, Quantity};
 use super::error::TrainError;
@@ -39,7 +41,7 @@ impl Latent {
         }
     }
 
-    /// `[z; dz; u_lat]` of the samples of one phase, `3 latent_dim x n`, and `ddz^T`, `n x latent_dim`.
+    /// `[z, dz, u_lat]` of the samples of one phase, `n x 3 latent_dim`, and `ddz^T`, `n x latent_dim`.
     pub fn regression_samples(
         dataset: &Dataset,
         latent: &[Latent],
@@ -47,27 +49,29 @@ impl Latent {
     ) -> (DMatrix<f64>, DMatrix<f64>) {
         let d = latent.first().map_or(0, |first| first.z.nrows());
         let n = dataset.samples(Some(phase));
-        let (mut variables, mut target) = (DMatrix::zeros(3 * d, n), DMatrix::zeros(n, d));
+        let (mut variables, mut target) = (DMatrix::zeros(n, 3 * d), DMatrix::zeros(n, d));
         let mut at = 0;
         for (jump, samples) in dataset.jumps.iter().zip(latent) {
             for (_, range) in jump.spans.iter().filter(|(index, _)| *index == phase) {
-                let (start, count) = (range.start, range.len());
-                variables
-                    .view_mut((0, at), (d, count))
-                    .copy_from(&samples.z.columns(start, count));
-                variables
-                    .view_mut((d, at), (d, count))
-                    .copy_from(&samples.dz.columns(start, count));
-                variables
-                    .view_mut((2 * d, at), (d, count))
-                    .copy_from(&samples.u_lat.columns(start, count));
+                let count = range.len();
+                samples.copy_variables(range.clone(), &mut variables.rows_mut(at, count));
                 target
-                    .view_mut((at, 0), (count, d))
-                    .tr_copy_from(&samples.ddz.columns(start, count));
+                    .rows_mut(at, count)
+                    .tr_copy_from(&samples.ddz.columns_range(range.clone()));
                 at += count;
             }
         }
         (variables, target)
+    }
+
+    /// Writes `[z, dz, u_lat]` of some samples into the rows of `variables`.
+    pub fn copy_variables(&self, range: Range<usize>, variables: &mut DMatrixViewMut<'_, f64>) {
+        let d = self.z.nrows();
+        for (block, source) in [&self.z, &self.dz, &self.u_lat].into_iter().enumerate() {
+            variables
+                .columns_mut(block * d, d)
+                .tr_copy_from(&source.columns_range(range.clone()));
+        }
     }
 }
 

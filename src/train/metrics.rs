@@ -151,7 +151,7 @@ fn ddz_r2(candidate: Candidate<'_>, dataset: &Dataset, latent: &[Latent], phase:
     let (variables, target) = Latent::regression_samples(dataset, latent, phase);
     let theta = candidate
         .features
-        .evaluate(variables.as_view(), &mut Default::default());
+        .evaluate(&variables, &mut Default::default());
     r_squared(
         &(theta * &candidate.xi[phase]).transpose(),
         &target.transpose(),

@@ -23,6 +23,7 @@ mod error;
 mod options;
 #[cfg(test)]
 mod oscillator;
+mod prune;
 mod random;
 mod report;
 mod smooth;

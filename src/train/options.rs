@@ -69,6 +69,8 @@ pub struct RegressionOptions {
     pub prunings: Vec<Pruning>,
     /// Of all candidates within this share of the best validation score, the one with fewest terms is taken.
     pub slack: f64,
+    /// How many candidates are pruned further, a term at a time, while their score stays within the slack.
+    pub sweeps: usize,
     /// Weight of whole-jump rollouts against predictions of 0.1 s in the validation score.
     pub rollout_weight: f64,
 }
@@ -171,7 +173,8 @@ impl Default for RegressionOptions {
             windows: vec![0, 25, 50],
             ridges: vec![1e-4, 1e-3, 1e-2],
             prunings: eliminations.into_iter().chain(thresholds).collect(),
-            slack: 0.3,
+            slack: 0.15,
+            sweeps: 3,
             rollout_weight: 0.2,
         }
     }

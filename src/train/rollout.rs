@@ -1,6 +1,6 @@
 //! Light rollouts of candidate models, many at once, for choosing between them.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::dataset::Dataset;
 use super::features::{FeatureValues, Features};
@@ -76,48 +76,60 @@ pub fn predict(
         .iter()
         .map(|window| DMatrix::zeros(d, window.steps))
         .collect();
-    let mut state = DMatrix::zeros(2 * d, windows.len());
-    for (column, window) in windows.iter().enumerate() {
-        state
-            .view_mut((0, column), (d, 1))
-            .copy_from(&latent[window.jump].z.column(window.start));
-        state
-            .view_mut((d, column), (d, 1))
-            .copy_from(&latent[window.jump].dz.column(window.start));
+    let mut state = DMatrix::zeros(windows.len(), 2 * d);
+    for (row, window) in windows.iter().enumerate() {
+        let start = &latent[window.jump];
+        for i in 0..d {
+            state[(row, i)] = start.z[(i, window.start)];
+            state[(row, d + i)] = start.dz[(i, window.start)];
+        }
     }
     let mut stepper = Stepper::new(candidate, windows.len());
     for step in 0..longest {
         stepper.load_inputs(dataset, latent, windows, step);
         stepper.advance(&mut state);
-        for (column, _) in windows
-            .iter()
-            .enumerate()
-            .filter(|(_, window)| step < window.steps)
-        {
-            predictions[column].set_column(step, &state.view((0, column), (d, 1)).column(0));
+        for (row, prediction) in predictions.iter_mut().enumerate() {
+            if step < windows[row].steps {
+                (0..d).for_each(|i| prediction[(i, step)] = state[(row, i)]);
+            }
         }
     }
     predictions
 }
 
-/// RK4 over a batch of windows.
+/// RK4 over a batch of windows; rows are windows.
 struct Stepper<'a> {
     candidate: Candidate<'a>,
+    active: Vec<Vec<Vec<(usize, f64)>>>, // a phase and output: active terms and their coefficients
     values: FeatureValues,
     phase: Vec<usize>,
-    step_s: DVector<f64>,
+    step_s: Vec<f64>,
     input: [DMatrix<f64>; 3], // at the start, middle and end of the step
+    variables: DMatrix<f64>,  // z, dz, u_lat
+    rates: [DMatrix<f64>; 4], // dz, ddz at the four stages
 }
 
 impl<'a> Stepper<'a> {
     fn new(candidate: Candidate<'a>, n_windows: usize) -> Self {
-        let input = DMatrix::zeros(candidate.features.latent_dim(), n_windows);
+        let d = candidate.features.latent_dim();
+        let active_of = |xi: &DMatrix<f64>| {
+            let active = |column: usize| {
+                (0..xi.nrows())
+                    .map(|term| (term, xi[(term, column)]))
+                    .filter(|(_, coefficient)| *coefficient != 0.0)
+                    .collect()
+            };
+            (0..d).map(active).collect()
+        };
         Self {
             candidate,
+            active: candidate.xi.iter().map(active_of).collect(),
             values: FeatureValues::default(),
             phase: vec![0; n_windows],
-            step_s: DVector::zeros(n_windows),
-            input: [input.clone(), input.clone(), input],
+            step_s: vec![0.0; n_windows],
+            input: std::array::from_fn(|_| DMatrix::zeros(n_windows, d)),
+            variables: DMatrix::zeros(n_windows, 3 * d),
+            rates: std::array::from_fn(|_| DMatrix::zeros(n_windows, 2 * d)),
         }
     }
 
@@ -129,33 +141,36 @@ impl<'a> Stepper<'a> {
         windows: &[Window],
         step: usize,
     ) {
-        for (column, window) in windows.iter().enumerate() {
+        for (row, window) in windows.iter().enumerate() {
             let sample = window.start + step;
             if step >= window.steps {
-                self.step_s[column] = 0.0;
+                self.step_s[row] = 0.0;
                 continue;
             }
             let jump = &dataset.jumps[window.jump];
+            self.phase[row] = jump.phase[sample];
+            self.step_s[row] = jump.time_s[sample + 1] - jump.time_s[sample];
             let u = &latent[window.jump].u_lat;
-            self.phase[column] = jump.phase[sample];
-            self.step_s[column] = jump.time_s[sample + 1] - jump.time_s[sample];
-            let (first, last) = (u.column(sample), u.column(sample + 1));
-            self.input[0].set_column(column, &first);
-            self.input[1].set_column(column, &((first + last) * 0.5));
-            self.input[2].set_column(column, &last);
+            for i in 0..u.nrows() {
+                let (first, last) = (u[(i, sample)], u[(i, sample + 1)]);
+                self.input[0][(row, i)] = first;
+                self.input[1][(row, i)] = 0.5 * (first + last);
+                self.input[2][(row, i)] = last;
+            }
         }
     }
 
     fn advance(&mut self, state: &mut DMatrix<f64>) {
-        let k1 = self.rate(state, 0);
-        let k2 = self.rate(&self.moved(state, &k1, 0.5), 1);
-        let k3 = self.rate(&self.moved(state, &k2, 0.5), 1);
-        let k4 = self.rate(&self.moved(state, &k3, 1.0), 2);
+        self.rate(state, 0, 0, 0.0);
+        self.rate(state, 1, 1, 0.5);
+        self.rate(state, 2, 1, 0.5);
+        self.rate(state, 3, 2, 1.0);
+        let [k1, k2, k3, k4] = &self.rates;
         for column in 0..state.ncols() {
             for row in 0..state.nrows() {
                 let at = (row, column);
                 let mean = (k1[at] + 2.0 * k2[at] + 2.0 * k3[at] + k4[at]) / 6.0;
-                let next = state[at] + self.step_s[column] * mean;
+                let next = state[at] + self.step_s[row] * mean;
                 state[at] = if next.abs() < 1e6 {
                     next
                 } else {
@@ -165,36 +180,36 @@ impl<'a> Stepper<'a> {
         }
     }
 
-    fn moved(&self, state: &DMatrix<f64>, rate: &DMatrix<f64>, share: f64) -> DMatrix<f64> {
-        let mut moved = rate.clone();
-        for (mut column, step_s) in moved.column_iter_mut().zip(self.step_s.iter()) {
-            column *= share * step_s;
-        }
-        moved + state
-    }
-
-    /// `[dz; ddz]` of every window.
-    fn rate(&mut self, state: &DMatrix<f64>, stage: usize) -> DMatrix<f64> {
+    /// Rates `[dz; ddz]` of stage `stage`, taken `share` of the step along the rates of the stage before.
+    fn rate(&mut self, state: &DMatrix<f64>, stage: usize, input: usize, share: f64) {
         let d = self.candidate.features.latent_dim();
-        let n = state.ncols();
-        let mut variables = DMatrix::zeros(3 * d, n);
-        variables.rows_mut(0, 2 * d).copy_from(state);
-        variables.rows_mut(2 * d, d).copy_from(&self.input[stage]);
-        let theta = self
-            .candidate
-            .features
-            .evaluate(variables.as_view(), &mut self.values);
-        let mut rate = DMatrix::zeros(2 * d, n);
-        rate.rows_mut(0, d).copy_from(&state.rows(d, d));
-        for column in 0..n {
-            let xi = &self.candidate.xi[self.phase[column]];
-            for output in 0..d {
-                rate[(d + output, column)] = (0..xi.nrows())
-                    .map(|term| theta[(column, term)] * xi[(term, output)])
-                    .sum();
+        for column in 0..2 * d {
+            for row in 0..state.nrows() {
+                let moved = match stage {
+                    0 => 0.0,
+                    _ => share * self.step_s[row] * self.rates[stage - 1][(row, column)],
+                };
+                self.variables[(row, column)] = state[(row, column)] + moved;
             }
         }
-        rate
+        self.variables
+            .columns_mut(2 * d, d)
+            .copy_from(&self.input[input]);
+        self.candidate
+            .features
+            .forward(&self.variables, &mut self.values);
+        let rates = &mut self.rates[stage];
+        rates
+            .columns_mut(0, d)
+            .copy_from(&self.variables.columns(d, d));
+        for row in 0..state.nrows() {
+            for (output, active) in self.active[self.phase[row]].iter().enumerate() {
+                let products = active.iter().map(|&(term, coefficient)| {
+                    coefficient * self.candidate.features.term(&self.values, term)[row]
+                });
+                rates[(row, d + output)] = products.sum();
+            }
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use super::features::Features;
 use super::latent::Latent;
 use super::options::RegressionOptions;
 use super::progress::Watch;
+use super::prune::Pruned;
 use super::rollout::{Candidate, Window, predict, restarted, whole};
 use super::sparse::{Pruning, Regression, active_terms};
 use super::weak::windowed_samples;
@@ -110,63 +111,137 @@ pub fn select(
     options: &RegressionOptions,
     watch: &mut Watch<'_>,
 ) -> Result<Selected, TrainError> {
-    let mut tried: Vec<(Vec<DMatrix<f64>>, Choice)> = Vec::new();
-    let total = options.windows.len() * options.ridges.len() * options.prunings.len();
-    watch.stage("fitting the dynamics", total);
-    for &window in &options.windows {
-        let regressions: Vec<Regression> = (0..dataset.phases.patterns.len())
-            .map(|phase| {
-                let (theta, target) = windowed_samples(dataset, latent, features, phase, window);
-                Regression::new(&theta, &target)
-            })
-            .collect();
+    let regressions: Vec<Vec<Regression>> = options
+        .windows
+        .iter()
+        .map(|&window| {
+            (0..dataset.phases.patterns.len())
+                .map(|phase| {
+                    let (theta, target) =
+                        windowed_samples(dataset, latent, features, phase, window);
+                    Regression::new(&theta, &target)
+                })
+                .collect()
+        })
+        .collect();
+    let tried = try_all(&regressions, features, judge, options, watch);
+    let candidates = tried.len();
+    let best = best_score(&tried)?;
+    let limit = (1.0 + options.slack) * best;
+    let mut sparsest: Option<Fitted> = None;
+    for (index, start) in starts(tried, &options.windows, limit)
+        .into_iter()
+        .enumerate()
+    {
+        let Fitted { xi, choice, window } = start;
+        let mut pruned = Pruned {
+            regressions: &regressions[window],
+            ridge: choice.ridge,
+            xi,
+            score: choice.score,
+        };
+        if index < options.sweeps {
+            pruned.sweep(features, judge, limit, watch);
+        }
+        let active = pruned.xi.iter().map(active_terms).sum();
+        if sparsest
+            .as_ref()
+            .is_none_or(|known| active < known.choice.active)
+        {
+            let choice = Choice {
+                score: pruned.score,
+                active,
+                ..choice
+            };
+            sparsest = Some(Fitted {
+                xi: pruned.xi,
+                choice,
+                window,
+            });
+        }
+    }
+    let Fitted { xi, choice, .. } = sparsest.ok_or(TrainError::NoStableModel { candidates })?;
+    Ok(Selected {
+        xi,
+        choice,
+        candidates,
+    })
+}
+
+/// A candidate that was fitted and judged.
+struct Fitted {
+    xi: Vec<DMatrix<f64>>,
+    choice: Choice,
+    window: usize, // index into the windows of the options
+}
+
+fn try_all(
+    regressions: &[Vec<Regression>],
+    features: &Features,
+    judge: &Judge<'_>,
+    options: &RegressionOptions,
+    watch: &mut Watch<'_>,
+) -> Vec<Fitted> {
+    let mut tried = Vec::new();
+    watch.stage(
+        "fitting the dynamics",
+        regressions.len() * options.ridges.len() * options.prunings.len(),
+    );
+    for (window, phases) in regressions.iter().enumerate() {
         for &ridge in &options.ridges {
             for &pruning in &options.prunings {
                 if watch.cancelled() {
-                    return best_of(tried, options.slack);
+                    return tried;
                 }
-                let xi: Vec<_> = regressions
+                let xi: Vec<_> = phases
                     .iter()
                     .map(|regression| regression.fit(ridge, pruning))
                     .collect();
                 let score = judge.score(Candidate { features, xi: &xi });
                 let active = xi.iter().map(active_terms).sum();
                 watch.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
-                tried.push((
-                    xi,
-                    Choice {
-                        window,
-                        ridge,
-                        pruning,
-                        score,
-                        active,
-                    },
-                ));
+                let choice = Choice {
+                    window: options.windows[window],
+                    ridge,
+                    pruning,
+                    score,
+                    active,
+                };
+                tried.push(Fitted { xi, choice, window });
             }
         }
     }
-    best_of(tried, options.slack)
+    tried
 }
 
-fn best_of(tried: Vec<(Vec<DMatrix<f64>>, Choice)>, slack: f64) -> Result<Selected, TrainError> {
-    let candidates = tried.len();
-    if candidates == 0 {
-        return Err(TrainError::Cancelled);
-    }
+fn best_score(tried: &[Fitted]) -> Result<f64, TrainError> {
     let best = tried
         .iter()
-        .map(|(_, choice)| choice.score)
+        .map(|fitted| fitted.choice.score)
         .fold(f64::INFINITY, f64::min);
-    let (xi, choice) = tried
+    match tried.len() {
+        0 => Err(TrainError::Cancelled),
+        candidates if best.is_infinite() => Err(TrainError::NoStableModel { candidates }),
+        _ => Ok(best),
+    }
+}
+
+/// Candidates to prune further: of every window the one with the best score, then all others within the limit, best
+/// first.
+fn starts(tried: Vec<Fitted>, windows: &[usize], limit: f64) -> Vec<Fitted> {
+    let mut within: Vec<Fitted> = tried
         .into_iter()
-        .filter(|(_, choice)| choice.score.is_finite() && choice.score <= (1.0 + slack) * best)
-        .min_by(|(_, a), (_, b)| a.active.cmp(&b.active).then(a.score.total_cmp(&b.score)))
-        .ok_or(TrainError::NoStableModel { candidates })?;
-    Ok(Selected {
-        xi,
-        choice,
-        candidates,
-    })
+        .filter(|fitted| fitted.choice.score <= limit)
+        .collect();
+    within.sort_by(|a, b| a.choice.score.total_cmp(&b.choice.score));
+    let mut seen = vec![false; windows.len()];
+    let rank: Vec<bool> = within
+        .iter()
+        .map(|fitted| std::mem::replace(&mut seen[fitted.window], true))
+        .collect();
+    let mut ranked: Vec<(bool, Fitted)> = rank.into_iter().zip(within).collect();
+    ranked.sort_by_key(|(later, _)| *later);
+    ranked.into_iter().map(|(_, fitted)| fitted).collect()
 }
 
 fn row_std(latent: &[Latent], row: usize) -> f64 {

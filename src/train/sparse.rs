@@ -106,8 +106,6 @@ impl Regression {
         }
     }
 
-    /// Removing term `j` raises the ridge objective by `c_j^2 / (G^-1)_jj`, with `c` the solution and `G` the ridged
-    /// Gram matrix of the support.
     fn eliminate(
         &self,
         column: usize,
@@ -115,16 +113,14 @@ impl Regression {
         ridge: f64,
         loss: f64,
     ) -> (Vec<usize>, DVector<f64>) {
-        let energy = self.target_rms[column].powi(2);
         let mut lost = 0.0;
         loop {
             let solution = self.solve(column, &support, ridge);
-            let inverse = self.ridged_gram(&support, ridge).inverse();
-            let rise = |j: usize| solution[j].powi(2) / inverse[(j, j)] / energy;
-            let weakest = (0..support.len()).min_by(|&a, &b| rise(a).total_cmp(&rise(b)));
+            let rises = self.rises(column, &support, &solution, ridge);
+            let weakest = (0..support.len()).min_by(|&a, &b| rises[a].total_cmp(&rises[b]));
             match weakest {
-                Some(j) if lost + rise(j) <= loss => {
-                    lost += rise(j);
+                Some(j) if lost + rises[j] <= loss => {
+                    lost += rises[j];
                     support.remove(j);
                 }
                 Some(_) | None => return (support, solution),
@@ -132,17 +128,41 @@ impl Regression {
         }
     }
 
-    /// Coefficients on a given support (`library_dim x latent_dim`, true where a term is active).
-    pub fn fit_on(&self, support: &DMatrix<bool>, ridge: f64) -> DMatrix<f64> {
+    /// One column of Xi on a given support (`library_dim x latent_dim`, true where a term is active).
+    pub fn fit_column(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> DVector<f64> {
+        let rows: Vec<usize> = (0..self.library_dim())
+            .filter(|&i| support[(i, column)])
+            .collect();
+        let solution = self.solve(column, &rows, ridge);
         let mut xi = DMatrix::zeros(self.library_dim(), self.latent_dim());
-        for column in 0..self.latent_dim() {
-            let rows: Vec<usize> = (0..self.library_dim())
-                .filter(|&i| support[(i, column)])
-                .collect();
-            let solution = self.solve(column, &rows, ridge);
-            self.store(&mut xi, column, &rows, &solution);
-        }
-        xi
+        self.store(&mut xi, column, &rows, &solution);
+        xi.column(column).into_owned()
+    }
+
+    /// For every active term of a column: its row, and the share of the acceleration's energy lost without it.
+    pub fn losses(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> Vec<(usize, f64)> {
+        let rows: Vec<usize> = (0..self.library_dim())
+            .filter(|&i| support[(i, column)])
+            .collect();
+        let solution = self.solve(column, &rows, ridge);
+        let losses = self.rises(column, &rows, &solution, ridge);
+        rows.into_iter().zip(losses).collect()
+    }
+
+    /// Removing term `j` raises the ridge objective by `c_j^2 / (G^-1)_jj`, with `c` the solution and `G` the ridged
+    /// Gram matrix of the support; here as a share of the acceleration's energy.
+    fn rises(
+        &self,
+        column: usize,
+        support: &[usize],
+        solution: &DVector<f64>,
+        ridge: f64,
+    ) -> Vec<f64> {
+        let energy = self.target_rms[column].powi(2).max(f64::MIN_POSITIVE);
+        let inverse = self.ridged_gram(support, ridge).inverse();
+        (0..support.len())
+            .map(|j| solution[j].powi(2) / inverse[(j, j)] / energy)
+            .collect()
     }
 
     /// Ridge solution for the normalised columns in `support`.
@@ -237,12 +257,12 @@ mod tests {
     }
 
     #[test]
-    fn fit_on_keeps_the_given_support_only() {
+    fn fit_column_keeps_the_given_support_only() {
         let (theta, target) = samples();
         let support = DMatrix::from_column_slice(4, 1, &[true, false, true, false]);
-        let xi = Regression::new(&theta, &target).fit_on(&support, 1e-6);
-        assert_eq!((xi[(1, 0)], xi[(3, 0)]), (0.0, 0.0));
-        assert!((xi[(0, 0)] - 2.0).abs() < 0.1);
+        let xi = Regression::new(&theta, &target).fit_column(0, &support, 1e-6);
+        assert_eq!((xi[1], xi[3]), (0.0, 0.0));
+        assert!((xi[0] - 2.0).abs() < 0.1);
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub fn windowed_samples(
     if window == 0 {
         let (variables, target) = Latent::regression_samples(dataset, latent, phase);
         return (
-            features.evaluate(variables.as_view(), &mut FeatureValues::default()),
+            features.evaluate(&variables, &mut FeatureValues::default()),
             target,
         );
     }
@@ -67,17 +67,10 @@ impl Span {
         range: std::ops::Range<usize>,
         features: &Features,
     ) -> Self {
-        let (start, n, d) = (range.start, range.len(), features.latent_dim());
-        let mut variables = DMatrix::zeros(3 * d, n);
-        for (block, source) in [&latent.z, &latent.dz, &latent.u_lat]
-            .into_iter()
-            .enumerate()
-        {
-            variables
-                .rows_mut(block * d, d)
-                .copy_from(&source.columns(start, n));
-        }
-        let theta = features.evaluate(variables.as_view(), &mut FeatureValues::default());
+        let (start, n) = (range.start, range.len());
+        let mut variables = DMatrix::zeros(n, 3 * features.latent_dim());
+        latent.copy_variables(range.clone(), &mut variables.rows_mut(0, n));
+        let theta = features.evaluate(&variables, &mut FeatureValues::default());
         let (mut once, mut twice) = (
             DMatrix::zeros(n, theta.ncols()),
             DMatrix::zeros(n, theta.ncols()),
