@@ -5,6 +5,8 @@ use std::fmt;
 use crate::backend::typeset::{Decimal, GREEK, Glyph, Math, Signed, Symbol};
 
 const INVISIBLE_TIMES: &str = "<mo>\u{2062}</mo>";
+/// What TeX puts before a function's name.
+const THIN_SPACE: &str = r#"<mspace width="0.167em"/>"#;
 const APPLY: &str = "<mo>\u{2061}</mo>";
 const MINUS: &str = "\u{2212}";
 
@@ -44,6 +46,9 @@ impl fmt::Display for Mathml<'_> {
                     let after_dot = place > 0 && factors[place - 1] == Math::Dot;
                     if place > 0 && !after_dot && *factor != Math::Dot {
                         f.write_str(INVISIBLE_TIMES)?;
+                        if matches!(factor, Math::Function(..)) {
+                            f.write_str(THIN_SPACE)?;
+                        }
                     }
                     Mathml(factor).fmt(f)?;
                 }
@@ -61,9 +66,15 @@ impl fmt::Display for Mathml<'_> {
                     Mathml(bottom)
                 )
             }
-            Math::Power(base, exponent) => {
-                write!(f, "<msup>{}{}</msup>", Mathml(base), Mathml(exponent))
-            }
+            Math::Power(base, exponent) => match &**base {
+                // Both scripts stand above each other.
+                Math::Symbol(symbol) if !symbol.subscript.is_empty() => {
+                    let (base, subscript) = (accented(symbol), subscript(symbol));
+                    let exponent = Mathml(exponent);
+                    write!(f, "<msubsup>{base}{subscript}{exponent}</msubsup>")
+                }
+                base => write!(f, "<msup>{}{}</msup>", Mathml(base), Mathml(exponent)),
+            },
             Math::Root(inner, None) => write!(f, "<msqrt>{}</msqrt>", Mathml(inner)),
             Math::Root(inner, Some(index)) => {
                 write!(f, "<mroot>{}<mn>{index}</mn></mroot>", Mathml(inner))
@@ -125,26 +136,34 @@ impl fmt::Display for MathmlNumber<'_> {
 
 impl fmt::Display for MathmlSymbol<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let glyph = element(&self.0.glyph);
-        let accent = match self.0.dots {
-            0 => None,
-            1 => Some('\u{2D9}'),
-            2 => Some('\u{A8}'),
-            _ => Some('\u{20DB}'),
-        };
-        let base = match accent {
-            None => glyph,
-            Some(dots) => format!(r#"<mover accent="true">{glyph}<mo>{dots}</mo></mover>"#),
-        };
-        let parts: Vec<String> = self.0.subscript.iter().map(element).collect();
-        match parts.as_slice() {
-            [] => f.write_str(&base),
-            [one] => write!(f, "<msub>{base}{one}</msub>"),
-            several => {
-                let list = several.join("<mo>,</mo>");
-                write!(f, "<msub>{base}<mrow>{list}</mrow></msub>")
-            }
+        let base = accented(self.0);
+        if self.0.subscript.is_empty() {
+            f.write_str(&base)
+        } else {
+            write!(f, "<msub>{base}{}</msub>", subscript(self.0))
         }
+    }
+}
+
+/// The glyph of a symbol with its dots.
+fn accented(symbol: &Symbol) -> String {
+    let glyph = element(&symbol.glyph);
+    let dots = match symbol.dots {
+        0 => return glyph,
+        1 => '\u{2D9}',
+        2 => '\u{A8}',
+        _ => '\u{20DB}',
+    };
+    // Without `accent`: Chromium would set an accent's dots onto the letter.
+    format!("<mover>{glyph}<mo>{dots}</mo></mover>")
+}
+
+/// The subscript of a symbol as one element.
+fn subscript(symbol: &Symbol) -> String {
+    let parts: Vec<String> = symbol.subscript.iter().map(element).collect();
+    match parts.as_slice() {
+        [one] => one.clone(),
+        several => format!("<mrow>{}</mrow>", several.join("<mo>,</mo>")),
     }
 }
 
@@ -159,8 +178,10 @@ fn element(glyph: &Glyph) -> String {
 }
 
 fn fenced(open: &str, close: &str, inner: &Math) -> String {
-    format!(
-        r#"<mrow><mo fence="true" form="prefix">{open}</mo>{}<mo fence="true" form="postfix">{close}</mo></mrow>"#,
-        Mathml(inner)
-    )
+    let stretchy = inner.is_tall();
+    let mark = |form: &str, text: &str| {
+        format!(r#"<mo fence="true" form="{form}" stretchy="{stretchy}">{text}</mo>"#)
+    };
+    let (open, close) = (mark("prefix", open), mark("postfix", close));
+    format!("<mrow>{open}{}{close}</mrow>", Mathml(inner))
 }
