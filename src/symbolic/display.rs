@@ -153,7 +153,8 @@ impl Printer<'_> {
         };
         let exponent = match number.as_rational() {
             Some((1, 1)) => return self.stack.push(self.factor_piece(base)),
-            Some((halves, 2)) => {
+            // `sqrt(0)` is zero, its negative powers are not.
+            Some((halves, 2)) if base != ExprId::ZERO => {
                 let root = [Piece::Text("sqrt("), Piece::Expr(base), Piece::Text(")")];
                 let mut pieces = Vec::from(root);
                 if halves != 1 {
@@ -242,6 +243,7 @@ mod tests {
         "(-2)^x",
         "0^-1",
         "0^-2*x",
+        "0^(-5/2)",
         "sqrt(-1)",
         "sqrt(-1)^-1",
         "10^400",

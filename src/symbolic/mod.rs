@@ -41,7 +41,12 @@ mod parse;
 mod poly;
 mod pool;
 mod power;
+mod rational;
+mod region;
+mod rules;
+mod simplify;
 mod substitute;
+mod trig;
 
 pub use display::Display;
 pub use expand::ExpandLimits;
@@ -52,3 +57,4 @@ pub use number::Number;
 pub use parse::{ParseError, ParseLimits};
 pub use poly::Polynomial;
 pub use pool::ExprPool;
+pub use simplify::SimplifyLimits;

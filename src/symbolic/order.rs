@@ -172,10 +172,11 @@ impl ExprPool {
                     .as_number(*exponent)
                     .and_then(Number::as_integer)
                     .and_then(|n| u32::try_from(n).ok())
-                    .filter(|_| self.as_symbol(*base).is_some());
-                match degree {
-                    Some(degree) => degree.min(NOT_POLYNOMIAL - 1),
-                    None => NOT_POLYNOMIAL + 1,
+                    .map(|degree| degree.min(NOT_POLYNOMIAL - 1));
+                match (degree, self.as_symbol(*base)) {
+                    (Some(degree), Some(_)) => degree,
+                    (Some(degree), None) => NOT_POLYNOMIAL | degree,
+                    (None, _) => NOT_POLYNOMIAL + 1,
                 }
             }
         }

@@ -1,0 +1,211 @@
+//! Quotients: common denominators and exact division.
+
+use std::collections::BTreeMap;
+
+use super::expand::Terms;
+use super::node::{ExprId, Node};
+use super::number::Number;
+use super::pool::ExprPool;
+
+/// Most steps of one polynomial division.
+const MAX_STEPS: usize = 2_000;
+
+/// Exact coefficients by the exponents of common bases.
+type Monomials = BTreeMap<Vec<i64>, Number>;
+
+impl ExprPool {
+    /// The terms of a sum over one common denominator, with the numerator multiplied out and
+    /// divided by parts of the denominator where that leaves no remainder:
+    /// `x/(x + y) + y/(x + y)` becomes `1`, `(x^2 - 1)/(x - 1)` becomes `1 + x`.
+    ///
+    /// Nothing changes unless a sum or a function occurs in a denominator.
+    pub fn together(&mut self, expr: ExprId) -> ExprId {
+        self.together_spending(expr, 10_000, &mut 100_000)
+    }
+
+    /// As [`together`](ExprPool::together), with limits as in expansions.
+    pub(super) fn together_spending(
+        &mut self,
+        expr: ExprId,
+        max_terms: usize,
+        budget: &mut usize,
+    ) -> ExprId {
+        let terms = self.terms_of(expr);
+        let mut denominators: Vec<(ExprId, Number)> = Vec::new();
+        for (_, rest) in &terms {
+            for (base, exponent) in self.denominators_of(*rest) {
+                match denominators.iter_mut().find(|(known, _)| *known == base) {
+                    Some((_, known)) => *known = (*known).max(exponent),
+                    None => denominators.push((base, exponent)),
+                }
+            }
+        }
+        let is_needed = |(base, _): &(ExprId, Number)| self.as_symbol(*base).is_none();
+        if !denominators.iter().any(is_needed) {
+            return expr;
+        }
+        let powers: Vec<ExprId> = denominators
+            .iter()
+            .map(|(base, exponent)| self.pow_number(*base, *exponent))
+            .collect();
+        let mut numerators = Vec::with_capacity(terms.len());
+        for (coefficient, rest) in terms {
+            let mut factors = powers.clone();
+            factors.push(rest);
+            let numerator = self.product(&factors);
+            let numerator = self.scale(coefficient, numerator);
+            numerators.push(self.expand_node(numerator, max_terms, budget));
+        }
+        let numerator = self.sum(&numerators);
+        self.cancel(numerator, &denominators)
+    }
+
+    /// Bases with negative integer exponents in a term, and the magnitudes of these.
+    fn denominators_of(&self, rest: ExprId) -> Vec<(ExprId, Number)> {
+        self.numeric_powers(rest)
+            .into_iter()
+            .filter(|(_, exponent)| exponent.is_negative() && exponent.as_integer().is_some())
+            .map(|(base, exponent)| (base, -exponent))
+            .collect()
+    }
+
+    /// `numerator / denominators` with exact divisions carried out.
+    fn cancel(&mut self, numerator: ExprId, denominators: &[(ExprId, Number)]) -> ExprId {
+        let mut numerator = numerator;
+        let mut factors = Vec::new();
+        for &(base, exponent) in denominators {
+            let mut left = exponent;
+            while !left.is_zero() && matches!(self.node(base), Node::Sum(_)) {
+                let Some(quotient) = self.divide_exactly(numerator, base) else {
+                    break;
+                };
+                numerator = quotient;
+                left = left.checked_add(Number::MINUS_ONE).unwrap_or(Number::ZERO);
+            }
+            factors.push(self.pow_number(base, -left));
+        }
+        factors.push(numerator);
+        self.product(&factors)
+    }
+
+    /// `dividend / divisor` if both are sums of products with exact coefficients and positive
+    /// integer powers, and the division leaves no remainder.
+    pub fn divide_exactly(&mut self, dividend: ExprId, divisor: ExprId) -> Option<ExprId> {
+        let (dividend, divisor) = (self.terms_of(dividend), self.terms_of(divisor));
+        let mut bases: Vec<ExprId> = Vec::new();
+        for (_, rest) in dividend.iter().chain(&divisor) {
+            bases.extend(self.numeric_powers(*rest).into_iter().map(|(base, _)| base));
+        }
+        bases.sort_by(|a, b| self.compare(*a, *b));
+        bases.dedup();
+        let mut remainder = self.monomials(&dividend, &bases)?;
+        let divisor = self.monomials(&divisor, &bases)?;
+        let (leading, leading_coefficient) = divisor.last_key_value()?;
+        let mut quotient = Monomials::new();
+        for _ in 0..MAX_STEPS {
+            let Some((exponents, coefficient)) = remainder.last_key_value() else {
+                return Some(self.from_monomials(&quotient, &bases));
+            };
+            let step: Vec<i64> = exponents.iter().zip(leading).map(|(a, b)| a - b).collect();
+            if step.iter().any(|exponent| *exponent < 0) {
+                return None;
+            }
+            let factor = coefficient.checked_div(*leading_coefficient)?;
+            for (exponents, coefficient) in &divisor {
+                let place: Vec<i64> = exponents.iter().zip(&step).map(|(a, b)| a + b).collect();
+                let product = coefficient.checked_mul(factor)?;
+                let entry = remainder.entry(place.clone()).or_insert(Number::ZERO);
+                *entry = entry.checked_add(-product).filter(|sum| sum.is_exact())?;
+                if entry.is_zero() {
+                    remainder.remove(&place);
+                }
+            }
+            quotient.insert(step, factor);
+        }
+        None
+    }
+
+    /// Terms by exponents; `None` for floats, numeric roots and powers that are not positive
+    /// integers.
+    fn monomials(&self, terms: &Terms, bases: &[ExprId]) -> Option<Monomials> {
+        let mut monomials = Monomials::new();
+        for (coefficient, rest) in terms {
+            let powers = self.numeric_powers(*rest);
+            let n_factors = self
+                .factors_of(*rest)
+                .iter()
+                .filter(|f| **f != ExprId::ONE)
+                .count();
+            if !coefficient.is_exact() || powers.len() != n_factors {
+                return None;
+            }
+            let mut exponents = vec![0; bases.len()];
+            for (base, exponent) in powers {
+                let place = bases.iter().position(|known| *known == base)?;
+                exponents[place] = exponent.as_integer().filter(|exponent| *exponent > 0)?;
+            }
+            monomials.insert(exponents, *coefficient);
+        }
+        Some(monomials)
+    }
+
+    fn from_monomials(&mut self, monomials: &Monomials, bases: &[ExprId]) -> ExprId {
+        let mut terms = Vec::with_capacity(monomials.len());
+        for (exponents, coefficient) in monomials {
+            let powers: Vec<ExprId> = bases
+                .iter()
+                .zip(exponents)
+                .map(|(base, exponent)| self.pow_number(*base, Number::integer(*exponent)))
+                .collect();
+            let product = self.product(&powers);
+            terms.push(self.scale(*coefficient, product));
+        }
+        self.sum(&terms)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn together(text: &str) -> String {
+        let mut pool = ExprPool::new();
+        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let result = pool.together(expr);
+        pool.display(result).to_string()
+    }
+
+    #[test]
+    fn together_finds_the_common_denominator_and_cancels() {
+        assert_eq!(together("x/(x + y) + y/(x + y)"), "1");
+        assert_eq!(together("(x^2 - 1)/(x - 1)"), "1 + x");
+        assert_eq!(together("1/(x + 1) - 1/(x + 2)"), "1/((1 + x)*(2 + x))");
+        assert_eq!(together("1/x - 1/(x*(x + 1))"), "1/(1 + x)");
+        assert_eq!(
+            together("(x^3 - y^3)/(x - y)^2"),
+            "(x^2 + x*y + y^2)/(x - y)"
+        );
+    }
+
+    #[test]
+    fn together_without_sums_in_denominators_changes_nothing() {
+        assert_eq!(together("1/x + 1/y"), "1/x + 1/y");
+        assert_eq!(together("x + y"), "x + y");
+    }
+
+    #[test]
+    fn divide_exactly_refuses_remainders_and_floats() {
+        let mut pool = ExprPool::new();
+        let mut divide = |a: &str, b: &str| {
+            let a = pool.parse(a, &|_| true).expect("test text parses");
+            let b = pool.parse(b, &|_| true).expect("test text parses");
+            pool.divide_exactly(a, b)
+                .map(|quotient| pool.display(quotient).to_string())
+        };
+        assert_eq!(divide("x^2 + 2*x*y + y^2", "x + y"), Some("x + y".into()));
+        assert_eq!(divide("2*x + 2", "3*x + 3"), Some("2/3".into()));
+        assert_eq!(divide("x^2 + 1", "x + 1"), None);
+        assert_eq!(divide("0.5*x^2 - 0.5", "x - 1"), None);
+        assert_eq!(divide("1/x - x", "1 - x"), None);
+    }
+}

@@ -1,0 +1,155 @@
+//! Rewriting level by level: sums, products and integer powers on one side, what is inside
+//! functions and other powers on the other.
+//!
+//! A *region* is what can be reached from an expression through sums, products and integer powers.
+//! Function calls and other powers are its atoms; their arguments are regions of their own.
+
+use std::collections::HashMap;
+
+use super::intern::BuildIdHasher;
+use super::node::{ExprId, Function, Node};
+use super::number::Number;
+use super::order::Exponent;
+use super::pool::ExprPool;
+
+/// Results by expression.
+type Memo = HashMap<ExprId, ExprId, BuildIdHasher>;
+
+impl ExprPool {
+    /// Rebuilds `expr` bottom-up within its region, passing every new node through `rule`.
+    pub(super) fn rewrite_region(
+        &mut self,
+        expr: ExprId,
+        mut rule: impl FnMut(&mut ExprPool, ExprId) -> ExprId,
+    ) -> ExprId {
+        let mut rewritten = Memo::default();
+        for node in self.region(expr) {
+            let rebuilt = if self.is_atom(node) {
+                node
+            } else {
+                self.rebuild(node, |child| *rewritten.get(&child).unwrap_or(&child))
+            };
+            let result = rule(self, rebuilt);
+            rewritten.insert(node, result);
+        }
+        rewritten[&expr]
+    }
+
+    /// Passes every region through `finish`, innermost first, and puts the results together.
+    pub(super) fn map_regions(
+        &mut self,
+        expr: ExprId,
+        mut finish: impl FnMut(&mut ExprPool, ExprId) -> ExprId,
+    ) -> ExprId {
+        let mut rebuilt = Memo::default();
+        let mut finished = Memo::default();
+        for node in self.reachable(&[expr]) {
+            let is_atom = self.is_atom(node);
+            if is_atom {
+                for child in self.children(node).collect::<Vec<_>>() {
+                    if !finished.contains_key(&child) {
+                        let result = finish(self, rebuilt[&child]);
+                        finished.insert(child, result);
+                    }
+                }
+            }
+            let operands = if is_atom { &finished } else { &rebuilt };
+            let result = self.rebuild(node, |child| operands[&child]);
+            rebuilt.insert(node, result);
+        }
+        finish(self, rebuilt[&expr])
+    }
+
+    /// All nodes of the region of `expr`, operands first.
+    fn region(&self, expr: ExprId) -> Vec<ExprId> {
+        let mut seen = std::collections::HashSet::with_hasher(BuildIdHasher::default());
+        let mut found = Vec::new();
+        let mut stack = vec![expr];
+        while let Some(node) = stack.pop() {
+            if seen.insert(node) {
+                found.push(node);
+                if !self.is_atom(node) {
+                    stack.extend(self.children(node));
+                }
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+
+    /// The function calls and other powers of the region of `expr`, in order of creation.
+    pub(super) fn atoms_of(&self, expr: ExprId) -> Vec<ExprId> {
+        let mut atoms = self.region(expr);
+        atoms.retain(|node| self.is_atom(*node));
+        atoms
+    }
+
+    /// Whether the operands of a node are regions of their own.
+    fn is_atom(&self, expr: ExprId) -> bool {
+        match *self.node(expr) {
+            Node::Apply(..) => true,
+            Node::Power(_, exponent) => self
+                .as_number(exponent)
+                .and_then(Number::as_integer)
+                .is_none(),
+            Node::Number(_) | Node::Symbol(_) | Node::Sum(_) | Node::Product(_) => false,
+        }
+    }
+
+    /// A factor as an integer power of a function call: `sin(x)^2` is `(Sin, x, 2)`.
+    pub(super) fn function_power(&self, factor: ExprId) -> Option<(Function, ExprId, i64)> {
+        let (base, exponent) = self.base_and_exponent(factor);
+        match (self.node(base), exponent) {
+            (Node::Apply(function, argument), Exponent::Number(number)) => {
+                Some((*function, *argument, number.as_integer()?))
+            }
+            _ => None,
+        }
+    }
+
+    /// `function(argument)^exponent`.
+    pub(super) fn apply_power(
+        &mut self,
+        function: Function,
+        argument: ExprId,
+        exponent: i64,
+    ) -> ExprId {
+        let value = self.apply(function, argument);
+        self.pow_number(value, Number::integer(exponent))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rewrite_region_stops_at_functions_and_roots() {
+        let mut pool = ExprPool::new();
+        let expr = pool
+            .parse("x + (x + y)^2*sin(x) + x^0.3", &|_| true)
+            .expect("test text parses");
+        let (x, z) = (pool.symbol("x"), pool.symbol("z"));
+        let result = pool.rewrite_region(expr, |_, node| if node == x { z } else { node });
+        let expected = pool
+            .parse("z + (z + y)^2*sin(x) + x^0.3", &|_| true)
+            .expect("test text parses");
+        assert_eq!(result, expected);
+    }
+
+    #[test]
+    fn map_regions_finishes_every_region_once_from_the_inside() {
+        let mut pool = ExprPool::new();
+        let expr = pool
+            .parse("sin(x + y)*cos(x + y) + exp(sin(x + y))", &|_| true)
+            .expect("test text parses");
+        let mut seen = Vec::new();
+        let result = pool.map_regions(expr, |pool, region| {
+            seen.push(pool.display(region).to_string());
+            region
+        });
+        assert_eq!(result, expr);
+        assert_eq!(seen[..2], ["x + y", "sin(x + y)"]);
+        assert_eq!(seen.len(), 3);
+    }
+}

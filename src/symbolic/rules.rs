@@ -1,0 +1,358 @@
+//! Identities of exponentials, logarithms, magnitudes, roots and tangents.
+//!
+//! Rules come in two directions: towards a normal form in which equal expressions coincide, and
+//! towards fewer function calls. Each is an identity wherever its left side has a value:
+//!
+//! | normal form | |
+//! |---|---|
+//! | `exp(a)*exp(b)`, `exp(a)^n` | `exp(a + b)`, `exp(n*a)` |
+//! | `log(a^n)`, `log(exp(a)*b)` | `n*log(a)` (`n*log(abs(a))` for even `n`), `a + log(b)` |
+//! | `n*log(a) + m*log(b)` | `log(a^n*b^m)` for small integers `n`, `m` up to a common factor |
+//! | `abs(a*b)`, `abs(a)^2`, `abs(a)*sign(a)` | `abs(a)*abs(b)`, `a^2`, `a` |
+//! | `sign(a)*a`, `sign(a)^3` | `abs(a)`, `sign(a)` |
+//! | `sqrt(a)*sqrt(b)` | `sqrt(a*b)` |
+//!
+//! | fewer calls | |
+//! |---|---|
+//! | `sin(a)/cos(a)` | `tan(a)` |
+//! | `abs(a)*abs(b)` | `abs(a*b)` |
+
+use super::node::{ExprId, Function, Node};
+use super::number::Number;
+use super::order::Exponent;
+use super::pool::ExprPool;
+
+/// Largest power that merging logarithms may create.
+const MAX_LOG_POWER: i64 = 4;
+
+impl ExprPool {
+    /// One node rewritten towards the normal form.
+    pub(super) fn normal_rules(&mut self, expr: ExprId) -> ExprId {
+        match *self.node(expr) {
+            Node::Apply(Function::Log, argument) => self.split_log(argument).unwrap_or(expr),
+            Node::Apply(Function::Abs, argument) => self.split_abs(argument).unwrap_or(expr),
+            Node::Product(_) | Node::Power(..) => {
+                let expr = self.merge_exponentials(expr);
+                let expr = self.merge_signs(expr);
+                self.merge_roots(expr)
+            }
+            Node::Sum(_) => self.merge_logs(expr),
+            Node::Number(_) | Node::Symbol(_) | Node::Apply(..) => expr,
+        }
+    }
+
+    /// One node rewritten towards fewer function calls.
+    pub(super) fn compact_rules(&mut self, expr: ExprId) -> ExprId {
+        match self.node(expr) {
+            Node::Product(_) => {
+                let expr = self.merge_tangents(expr);
+                self.merge_abs(expr)
+            }
+            Node::Number(_)
+            | Node::Symbol(_)
+            | Node::Sum(_)
+            | Node::Power(..)
+            | Node::Apply(..) => expr,
+        }
+    }
+
+    fn split_log(&mut self, argument: ExprId) -> Option<ExprId> {
+        if let (base, Exponent::Number(exponent)) = self.base_and_exponent(argument)
+            && !exponent.is_one()
+            && self.as_number(base).is_none()
+        {
+            let base = if exponent.is_even() {
+                self.apply(Function::Abs, base)
+            } else {
+                base
+            };
+            let log = self.apply(Function::Log, base);
+            return Some(self.scale(exponent, log));
+        }
+        let factors = self.factors_of(argument).to_vec();
+        let mut outside = Vec::new();
+        let mut inside = Vec::new();
+        for factor in factors {
+            match self.function_power(factor) {
+                Some((Function::Exp, exponent, power)) => {
+                    outside.push(self.scale(Number::integer(power), exponent));
+                }
+                _ => inside.push(factor),
+            }
+        }
+        if outside.is_empty() {
+            return None;
+        }
+        let inside = self.product(&inside);
+        outside.push(self.apply(Function::Log, inside));
+        Some(self.sum(&outside))
+    }
+
+    fn split_abs(&mut self, argument: ExprId) -> Option<ExprId> {
+        if !matches!(self.node(argument), Node::Product(_) | Node::Power(..)) {
+            return None;
+        }
+        let factors = self.factors_of(argument).to_vec();
+        let mut parts = Vec::with_capacity(factors.len());
+        for factor in factors {
+            let part = match self.base_and_exponent(factor) {
+                (base, Exponent::Number(exponent)) if exponent.as_integer().is_some() => {
+                    let magnitude = self.apply(Function::Abs, base);
+                    self.pow_number(magnitude, exponent)
+                }
+                _ => self.apply(Function::Abs, factor),
+            };
+            parts.push(part);
+        }
+        let product = self.product(&parts);
+        let whole = self.intern(Node::Apply(Function::Abs, argument));
+        (product != whole).then_some(product)
+    }
+
+    fn merge_exponentials(&mut self, expr: ExprId) -> ExprId {
+        let mut exponents = Vec::new();
+        let mut others = Vec::new();
+        let mut n_merged = 0;
+        for factor in self.factors_of(expr).to_vec() {
+            match self.function_power(factor) {
+                Some((Function::Exp, argument, power)) => {
+                    n_merged += if power == 1 { 1 } else { 2 };
+                    exponents.push(self.scale(Number::integer(power), argument));
+                }
+                _ => others.push(factor),
+            }
+        }
+        if n_merged < 2 {
+            return expr;
+        }
+        let exponent = self.sum(&exponents);
+        others.push(self.apply(Function::Exp, exponent));
+        self.product(&others)
+    }
+
+    fn merge_signs(&mut self, expr: ExprId) -> ExprId {
+        let factors = self.factors_of(expr).to_vec();
+        for (place, &factor) in factors.iter().enumerate() {
+            let mut rest = factors.clone();
+            match self.function_power(factor) {
+                Some((Function::Abs, argument, power)) if !(0..2).contains(&power) => {
+                    let even = power - power.rem_euclid(2);
+                    rest[place] = self.apply_power(Function::Abs, argument, power - even);
+                    rest.push(self.pow_number(argument, Number::integer(even)));
+                }
+                Some((Function::Sign, argument, power)) if power > 0 => {
+                    if power > 2 {
+                        let lower = 2 - power % 2;
+                        rest[place] = self.apply_power(Function::Sign, argument, lower);
+                    } else if let Some(partner) = self.partner_of_sign(&factors, argument) {
+                        let (base, with_sign) = partner;
+                        let lower = self.powi(base, -1);
+                        rest[place] = self.apply_power(Function::Sign, argument, power - 1);
+                        rest.extend([lower, with_sign]);
+                    } else {
+                        continue;
+                    }
+                }
+                _ => continue,
+            }
+            return self.product(&rest);
+        }
+        expr
+    }
+
+    /// What loses a factor and what takes its place when `sign(argument)` is multiplied in:
+    /// `x` becomes `abs(x)`, `abs(x)` becomes `x`.
+    fn partner_of_sign(
+        &mut self,
+        factors: &[ExprId],
+        argument: ExprId,
+    ) -> Option<(ExprId, ExprId)> {
+        let magnitude = self.apply(Function::Abs, argument);
+        for (base, other) in [(magnitude, argument), (argument, magnitude)] {
+            let occurs = factors.iter().any(|factor| {
+                let (found, exponent) = self.base_and_exponent(*factor);
+                let exponent = match exponent {
+                    Exponent::Number(number) => number.as_integer(),
+                    Exponent::Expr(_) => None,
+                };
+                found == base && exponent.is_some_and(|exponent| exponent > 0)
+            });
+            if occurs {
+                return Some((base, other));
+            }
+        }
+        None
+    }
+
+    fn merge_roots(&mut self, expr: ExprId) -> ExprId {
+        let mut inside = Vec::new();
+        let mut outside = Vec::new();
+        for factor in self.factors_of(expr).to_vec() {
+            match self.base_and_exponent(factor) {
+                (base, Exponent::Number(exponent))
+                    if matches!(exponent.as_rational(), Some((_, 2)))
+                        && self.as_number(base).is_none() =>
+                {
+                    inside.push(base);
+                    let whole = exponent.checked_add(-Number::HALF).unwrap_or(Number::ZERO);
+                    outside.push(self.pow_number(base, whole));
+                }
+                _ => outside.push(factor),
+            }
+        }
+        if inside.len() < 2 {
+            return expr;
+        }
+        let radicand = self.product(&inside);
+        outside.push(self.pow_number(radicand, Number::HALF));
+        self.product(&outside)
+    }
+
+    fn merge_tangents(&mut self, expr: ExprId) -> ExprId {
+        let factors = self.factors_of(expr).to_vec();
+        for &factor in &factors {
+            let Some((Function::Cos, argument, cosines)) = self.function_power(factor) else {
+                continue;
+            };
+            let sines = factors
+                .iter()
+                .filter_map(|factor| self.function_power(*factor))
+                .find(|(function, angle, _)| (*function, *angle) == (Function::Sin, argument))
+                .map_or(0, |(_, _, power)| power);
+            if sines.signum() * cosines.signum() >= 0 {
+                continue;
+            }
+            let tangents = sines.signum() * sines.abs().min(cosines.abs());
+            let mut merged = factors.clone();
+            merged.push(self.apply_power(Function::Tan, argument, tangents));
+            merged.push(self.apply_power(Function::Sin, argument, -tangents));
+            merged.push(self.apply_power(Function::Cos, argument, tangents));
+            return self.product(&merged);
+        }
+        expr
+    }
+
+    fn merge_abs(&mut self, expr: ExprId) -> ExprId {
+        let mut inside = Vec::new();
+        let mut outside = Vec::new();
+        for factor in self.factors_of(expr).to_vec() {
+            match self.function_power(factor) {
+                Some((Function::Abs, argument, 1)) => inside.push(argument),
+                _ => outside.push(factor),
+            }
+        }
+        if inside.len() < 2 {
+            return expr;
+        }
+        let product = self.product(&inside);
+        outside.push(self.apply(Function::Abs, product));
+        self.product(&outside)
+    }
+
+    /// Adds logarithms that have the same cofactor and coefficients in small integer ratios.
+    fn merge_logs(&mut self, expr: ExprId) -> ExprId {
+        let terms = self.terms_of(expr);
+        let mut logs: Vec<(ExprId, Number, ExprId)> = Vec::new();
+        let mut others = Vec::new();
+        for (coefficient, rest) in terms {
+            match self.as_log_term(rest) {
+                Some((cofactor, argument)) => logs.push((cofactor, coefficient, argument)),
+                None => others.push((coefficient, rest)),
+            }
+        }
+        if logs.len() < 2 {
+            return expr;
+        }
+        logs.sort_by_key(|(cofactor, coefficient, _)| (*cofactor, coefficient.abs()));
+        let mut parts = vec![self.sum_of_terms(others)];
+        for group in logs.chunk_by(|a, b| a.0 == b.0) {
+            let (cofactor, unit) = (group[0].0, group[0].1.abs());
+            let mut arguments = Vec::new();
+            for &(_, coefficient, argument) in group {
+                let ratio = coefficient.checked_div(unit).and_then(Number::as_integer);
+                match ratio.filter(|ratio| ratio.abs() <= MAX_LOG_POWER) {
+                    Some(ratio) => {
+                        arguments.push(self.pow_number(argument, Number::integer(ratio)));
+                    }
+                    None => {
+                        let log = self.apply(Function::Log, argument);
+                        let term = self.product(&[cofactor, log]);
+                        parts.push(self.scale(coefficient, term));
+                    }
+                }
+            }
+            let product = self.product(&arguments);
+            let log = self.apply(Function::Log, product);
+            let term = self.product(&[cofactor, log]);
+            parts.push(self.scale(unit, term));
+        }
+        self.sum(&parts)
+    }
+
+    /// A term with exactly one logarithm, as cofactor and argument.
+    fn as_log_term(&mut self, rest: ExprId) -> Option<(ExprId, ExprId)> {
+        let mut cofactors = Vec::new();
+        let mut found = None;
+        for factor in self.factors_of(rest).to_vec() {
+            match *self.node(factor) {
+                Node::Apply(Function::Log, argument) if found.is_none() => found = Some(argument),
+                Node::Apply(Function::Log, _) => return None,
+                _ => cofactors.push(factor),
+            }
+        }
+        let argument = found?;
+        Some((self.product(&cofactors), argument))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rewritten(text: &str, rule: fn(&mut ExprPool, ExprId) -> ExprId) -> String {
+        let mut pool = ExprPool::new();
+        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let result = pool.rewrite_region(expr, rule);
+        pool.display(result).to_string()
+    }
+
+    #[test]
+    fn normal_rules_rewrite_each_left_side() {
+        for (text, expected) in [
+            ("exp(a)*exp(b)", "exp(a + b)"),
+            ("exp(a)^3", "exp(3*a)"),
+            ("exp(a)/exp(a + 1)", "exp(-1)"),
+            ("log(a^3)", "3*log(a)"),
+            ("log(a^2)", "2*log(abs(a))"),
+            ("log(b*exp(2*a))", "2*a + log(b)"),
+            ("log(sqrt(a))", "1/2*log(a)"),
+            ("log(a) + log(b)", "log(a*b)"),
+            ("0.3*c*log(a) - 0.3*c*log(b)", "0.3*c*log(a/b)"),
+            ("log(a) - 2*log(b) + c", "c + log(a/b^2)"),
+            ("log(a) + 9*log(b)", "log(a) + 9*log(b)"),
+            ("abs(a*b)", "abs(a)*abs(b)"),
+            ("abs(a)^3", "a^2*abs(a)"),
+            ("abs(a)*sign(a)", "a"),
+            ("a^2*sign(a)", "a*abs(a)"),
+            ("sign(a)^5", "sign(a)"),
+            ("sign(a)^2", "sign(a)^2"),
+            ("sqrt(a)*sqrt(b)", "sqrt(a*b)"),
+            ("sqrt(a)^3/sqrt(b)", "a*sqrt(a*b)/b"),
+        ] {
+            assert_eq!(rewritten(text, ExprPool::normal_rules), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn compact_rules_save_calls() {
+        for (text, expected) in [
+            ("sin(a)/cos(a)", "tan(a)"),
+            ("sin(a)^2/cos(a)^3*b", "b*tan(a)^2/cos(a)"),
+            ("cos(a)/sin(a)", "1/tan(a)"),
+            ("sin(a)*cos(a)", "sin(a)*cos(a)"),
+            ("abs(a)*abs(b)*c", "c*abs(a*b)"),
+        ] {
+            assert_eq!(rewritten(text, ExprPool::compact_rules), expected, "{text}");
+        }
+    }
+}

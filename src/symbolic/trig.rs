@@ -1,0 +1,357 @@
+//! Trigonometric identities, each in the direction it is asked for.
+//!
+//! | method | rewrites |
+//! |---|---|
+//! | [`expand_angles`](ExprPool::expand_angles) | `sin(x + y)`, `cos(2*x)`, `tan(x)` into sines and cosines of single angles |
+//! | [`sines_to_cosines`](ExprPool::sines_to_cosines) | `sin(x)^2` into `1 - cos(x)^2` |
+//! | [`cosines_to_sines`](ExprPool::cosines_to_sines) | `cos(x)^2` into `1 - sin(x)^2` |
+//! | [`combine_angles`](ExprPool::combine_angles) | products into sums: `2*sin(x)*cos(x)` into `sin(2*x)` |
+//! | [`amplitude_phase`](ExprPool::amplitude_phase) | `a*sin(x) + b*cos(x)` into `c*sin(x + p)` |
+//!
+//! All work on the outermost level (sums, products and integer powers), not inside arguments.
+
+use std::collections::BTreeMap;
+
+use super::node::{ExprId, Function, Node};
+use super::number::Number;
+use super::pool::ExprPool;
+
+/// Largest multiple of an angle, and most angles in one argument, that are expanded.
+const MAX_MULTIPLE: i64 = 6;
+/// Most sines and cosines multiplied in one term that are combined.
+const MAX_TRIG_DEGREE: i64 = 8;
+/// Limits of intermediate expansions; larger ones stay as they are.
+const MAX_TERMS: usize = 500;
+
+/// The unit in which multiples of an angle are counted, by what stands beside the coefficient.
+type Units = BTreeMap<ExprId, Number>;
+
+impl ExprPool {
+    /// `expr` with sines, cosines and tangents of sums and of exact multiples of a common angle
+    /// written with those of the single angles. Results are not multiplied out further.
+    pub fn expand_angles(&mut self, expr: ExprId) -> ExprId {
+        let expr = self.rewrite_region(expr, |pool, node| match *pool.node(node) {
+            Node::Apply(Function::Tan, argument) => {
+                let sine = pool.apply(Function::Sin, argument);
+                let cosine = pool.apply_power(Function::Cos, argument, -1);
+                pool.product(&[sine, cosine])
+            }
+            _ => node,
+        });
+        let mut units = Units::new();
+        for atom in self.atoms_of(expr) {
+            if let Node::Apply(Function::Sin | Function::Cos, argument) = *self.node(atom) {
+                for (coefficient, rest) in self.terms_of(argument) {
+                    note_unit(&mut units, coefficient, rest);
+                }
+            }
+        }
+        self.rewrite_region(expr, |pool, node| match *pool.node(node) {
+            Node::Apply(Function::Sin, argument) => match pool.sine_and_cosine(argument, &units) {
+                Some((sine, _)) => sine,
+                None => node,
+            },
+            Node::Apply(Function::Cos, argument) => match pool.sine_and_cosine(argument, &units) {
+                Some((_, cosine)) => cosine,
+                None => node,
+            },
+            _ => node,
+        })
+    }
+
+    /// Sine and cosine of a sum of multiples of units; `None` if there are too many.
+    fn sine_and_cosine(&mut self, argument: ExprId, units: &Units) -> Option<(ExprId, ExprId)> {
+        let terms = self.terms_of(argument);
+        let multiples: Option<Vec<(Number, ExprId, i64)>> = terms
+            .into_iter()
+            .map(|(coefficient, rest)| match units.get(&rest) {
+                Some(unit) if coefficient.is_exact() => {
+                    let multiple = coefficient.checked_div(*unit)?.as_integer()?;
+                    Some((*unit, rest, multiple))
+                }
+                _ if coefficient.is_negative() => Some((-coefficient, rest, -1)),
+                _ => Some((coefficient, rest, 1)),
+            })
+            .collect();
+        let multiples = multiples?;
+        let total: i64 = multiples.iter().try_fold(0_i64, |sum, (_, _, multiple)| {
+            sum.checked_add(multiple.checked_abs()?)
+        })?;
+        if total > MAX_MULTIPLE {
+            return None;
+        }
+        let (mut sine, mut cosine) = (ExprId::ZERO, ExprId::ONE);
+        for (unit, rest, multiple) in multiples {
+            let angle = self.scale(unit, rest);
+            let unit_sine = self.apply(Function::Sin, angle);
+            let unit_sine = if multiple < 0 {
+                self.neg(unit_sine)
+            } else {
+                unit_sine
+            };
+            let unit_cosine = self.apply(Function::Cos, angle);
+            for _ in 0..multiple.abs() {
+                // sin(a + b) = sin a cos b + cos a sin b; cos(a + b) = cos a cos b - sin a sin b.
+                let parts = [
+                    self.expanded_product(sine, unit_cosine),
+                    self.expanded_product(cosine, unit_sine),
+                    self.expanded_product(cosine, unit_cosine),
+                    self.expanded_product(sine, unit_sine),
+                ];
+                sine = self.add(parts[0], parts[1]);
+                cosine = self.sub(parts[2], parts[3]);
+            }
+        }
+        Some((sine, cosine))
+    }
+
+    fn expanded_product(&mut self, a: ExprId, b: ExprId) -> ExprId {
+        let product = self.mul(a, b);
+        self.expand_node(product, MAX_TERMS, &mut MAX_TERMS.clone())
+    }
+
+    /// `expr` with every power of a sine reduced to the first by `sin(x)^2 = 1 - cos(x)^2`, also
+    /// in denominators (`1/sin(x) = sin(x)/(1 - cos(x)^2)`). Not multiplied out.
+    pub fn sines_to_cosines(&mut self, expr: ExprId) -> ExprId {
+        self.reduce_powers(expr, Function::Sin, Function::Cos)
+    }
+
+    /// As [`sines_to_cosines`](ExprPool::sines_to_cosines) with the functions exchanged.
+    pub fn cosines_to_sines(&mut self, expr: ExprId) -> ExprId {
+        self.reduce_powers(expr, Function::Cos, Function::Sin)
+    }
+
+    fn reduce_powers(&mut self, expr: ExprId, from: Function, to: Function) -> ExprId {
+        self.rewrite_region(expr, |pool, node| {
+            // Single factors of products were visited before the product.
+            if matches!(pool.node(node), Node::Product(_) | Node::Sum(_)) {
+                return node;
+            }
+            let Some((function, argument, exponent)) = pool.function_power(node) else {
+                return node;
+            };
+            if function != from || (0..2).contains(&exponent) {
+                return node;
+            }
+            let other_square = pool.apply_power(to, argument, 2);
+            let square = pool.sub(ExprId::ONE, other_square);
+            let squares = pool.pow_number(square, Number::integer(exponent.div_euclid(2)));
+            let single = pool.apply_power(from, argument, exponent.rem_euclid(2));
+            pool.product(&[single, squares])
+        })
+    }
+
+    /// `expr` with the products of sines and cosines in each term of the outermost sum written as
+    /// sums: `sin(x)^2` becomes `1/2 - 1/2*cos(2*x)`.
+    pub fn combine_angles(&mut self, expr: ExprId) -> ExprId {
+        let terms = self.terms_of(expr);
+        let mut combined = Vec::with_capacity(terms.len());
+        for (coefficient, rest) in terms {
+            let term = self.combine_angles_of_term(rest);
+            let term = if matches!(self.node(term), Node::Sum(_)) {
+                let factor = self.constant(coefficient);
+                self.expanded_product(factor, term)
+            } else {
+                self.scale(coefficient, term)
+            };
+            combined.push(term);
+        }
+        self.sum(&combined)
+    }
+
+    fn combine_angles_of_term(&mut self, rest: ExprId) -> ExprId {
+        let mut others = Vec::new();
+        let mut waves = Vec::new();
+        for factor in self.factors_of(rest).to_vec() {
+            match self.function_power(factor) {
+                Some((function @ (Function::Sin | Function::Cos), argument, exponent))
+                    if (1..=MAX_TRIG_DEGREE).contains(&exponent) =>
+                {
+                    waves.extend((0..exponent).map(|_| (function, argument)));
+                }
+                _ => others.push(factor),
+            }
+        }
+        if waves.len() < 2 || waves.len() > MAX_TRIG_DEGREE as usize {
+            return rest;
+        }
+        // The product so far, as a sum of sines and cosines.
+        let (function, argument) = waves[0];
+        let mut sum = vec![(Number::ONE, function, argument)];
+        for (factor, angle) in waves.into_iter().skip(1) {
+            let mut next = Vec::with_capacity(2 * sum.len());
+            for (coefficient, function, argument) in sum {
+                let half = coefficient.checked_mul(Number::HALF).unwrap_or(coefficient);
+                let (plus, minus) = (self.add(argument, angle), self.sub(argument, angle));
+                let (product, sign_plus, sign_minus) = match (function, factor) {
+                    (Function::Sin, Function::Sin) => (Function::Cos, -half, half),
+                    (Function::Cos, Function::Sin) => (Function::Sin, half, -half),
+                    (Function::Sin, _) => (Function::Sin, half, half),
+                    (_, _) => (Function::Cos, half, half),
+                };
+                next.push((sign_plus, product, plus));
+                next.push((sign_minus, product, minus));
+            }
+            sum = next;
+        }
+        let mut terms = Vec::with_capacity(sum.len());
+        for (coefficient, function, argument) in sum {
+            let wave = self.apply(function, argument);
+            terms.push(self.scale(coefficient, wave));
+        }
+        let sum = self.sum(&terms);
+        let others = self.product(&others);
+        self.expanded_product(others, sum)
+    }
+
+    /// `expr` with pairs of terms `a*sin(x)*r + b*cos(x)*r`, where `a` and `b` are numbers,
+    /// written as `c*sin(x + p)*r` with `c = sqrt(a^2 + b^2)` and `p = atan2(b, a)`.
+    ///
+    /// Both are rounded floats, unlike other rewritings: ask for it where one sine less is worth
+    /// a relative error of about 2e-16.
+    pub fn amplitude_phase(&mut self, expr: ExprId) -> ExprId {
+        let mut terms = self.terms_of(expr);
+        let mut index = 0;
+        while index < terms.len() {
+            if let Some((partner, merged)) = self.merge_waves(&terms, index) {
+                terms[index] = self.split(merged);
+                terms.remove(partner);
+                // The next term has moved here already if the partner came earlier.
+                index += usize::from(partner > index);
+            } else {
+                index += 1;
+            }
+        }
+        self.sum_of_terms(terms)
+    }
+
+    /// The cosine term that belongs to the sine term at `index`, and what both are together.
+    fn merge_waves(&mut self, terms: &[(Number, ExprId)], index: usize) -> Option<(usize, ExprId)> {
+        let (sine_weight, rest) = terms[index];
+        let factors = self.factors_of(rest).to_vec();
+        for (place, factor) in factors.iter().enumerate() {
+            let Node::Apply(Function::Sin, argument) = *self.node(*factor) else {
+                continue;
+            };
+            let mut with_cosine = factors.clone();
+            with_cosine[place] = self.apply(Function::Cos, argument);
+            let partner_rest = self.product(&with_cosine);
+            let Some(partner) = terms.iter().position(|(_, rest)| *rest == partner_rest) else {
+                continue;
+            };
+            let (a, b) = (sine_weight.to_f64(), terms[partner].0.to_f64());
+            let amplitude = Number::from_f64((a * a + b * b).sqrt())?;
+            let phase = Number::from_f64(b.atan2(a))?;
+            let phase = self.constant(phase);
+            let angle = self.add(argument, phase);
+            let mut merged = factors.clone();
+            merged[place] = self.apply(Function::Sin, angle);
+            let merged = self.product(&merged);
+            return Some((partner, self.scale(amplitude, merged)));
+        }
+        None
+    }
+}
+
+/// Notes that multiples of `rest` occur with this coefficient: the unit is the largest exact
+/// number of which all exact coefficients are multiples.
+fn note_unit(units: &mut Units, coefficient: Number, rest: ExprId) {
+    let Some((numerator, denominator)) = coefficient.abs().as_rational() else {
+        return;
+    };
+    let unit = units.entry(rest).or_insert(Number::ZERO);
+    let Some((known_numerator, known_denominator)) = unit.as_rational() else {
+        return;
+    };
+    // gcd(a/b, c/d) = gcd(a d, c b) / (b d)
+    let common = || {
+        let a = known_numerator.checked_mul(denominator)?;
+        let b = numerator.checked_mul(known_denominator)?;
+        Number::rational(gcd(a, b), known_denominator.checked_mul(denominator)?)
+    };
+    *unit = common().unwrap_or(*unit);
+}
+
+fn gcd(mut a: i64, mut b: i64) -> i64 {
+    while b != 0 {
+        (a, b) = (b, a % b);
+    }
+    a
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rewritten(text: &str, rewrite: fn(&mut ExprPool, ExprId) -> ExprId) -> String {
+        let mut pool = ExprPool::new();
+        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let result = rewrite(&mut pool, expr);
+        pool.display(result).to_string()
+    }
+
+    #[test]
+    fn expand_angles_of_sums_and_multiples() {
+        let expand = |text| rewritten(text, ExprPool::expand_angles);
+        assert_eq!(expand("sin(x + y)"), "sin(x)*cos(y) + sin(y)*cos(x)");
+        assert_eq!(expand("cos(x - y)"), "sin(x)*sin(y) + cos(x)*cos(y)");
+        assert_eq!(expand("sin(x) + sin(2*x)"), "sin(x) + 2*sin(x)*cos(x)");
+        assert_eq!(
+            expand("cos(x/2) + cos(x)"),
+            "cos(1/2*x) - sin(1/2*x)^2 + cos(1/2*x)^2"
+        );
+        assert_eq!(expand("sin(2*x)"), "sin(2*x)");
+        assert_eq!(expand("tan(x)"), "sin(x)/cos(x)");
+        assert_eq!(expand("sin(0.3*x)"), "sin(0.3*x)");
+        assert_eq!(expand("sin(x) + sin(100*x)"), "sin(x) + sin(100*x)");
+    }
+
+    #[test]
+    fn reduce_squares_either_way() {
+        assert_eq!(
+            rewritten("sin(x)^2", ExprPool::sines_to_cosines),
+            "1 - cos(x)^2"
+        );
+        assert_eq!(
+            rewritten("cos(x)^3", ExprPool::cosines_to_sines),
+            "cos(x)*(1 - sin(x)^2)"
+        );
+        assert_eq!(
+            rewritten("1/sin(x)", ExprPool::sines_to_cosines),
+            "sin(x)/(1 - cos(x)^2)"
+        );
+        assert_eq!(
+            rewritten("sin(sin(x)^2)", ExprPool::sines_to_cosines),
+            "sin(sin(x)^2)"
+        );
+    }
+
+    #[test]
+    fn combine_angles_turns_products_into_sums() {
+        let combine = |text| rewritten(text, ExprPool::combine_angles);
+        assert_eq!(combine("2*sin(x)*cos(x)"), "sin(2*x)");
+        assert_eq!(combine("sin(x)^2"), "1/2 - 1/2*cos(2*x)");
+        assert_eq!(combine("cos(x)^2 - sin(x)^2"), "cos(2*x)");
+        assert_eq!(
+            combine("z*sin(x)*sin(y)"),
+            "1/2*z*cos(x - y) - 1/2*z*cos(x + y)"
+        );
+        assert_eq!(combine("sin(x) + y"), "y + sin(x)");
+    }
+
+    #[test]
+    fn amplitude_phase_merges_a_sine_and_a_cosine() {
+        let mut pool = ExprPool::new();
+        let expr = pool
+            .parse("1 + 3*y*sin(x) + 4*y*cos(x) + cos(z)", &|_| true)
+            .expect("test text parses");
+        let merged = pool.amplitude_phase(expr);
+        assert_eq!(
+            pool.display(merged).to_string(),
+            "1 + cos(z) + 5*y*sin(0.9272952180016122 + x)"
+        );
+        let difference = pool.sub(expr, merged);
+        let value = pool.evaluate(difference, &|symbol| 0.3 + symbol.index() as f64);
+        assert!(value.abs() < 1e-14);
+    }
+}
