@@ -1,1 +1,7 @@
-fn main() {}
+//! The `romc` binary: hands over to [`romc::cli::run`].
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    romc::cli::run()
+}

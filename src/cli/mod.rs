@@ -1,1 +1,90 @@
-//! The command line.
+//! The command line: what is typed comes in, text or one JSON object leaves.
+//!
+//! Each command is a file with one function from its arguments to an [`Answer`]; [`run`] prints the
+//! answer and picks the exit code (0 done, 1 the run failed, 2 wrong usage). Human text and JSON go
+//! to stdout; progress, warnings and errors go to stderr. Start with [`args`].
+
+pub mod args;
+mod compile;
+mod demo;
+mod inspect;
+mod mpc;
+mod output;
+mod simulate;
+mod train;
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::Error;
+use args::{Arguments, Command};
+
+/// What a command has to say: to people and to programs.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    /// Human text, complete with its last newline.
+    pub text: String,
+    /// The same as one JSON object.
+    pub json: serde_json::Value,
+}
+
+/// Parses the process's arguments, runs the command, prints its answer.
+///
+/// Wrong usage ends the process with exit code 2 (by clap); a failed run gives 1.
+pub fn run() -> ExitCode {
+    let arguments = Arguments::parse();
+    let json = arguments.command.wants_json();
+    let printed = execute(arguments.command).map(|answer| {
+        if json {
+            format!("{}\n", answer.json)
+        } else {
+            answer.text
+        }
+    });
+    match printed {
+        Ok(text) => print(&text),
+        Err(error) => {
+            report(&error);
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn execute(command: Command) -> Result<Answer, Error> {
+    match command {
+        Command::Demo(arguments) => demo::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Train(arguments) => train::run(&arguments),
+        Command::Compile(arguments) => compile::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Mpc(arguments) => mpc::run(&arguments),
+    }
+}
+
+/// Prints to stdout; a reader that has gone away (`| head`) is no failure.
+fn print(text: &str) -> ExitCode {
+    let mut stdout = io::stdout().lock();
+    match stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush())
+    {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: cannot write to stdout: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Prints an error and its chain of causes to stderr.
+fn report(error: &Error) {
+    eprintln!("error: {error}");
+    let mut source = std::error::Error::source(error);
+    while let Some(cause) = source {
+        eprintln!("  because: {cause}");
+        source = cause.source();
+    }
+}

@@ -1,1 +1,10 @@
 //! How good a model is, in numbers.
+//!
+//! Rollouts and recordings come in; fits (root mean square in SI units, coefficient of
+//! determination) leave. Start with [`metrics`](Fit).
+
+mod coordinates;
+mod metrics;
+
+pub use coordinates::{CoordinateSums, PointwiseSums};
+pub use metrics::{Fit, FitSums};

@@ -1,0 +1,251 @@
+//! What can be typed: the commands, their options, and an example for each.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::backend::Target;
+
+/// The reduced-order model compiler: from recorded jumps to equations, code and torques.
+#[derive(Debug, Parser)]
+#[command(
+    name = "romc",
+    version,
+    propagate_version = true,
+    after_help = "Start with `romc demo`. `romc <command> --help` explains a command with an example."
+)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// One of romc's commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// The main job on the shipped model and recordings: equations, code, rollouts, controller
+    Demo(DemoArguments),
+    /// Tell what a recording or a model holds, and what is implausible in it
+    Inspect(InspectArguments),
+    /// Learn a model from recordings
+    Train(TrainArguments),
+    /// Compile a model to LaTeX, C and Rust
+    Compile(CompileArguments),
+    /// Roll a model out over recordings and measure how far it drifts
+    Simulate(SimulateArguments),
+    /// Run the latent-space controller along a recording
+    Mpc(MpcArguments),
+}
+
+impl Command {
+    /// Whether `--json` was given.
+    pub fn wants_json(&self) -> bool {
+        match self {
+            Self::Demo(arguments) => arguments.output_format.json,
+            Self::Inspect(arguments) => arguments.output_format.json,
+            Self::Train(arguments) => arguments.output_format.json,
+            Self::Compile(arguments) => arguments.output_format.json,
+            Self::Simulate(arguments) => arguments.output_format.json,
+            Self::Mpc(arguments) => arguments.output_format.json,
+        }
+    }
+}
+
+/// Output every command offers.
+#[derive(Debug, Clone, Args)]
+pub struct OutputArguments {
+    /// Print one JSON object to stdout and nothing else there
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `romc demo`
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  romc demo --out-dir out/demo")]
+pub struct DemoArguments {
+    /// Folder for what the demo makes
+    #[arg(long, value_name = "DIR", default_value = "out/demo")]
+    pub out_dir: PathBuf,
+    /// Write into a folder that holds files romc did not make
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// `romc inspect`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc inspect models/go1-d4.json examples/recordings/go1/test_01.csv.gz"
+)]
+pub struct InspectArguments {
+    /// Models (`.json`) and recordings (`.csv`, `.csv.gz`)
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Robot whose limits the recordings are held against
+    #[arg(long, default_value = "go1")]
+    pub robot: String,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// How a model is learned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TrainMethod {
+    /// Encoder, decoder and coefficients each from a least-squares problem; seconds
+    ClosedForm,
+}
+
+/// `romc train`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc train examples/recordings/go1/train_*.csv.gz \\\n      --validation examples/recordings/go1/validation_*.csv.gz \\\n      --latent-dim 4 --method closed-form --output my-model.json"
+)]
+pub struct TrainArguments {
+    /// Recordings to learn from
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    /// Recordings that choose between candidate models
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    pub validation: Vec<PathBuf>,
+    /// Number of latent coordinates d
+    #[arg(long, value_name = "D", value_parser = at_least_one)]
+    pub latent_dim: usize,
+    /// The model file to write
+    #[arg(long, value_name = "MODEL.json")]
+    pub output: PathBuf,
+    /// How to learn
+    #[arg(long, value_enum, default_value = "closed-form")]
+    pub method: TrainMethod,
+    /// Robot that made the recordings
+    #[arg(long, default_value = "go1")]
+    pub robot: String,
+    /// Name of the model; the output file's stem unless given
+    #[arg(long)]
+    pub name: Option<String>,
+    /// Replace an existing output file
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// `romc compile`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc compile models/paper-2d.json --emit latex,c,rust --out-dir out/paper-2d"
+)]
+pub struct CompileArguments {
+    /// Model file
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// What to write, separated by commas
+    #[arg(
+        long,
+        value_name = "TARGET",
+        value_delimiter = ',',
+        default_value = "latex,c,rust"
+    )]
+    pub emit: Vec<Target>,
+    /// Folder for the emitted files
+    #[arg(long, value_name = "DIR")]
+    pub out_dir: PathBuf,
+    /// Decimal places of the coefficients in LaTeX
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub digits: usize,
+    /// Write into a folder that holds files romc did not make
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// `romc simulate`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc simulate models/go1-d4.json examples/recordings/go1/test_*.csv.gz"
+)]
+pub struct SimulateArguments {
+    /// Model file
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Recordings to follow
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    /// Time between restarts from the recorded state, in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = positive_seconds)]
+    pub restart_every: f64,
+    /// Write the trajectories of all rollouts to this CSV file
+    #[arg(long, value_name = "FILE.csv")]
+    pub output: Option<PathBuf>,
+    /// Replace an existing output file
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// Where the controller's input reference comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ReferenceInput {
+    /// The recorded torques and forces, projected into the latent space
+    Recorded,
+    /// None: the controller finds the input itself
+    None,
+}
+
+/// How a latent input becomes joint torques.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LiftChoice {
+    /// `u = W_e^T u_lat`, the paper's
+    Transpose,
+    /// Torques whose own ground reaction forces reproduce the latent input
+    Consistent,
+}
+
+/// `romc mpc`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc mpc models/go1-d4.json examples/recordings/go1/test_01.csv.gz --output mpc.csv"
+)]
+pub struct MpcArguments {
+    /// Model file
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Recordings to follow
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    /// Number of stages
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one)]
+    pub horizon: usize,
+    /// Length of a stage in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.01, value_parser = positive_seconds)]
+    pub step: f64,
+    /// How latent inputs become joint torques
+    #[arg(long, value_enum, default_value = "transpose")]
+    pub lift: LiftChoice,
+    /// Where the input reference comes from
+    #[arg(long, value_enum, default_value = "recorded")]
+    pub reference_input: ReferenceInput,
+    /// Write one row per control step to this CSV file
+    #[arg(long, value_name = "FILE.csv")]
+    pub output: Option<PathBuf>,
+    /// Replace an existing output file
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+fn positive_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds.is_finite() && seconds > 0.0 => Ok(seconds),
+        _ => Err("expected a positive number of seconds".to_owned()),
+    }
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(count) if count > 0 => Ok(count),
+        _ => Err("expected a whole number of at least 1".to_owned()),
+    }
+}

@@ -1,0 +1,48 @@
+//! One error for the whole library: each stage's own, told apart by variant.
+
+use std::io;
+use std::path::PathBuf;
+
+use crate::artifact::ArtifactError;
+use crate::backend::EmitError;
+use crate::model::ModelError;
+use crate::mpc::MpcError;
+use crate::recording::RecordingError;
+use crate::robot::RobotError;
+use crate::sim::SimError;
+use crate::train::TrainError;
+
+/// What can go wrong between a recording and a torque.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    #[error(transparent)]
+    Robot(#[from] RobotError),
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
+    Artifact(#[from] ArtifactError),
+    #[error(transparent)]
+    Train(#[from] TrainError),
+    #[error(transparent)]
+    Emit(#[from] EmitError),
+    #[error(transparent)]
+    Sim(#[from] SimError),
+    #[error(transparent)]
+    Mpc(#[from] MpcError),
+    /// A file that romc would have to replace.
+    #[error("{0}: already exists; pass --force to replace it, or choose another name")]
+    Exists(PathBuf),
+    /// The file system refused an output.
+    #[error("{path}: cannot write")]
+    Write { path: PathBuf, source: io::Error },
+    /// A number on the command line outside its range.
+    #[error("{option}: found {found}, expected {expected}")]
+    Option {
+        option: &'static str,
+        found: String,
+        expected: &'static str,
+    },
+}

@@ -1,0 +1,102 @@
+//! Root mean square and coefficient of determination.
+
+/// How far predicted samples are from recorded ones.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fit {
+    /// Root mean square of the residuals, in the unit of the samples.
+    pub rms: f64,
+    /// Coefficient of determination `1 - sum (y - y_hat)^2 / sum (y - mean y)^2`; at most 1, and
+    /// negative where the mean of the record would have been the better prediction. `None` when the
+    /// record does not move.
+    pub r2: Option<f64>,
+}
+
+/// Sums that a [`Fit`] follows from; filled sample by sample, over several recordings if wanted.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct FitSums {
+    count: usize,
+    residual_square: f64,
+    mean: f64,
+    deviation_square: f64,
+}
+
+impl FitSums {
+    /// Adds one pair of a recorded and a predicted value (the mean is updated as by Welford, 1962).
+    pub fn add(&mut self, recorded: f64, predicted: f64) {
+        self.count += 1;
+        self.residual_square += (recorded - predicted).powi(2);
+        let from_old_mean = recorded - self.mean;
+        self.mean += from_old_mean / self.count as f64;
+        self.deviation_square += from_old_mean * (recorded - self.mean);
+    }
+
+    /// Adds the pairs that `other` holds; deviations are each taken from its own mean.
+    ///
+    /// This is how several coordinates, or several jumps, make one coefficient of determination
+    /// without the differences between their means counting as explained.
+    pub fn merge_keeping_means(&mut self, other: &Self) {
+        self.count += other.count;
+        self.residual_square += other.residual_square;
+        self.deviation_square += other.deviation_square;
+    }
+
+    /// Number of pairs added.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The fit of all pairs added so far; `None` before the first.
+    pub fn fit(&self) -> Option<Fit> {
+        (self.count > 0).then(|| Fit {
+            rms: (self.residual_square / self.count as f64).sqrt(),
+            r2: (self.deviation_square > 0.0)
+                .then(|| 1.0 - self.residual_square / self.deviation_square),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sums(pairs: &[(f64, f64)]) -> FitSums {
+        let mut sums = FitSums::default();
+        pairs.iter().for_each(|&(y, p)| sums.add(y, p));
+        sums
+    }
+
+    #[test]
+    fn fit_of_exact_prediction_is_perfect() {
+        let fit = sums(&[(1.0, 1.0), (2.0, 2.0), (4.0, 4.0)]).fit();
+        assert_eq!(
+            fit,
+            Some(Fit {
+                rms: 0.0,
+                r2: Some(1.0)
+            })
+        );
+    }
+
+    #[test]
+    fn fit_by_the_mean_explains_nothing() {
+        let fit = sums(&[(1.0, 2.0), (3.0, 2.0)]).fit().expect("two pairs");
+        assert_eq!(fit.r2, Some(0.0));
+        assert_eq!(fit.rms, 1.0);
+    }
+
+    #[test]
+    fn fit_of_a_record_that_does_not_move_has_no_r2() {
+        assert_eq!(sums(&[(2.0, 2.5)]).fit().expect("one pair").r2, None);
+        assert_eq!(FitSums::default().fit(), None);
+    }
+
+    #[test]
+    fn merging_two_coordinates_ignores_the_distance_of_their_means() {
+        let mut merged = sums(&[(0.0, 0.0), (2.0, 1.0)]);
+        merged.merge_keeping_means(&sums(&[(100.0, 100.0), (102.0, 101.0)]));
+        let fit = merged.fit().expect("four pairs");
+        // residual squares 1 + 1, deviations 2 + 2 about the means 1 and 101
+        assert_eq!(fit.r2, Some(0.5));
+        assert_eq!(merged.count(), 4);
+    }
+}

@@ -1,0 +1,100 @@
+//! A recorded segment as the model sees it: latent states, latent inputs, phases.
+
+use nalgebra::{DMatrix, DVectorView};
+
+use super::error::SimError;
+use crate::model::ReducedModel;
+use crate::recording::Segment;
+
+/// Latent samples of one recorded segment; every matrix is `latent_dim x n`, a column a sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LatentSegment {
+    /// Increasing times, in s.
+    pub time_s: Vec<f64>,
+    /// Latent positions `z = W_e (s_x x) + b_e` (equation 9).
+    pub z: DMatrix<f64>,
+    /// Latent velocities `dz = W_e (s_x dx)` (equation 11).
+    pub dz: DMatrix<f64>,
+    /// Latent accelerations `ddz = W_e (s_x ddx)` (equation 12).
+    pub ddz: DMatrix<f64>,
+    /// Latent inputs `u_lat = pinv(W_e^T) (s_u u)` (equation 13).
+    pub u_lat: DMatrix<f64>,
+    /// Index of the phase that the recorded feet select, a sample.
+    pub phase: Vec<usize>,
+}
+
+impl LatentSegment {
+    /// Encodes a segment.
+    ///
+    /// # Errors
+    /// [`SimError::Model`] for a latent-only model, [`SimError::Recording`] if the body wrench cannot
+    /// be computed, [`SimError::NoPhase`] with the row whose feet no phase covers.
+    pub fn encode(model: &ReducedModel, segment: &Segment) -> Result<Self, SimError> {
+        let input = segment.input(model.robot()?)?;
+        let columns = |matrix: &DMatrix<f64>,
+                       map: &dyn Fn(DVectorView<f64>) -> Result<_, SimError>|
+         -> Result<DMatrix<f64>, SimError> {
+            let mut out = DMatrix::zeros(model.latent_dim(), matrix.ncols());
+            for (mut to, from) in out.column_iter_mut().zip(matrix.column_iter()) {
+                to.copy_from(&map(from)?);
+            }
+            Ok(out)
+        };
+        let velocity =
+            |dx: DVectorView<f64>| Ok(model.encode_velocity(&dx.into_owned())?);
+        Ok(Self {
+            time_s: segment.time_s.clone(),
+            z: columns(&segment.x, &|x| Ok(model.encode(&x.into_owned())?))?,
+            dz: columns(&segment.dx, &velocity)?,
+            ddz: columns(&segment.ddx, &velocity)?,
+            u_lat: columns(&input, &|u| Ok(model.project_input(&u.into_owned())?))?,
+            phase: phases(model, segment)?,
+        })
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// Latent input at a time between samples, interpolated linearly; held outside the record.
+    pub fn input_at(&self, time_s: f64, u_lat: &mut [f64]) {
+        let after = self.time_s.partition_point(|&t| t <= time_s);
+        let (left, right) = match after {
+            0 => (0, 0),
+            n if n == self.len() => (n - 1, n - 1),
+            n => (n - 1, n),
+        };
+        let step = self.time_s[right] - self.time_s[left];
+        let share = if step > 0.0 {
+            (time_s - self.time_s[left]) / step
+        } else {
+            0.0
+        };
+        for (row, value) in u_lat.iter_mut().enumerate() {
+            let (from, to) = (self.u_lat[(row, left)], self.u_lat[(row, right)]);
+            *value = from + share * (to - from);
+        }
+    }
+}
+
+fn phases(model: &ReducedModel, segment: &Segment) -> Result<Vec<usize>, SimError> {
+    segment
+        .feet
+        .iter()
+        .enumerate()
+        .map(|(sample, &feet)| {
+            model.phase_for(feet).ok_or_else(|| SimError::NoPhase {
+                model: model.name().to_owned(),
+                segment: segment.path.display().to_string(),
+                row: segment.row(sample),
+                found: feet,
+            })
+        })
+        .collect()
+}
