@@ -14,4 +14,4 @@ pub use compiled::CompiledModel;
 pub use error::SimError;
 pub use integrate::{Integration, IntegrationMethod, IntegrationOptions, integrate};
 pub use latent::LatentSegment;
-pub use rollout::{Restart, Rollout, Window, rollout};
+pub use rollout::{Restart, Rollout, Window, restart_windows, rollout};

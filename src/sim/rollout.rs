@@ -3,13 +3,14 @@
 //! Phases switch as recorded; the latent state is carried through the switch. Between samples the
 //! latent input is interpolated linearly.
 
+use std::cell::RefCell;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
 
 use super::compiled::CompiledModel;
 use super::error::SimError;
-use super::integrate::{IntegrationMethod, IntegrationOptions, integrate};
+use super::integrate::{Integration, IntegrationMethod, IntegrationOptions, integrate};
 use super::latent::LatentSegment;
 
 /// When a rollout starts again from the recorded latent state.
@@ -67,7 +68,7 @@ pub fn rollout(
     restart: Restart,
     options: &IntegrationOptions,
 ) -> Result<Rollout, SimError> {
-    windows(&recorded.time_s, restart)
+    restart_windows(&recorded.time_s, restart)
         .into_iter()
         .map(|samples| roll_window(model, recorded, samples, options))
         .collect::<Result<_, _>>()
@@ -75,7 +76,7 @@ pub fn rollout(
 }
 
 /// Ranges of samples between restarts; a restart falls on the first sample not before its time.
-fn windows(time_s: &[f64], restart: Restart) -> Vec<Range<usize>> {
+pub fn restart_windows(time_s: &[f64], restart: Restart) -> Vec<Range<usize>> {
     let Restart::Every(interval_s) = restart else {
         return vec![0..time_s.len()];
     };
@@ -131,6 +132,44 @@ fn roll_window(
         diverged_at_s: window_end.0,
         stiff: window_end.1,
     })
+}
+
+/// `[z; dz]` at `times` under one phase, from `state` at the first of them.
+fn integrate_phase(
+    model: &CompiledModel,
+    recorded: &LatentSegment,
+    phase: usize,
+    state: &[f64],
+    times: &[f64],
+    options: &IntegrationOptions,
+) -> Result<Integration, SimError> {
+    let d = model.latent_dim();
+    // the integrator takes shared closures, the interpreter writes into its own registers
+    let evaluation = RefCell::new((model.clone(), vec![0.0; d], vec![0.0; d], DMatrix::zeros(d, 3 * d)));
+    integrate(
+        |time, y, dy| {
+            let (model, u_lat, _, _) = &mut *evaluation.borrow_mut();
+            recorded.input_at(time, u_lat);
+            let (z, dz) = y.split_at(d);
+            let (velocity, acceleration) = dy.split_at_mut(d);
+            velocity.copy_from_slice(dz);
+            model.ddz(phase, z, dz, u_lat, acceleration);
+        },
+        |time, y, v, jv| {
+            let (model, u_lat, ddz, jacobian) = &mut *evaluation.borrow_mut();
+            recorded.input_at(time, u_lat);
+            let (z, dz) = y.split_at(d);
+            model.jacobian(phase, z, dz, u_lat, ddz, jacobian);
+            let (velocity, acceleration) = jv.split_at_mut(d);
+            velocity.copy_from_slice(&v[d..]);
+            for (row, value) in acceleration.iter_mut().enumerate() {
+                *value = (0..2 * d).map(|col| jacobian[(row, col)] * v[col]).sum();
+            }
+        },
+        state,
+        times,
+        options,
+    )
 }
 
 /// Runs of samples with one phase.

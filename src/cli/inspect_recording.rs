@@ -1,0 +1,186 @@
+//! `romc inspect` of a recording: ranges, phases on a time bar, implausible samples.
+
+use std::fmt::Write as _;
+
+use nalgebra::DMatrix;
+use serde_json::{Value, json};
+
+use super::Answer;
+use super::output::{Table, significant};
+use crate::Error;
+use crate::recording::check::{CheckOptions, Finding, check};
+use crate::recording::{PhaseRule, PhaseSpan, Recording, Segment, Stance};
+use crate::robot::{JOINT_DIM, Robot};
+
+/// Characters of the time bar.
+const BAR_WIDTH: usize = 60;
+/// Findings shown to people; JSON holds them all.
+const FINDINGS_SHOWN: usize = 12;
+
+/// Describes a recording.
+///
+/// # Errors
+/// [`Error::Recording`] if no phase rule covers the feet.
+pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
+    let findings = check(recording, robot, &CheckOptions::default());
+    let rule = PhaseRule::three_phase();
+    let mut text = format!(
+        "{}: {} samples in {} segments\n",
+        recording.path.display(),
+        recording.sample_count(),
+        recording.segments.len()
+    );
+    let mut segments = Vec::new();
+    for (index, segment) in recording.segments.iter().enumerate() {
+        let spans = rule.spans(segment)?;
+        let _ = writeln!(
+            text,
+            "  segment {index}: {:.3} s, {} samples every {:.3} ms",
+            segment.duration_s(),
+            segment.len(),
+            1e3 * segment.mean_step_s()
+        );
+        let _ = writeln!(text, "  |{}|", time_bar(segment));
+        segments.push(segment_json(segment, &spans, &rule));
+    }
+    text.push_str("  # a front foot is down, = only rear feet are, blank: flight\n\n");
+    let ranges = ranges(recording);
+    let _ = writeln!(text, "{}", range_table(&ranges));
+    text.push_str(&findings_text(&findings));
+    Ok(Answer {
+        text,
+        json: json!({
+            "kind": "recording",
+            "file": recording.path.display().to_string(),
+            "samples": recording.sample_count(),
+            "segments": segments,
+            "ranges": ranges.iter().map(Range::json).collect::<Vec<_>>(),
+            "ignored_columns": recording.ignored_columns,
+            "implausible": findings.iter().map(finding_json).collect::<Vec<_>>(),
+        }),
+    })
+}
+
+/// Feet on the ground over time, a character a slice of equal duration.
+fn time_bar(segment: &Segment) -> String {
+    (0..BAR_WIDTH)
+        .map(|slot| match segment.feet[slot * segment.len() / BAR_WIDTH] {
+            [false, false, false, false] => ' ',
+            [false, false, _, _] => '=',
+            [_, _, _, _] => '#',
+        })
+        .collect()
+}
+
+fn segment_json(segment: &Segment, spans: &[PhaseSpan], rule: &PhaseRule) -> Value {
+    let names = rule.names();
+    let phases: Vec<Value> = (spans.iter())
+        .map(|span| {
+            json!({
+                "phase": names[span.phase],
+                "stance": match span.kind {
+                    Stance::Launch => "launch",
+                    Stance::Flight => "flight",
+                    Stance::Landing => "landing",
+                },
+                "samples": span.range.len(),
+                "start_s": segment.time_s[span.range.start],
+            })
+        })
+        .collect();
+    json!({
+        "samples": segment.len(),
+        "duration_s": segment.duration_s(),
+        "mean_step_s": segment.mean_step_s(),
+        "first_row": segment.first_row,
+        "phases": phases,
+    })
+}
+
+/// Extremes of one coordinate over all segments.
+struct Range {
+    name: String,
+    unit: String,
+    position: (f64, f64),
+    velocity: (f64, f64),
+    torque: Option<(f64, f64)>,
+}
+
+impl Range {
+    fn json(&self) -> Value {
+        let pair = |(low, high): (f64, f64)| json!([low, high]);
+        json!({
+            "coordinate": self.name,
+            "unit": self.unit,
+            "position": pair(self.position),
+            "velocity": pair(self.velocity),
+            "torque_nm": self.torque.map(pair),
+        })
+    }
+}
+
+fn ranges(recording: &Recording) -> Vec<Range> {
+    let extremes = |row: usize, matrix: &dyn Fn(&Segment) -> &DMatrix<f64>| {
+        let values = recording
+            .segments
+            .iter()
+            .flat_map(|segment| matrix(segment).row(row).iter().copied().collect::<Vec<_>>());
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(value), high.max(value))
+        })
+    };
+    let names = Robot::state_names().into_iter().zip(Robot::state_units());
+    names
+        .enumerate()
+        .map(|(row, (name, unit))| Range {
+            name,
+            unit,
+            position: extremes(row, &|segment| &segment.x),
+            velocity: extremes(row, &|segment| &segment.dx),
+            torque: (row < JOINT_DIM).then(|| extremes(row, &|segment| &segment.torque_nm)),
+        })
+        .collect()
+}
+
+fn range_table(ranges: &[Range]) -> Table {
+    let mut table = Table::new(["coordinate", "unit", "position", "velocity per s", "torque N m"]);
+    let pair = |(low, high): (f64, f64)| format!("{} .. {}", significant(low), significant(high));
+    for range in ranges {
+        table.row([
+            range.name.clone(),
+            range.unit.clone(),
+            pair(range.position),
+            pair(range.velocity),
+            range.torque.map_or(String::new(), pair),
+        ]);
+    }
+    table
+}
+
+fn findings_text(findings: &[Finding]) -> String {
+    if findings.is_empty() {
+        return "nothing implausible\n".to_owned();
+    }
+    let mut text = format!("{} implausible runs of samples\n", findings.len());
+    for finding in findings.iter().take(FINDINGS_SHOWN) {
+        let _ = writeln!(text, "  {finding}");
+    }
+    if findings.len() > FINDINGS_SHOWN {
+        let more = findings.len() - FINDINGS_SHOWN;
+        let _ = writeln!(text, "  and {more} more, all of them with --json");
+    }
+    text
+}
+
+fn finding_json(finding: &Finding) -> Value {
+    json!({
+        "what": finding.kind.description(),
+        "segment": finding.segment,
+        "samples": finding.samples.len(),
+        "first_row": finding.first_row,
+        "worst_row": finding.worst_row,
+        "column": finding.column,
+        "value": finding.value,
+        "bound": finding.bound,
+    })
+}

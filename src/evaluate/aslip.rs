@@ -1,0 +1,207 @@
+//! The baseline: the actuated spring-loaded inverted pendulum, equations (27) and (28).
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, Rotation3, Vector2, Vector3};
+
+use super::metrics::FitSums;
+use crate::recording::{RecordingError, Segment};
+use crate::robot::{JOINT_DIM, Leg, Robot};
+use crate::sim::{IntegrationOptions, Restart, SimError, integrate, restart_windows};
+
+/// Constants of the pendulum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aslip {
+    /// Mass `m`, kg.
+    pub mass_kg: f64,
+    /// Spring constant `k_s`, N/m.
+    pub stiffness_n_m: f64,
+    /// Vertical rest length `l_0`, m; the horizontal one is 0.
+    pub rest_length_m: f64,
+    /// Gravity `g`, m/s^2.
+    pub gravity_m_s2: f64,
+}
+
+impl Aslip {
+    /// The constants that the paper's comparison uses.
+    pub const PUBLISHED: Self = Self {
+        mass_kg: 12.01,
+        stiffness_n_m: 250.0,
+        rest_length_m: 0.32,
+        gravity_m_s2: 9.81,
+    };
+
+    /// Accelerations of body x and z, in m/s^2.
+    ///
+    /// In contact `ddx = k_s/m (p_f,x - x) + F_x/m`, `ddz = k_s/m (l_0 + p_f,z - z) - g + F_z/m`
+    /// (equation 27, actuated by the legs' force over the mass); in flight `0` and `-g` (equation 28).
+    fn acceleration(&self, position: Vector2<f64>, stance: Option<Stance>) -> Vector2<f64> {
+        let gravity = Vector2::new(0.0, -self.gravity_m_s2);
+        match stance {
+            None => gravity,
+            Some(stance) => {
+                let rest = stance.foot_m + Vector2::new(0.0, self.rest_length_m);
+                gravity
+                    + (rest - position) * (self.stiffness_n_m / self.mass_kg)
+                    + stance.force_n / self.mass_kg
+            }
+        }
+    }
+
+    /// Adds the residuals of the pendulum's body x and z over a segment, in m.
+    ///
+    /// The pendulum is driven by the same recorded forces as a learned model, turned into the world
+    /// frame, and switches between contact and flight as recorded.
+    ///
+    /// # Errors
+    /// [`SimError::Recording`] if a leg in contact is singular, [`SimError::Solver`].
+    pub fn add_rollout(
+        &self,
+        robot: &Robot,
+        segment: &Segment,
+        restart: Restart,
+        sums: &mut AslipSums,
+    ) -> Result<(), SimError> {
+        let stances = stances(robot, segment)?;
+        for window in restart_windows(&segment.time_s, restart) {
+            self.add_window(segment, &stances, window, sums)?;
+        }
+        Ok(())
+    }
+
+    fn add_window(
+        &self,
+        segment: &Segment,
+        stances: &[Option<Stance>],
+        window: Range<usize>,
+        sums: &mut AslipSums,
+    ) -> Result<(), SimError> {
+        let (x, z) = (BODY_X, BODY_Z);
+        let start = window.start;
+        let mut state = [
+            segment.x[(x, start)],
+            segment.x[(z, start)],
+            segment.dx[(x, start)],
+            segment.dx[(z, start)],
+        ];
+        let mut first = start;
+        while first < window.end {
+            let down = stances[first].is_some();
+            let same = (first..window.end).take_while(|&k| stances[k].is_some() == down);
+            let end = first + same.count();
+            let times = &segment.time_s[first..(end + 1).min(window.end)];
+            let states = self.integrate_span(&stances[first..end], times, &state)?;
+            let fresh = if first == start { 0 } else { 1 };
+            for column in fresh..states.ncols() {
+                let sample = first + column;
+                sums.x.add(segment.x[(x, sample)], states[(0, column)]);
+                sums.z.add(segment.x[(z, sample)], states[(1, column)]);
+            }
+            state.copy_from_slice(states.column(states.ncols() - 1).as_slice());
+            first = end;
+        }
+        Ok(())
+    }
+
+    /// States `[x, z, dx, dz]` at `times`, all within one contact or flight.
+    fn integrate_span(
+        &self,
+        stances: &[Option<Stance>],
+        times: &[f64],
+        initial: &[f64; 4],
+    ) -> Result<DMatrix<f64>, SimError> {
+        let stance_at = |time: f64| {
+            let after = times[..stances.len()].partition_point(|&t| t <= time);
+            let left = after.saturating_sub(1);
+            let right = after.min(stances.len() - 1);
+            let (from, to) = (stances[left]?, stances[right]?);
+            let step = times[right] - times[left];
+            let share = if step > 0.0 { (time - times[left]) / step } else { 0.0 };
+            Some(Stance {
+                foot_m: from.foot_m,
+                force_n: from.force_n.lerp(&to.force_n, share),
+            })
+        };
+        let spring = if stances[0].is_some() {
+            self.stiffness_n_m / self.mass_kg
+        } else {
+            0.0
+        };
+        let integration = integrate(
+            |time, y, dy| {
+                let acceleration = self.acceleration(Vector2::new(y[0], y[1]), stance_at(time));
+                dy.copy_from_slice(&[y[2], y[3], acceleration.x, acceleration.y]);
+            },
+            |_time, _y, v, jv| jv.copy_from_slice(&[v[2], v[3], -spring * v[0], -spring * v[1]]),
+            initial,
+            times,
+            &IntegrationOptions::default(),
+        )?;
+        Ok(integration.states)
+    }
+}
+
+const BODY_X: usize = JOINT_DIM;
+const BODY_Z: usize = JOINT_DIM + 2;
+
+/// Residuals of the pendulum.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct AslipSums {
+    /// Body x, m.
+    pub x: FitSums,
+    /// Body z, m.
+    pub z: FitSums,
+}
+
+/// What holds the pendulum while a foot is down, in the world's plane of x and z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Stance {
+    /// Mean position of the feet in contact at the sample where the contact began.
+    foot_m: Vector2<f64>,
+    /// Force of the legs on the body.
+    force_n: Vector2<f64>,
+}
+
+/// The stance of every sample; `None` in flight.
+fn stances(robot: &Robot, segment: &Segment) -> Result<Vec<Option<Stance>>, RecordingError> {
+    let wrench = segment.wrench(robot)?;
+    let mut stances = Vec::with_capacity(segment.len());
+    let mut foot_m = None;
+    for sample in 0..segment.len() {
+        if !segment.feet[sample].contains(&true) {
+            foot_m = None;
+            stances.push(None);
+            continue;
+        }
+        let foot = *foot_m.get_or_insert_with(|| mean_foot(robot, segment, sample));
+        let force = Vector3::new(wrench[(0, sample)], wrench[(1, sample)], wrench[(2, sample)]);
+        let force = orientation(segment, sample) * force;
+        stances.push(Some(Stance {
+            foot_m: foot,
+            force_n: Vector2::new(force.x, force.z),
+        }));
+    }
+    Ok(stances)
+}
+
+/// Rotation from the body frame to the world, from roll, pitch and yaw.
+fn orientation(segment: &Segment, sample: usize) -> Rotation3<f64> {
+    let angle = |index: usize| segment.x[(JOINT_DIM + 3 + index, sample)];
+    Rotation3::from_euler_angles(angle(0), angle(1), angle(2))
+}
+
+/// Mean of the feet in contact in the world's plane of x and z.
+fn mean_foot(robot: &Robot, segment: &Segment, sample: usize) -> Vector2<f64> {
+    let joints = segment.joints(sample);
+    let down = Leg::ALL.into_iter().filter(|leg| segment.feet[sample][leg.index()]);
+    let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+    for leg in down {
+        sum += robot.hip_position(leg) + robot.foot_position(leg, &leg.of_joints(&joints));
+        count += 1.0;
+    }
+    let in_body = sum / f64::max(count, 1.0);
+    let body = segment.x.column(sample);
+    let in_world = orientation(segment, sample) * in_body
+        + Vector3::new(body[BODY_X], body[BODY_X + 1], body[BODY_Z]);
+    Vector2::new(in_world.x, in_world.z)
+}
