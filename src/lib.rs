@@ -3,7 +3,9 @@
 pub mod artifact;
 pub mod backend;
 pub mod cli;
+mod error;
 pub mod evaluate;
+pub mod files;
 pub mod ir;
 pub mod lower;
 pub mod model;
@@ -13,3 +15,5 @@ pub mod robot;
 pub mod sim;
 pub mod symbolic;
 pub mod train;
+
+pub use error::Error;

@@ -41,4 +41,4 @@ pub use digest::{Digest, digest};
 pub use error::{ArtifactError, describe};
 pub use manifest::SCHEMA;
 pub use read::{MAX_FILE_BYTES, read, read_from_bytes};
-pub use write::{Overwrite, to_text, write, write_with};
+pub use write::{to_text, write, write_with};

@@ -8,10 +8,13 @@ pub mod args;
 mod compile;
 mod demo;
 mod inspect;
+mod inspect_model;
+mod inspect_recording;
 mod mpc;
 mod output;
 mod simulate;
 mod train;
+mod trajectory;
 
 use std::io::{self, Write};
 use std::process::ExitCode;

@@ -1,77 +1,35 @@
 //! Files, tables and progress: how every command shows what it did.
-//!
-//! A file appears whole or not at all: it is written beside its final place and renamed.
 
 use std::fmt::Display;
-use std::fs;
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::Error;
+use crate::files::{Overwrite, write_whole};
 
-/// Writes `contents` to `path` in one step, creating missing folders above it.
+/// Tells before long work that its output could not be written.
 ///
 /// # Errors
-/// [`Error::Exists`] if the file is there and `force` was not asked for, [`Error::Write`] if the
-/// file system refuses.
-pub fn write_file(path: &Path, contents: &[u8], force: Overwrite) -> Result<(), Error> {
-    force.check(path)?;
-    write_beside_then_rename(path, contents).map_err(|source| Error::Write {
-        path: path.to_path_buf(),
+/// [`Error::Exists`] if the file is there and may not be replaced.
+pub fn check_output(path: Option<&Path>, overwrite: Overwrite) -> Result<(), Error> {
+    match path {
+        Some(path) if !overwrite.allows(path) => Err(Error::Exists(path.to_owned())),
+        Some(_) | None => Ok(()),
+    }
+}
+
+/// Writes a whole file.
+///
+/// # Errors
+/// [`Error::Exists`] as [`check_output`], [`Error::Write`] if the file system refuses.
+pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<(), Error> {
+    check_output(Some(path), overwrite)?;
+    write_whole(path, |out| out.write_all(contents)).map_err(|source| Error::Write {
+        path: path.to_owned(),
         source,
     })
-}
-
-/// Whether a command may replace a file that is already there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Overwrite {
-    /// Refuse with an error.
-    Refuse,
-    /// Replace it (`--force`).
-    Replace,
-}
-
-impl Overwrite {
-    /// From the state of a `--force` flag.
-    pub fn when_forced(force: bool) -> Self {
-        if force { Self::Replace } else { Self::Refuse }
-    }
-
-    /// Tells before long work that its output could not be written.
-    ///
-    /// # Errors
-    /// [`Error::Exists`] if the file is there and may not be replaced.
-    pub fn check(self, path: &Path) -> Result<(), Error> {
-        match self {
-            Self::Refuse if path.exists() => Err(Error::Exists(path.to_path_buf())),
-            Self::Refuse | Self::Replace => Ok(()),
-        }
-    }
-}
-
-fn write_beside_then_rename(path: &Path, contents: &[u8]) -> io::Result<()> {
-    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        fs::create_dir_all(folder)?;
-    }
-    let beside = beside(path);
-    let written = fs::File::create(&beside).and_then(|mut file| {
-        file.write_all(contents)?;
-        file.sync_all()
-    });
-    let renamed = written.and_then(|()| fs::rename(&beside, path));
-    if renamed.is_err() && beside.exists() {
-        fs::remove_file(&beside)?;
-    }
-    renamed
-}
-
-fn beside(path: &Path) -> PathBuf {
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(format!(".{}.part", std::process::id()));
-    path.with_file_name(name)
 }
 
 /// A table of text cells with a header, columns aligned: the first to the left, the rest to the right.
@@ -153,23 +111,18 @@ pub fn spinner(message: impl Into<String>) -> ProgressBar {
     bar
 }
 
+/// A bar on stderr for a known number of steps, shown only when stderr is a terminal.
+pub fn progress_bar(message: impl Into<String>) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}")
+        .expect("the bar's template is a constant");
+    let bar = ProgressBar::new(0).with_style(style);
+    bar.set_message(message.into());
+    bar
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn write_file_refuses_an_existing_file_and_leaves_it_as_it_was() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("model.json");
-        write_file(&path, b"first", Overwrite::Refuse).expect("a new file");
-        let refused = write_file(&path, b"second", Overwrite::Refuse);
-        assert!(matches!(refused, Err(Error::Exists(p)) if p == path));
-        assert_eq!(fs::read(&path).expect("still there"), b"first");
-        write_file(&path, b"second", Overwrite::Replace).expect("forced");
-        assert_eq!(fs::read(&path).expect("replaced"), b"second");
-        let left = fs::read_dir(folder.path()).expect("readable").count();
-        assert_eq!(left, 1, "no part file stays behind");
-    }
 
     #[test]
     fn significant_keeps_four_digits() {

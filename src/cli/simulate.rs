@@ -7,12 +7,13 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::SimulateArguments;
-use super::output::{Overwrite, Table, significant, spinner, write_file};
+use super::output::{check_output, Table, significant, spinner, write_file};
 use super::trajectory::TrajectoryTable;
 use crate::evaluate::{CoordinateSums, Fit, FitSums, PointwiseSums};
 use crate::model::ReducedModel;
 use crate::recording::Segment;
 use crate::sim::{CompiledModel, IntegrationOptions, LatentSegment, Restart, rollout};
+use crate::files::Overwrite;
 use crate::{Error, artifact, recording};
 
 /// Rolls the model out over every segment of every recording.
@@ -21,9 +22,7 @@ use crate::{Error, artifact, recording};
 /// Whatever reading, encoding or integrating refuses; [`Error::Exists`] for the output file.
 pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    if let Some(path) = &arguments.output {
-        overwrite.check(path)?;
-    }
+    check_output(arguments.output.as_deref(), overwrite)?;
     let model = artifact::read(&arguments.model)?;
     let evaluation = Evaluation::over(&model, &arguments.recordings, arguments.restart_every)?;
     if let Some(path) = &arguments.output {

@@ -5,8 +5,7 @@
 //! place and then renamed.
 
 use std::fmt::Write as _;
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 use flate2::Compression;
@@ -15,6 +14,7 @@ use flate2::write::GzEncoder;
 use super::columns::Column;
 use super::error::RecordingError;
 use super::segment::{Recording, Segment};
+use crate::files::write_whole;
 
 /// Cell separator and decimal mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -61,46 +61,20 @@ pub fn write_with(
     recording: &Recording,
     options: &WriteOptions,
 ) -> Result<(), RecordingError> {
-    let beside = match path.file_name() {
-        Some(name) => {
-            let mut part = std::ffi::OsString::from(".");
-            part.push(name);
-            part.push(format!(".{}.part", std::process::id()));
-            path.with_file_name(part)
+    let is_gzip = (path.extension()).is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    let written = write_whole(path, |mut file| {
+        if !is_gzip {
+            return write_to(&mut file, recording, options);
         }
-        None => path.to_owned(),
-    };
-    let outcome =
-        write_file(&beside, path, recording, options).and_then(|()| fs::rename(&beside, path));
-    outcome.map_err(|source| {
-        // The rest of a failed attempt; the fault itself is what is reported.
-        let _ = fs::remove_file(&beside);
-        RecordingError::Io {
-            path: path.to_owned(),
-            action: "write",
-            source,
-        }
-    })
-}
-
-fn write_file(
-    beside: &Path,
-    path: &Path,
-    recording: &Recording,
-    options: &WriteOptions,
-) -> io::Result<()> {
-    let mut file = BufWriter::new(File::create(beside)?);
-    if path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("gz"))
-    {
-        let mut packed = GzEncoder::new(&mut file, Compression::best());
+        let mut packed = GzEncoder::new(file, Compression::best());
         write_to(&mut packed, recording, options)?;
-        packed.finish()?;
-    } else {
-        write_to(&mut file, recording, options)?;
-    }
-    file.into_inner()?.sync_all()
+        packed.finish().map(|_| ())
+    });
+    written.map_err(|source| RecordingError::Io {
+        path: path.to_owned(),
+        action: "write",
+        source,
+    })
 }
 
 /// Writes a recording as text.
