@@ -4,7 +4,8 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::artifact::ArtifactError;
-use crate::backend::EmitError;
+use crate::backend::{EmitError, FolderError};
+use crate::lower::LowerError;
 use crate::model::ModelError;
 use crate::mpc::MpcError;
 use crate::recording::RecordingError;
@@ -29,6 +30,10 @@ pub enum Error {
     #[error(transparent)]
     Emit(#[from] EmitError),
     #[error(transparent)]
+    Folder(#[from] FolderError),
+    #[error(transparent)]
+    Lower(#[from] LowerError),
+    #[error(transparent)]
     Sim(#[from] SimError),
     #[error(transparent)]
     Mpc(#[from] MpcError),
@@ -38,11 +43,4 @@ pub enum Error {
     /// The file system refused an output.
     #[error("{path}: cannot write")]
     Write { path: PathBuf, source: io::Error },
-    /// A number on the command line outside its range.
-    #[error("{option}: found {found}, expected {expected}")]
-    Option {
-        option: &'static str,
-        found: String,
-        expected: &'static str,
-    },
 }

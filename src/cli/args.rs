@@ -143,15 +143,16 @@ pub struct CompileArguments {
         long,
         value_name = "TARGET",
         value_delimiter = ',',
-        default_value = "latex,c,rust"
+        default_value = "latex,c,rust",
+        value_parser = target
     )]
     pub emit: Vec<Target>,
     /// Folder for the emitted files
     #[arg(long, value_name = "DIR")]
     pub out_dir: PathBuf,
-    /// Decimal places of the coefficients in LaTeX
-    #[arg(long, value_name = "N", default_value_t = 2)]
-    pub digits: usize,
+    /// Decimal places of printed coefficients; as many as each needs, at least two, unless given
+    #[arg(long, value_name = "N")]
+    pub digits: Option<usize>,
     /// Write into a folder that holds files romc did not make
     #[arg(long)]
     pub force: bool,
@@ -248,4 +249,8 @@ fn at_least_one(text: &str) -> Result<usize, String> {
         Ok(count) if count > 0 => Ok(count),
         _ => Err("expected a whole number of at least 1".to_owned()),
     }
+}
+
+fn target(text: &str) -> Result<Target, String> {
+    text.parse::<Target>().map_err(|error| error.to_string())
 }

@@ -63,7 +63,7 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
             "file": path.display().to_string(),
             "name": model.name(),
             "description": model.description(),
-            "digest": artifact::digest(model)?,
+            "digest": artifact::digest(model).to_string(),
             "latent_dim": model.latent_dim(),
             "library_dim": model.library().len(),
             "library": model.library().terms().iter().map(|term| term.text()).collect::<Vec<_>>(),

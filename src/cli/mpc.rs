@@ -7,12 +7,13 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::{LiftChoice, MpcArguments, ReferenceInput};
-use super::output::{check_output, Table, progress_bar, significant, write_file};
+use super::output::{Table, check_output, progress_bar, read_recordings, significant, write_file};
 use crate::model::ReducedModel;
+use crate::recording::Recording;
 use crate::mpc::{self, Controller, Lift, MpcSettings, Run, StepRow};
 use crate::robot::{JOINT_DIM, Robot};
 use crate::files::Overwrite;
-use crate::{Error, artifact, recording};
+use crate::{Error, artifact};
 
 /// Runs the controller along each recording.
 ///
@@ -35,7 +36,8 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
         ReferenceInput::Recorded => mpc::ReferenceInput::Recorded,
         ReferenceInput::None => mpc::ReferenceInput::None,
     };
-    let runs = run_all(&model, &arguments.recordings, settings, reference_input)?;
+    let recordings = read_recordings(&arguments.recordings)?;
+    let runs = run_all(&model, &recordings, settings, reference_input)?;
     if let Some(path) = &arguments.output {
         write_file(path, command_table(&model, &runs).as_bytes(), overwrite)?;
     }
@@ -51,22 +53,21 @@ pub type NamedRun = (PathBuf, Run);
 /// Whatever reading or the controller's set-up refuses.
 pub fn run_all(
     model: &ReducedModel,
-    paths: &[PathBuf],
+    recordings: &[Recording],
     settings: MpcSettings,
     reference_input: mpc::ReferenceInput,
 ) -> Result<Vec<NamedRun>, Error> {
     let mut controller = Controller::new(model, settings)?;
-    let mut runs = Vec::with_capacity(paths.len());
-    for path in paths {
-        let recording = recording::read(path)?;
-        let bar = progress_bar(format!("controlling along {}", path.display()));
+    let mut runs = Vec::with_capacity(recordings.len());
+    for recording in recordings {
+        let bar = progress_bar(format!("controlling along {}", recording.path.display()));
         controller.reset();
-        let run = mpc::along_recording(&mut controller, &recording, reference_input, |done, total| {
+        let run = mpc::along_recording(&mut controller, recording, reference_input, |done, total| {
             bar.set_length(total as u64);
             bar.set_position(done as u64);
         })?;
         bar.finish_and_clear();
-        runs.push((path.clone(), run));
+        runs.push((recording.path.clone(), run));
     }
     Ok(runs)
 }

@@ -1,12 +1,13 @@
 //! Files, tables and progress: how every command shows what it did.
 
 use std::fmt::Display;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::Error;
+use crate::recording::{self, Recording};
 use crate::files::{Overwrite, write_whole};
 
 /// Tells before long work that its output could not be written.
@@ -30,6 +31,22 @@ pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<
         path: path.to_owned(),
         source,
     })
+}
+
+/// Reads recordings, showing which.
+///
+/// # Errors
+/// [`Error::Recording`] for the first that cannot be read.
+pub fn read_recordings(paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
+    let progress = spinner("reading recordings");
+    let read = (paths.iter())
+        .map(|path| {
+            progress.set_message(format!("reading {}", path.display()));
+            Ok(recording::read(path)?)
+        })
+        .collect();
+    progress.finish_and_clear();
+    read
 }
 
 /// A table of text cells with a header, columns aligned: the first to the left, the rest to the right.

@@ -1,20 +1,19 @@
 //! `romc simulate`: rollouts over recordings, in full and restarted.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::SimulateArguments;
-use super::output::{check_output, Table, significant, spinner, write_file};
+use super::output::{Table, check_output, read_recordings, significant, spinner, write_file};
 use super::trajectory::TrajectoryTable;
 use crate::evaluate::{CoordinateSums, Fit, FitSums, PointwiseSums};
 use crate::model::ReducedModel;
-use crate::recording::Segment;
+use crate::recording::{Recording, Segment};
 use crate::sim::{CompiledModel, IntegrationOptions, LatentSegment, Restart, rollout};
 use crate::files::Overwrite;
-use crate::{Error, artifact, recording};
+use crate::{Error, artifact};
 
 /// Rolls the model out over every segment of every recording.
 ///
@@ -24,13 +23,21 @@ pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(arguments.output.as_deref(), overwrite)?;
     let model = artifact::read(&arguments.model)?;
-    let evaluation = Evaluation::over(&model, &arguments.recordings, arguments.restart_every)?;
+    let recordings = read_recordings(&arguments.recordings)?;
+    let progress = spinner("simulating");
+    let evaluation = Evaluation::over(&model, &recordings, arguments.restart_every)?;
+    progress.finish_and_clear();
     if let Some(path) = &arguments.output {
         write_file(path, evaluation.trajectories.as_bytes(), overwrite)?;
     }
     Ok(Answer {
         text: evaluation.text(arguments),
-        json: evaluation.json(arguments),
+        json: json!({
+            "command": "simulate",
+            "model": arguments.model.display().to_string(),
+            "rollouts": evaluation.json(arguments.restart_every),
+            "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+        }),
     })
 }
 
@@ -57,7 +64,7 @@ impl Evaluation {
     /// Whatever reading, encoding or integrating refuses.
     pub fn over(
         model: &ReducedModel,
-        recordings: &[PathBuf],
+        recordings: &[Recording],
         restart_every_s: f64,
     ) -> Result<Self, Error> {
         let state_names = crate::robot::Robot::state_names().to_vec();
@@ -74,12 +81,8 @@ impl Evaluation {
             trajectories: TrajectoryTable::new(model),
         };
         let compiled = CompiledModel::new(model)?;
-        for path in recordings {
-            let progress = spinner(format!("simulating {}", path.display()));
-            for segment in &recording::read(path)?.segments {
-                evaluation.add(model, &compiled, segment, Restart::Every(restart_every_s))?;
-            }
-            progress.finish_and_clear();
+        for segment in recordings.iter().flat_map(|recording| &recording.segments) {
+            evaluation.add(model, &compiled, segment, Restart::Every(restart_every_s))?;
         }
         Ok(evaluation)
     }
@@ -152,21 +155,24 @@ impl Evaluation {
         self.phase_names.iter().map(String::as_str).zip(fits)
     }
 
-    fn json(&self, arguments: &SimulateArguments) -> Value {
+    /// The figures as JSON.
+    pub fn json(&self, restart_every_s: f64) -> Value {
         json!({
-            "command": "simulate",
-            "model": arguments.model.display().to_string(),
-            "recordings": arguments.recordings.len(),
             "segments": self.segments,
-            "restart_every_s": arguments.restart_every,
+            "restart_every_s": restart_every_s,
             "full": self.rollouts_json(&self.full),
             "restarted": self.rollouts_json(&self.restarted),
             "acceleration_r2": self.acceleration_fits()
                 .map(|(name, fit)| (name.to_owned(), json!(fit.and_then(|fit| fit.r2))))
                 .collect::<serde_json::Map<_, _>>(),
             "decoder_mean_square_scaled": self.pointwise.decoder.fit().map(|fit| fit.rms.powi(2)),
-            "output": arguments.output.as_ref().map(|path| path.display().to_string()),
         })
+    }
+
+    /// Fit of the coordinate with this name.
+    pub fn fit(&self, sums: &CoordinateSums, name: &str) -> Option<Fit> {
+        let index = self.names.iter().position(|known| known == name)?;
+        sums.fits()[index]
     }
 
     fn rollouts_json(&self, sums: &CoordinateSums) -> Value {

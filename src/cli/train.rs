@@ -8,12 +8,12 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::{TrainArguments, TrainMethod};
-use super::output::{check_output, Table, significant, spinner};
+use super::output::{Table, check_output, read_recordings, significant, spinner};
 use crate::recording::Recording;
 use crate::robot::Robot;
 use crate::train::{Origin, Progress, Recordings, SetMetrics, TrainOptions, Trained, Watch};
 use crate::files::Overwrite;
-use crate::{Error, artifact, recording, train};
+use crate::{Error, artifact, train};
 
 /// Learns a model and writes it.
 ///
@@ -23,8 +23,8 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(Some(&arguments.output), overwrite)?;
     let robot = Robot::by_name(&arguments.robot)?;
-    let training = read_all(&arguments.recordings)?;
-    let validation = read_all(&arguments.validation)?;
+    let training = read_recordings(&arguments.recordings)?;
+    let validation = read_recordings(&arguments.validation)?;
     let sets = Recordings {
         training: &training,
         validation: &validation,
@@ -48,18 +48,6 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     bar.finish_and_clear();
     artifact::write_with(&arguments.output, &trained.model, overwrite)?;
     Ok(answer(arguments, &trained))
-}
-
-fn read_all(paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
-    let progress = spinner("reading recordings");
-    let read = (paths.iter())
-        .map(|path| {
-            progress.set_message(format!("reading {}", path.display()));
-            Ok(recording::read(path)?)
-        })
-        .collect();
-    progress.finish_and_clear();
-    read
 }
 
 fn model_name(arguments: &TrainArguments) -> String {

@@ -1,0 +1,260 @@
+//! `romc demo`: the main job on the shipped model and recordings, from a recorded jump to torques.
+//!
+//! Model and recordings are part of the binary, so that the demo runs anywhere.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::{Value, json};
+
+use super::Answer;
+use super::args::DemoArguments;
+use super::mpc::NamedRun;
+use super::output::{Table, significant, spinner};
+use super::simulate::Evaluation;
+use super::{compile, mpc as mpc_command};
+use crate::backend::{EmittedFile, Target};
+use crate::evaluate::{Aslip, AslipSums, CoordinateSums, FitSums};
+use crate::files::Overwrite;
+use crate::model::ReducedModel;
+use crate::mpc::{Lift, MpcSettings, ReferenceInput};
+use crate::recording::Recording;
+use crate::sim::Restart;
+use crate::{Error, artifact, recording};
+
+/// The shipped model that the demo works with.
+const MODEL: (&str, &[u8]) = ("go1-d4.json", include_bytes!("../../models/go1-d4.json"));
+
+/// Recorded jumps that its training did not see.
+const JUMPS: [(&str, &[u8]); 3] = [
+    (
+        "test_01",
+        include_bytes!("../../examples/recordings/go1/test_01.csv.gz"),
+    ),
+    (
+        "test_02",
+        include_bytes!("../../examples/recordings/go1/test_02.csv.gz"),
+    ),
+    (
+        "test_03",
+        include_bytes!("../../examples/recordings/go1/test_03.csv.gz"),
+    ),
+];
+
+/// Time between restarts of the short rollouts, as in the paper's second test.
+const RESTART_S: f64 = 0.1;
+
+/// Runs the whole path and tells what it made and how well it does.
+///
+/// # Errors
+/// [`Error::Folder`] for a file in the folder that romc did not make; nothing else should fail on
+/// the shipped files.
+pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
+    let overwrite = Overwrite::when_forced(arguments.force);
+    let progress = spinner("reading the shipped model and recordings");
+    let model = artifact::read_from_bytes(MODEL.0, MODEL.1)?;
+    let jumps = (JUMPS.iter())
+        .map(|(name, bytes)| recording::read_from_bytes(name, bytes))
+        .collect::<Result<Vec<_>, _>>()?;
+
+    progress.set_message("compiling equations and code");
+    let targets = [Target::Latex, Target::C, Target::Rust];
+    let mut files = compile::emit(&model, &targets, None)?;
+    progress.set_message("rolling the model out");
+    let evaluation = Evaluation::over(&model, &jumps, RESTART_S)?;
+    let aslip = aslip(&model, &jumps)?;
+    progress.set_message("running the controller");
+    let control = Control::along(&model, &jumps)?;
+    let commands = mpc_command::command_table(&model, &control.transpose);
+    files.push(EmittedFile::new("commands.csv", commands));
+    let made = compile::write(&arguments.out_dir, &files, overwrite)?;
+    progress.set_message("checking the C code");
+    let self_test = self_test(&model, &arguments.out_dir);
+    progress.finish_and_clear();
+
+    let results = Results {
+        jumps: jumps.len(),
+        evaluation,
+        aslip,
+        control,
+        self_test,
+        made,
+    };
+    Ok(Answer {
+        text: results.text(&arguments.out_dir),
+        json: results.json(),
+    })
+}
+
+/// What the controller did along the jumps, with each lift.
+struct Control {
+    transpose: Vec<NamedRun>,
+    consistent: Vec<NamedRun>,
+}
+
+impl Control {
+    fn along(model: &ReducedModel, jumps: &[Recording]) -> Result<Self, Error> {
+        let with = |lift| {
+            let settings = MpcSettings {
+                lift,
+                ..MpcSettings::default()
+            };
+            mpc_command::run_all(model, jumps, settings, ReferenceInput::Recorded)
+        };
+        Ok(Self {
+            transpose: with(Lift::Transpose)?,
+            consistent: with(Lift::Consistent)?,
+        })
+    }
+}
+
+/// What became of the emitted self-test.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum SelfTest {
+    Passed,
+    NoCompiler,
+    Failed(String),
+}
+
+impl SelfTest {
+    fn words(&self) -> String {
+        match self {
+            Self::Passed => "passed".to_owned(),
+            Self::NoCompiler => "not run: no C compiler `cc` was found".to_owned(),
+            Self::Failed(reason) => format!("FAILED: {reason}"),
+        }
+    }
+}
+
+/// Compiles the emitted C with the machine's compiler and runs its self-test.
+fn self_test(model: &ReducedModel, folder: &Path) -> SelfTest {
+    let name = model.identifier().as_str();
+    let Ok(scratch) = tempfile::tempdir() else {
+        return SelfTest::Failed("no temporary folder".to_owned());
+    };
+    let binary = scratch.path().join("selftest");
+    let compiled = Command::new("cc")
+        .args(["-std=c99", "-O2", "-o"])
+        .arg(&binary)
+        .arg(folder.join(format!("{name}.c")))
+        .arg(folder.join(format!("{name}_selftest.c")))
+        .arg("-lm")
+        .output();
+    match compiled {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => SelfTest::NoCompiler,
+        Err(error) => SelfTest::Failed(error.to_string()),
+        Ok(output) if !output.status.success() => {
+            SelfTest::Failed(String::from_utf8_lossy(&output.stderr).into_owned())
+        }
+        Ok(_) => match Command::new(&binary).output() {
+            Ok(output) if output.status.success() => SelfTest::Passed,
+            Ok(output) => SelfTest::Failed(String::from_utf8_lossy(&output.stdout).into_owned()),
+            Err(error) => SelfTest::Failed(error.to_string()),
+        },
+    }
+}
+
+/// The pendulum's residuals over the same jumps: whole, and restarted.
+fn aslip(model: &ReducedModel, jumps: &[Recording]) -> Result<[AslipSums; 2], Error> {
+    let mut sums = [AslipSums::default(); 2];
+    for segment in jumps.iter().flat_map(|jump| &jump.segments) {
+        for (restart, sums) in [Restart::Never, Restart::Every(RESTART_S)].iter().zip(&mut sums) {
+            Aslip::PUBLISHED.add_rollout(model.robot()?, segment, *restart, sums)?;
+        }
+    }
+    Ok(sums)
+}
+
+/// Everything the demo has to tell.
+struct Results {
+    jumps: usize,
+    evaluation: Evaluation,
+    aslip: [AslipSums; 2],
+    control: Control,
+    self_test: SelfTest,
+    made: Vec<(PathBuf, usize)>,
+}
+
+impl Results {
+    fn text(&self, folder: &Path) -> String {
+        let mut text = format!(
+            "romc demo: model {} on {} recorded jumps of a simulated Go1 that its training did not see\n\n",
+            MODEL.0, self.jumps
+        );
+        let _ = writeln!(text, "{}\n{}", self.figures(), self.commands());
+        let _ = writeln!(text, "self-test of the emitted C: {}\n", self.self_test.words());
+        let _ = writeln!(text, "made in {}:", folder.display());
+        for (path, bytes) in &self.made {
+            let name = path.strip_prefix(folder).unwrap_or(path).display();
+            let _ = writeln!(text, "  {name} ({bytes} bytes)");
+        }
+        text
+    }
+
+    /// Prediction errors of the model beside those of the pendulum.
+    fn figures(&self) -> Table {
+        let mut table = Table::new(["rms error, m", "model", "ASLIP, published constants"]);
+        let rms = |sums: FitSums| sums.fit().map_or("-".to_owned(), |fit| significant(fit.rms));
+        for (name, whole, short) in [
+            ("body.x", self.aslip[0].x, self.aslip[1].x),
+            ("body.z", self.aslip[0].z, self.aslip[1].z),
+        ] {
+            let cell = |fits: &CoordinateSums| {
+                let fit = self.evaluation.fit(fits, name);
+                fit.map_or("-".to_owned(), |fit| significant(fit.rms))
+            };
+            let (full, restarted) = (&self.evaluation.full, &self.evaluation.restarted);
+            table.row([format!("{name}, whole jump"), cell(full), rms(whole)]);
+            let title = format!("{name}, restarted every {RESTART_S} s");
+            table.row([title, cell(restarted), rms(short)]);
+        }
+        table
+    }
+
+    /// What the controller commanded, with each lift.
+    fn commands(&self) -> Table {
+        let header = [
+            "controller", "steps", "solved", "torque R^2 in contact", "beyond torque limits",
+            "median step us",
+        ];
+        let mut table = Table::new(header);
+        for (lift, runs) in [
+            ("plain lift, u = W_e^T u_lat", &self.control.transpose),
+            ("consistent lift", &self.control.consistent),
+        ] {
+            for (path, run) in runs {
+                let summary = &run.summary;
+                table.row([
+                    format!("{lift}, {}", path.display()),
+                    summary.steps.to_string(),
+                    summary.solved.to_string(),
+                    summary.torque_r2.contact.map_or("-".to_owned(), significant),
+                    summary.limit_violations.to_string(),
+                    format!("{:.0}", summary.step_us.p50),
+                ]);
+            }
+        }
+        table
+    }
+
+    fn json(&self) -> Value {
+        let rms = |sums: FitSums| sums.fit().map(|fit| fit.rms);
+        let runs = |runs: &[NamedRun]| runs.iter().map(mpc_command::run_json).collect::<Vec<_>>();
+        json!({
+            "command": "demo",
+            "model": MODEL.0,
+            "rollouts": self.evaluation.json(RESTART_S),
+            "aslip_rms_m": {
+                "full": { "body.x": rms(self.aslip[0].x), "body.z": rms(self.aslip[0].z) },
+                "restarted": { "body.x": rms(self.aslip[1].x), "body.z": rms(self.aslip[1].z) },
+            },
+            "mpc": {
+                "transpose": runs(&self.control.transpose),
+                "consistent": runs(&self.control.consistent),
+            },
+            "self_test": self.self_test.words(),
+            "files": self.made.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
+        })
+    }
+}
