@@ -5,7 +5,8 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use romc::artifact;
-use romc::backend::{EmitOptions, Overwrite, Target, emit, write_files};
+use romc::backend::{EmitOptions, Target, emit, write_files};
+use romc::files::Overwrite;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -29,7 +30,7 @@ fn compile(model: &Path, folder: &Path) -> Result<(), Box<dyn std::error::Error>
         ..EmitOptions::default()
     };
     let files = emit(&model, &[Target::C, Target::Rust], &options)?;
-    for path in write_files(folder, &files, Overwrite::OwnFiles)? {
+    for path in write_files(folder, &files, Overwrite::Refuse)? {
         println!("{}", path.display());
     }
     Ok(())

@@ -5,19 +5,10 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use super::target::EmittedFile;
+use crate::files::Overwrite;
 
 /// Names the files of the folder that were emitted, one a line.
 const MANIFEST: &str = ".romc-emitted";
-
-/// Whether files that romc did not make may be replaced.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Overwrite {
-    /// Only files that an earlier run made.
-    #[default]
-    OwnFiles,
-    /// Any file of the same name.
-    AnyFile,
-}
 
 /// Why files could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -58,7 +49,7 @@ pub fn write_files(
     };
     for file in files {
         let path = folder.join(&file.path);
-        let is_own = own.contains(&file.path) || overwrite == Overwrite::AnyFile;
+        let is_own = own.contains(&file.path) || overwrite == Overwrite::Replace;
         if path.symlink_metadata().is_ok() && (path.is_dir() || !is_own) {
             return Err(FolderError::Foreign { path });
         }
@@ -119,8 +110,8 @@ mod tests {
     fn second_run_replaces_own_files_and_leaves_no_part() {
         let folder = tempfile::tempdir().expect("a folder");
         let out = folder.path().join("new/out");
-        write_files(&out, &files("one"), Overwrite::OwnFiles).expect("first");
-        let written = write_files(&out, &files("two"), Overwrite::OwnFiles).expect("second");
+        write_files(&out, &files("one"), Overwrite::Refuse).expect("first");
+        let written = write_files(&out, &files("two"), Overwrite::Refuse).expect("second");
         assert_eq!(written, [out.join("m.c"), out.join("m/src/lib.rs")]);
         for path in written {
             assert_eq!(fs::read_to_string(path).expect("written"), "two");
@@ -138,11 +129,11 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let foreign = folder.path().join("m.c");
         fs::write(&foreign, "mine").expect("written");
-        let found = write_files(folder.path(), &files("new"), Overwrite::OwnFiles);
+        let found = write_files(folder.path(), &files("new"), Overwrite::Refuse);
         assert!(matches!(found, Err(FolderError::Foreign { path }) if path == foreign));
         assert_eq!(fs::read_to_string(&foreign).expect("kept"), "mine");
         assert!(!folder.path().join("m").exists());
-        write_files(folder.path(), &files("new"), Overwrite::AnyFile).expect("forced");
+        write_files(folder.path(), &files("new"), Overwrite::Replace).expect("forced");
         assert_eq!(fs::read_to_string(&foreign).expect("replaced"), "new");
     }
 }

@@ -28,5 +28,5 @@ mod vectors;
 mod wrap;
 
 pub use emit::{EmitOptions, Target, emit};
-pub use folder::{FolderError, Overwrite, write_files};
+pub use folder::{FolderError, write_files};
 pub use target::{EmitError, EmittedFile};

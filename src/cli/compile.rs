@@ -94,7 +94,12 @@ fn phases_in_words(model: &ReducedModel) -> String {
     let phase = |phase: &crate::model::Phase| {
         format!("{} active terms in {}", phase.active_count(), phase.name)
     };
-    model.phases().iter().map(phase).collect::<Vec<_>>().join(", ")
+    model
+        .phases()
+        .iter()
+        .map(phase)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 fn file_json(path: &Path, bytes: usize) -> Value {

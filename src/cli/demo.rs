@@ -159,7 +159,10 @@ fn self_test(model: &ReducedModel, folder: &Path) -> SelfTest {
 fn aslip(model: &ReducedModel, jumps: &[Recording]) -> Result<[AslipSums; 2], Error> {
     let mut sums = [AslipSums::default(); 2];
     for segment in jumps.iter().flat_map(|jump| &jump.segments) {
-        for (restart, sums) in [Restart::Never, Restart::Every(RESTART_S)].iter().zip(&mut sums) {
+        for (restart, sums) in [Restart::Never, Restart::Every(RESTART_S)]
+            .iter()
+            .zip(&mut sums)
+        {
             Aslip::PUBLISHED.add_rollout(model.robot()?, segment, *restart, sums)?;
         }
     }
@@ -183,7 +186,11 @@ impl Results {
             MODEL.0, self.jumps
         );
         let _ = writeln!(text, "{}\n{}", self.figures(), self.commands());
-        let _ = writeln!(text, "self-test of the emitted C: {}\n", self.self_test.words());
+        let _ = writeln!(
+            text,
+            "self-test of the emitted C: {}\n",
+            self.self_test.words()
+        );
         let _ = writeln!(text, "made in {}:", folder.display());
         for (path, bytes) in &self.made {
             let name = path.strip_prefix(folder).unwrap_or(path).display();
@@ -195,7 +202,10 @@ impl Results {
     /// Prediction errors of the model beside those of the pendulum.
     fn figures(&self) -> Table {
         let mut table = Table::new(["rms error, m", "model", "ASLIP, published constants"]);
-        let rms = |sums: FitSums| sums.fit().map_or("-".to_owned(), |fit| significant(fit.rms));
+        let rms = |sums: FitSums| {
+            sums.fit()
+                .map_or("-".to_owned(), |fit| significant(fit.rms))
+        };
         for (name, whole, short) in [
             ("body.x", self.aslip[0].x, self.aslip[1].x),
             ("body.z", self.aslip[0].z, self.aslip[1].z),
@@ -215,7 +225,11 @@ impl Results {
     /// What the controller commanded, with each lift.
     fn commands(&self) -> Table {
         let header = [
-            "controller", "steps", "solved", "torque R^2 in contact", "beyond torque limits",
+            "controller",
+            "steps",
+            "solved",
+            "torque R^2 in contact",
+            "beyond torque limits",
             "median step us",
         ];
         let mut table = Table::new(header);
@@ -229,7 +243,10 @@ impl Results {
                     format!("{lift}, {}", path.display()),
                     summary.steps.to_string(),
                     summary.solved.to_string(),
-                    summary.torque_r2.contact.map_or("-".to_owned(), significant),
+                    summary
+                        .torque_r2
+                        .contact
+                        .map_or("-".to_owned(), significant),
                     summary.limit_violations.to_string(),
                     format!("{:.0}", summary.step_us.p50),
                 ]);

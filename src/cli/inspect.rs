@@ -28,7 +28,10 @@ pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
 }
 
 fn inspect(path: &Path, robot: &Robot) -> Result<Answer, Error> {
-    if path.extension().is_some_and(|extension| extension == "json") {
+    if path
+        .extension()
+        .is_some_and(|extension| extension == "json")
+    {
         inspect_model::describe(path, &artifact::read(path)?)
     } else {
         inspect_recording::describe(&recording::read(path)?, robot)

@@ -79,7 +79,8 @@ fn feet(rule: &FeetRule) -> String {
         FeetRule::Any => "any".to_owned(),
         FeetRule::None => "none".to_owned(),
         FeetRule::Patterns(patterns) => {
-            let text = |pattern: &[bool; 4]| pattern.map(|down| if down { "1" } else { "0" }).concat();
+            let text =
+                |pattern: &[bool; 4]| pattern.map(|down| if down { "1" } else { "0" }).concat();
             patterns.iter().map(text).collect::<Vec<_>>().join(" ")
         }
     }
@@ -90,7 +91,10 @@ fn pattern(model: &ReducedModel, phase: &Phase) -> String {
     if model.library().len() > PATTERN_WIDTH {
         return String::new();
     }
-    let mut text = format!("Xi of {} (a column a term, + positive, - negative)\n", phase.name);
+    let mut text = format!(
+        "Xi of {} (a column a term, + positive, - negative)\n",
+        phase.name
+    );
     for output in 0..model.latent_dim() {
         let cells: String = (phase.xi.column(output).iter())
             .map(|value| match value {
@@ -111,11 +115,16 @@ fn dominant_coordinates(model: &ReducedModel) -> Option<Vec<Vec<(String, f64)>>>
     let names = match model.state() {
         Some(state) => state.names.clone(),
         None if weights.ncols() == Robot::state_names().len() => Robot::state_names().to_vec(),
-        None => (1..=weights.ncols()).map(|index| format!("x{index}")).collect(),
+        None => (1..=weights.ncols())
+            .map(|index| format!("x{index}"))
+            .collect(),
     };
     let of_latent = |row: usize| {
-        let mut pairs: Vec<(String, f64)> =
-            names.iter().cloned().zip(weights.row(row).iter().copied()).collect();
+        let mut pairs: Vec<(String, f64)> = names
+            .iter()
+            .cloned()
+            .zip(weights.row(row).iter().copied())
+            .collect();
         pairs.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         pairs.truncate(DOMINANT);
         pairs

@@ -64,11 +64,13 @@ pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
 /// Feet on the ground over time, a character a slice of equal duration.
 fn time_bar(segment: &Segment) -> String {
     (0..BAR_WIDTH)
-        .map(|slot| match segment.feet[slot * segment.len() / BAR_WIDTH] {
-            [false, false, false, false] => ' ',
-            [false, false, _, _] => '=',
-            [_, _, _, _] => '#',
-        })
+        .map(
+            |slot| match segment.feet[slot * segment.len() / BAR_WIDTH] {
+                [false, false, false, false] => ' ',
+                [false, false, _, _] => '=',
+                [_, _, _, _] => '#',
+            },
+        )
         .collect()
 }
 
@@ -143,7 +145,13 @@ fn ranges(recording: &Recording) -> Vec<Range> {
 }
 
 fn range_table(ranges: &[Range]) -> Table {
-    let mut table = Table::new(["coordinate", "unit", "position", "velocity per s", "torque N m"]);
+    let mut table = Table::new([
+        "coordinate",
+        "unit",
+        "position",
+        "velocity per s",
+        "torque N m",
+    ]);
     let pair = |(low, high): (f64, f64)| format!("{} .. {}", significant(low), significant(high));
     for range in ranges {
         table.row([

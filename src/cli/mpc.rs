@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::{LiftChoice, MpcArguments, ReferenceInput};
 use super::output::{Table, check_output, progress_bar, read_recordings, significant, write_file};
-use crate::model::ReducedModel;
-use crate::recording::Recording;
-use crate::mpc::{self, Controller, Lift, MpcSettings, Run, StepRow};
-use crate::robot::{JOINT_DIM, Robot};
 use crate::files::Overwrite;
+use crate::model::ReducedModel;
+use crate::mpc::{self, Controller, Lift, MpcSettings, Run, StepRow};
+use crate::recording::Recording;
+use crate::robot::{JOINT_DIM, Robot};
 use crate::{Error, artifact};
 
 /// Runs the controller along each recording.
@@ -62,10 +62,15 @@ pub fn run_all(
     for recording in recordings {
         let bar = progress_bar(format!("controlling along {}", recording.path.display()));
         controller.reset();
-        let run = mpc::along_recording(&mut controller, recording, reference_input, |done, total| {
-            bar.set_length(total as u64);
-            bar.set_position(done as u64);
-        })?;
+        let run = mpc::along_recording(
+            &mut controller,
+            recording,
+            reference_input,
+            |done, total| {
+                bar.set_length(total as u64);
+                bar.set_position(done as u64);
+            },
+        )?;
         bar.finish_and_clear();
         runs.push((recording.path.clone(), run));
     }
@@ -74,15 +79,25 @@ pub fn run_all(
 
 fn answer(arguments: &MpcArguments, runs: &[NamedRun]) -> Answer {
     let header = [
-        "recording", "steps", "solved", "softened", "failed", "torque R^2 contact", "flight",
-        "rms N m", "limit violations", "median us", "p99 us",
+        "recording",
+        "steps",
+        "solved",
+        "softened",
+        "failed",
+        "torque R^2 contact",
+        "flight",
+        "rms N m",
+        "limit violations",
+        "median us",
+        "p99 us",
     ];
     let mut table = Table::new(header);
     let optional = |value: Option<f64>| value.map_or("-".to_owned(), significant);
     for (path, run) in runs {
         let summary = &run.summary;
         table.row([
-            path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned()),
+            path.file_name()
+                .map_or(String::new(), |name| name.to_string_lossy().into_owned()),
             summary.steps.to_string(),
             summary.solved.to_string(),
             summary.softened.to_string(),
@@ -101,7 +116,11 @@ fn answer(arguments: &MpcArguments, runs: &[NamedRun]) -> Answer {
         arguments.horizon,
         arguments.step
     );
-    if let Some(row) = runs.iter().flat_map(|(_, run)| &run.rows).find(|row| row.status.has_plan()) {
+    if let Some(row) = runs
+        .iter()
+        .flat_map(|(_, run)| &run.rows)
+        .find(|row| row.status.has_plan())
+    {
         let torques = row.torque_nm.map(|torque| format!("{torque:.2}")).join(" ");
         let _ = writeln!(text, "first torque command (N m): {torques}");
     }
@@ -152,12 +171,25 @@ pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> String {
         Some(input) => input.names.clone(),
         None => Robot::input_names().to_vec(),
     };
-    let mut header: Vec<String> = ["recording", "segment", "time", "phase", "status", "solve_us", "iterations"]
-        .map(str::to_owned)
-        .to_vec();
+    let mut header: Vec<String> = [
+        "recording",
+        "segment",
+        "time",
+        "phase",
+        "status",
+        "solve_us",
+        "iterations",
+    ]
+    .map(str::to_owned)
+    .to_vec();
     header.extend((1..=d).map(|i| format!("u_lat_{i}")));
     header.extend(input_names.iter().cloned());
-    header.extend(input_names.iter().take(JOINT_DIM).map(|name| format!("{name} torque")));
+    header.extend(
+        input_names
+            .iter()
+            .take(JOINT_DIM)
+            .map(|name| format!("{name} torque")),
+    );
     header.extend((1..=d).map(|i| format!("z_ref_{i}")));
     header.extend((1..=d).map(|i| format!("z_{i}")));
     let mut text = header.join(",");
@@ -171,7 +203,9 @@ pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> String {
 }
 
 fn write_row(text: &mut String, model: &ReducedModel, recording: &str, row: &StepRow) {
-    let phase = row.phase.map_or("", |phase| model.phases()[phase].name.as_str());
+    let phase = row
+        .phase
+        .map_or("", |phase| model.phases()[phase].name.as_str());
     let _ = write!(
         text,
         "{},{},{},{phase},{},{:.1},{}",

@@ -7,8 +7,8 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::Error;
-use crate::recording::{self, Recording};
 use crate::files::{Overwrite, write_whole};
+use crate::recording::{self, Recording};
 
 /// Tells before long work that its output could not be written.
 ///

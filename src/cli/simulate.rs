@@ -9,10 +9,10 @@ use super::args::SimulateArguments;
 use super::output::{Table, check_output, read_recordings, significant, spinner, write_file};
 use super::trajectory::TrajectoryTable;
 use crate::evaluate::{CoordinateSums, Fit, FitSums, PointwiseSums};
+use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::recording::{Recording, Segment};
 use crate::sim::{CompiledModel, IntegrationOptions, LatentSegment, Restart, rollout};
-use crate::files::Overwrite;
 use crate::{Error, artifact};
 
 /// Rolls the model out over every segment of every recording.

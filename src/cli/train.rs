@@ -9,10 +9,10 @@ use serde_json::json;
 use super::Answer;
 use super::args::{TrainArguments, TrainMethod};
 use super::output::{Table, check_output, read_recordings, significant, spinner};
+use crate::files::Overwrite;
 use crate::recording::Recording;
 use crate::robot::Robot;
 use crate::train::{Origin, Progress, Recordings, SetMetrics, TrainOptions, Trained, Watch};
-use crate::files::Overwrite;
 use crate::{Error, artifact, train};
 
 /// Learns a model and writes it.
@@ -41,9 +41,7 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let cancel = AtomicBool::new(false);
     let mut watch = Watch::new(&mut listener, &cancel);
     let trained = match arguments.method {
-        TrainMethod::ClosedForm => {
-            train::closed_form(sets, robot, &options, &origin, &mut watch)?
-        }
+        TrainMethod::ClosedForm => train::closed_form(sets, robot, &options, &origin, &mut watch)?,
     };
     bar.finish_and_clear();
     artifact::write_with(&arguments.output, &trained.model, overwrite)?;
@@ -51,7 +49,12 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
 }
 
 fn model_name(arguments: &TrainArguments) -> String {
-    let stem = || arguments.output.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let stem = || {
+        arguments
+            .output
+            .file_stem()
+            .map(|stem| stem.to_string_lossy().into_owned())
+    };
     arguments.name.clone().or_else(stem).unwrap_or_default()
 }
 
@@ -92,8 +95,12 @@ fn answer(arguments: &TrainArguments, trained: &Trained) -> Answer {
             cell(validation, "diverged"),
         ]);
     };
-    row("decoder mean square", "scaled", &|set| Some(set.decoder_mse));
-    row("torque R^2 of the plain lift", "", &|set| Some(set.torque_r2));
+    row("decoder mean square", "scaled", &|set| {
+        Some(set.decoder_mse)
+    });
+    row("torque R^2 of the plain lift", "", &|set| {
+        Some(set.torque_r2)
+    });
     row("body x after 0.1 s", "m", &|set| Some(set.prediction_x_m));
     row("body z after 0.1 s", "m", &|set| Some(set.prediction_z_m));
     row("body x, whole jump", "m", &|set| set.rollout_x_m);

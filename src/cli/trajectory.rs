@@ -57,13 +57,19 @@ impl TrajectoryTable {
             let _ = write!(self.text, "{index},{},{phase}", segment.time_s[sample]);
             let z = [&predicted[0][sample], &predicted[1][sample]];
             let recorded = latent.z.column(sample).into_owned();
-            self.cells(recorded.as_slice(), z.map(|z| z.as_ref().map(|z| z.as_slice())));
+            self.cells(
+                recorded.as_slice(),
+                z.map(|z| z.as_ref().map(|z| z.as_slice())),
+            );
             let mut decoded = [None, None];
             for (x, z) in decoded.iter_mut().zip(z) {
                 *x = z.as_ref().map(|z| model.decode(z)).transpose()?;
             }
             let recorded = segment.x.column(sample).into_owned();
-            self.cells(recorded.as_slice(), [0, 1].map(|k: usize| decoded[k].as_ref().map(|x| x.as_slice())));
+            self.cells(
+                recorded.as_slice(),
+                [0, 1].map(|k: usize| decoded[k].as_ref().map(|x| x.as_slice())),
+            );
             self.text.push('\n');
         }
         Ok(())

@@ -116,7 +116,11 @@ impl Aslip {
             let right = after.min(stances.len() - 1);
             let (from, to) = (stances[left]?, stances[right]?);
             let step = times[right] - times[left];
-            let share = if step > 0.0 { (time - times[left]) / step } else { 0.0 };
+            let share = if step > 0.0 {
+                (time - times[left]) / step
+            } else {
+                0.0
+            };
             Some(Stance {
                 foot_m: from.foot_m,
                 force_n: from.force_n.lerp(&to.force_n, share),
@@ -174,7 +178,11 @@ fn stances(robot: &Robot, segment: &Segment) -> Result<Vec<Option<Stance>>, Reco
             continue;
         }
         let foot = *foot_m.get_or_insert_with(|| mean_foot(robot, segment, sample));
-        let force = Vector3::new(wrench[(0, sample)], wrench[(1, sample)], wrench[(2, sample)]);
+        let force = Vector3::new(
+            wrench[(0, sample)],
+            wrench[(1, sample)],
+            wrench[(2, sample)],
+        );
         let force = orientation(segment, sample) * force;
         stances.push(Some(Stance {
             foot_m: foot,
@@ -193,7 +201,9 @@ fn orientation(segment: &Segment, sample: usize) -> Rotation3<f64> {
 /// Mean of the feet in contact in the world's plane of x and z.
 fn mean_foot(robot: &Robot, segment: &Segment, sample: usize) -> Vector2<f64> {
     let joints = segment.joints(sample);
-    let down = Leg::ALL.into_iter().filter(|leg| segment.feet[sample][leg.index()]);
+    let down = Leg::ALL
+        .into_iter()
+        .filter(|leg| segment.feet[sample][leg.index()]);
     let (mut sum, mut count) = (Vector3::zeros(), 0.0);
     for leg in down {
         sum += robot.hip_position(leg) + robot.foot_position(leg, &leg.of_joints(&joints));

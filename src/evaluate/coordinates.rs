@@ -110,7 +110,9 @@ impl PointwiseSums {
             }
         }
         for (total, outputs) in self.acceleration.iter_mut().zip(&accelerations) {
-            outputs.iter().for_each(|sums| total.merge_keeping_means(sums));
+            outputs
+                .iter()
+                .for_each(|sums| total.merge_keeping_means(sums));
         }
         Ok(())
     }

@@ -40,8 +40,7 @@ impl LatentSegment {
             }
             Ok(out)
         };
-        let velocity =
-            |dx: DVectorView<f64>| Ok(model.encode_velocity(&dx.into_owned())?);
+        let velocity = |dx: DVectorView<f64>| Ok(model.encode_velocity(&dx.into_owned())?);
         Ok(Self {
             time_s: segment.time_s.clone(),
             z: columns(&segment.x, &|x| Ok(model.encode(&x.into_owned())?))?,

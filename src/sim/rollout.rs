@@ -115,7 +115,9 @@ fn roll_window(
         let result = integrate_phase(model, recorded, phase, &state, times, options)?;
         for column in 1..result.states.ncols() {
             let sample = span.start + column - samples.start;
-            states.column_mut(sample).copy_from(&result.states.column(column));
+            states
+                .column_mut(sample)
+                .copy_from(&result.states.column(column));
             reached = sample + 1;
         }
         window_end.1 |= result.method == IntegrationMethod::BackwardDifferentiation;
@@ -145,7 +147,12 @@ fn integrate_phase(
 ) -> Result<Integration, SimError> {
     let d = model.latent_dim();
     // the integrator takes shared closures, the interpreter writes into its own registers
-    let evaluation = RefCell::new((model.clone(), vec![0.0; d], vec![0.0; d], DMatrix::zeros(d, 3 * d)));
+    let evaluation = RefCell::new((
+        model.clone(),
+        vec![0.0; d],
+        vec![0.0; d],
+        DMatrix::zeros(d, 3 * d),
+    ));
     integrate(
         |time, y, dy| {
             let (model, u_lat, _, _) = &mut *evaluation.borrow_mut();
