@@ -45,31 +45,24 @@ impl TrajectoryTable {
         full: &Rollout,
         restarted: &Rollout,
     ) -> Result<(), Error> {
-        let predicted = [full, restarted].map(|rollout| {
+        let [full, restarted] = [full, restarted].map(|rollout| {
             let mut columns = vec![None; latent.len()];
             for (sample, window, column) in rollout.predictions() {
                 columns[sample] = Some(window.z.column(column).into_owned());
             }
             columns
         });
-        for sample in 0..latent.len() {
+        for (sample, (full, restarted)) in full.iter().zip(&restarted).enumerate() {
             let phase = &model.phases()[latent.phase[sample]].name;
             let _ = write!(self.text, "{index},{},{phase}", segment.time_s[sample]);
-            let z = [&predicted[0][sample], &predicted[1][sample]];
+            let z = [full.as_ref(), restarted.as_ref()];
             let recorded = latent.z.column(sample).into_owned();
-            self.cells(
-                recorded.as_slice(),
-                z.map(|z| z.as_ref().map(|z| z.as_slice())),
-            );
-            let mut decoded = [None, None];
-            for (x, z) in decoded.iter_mut().zip(z) {
-                *x = z.as_ref().map(|z| model.decode(z)).transpose()?;
-            }
+            self.cells(recorded.as_slice(), z.map(|z| z.map(|z| z.as_slice())));
+            let [full, restarted] = z.map(|z| z.map(|z| model.decode(z)).transpose());
+            let decoded = [full?, restarted?];
             let recorded = segment.x.column(sample).into_owned();
-            self.cells(
-                recorded.as_slice(),
-                [0, 1].map(|k: usize| decoded[k].as_ref().map(|x| x.as_slice())),
-            );
+            let decoded = decoded.each_ref().map(|x| x.as_ref().map(|x| x.as_slice()));
+            self.cells(recorded.as_slice(), decoded);
             self.text.push('\n');
         }
         Ok(())

@@ -152,6 +152,7 @@ mod tests {
     use crate::recording::read_from_bytes;
     use crate::recording::segment::tests::sample_segment;
     use nalgebra::DMatrix;
+    use std::fs;
     use std::path::PathBuf;
 
     fn awkward() -> Recording {
@@ -224,9 +225,10 @@ mod tests {
     }
 
     #[test]
-    fn write_to_a_missing_folder_is_an_error_and_leaves_nothing() {
+    fn write_below_a_file_is_an_error_and_leaves_nothing() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("no/such/place.csv");
+        fs::write(folder.path().join("file"), "").unwrap();
+        let path = folder.path().join("file/place.csv");
         let error = write(&path, &awkward()).unwrap_err();
         assert!(matches!(
             error,
@@ -235,7 +237,7 @@ mod tests {
                 ..
             }
         ));
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
     #[test]

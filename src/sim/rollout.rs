@@ -77,8 +77,9 @@ pub fn rollout(
 
 /// Ranges of samples between restarts; a restart falls on the first sample not before its time.
 pub fn restart_windows(time_s: &[f64], restart: Restart) -> Vec<Range<usize>> {
-    let Restart::Every(interval_s) = restart else {
-        return vec![0..time_s.len()];
+    let interval_s = match restart {
+        Restart::Never => f64::INFINITY,
+        Restart::Every(interval_s) => interval_s,
     };
     // half a microsecond forgives the rounding of times such as 0.1 written in decimal
     const ROUNDING_S: f64 = 5e-7;
