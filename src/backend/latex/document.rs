@@ -2,7 +2,7 @@
 
 use askama::Template;
 
-use crate::backend::typeset::{RoundingReport, Typeset, words};
+use crate::backend::typeset::{EquationSystem, RobotTypeset, RoundingReport, Typeset, words};
 use crate::backend::{EmitError, EmittedFile};
 use crate::model::ReducedModel;
 
@@ -18,7 +18,9 @@ use super::table::{self, TableBlock};
 /// - `NAME.tex`: the equations of each phase, to be taken in by `\input`;
 /// - `NAME-table.tex`: the coefficients as booktabs tables;
 /// - `NAME-nomenclature.tex`: what the symbols mean;
-/// - `NAME-preview.tex`: a document that shows all three.
+/// - `NAME-robot.tex`, if the model has encoder and decoder: what the latent coordinates
+///   are made of, and the accelerations of the robot, in SI units;
+/// - `NAME-preview.tex`: a document that shows them all.
 ///
 /// The first lines of `NAME.tex` say how coefficients were rounded, the largest
 /// error that this made, and which terms vanished by it.
@@ -31,8 +33,10 @@ pub fn emit(model: &ReducedModel, options: &LatexOptions) -> Result<Vec<EmittedF
     let header = Header { model, options };
     let equations = Equations {
         header: header.equations(&typeset.rounding),
-        systems: systems(model, &typeset, options),
+        systems: phases(model, &typeset.systems, "", options),
     };
+    let robot = RobotTypeset::new(model, &options.symbols, options.rounding)?
+        .map(|robot| robot_equations(model, &robot, &header));
     let coefficients = Table {
         header: header.short("Needs booktabs and, for more than 40 terms, longtable."),
         blocks: table::blocks(&typeset.table, model.name(), options.numbers),
@@ -49,13 +53,18 @@ pub fn emit(model: &ReducedModel, options: &LatexOptions) -> Result<Vec<EmittedF
         phases: equations.systems.iter().map(System::sentence).collect(),
         rounding: TexText(&words::rounding(options.rounding, &typeset.rounding)).to_string(),
         siunitx: options.numbers == NumberStyle::Siunitx,
+        has_robot: robot.is_some(),
     };
-    Ok(vec![
+    let mut files = vec![
         file(format!("{stem}.tex"), &equations)?,
         file(format!("{stem}-table.tex"), &coefficients)?,
         file(format!("{stem}-nomenclature.tex"), &nomenclature)?,
-        file(format!("{stem}-preview.tex"), &preview)?,
-    ])
+    ];
+    if let Some(robot) = &robot {
+        files.push(file(format!("{stem}-robot.tex"), robot)?);
+    }
+    files.push(file(format!("{stem}-preview.tex"), &preview)?);
+    Ok(files)
 }
 
 #[derive(Template)]
@@ -69,17 +78,19 @@ struct Equations {
     systems: Vec<System>,
 }
 
-/// One phase in the template.
+/// One system of equations in the template.
 struct System {
-    phase: String,
-    feet: String,
+    /// What it is, in a comment.
+    comment: String,
+    /// When it holds, escaped for the running text.
+    condition: String,
     label: String,
     aligned: bool,
     lines: Vec<String>,
 }
 
 impl System {
-    /// Which equation belongs to the phase and when it holds.
+    /// The number of its equation and when that holds.
     fn sentence(&self) -> String {
         let label = &self.label;
         let number = if self.aligned {
@@ -87,7 +98,7 @@ impl System {
         } else {
             format!(r"Equation \eqref{{{label}}}")
         };
-        format!("{number}: {}, {}.", TexText(&self.phase), self.feet)
+        format!("{number}: {}.", self.condition)
     }
 }
 
@@ -127,25 +138,59 @@ struct Preview {
     phases: Vec<String>,
     rounding: String,
     siunitx: bool,
+    has_robot: bool,
 }
 
-fn systems(model: &ReducedModel, typeset: &Typeset, options: &LatexOptions) -> Vec<System> {
-    typeset
-        .systems
+/// The systems of a model's phases; `part` tells their labels from those of another file.
+fn phases(
+    model: &ReducedModel,
+    systems: &[EquationSystem],
+    part: &str,
+    options: &LatexOptions,
+) -> Vec<System> {
+    systems
         .iter()
         .zip(model.phases())
         .map(|(system, phase)| {
-            let label = format!("eq:{}:{}", label(model.name()), label(&system.phase));
+            let label = format!("eq:{}{part}:{}", label(model.name()), label(&system.phase));
             let block = lines::block(system, &label, options);
+            let feet = words::feet(&phase.feet);
             System {
-                phase: CommentText(&system.phase).to_string(),
-                feet: words::feet(&phase.feet),
+                comment: format!("Phase {}: {feet}.", CommentText(&system.phase)),
+                condition: format!("{}, {feet}", TexText(&system.phase)),
                 aligned: block.aligned,
                 lines: block.lines,
                 label,
             }
         })
         .collect()
+}
+
+/// The encoder's rows, then the robot's accelerations a phase.
+fn robot_equations(model: &ReducedModel, robot: &RobotTypeset, header: &Header<'_>) -> Equations {
+    let label = format!("eq:{}-robot:encoder", label(model.name()));
+    let encoder = EquationSystem {
+        phase: "encoder".to_owned(),
+        equations: robot.encoder.clone(),
+    };
+    let block = lines::block(&encoder, &label, header.options);
+    let mut systems = vec![System {
+        comment: format!(
+            "Latent coordinates, 3 significant digits; {} weights below 2 % of the largest of \
+             their row are left out.",
+            robot.negligible_weights
+        ),
+        condition: String::new(),
+        aligned: block.aligned,
+        lines: block.lines,
+        label,
+    }];
+    systems.extend(phases(model, &robot.systems, "-robot", header.options));
+    let note = "Robot coordinates q in SI units (rad, m); z, u as in the latent equations, scaled.";
+    Equations {
+        header: format!("{}\n% {note}", header.equations(&robot.rounding)),
+        systems,
+    }
 }
 
 /// The comments at the top of each file.
@@ -177,7 +222,8 @@ impl Header<'_> {
             let (phase, term) = (CommentText(&place.phase), CommentText(&place.term));
             header.push_str(&format!(
                 "\n%   left out: {phase}, {}: {:e} * {term}",
-                place.output, place.coefficient
+                CommentText(&place.output),
+                place.coefficient
             ));
         }
         header

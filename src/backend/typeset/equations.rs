@@ -1,9 +1,10 @@
 //! A model's latent dynamics as equations to print, and what rounding did to them.
 
-use crate::model::{Phase, ReducedModel};
+use crate::model::{CandidateTerm, Phase, ReducedModel};
 
 use super::decimal::{Decimal, Rounding};
-use super::expression::{Leading, UnknownSymbol, expression, with_coefficient};
+use super::expression::{UnknownSymbol, expression};
+use super::rounder::{Rounder, RoundingReport};
 use super::symbols::{Quantity, SymbolTable, Variable};
 use super::tree::{Math, Signed, Symbol};
 
@@ -43,32 +44,6 @@ pub struct CoefficientRow {
     pub coefficients: Vec<Option<Decimal>>,
 }
 
-/// A coefficient's place in the model.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Place {
-    /// The phase's name.
-    pub phase: String,
-    /// `ddz1` and so on.
-    pub output: String,
-    /// The candidate term in the library's syntax.
-    pub term: String,
-    /// The coefficient in full.
-    pub coefficient: f64,
-}
-
-/// What rounding for print changed.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct RoundingReport {
-    /// Largest |printed - coefficient|, where it is not zero, and where it occurs.
-    pub largest: Option<(f64, Place)>,
-    /// Largest |printed - coefficient| / |coefficient| of the terms that are printed.
-    pub largest_relative: f64,
-    /// Active terms whose coefficient prints as zero, so that they are left out.
-    pub dropped: Vec<Place>,
-    /// How many coefficients are active in all.
-    pub active: usize,
-}
-
 /// A model's equations with all that printers need of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Typeset {
@@ -100,9 +75,8 @@ impl Typeset {
         let mut layout = Layout {
             model,
             symbols,
-            rounding,
             terms,
-            report: RoundingReport::default(),
+            rounder: Rounder::new(rounding),
         };
         let systems = model
             .phases()
@@ -113,7 +87,7 @@ impl Typeset {
         Ok(Self {
             systems,
             table,
-            rounding: layout.report,
+            rounding: layout.rounder.into_report(),
         })
     }
 }
@@ -121,9 +95,8 @@ impl Typeset {
 struct Layout<'a> {
     model: &'a ReducedModel,
     symbols: &'a SymbolTable,
-    rounding: Rounding,
     terms: Vec<Signed>,
-    report: RoundingReport,
+    rounder: Rounder,
 }
 
 impl Layout<'_> {
@@ -145,47 +118,16 @@ impl Layout<'_> {
     }
 
     fn equation(&mut self, phase: &Phase, output: usize) -> Equation {
-        let mut terms = Vec::new();
-        for (row, term) in self.terms.iter().enumerate() {
-            let coefficient = phase.xi[(row, output)];
-            if coefficient == 0.0 {
-                continue;
-            }
-            let place = || Place {
-                phase: phase.name.clone(),
-                output: format!("ddz{}", output + 1),
-                term: self.model.library().terms()[row].text().to_owned(),
-                coefficient,
-            };
-            let printed = Decimal::rounded(coefficient, self.rounding);
-            self.report.active += 1;
-            let error = (printed.value() - coefficient).abs();
-            let largest = self
-                .report
-                .largest
-                .as_ref()
-                .map_or(0.0, |(error, _)| *error);
-            if error > largest {
-                self.report.largest = Some((error, place()));
-            }
-            if printed.is_zero() {
-                self.report.dropped.push(place());
-            } else {
-                let relative = error / coefficient.abs();
-                self.report.largest_relative = self.report.largest_relative.max(relative);
-                // Only a true one: a rounded 1.00 says how well it is known.
-                let leading = if coefficient.abs() == 1.0 && self.rounding.omits_one() {
-                    Leading::Omitted
-                } else {
-                    Leading::Printed
-                };
-                terms.push(with_coefficient(&printed, leading, term.clone()));
-            }
-        }
-        Equation {
-            left: self.acceleration(output),
-            terms,
-        }
+        let column = phase.xi.column(output);
+        let names = self.model.library().terms().iter().map(CandidateTerm::text);
+        let terms = self.terms.iter().zip(names).zip(column.iter());
+        let left = self.acceleration(output);
+        let output = format!("ddz{}", output + 1);
+        self.rounder.equation(
+            left,
+            (&phase.name, &output),
+            terms.map(|((term, text), coefficient)| (*coefficient, text, term)),
+        )
     }
 
     fn table(&self) -> CoefficientTable {
@@ -210,7 +152,7 @@ impl Layout<'_> {
                     .iter()
                     .flat_map(|phase| outputs.clone().map(|output| phase.xi[(row, output)]))
                     .map(|value| {
-                        let printed = Decimal::rounded(value, self.rounding);
+                        let printed = self.rounder.round(value);
                         (!printed.is_zero()).then_some(printed)
                     })
                     .collect(),

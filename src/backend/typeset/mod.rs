@@ -9,16 +9,18 @@
 mod decimal;
 pub mod equations;
 pub mod expression;
+pub mod robot;
+mod rounder;
 mod symbols;
 pub mod tree;
 mod width;
 pub mod words;
 
 pub use decimal::{Decimal, Rounding};
-pub use equations::{
-    CoefficientRow, CoefficientTable, Equation, EquationSystem, Place, RoundingReport, Typeset,
-};
+pub use equations::{CoefficientRow, CoefficientTable, Equation, EquationSystem, Typeset};
 pub use expression::{Leading, UnknownSymbol, expression, with_coefficient};
+pub use robot::RobotTypeset;
+pub use rounder::{Place, RoundingReport};
 pub use symbols::{Quantity, RenameError, SymbolTable, Variable};
 pub use tree::{FunctionName, GREEK, Glyph, Math, Signed, Symbol};
 pub use width::{EQUALS, OPERATOR, break_lines, sum_width, symbol_width, width};

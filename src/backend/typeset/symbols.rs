@@ -217,24 +217,25 @@ fn parse_symbol(text: &str) -> Option<Symbol> {
     if base.trim_start().starts_with(|c: char| c.is_ascii_digit()) {
         return None;
     }
-    let glyph = parse_glyph(base)?;
+    let letter = glyph(base)?;
     let subscript = match subscript {
         None => Vec::new(),
         Some(parts) => {
             let inner = parts
                 .strip_prefix('{')
                 .map_or(Some(parts), |rest| rest.strip_suffix('}'))?;
-            inner.split(',').map(parse_glyph).collect::<Option<_>>()?
+            inner.split(',').map(glyph).collect::<Option<_>>()?
         }
     };
     Some(Symbol {
-        glyph,
+        glyph: letter,
         dots: 0,
         subscript,
     })
 }
 
-fn parse_glyph(text: &str) -> Option<Glyph> {
+/// Reads a letter, a word, digits or a Greek letter's name; anything else is refused.
+pub(super) fn glyph(text: &str) -> Option<Glyph> {
     let text = text.trim();
     let named = text.strip_prefix('\\');
     let name = named.unwrap_or(text);

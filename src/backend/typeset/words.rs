@@ -3,7 +3,7 @@
 use crate::model::FeetRule;
 
 use super::decimal::Rounding;
-use super::equations::RoundingReport;
+use super::rounder::RoundingReport;
 
 /// Names of the feet in the order of contact flags.
 const FEET: [&str; 4] = ["fr", "fl", "rr", "rl"];

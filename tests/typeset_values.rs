@@ -1,0 +1,251 @@
+//! Printed equations mean what the model computes: the typeset tree is evaluated as a reader
+//! would and compared with the model.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use nalgebra::DVector;
+use proptest::prelude::*;
+use romc::artifact;
+use romc::backend::typeset::{
+    Equation, FunctionName, Math, Quantity, RobotTypeset, Rounding, Signed, Symbol, SymbolTable,
+    Typeset, Variable, expression,
+};
+use romc::model::{Library, ReducedModel};
+
+type Values = BTreeMap<Symbol, f64>;
+
+fn sum(terms: &[Signed], values: &Values) -> f64 {
+    let value = |term: &Signed| {
+        let size = value_of(&term.math, values);
+        if term.negative { -size } else { size }
+    };
+    terms.iter().map(value).sum()
+}
+
+/// The value of a typeset tree, by the rules of mathematical notation.
+fn value_of(math: &Math, values: &Values) -> f64 {
+    let of = |math: &Math| value_of(math, values);
+    match math {
+        Math::Number(number) => number.value(),
+        Math::Symbol(symbol) => values[symbol],
+        Math::Sum(terms) => sum(terms, values),
+        Math::Product(factors) => {
+            for pair in factors.windows(2) {
+                // Side by side, digits would be read as one number and signs as subtraction.
+                assert!(
+                    pair[0] == Math::Dot || !pair[1].starts_with_digit(),
+                    "{pair:?}"
+                );
+                assert!(
+                    !matches!(pair[1], Math::Sum(_)),
+                    "a sum needs parentheses: {pair:?}"
+                );
+            }
+            assert!(!matches!(factors[0], Math::Sum(_)), "{factors:?}");
+            factors
+                .iter()
+                .filter(|factor| **factor != Math::Dot)
+                .map(of)
+                .product()
+        }
+        Math::Dot => panic!("a dot stands only in a product"),
+        Math::Fraction(top, bottom) | Math::Slash(top, bottom) => of(top) / of(bottom),
+        Math::Power(base, exponent) => {
+            let needs_parentheses = matches!(
+                **base,
+                Math::Sum(_) | Math::Product(_) | Math::Fraction(..) | Math::Power(..)
+            );
+            assert!(!needs_parentheses, "{base:?}");
+            of(base).powf(of(exponent))
+        }
+        Math::Root(inner, None) => of(inner).sqrt(),
+        Math::Root(inner, Some(index)) => of(inner).powf(1.0 / f64::from(*index)),
+        Math::Function(name, power, argument) => {
+            let argument = of(argument);
+            let value = match name {
+                FunctionName::Sin => argument.sin(),
+                FunctionName::Cos => argument.cos(),
+                FunctionName::Tan => argument.tan(),
+                FunctionName::Tanh => argument.tanh(),
+                FunctionName::Exp => argument.exp(),
+                FunctionName::Ln => argument.ln(),
+                FunctionName::Sgn => argument.signum(),
+            };
+            value.powf(power.as_ref().map_or(1.0, |power| of(power)))
+        }
+        Math::Absolute(inner) => of(inner).abs(),
+        Math::Group(inner) => of(inner),
+    }
+}
+
+fn models() -> Vec<ReducedModel> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut paths = Vec::new();
+    for folder in ["models", "tests/fixtures/models"] {
+        for entry in fs::read_dir(root.join(folder)).unwrap() {
+            let path = entry.unwrap().path();
+            if path
+                .extension()
+                .is_some_and(|extension| extension == "json")
+            {
+                paths.push(path);
+            }
+        }
+    }
+    paths.sort();
+    paths
+        .iter()
+        .map(|path| artifact::read(path).unwrap())
+        .collect()
+}
+
+/// Values between 0.2 and 1.2, so that roots and logarithms exist; `seed` tells vectors apart.
+fn point(dim: usize, seed: f64) -> DVector<f64> {
+    DVector::from_fn(dim, |row, _| {
+        0.7 + 0.5 * (3.7 * seed + 1.9 * row as f64).sin()
+    })
+}
+
+fn latent_values(z: &DVector<f64>, dz: &DVector<f64>, u: &DVector<f64>) -> Values {
+    let symbols = SymbolTable::default();
+    let quantities = [
+        (Quantity::Position, z),
+        (Quantity::Velocity, dz),
+        (Quantity::Input, u),
+    ];
+    let mut values = Values::new();
+    for (quantity, vector) in quantities {
+        for (row, value) in vector.iter().enumerate() {
+            let index = row + 1;
+            values.insert(symbols.symbol(Variable { quantity, index }), *value);
+        }
+    }
+    values
+}
+
+fn assert_close(equation: &Equation, values: &Values, expected: f64, tolerance: f64) {
+    let found = value_of(&equation.right(), values);
+    let size: f64 = equation
+        .terms
+        .iter()
+        .map(|term| value_of(&term.math, values).abs())
+        .sum();
+    let error = (found - expected).abs();
+    let left = &equation.left;
+    assert!(
+        error <= tolerance * size,
+        "{left}: {found} for {expected}, size {size}"
+    );
+}
+
+#[test]
+fn printed_equations_in_full_have_the_value_of_the_model() {
+    for model in models() {
+        let symbols = SymbolTable::default();
+        let typeset = Typeset::new(&model, &symbols, Rounding::Exact).unwrap();
+        for seed in 0..5 {
+            let dim = model.latent_dim();
+            let at = |offset: f64| point(dim, f64::from(seed) + offset);
+            let (z, dz, u) = (at(0.0), at(0.3), at(0.6));
+            let values = latent_values(&z, &dz, &u);
+            for (phase, system) in typeset.systems.iter().enumerate() {
+                let ddz = model.ddz(phase, &z, &dz, &u).unwrap();
+                for (equation, expected) in system.equations.iter().zip(ddz.iter()) {
+                    assert_close(equation, &values, *expected, 1e-12);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn rounded_equations_stay_within_the_stated_relative_error() {
+    for model in models() {
+        let symbols = SymbolTable::default();
+        let typeset = Typeset::new(&model, &symbols, Rounding::default()).unwrap();
+        assert!(typeset.rounding.dropped.is_empty());
+        assert!(typeset.rounding.largest_relative <= 0.05);
+        let dim = model.latent_dim();
+        let (z, dz, u) = (point(dim, 0.0), point(dim, 0.3), point(dim, 0.6));
+        let values = latent_values(&z, &dz, &u);
+        // The size in `assert_close` is that of the printed terms, up to 5 % off itself.
+        let tolerance = 1.06 * typeset.rounding.largest_relative + 1e-12;
+        for (phase, system) in typeset.systems.iter().enumerate() {
+            let ddz = model.ddz(phase, &z, &dz, &u).unwrap();
+            for (equation, expected) in system.equations.iter().zip(ddz.iter()) {
+                assert_close(equation, &values, *expected, tolerance);
+            }
+        }
+    }
+}
+
+#[test]
+fn robot_equations_in_full_are_the_decoded_accelerations() {
+    let mut with_robot = 0;
+    for model in models() {
+        let symbols = SymbolTable::default();
+        let robot = RobotTypeset::new(&model, &symbols, Rounding::Exact).unwrap();
+        let Some(robot) = robot else { continue };
+        with_robot += 1;
+        let dim = model.latent_dim();
+        let (z, dz, u) = (point(dim, 0.0), point(dim, 0.3), point(dim, 0.6));
+        let values = latent_values(&z, &dz, &u);
+        for (phase, system) in robot.systems.iter().enumerate() {
+            let ddz = model.ddz(phase, &z, &dz, &u).unwrap();
+            let ddq = model.decode_velocity(&ddz).unwrap();
+            assert_eq!(system.equations.len(), ddq.len());
+            for (equation, expected) in system.equations.iter().zip(ddq.iter()) {
+                assert_close(equation, &values, *expected, 1e-10);
+            }
+        }
+    }
+    assert!(with_robot > 0);
+}
+
+/// Text of a random term over three kinds of variables, functions and powers.
+fn term() -> impl Strategy<Value = String> {
+    let leaf = prop_oneof![
+        Just("z1".to_owned()),
+        Just("dz2".to_owned()),
+        Just("u1".to_owned()),
+        (1u32..9).prop_map(|number| number.to_string()),
+        (1u32..400).prop_map(|number| format!("{}", f64::from(number) / 64.0)),
+    ];
+    leaf.prop_recursive(4, 24, 2, |inner| {
+        let pair = (inner.clone(), inner.clone());
+        let functions = ["sin", "cos", "tan", "tanh", "exp", "log", "sqrt", "abs"];
+        prop_oneof![
+            pair.clone().prop_map(|(a, b)| format!("({a}) + ({b})")),
+            pair.clone().prop_map(|(a, b)| format!("({a}) - ({b})")),
+            pair.clone().prop_map(|(a, b)| format!("({a})*({b})")),
+            pair.clone().prop_map(|(a, b)| format!("({a})/({b})")),
+            pair.prop_map(|(a, b)| format!("({a})^({b})")),
+            (inner.clone(), -3i32..5).prop_map(|(a, power)| format!("({a})^({power})")),
+            (inner.clone(), 1i32..5, 2i32..5).prop_map(|(a, n, d)| format!("({a})^({n}/{d})")),
+            inner.clone().prop_map(|a| format!("-({a})")),
+            (inner, 0..functions.len()).prop_map(move |(a, f)| format!("{}({a})", functions[f])),
+        ]
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn typeset_terms_have_the_value_of_the_expression(text in term()) {
+        // Terms that are too large or constant without a value are refused by the library.
+        let library = Library::from_terms(2, std::slice::from_ref(&text));
+        prop_assume!(library.is_ok());
+        let library = library.unwrap();
+        let (z, dz, u) = (point(2, 0.0), point(2, 0.3), point(2, 0.6));
+        let expected = library.evaluate(&z, &dz, &u).unwrap()[0];
+        prop_assume!(expected.is_finite() && expected.abs() < 1e12);
+        let printed = expression(library.pool(), library.terms()[0].expr(), &SymbolTable::default());
+        let found = value_of(&printed.unwrap().into_math(), &latent_values(&z, &dz, &u));
+        // Cancellation inside the term amplifies rounding.
+        let error = (found - expected).abs();
+        prop_assert!(error <= 1e-6 * expected.abs().max(1.0), "{text}: {found} for {expected}");
+    }
+}
