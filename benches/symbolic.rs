@@ -5,10 +5,10 @@
 
 use std::time::{Duration, Instant};
 
-use romc::symbolic::{ExprId, ExprPool, Function, SymbolId};
+use romc::symbolic::{ExprId, ExprPool, Function, Interval, SymbolId};
 
 const LATENT_DIM: usize = 8;
-const REPEATS: usize = 7;
+const REPEATS: u32 = 25;
 
 struct Model {
     pool: ExprPool,
@@ -71,18 +71,26 @@ fn build() -> Model {
     }
 }
 
-/// The shortest of several runs.
-fn fastest(mut run: impl FnMut() -> Duration) -> Duration {
-    (0..REPEATS)
-        .map(|_| run())
-        .min()
-        .expect("there is at least one run")
+/// The mean of several runs (the clock of [`cpu_time`] moves in steps of a few milliseconds).
+fn mean(mut run: impl FnMut() -> Duration) -> Duration {
+    (0..REPEATS).map(|_| run()).sum::<Duration>() / REPEATS
 }
 
 fn timed<T>(work: impl FnOnce() -> T) -> Duration {
-    let start = Instant::now();
+    let (start, start_cpu) = (Instant::now(), cpu_time());
     std::hint::black_box(work());
-    start.elapsed()
+    match (start_cpu, cpu_time()) {
+        (Some(before), Some(after)) => after - before,
+        _ => start.elapsed(),
+    }
+}
+
+/// The time this thread has spent on a processor, where the system tells (Linux): the machine may
+/// be busy with other work.
+fn cpu_time() -> Option<Duration> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    let nanoseconds = text.split(' ').next()?.parse().ok()?;
+    Some(Duration::from_nanos(nanoseconds))
 }
 
 fn report(name: &str, time: Duration, note: &str) {
@@ -94,13 +102,13 @@ fn main() {
     let n_terms = model.pool.terms_of(model.outputs[0]).len();
     report(
         "build",
-        fastest(|| timed(build)),
+        mean(|| timed(build)),
         &format!("{n_terms} terms x {LATENT_DIM}"),
     );
 
     let mut n_entries = 0;
     let mut n_nodes = 0;
-    let jacobian = fastest(|| {
+    let jacobian = mean(|| {
         let mut pool = model.pool.clone();
         let time = timed(|| n_entries = pool.jacobian(&model.outputs, &model.symbols).len());
         n_nodes = pool.len();
@@ -121,38 +129,84 @@ fn main() {
     roots.extend(&model.outputs);
     report(
         "evaluate with jacobian",
-        fastest(|| timed(|| pool.evaluate_all(&roots, &|symbol| 0.1 * symbol.index() as f64))),
+        mean(|| timed(|| pool.evaluate_all(&roots, &|symbol| 0.1 * symbol.index() as f64))),
         &format!("{} distinct nodes", pool.reachable(&roots).len()),
     );
-    let texts: Vec<String> = model
-        .outputs
-        .iter()
-        .map(|e| model.pool.display(*e).to_string())
-        .collect();
+    time_rewriting(&model);
+    time_text(&model);
+    time_pool_of_distinct_sums();
+}
+
+/// Simplification, intervals, Horner forms.
+fn time_rewriting(model: &Model) {
+    let simplify = mean(|| {
+        let mut pool = model.pool.clone();
+        timed(|| {
+            for &output in &model.outputs {
+                std::hint::black_box(pool.simplify(output));
+            }
+        })
+    });
+    report("simplify", simplify, "all outputs");
+    let horner = mean(|| {
+        let mut pool = model.pool.clone();
+        timed(|| {
+            for &output in &model.outputs {
+                std::hint::black_box(pool.horner(output));
+            }
+        })
+    });
+    report("horner", horner, "all outputs");
+    let interval = Interval::new(-0.5, 0.75);
+    let bounds = mean(|| timed(|| model.pool.evaluate_intervals(&model.outputs, &|_| interval)));
+    report("intervals", bounds, "all outputs");
+}
+
+/// Printing and reading.
+fn time_text(model: &Model) {
+    let print = || -> Vec<String> {
+        let outputs = model.outputs.iter();
+        outputs
+            .map(|output| model.pool.display(*output).to_string())
+            .collect()
+    };
+    let texts = print();
     let length: usize = texts.iter().map(String::len).sum();
+    report("display", mean(|| timed(print)), &format!("{length} bytes"));
+    let parse = mean(|| {
+        let mut pool = ExprPool::new();
+        timed(|| {
+            for text in &texts {
+                std::hint::black_box(pool.parse(text, &|_| true)).expect("printed text parses");
+            }
+        })
+    });
+    report("parse", parse, &format!("{length} bytes"));
+}
+
+/// A pool of more than a hundred thousand expressions, and one pass over them.
+fn time_pool_of_distinct_sums() {
+    let mut pool = ExprPool::new();
+    let symbols: Vec<ExprId> = (0..200).map(|i| pool.symbol(&format!("x{i}"))).collect();
+    let mut roots = Vec::new();
+    let build = timed(|| {
+        for &a in &symbols {
+            for &b in &symbols {
+                let product = pool.mul(a, b);
+                let sine = pool.apply(Function::Sin, product);
+                roots.push(pool.add(sine, a));
+            }
+        }
+    });
     report(
-        "display",
-        fastest(|| {
-            timed(|| {
-                model
-                    .outputs
-                    .iter()
-                    .map(|e| model.pool.display(*e).to_string().len())
-                    .sum::<usize>()
-            })
-        }),
-        &format!("{length} bytes"),
+        "build distinct sums",
+        build,
+        &format!("{} expressions", pool.len()),
     );
-    report(
-        "parse",
-        fastest(|| {
-            let mut pool = ExprPool::new();
-            timed(|| {
-                for text in &texts {
-                    std::hint::black_box(pool.parse(text, &|_| true)).expect("printed text parses");
-                }
-            })
-        }),
-        &format!("{length} bytes"),
-    );
+    let sum = timed(|| pool.sum(&roots));
+    report("add them up", sum, &format!("{} operands", roots.len()));
+    let symbol = pool.symbol_id("x7");
+    let sum = pool.sum(&roots);
+    let derivative = timed(|| pool.derivative(sum, symbol));
+    report("derivative of the sum", derivative, "by one of 200 symbols");
 }

@@ -1,5 +1,8 @@
 //! Derivatives, memoised per expression and symbol.
 
+use std::collections::HashSet;
+
+use super::intern::BuildIdHasher;
 use super::node::{ExprId, Function, Node, SymbolId};
 use super::number::Number;
 use super::pool::ExprPool;
@@ -13,14 +16,30 @@ impl ExprPool {
         if let Some(known) = self.known_derivative(expr, symbol) {
             return known;
         }
-        let order = self.reachable_where(&[expr], |node| {
-            self.known_derivative(node, symbol).is_none()
-        });
-        for node in order {
+        for node in self.to_differentiate(expr, symbol) {
             let derivative = self.derivative_of_node(node, symbol);
             self.derivatives.insert((node, symbol), derivative);
         }
         self.derivatives[&(expr, symbol)]
+    }
+
+    /// What has to be differentiated before and with `expr`, operands first. A product with a
+    /// numeric factor needs only the rest, which other terms share.
+    fn to_differentiate(&self, expr: ExprId, symbol: SymbolId) -> Vec<ExprId> {
+        let mut seen = HashSet::with_hasher(BuildIdHasher::default());
+        let mut stack = vec![expr];
+        while let Some(node) = stack.pop() {
+            if self.known_derivative(node, symbol).is_some() || !seen.insert(node) {
+                continue;
+            }
+            match self.split(node) {
+                (_, rest) if rest != node => stack.push(rest),
+                _ => stack.extend(self.children(node)),
+            }
+        }
+        let mut order: Vec<ExprId> = seen.into_iter().collect();
+        order.sort_unstable();
+        order
     }
 
     fn known_derivative(&self, expr: ExprId, symbol: SymbolId) -> Option<ExprId> {
@@ -36,6 +55,11 @@ impl ExprPool {
             pool.known_derivative(operand, symbol)
                 .expect("operands are differentiated before what uses them")
         };
+        let (coefficient, rest) = self.split(expr);
+        if rest != expr {
+            let derivative = inner(self, rest);
+            return self.scale(coefficient, derivative);
+        }
         match self.node(expr).clone() {
             Node::Number(_) => ExprId::ZERO,
             Node::Symbol(other) if other == symbol => ExprId::ONE,

@@ -85,7 +85,7 @@ impl ExprPool {
     }
 
     /// The expression of a polynomial: its terms, added.
-    pub fn from_polynomial(&mut self, polynomial: &Polynomial) -> ExprId {
+    pub fn polynomial_expr(&mut self, polynomial: &Polynomial) -> ExprId {
         let mut terms = Vec::new();
         for (exponents, coefficient) in polynomial.terms() {
             let mut factors = vec![coefficient];
@@ -173,10 +173,10 @@ mod tests {
         let text = "0.36 - 0.16*x + 2*x^2*sin(y)";
         let expr = pool.parse(text, &|_| true).expect("parses");
         let view = polynomial(&mut pool, text, &["x"]).expect("a polynomial in x");
-        assert_eq!(pool.from_polynomial(&view), expr);
+        assert_eq!(pool.polynomial_expr(&view), expr);
         let zero = polynomial(&mut pool, "0", &["x"]).expect("zero is a polynomial");
         assert_eq!(
-            (zero.degree(), pool.from_polynomial(&zero)),
+            (zero.degree(), pool.polynomial_expr(&zero)),
             (None, ExprId::ZERO)
         );
     }

@@ -104,7 +104,7 @@ impl ExprPool {
         let mut quotient = Monomials::new();
         for _ in 0..MAX_STEPS {
             let Some((exponents, coefficient)) = remainder.last_key_value() else {
-                return Some(self.from_monomials(&quotient, &bases));
+                return Some(self.sum_of_monomials(&quotient, &bases));
             };
             let step: Vec<i64> = exponents.iter().zip(leading).map(|(a, b)| a - b).collect();
             if step.iter().any(|exponent| *exponent < 0) {
@@ -149,7 +149,7 @@ impl ExprPool {
         Some(monomials)
     }
 
-    fn from_monomials(&mut self, monomials: &Monomials, bases: &[ExprId]) -> ExprId {
+    fn sum_of_monomials(&mut self, monomials: &Monomials, bases: &[ExprId]) -> ExprId {
         let mut terms = Vec::with_capacity(monomials.len());
         for (exponents, coefficient) in monomials {
             let powers: Vec<ExprId> = bases

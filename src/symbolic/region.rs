@@ -47,10 +47,9 @@ impl ExprPool {
             let is_atom = self.is_atom(node);
             if is_atom {
                 for child in self.children(node).collect::<Vec<_>>() {
-                    if !finished.contains_key(&child) {
-                        let result = finish(self, rebuilt[&child]);
-                        finished.insert(child, result);
-                    }
+                    finished
+                        .entry(child)
+                        .or_insert_with(|| finish(self, rebuilt[&child]));
                 }
             }
             let operands = if is_atom { &finished } else { &rebuilt };
