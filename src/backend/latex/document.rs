@@ -16,6 +16,7 @@ use super::table::{self, TableBlock};
 /// The LaTeX files of `model`; NAME is its identifier:
 ///
 /// - `NAME.tex`: the equations of each phase, to be taken in by `\input`;
+/// - `NAME_PHASE.tex`: the same equations, one phase a file, to be placed one by one;
 /// - `NAME-table.tex`: the coefficients as booktabs tables;
 /// - `NAME-nomenclature.tex`: what the symbols mean;
 /// - `NAME-robot.tex`, if the model has encoder and decoder: what the latent coordinates
@@ -55,16 +56,42 @@ pub fn emit(model: &ReducedModel, options: &LatexOptions) -> Result<Vec<EmittedF
         siunitx: options.numbers == NumberStyle::Siunitx,
         has_robot: robot.is_some(),
     };
-    let mut files = vec![
-        file(format!("{stem}.tex"), &equations)?,
+    let mut files = vec![file(format!("{stem}.tex"), &equations)?];
+    files.extend(phase_files(model, &equations, &header)?);
+    files.extend([
         file(format!("{stem}-table.tex"), &coefficients)?,
         file(format!("{stem}-nomenclature.tex"), &nomenclature)?,
-    ];
+    ]);
     if let Some(robot) = &robot {
         files.push(file(format!("{stem}-robot.tex"), robot)?);
     }
     files.push(file(format!("{stem}-preview.tex"), &preview)?);
     Ok(files)
+}
+
+/// The equations of each phase in a file of their own.
+fn phase_files(
+    model: &ReducedModel,
+    equations: &Equations,
+    header: &Header<'_>,
+) -> Result<Vec<EmittedFile>, EmitError> {
+    let stem = model.identifier();
+    let one_phase = |(place, system): (usize, &System)| {
+        let one = Equations {
+            header: header.short("One phase of the equations, with the same label."),
+            systems: vec![system.clone()],
+        };
+        file(
+            format!("{stem}_{}.tex", model.phase_identifier(place)),
+            &one,
+        )
+    };
+    equations
+        .systems
+        .iter()
+        .enumerate()
+        .map(one_phase)
+        .collect()
 }
 
 #[derive(Template)]
@@ -79,6 +106,7 @@ struct Equations {
 }
 
 /// One system of equations in the template.
+#[derive(Clone)]
 struct System {
     /// What it is, in a comment.
     comment: String,

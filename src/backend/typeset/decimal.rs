@@ -50,6 +50,8 @@ pub struct Decimal {
     exponent: Option<i32>,
 }
 
+/// Most digits that are ever printed of a fixed number of them.
+const MOST_DIGITS: usize = 40;
 /// Places after the point beyond which [`Rounding::Adaptive`] turns to powers of ten.
 const MOST_DECIMALS: usize = 6;
 /// Values from here on are printed with a power of ten.
@@ -79,15 +81,16 @@ impl Decimal {
     }
 
     /// `value` rounded for print; the exact binary value is rounded, ties to even.
+    /// More than 40 digits are taken as 40.
     pub fn rounded(value: f64, rounding: Rounding) -> Self {
         match rounding {
             Rounding::Exact => Self::exact(value),
-            Rounding::Decimals(places) => Self::fixed(value, places),
-            Rounding::Significant(digits) => Self::significant(value, digits.max(1)),
+            Rounding::Decimals(places) => Self::fixed(value, places.min(MOST_DIGITS)),
+            Rounding::Significant(digits) => Self::significant(value, digits.clamp(1, MOST_DIGITS)),
             Rounding::Adaptive {
                 decimals,
                 relative_error,
-            } => Self::adaptive(value, decimals, relative_error),
+            } => Self::adaptive(value, decimals.min(MOST_DIGITS), relative_error),
         }
     }
 
@@ -255,6 +258,13 @@ mod tests {
         assert_eq!(text(51234.0, Rounding::Significant(3)), "51200");
         assert_eq!(text(9.996, Rounding::Significant(3)), "10.0");
         assert_eq!(text(-1.25e-7, Rounding::Significant(2)), "-1.2e-7");
+    }
+
+    #[test]
+    fn absurd_numbers_of_digits_are_cut_to_forty() {
+        let digits = |rounding| Decimal::rounded(0.1, rounding).digits().len();
+        assert_eq!(digits(Rounding::Decimals(1_000_000)), 42);
+        assert_eq!(digits(Rounding::Significant(1_000_000)), 42);
     }
 
     #[test]
