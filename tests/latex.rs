@@ -366,6 +366,28 @@ fn every_kind_of_term_compiles_to_pdf_in_each_form() {
 }
 
 #[test]
+fn equations_of_width_22_fit_a_column_of_a_two_column_paper() {
+    for (path, model) in shipped_models() {
+        let options = LatexOptions {
+            width_em: 22.0,
+            ..LatexOptions::default()
+        };
+        let mut files = latex::emit(&model, &options).unwrap();
+        let stem = model.identifier();
+        // Columns of 252 pt as in IEEE conference papers.
+        let paper = format!(
+            "\\documentclass[10pt,twocolumn]{{article}}\n\\usepackage{{amsmath}}\n\
+             \\usepackage[textwidth=516pt,columnsep=12pt]{{geometry}}\n\\begin{{document}}\n\
+             The model for the contact phase is described by\n\\input{{{stem}}}\n\
+             \\end{{document}}\n"
+        );
+        files.push(EmittedFile::new("column.tex", paper));
+        println!("{}", path.display());
+        typeset_document(&files, "column");
+    }
+}
+
+#[test]
 fn emission_is_identical_from_run_to_run() {
     let options = LatexOptions::default();
     assert_eq!(
@@ -377,6 +399,11 @@ fn emission_is_identical_from_run_to_run() {
 /// Runs pdflatex on the preview and fails on errors and on lines that stick out. Without pdflatex
 /// it says so and returns, unless ROMC_REQUIRE_TOOLS=1. With ROMC_KEEP_PDF=DIR the PDF is kept.
 fn typeset(files: &[EmittedFile], stem: &str) {
+    typeset_document(files, &format!("{stem}-preview"));
+}
+
+/// The same for the document `NAME.tex`.
+fn typeset_document(files: &[EmittedFile], name: &str) {
     let required = std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1");
     if Command::new("pdflatex").arg("--version").output().is_err() {
         assert!(!required, "pdflatex is missing and ROMC_REQUIRE_TOOLS=1");
@@ -387,7 +414,7 @@ fn typeset(files: &[EmittedFile], stem: &str) {
     for file in files {
         fs::write(folder.path().join(&file.path), &file.contents).unwrap();
     }
-    let preview = format!("{stem}-preview.tex");
+    let preview = format!("{name}.tex");
     // Twice: longtable and labels settle in the second run.
     for _ in 0..2 {
         let run = Command::new("pdflatex")
@@ -403,7 +430,7 @@ fn typeset(files: &[EmittedFile], stem: &str) {
         let log = String::from_utf8_lossy(&run.stdout);
         assert!(run.status.success(), "{preview}:\n{log}");
     }
-    let log = fs::read(folder.path().join(format!("{stem}-preview.log"))).unwrap();
+    let log = fs::read(folder.path().join(format!("{name}.log"))).unwrap();
     let log = String::from_utf8_lossy(&log);
     for fault in [
         "Overfull",
@@ -416,7 +443,7 @@ fn typeset(files: &[EmittedFile], stem: &str) {
     if let Ok(keep) = std::env::var("ROMC_KEEP_PDF") {
         fs::create_dir_all(&keep).unwrap();
         let number = fs::read_dir(&keep).unwrap().count();
-        let pdf = folder.path().join(format!("{stem}-preview.pdf"));
-        fs::copy(pdf, Path::new(&keep).join(format!("{stem}-{number}.pdf"))).unwrap();
+        let pdf = folder.path().join(format!("{name}.pdf"));
+        fs::copy(pdf, Path::new(&keep).join(format!("{name}-{number}.pdf"))).unwrap();
     }
 }

@@ -5,6 +5,32 @@
 //! and the rounding are done by [`typeset`](crate::backend::typeset); here it gets
 //! its spelling ([`TexMath`]), its line breaks, tables and comments. Names from a
 //! model file pass through [`TexText`] and nothing else.
+//!
+//! ```
+//! use nalgebra::DMatrix;
+//! use romc::backend::latex::{self, LatexOptions};
+//! use romc::model::{FeetRule, Library, Phase, ReducedModel};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let library = Library::from_terms(1, &["1".into(), "dz1".into(), "sin(dz1)".into()])?;
+//! let model = ReducedModel::builder("flight-only", library)
+//!     .phase(Phase {
+//!         name: "flight".into(),
+//!         feet: FeetRule::None,
+//!         xi: DMatrix::from_column_slice(3, 1, &[0.29, -1.22, -1.0]),
+//!     })
+//!     .build()?;
+//! let files = latex::emit(&model, &LatexOptions::default())?;
+//! assert_eq!(files[0].path, "flight_only.tex");
+//! let equation = r"\ddot{z}_1 = 0.29 - 1.22\dot{z}_1 - 1.00\sin(\dot{z}_1)";
+//! assert!(files[0].contents.contains(equation));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! In a paper: `\usepackage{amsmath}` in the preamble, then `\input{flight_only}` for all
+//! phases, or `\input{flight_only_flight}` for one, and `\eqref{eq:flight-only:flight}` to
+//! refer to it.
 
 mod document;
 mod escape;
