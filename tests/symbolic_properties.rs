@@ -410,11 +410,17 @@ proptest! {
     ) {
         let mut pool = ExprPool::new();
         let expr = tree.build(&mut pool);
-        let place = |symbol: SymbolId| NAMES.iter().position(|name| *name == pool.symbol_name(symbol)).expect("known");
-        let bounds = pool.evaluate_interval(expr, &|symbol| {
-            let place = place(symbol);
-            Interval::new(lows[place], lows[place] + widths[place])
-        });
+        let ids = NAMES.map(|name| pool.symbol_id(name));
+        let place = |symbol: SymbolId| ids.iter().position(|id| *id == symbol).expect("known");
+        let range = |place: usize| Interval::new(lows[place], lows[place] + widths[place]);
+        let natural = pool.evaluate_interval(expr, &|symbol| range(place(symbol)));
+        let domain: Vec<(SymbolId, Interval)> = pool
+            .symbols_of(expr)
+            .into_iter()
+            .map(|symbol| (symbol, range(place(symbol))))
+            .collect();
+        let bounds = pool.bound(expr, &domain);
+        prop_assert!(natural.lo() <= bounds.lo() && bounds.hi() <= natural.hi());
         for share in shares {
             let point: [f64; 3] = std::array::from_fn(|i| (lows[i] + widths[i] * share[i]).min(lows[i] + widths[i]));
             let sample = approximate(&pool, expr, &point);

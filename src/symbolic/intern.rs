@@ -57,12 +57,14 @@ impl Hasher for IdHasher {
 /// Open-addressing index into the pool's nodes; the nodes themselves are stored once, outside.
 #[derive(Clone, Debug)]
 pub(super) struct InternTable {
-    /// Ids, or [`EMPTY`]; the length is a power of two.
-    slots: Vec<u32>,
+    /// Half of the node's hash and its id, or [`EMPTY`]; the length is a power of two.
+    ///
+    /// Comparing hashes first spares a look at most nodes that are not the one sought.
+    slots: Vec<(u32, u32)>,
     used: usize,
 }
 
-const EMPTY: u32 = u32::MAX;
+const EMPTY: (u32, u32) = (0, u32::MAX);
 
 impl InternTable {
     pub(super) fn new() -> InternTable {
@@ -75,11 +77,14 @@ impl InternTable {
     /// The id of a node equal to `node`, or the free slot where it belongs.
     pub(super) fn find(&self, nodes: &[Node], node: &Node) -> Result<ExprId, usize> {
         let mask = self.slots.len() - 1;
-        let mut slot = hash(node) & mask;
+        let sought = hash(node);
+        let mut slot = sought as usize & mask;
         loop {
             match self.slots[slot] {
                 EMPTY => return Err(slot),
-                id if nodes[id as usize] == *node => return Ok(ExprId(id)),
+                (found, id) if found == sought && nodes[id as usize] == *node => {
+                    return Ok(ExprId(id));
+                }
                 _ => slot = (slot + 1) & mask,
             }
         }
@@ -87,30 +92,30 @@ impl InternTable {
 
     /// Records `id`, whose node was just looked up, in the free slot `slot`.
     pub(super) fn fill(&mut self, slot: usize, id: ExprId, nodes: &[Node]) {
-        self.slots[slot] = id.0;
+        self.slots[slot] = (hash(&nodes[id.index()]), id.0);
         self.used += 1;
         if self.used * 2 > self.slots.len() {
-            self.grow(nodes);
+            self.grow();
         }
     }
 
-    fn grow(&mut self, nodes: &[Node]) {
+    fn grow(&mut self) {
         let size = self.slots.len() * 2;
-        let ids = std::mem::replace(&mut self.slots, vec![EMPTY; size]);
-        for id in ids.into_iter().filter(|id| *id != EMPTY) {
-            let mut slot = hash(&nodes[id as usize]) & (size - 1);
+        let entries = std::mem::replace(&mut self.slots, vec![EMPTY; size]);
+        for entry in entries.into_iter().filter(|entry| *entry != EMPTY) {
+            let mut slot = entry.0 as usize & (size - 1);
             while self.slots[slot] != EMPTY {
                 slot = (slot + 1) & (size - 1);
             }
-            self.slots[slot] = id;
+            self.slots[slot] = entry;
         }
     }
 }
 
-fn hash(node: &Node) -> usize {
+fn hash(node: &Node) -> u32 {
     let mut hasher = IdHasher::default();
     node.hash(&mut hasher);
-    hasher.finish() as usize
+    hasher.finish() as u32
 }
 
 #[cfg(test)]

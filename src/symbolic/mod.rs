@@ -22,8 +22,10 @@
 //! # Ok::<(), romc::symbolic::ParseError>(())
 //! ```
 
+mod bounds;
 mod build;
 mod collect;
+mod cost;
 mod diff;
 mod display;
 mod eval;

@@ -17,9 +17,9 @@
 //! [`ExprPool`]). Floats are added and multiplied when terms are collected; exact numbers stay
 //! exact. Nothing is rounded to fewer digits, and no term is dropped for being small.
 
+use super::cost::Costs;
 use super::expand::ExpandLimits;
 use super::node::{ExprId, Function, Node};
-use super::number::Number;
 use super::pool::ExprPool;
 
 /// How much one simplification may do.
@@ -51,13 +51,14 @@ impl ExprPool {
 
     /// As [`simplify`](ExprPool::simplify), within given limits.
     pub fn simplify_within(&mut self, expr: ExprId, limits: SimplifyLimits) -> ExprId {
+        let mut costs = Costs::default();
         let mut best = expr;
         loop {
             let mut budget = limits.expand.products;
             let next = self.map_regions(best, |pool, region| {
-                pool.cheapest_form(region, limits, &mut budget)
+                pool.cheapest_form(region, limits, &mut budget, &mut costs)
             });
-            if self.cost(next) >= self.cost(best) {
+            if costs.of(self, next) >= costs.of(self, best) {
                 return best;
             }
             best = next;
@@ -85,60 +86,21 @@ impl ExprPool {
         false
     }
 
-    /// What computing `expr` costs, by counting operations of the tree (shared parts as often as
-    /// they are used): 2 an addition or multiplication, more a division, most a function call,
-    /// 1 a number or symbol. Saturates.
-    pub fn cost(&self, expr: ExprId) -> u64 {
-        self.fold_up::<u64>(&[expr], |pool, node, child| match pool.node(node) {
-            Node::Number(_) | Node::Symbol(_) => 1,
-            Node::Sum(operands) | Node::Product(operands) => operands
-                .iter()
-                .filter(|operand| pool.as_number(**operand) != Some(Number::MINUS_ONE))
-                .map(|operand| child(*operand).saturating_add(2))
-                .fold(0, u64::saturating_add)
-                .saturating_sub(2),
-            Node::Power(base, exponent) => {
-                match pool.as_number(*exponent).and_then(Number::as_integer) {
-                    Some(integer) => {
-                        let products = u64::from(integer.unsigned_abs().ilog2()) + 1;
-                        let division = if integer < 0 { 6 } else { 0 };
-                        child(*base).saturating_add(products + division)
-                    }
-                    None => child(*base)
-                        .saturating_add(child(*exponent))
-                        .saturating_add(40),
-                }
-            }
-            Node::Apply(function, argument) => {
-                let call = match function {
-                    Function::Abs | Function::Sign => 2,
-                    Function::Sqrt => 6,
-                    Function::Sin
-                    | Function::Cos
-                    | Function::Tan
-                    | Function::Tanh
-                    | Function::Exp
-                    | Function::Log => 20,
-                };
-                child(*argument).saturating_add(call)
-            }
-        })[0]
-    }
-
     /// The cheapest of the forms of one region; the region itself unless one is cheaper.
     fn cheapest_form(
         &mut self,
         region: ExprId,
         limits: SimplifyLimits,
         budget: &mut usize,
+        costs: &mut Costs,
     ) -> ExprId {
         if self.as_number(region).is_some() || self.as_symbol(region).is_some() {
             return region;
         }
         let mut best = region;
-        let mut best_cost = self.cost(region);
+        let mut best_cost = costs.of(self, region);
         for form in self.forms(region, limits, budget) {
-            let cost = self.cost(form);
+            let cost = costs.of(self, form);
             if cost < best_cost {
                 (best, best_cost) = (form, cost);
             }
@@ -281,6 +243,19 @@ mod tests {
             let result = pool.simplify(expr);
             assert!(pool.cost(result) <= pool.cost(expr), "{text}");
         }
+    }
+
+    #[test]
+    fn simplify_of_deep_nesting_takes_linear_work() {
+        let mut pool = ExprPool::new();
+        let x = pool.symbol("x");
+        let mut deep = x;
+        for _ in 0..3_000 {
+            let sine = pool.apply(Function::Tanh, deep);
+            deep = pool.add(sine, x);
+        }
+        assert_eq!(pool.simplify(deep), deep);
+        assert!(pool.len() < 100_000, "{} expressions were made", pool.len());
     }
 
     #[test]

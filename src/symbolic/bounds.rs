@@ -1,0 +1,173 @@
+//! Sharper bounds of smooth expressions over boxes, by their slopes.
+
+use super::interval::Interval;
+use super::node::{ExprId, Function, Node, SymbolId};
+use super::number::Number;
+use super::pool::ExprPool;
+
+impl ExprPool {
+    /// An interval that contains every value of `expr` where symbols lie in the given intervals
+    /// (others may be anything), at the points where it is defined.
+    ///
+    /// Where the expression is defined and Lipschitz continuous on the whole box, its slopes
+    /// sharpen what [`evaluate_interval`](ExprPool::evaluate_interval) gives: a symbol of which
+    /// it is monotone goes to its ends, and for the others the mean value form
+    /// `f(c) + sum D_i (X_i - c_i)` around the centre is used. `sin(x) - x` on `[-0.1, 0.1]` is
+    /// bounded by 1.7e-4 this way, instead of by 0.2.
+    pub fn bound(&mut self, expr: ExprId, domain: &[(SymbolId, Interval)]) -> Interval {
+        let natural = self.bound_naturally(expr, domain);
+        if !self.is_lipschitz_on(expr, domain) {
+            return natural;
+        }
+        let slopes: Vec<Interval> = domain
+            .iter()
+            .map(|(symbol, _)| {
+                let slope = self.derivative(expr, *symbol);
+                self.bound_naturally(slope, domain)
+            })
+            .collect();
+        let lowest = self.bound_from_side(expr, domain, &slopes, Side::Low);
+        let highest = self.bound_from_side(expr, domain, &slopes, Side::High);
+        natural.intersection(Interval::new(lowest.lo(), highest.hi()))
+    }
+
+    fn bound_naturally(&self, expr: ExprId, domain: &[(SymbolId, Interval)]) -> Interval {
+        self.evaluate_interval(expr, &|symbol| range_of(domain, symbol))
+    }
+
+    /// Bounds of `expr` where every symbol of which it is monotone is at the end that leads to
+    /// `side`.
+    fn bound_from_side(
+        &self,
+        expr: ExprId,
+        domain: &[(SymbolId, Interval)],
+        slopes: &[Interval],
+        side: Side,
+    ) -> Interval {
+        let mut reduced = domain.to_vec();
+        for ((_, range), slope) in reduced.iter_mut().zip(slopes) {
+            let to_low_end = match side {
+                Side::Low => slope.lo() >= 0.0,
+                Side::High => slope.hi() <= 0.0,
+            };
+            let to_high_end = match side {
+                Side::Low => slope.hi() <= 0.0,
+                Side::High => slope.lo() >= 0.0,
+            };
+            if to_low_end {
+                *range = Interval::point(range.lo());
+            } else if to_high_end {
+                *range = Interval::point(range.hi());
+            }
+        }
+        let natural = self.bound_naturally(expr, &reduced);
+        let mut centred = reduced.clone();
+        let mut spread = Interval::point(0.0);
+        for ((_, range), slope) in centred.iter_mut().zip(slopes) {
+            let centre = Interval::point(0.5 * range.lo() + 0.5 * range.hi());
+            spread = spread + *slope * (*range - centre);
+            *range = centre;
+        }
+        natural.intersection(self.bound_naturally(expr, &centred) + spread)
+    }
+
+    /// Whether `expr` is surely defined on the whole box and has bounded slopes: no jump, and no
+    /// argument that leaves the inside of a function's domain.
+    fn is_lipschitz_on(&self, expr: ExprId, domain: &[(SymbolId, Interval)]) -> bool {
+        let nodes = self.reachable(&[expr]);
+        let ranges = self.evaluate_intervals(&nodes, &|symbol| range_of(domain, symbol));
+        let range = |expr: ExprId| {
+            let place = nodes.binary_search(&expr);
+            ranges[place.expect("operands are reachable")]
+        };
+        nodes.iter().all(|node| match *self.node(*node) {
+            Node::Number(_) | Node::Sum(_) | Node::Product(_) => true,
+            Node::Symbol(_) => range(*node).magnitude().is_finite() && !range(*node).is_empty(),
+            Node::Power(base, exponent) => {
+                match self.as_number(exponent).and_then(Number::as_integer) {
+                    Some(integer) => integer > 0 || !range(base).contains(0.0),
+                    None => range(base).lo() > 0.0,
+                }
+            }
+            Node::Apply(function, argument) => match function {
+                Function::Sin | Function::Cos | Function::Tanh | Function::Exp | Function::Abs => {
+                    true
+                }
+                Function::Tan => range(*node) != Interval::ENTIRE,
+                Function::Log | Function::Sqrt => range(argument).lo() > 0.0,
+                Function::Sign => false,
+            },
+        })
+    }
+}
+
+/// Which bound is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    Low,
+    High,
+}
+
+fn range_of(domain: &[(SymbolId, Interval)], symbol: SymbolId) -> Interval {
+    domain
+        .iter()
+        .find(|(known, _)| *known == symbol)
+        .map_or(Interval::ENTIRE, |(_, range)| *range)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bound(text: &str, lo: f64, hi: f64) -> Interval {
+        let mut pool = ExprPool::new();
+        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let domain: Vec<(SymbolId, Interval)> = pool
+            .symbols_of(expr)
+            .into_iter()
+            .map(|symbol| (symbol, Interval::new(lo, hi)))
+            .collect();
+        pool.bound(expr, &domain)
+    }
+
+    #[test]
+    fn bound_of_sine_minus_its_argument_is_sharp() {
+        let error = bound("sin(x) - x", -0.1, 0.1);
+        let exact = 0.1 - 0.1f64.sin();
+        assert!(
+            error.magnitude() >= exact && error.magnitude() < exact * 1.0001,
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn bound_of_monotone_expression_is_its_values_at_the_ends() {
+        let range = bound("x^3 + x - 1", -1.0, 2.0);
+        assert_eq!((range.lo(), range.hi()), (-3.0, 9.0));
+        let range = bound("1/(1 + x) - 2*x", 1.0, 3.0);
+        assert_eq!((range.lo(), range.hi()), (-5.75, -1.5));
+    }
+
+    #[test]
+    fn bound_uses_the_mean_value_form_near_extremes() {
+        let range = bound("x - x^2", 0.4, 0.6);
+        assert!(
+            range.contains(0.25) && range.contains(0.24) && range.width() < 0.05,
+            "{range}"
+        );
+    }
+
+    #[test]
+    fn bound_of_jumps_and_partly_undefined_expressions_is_the_natural_one() {
+        assert_eq!(bound("sign(x)", -1.0, 1.0), Interval::new(-1.0, 1.0));
+        assert_eq!(bound("sqrt(x)", -1.0, 4.0), Interval::new(0.0, 2.0));
+        assert_eq!(bound("1/x", -1.0, 1.0), Interval::ENTIRE);
+        assert_eq!(bound("x", f64::NEG_INFINITY, 0.0).hi(), 0.0);
+    }
+
+    #[test]
+    fn bound_of_magnitude_knows_its_kink() {
+        assert_eq!(bound("abs(x)", -1.0, 2.0), Interval::new(0.0, 2.0));
+        assert!(bound("abs(x) - x", 1.0, 2.0).magnitude() < 1e-12);
+    }
+}
