@@ -10,7 +10,7 @@ mod models;
 use drivers::{Workshop, c_compilers, contents};
 use functions::{Function, Random, functions as functions_of};
 use nalgebra::DVector;
-use romc::lower::{LowerOptions, dynamics_jacobian};
+use romc::lower::{Form, LowerOptions, dynamics_jacobian};
 use romc::model::{LatentVariable, ReducedModel};
 use romc::sim::CompiledModel;
 
@@ -30,13 +30,15 @@ struct Case {
     functions: Vec<Function>,
     points: Vec<Vec<f64>>,
     expected: Vec<Vec<f64>>,
+    options: LowerOptions,
 }
 
 impl Case {
-    fn new(models: Vec<ReducedModel>, n_points: usize) -> Self {
+    fn new(models: Vec<ReducedModel>, n_points: usize, form: Form) -> Self {
+        let options = LowerOptions { form };
         let functions: Vec<Function> = models
             .iter()
-            .flat_map(|model| functions_of(model, n_points))
+            .flat_map(|model| functions_of(model, n_points, &options))
             .collect();
         let mut random = Random(7);
         let points: Vec<Vec<f64>> = functions.iter().map(|f| f.points(&mut random)).collect();
@@ -50,11 +52,12 @@ impl Case {
             functions,
             points,
             expected,
+            options,
         }
     }
 
     fn workshop(&self) -> Workshop {
-        Workshop::new(&self.models)
+        Workshop::new(&self.models, &self.options)
     }
 
     fn assert_same_bits(&self, found: &[Vec<f64>], by: &str) {
@@ -108,18 +111,48 @@ fn check_c_and_rust(case: &Case) {
 
 #[test]
 fn generated_code_of_shipped_models_equals_the_interpreter_bit_for_bit() {
-    check_c_and_rust(&Case::new(models::shipped(), N_POINTS));
+    check_c_and_rust(&Case::new(models::shipped(), N_POINTS, Form::Automatic));
 }
 
 #[test]
 fn generated_code_of_random_models_equals_the_interpreter_bit_for_bit() {
     let models = (0..n_random_models()).map(models::random).collect();
-    check_c_and_rust(&Case::new(models, 50));
+    check_c_and_rust(&Case::new(models, 50, Form::Automatic));
+}
+
+#[test]
+fn generated_code_with_tables_equals_the_interpreter_bit_for_bit() {
+    let random_models = (1000..1000 + n_random_models()).map(models::random);
+    let models = models::shipped().into_iter().chain(random_models).collect();
+    check_c_and_rust(&Case::new(models, 100, Form::Tables));
+}
+
+#[test]
+fn tables_and_straight_lines_agree() {
+    for model in models::shipped()
+        .into_iter()
+        .chain((0..n_random_models()).map(models::random))
+    {
+        let [lines, tables] = [Form::StraightLine, Form::Tables]
+            .map(|form| functions_of(&model, 50, &LowerOptions { form }));
+        for (lines, tables) in lines.iter().zip(&tables) {
+            let points = lines.points(&mut Random(5));
+            let (found, expected) = (tables.interpret(&points), lines.interpret(&points));
+            let len = lines.output_len();
+            for (found, expected) in found.chunks(len).zip(expected.chunks(len)) {
+                let scale = expected.iter().fold(1.0_f64, |scale, x| scale.max(x.abs()));
+                for (f, e) in found.iter().zip(expected) {
+                    let same = (f - e).abs() <= 1e-11 * scale || (f.is_nan() && e.is_nan());
+                    assert!(same, "{}_{}: {f} against {e}", lines.model, lines.name);
+                }
+            }
+        }
+    }
 }
 
 #[test]
 fn generated_code_beyond_the_reduction_limit_equals_the_interpreter() {
-    let mut case = Case::new(models::shipped(), 200);
+    let mut case = Case::new(models::shipped(), 200, Form::Automatic);
     for (function, points) in case.functions.iter().zip(&mut case.points) {
         for (k, x) in points.iter_mut().enumerate() {
             // Far points only for accelerations: a step's intermediate states may overflow.
@@ -145,7 +178,10 @@ fn generated_code_beyond_the_reduction_limit_equals_the_interpreter() {
 #[test]
 fn emission_twice_gives_identical_bytes() {
     let models: Vec<ReducedModel> = models::shipped();
-    let (first, second) = (Workshop::new(&models), Workshop::new(&models));
+    let (first, second) = (
+        Workshop::new(&models, &LowerOptions::default()),
+        Workshop::new(&models, &LowerOptions::default()),
+    );
     let (first, second) = (contents(first.path()), contents(second.path()));
     assert!(first.len() >= 7 * models.len());
     assert_eq!(first, second);

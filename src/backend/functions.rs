@@ -4,7 +4,8 @@ use super::code::{Function, Parameter, Role};
 use super::dialect::Dialect;
 use super::entries::{Entry, ModelEntries};
 use super::ident::{Ident, Namer};
-use super::translate::{Names, Tables, translate};
+use super::tables::Tables;
+use super::translate::{Names, translate};
 
 /// The functions of a model in one target, with the tables that they share.
 #[derive(Debug)]

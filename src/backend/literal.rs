@@ -7,6 +7,9 @@ use std::fmt;
 pub struct Literal(f64);
 
 impl Literal {
+    /// Zero.
+    pub const ZERO: Literal = Literal(0.0);
+
     /// The literal of a number; `None` if it is infinite or not a number.
     pub fn new(value: f64) -> Option<Self> {
         value.is_finite().then_some(Self(value))

@@ -2,15 +2,20 @@
 //!
 //! No mathematics happens here: the tree of operations of the program is kept as it is.
 
-use super::code::{
-    Argument, ConstTable, Expr, Index, Infix, MathFunction, Parameter, Role, Span, Stmt,
-};
+use std::ops::Range;
+
+use super::code::{Expr, Index, Infix, MathFunction, Parameter, Role, Span, Stmt};
 use super::ident::{Ident, Namer};
 use super::literal::Literal;
-use crate::ir::{Binary, Program, ResultEntry, Statement, Table, TableId, Unary, ValueId};
+use super::tables::Tables;
+use crate::ir::{Binary, Program, ResultEntry, Statement, Unary, ValueId};
 
 /// Deepest nesting of operations in one expression.
 const DEEPEST: usize = 48;
+
+/// Arrays up to this length are copied element by element, not in loops: what reads a short
+/// array wholly would wait for the stores of several loops.
+const LONGEST_LIST: usize = 24;
 
 /// The statements of a program.
 pub struct Translation {
@@ -35,56 +40,23 @@ pub struct Names<'a> {
     pub tables: &'a mut Tables,
 }
 
-/// The constant tables of a file; equal tables are stored once.
-#[derive(Debug)]
-pub struct Tables {
-    namer: Namer,
-    base: String,
-    known: Vec<(Table, ConstTable)>,
+/// Where the rows of a matrix of values live: `array[offset + stride * row + col]`.
+pub(super) struct MatrixHome {
+    pub array: Ident,
+    pub offset: usize,
+    pub stride: usize,
 }
 
-impl Tables {
-    /// No table yet; names begin with `base`.
-    pub fn new(namer: Namer, base: &str) -> Self {
-        Self {
-            namer,
-            base: base.to_owned(),
-            known: Vec::new(),
-        }
-    }
-
-    /// All tables, in the order of their first use.
-    pub fn iter(&self) -> impl Iterator<Item = &ConstTable> {
-        self.known.iter().map(|(_, table)| table)
-    }
-
-    fn name(&mut self, table: &Table) -> Ident {
-        if let Some((_, known)) = self.known.iter().find(|(known, _)| known == table) {
-            return known.name.clone();
-        }
-        let name = self
-            .namer
-            .mint(&format!("{}_{}", self.base, self.known.len()));
-        let literal = |&value| Literal::new(value).expect("tables of programs are finite");
-        let printed = ConstTable {
-            name: name.clone(),
-            rows: table.rows(),
-            cols: table.cols(),
-            entries: table.entries().iter().map(literal).collect(),
-        };
-        self.known.push((table.clone(), printed));
-        name
-    }
-}
-
-struct Translator<'a> {
-    program: &'a Program,
-    names: Names<'a>,
+pub(super) struct Translator<'a> {
+    pub program: &'a Program,
+    pub names: Names<'a>,
     n_uses: Vec<usize>,
     /// How a value is read: a name, an element, or an expression to be nested once, and
     /// how deeply operations are nested in it.
     spelled: Vec<Option<(Expr, usize)>>,
-    body: Vec<Stmt>,
+    pub body: Vec<Stmt>,
+    /// Values that were copied to an array.
+    copies: Vec<(Vec<ValueId>, Ident)>,
 }
 
 /// Translates a program into the body of a function.
@@ -96,6 +68,7 @@ pub fn translate(program: &Program, names: Names) -> Translation {
         n_uses: n_uses(program, &live),
         spelled: vec![None; program.n_values()],
         body: Vec::new(),
+        copies: Vec::new(),
     };
     for (position, statement) in program.statements().iter().enumerate() {
         if live[position] {
@@ -156,10 +129,13 @@ impl Translator<'_> {
                 self.define(first, expr, left.max(right) + 1);
             }
             Statement::SinCos { arguments } => self.sin_cos(first, arguments),
-            Statement::Accumulate { table, weights } => self.accumulate(first, *table, weights),
-            Statement::ScaleColumns { offset, scaled } => {
-                self.scale_columns(first, *offset, scaled);
-            }
+            Statement::Accumulate { table, sections } => self.accumulate(first, *table, sections),
+            Statement::Constants { table } => self.constants(first, *table),
+            Statement::Separable {
+                start,
+                base,
+                groups,
+            } => self.separable(first, start, base.as_deref(), groups),
             Statement::Call { callee, arguments } => self.call(first, *callee, arguments),
         }
     }
@@ -182,22 +158,80 @@ impl Translator<'_> {
     }
 
     /// The values as contiguous elements of one array: in place if they are, copied if not.
-    fn span(&mut self, values: &[ValueId]) -> Span {
+    pub(super) fn span(&mut self, values: &[ValueId]) -> Span {
         if let Some(span) = self.contiguous(values) {
             return span;
         }
         self.copied(values)
     }
 
+    /// The values copied to an array of their own, long runs of elements by loops.
     fn copied(&mut self, values: &[ValueId]) -> Span {
-        let elements = values.iter().map(|&value| self.read(value).0).collect();
+        let known = self.copies.iter().find(|(copied, _)| copied == values);
+        if let Some((_, array)) = known {
+            return local(array.clone(), values.len());
+        }
         let array = self.names.locals.mint("a");
-        self.body.push(Stmt::LetArray(array.clone(), elements));
+        self.copies.push((values.to_vec(), array.clone()));
+        let runs = self.runs(values);
+        if values.len() < LONGEST_LIST {
+            let elements = values.iter().map(|&value| self.read(value).0).collect();
+            self.body.push(Stmt::LetArray(array.clone(), elements));
+            return local(array, values.len());
+        }
+        self.body.push(Stmt::Declare(array.clone(), values.len()));
+        for run in runs {
+            self.copy_run(&array, values, run);
+        }
         local(array, values.len())
     }
 
+    fn copy_run(&mut self, array: &Ident, values: &[ValueId], run: Range<usize>) {
+        let from = self.read(values[run.start]).0;
+        match from {
+            Expr::Element(source, at) if run.len() > 1 => {
+                let i = self.names.locals.mint("i");
+                let target = Index::variable(&i).shifted(run.start);
+                let source = Expr::Element(source, Index::variable(&i).shifted(at.offset));
+                let assign = Stmt::Assign(Expr::Element(array.clone(), target), source);
+                self.body.push(Stmt::For(i, run.len(), vec![assign]));
+            }
+            value => {
+                let target = Expr::Element(array.clone(), Index::fixed(run.start));
+                self.body.push(Stmt::Assign(target, value));
+            }
+        }
+    }
+
+    /// Divides values into runs of consecutive elements of one array.
+    fn runs(&self, values: &[ValueId]) -> Vec<Range<usize>> {
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for (k, &value) in values.iter().enumerate() {
+            let follows = k > 0
+                && match (self.element(values[k - 1]), self.element(value)) {
+                    (Some((before, at)), Some((array, next))) => before == array && at + 1 == next,
+                    _ => false,
+                };
+            match runs.last_mut() {
+                Some(run) if follows => run.end = k + 1,
+                _ => runs.push(k..k + 1),
+            }
+        }
+        runs
+    }
+
+    /// Array and position of a value that is an element.
+    fn element(&self, value: ValueId) -> Option<(&Ident, usize)> {
+        match self.spelled[value.index()].as_ref() {
+            Some((Expr::Element(array, index), _)) if index.terms.is_empty() => {
+                Some((array, index.offset))
+            }
+            _ => None,
+        }
+    }
+
     /// As [`Self::span`], but the whole of an array.
-    fn whole_span(&mut self, values: &[ValueId]) -> Span {
+    pub(super) fn whole_span(&mut self, values: &[ValueId]) -> Span {
         match self.contiguous(values).filter(Span::is_whole) {
             Some(span) => span,
             None => self.copied(values),
@@ -205,18 +239,9 @@ impl Translator<'_> {
     }
 
     fn contiguous(&self, values: &[ValueId]) -> Option<Span> {
-        let element = |value: &ValueId| match self.spelled[value.index()].as_ref() {
-            Some((Expr::Element(array, index), _)) if index.terms.is_empty() => {
-                Some((array.clone(), index.offset))
-            }
-            _ => None,
-        };
-        let (array, offset) = element(values.first()?)?;
-        let in_place = values
-            .iter()
-            .enumerate()
-            .all(|(k, value)| element(value) == Some((array.clone(), offset + k)));
-        if !in_place {
+        let (array, offset) = self.element(*values.first()?)?;
+        let array = array.clone();
+        if self.runs(values).len() != 1 {
             return None;
         }
         let parameters = self.names.inputs.iter().chain(self.names.outputs);
@@ -235,7 +260,7 @@ impl Translator<'_> {
     }
 
     /// Reserves `len` elements for values, in an output where they belong if possible.
-    fn home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
+    pub(super) fn home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
         match self.output_home(first, len) {
             Some(home) => self.settle(first, home),
             None => self.local_home(first, len, wanted),
@@ -243,14 +268,14 @@ impl Translator<'_> {
     }
 
     /// Reserves `len` elements of a new array for values.
-    fn local_home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
+    pub(super) fn local_home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
         let array = self.names.locals.mint(wanted);
         self.body.push(Stmt::Declare(array.clone(), len));
         self.settle(first, local(array, len))
     }
 
     /// Spells values as the elements of a span.
-    fn settle(&mut self, first: usize, home: Span) -> Span {
+    pub(super) fn settle(&mut self, first: usize, home: Span) -> Span {
         for k in 0..home.len {
             let index = Index::fixed(home.offset + k);
             self.spelled[first + k] = Some((Expr::Element(home.array.clone(), index), 0));
@@ -260,7 +285,7 @@ impl Translator<'_> {
 
     /// The output array, if the values are just a run of its elements and nothing in it is
     /// still to be read.
-    fn output_home(&self, first: usize, len: usize) -> Option<Span> {
+    pub(super) fn output_home(&self, first: usize, len: usize) -> Option<Span> {
         let results = self.program.results();
         let at = results
             .iter()
@@ -281,98 +306,56 @@ impl Translator<'_> {
         })
     }
 
-    fn sin_cos(&mut self, first: usize, arguments: &[ValueId]) {
-        let n = arguments.len();
-        let arguments = self.span(arguments);
-        let sines = self.local_home(first, n, "s");
-        let cosines = self.local_home(first + n, n, "c");
-        self.body.push(Stmt::SinCos {
-            arguments,
-            sines,
-            cosines,
+    /// Reserves `rows x cols` elements for values, row by row in an output where they belong
+    /// if possible.
+    pub(super) fn matrix_home(&mut self, first: usize, rows: usize, cols: usize) -> MatrixHome {
+        let home = self.output_matrix(first, rows, cols).unwrap_or_else(|| {
+            let array = self.names.locals.mint("m");
+            self.body.push(Stmt::Declare(array.clone(), rows * cols));
+            MatrixHome {
+                array,
+                offset: 0,
+                stride: cols,
+            }
         });
+        for r in 0..rows {
+            for i in 0..cols {
+                let index = Index::fixed(home.offset + home.stride * r + i);
+                let element = Expr::Element(home.array.clone(), index);
+                self.spelled[first + r * cols + i] = Some((element, 0));
+            }
+        }
+        home
     }
 
-    fn table(&mut self, id: TableId) -> Ident {
-        self.names.tables.name(&self.program.tables()[id.index()])
-    }
-
-    fn accumulate(&mut self, first: usize, table: TableId, weights: &[ValueId]) {
-        let cols = self.program.tables()[table.index()].cols();
-        let name = self.table(table);
-        let weights_at = (!weights.is_empty()).then(|| self.span(weights));
-        let home = self.home(first, cols, "y");
-        let (i, k) = (self.names.locals.mint("i"), self.names.locals.mint("k"));
-        let target = |home: &Span| {
-            Expr::Element(home.array.clone(), Index::variable(&i).shifted(home.offset))
+    /// The output array in which each row is a run of elements, all equally far apart.
+    fn output_matrix(&self, first: usize, rows: usize, cols: usize) -> Option<MatrixHome> {
+        let results = self.program.results();
+        let find = |value: usize| {
+            results
+                .iter()
+                .position(|entry| entry.value.index() == value)
         };
-        let entry = |row: Index| Expr::Entry(name.clone(), row, Index::variable(&i));
-        let offset = Stmt::Assign(target(&home), entry(Index::fixed(0)));
-        self.body.push(Stmt::For(i.clone(), cols, vec![offset]));
-        let Some(w) = weights_at else { return };
-        let product = |row: Index| {
-            let weight = Expr::Element(w.array.clone(), row.clone().shifted(w.offset));
-            Expr::infix(Infix::Mul, entry(row.shifted(1)), weight)
+        let at = find(first)?;
+        let stride = if rows > 1 {
+            find(first + cols)?.checked_sub(at)?
+        } else {
+            cols
         };
-        let add = |value| Stmt::For(i.clone(), cols, vec![Stmt::AddAssign(target(&home), value)]);
-        let blocks = weights.len() / 4;
-        if blocks > 0 {
-            let row = |n: usize| product(Index::fixed(n).plus(4, &k));
-            let front = Expr::infix(Infix::Add, row(0), row(1));
-            let back = Expr::infix(Infix::Add, row(2), row(3));
-            let sum = Expr::infix(Infix::Add, front, back);
-            self.body.push(Stmt::For(k.clone(), blocks, vec![add(sum)]));
-        }
-        for row in 4 * blocks..weights.len() {
-            self.body.push(add(product(Index::fixed(row))));
-        }
-    }
-
-    fn scale_columns(&mut self, first: usize, offset: TableId, scaled: &[(TableId, Vec<ValueId>)]) {
-        let shape = &self.program.tables()[offset.index()];
-        let (rows, cols) = (shape.rows(), shape.cols());
-        let offset = self.table(offset);
-        let scaled: Vec<(Ident, Span)> = scaled
-            .iter()
-            .map(|(table, weights)| (self.table(*table), self.span(weights)))
-            .collect();
-        let home = self.home(first, rows * cols, "y");
-        let (r, i) = (self.names.locals.mint("r"), self.names.locals.mint("i"));
-        let entry = |table: Ident| Expr::Entry(table, Index::variable(&r), Index::variable(&i));
-        let mut sum = entry(offset);
-        for (table, weights) in scaled {
-            let index = Index::variable(&i).shifted(weights.offset);
-            let weight = Expr::Element(weights.array, index);
-            let product = Expr::infix(Infix::Mul, entry(table), weight);
-            sum = Expr::infix(Infix::Add, sum, product);
-        }
-        let index = Index::fixed(home.offset).plus(cols, &r).plus(1, &i);
-        let assign = Stmt::Assign(Expr::Element(home.array, index), sum);
-        let inner = Stmt::For(i, cols, vec![assign]);
-        self.body.push(Stmt::For(r, rows, vec![inner]));
-    }
-
-    fn call(&mut self, first: usize, callee: usize, arguments: &[ValueId]) {
-        let program = &self.program.callees()[callee];
-        let mut passed = Vec::new();
-        let mut rest = arguments;
-        for slot in program.inputs() {
-            let (these, others) = rest.split_at(slot.len);
-            passed.push(Argument::Read(self.whole_span(these)));
-            rest = others;
-        }
-        let mut next = first;
-        for slot in program.outputs() {
-            let home = self.output_home(next, slot.len).filter(Span::is_whole);
-            let home = match home {
-                Some(home) => self.settle(next, home),
-                None => self.local_home(next, slot.len, &slot.name),
-            };
-            passed.push(Argument::Write(home));
-            next += slot.len;
-        }
-        let callee = self.names.callees[callee].clone();
-        self.body.push(Stmt::Call(callee, passed));
+        let slot = results[at].slot;
+        let output = &self.names.outputs[slot];
+        let fits = (0..rows).all(|r| {
+            (0..cols).all(|i| {
+                results.get(at + r * stride + i).is_some_and(|entry| {
+                    entry.slot == slot && entry.value.index() == first + r * cols + i
+                })
+            })
+        });
+        (fits && output.role == Role::Output).then(|| MatrixHome {
+            array: output.name.clone(),
+            offset: results[at].index,
+            stride,
+        })
     }
 
     /// Input parameters without a live element, and outputs without elements.

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::program::{
-    Binary, Program, ResultEntry, Slot, Statement, Table, TableId, Unary, ValueId,
+    Binary, Group, Program, ResultEntry, Slot, Statement, Table, TableId, Unary, ValueId,
 };
 use super::validate::{IrError, validate};
 
@@ -104,23 +104,38 @@ impl ProgramBuilder {
     }
 
     /// Matrix-vector accumulation, see [`Statement::Accumulate`].
-    pub fn accumulate(&mut self, table: TableId, weights: &[ValueId]) -> Vec<ValueId> {
+    pub fn accumulate(&mut self, table: TableId, sections: Vec<Vec<ValueId>>) -> Vec<ValueId> {
         let cols = self.program.tables[table.index()].cols;
-        let statement = Statement::Accumulate {
-            table,
-            weights: weights.to_vec(),
-        };
+        let statement = Statement::Accumulate { table, sections };
         self.push_array(statement, cols)
     }
 
-    /// Sum of column-scaled tables, see [`Statement::ScaleColumns`].
-    pub fn scale_columns(
+    /// All entries of a constant table, row-major.
+    pub fn constants(&mut self, table: TableId) -> Vec<ValueId> {
+        let n = self.program.tables[table.index()].entries.len();
+        self.push_array(Statement::Constants { table }, n)
+    }
+
+    /// Sums of functions of one variable each, and their slopes, see
+    /// [`Statement::Separable`].
+    ///
+    /// # Panics
+    /// If there is no group; a caller's defect.
+    pub fn separable(
         &mut self,
-        offset: TableId,
-        scaled: Vec<(TableId, Vec<ValueId>)>,
-    ) -> Vec<ValueId> {
-        let n = self.program.tables[offset.index()].entries.len();
-        self.push_array(Statement::ScaleColumns { offset, scaled }, n)
+        start: Vec<ValueId>,
+        base: Option<Vec<ValueId>>,
+        groups: Vec<Group>,
+    ) -> (Vec<ValueId>, Vec<ValueId>) {
+        let shape = &self.program.tables[groups[0].table.index()];
+        let (rows, n) = (shape.rows, shape.entries.len());
+        let statement = Statement::Separable {
+            start,
+            base,
+            groups,
+        };
+        let values = self.push_array(statement, rows + n);
+        (values[..rows].to_vec(), values[rows..].to_vec())
     }
 
     /// Evaluates another program; returns the values of each of its outputs.
@@ -158,6 +173,27 @@ impl ProgramBuilder {
         self.program
             .results
             .extend(entries.map(|(index, &value)| ResultEntry { slot, index, value }));
+    }
+
+    /// Whether `b` follows `a` in an input array or in an array that a statement defines, so that
+    /// generated loops can read both in place.
+    pub fn are_adjacent(&self, a: ValueId, b: ValueId) -> bool {
+        let program = &self.program;
+        let ((first, at), (second, next)) = (program.definition(a), program.definition(b));
+        match (&program.statements[first], &program.statements[second]) {
+            (
+                Statement::Input { slot, index },
+                Statement::Input {
+                    slot: other,
+                    index: following,
+                },
+            ) => slot == other && index + 1 == *following,
+            // Sines and cosines are two arrays.
+            (Statement::SinCos { arguments }, _) => {
+                first == second && at + 1 == next && next != arguments.len()
+            }
+            _ => first == second && at + 1 == next,
+        }
     }
 
     /// The value of a constant, `None` for anything computed.

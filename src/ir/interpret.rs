@@ -2,7 +2,7 @@
 //! control run.
 
 use super::kernel::sin_cos;
-use super::program::{Binary, Program, Slot, Statement, Table, Unary, ValueId};
+use super::program::{Binary, Group, Program, Slopes, Slot, Statement, Table, Unary, ValueId};
 
 /// Runs one program as often as asked; owns the memory of all its values, so that
 /// a run allocates nothing.
@@ -27,9 +27,34 @@ enum Step {
     Unary(Unary, usize, usize),
     Binary(Binary, usize, usize, usize),
     SinCos(Box<[usize]>, usize),
-    Accumulate(usize, Box<[usize]>, usize),
-    ScaleColumns(usize, Box<[(usize, Box<[usize]>)]>, usize),
+    Accumulate(usize, Box<[Box<[usize]>]>, usize),
+    Constants(usize, usize),
+    Separable(Box<SeparableStep>, usize),
     Call(usize, Box<[usize]>, usize),
+}
+
+/// Sums of functions of one variable each; positions in the values.
+#[derive(Clone, Debug)]
+struct SeparableStep {
+    start: Box<[usize]>,
+    base: Option<Box<[usize]>>,
+    groups: Box<[GroupStep]>,
+    /// One product sum a column, reused by every row.
+    columns: Vec<f64>,
+}
+
+#[derive(Clone, Debug)]
+struct GroupStep {
+    table: usize,
+    values: Box<[usize]>,
+    slopes: SlopeStep,
+}
+
+#[derive(Clone, Debug)]
+enum SlopeStep {
+    One,
+    Plus(Box<[usize]>),
+    Minus(Box<[usize]>),
 }
 
 /// A program run inside another one.
@@ -57,15 +82,21 @@ impl Interpreter {
                 Statement::SinCos { arguments } => {
                     steps.push(Step::SinCos(positions(arguments), first));
                 }
-                Statement::Accumulate { table, weights } => {
-                    steps.push(Step::Accumulate(table.index(), positions(weights), first));
+                Statement::Accumulate { table, sections } => {
+                    let sections = sections.iter().map(|section| positions(section)).collect();
+                    steps.push(Step::Accumulate(table.index(), sections, first));
                 }
-                Statement::ScaleColumns { offset, scaled } => {
-                    let scaled = scaled
-                        .iter()
-                        .map(|(table, weights)| (table.index(), positions(weights)))
-                        .collect();
-                    steps.push(Step::ScaleColumns(offset.index(), scaled, first));
+                Statement::Constants { table } => {
+                    steps.push(Step::Constants(table.index(), first));
+                }
+                Statement::Separable {
+                    start,
+                    base,
+                    groups,
+                } => {
+                    let cols = program.tables()[groups[0].table.index()].cols();
+                    let step = SeparableStep::new(start, base.as_deref(), groups, cols);
+                    steps.push(Step::Separable(Box::new(step), first));
                 }
                 Statement::Call { callee, arguments } => {
                     steps.push(Step::Call(*callee, positions(arguments), first));
@@ -117,7 +148,7 @@ impl Interpreter {
 
     fn evaluate(&mut self) {
         let values = &mut self.values;
-        for step in &self.steps {
+        for step in &mut self.steps {
             match step {
                 Step::Unary(op, a, result) => values[*result] = unary(*op, values[*a]),
                 Step::Binary(op, a, b, result) => {
@@ -126,23 +157,25 @@ impl Interpreter {
                 Step::SinCos(arguments, first) => {
                     for (k, &argument) in arguments.iter().enumerate() {
                         let (sine, cosine) = sin_cos(values[argument]);
-                        values[first + k] = sine;
-                        values[first + arguments.len() + k] = cosine;
+                        values[*first + k] = sine;
+                        values[*first + arguments.len() + k] = cosine;
                     }
                 }
-                Step::Accumulate(table, weights, first) => {
-                    accumulate(&self.tables[*table], weights, *first, values);
+                Step::Accumulate(table, sections, first) => {
+                    accumulate(&self.tables[*table], sections, *first, values);
                 }
-                Step::ScaleColumns(offset, scaled, first) => {
-                    scale_columns(&self.tables, *offset, scaled, *first, values);
+                Step::Constants(table, first) => {
+                    let entries = self.tables[*table].entries();
+                    values[*first..*first + entries.len()].copy_from_slice(entries);
                 }
+                Step::Separable(step, first) => step.run(&self.tables, *first, values),
                 Step::Call(callee, arguments, first) => {
                     let callee = &mut self.callees[*callee];
-                    for (slot, &argument) in callee.arguments.iter_mut().zip(arguments) {
+                    for (slot, &argument) in callee.arguments.iter_mut().zip(&*arguments) {
                         *slot = values[argument];
                     }
                     callee.run();
-                    let end = first + callee.results.len();
+                    let end = *first + callee.results.len();
                     values[*first..end].copy_from_slice(&callee.results);
                 }
             }
@@ -202,45 +235,97 @@ fn binary(op: Binary, a: f64, b: f64) -> f64 {
     }
 }
 
-fn accumulate(table: &Table, weights: &[usize], first: usize, values: &mut [f64]) {
+fn accumulate(table: &Table, sections: &[Box<[usize]>], first: usize, values: &mut [f64]) {
     let cols = table.cols();
     values[first..first + cols].copy_from_slice(table.row(0));
-    let blocks = weights.len() / 4;
-    for block in 0..blocks {
-        let w: [f64; 4] = std::array::from_fn(|k| values[weights[4 * block + k]]);
-        let rows: [&[f64]; 4] = std::array::from_fn(|k| table.row(1 + 4 * block + k));
-        for (j, y) in values[first..first + cols].iter_mut().enumerate() {
-            let front = rows[0][j] * w[0] + rows[1][j] * w[1];
-            let back = rows[2][j] * w[2] + rows[3][j] * w[3];
-            *y += front + back;
+    let mut row = 1;
+    for weights in sections {
+        let blocks = weights.chunks_exact(4);
+        let rest = blocks.remainder();
+        for block in blocks {
+            let w: [f64; 4] = std::array::from_fn(|k| values[block[k]]);
+            let rows: [&[f64]; 4] = std::array::from_fn(|k| table.row(row + k));
+            for (j, y) in values[first..first + cols].iter_mut().enumerate() {
+                let front = rows[0][j] * w[0] + rows[1][j] * w[1];
+                let back = rows[2][j] * w[2] + rows[3][j] * w[3];
+                *y += front + back;
+            }
+            row += 4;
         }
-    }
-    for (k, &weight) in weights.iter().enumerate().skip(4 * blocks) {
-        let w = values[weight];
-        let row = table.row(1 + k);
-        for (y, t) in values[first..first + cols].iter_mut().zip(row) {
-            *y += t * w;
+        for &weight in rest {
+            let w = values[weight];
+            for (y, t) in values[first..first + cols].iter_mut().zip(table.row(row)) {
+                *y += t * w;
+            }
+            row += 1;
         }
     }
 }
 
-fn scale_columns(
-    tables: &[Table],
-    offset: usize,
-    scaled: &[(usize, Box<[usize]>)],
-    first: usize,
-    values: &mut [f64],
-) {
-    let (rows, cols) = (tables[offset].rows(), tables[offset].cols());
-    for r in 0..rows {
-        for i in 0..cols {
-            let mut sum = tables[offset].row(r)[i];
-            for (table, weights) in scaled {
-                sum += tables[*table].row(r)[i] * values[weights[i]];
-            }
-            values[first + r * cols + i] = sum;
+impl SeparableStep {
+    fn new(start: &[ValueId], base: Option<&[ValueId]>, groups: &[Group], cols: usize) -> Self {
+        let group = |group: &Group| GroupStep {
+            table: group.table.index(),
+            values: positions(&group.values),
+            slopes: match &group.slopes {
+                Slopes::One => SlopeStep::One,
+                Slopes::Plus(values) => SlopeStep::Plus(positions(values)),
+                Slopes::Minus(values) => SlopeStep::Minus(positions(values)),
+            },
+        };
+        Self {
+            start: positions(start),
+            base: base.map(positions),
+            groups: groups.iter().map(group).collect(),
+            columns: vec![0.0; cols],
         }
     }
+
+    fn run(&mut self, tables: &[Table], first: usize, values: &mut [f64]) {
+        let (rows, cols) = (self.start.len(), self.columns.len());
+        for r in 0..rows {
+            for i in 0..cols {
+                let mut sum: Option<f64> = None;
+                let mut slope = self.base.as_ref().map(|base| values[base[r * cols + i]]);
+                for group in &self.groups {
+                    let t = tables[group.table].row(r)[i];
+                    let product = t * values[group.values[i]];
+                    sum = Some(sum.map_or(product, |sum| sum + product));
+                    slope = Some(match (&group.slopes, slope) {
+                        (SlopeStep::One, None) => t,
+                        (SlopeStep::One, Some(slope)) => slope + t,
+                        (SlopeStep::Plus(slopes), None) => t * values[slopes[i]],
+                        (SlopeStep::Plus(slopes), Some(slope)) => slope + t * values[slopes[i]],
+                        (SlopeStep::Minus(slopes), None) => -(t * values[slopes[i]]),
+                        (SlopeStep::Minus(slopes), Some(slope)) => slope - t * values[slopes[i]],
+                    });
+                }
+                self.columns[i] = sum.unwrap_or(0.0);
+                values[first + rows + r * cols + i] = slope.unwrap_or(0.0);
+            }
+            values[first + r] = lane_sum(values[self.start[r]], &self.columns);
+        }
+    }
+}
+
+/// `start` plus all columns, associated as [`Statement::Separable`] says.
+fn lane_sum(start: f64, columns: &[f64]) -> f64 {
+    let blocks = columns.len() / 4;
+    let mut sum = start;
+    if blocks > 0 {
+        let lane = |l: usize| tree_sum(columns, l, 0, blocks);
+        sum += (lane(0) + lane(1)) + (lane(2) + lane(3));
+    }
+    columns[4 * blocks..].iter().fold(sum, |sum, q| sum + q)
+}
+
+/// The columns `4 k + lane` for `k` from `low` to below `high`, in a balanced tree.
+fn tree_sum(columns: &[f64], lane: usize, low: usize, high: usize) -> f64 {
+    if high - low == 1 {
+        return columns[4 * low + lane];
+    }
+    let middle = (low + high).div_ceil(2);
+    tree_sum(columns, lane, low, middle) + tree_sum(columns, lane, middle, high)
 }
 
 #[cfg(test)]
@@ -254,7 +339,7 @@ mod tests {
         let mut builder = ProgramBuilder::new("table");
         let x = builder.input("x", 6);
         let table = builder.table(Table::new(7, 3, entries.clone()));
-        let y = builder.accumulate(table, &x);
+        let y = builder.accumulate(table, vec![x]);
         builder.output("y", &y);
         (builder.finish().expect("valid program"), entries)
     }
@@ -299,17 +384,43 @@ mod tests {
     }
 
     #[test]
-    fn scale_columns_scales_each_column_of_each_table() {
-        let mut builder = ProgramBuilder::new("scale");
-        let w = builder.input("w", 2);
-        let offset = builder.table(Table::new(2, 2, vec![1.0, 2.0, 3.0, 4.0]));
-        let table = builder.table(Table::new(2, 2, vec![10.0, 20.0, 30.0, 40.0]));
-        let y = builder.scale_columns(offset, vec![(table, w)]);
-        builder.output("y", &y);
+    fn separable_gives_sums_and_slopes_of_each_row() {
+        let mut builder = ProgramBuilder::new("separable");
+        let x = builder.input("x", 5);
+        let one = builder.constant(1.0);
+        let (sines, cosines) = builder.sin_cos(&x);
+        let entries = |shift: f64| (0..10).map(|k| f64::from(k) - shift).collect();
+        let tables: [_; 3] =
+            [1.5, -2.0, 7.25].map(|shift| builder.table(Table::new(2, 5, entries(shift))));
+        let group = |table, values: &[ValueId], slopes| Group {
+            table,
+            values: values.to_vec(),
+            slopes,
+        };
+        let groups = vec![
+            group(tables[0], &x, Slopes::One),
+            group(tables[1], &sines, Slopes::Plus(cosines.clone())),
+            group(tables[2], &cosines, Slopes::Minus(sines.clone())),
+        ];
+        let (sums, slopes) = builder.separable(vec![one, one], None, groups);
+        builder.output("y", &sums);
+        builder.output("slopes", &slopes);
         let program = builder.finish().expect("valid program");
-        let mut y = [0.0; 4];
-        Interpreter::new(&program).run(&[&[0.5, -1.0]], &mut [&mut y]);
-        assert_eq!(y, [6.0, -18.0, 18.0, -36.0]);
+
+        let x: [f64; 5] = [0.3, -1.2, 2.0, 0.7, -0.4];
+        let (mut y, mut slopes) = ([0.0; 2], [0.0; 10]);
+        Interpreter::new(&program).run(&[&x], &mut [&mut y, &mut slopes]);
+        for r in 0..2 {
+            let mut expected = 1.0;
+            for i in 0..5 {
+                let k = (5 * r + i) as f64;
+                let (a, b, c) = (k - 1.5, k + 2.0, k - 7.25);
+                expected += a * x[i] + b * x[i].sin() + c * x[i].cos();
+                let slope = a + b * x[i].cos() - c * x[i].sin();
+                assert!((slopes[5 * r + i] - slope).abs() < 1e-13);
+            }
+            assert!((y[r] - expected).abs() < 1e-13, "{} {expected}", y[r]);
+        }
     }
 
     #[test]

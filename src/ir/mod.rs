@@ -27,5 +27,7 @@ mod validate;
 
 pub use build::ProgramBuilder;
 pub use interpret::Interpreter;
-pub use program::{Binary, Program, ResultEntry, Slot, Statement, Table, TableId, Unary, ValueId};
+pub use program::{
+    Binary, Group, Program, ResultEntry, Slopes, Slot, Statement, Table, TableId, Unary, ValueId,
+};
 pub use validate::IrError;

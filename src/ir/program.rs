@@ -110,6 +110,38 @@ pub enum Binary {
     Div,
 }
 
+/// Derivatives of a group of functions, one a column.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Slopes {
+    /// All are one: the group is the variables themselves.
+    One,
+    /// These values.
+    Plus(Vec<ValueId>),
+    /// The negatives of these values.
+    Minus(Vec<ValueId>),
+}
+
+impl Slopes {
+    /// The values that are read.
+    pub fn values(&self) -> &[ValueId] {
+        match self {
+            Self::One => &[],
+            Self::Plus(values) | Self::Minus(values) => values,
+        }
+    }
+}
+
+/// Functions of one variable each, one a column of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Group {
+    /// Coefficients, `rows x cols`.
+    pub table: TableId,
+    /// Value of each function.
+    pub values: Vec<ValueId>,
+    /// Derivative of each function by its variable.
+    pub slopes: Slopes,
+}
+
 /// One step of the schedule; defines one or several values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Statement {
@@ -135,22 +167,38 @@ pub enum Statement {
     /// Matrix-vector accumulation `y_j = t_0j + sum_i t_(i+1)j w_i`: the first row
     /// of the table is the offset, each later row is scaled by one weight.
     ///
-    /// Association: the accumulator starts at the offset and takes four rows at a
-    /// time, `y += (t_1 w_1 + t_2 w_2) + (t_3 w_3 + t_4 w_4)`; the rows that
+    /// Association: the accumulator starts at the offset and takes one section of weights after
+    /// the other, each four rows at a time,
+    /// `y += (t_1 w_1 + t_2 w_2) + (t_3 w_3 + t_4 w_4)`; the rows of the section that
     /// remain are added one by one. Defines `cols` values.
     Accumulate {
-        /// Table of `weights.len() + 1` rows.
+        /// Table with one row more than there are weights.
         table: TableId,
-        /// One weight a row after the first.
-        weights: Vec<ValueId>,
+        /// One weight a row after the first, in sections.
+        sections: Vec<Vec<ValueId>>,
     },
-    /// Sum of column-scaled tables, `y_ri = t0_ri + t1_ri w1_i + t2_ri w2_i + ...`,
-    /// added in that order. Defines `rows x cols` values, row-major.
-    ScaleColumns {
-        /// The table that is not scaled.
-        offset: TableId,
-        /// Tables of the same shape, each with one weight a column.
-        scaled: Vec<(TableId, Vec<ValueId>)>,
+    /// The entries of a constant table, row-major: defines `rows x cols` values.
+    Constants {
+        /// The table.
+        table: TableId,
+    },
+    /// Sums of functions of one variable each, with their derivatives. With the groups
+    /// `g` of functions, one function a column `i`, and `rows x cols` tables `T_g`:
+    ///
+    /// `y_r = start_r + sum_i q_ri`, `q_ri = sum_g T_g,ri value_g,i` (groups in order), and
+    /// `slope_ri = base_ri + sum_g T_g,ri slope_g,i` (base, then groups in order).
+    ///
+    /// Association of the sum over columns: four lanes `p_l` add the columns `4 k + l` in a
+    /// balanced tree over `k`; then `y_r = start_r + ((p_0 + p_1) + (p_2 + p_3))`, and the columns
+    /// beyond a multiple of four are added one by one. Defines the `rows` sums, then the
+    /// `rows x cols` slopes, row-major.
+    Separable {
+        /// One value a row.
+        start: Vec<ValueId>,
+        /// What the slopes begin with, `rows x cols` values; nothing if absent.
+        base: Option<Vec<ValueId>>,
+        /// At least one group; all tables have the same shape.
+        groups: Vec<Group>,
     },
     /// Evaluation of another program; the arguments fill its input slots in order.
     /// Defines the values of its output slots in order.
@@ -166,15 +214,24 @@ impl Statement {
     /// The values that the statement reads, in order.
     pub fn operands(&self) -> Vec<ValueId> {
         match self {
-            Self::Constant(_) | Self::Input { .. } => Vec::new(),
+            Self::Constant(_) | Self::Input { .. } | Self::Constants { .. } => Vec::new(),
             Self::Unary(_, a) => vec![*a],
             Self::Binary(_, a, b) => vec![*a, *b],
             Self::SinCos { arguments } | Self::Call { arguments, .. } => arguments.clone(),
-            Self::Accumulate { weights, .. } => weights.clone(),
-            Self::ScaleColumns { scaled, .. } => scaled
-                .iter()
-                .flat_map(|(_, weights)| weights.iter().copied())
-                .collect(),
+            Self::Accumulate { sections, .. } => sections.concat(),
+            Self::Separable {
+                start,
+                base,
+                groups,
+            } => {
+                let mut operands = start.clone();
+                operands.extend(base.iter().flatten());
+                for group in groups {
+                    operands.extend(&group.values);
+                    operands.extend(group.slopes.values());
+                }
+                operands
+            }
         }
     }
 }
@@ -286,7 +343,8 @@ impl Program {
             | Statement::Input { .. }
             | Statement::Binary(..)
             | Statement::Accumulate { .. }
-            | Statement::ScaleColumns { .. }
+            | Statement::Constants { .. }
+            | Statement::Separable { .. }
             | Statement::Call { .. } => false,
         }) || self.callees.iter().any(Program::is_transcendental)
     }

@@ -1,6 +1,6 @@
 //! What every program promises, checked once when it is built.
 
-use super::program::{Program, Statement, TableId, ValueId};
+use super::program::{Program, Slopes, Statement, TableId, ValueId};
 
 /// Why a program is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -169,17 +169,36 @@ fn check_shape(program: &Program, position: usize, statement: &Statement) -> Res
     let table = |id: &TableId| &program.tables[id.index()];
     match statement {
         Statement::Constant(value) => finite(&[*value]),
-        Statement::Accumulate { table: id, weights } => {
+        Statement::Accumulate {
+            table: id,
+            sections,
+        } => {
             finite(&table(id).entries)?;
-            count(weights.len() + 1, table(id).rows)
+            let n_weights: usize = sections.iter().map(Vec::len).sum();
+            count(n_weights + 1, table(id).rows)
         }
-        Statement::ScaleColumns { offset, scaled } => {
-            finite(&table(offset).entries)?;
-            for (id, weights) in scaled {
-                finite(&table(id).entries)?;
-                count(table(id).rows, table(offset).rows)?;
-                count(table(id).cols, table(offset).cols)?;
-                count(weights.len(), table(id).cols)?;
+        Statement::Constants { table: id } => finite(&table(id).entries),
+        Statement::Separable {
+            start,
+            base,
+            groups,
+        } => {
+            let shape = table(&groups[0].table);
+            count(start.len(), shape.rows)?;
+            if let Some(base) = base {
+                count(base.len(), shape.entries.len())?;
+            }
+            for group in groups {
+                finite(&table(&group.table).entries)?;
+                count(table(&group.table).rows, shape.rows)?;
+                count(table(&group.table).cols, shape.cols)?;
+                count(group.values.len(), shape.cols)?;
+                match &group.slopes {
+                    Slopes::One => {}
+                    Slopes::Plus(slopes) | Slopes::Minus(slopes) => {
+                        count(slopes.len(), shape.cols)?;
+                    }
+                }
             }
             Ok(())
         }
@@ -237,7 +256,7 @@ mod tests {
         let mut builder = ProgramBuilder::new("p");
         let x = builder.input("x", 1);
         let table = builder.table(Table::new(3, 2, vec![1.0; 6]));
-        let y = builder.accumulate(table, &x);
+        let y = builder.accumulate(table, vec![x]);
         builder.output("y", &y);
         let found = builder.finish();
         let expected = IrError::OperandCount {

@@ -3,15 +3,13 @@
 use std::collections::HashMap;
 
 use super::combination::Combination;
+use super::cost::LowerOptions;
+use super::dense::{self, DenseJacobian};
 use super::error::LowerError;
 use super::expression::ExpressionLowering;
 use crate::ir::{Program, ProgramBuilder, ValueId};
 use crate::model::{LatentVariable, ReducedModel};
 use crate::symbolic::{ExprId, ExprPool, SymbolId};
-
-/// How programs are made from a model.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LowerOptions {}
 
 /// Where the structural nonzeros of `d ddz / d (z, dz, u_lat)` stand, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,12 +41,16 @@ impl JacobianPattern {
 pub fn dynamics(
     model: &ReducedModel,
     phase: usize,
-    _options: &LowerOptions,
+    options: &LowerOptions,
 ) -> Result<Program, LowerError> {
     let equations = accelerations(model, phase)?;
     let mut lowering = start(model, model.library().pool(), "dynamics");
     lowering.prepare(&expressions(&equations));
-    let ddz = values(&mut lowering, &equations);
+    let ddz = if options.uses_tables(&equations) {
+        dense::accelerations(&mut lowering, &equations)
+    } else {
+        values(&mut lowering, &equations)
+    };
     let mut builder = lowering.builder;
     builder.output("ddz", &ddz);
     Ok(builder.finish()?)
@@ -63,7 +65,7 @@ pub fn dynamics(
 pub fn dynamics_jacobian(
     model: &ReducedModel,
     phase: usize,
-    _options: &LowerOptions,
+    options: &LowerOptions,
 ) -> Result<(Program, JacobianPattern), LowerError> {
     let equations = accelerations(model, phase)?;
     let mut pool = model.library().pool().clone();
@@ -83,18 +85,46 @@ pub fn dynamics_jacobian(
             }
         }
     }
-    let mut lowering = start(model, &pool, "dynamics_jacobian");
-    let mut roots = expressions(&equations);
-    roots.extend(expressions(&entries));
-    lowering.prepare(&roots);
-    let ddz = values(&mut lowering, &equations);
-    let jacobian = values(&mut lowering, &entries);
-    let mut builder = lowering.builder;
+    let (builder, ddz, jacobian) = if options.uses_tables(&equations) {
+        dense_jacobian(model, &mut pool, &equations, &pattern)
+    } else {
+        let mut lowering = start(model, &pool, "dynamics_jacobian");
+        let mut roots = expressions(&equations);
+        roots.extend(expressions(&entries));
+        lowering.prepare(&roots);
+        let ddz = values(&mut lowering, &equations);
+        let jacobian = values(&mut lowering, &entries);
+        (lowering.builder, ddz, jacobian)
+    };
+    let mut builder = builder;
     builder.output("ddz", &ddz);
     if !jacobian.is_empty() {
         builder.output("jacobian", &jacobian);
     }
     Ok((builder.finish()?, pattern))
+}
+
+/// Accelerations and the entries of the pattern by tables.
+fn dense_jacobian(
+    model: &ReducedModel,
+    pool: &mut ExprPool,
+    equations: &[Combination],
+    pattern: &JacobianPattern,
+) -> (ProgramBuilder, Vec<ValueId>, Vec<ValueId>) {
+    let columns: Vec<SymbolId> = LatentVariable::all(model.latent_dim())
+        .map(|variable| symbol(model, variable))
+        .collect();
+    let dense = DenseJacobian::new(pool, equations, &columns);
+    let mut lowering = start(model, pool, "dynamics_jacobian");
+    let mut roots = expressions(equations);
+    roots.extend(dense.expressions());
+    lowering.prepare(&roots);
+    let (ddz, entries) = dense.lower(&mut lowering, equations);
+    let places = pattern.rows.iter().zip(&pattern.cols);
+    let jacobian = places
+        .map(|(&row, &col)| entries[&(row, columns[col])])
+        .collect();
+    (lowering.builder, ddz, jacobian)
 }
 
 /// The right-hand sides with folded coefficients, one a latent coordinate.

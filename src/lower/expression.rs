@@ -213,6 +213,22 @@ impl<'a> ExpressionLowering<'a> {
         self.builder.unary(op, argument)
     }
 
+    /// Sines and cosines of the arguments, in their order.
+    pub fn angles(&mut self, arguments: &[ExprId]) -> (Vec<ValueId>, Vec<ValueId>) {
+        let missing: Vec<ExprId> = arguments
+            .iter()
+            .copied()
+            .filter(|argument| !self.angles.contains_key(argument))
+            .collect();
+        if !missing.is_empty() {
+            self.sines_and_cosines(&missing);
+        }
+        arguments
+            .iter()
+            .map(|argument| self.angles[argument])
+            .unzip()
+    }
+
     fn angle(&mut self, argument: ExprId) -> (ValueId, ValueId) {
         if !self.angles.contains_key(&argument) {
             self.sines_and_cosines(&[argument]);

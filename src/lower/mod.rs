@@ -7,6 +7,8 @@
 //! added, that a power is a chain of products. Read `dynamics` first, then `expression`.
 
 mod combination;
+mod cost;
+mod dense;
 mod dynamics;
 mod error;
 mod expression;
@@ -14,7 +16,8 @@ mod maps;
 mod step;
 mod sums;
 
-pub use dynamics::{JacobianPattern, LowerOptions, dynamics, dynamics_jacobian};
+pub use cost::{Form, LowerOptions};
+pub use dynamics::{JacobianPattern, dynamics, dynamics_jacobian};
 pub use error::LowerError;
 pub use maps::{decode, decode_velocity, encode, encode_velocity, lift_input, project_input};
 pub use step::rk4_step;

@@ -1,6 +1,7 @@
 //! One step of the classical Runge-Kutta method, with the input held.
 
-use super::dynamics::{LowerOptions, dynamics};
+use super::cost::LowerOptions;
+use super::dynamics::dynamics;
 use super::error::LowerError;
 use crate::ir::{Binary, Program, ProgramBuilder, ValueId};
 use crate::model::ReducedModel;

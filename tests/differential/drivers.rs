@@ -5,7 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use romc::backend::{EmitOptions, Overwrite, Target, emit, write_files};
+use romc::backend::{EmitOptions, Target, emit, write_files};
+use romc::files::Overwrite;
+use romc::lower::LowerOptions;
 use romc::model::ReducedModel;
 
 use super::functions::Function;
@@ -17,13 +19,17 @@ pub struct Workshop {
 }
 
 impl Workshop {
-    pub fn new(models: &[ReducedModel]) -> Self {
+    pub fn new(models: &[ReducedModel], lower: &LowerOptions) -> Self {
+        let options = EmitOptions {
+            lower: *lower,
+            ..EmitOptions::default()
+        };
         let folder = tempfile::tempdir().expect("a temporary folder");
         for model in models {
-            let files = emit(model, &[Target::C, Target::Rust], &EmitOptions::default());
+            let files = emit(model, &[Target::C, Target::Rust], &options);
             let files = files.unwrap_or_else(|error| panic!("{}: {error}", model.name()));
             let own = folder.path().join(model.identifier().as_str());
-            write_files(&own, &files, Overwrite::OwnFiles).expect("written");
+            write_files(&own, &files, Overwrite::Refuse).expect("written");
         }
         Self {
             folder,

@@ -71,8 +71,7 @@ impl Function {
 }
 
 /// All functions that are generated for a model.
-pub fn functions(model: &ReducedModel, n_points: usize) -> Vec<Function> {
-    let options = LowerOptions::default();
+pub fn functions(model: &ReducedModel, n_points: usize, options: &LowerOptions) -> Vec<Function> {
     let name = model.identifier().as_str();
     let function = |name_of: String, program: Program, n_points: usize| Function {
         model: name.to_owned(),
@@ -94,16 +93,16 @@ pub fn functions(model: &ReducedModel, n_points: usize) -> Vec<Function> {
     }
     for phase in 0..model.phases().len() {
         let phase_name = model.phase_identifier(phase);
-        let program = lower::dynamics(model, phase, &options).expect("lowers");
+        let program = lower::dynamics(model, phase, options).expect("lowers");
         list.push(function(
             format!("{phase_name}_dynamics"),
             program,
             n_points,
         ));
-        let (program, _) = lower::dynamics_jacobian(model, phase, &options).expect("lowers");
+        let (program, _) = lower::dynamics_jacobian(model, phase, options).expect("lowers");
         let name_of = format!("{phase_name}_dynamics_jacobian");
         list.push(function(name_of, program, n_points));
-        let program = lower::rk4_step(model, phase, &options).expect("lowers");
+        let program = lower::rk4_step(model, phase, options).expect("lowers");
         list.push(function(format!("{phase_name}_step"), program, 200));
     }
     list

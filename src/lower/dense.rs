@@ -1,0 +1,308 @@
+//! Dense models: tables of coefficients instead of one operation a coefficient.
+//!
+//! The accelerations are a matrix-vector product over the distinct candidate terms. For the
+//! Jacobian the terms are divided: variables, sines and cosines of variables each touch one
+//! column and go through [`Statement::Separable`](crate::ir::Statement), which shares
+//! each table between sum and slope; the derivatives of all other terms are another
+//! matrix-vector product over the flattened Jacobian; variables that occur only
+//! linearly have constant columns.
+
+use std::collections::{BTreeSet, HashMap};
+
+use super::combination::Combination;
+use super::expression::ExpressionLowering;
+use crate::ir::{Group, Slopes, Table, TableId, ValueId};
+use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
+
+/// Fewest weights for which a loop of their own is worth it.
+const SHORTEST_RUN: usize = 4;
+
+/// Number of distinct candidate terms that the equations use.
+pub(super) fn n_weights(equations: &[Combination]) -> usize {
+    distinct(equations).len()
+}
+
+fn distinct(equations: &[Combination]) -> Vec<ExprId> {
+    let mut seen = BTreeSet::new();
+    let items = equations.iter().flat_map(|equation| &equation.items);
+    items
+        .map(|&(_, expr)| expr)
+        .filter(|&expr| seen.insert(expr))
+        .collect()
+}
+
+/// The accelerations as one matrix-vector product.
+pub(super) fn accelerations(
+    lowering: &mut ExpressionLowering,
+    equations: &[Combination],
+) -> Vec<ValueId> {
+    matrix_vector(lowering, equations)
+}
+
+/// `y_r = constant_r + sum coefficient weight` for all combinations by one table.
+fn matrix_vector(lowering: &mut ExpressionLowering, sums: &[Combination]) -> Vec<ValueId> {
+    // Weights in the order of their values are runs of arrays, which loops read in place.
+    let mut weights: Vec<(ValueId, ExprId)> = distinct(sums)
+        .into_iter()
+        .map(|expr| (lowering.value(expr), expr))
+        .collect();
+    weights.sort();
+    let sections = sections(lowering, &mut weights);
+    let row_of: HashMap<ExprId, usize> = weights
+        .iter()
+        .enumerate()
+        .map(|(position, &(_, expr))| (expr, position + 1))
+        .collect();
+    let cols = sums.len();
+    let mut entries = vec![0.0; (weights.len() + 1) * cols];
+    for (col, sum) in sums.iter().enumerate() {
+        entries[col] = sum.constant;
+        for (coefficient, expr) in &sum.items {
+            entries[row_of[expr] * cols + col] = *coefficient;
+        }
+    }
+    let table = Table::new(weights.len() + 1, cols, entries);
+    let table = lowering.builder.table(table);
+    lowering.builder.accumulate(table, sections)
+}
+
+/// Divides sorted weights into runs that loops read in place; what is scattered goes to the
+/// end, as one section.
+fn sections(
+    lowering: &ExpressionLowering,
+    weights: &mut Vec<(ValueId, ExprId)>,
+) -> Vec<Vec<ValueId>> {
+    let adjacent =
+        |a: &(ValueId, ExprId), b: &(ValueId, ExprId)| lowering.builder.are_adjacent(a.0, b.0);
+    let (mut runs, mut scattered) = (Vec::new(), Vec::new());
+    for run in weights.chunk_by(adjacent) {
+        if run.len() >= SHORTEST_RUN {
+            runs.push(run.to_vec());
+        } else {
+            scattered.extend_from_slice(run);
+        }
+    }
+    if !scattered.is_empty() {
+        runs.push(scattered);
+    }
+    *weights = runs.concat();
+    let values = |run: Vec<(ValueId, ExprId)>| run.into_iter().map(|(value, _)| value).collect();
+    runs.into_iter().map(values).collect()
+}
+
+/// What a candidate term is to the Jacobian.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Variable(SymbolId),
+    Sine(SymbolId),
+    Cosine(SymbolId),
+    Other,
+}
+
+fn kind(pool: &ExprPool, expr: ExprId) -> Kind {
+    match pool.node(expr) {
+        Node::Symbol(symbol) => Kind::Variable(*symbol),
+        Node::Apply(Function::Sin, argument) => {
+            pool.as_symbol(*argument).map_or(Kind::Other, Kind::Sine)
+        }
+        Node::Apply(Function::Cos, argument) => {
+            pool.as_symbol(*argument).map_or(Kind::Other, Kind::Cosine)
+        }
+        Node::Number(_) | Node::Sum(_) | Node::Product(_) | Node::Power(..) | Node::Apply(..) => {
+            Kind::Other
+        }
+    }
+}
+
+/// How the equations divide; `columns` are the variables in the order of the Jacobian.
+pub(super) struct DenseJacobian {
+    /// Variables whose columns of the Jacobian vary.
+    curved: Vec<SymbolId>,
+    /// Variables that occur only linearly.
+    linear: Vec<SymbolId>,
+    /// Whether sines or cosines of variables occur.
+    has_angles: bool,
+    /// What is not in a separable group, one combination a row.
+    rest: Vec<Combination>,
+    /// Derivatives of the curved part of `rest`, rows x curved.
+    rest_slopes: Vec<Combination>,
+}
+
+impl DenseJacobian {
+    /// Divides the equations; `pool` takes the derivatives.
+    pub fn new(pool: &mut ExprPool, equations: &[Combination], columns: &[SymbolId]) -> Self {
+        let mut curved_set = BTreeSet::new();
+        let mut has_angles = false;
+        for expr in distinct(equations) {
+            match kind(pool, expr) {
+                Kind::Variable(_) => {}
+                Kind::Sine(symbol) | Kind::Cosine(symbol) => {
+                    has_angles = true;
+                    curved_set.insert(symbol);
+                }
+                Kind::Other => curved_set.extend(pool.symbols_of(expr)),
+            }
+        }
+        let is_linear = |symbol: &SymbolId| {
+            let used = |&(_, expr): &(f64, ExprId)| pool.as_symbol(expr) == Some(*symbol);
+            !curved_set.contains(symbol) && equations.iter().any(|e| e.items.iter().any(used))
+        };
+        let linear: Vec<SymbolId> = columns.iter().copied().filter(is_linear).collect();
+        let curved: Vec<SymbolId> = columns
+            .iter()
+            .copied()
+            .filter(|s| curved_set.contains(s))
+            .collect();
+        // With angles, the linear terms of curved variables share the angles' loop.
+        let in_group = |pool: &ExprPool, expr| match kind(pool, expr) {
+            Kind::Variable(symbol) => has_angles && curved_set.contains(&symbol),
+            Kind::Sine(_) | Kind::Cosine(_) => true,
+            Kind::Other => false,
+        };
+        let rest: Vec<Combination> = equations
+            .iter()
+            .map(|equation| Combination {
+                constant: equation.constant,
+                items: equation
+                    .items
+                    .iter()
+                    .copied()
+                    .filter(|&(_, expr)| !in_group(pool, expr))
+                    .collect(),
+            })
+            .collect();
+        let mut rest_slopes = Vec::new();
+        for equation in &rest {
+            for &symbol in &curved {
+                rest_slopes.push(equation.derivative(pool, symbol));
+            }
+        }
+        Self {
+            curved,
+            linear,
+            has_angles,
+            rest,
+            rest_slopes,
+        }
+    }
+
+    /// All expressions that the code needs besides the equations.
+    pub fn expressions(&self) -> Vec<ExprId> {
+        distinct(&self.rest_slopes)
+    }
+
+    /// The accelerations, and the value of each entry that may be nonzero by (row, variable).
+    pub fn lower(
+        &self,
+        lowering: &mut ExpressionLowering,
+        equations: &[Combination],
+    ) -> (Vec<ValueId>, HashMap<(usize, SymbolId), ValueId>) {
+        let mut ddz = matrix_vector(lowering, &self.rest);
+        let has_rest_slopes = self.rest_slopes.iter().any(|slope| !slope.is_zero());
+        let is_base_needed = has_rest_slopes || !self.has_angles && !self.curved.is_empty();
+        let mut slopes = is_base_needed.then(|| matrix_vector(lowering, &self.rest_slopes));
+        if self.has_angles {
+            let groups = self.groups(lowering, equations);
+            let (sums, all) = lowering.builder.separable(ddz, slopes, groups);
+            (ddz, slopes) = (sums, Some(all));
+        }
+        let constants = self.linear_slopes(lowering, equations);
+        let mut entries = HashMap::new();
+        for row in 0..equations.len() {
+            let values = slopes.iter().flatten().skip(row * self.curved.len());
+            for (&symbol, &value) in self.curved.iter().zip(values) {
+                entries.insert((row, symbol), value);
+            }
+            let values = constants.iter().skip(row * self.linear.len());
+            for (&symbol, &value) in self.linear.iter().zip(values) {
+                entries.insert((row, symbol), value);
+            }
+        }
+        (ddz, entries)
+    }
+
+    /// Coefficients of the terms of one kind, rows x variables.
+    fn coefficients(
+        pool: &ExprPool,
+        equations: &[Combination],
+        variables: &[SymbolId],
+        of: impl Fn(Kind) -> Option<SymbolId>,
+    ) -> Table {
+        let mut entries = vec![0.0; equations.len() * variables.len()];
+        let column: HashMap<SymbolId, usize> = variables
+            .iter()
+            .enumerate()
+            .map(|(col, &symbol)| (symbol, col))
+            .collect();
+        for (row, equation) in equations.iter().enumerate() {
+            for &(coefficient, expr) in &equation.items {
+                if let Some(col) = of(kind(pool, expr)).and_then(|symbol| column.get(&symbol)) {
+                    entries[row * variables.len() + col] = coefficient;
+                }
+            }
+        }
+        Table::new(equations.len(), variables.len(), entries)
+    }
+
+    fn groups(&self, lowering: &mut ExpressionLowering, equations: &[Combination]) -> Vec<Group> {
+        let table = |lowering: &mut ExpressionLowering, of: fn(Kind) -> Option<SymbolId>| {
+            let table = Self::coefficients(lowering.pool, equations, &self.curved, of);
+            let is_used = table.entries().iter().any(|&entry| entry != 0.0);
+            is_used.then(|| lowering.builder.table(table))
+        };
+        let variable = table(lowering, |kind| match kind {
+            Kind::Variable(symbol) => Some(symbol),
+            Kind::Sine(_) | Kind::Cosine(_) | Kind::Other => None,
+        });
+        let sine = table(lowering, |kind| match kind {
+            Kind::Sine(symbol) => Some(symbol),
+            Kind::Variable(_) | Kind::Cosine(_) | Kind::Other => None,
+        });
+        let cosine = table(lowering, |kind| match kind {
+            Kind::Cosine(symbol) => Some(symbol),
+            Kind::Variable(_) | Kind::Sine(_) | Kind::Other => None,
+        });
+        let arguments: Vec<ExprId> = self
+            .curved
+            .iter()
+            .map(|&symbol| lowering.pool.symbol_expr(symbol))
+            .collect();
+        let variables: Vec<ValueId> = arguments
+            .iter()
+            .map(|&argument| lowering.value(argument))
+            .collect();
+        let (sines, cosines) = lowering.angles(&arguments);
+        let group = |table: Option<TableId>, values: &[ValueId], slopes: Slopes| {
+            table.map(|table| Group {
+                table,
+                values: values.to_vec(),
+                slopes,
+            })
+        };
+        [
+            group(variable, &variables, Slopes::One),
+            group(sine, &sines, Slopes::Plus(cosines.clone())),
+            group(cosine, &cosines, Slopes::Minus(sines.clone())),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    fn linear_slopes(
+        &self,
+        lowering: &mut ExpressionLowering,
+        equations: &[Combination],
+    ) -> Vec<ValueId> {
+        if self.linear.is_empty() {
+            return Vec::new();
+        }
+        let pool = lowering.pool;
+        let table = Self::coefficients(pool, equations, &self.linear, |kind| match kind {
+            Kind::Variable(symbol) => Some(symbol),
+            Kind::Sine(_) | Kind::Cosine(_) | Kind::Other => None,
+        });
+        let table = lowering.builder.table(table);
+        lowering.builder.constants(table)
+    }
+}
