@@ -1,0 +1,324 @@
+//! The command line from outside: exit codes, JSON, files that appear whole, errors that name the place.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn romc(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_romc"))
+        .args(arguments)
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .expect("the binary runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).expect("romc prints UTF-8")
+}
+
+/// Runs, expects success, returns stdout.
+fn done(arguments: &[&str]) -> String {
+    let output = romc(arguments);
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {stderr}");
+    text(&output.stdout)
+}
+
+/// Runs with `--json`, expects exactly one object.
+fn json(arguments: &[&str]) -> Value {
+    let mut arguments = arguments.to_vec();
+    arguments.push("--json");
+    let value: Value = serde_json::from_str(&done(&arguments)).expect("one JSON value, nothing else");
+    assert!(value.is_object());
+    value
+}
+
+/// Runs, expects exit code 1 and nothing on stdout, returns stderr.
+fn failed(arguments: &[&str]) -> String {
+    let output = romc(arguments);
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+    assert_eq!(text(&output.stdout), "", "a failed run prints nothing to stdout");
+    let stderr = text(&output.stderr);
+    assert!(stderr.starts_with("error: "), "{stderr}");
+    assert!(!stderr.contains("panicked"), "{stderr}");
+    stderr
+}
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a temporary folder")
+}
+
+fn path(folder: &tempfile::TempDir, name: &str) -> String {
+    folder.path().join(name).display().to_string()
+}
+
+/// Every file below a folder, with its bytes.
+fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            files.extend(contents(&path));
+        } else {
+            files.push((path.clone(), fs::read(&path).expect("readable")));
+        }
+    }
+    files.sort();
+    files
+}
+
+const MODEL: &str = "models/go1-d4.json";
+const JUMP: &str = "examples/recordings/go1/test_01.csv.gz";
+const COMMANDS: [&str; 6] = ["demo", "inspect", "train", "compile", "simulate", "mpc"];
+
+#[test]
+fn help_of_every_command_shows_an_example_that_starts_with_it() {
+    for command in COMMANDS {
+        let help = done(&[command, "--help"]);
+        assert!(help.contains("--json"), "{command}");
+        assert!(help.contains(&format!("Example:\n  romc {command}")), "{help}");
+    }
+}
+
+#[test]
+fn wrong_usage_ends_with_two_and_runs_nothing() {
+    let wrong: [&[&str]; 8] = [
+        &[],
+        &["polish"],
+        &["compile", MODEL],
+        &["compile", MODEL, "--emit", "fortran", "--out-dir", "x"],
+        &["train", JUMP, "--output", "x.json"],
+        &["train", JUMP, "--latent-dim", "0", "--output", "x.json"],
+        &["simulate", MODEL, JUMP, "--restart-every", "-1"],
+        &["mpc", MODEL, JUMP, "--horizon", "0"],
+    ];
+    for arguments in wrong {
+        let output = romc(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert_eq!(text(&output.stdout), "");
+    }
+}
+
+#[test]
+fn demo_makes_equations_code_and_commands_and_tells_how_well_it_does() {
+    let folder = folder();
+    let out = path(&folder, "demo");
+    let value = json(&["demo", "--out-dir", &out]);
+    assert_eq!(value["self_test"], "passed");
+    for run in value["mpc"]["transpose"].as_array().expect("three jumps") {
+        assert_eq!(run["limit_violations"], 0);
+        assert_eq!(run["failed"], 0);
+        assert!(run["torque_r2"]["contact"].as_f64().expect("a number") > 0.75);
+    }
+    let whole = &value["rollouts"]["full"]["coordinates"];
+    let learned = whole["body.z"]["rms"].as_f64().expect("a number");
+    let aslip = value["aslip_rms_m"]["full"]["body.z"].as_f64().expect("a number");
+    assert!(learned < aslip, "{learned} against {aslip}");
+    for name in ["go1_d4.tex", "go1_d4.c", "go1_d4.h", "go1_d4/src/lib.rs", "commands.csv"] {
+        assert!(Path::new(&out).join(name).is_file(), "{name}");
+    }
+    let table = done(&["demo", "--out-dir", &out]);
+    assert!(table.contains("ASLIP") && table.contains("self-test of the emitted C: passed"));
+}
+
+#[test]
+fn compile_of_the_same_model_gives_the_same_bytes() {
+    let folder = folder();
+    let out = |name: &str| {
+        let out = path(&folder, name);
+        done(&["compile", MODEL, "--emit", "latex,c,rust,markdown,mathml", "--out-dir", &out]);
+        let strip = |(file, bytes): (PathBuf, Vec<u8>)| {
+            let relative = file.strip_prefix(&out).expect("below").to_path_buf();
+            (relative, bytes)
+        };
+        contents(Path::new(&out)).into_iter().map(strip).collect::<Vec<_>>()
+    };
+    let (first, second) = (out("first"), out("second"));
+    assert!(first.len() > 10);
+    assert_eq!(first, second);
+}
+
+#[test]
+fn compile_into_a_folder_with_a_foreign_file_is_refused_and_leaves_it() {
+    let folder = folder();
+    let out = path(&folder, "");
+    let own = folder.path().join("paper_2d.c");
+    fs::write(&own, "int mine;\n").expect("writable");
+    let arguments = ["compile", "models/paper-2d.json", "--emit", "c", "--out-dir", &out];
+    let error = failed(&arguments);
+    assert!(error.contains("paper_2d.c") && error.contains("--force"), "{error}");
+    assert_eq!(contents(folder.path()), [(own.clone(), b"int mine;\n".to_vec())]);
+
+    let mut forced = arguments.to_vec();
+    forced.push("--force");
+    done(&forced);
+    assert!(fs::read_to_string(own).expect("replaced").contains("Generated by romc"));
+}
+
+#[test]
+fn train_writes_a_model_that_compiles_and_refuses_to_replace_it() {
+    let folder = folder();
+    let model = path(&folder, "small.json");
+    let jump = |set: &str, number: usize| format!("examples/recordings/go1/{set}_{number:02}.csv.gz");
+    let (training, validation): (Vec<_>, Vec<_>) = (
+        (1..=3).map(|number| jump("train", number)).collect(),
+        (1..=2).map(|number| jump("validation", number)).collect(),
+    );
+    let mut arguments = vec!["train"];
+    arguments.extend(training.iter().map(String::as_str));
+    arguments.push("--validation");
+    arguments.extend(validation.iter().map(String::as_str));
+    arguments.extend(["--latent-dim", "2", "--output", &model]);
+    let value = json(&arguments);
+    assert_eq!(value["latent_dim"], 2);
+    assert!(value["report"]["training"]["decoder_mse"].as_f64().expect("a number") < 1e-3);
+    let written = fs::read(&model).expect("a model");
+    assert!(text(&written).contains("romc train"), "the provenance has the command");
+
+    let error = failed(&arguments);
+    assert!(error.contains("already exists") && error.contains("--force"), "{error}");
+    assert_eq!(fs::read(&model).expect("still there"), written);
+    arguments.push("--force");
+    done(&arguments);
+    assert_eq!(fs::read(&model).expect("a model"), written, "training is deterministic");
+    done(&["compile", &model, "--emit", "c", "--out-dir", &path(&folder, "out")]);
+}
+
+#[test]
+fn simulate_writes_one_row_a_sample_without_nan() {
+    let folder = folder();
+    let table = path(&folder, "trajectories.csv");
+    let value = json(&["simulate", MODEL, JUMP, "--output", &table]);
+    assert_eq!(value["rollouts"]["segments"], 1);
+    assert_eq!(value["rollouts"]["full"]["diverged"], 0);
+    let rows = fs::read_to_string(&table).expect("a table");
+    let recording = romc::recording::read(Path::new(JUMP)).expect("a recording");
+    assert_eq!(rows.lines().count(), 1 + recording.sample_count());
+    assert!(!rows.contains("NaN") && !rows.contains("inf"));
+    assert!(failed(&["simulate", MODEL, JUMP, "--output", &table]).contains("already exists"));
+}
+
+#[test]
+fn simulate_of_a_latent_only_model_says_what_is_missing() {
+    let error = failed(&["simulate", "models/paper-2d.json", JUMP]);
+    assert!(error.contains("paper-2d") && error.contains("decoder"), "{error}");
+}
+
+#[test]
+fn mpc_commands_stay_inside_the_torque_limits() {
+    let folder = folder();
+    let table = path(&folder, "commands.csv");
+    for (lift, reference) in [("transpose", "recorded"), ("consistent", "none")] {
+        let value = json(&[
+            "mpc", MODEL, JUMP, "--lift", lift, "--reference-input", reference, "--output", &table,
+            "--force",
+        ]);
+        assert_eq!(value["runs"][0]["limit_violations"], 0);
+        let steps = value["runs"][0]["steps"].as_u64().expect("a count") as usize;
+        let rows = fs::read_to_string(&table).expect("a table");
+        let header: Vec<&str> = rows.lines().next().expect("a header").split(',').collect();
+        let torque = |name: &str| header.iter().position(|column| *column == format!("{name} torque"));
+        let robot = romc::robot::Robot::by_name("go1").expect("known");
+        let columns: Vec<usize> = romc::robot::Robot::input_names()[..12]
+            .iter()
+            .map(|name| torque(name).expect("a column a joint"))
+            .collect();
+        assert_eq!(rows.lines().count(), 1 + steps);
+        for row in rows.lines().skip(1) {
+            let cells: Vec<&str> = row.split(',').collect();
+            for (column, limit) in columns.iter().zip(robot.torque_limit_nm()) {
+                let torque: f64 = cells[*column].parse().expect("a number");
+                assert!(torque.abs() <= *limit, "{torque} N m beyond {limit} N m");
+            }
+        }
+    }
+}
+
+#[test]
+fn inspect_tells_findings_of_a_recording_and_parts_of_a_model() {
+    let value = json(&["inspect", MODEL, JUMP]);
+    assert_eq!(value["files"][0]["latent_dim"], 4);
+    let dominant = &value["files"][0]["dominant_coordinates"][0][0][0];
+    assert_eq!(dominant, "body.x");
+    assert_eq!(value["files"][1]["implausible"].as_array().expect("a list").len(), 0);
+    let phases = value["files"][1]["segments"][0]["phases"].as_array().expect("a list");
+    assert_eq!(phases.len(), 3, "launch, flight, landing");
+    assert!(done(&["inspect", MODEL]).contains("Xi of contact"));
+}
+
+#[test]
+fn inspect_of_an_unknown_robot_lists_the_known_ones() {
+    let error = failed(&["inspect", JUMP, "--robot", "go9"]);
+    assert!(error.contains("go9") && error.contains("go1"), "{error}");
+}
+
+#[test]
+fn bad_recordings_end_with_one_and_name_file_row_and_column() {
+    let folder = folder();
+    let missing = path(&folder, "missing.csv");
+    let error = failed(&["simulate", MODEL, &missing]);
+    assert!(error.contains("missing.csv"), "{error}");
+
+    let header: Vec<String> = romc::recording::columns::Column::all()
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    let zeros = vec!["0"; header.len()].join(";");
+    let mut bad = zeros.replacen('0', "zero", 1);
+    bad = format!("{}\n{zeros}\n{bad}\n", header.join(";"));
+    let file = folder.path().join("text.csv");
+    fs::write(&file, &bad).expect("writable");
+    let error = failed(&["mpc", MODEL, &file.display().to_string()]);
+    assert!(error.contains("text.csv") && error.contains("row 3") && error.contains("Time"), "{error}");
+
+    fs::write(&file, "").expect("writable");
+    let error = failed(&["inspect", &file.display().to_string()]);
+    assert!(error.contains("text.csv") && error.contains("empty"), "{error}");
+}
+
+#[test]
+fn bad_models_end_with_one_and_name_tensor_and_expectation() {
+    let folder = folder();
+    let file = folder.path().join("bad.json");
+    let name = file.display().to_string();
+    let good = fs::read_to_string("models/paper-2d.json").expect("shipped");
+    let cases = [
+        (good.replace("romc-model/1", "romc-model/9"), "romc-model/9"),
+        (good.replacen("\"latent_dim\": 2", "\"latent_dim\": 3", 1), "xi"),
+        (good.replacen("paper-2d", "while", 1), "while"),
+        (good.replacen("\"contact\"", "\"x; system(\\\"x\\\")\"", 1), "system"),
+        (good.replacen("\"contact\"", "\"\\\\input{x}\"", 1), "input"),
+        ("{".to_owned(), "bad.json"),
+    ];
+    for (model, named) in cases {
+        assert_ne!(model, good, "{named}: the case changes the model");
+        fs::write(&file, model).expect("writable");
+        let out = path(&folder, "out");
+        let error = failed(&["compile", &name, "--out-dir", &out]);
+        assert!(error.contains("bad.json") && error.contains(named), "{named}: {error}");
+        assert!(!Path::new(&out).exists(), "nothing is written");
+    }
+}
+
+#[test]
+fn hardware_jump_trains_simulates_and_gives_torques_inside_the_limits() {
+    let recording = "../shared/data/go1_hardware_jump.csv";
+    if !Path::new(env!("CARGO_MANIFEST_DIR")).join(recording).exists() {
+        println!("skipped: no hardware recording beside the checkout");
+        return;
+    }
+    let folder = folder();
+    let model = path(&folder, "hardware.json");
+    done(&["train", recording, "--latent-dim", "4", "--output", &model]);
+    for model in [MODEL, &model] {
+        let value = json(&["simulate", model, recording]);
+        assert_eq!(value["rollouts"]["restarted"]["diverged"], 0);
+        let value = json(&["mpc", model, recording]);
+        let run = &value["runs"][0];
+        assert_eq!(run["limit_violations"], 0);
+        assert!(run["torque_r2"]["contact"].as_f64().expect("a number").is_finite());
+        assert!(run["torque_rms_nm"].as_f64().expect("a number") > 0.0);
+    }
+}
