@@ -40,6 +40,9 @@ pub enum Error {
     /// A file that romc would have to replace.
     #[error("{0}: already exists; pass --force to replace it, or choose another name")]
     Exists(PathBuf),
+    /// An output in a folder that is not there.
+    #[error("{path}: there is no folder `{folder}`; make it first", path = path.display(), folder = folder.display())]
+    NoFolder { path: PathBuf, folder: PathBuf },
     /// The file system refused an output.
     #[error("{path}: cannot write")]
     Write { path: PathBuf, source: io::Error },

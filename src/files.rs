@@ -22,7 +22,7 @@ impl Overwrite {
         if force { Self::Replace } else { Self::Refuse }
     }
 
-    /// Whether writing to `path` is allowed: tells before long work that it would end in a refusal.
+    /// Whether a file at `path` may be written.
     pub fn allows(self, path: &Path) -> bool {
         match self {
             Self::Refuse => path.symlink_metadata().is_err(),
@@ -31,7 +31,7 @@ impl Overwrite {
     }
 }
 
-/// Replaces `path` by what `fill` writes, in one step; missing folders above it are made.
+/// Replaces `path` by what `fill` writes, in one step.
 ///
 /// # Errors
 /// Those of the file system; then `path` is as it was, and nothing is left beside it.
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn write_whole_leaves_the_old_file_when_filling_fails() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("deep/model.json");
+        let path = folder.path().join("model.json");
         write_whole(&path, |out| out.write_all(b"first")).expect("a new file");
         let failed = write_whole(&path, |out| {
             out.write_all(b"half")?;
@@ -86,7 +86,7 @@ mod tests {
         });
         assert!(failed.is_err());
         assert_eq!(fs::read(&path).expect("still there"), b"first");
-        let left = fs::read_dir(path.parent().expect("deep")).expect("readable");
+        let left = fs::read_dir(folder.path()).expect("readable");
         assert_eq!(left.count(), 1, "no part stays behind");
     }
 

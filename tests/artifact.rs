@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use romc::artifact::{self, ArtifactError, Overwrite};
+use romc::artifact::{self, ArtifactError};
+use romc::files::Overwrite;
 use romc::model::{Dimensions, IdentifierError, LibraryError, ModelError, ReducedModel};
 use serde_json::{Value, json};
 

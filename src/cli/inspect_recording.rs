@@ -14,6 +14,8 @@ use crate::robot::{JOINT_DIM, Robot};
 
 /// Characters of the time bar.
 const BAR_WIDTH: usize = 60;
+/// Shorter spans are feet that leave or land one after the other, part of the span before them.
+const CHATTER: usize = 10;
 /// Findings shown to people; JSON holds them all.
 const FINDINGS_SHOWN: usize = 12;
 
@@ -23,7 +25,7 @@ const FINDINGS_SHOWN: usize = 12;
 /// [`Error::Recording`] if no phase rule covers the feet.
 pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
     let findings = check(recording, robot, &CheckOptions::default());
-    let rule = PhaseRule::three_phase();
+    let rule = PhaseRule::three_phase().with_min_samples(CHATTER);
     let mut text = format!(
         "{}: {} samples in {} segments\n",
         recording.path.display(),

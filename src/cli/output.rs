@@ -13,10 +13,20 @@ use crate::recording::{self, Recording};
 /// Tells before long work that its output could not be written.
 ///
 /// # Errors
-/// [`Error::Exists`] if the file is there and may not be replaced.
+/// [`Error::Exists`] if the file is there and may not be replaced, [`Error::NoFolder`] if its folder
+/// is not.
 pub fn check_output(path: Option<&Path>, overwrite: Overwrite) -> Result<(), Error> {
-    match path {
-        Some(path) if !overwrite.allows(path) => Err(Error::Exists(path.to_owned())),
+    let Some(path) = path else { return Ok(()) };
+    if !overwrite.allows(path) {
+        return Err(Error::Exists(path.to_owned()));
+    }
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+            Err(Error::NoFolder {
+                path: path.to_owned(),
+                folder: folder.to_owned(),
+            })
+        }
         Some(_) | None => Ok(()),
     }
 }
