@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::artifact::ArtifactError;
+use crate::backend::typeset::RenameError;
 use crate::backend::{EmitError, FolderError};
 use crate::lower::LowerError;
 use crate::model::ModelError;
@@ -29,6 +30,8 @@ pub enum Error {
     Train(#[from] TrainError),
     #[error(transparent)]
     Emit(#[from] EmitError),
+    #[error(transparent)]
+    Rename(#[from] RenameError),
     #[error(transparent)]
     Folder(#[from] FolderError),
     #[error(transparent)]

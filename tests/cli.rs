@@ -167,6 +167,44 @@ fn compile_of_the_same_model_gives_the_same_bytes() {
 }
 
 #[test]
+fn compile_prints_equations_with_the_names_and_digits_asked_for() {
+    let folder = folder();
+    let out = path(&folder, "out");
+    let compile = |extra: &[&str]| {
+        let mut arguments = vec![
+            "compile",
+            "models/paper-2d.json",
+            "--emit",
+            "latex",
+            "--out-dir",
+            &out,
+        ];
+        arguments.extend(extra);
+        done(&arguments);
+        fs::read_to_string(folder.path().join("out/paper_2d.tex")).expect("equations")
+    };
+    assert!(compile(&[]).contains(r"- 0.75\sin(\dot{z}_1) + 0.11u_1"));
+    let renamed = compile(&["--rename", "z1=x", "--digits", "1"]);
+    assert!(
+        renamed.contains(r"\ddot{x} = 0.4 - 0.2\dot{x}"),
+        "{renamed}"
+    );
+    assert!(compile(&["--siunitx"]).contains(r"\num{0.36}"));
+
+    let error = failed(&[
+        "compile",
+        "models/paper-2d.json",
+        "--emit",
+        "latex",
+        "--out-dir",
+        &out,
+        "--rename",
+        r"z1=\input{x}",
+    ]);
+    assert!(error.contains("z1="), "{error}");
+}
+
+#[test]
 fn compile_into_a_folder_with_a_foreign_file_is_refused_and_leaves_it() {
     let folder = folder();
     let out = path(&folder, "");

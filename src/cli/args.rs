@@ -150,14 +150,34 @@ pub struct CompileArguments {
     /// Folder for the emitted files
     #[arg(long, value_name = "DIR")]
     pub out_dir: PathBuf,
-    /// Decimal places of printed coefficients; as many as each needs, at least two, unless given
-    #[arg(long, value_name = "N")]
-    pub digits: Option<usize>,
+    #[command(flatten)]
+    pub equations: EquationArguments,
     /// Write into a folder that holds files romc did not make
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]
     pub output_format: OutputArguments,
+}
+
+/// How equations are printed.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Printed equations")]
+pub struct EquationArguments {
+    /// Decimal places of coefficients; as many as each needs, at least two, unless given
+    #[arg(long, value_name = "N", conflicts_with = "significant")]
+    pub digits: Option<usize>,
+    /// Significant digits of coefficients
+    #[arg(long, value_name = "N")]
+    pub significant: Option<usize>,
+    /// Another name for a variable, such as z1=x or u2=F_z; may be repeated
+    #[arg(long, value_name = "VARIABLE=NAME")]
+    pub rename: Vec<String>,
+    /// Longest line in em: 32 suits one column, 22 a column of a two-column paper
+    #[arg(long, value_name = "EM", value_parser = positive_width)]
+    pub width: Option<f64>,
+    /// Write numbers in LaTeX with siunitx's \\num
+    #[arg(long)]
+    pub siunitx: bool,
 }
 
 /// `romc simulate`
@@ -241,6 +261,13 @@ fn positive_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds.is_finite() && seconds > 0.0 => Ok(seconds),
         _ => Err("expected a positive number of seconds".to_owned()),
+    }
+}
+
+fn positive_width(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(width) if width.is_finite() && width > 0.0 => Ok(width),
+        _ => Err("expected a positive width in em".to_owned()),
     }
 }
 

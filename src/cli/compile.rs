@@ -6,9 +6,12 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::args::CompileArguments;
+use super::args::{CompileArguments, EquationArguments};
 use super::output::Table;
-use crate::backend::typeset::Rounding;
+use crate::backend::latex::{LatexOptions, NumberStyle};
+use crate::backend::markdown::MarkdownOptions;
+use crate::backend::mathml::MathmlOptions;
+use crate::backend::typeset::{Rounding, SymbolTable};
 use crate::backend::{self, EmitOptions, EmittedFile, Target};
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
@@ -21,8 +24,7 @@ use crate::{Error, artifact};
 pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let model = artifact::read(&arguments.model)?;
     let overwrite = Overwrite::when_forced(arguments.force);
-    let rounding = arguments.digits.map(Rounding::Decimals);
-    let files = emit(&model, &arguments.emit, rounding)?;
+    let files = emit(&model, &arguments.emit, &arguments.equations)?;
     let written = write(&arguments.out_dir, &files, overwrite)?;
     let mut table = Table::new(["file", "bytes"]);
     for (path, bytes) in &written {
@@ -58,21 +60,50 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
 /// The files of the targets, in memory, with the model's digest in their headers.
 ///
 /// # Errors
-/// [`Error::Emit`] if the model cannot be lowered or typeset.
+/// [`Error::Emit`] if the model cannot be lowered or typeset, [`Error::Rename`] for a new name that
+/// cannot be used.
 pub fn emit(
     model: &ReducedModel,
     targets: &[Target],
-    rounding: Option<Rounding>,
+    equations: &EquationArguments,
 ) -> Result<Vec<EmittedFile>, Error> {
-    let mut options = EmitOptions::default();
-    let digest = artifact::digest(model).short();
-    options.digest = Some(digest.clone());
-    options.latex.digest = Some(digest);
-    if let Some(rounding) = rounding {
-        options.latex.rounding = rounding;
-        options.markdown.rounding = rounding;
-        options.mathml.rounding = rounding;
-    }
+    let digest = Some(artifact::digest(model).short());
+    let symbols = SymbolTable::parse(&equations.rename, model.latent_dim())?;
+    let rounding = match (equations.digits, equations.significant) {
+        (Some(places), _) => Rounding::Decimals(places),
+        (None, Some(digits)) => Rounding::Significant(digits),
+        (None, None) => Rounding::default(),
+    };
+    let latex = LatexOptions::default();
+    let markdown = MarkdownOptions::default();
+    let mathml = MathmlOptions::default();
+    let options = EmitOptions {
+        latex: LatexOptions {
+            rounding,
+            numbers: match equations.siunitx {
+                true => NumberStyle::Siunitx,
+                false => NumberStyle::Plain,
+            },
+            width_em: equations.width.unwrap_or(latex.width_em),
+            symbols: symbols.clone(),
+            digest: digest.clone(),
+            ..latex
+        },
+        markdown: MarkdownOptions {
+            rounding,
+            width_em: equations.width.unwrap_or(markdown.width_em),
+            symbols: symbols.clone(),
+            digest: digest.clone(),
+        },
+        mathml: MathmlOptions {
+            rounding,
+            width_em: equations.width.unwrap_or(mathml.width_em),
+            symbols,
+            digest: digest.clone(),
+        },
+        digest,
+        ..EmitOptions::default()
+    };
     Ok(backend::emit(model, targets, &options)?)
 }
 

@@ -9,7 +9,7 @@ use std::process::Command;
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::args::DemoArguments;
+use super::args::{DemoArguments, EquationArguments};
 use super::mpc::NamedRun;
 use super::output::{Table, significant, spinner};
 use super::simulate::Evaluation;
@@ -60,7 +60,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
 
     progress.set_message("compiling equations and code");
     let targets = [Target::Latex, Target::C, Target::Rust];
-    let mut files = compile::emit(&model, &targets, None)?;
+    let mut files = compile::emit(&model, &targets, &EquationArguments::default())?;
     progress.set_message("rolling the model out");
     let evaluation = Evaluation::over(&model, &jumps, RESTART_S)?;
     let aslip = aslip(&model, &jumps)?;

@@ -215,3 +215,76 @@ fn mean_foot(robot: &Robot, segment: &Segment, sample: usize) -> Vector2<f64> {
         + Vector3::new(body[BODY_X], body[BODY_X + 1], body[BODY_Z]);
     Vector2::new(in_world.x, in_world.z)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::robot::STATE_DIM;
+
+    /// A body at rest at `height`, legs bent, without torques; `feet` for all samples.
+    fn at_rest(height: f64, feet: [bool; 4], count: usize) -> Segment {
+        let mut x = DMatrix::zeros(STATE_DIM, count);
+        for (row, mut values) in x.row_iter_mut().enumerate() {
+            values.fill(match row {
+                BODY_Z => height,
+                row if row < JOINT_DIM => [0.0, 0.8, -1.6][row % 3],
+                _ => 0.0,
+            });
+        }
+        Segment {
+            path: PathBuf::from("rest"),
+            first_row: 2,
+            row_stride: 1.0,
+            time_s: (0..count).map(|k| 0.002 * k as f64).collect(),
+            dx: DMatrix::zeros(STATE_DIM, count),
+            ddx: DMatrix::zeros(STATE_DIM, count),
+            x,
+            torque_nm: DMatrix::zeros(JOINT_DIM, count),
+            feet: vec![feet; count],
+            body_wrench: None,
+        }
+    }
+
+    fn rms_z(segment: &Segment) -> f64 {
+        let robot = Robot::by_name("go1").expect("known");
+        let mut sums = AslipSums::default();
+        Aslip::PUBLISHED
+            .add_rollout(robot, segment, Restart::Never, &mut sums)
+            .expect("runs");
+        sums.z.fit().expect("samples").rms
+    }
+
+    #[test]
+    fn pendulum_in_flight_falls_freely() {
+        let count = 101;
+        let expected: f64 = (0..count)
+            .map(|k| (0.5 * 9.81 * (0.002 * k as f64).powi(2)).powi(2))
+            .sum();
+        let expected = (expected / count as f64).sqrt();
+        let found = rms_z(&at_rest(1.0, [false; 4], count));
+        assert!((found - expected).abs() < 1e-8, "{found} {expected}");
+    }
+
+    #[test]
+    fn pendulum_in_contact_swings_about_the_springs_equilibrium() {
+        // feet hang below the hips at f; the spring's rest is f + l0, its equilibrium g m / k below
+        let segment = at_rest(0.3, [true; 4], 201);
+        let robot = Robot::by_name("go1").expect("known");
+        let foot = mean_foot(robot, &segment, 0).y;
+        let Aslip {
+            mass_kg,
+            stiffness_n_m,
+            rest_length_m,
+            gravity_m_s2,
+        } = Aslip::PUBLISHED;
+        let equilibrium = foot + rest_length_m - gravity_m_s2 * mass_kg / stiffness_n_m;
+        let rate = (stiffness_n_m / mass_kg).sqrt();
+        let residual = |t: f64| (0.3 - equilibrium) * (1.0 - (rate * t).cos());
+        let expected: f64 = (0..201).map(|k| residual(0.002 * k as f64).powi(2)).sum();
+        let expected = (expected / 201.0).sqrt();
+        let found = rms_z(&segment);
+        assert!((found - expected).abs() < 1e-7, "{found} {expected}");
+    }
+}
