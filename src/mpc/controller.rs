@@ -13,7 +13,7 @@ use super::plant::Plant;
 use super::problem::StageRows;
 use super::qp::{Outcome, QpSolver};
 use super::reference::{Reference, ReferenceSamples};
-use super::settings::{Lift, MpcSettings};
+use super::settings::{Lift, MissingInput, MpcSettings};
 use super::transcribe::{StepData, Transcription, Weights};
 use crate::model::ReducedModel;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
@@ -161,7 +161,10 @@ impl Controller {
     /// # Errors
     /// As [`Reference::new`]; the old reference stays.
     pub fn set_reference(&mut self, samples: ReferenceSamples<'_>) -> Result<(), MpcError> {
-        let reference = Reference::new(&self.plant, samples)?;
+        let mut reference = Reference::new(&self.plant, samples)?;
+        if !reference.has_input() && self.settings.missing_input == MissingInput::Estimate {
+            reference.estimate_input(&self.plant, &mut self.dynamics);
+        }
         let d = self.plant.latent_dim();
         let deviation = reference.deviation();
         let state: Vec<f64> = (0..2 * d)

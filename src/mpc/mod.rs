@@ -14,6 +14,7 @@ mod along_recording;
 mod command;
 mod controller;
 mod error;
+pub mod estimate;
 mod horizon;
 mod lift;
 pub mod linearise;
@@ -38,5 +39,7 @@ pub use plan::Plan;
 pub use plant::{Plant, PlantPhase};
 pub use qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, SolverProfile};
 pub use reference::{Reference, ReferenceSamples};
-pub use settings::{Drift, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MpcSettings};
+pub use settings::{
+    Drift, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput, MpcSettings,
+};
 pub use sparse::SparseColumns;

@@ -23,7 +23,8 @@
 //!   ([`linearise`](super::linearise)) at `(x̄, ū)`: the reference or the last plan. `e_k` is zero if
 //!   the model is the drift; otherwise `e_k = x_r,k+1 − F(x_r,k, u_r,k)`, so that the reference is
 //!   itself a trajectory and the model answers for deviations only.
-//! - Without a recorded input `u_r` is the phase's mean training input.
+//! - Without a recorded input `u_r` is estimated from the reference's accelerations
+//!   ([`estimate`](super::estimate)) or, if asked for, the phase's mean training input.
 //! - `T` and `F` are the torque and force rows of `W_eᵀ / s_u`, `R` turns the body frame upright by
 //!   the reference's roll and pitch. With the consistent lift the torques are chosen afterwards
 //!   within their limits, so the rows of `T` are left out.

@@ -1,8 +1,10 @@
 //! The trajectory that the controller follows, in latent coordinates.
 
 use super::error::MpcError;
+use super::estimate::{Motion, estimate_input};
 use super::plant::{Plant, add_product};
 use crate::robot::{ContactFlags, FOOT_DIM, STATE_DIM};
+use crate::sim::CompiledModel;
 
 /// A trajectory in SI units as its user has it: samples one after the other.
 #[derive(Debug, Clone, Copy)]
@@ -13,7 +15,8 @@ pub struct ReferenceSamples<'a> {
     pub x: &'a [f64],
     /// Velocities, 18 values a sample.
     pub dx: &'a [f64],
-    /// Generalised inputs (12 torques, force, moment), 18 values a sample, if they are known.
+    /// Generalised inputs (12 torques, force, moment), 18 values a sample, if they are known; the
+    /// controller estimates them if not.
     pub u: Option<&'a [f64]>,
     /// Feet in contact.
     pub feet: &'a [ContactFlags],
@@ -59,26 +62,50 @@ impl Reference {
             plant.encode(row(samples.x, sample), z);
             plant.encode_velocity(row(samples.dx, sample), dz);
         }
-        let inputs = samples.u.map(|u| project_all(plant, u));
-        let input_ends = match &inputs {
-            Some(u) => [u[..d].to_vec(), u[(count - 1) * d..].to_vec()],
-            None => [vec![0.0; d], vec![0.0; d]],
-        };
-        Ok(Self {
+        let mut reference = Self {
             latent_dim: d,
             deviation: deviations(&state, d),
             state,
-            input_integral: inputs.map(|u| integrate(samples.time_s, &u, d)),
-            input_ends,
+            input_integral: None,
+            input_ends: [vec![0.0; d], vec![0.0; d]],
             time_s: samples.time_s.to_vec(),
             feet: samples.feet.to_vec(),
-            attitude: (0..count)
-                .map(|sample| [row(samples.x, sample)[15], row(samples.x, sample)[16]])
+            attitude: samples
+                .x
+                .chunks_exact(STATE_DIM)
+                .map(|x| [x[15], x[16]])
                 .collect(),
-        })
+        };
+        if let Some(u) = samples.u {
+            reference.take_input(&project_all(plant, u));
+        }
+        Ok(reference)
     }
 
-    /// Whether the trajectory comes with its input.
+    /// Gives a trajectory that comes without its input the one that the model finds behind its
+    /// accelerations.
+    pub(super) fn estimate_input(&mut self, plant: &Plant, dynamics: &mut CompiledModel) {
+        let phase: Vec<usize> = self
+            .feet
+            .iter()
+            .map(|&feet| plant.phase_for(feet).expect("phases were checked"))
+            .collect();
+        let motion = Motion {
+            time_s: &self.time_s,
+            state: &self.state,
+            phase: &phase,
+        };
+        let input = estimate_input(plant, dynamics, &motion);
+        self.take_input(&input);
+    }
+
+    fn take_input(&mut self, input: &[f64]) {
+        let d = self.latent_dim;
+        self.input_ends = [input[..d].to_vec(), input[input.len() - d..].to_vec()];
+        self.input_integral = Some(integrate(&self.time_s, input, d));
+    }
+
+    /// Whether the trajectory has an input, its own or an estimate.
     pub fn has_input(&self) -> bool {
         self.input_integral.is_some()
     }

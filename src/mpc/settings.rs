@@ -27,12 +27,23 @@ pub enum Linearisation {
 /// What stands for the dynamics of the reference itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Drift {
-    /// The reference's own finite differences if it comes with its input, otherwise the model.
+    /// The reference's own finite differences if it has an input, its own or an estimate, otherwise
+    /// the model.
     Automatic,
     /// The reference's own finite differences: the model is trusted for deviations only.
     Reference,
     /// The model.
     Model,
+}
+
+/// What stands for the input of a reference that comes without one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum MissingInput {
+    /// What the model finds behind the reference's accelerations, see
+    /// [`estimate`](super::estimate).
+    Estimate,
+    /// The mean training input of each phase: the optimisation has to find the rest.
+    Mean,
 }
 
 /// What the controller does while it has no plan to trust.
@@ -83,6 +94,8 @@ pub struct MpcSettings {
     pub linearisation: Linearisation,
     /// What stands for the reference's own dynamics.
     pub drift: Drift,
+    /// What stands for the reference's input if it has none.
+    pub missing_input: MissingInput,
     /// Price of leaving the joint limits by their whole half range at one stage.
     pub joint_penalty: f64,
     /// Friction coefficient of the lifted body force in contact; none leaves it free.
@@ -105,15 +118,16 @@ impl Default for MpcSettings {
             horizon: 20,
             step_s: 0.01,
             lift: Lift::Transpose,
-            input_weight: 0.1,
+            input_weight: 1.0,
             velocity_weight: 0.02,
             terminal_weight: 1.0,
             linearisation: Linearisation::Reference,
             drift: Drift::Automatic,
+            missing_input: MissingInput::Estimate,
             joint_penalty: 100.0,
             body_friction: None,
             foot_friction: 0.6,
-            lift_prior_weight: 1e-4,
+            lift_prior_weight: 1e-3,
             torque_rate_nm_s: None,
             qp: QpSettings::default(),
             fallback: FallbackSettings::default(),

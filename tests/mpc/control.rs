@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 use romc::model::ReducedModel;
 use romc::mpc::{
-    Command, Controller, Drift, Linearisation, Measurement, MpcError, MpcSettings,
+    Command, Controller, Drift, Linearisation, Measurement, MissingInput, MpcError, MpcSettings,
     ReferenceSamples, Source, Status,
 };
 use romc::robot::ContactFlags;
@@ -160,6 +160,27 @@ fn without_a_recorded_input_the_reference_is_still_tracked() {
         let late = distances[40..].iter().copied().fold(0.0, f64::max);
         assert!(late < 0.2 * distances[0], "{late} of {}", distances[0]);
     }
+}
+
+#[test]
+fn input_of_a_reference_without_one_is_found_behind_its_accelerations() {
+    let model = model(Equations::Nonlinear);
+    let reference = trajectory(&model);
+    let mut controller = controller(&model, MpcSettings::default(), reference.without_input());
+    let (mut error, mut size) = (0.0, 0.0);
+    for sample in (0..350).step_by(5) {
+        let command = measure(&reference, sample, &mut controller);
+        assert_eq!(command.status, Status::Solved);
+        for joint in 0..12 {
+            error += (command.torque_nm[joint] - reference.u[sample * 18 + joint]).powi(2);
+            size += reference.u[sample * 18 + joint].powi(2);
+        }
+    }
+    assert!(
+        error < 0.1 * size,
+        "{} of the torques is missed",
+        error / size
+    );
 }
 
 #[test]

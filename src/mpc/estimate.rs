@@ -1,0 +1,231 @@
+//! The input of a reference that comes without one, estimated from its accelerations.
+//!
+//! In each phase the model reads `ddz = f(z, dz, u) + r`. Around the phase's mean training input
+//! `m`, with `B = ∂f/∂u` there, the reference's own acceleration leaves
+//!
+//! ```text
+//! y = ddz − f(z, dz, m) = B (u − m) + r,   u − m ~ (0, S),   r ~ (0, R)
+//! ```
+//!
+//! and the best linear estimate of the input is
+//!
+//! ```text
+//! û = m + S Bᵀ (B S Bᵀ + R)⁻¹ y.
+//! ```
+//!
+//! `S` is the covariance of the training inputs. How far the model's accelerations are to be
+//! believed, `R`, the reference tells itself: input and residual of a least-squares model are
+//! uncorrelated, so `Cov(y) = B S Bᵀ + R`, and `R` is what `B S Bᵀ` leaves of the sample covariance
+//! (in units of the standard deviations of `y`, eigenvalues not below [`RESIDUAL_FLOOR`]). Latents
+//! whose acceleration the model hardly explains then hardly count.
+
+use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+
+use super::plant::{Plant, PlantPhase};
+use crate::sim::CompiledModel;
+
+/// Half width of the window in which velocities are fitted by a straight line, s.
+const HALF_WINDOW_S: f64 = 0.016 + 1e-9;
+/// Smallest eigenvalue of the residual's covariance in units of the deviations of `y`.
+const RESIDUAL_FLOOR: f64 = 0.03;
+
+/// A trajectory whose input is looked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Motion<'a> {
+    /// Time of each sample, s.
+    pub time_s: &'a [f64],
+    /// `(z, dz)` a sample.
+    pub state: &'a [f64],
+    /// Phase of each sample.
+    pub phase: &'a [usize],
+}
+
+/// What one sample says about its input.
+struct Evidence {
+    sample: usize,
+    /// `y`.
+    unexplained: DVector<f64>,
+    /// `B`.
+    gain: DMatrix<f64>,
+}
+
+/// Latent inputs, `latent_dim` a sample.
+pub(super) fn estimate_input(
+    plant: &Plant,
+    dynamics: &mut CompiledModel,
+    motion: &Motion<'_>,
+) -> Vec<f64> {
+    let d = plant.latent_dim();
+    let mut input = vec![0.0; motion.time_s.len() * d];
+    let mut evidence: Vec<Vec<Evidence>> = plant.phases().iter().map(|_| Vec::new()).collect();
+    let (mut ddz, mut jacobian) = (vec![0.0; d], DMatrix::zeros(d, 3 * d));
+    for (sample, &phase) in motion.phase.iter().enumerate() {
+        let mean = plant.phases()[phase].latent_mean.as_slice();
+        input[sample * d..(sample + 1) * d].copy_from_slice(mean);
+        let (z, dz) = motion.state[sample * 2 * d..(sample + 1) * 2 * d].split_at(d);
+        dynamics.jacobian(phase, z, dz, mean, &mut ddz, &mut jacobian);
+        let acceleration = acceleration(motion, d, sample);
+        evidence[phase].push(Evidence {
+            sample,
+            unexplained: acceleration - DVector::from_column_slice(&ddz),
+            gain: jacobian.columns(2 * d, d).into_owned(),
+        });
+    }
+    for (phase, evidence) in plant.phases().iter().zip(&evidence) {
+        add_estimates(phase, evidence, &mut input);
+    }
+    input
+}
+
+/// Adds `S Bᵀ (B S Bᵀ + R)⁻¹ y` to the inputs of one phase's samples.
+fn add_estimates(phase: &PlantPhase, evidence: &[Evidence], input: &mut [f64]) {
+    let d = phase.latent_mean.len();
+    // A covariance of fewer samples than this says nothing about the residual.
+    if evidence.len() < 4 * d {
+        return;
+    }
+    let covariance = &phase.latent_root * phase.latent_root.transpose();
+    let Some(residual) = residual_covariance(evidence, &covariance) else {
+        return;
+    };
+    for Evidence {
+        sample,
+        unexplained,
+        gain,
+    } in evidence
+    {
+        let by_input = gain * &covariance * gain.transpose() + &residual;
+        let Some(factor) = Cholesky::new(by_input) else {
+            continue;
+        };
+        let estimate = &covariance * gain.transpose() * factor.solve(unexplained);
+        if estimate.iter().all(|value| value.is_finite()) {
+            for (input, estimate) in input[sample * d..].iter_mut().zip(estimate.iter()) {
+                *input += estimate;
+            }
+        }
+    }
+}
+
+/// `R = Cov(y) − mean(B S Bᵀ)`, made positive definite; none if `y` is not finite.
+fn residual_covariance(evidence: &[Evidence], input: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let d = input.nrows();
+    let count = evidence.len() as f64;
+    let mean = evidence
+        .iter()
+        .map(|item| &item.unexplained)
+        .sum::<DVector<f64>>()
+        / count;
+    let mut covariance = DMatrix::zeros(d, d);
+    let mut explained = DMatrix::zeros(d, d);
+    for Evidence {
+        unexplained, gain, ..
+    } in evidence
+    {
+        let off = unexplained - &mean;
+        covariance += &off * off.transpose() / count;
+        explained += gain * input * gain.transpose() / count;
+    }
+    // A latent that is explained exactly has no deviation of its own: any positive scale will do.
+    let deviation: Vec<f64> = (0..d)
+        .map(|i| {
+            f64::max(covariance[(i, i)], explained[(i, i)])
+                .sqrt()
+                .max(f64::MIN_POSITIVE)
+        })
+        .collect();
+    let relative = DMatrix::from_fn(d, d, |row, col| {
+        (covariance[(row, col)] - explained[(row, col)]) / (deviation[row] * deviation[col])
+    });
+    if relative.iter().any(|value| !value.is_finite()) {
+        return None;
+    }
+    let mut eigen = SymmetricEigen::new(relative);
+    eigen
+        .eigenvalues
+        .apply(|value| *value = value.max(RESIDUAL_FLOOR));
+    let floored = eigen.recompose();
+    Some(DMatrix::from_fn(d, d, |row, col| {
+        floored[(row, col)] * deviation[row] * deviation[col]
+    }))
+}
+
+/// Slope of the straight line through the velocities around a sample, within its phase.
+fn acceleration(motion: &Motion<'_>, latent_dim: usize, sample: usize) -> DVector<f64> {
+    let time_s = motion.time_s;
+    let belongs = |other: usize| {
+        motion.phase[other] == motion.phase[sample]
+            && (time_s[other] - time_s[sample]).abs() <= HALF_WINDOW_S
+    };
+    let mut first = (0..sample)
+        .rev()
+        .take_while(|&other| belongs(other))
+        .last()
+        .unwrap_or(sample);
+    let mut last = (sample + 1..time_s.len())
+        .take_while(|&other| belongs(other))
+        .last()
+        .unwrap_or(sample);
+    if first == last {
+        // A lone sample of its phase: its neighbours are all there is.
+        first = first.saturating_sub(1);
+        last = (last + 1).min(time_s.len() - 1);
+    }
+    let window = first..=last;
+    let count = (last - first + 1) as f64;
+    let mean_s = window.clone().map(|other| time_s[other]).sum::<f64>() / count;
+    let spread: f64 = window
+        .clone()
+        .map(|other| (time_s[other] - mean_s).powi(2))
+        .sum();
+    DVector::from_fn(latent_dim, |latent, _| {
+        let velocity = |other: usize| motion.state[(2 * other + 1) * latent_dim + latent];
+        window
+            .clone()
+            .map(|other| (time_s[other] - mean_s) * velocity(other))
+            .sum::<f64>()
+            / spread
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slope_of_a_parabola_is_its_derivative_inside_and_stops_at_the_phases_edge() {
+        let time_s: Vec<f64> = (0..40).map(|sample| 0.002 * sample as f64).collect();
+        let phase: Vec<usize> = (0..40).map(|sample| usize::from(sample >= 20)).collect();
+        // dz = t² before the edge, 5 after it.
+        let state: Vec<f64> = (0..40)
+            .flat_map(|k| [0.0, if k < 20 { time_s[k] * time_s[k] } else { 5.0 }])
+            .collect();
+        let motion = Motion {
+            time_s: &time_s,
+            state: &state,
+            phase: &phase,
+        };
+        assert!((acceleration(&motion, 1, 10)[0] - 0.04).abs() < 1e-12);
+        // One-sided at the edge: the slope at the middle of the eight samples before it.
+        assert!((acceleration(&motion, 1, 19)[0] - (time_s[19] + time_s[11])).abs() < 1e-12);
+        assert!(acceleration(&motion, 1, 20)[0].abs() < 1e-12);
+    }
+
+    #[test]
+    fn residual_covariance_is_what_the_input_leaves() {
+        // y = B u + r with B = 2, Var u = 1, Var r = 0.25, sampled on a symmetric grid.
+        let grid = [-1.0, 1.0];
+        let evidence: Vec<Evidence> = grid
+            .iter()
+            .flat_map(|u| grid.iter().map(move |r| 2.0 * u + 0.5 * r))
+            .enumerate()
+            .map(|(sample, y)| Evidence {
+                sample,
+                unexplained: DVector::from_element(1, y),
+                gain: DMatrix::from_element(1, 1, 2.0),
+            })
+            .collect();
+        let residual = residual_covariance(&evidence, &DMatrix::identity(1, 1)).expect("finite");
+        assert!((residual[(0, 0)] - 0.25).abs() < 1e-12, "{residual}");
+    }
+}
