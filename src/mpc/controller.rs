@@ -10,17 +10,18 @@ use super::horizon::{Contact, Horizon, Scene};
 use super::lift::{ConsistentLift, Footing, LiftFailure};
 use super::plan::Plan;
 use super::plant::Plant;
-use super::problem::StageRows;
+use super::problem::{ROW_MARGIN, StageRows};
 use super::qp::{Outcome, QpSolver};
 use super::reference::{Reference, ReferenceSamples};
-use super::settings::{Lift, MissingInput, MpcSettings};
+use super::settings::{Lift, MissingInput, MpcSettings, RowSelection};
 use super::transcribe::{StepData, Transcription, Weights};
 use crate::model::ReducedModel;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 use crate::sim::CompiledModel;
 
-/// Slack, in half ranges of a joint, from which a plan counts as softened.
-const SLACK_TOLERANCE: f64 = 1e-4;
+/// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the
+/// rows that were left out may hide.
+const SOFTENED_FROM: f64 = 1.05 * ROW_MARGIN;
 /// Lifted force, N, below which its inconsistency means nothing.
 const SMALL_FORCE_N: f64 = 1.0;
 
@@ -36,6 +37,8 @@ pub struct Controller {
     plant: Plant,
     dynamics: CompiledModel,
     settings: MpcSettings,
+    /// Rows for any reference; the transcription has those that matter near the present one.
+    rows: StageRows,
     transcription: Transcription,
     solver: QpSolver,
     roots: Vec<DMatrix<f64>>,
@@ -102,7 +105,7 @@ impl Controller {
         let d = plant.latent_dim();
         let rows = StageRows::new(&plant, &settings);
         let horizon = Horizon::new(d, settings.horizon, rows.friction.clone());
-        let (transcription, program) = Transcription::new(d, settings.horizon, rows);
+        let (transcription, program) = Transcription::new(d, settings.horizon, rows.clone());
         let consistent = match settings.lift {
             Lift::Transpose => None,
             Lift::Consistent => Some(ConsistentLift::new(&plant, &settings)?),
@@ -118,6 +121,7 @@ impl Controller {
             plan: Plan::new(d, settings.horizon, settings.step_s),
             memory: Memory::new(d),
             reference: None,
+            rows,
             transcription,
             horizon,
             consistent,
@@ -158,8 +162,10 @@ impl Controller {
 
     /// Takes a new trajectory to follow; a plan for an earlier one is forgotten.
     ///
+    /// This sets up the solver anew, for the rows that matter near the trajectory.
+    ///
     /// # Errors
-    /// As [`Reference::new`]; the old reference stays.
+    /// As [`Reference::new`] and [`QpSolver::new`]; the old reference stays.
     pub fn set_reference(&mut self, samples: ReferenceSamples<'_>) -> Result<(), MpcError> {
         let mut reference = Reference::new(&self.plant, samples)?;
         if !reference.has_input() && self.settings.missing_input == MissingInput::Estimate {
@@ -183,8 +189,14 @@ impl Controller {
             input: self.settings.input_weight,
             joint_penalty: self.settings.joint_penalty,
         };
-        self.transcription
-            .write_cost(&weights, self.solver.program_mut());
+        let rows = match self.settings.rows {
+            RowSelection::All => self.rows.clone(),
+            RowSelection::Needed => self.rows.clone().near(&reference),
+        };
+        let (transcription, mut program) = Transcription::new(d, self.settings.horizon, rows);
+        transcription.write_cost(&weights, &mut program);
+        self.solver = QpSolver::new(program, self.settings.qp)?;
+        self.transcription = transcription;
         self.reference = Some(reference);
         self.reset();
         Ok(())
@@ -342,7 +354,7 @@ impl Controller {
                 self.plan.end_mut(stage),
             );
         }
-        command.slack = self.transcription.largest_slack(solution);
+        command.slack = self.largest_violation();
         self.memory.footing = Some(Footing {
             joints_rad: std::array::from_fn(|joint| measurement.x[joint]),
             attitude_rad: [measurement.x[15], measurement.x[16]],
@@ -357,9 +369,25 @@ impl Controller {
             Contact::Early => Status::ContactEarly,
             Contact::Late => Status::ContactLate,
             Contact::Unknown => Status::ContactUnknown,
-            Contact::AsScheduled if command.slack > SLACK_TOLERANCE => Status::Softened,
+            Contact::AsScheduled if command.slack > SOFTENED_FROM => Status::Softened,
             Contact::AsScheduled => Status::Solved,
         }
+    }
+
+    /// Largest violation of a joint limit at the ends of the plan's stages, in half ranges of the
+    /// joint, whichever rows the program has.
+    fn largest_violation(&self) -> f64 {
+        let d = self.plant.latent_dim();
+        let limits = self.plant.robot().joint_limit_rad();
+        let mut largest = 0.0_f64;
+        for stage in 0..self.settings.horizon {
+            let joints = self.plant.decode_joints(&self.plan.end(stage)[..d]);
+            for (position, &(lower, upper)) in joints.iter().zip(limits) {
+                let outside = (position - upper).max(lower - position);
+                largest = largest.max(outside / (0.5 * (upper - lower)));
+            }
+        }
+        largest
     }
 
     /// Writes a stage of the plan into the command; false if its input cannot be lifted.

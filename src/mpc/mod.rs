@@ -41,5 +41,6 @@ pub use qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, Solver
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{
     Drift, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput, MpcSettings,
+    RowSelection,
 };
 pub use sparse::SparseColumns;

@@ -37,13 +37,26 @@
 //! `u_k = u_r,k + C_p û_k` with `C_p C_pᵀ = S_p`, and each row divided by its limit: then the cost is
 //! a constant diagonal and the solver needs no scaling of its own.
 
+use nalgebra::DVector;
+
 use super::plant::Plant;
 use super::prune::needed_rows;
-use super::settings::{Lift, MpcSettings};
+use super::reference::Reference;
+use super::settings::{Lift, MpcSettings, RowSelection};
 use crate::robot::JOINT_DIM;
 
 /// Gravity, m/s², for the weight that scales rows of forces.
 const GRAVITY: f64 = 9.81;
+
+/// Distance from the reference, in its standard deviations, within which joint limits matter.
+const STATE_REACH: f64 = 4.0;
+
+/// Distance from the mean training input, in standard deviations, within which limits matter.
+const INPUT_REACH: f64 = 10.0;
+
+/// By how much the rows that are kept may let one that is left out be exceeded, relative to its
+/// limit or half range: plans may be that far off, commands are clamped and are not.
+pub(super) const ROW_MARGIN: f64 = 0.02;
 
 /// A row `row · v ≤ bound` on latent inputs or latent positions.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,21 +123,34 @@ impl BodyFriction {
 }
 
 impl StageRows {
-    /// The rows for a model on its robot; rows that no input or state can make active while the
-    /// others hold are left out.
+    /// The rows for a model on its robot.
+    ///
+    /// Unless all are asked for, two kinds are left out, once: rows that the others imply to within
+    /// 2 % of the limit, and torque rows that in no phase an input within [`INPUT_REACH`] standard
+    /// deviations of the training inputs can reach. A plan may pass a limit that was left out, by
+    /// 2 % or by asking for an input unlike any in training; the command is clamped and does not.
     pub fn new(plant: &Plant, settings: &MpcSettings) -> Self {
-        let torque = match settings.lift {
-            Lift::Transpose => needed_rows(torque_rows(plant)),
-            Lift::Consistent => Vec::new(),
+        let select = |rows: Vec<Row>| match settings.rows {
+            RowSelection::All => rows,
+            RowSelection::Needed => needed_rows(rows, ROW_MARGIN),
+        };
+        let torque = match (settings.lift, settings.rows) {
+            (Lift::Consistent, _) => Vec::new(),
+            (Lift::Transpose, RowSelection::All) => torque_rows(plant),
+            (Lift::Transpose, RowSelection::Needed) => {
+                let mut rows = torque_rows(plant);
+                rows.retain(|row| is_reachable(plant, row));
+                select(rows)
+            }
         };
         let rate = match settings.torque_rate_nm_s {
             None => Vec::new(),
-            Some(rate) => rate_rows(plant, rate * settings.step_s),
+            Some(rate) => select(both_sides(plant, |_| rate * settings.step_s)),
         };
         Self {
             torque,
-            joint: needed_rows(joint_rows(plant)),
             rate,
+            joint: select(joint_rows(plant)),
             friction: settings
                 .body_friction
                 .map(|coefficient| BodyFriction::new(plant, coefficient)),
@@ -132,15 +158,41 @@ impl StageRows {
     }
 }
 
+impl StageRows {
+    /// The same without the joint rows that no state within [`STATE_REACH`] standard deviations of
+    /// some state of the reference reaches, the deviations being the reference's own.
+    ///
+    /// Joint limits are soft and positions in commands are clamped, so what is given up is only that
+    /// a plan from far away bends around limits that its reference is nowhere near.
+    pub fn near(mut self, reference: &Reference) -> Self {
+        let deviation = reference.deviation();
+        self.joint.retain(|Row { row, bound, .. }| {
+            let spread = row
+                .iter()
+                .zip(deviation)
+                .map(|(r, d)| (r * d).powi(2))
+                .sum::<f64>()
+                .sqrt();
+            reference.farthest(row) + STATE_REACH * spread >= *bound
+        });
+        self
+    }
+}
+
+/// Whether an input within [`INPUT_REACH`] standard deviations reaches a row's bound in some phase:
+/// the farthest that such inputs go along the row is `row · m + reach ‖Cᵀ row‖`.
+fn is_reachable(plant: &Plant, row: &Row) -> bool {
+    let direction = DVector::from_column_slice(&row.row);
+    plant.phases().iter().any(|phase| {
+        let spread = phase.latent_root.tr_mul(&direction).norm();
+        direction.dot(&phase.latent_mean) + INPUT_REACH * spread >= row.bound
+    })
+}
+
 /// Both sides of every torque limit; joints that the lift does not reach have none.
 pub(super) fn torque_rows(plant: &Plant) -> Vec<Row> {
     let limits = plant.robot().torque_limit_nm();
     both_sides(plant, |joint| limits[joint])
-}
-
-/// Both sides of every rate limit, `step_nm` per stage.
-fn rate_rows(plant: &Plant, step_nm: f64) -> Vec<Row> {
-    needed_rows(both_sides(plant, |_| step_nm))
 }
 
 fn both_sides(plant: &Plant, limit: impl Fn(usize) -> f64) -> Vec<Row> {

@@ -1,60 +1,82 @@
 //! Which of many linear constraints can be active at all.
 //!
-//! A row is superfluous if no point that satisfies the other rows violates it. That is a linear
-//! program for each row: maximise `row · v` subject to the others, with the row itself relaxed so
-//! that the maximum exists.
+//! A row is superfluous if no point that satisfies the other rows violates it by more than a margin.
+//! That is a linear program for each row: maximise `row · v` subject to the others, with the row
+//! itself relaxed so that the maximum exists. The margin matters: left and right legs have nearly
+//! equal rows, of which each cuts a sliver off what the other allows.
 
 use super::problem::Row;
 use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver};
 use super::sparse::SparseColumns;
 
-/// By how much a relaxed row may be exceeded before it counts as needed, relative to its relaxation.
-const MARGIN: f64 = 1e-5;
-
-/// The rows without those that follow from the others, in the same order.
+/// The rows without those that follow from the others to within `margin`, in the same order.
 ///
-/// Rows are tried from the last to the first and leave the set at once, so of two equal rows the
-/// first stays. A row stays whenever its linear program is not solved beyond doubt.
-pub(super) fn needed_rows(rows: Vec<Row>) -> Vec<Row> {
-    let mut kept = rows;
-    for index in (0..kept.len()).rev() {
-        if is_superfluous(&kept, index) {
-            kept.remove(index);
-        }
+/// Rows are tried from the last to the first, so of two equal rows the first stays. As rows leave,
+/// earlier decisions loosen; at the end each dropped row is tried against those that stayed and
+/// comes back if they no longer imply it. A row also stays whenever its linear program is not solved
+/// beyond doubt.
+pub(super) fn needed_rows(rows: Vec<Row>, margin: f64) -> Vec<Row> {
+    let mut is_kept = vec![true; rows.len()];
+    for index in (0..rows.len()).rev() {
+        is_kept[index] = !is_implied(&rows, &is_kept, index, margin);
     }
-    kept
+    // Each round brings at least one row back, so this ends.
+    while let Some(index) = (0..rows.len())
+        .find(|&index| !is_kept[index] && !is_implied(&rows, &is_kept, index, margin))
+    {
+        is_kept[index] = true;
+    }
+    rows.into_iter()
+        .zip(is_kept)
+        .filter_map(|(row, is_kept)| is_kept.then_some(row))
+        .collect()
 }
 
-fn is_superfluous(rows: &[Row], index: usize) -> bool {
-    let relaxation = rows[index]
+/// Whether the rows kept besides `index` imply it to within `margin`.
+fn is_implied(rows: &[Row], is_kept: &[bool], index: usize, margin: f64) -> bool {
+    let size = rows[index]
         .row
         .iter()
         .map(|entry| entry.abs())
-        .fold(0.0, f64::max)
-        .max(1.0);
-    match maximum(rows, index, relaxation) {
-        Some(maximum) => maximum <= rows[index].bound + MARGIN * relaxation,
+        .fold(0.0, f64::max);
+    let relaxation = size.max(1.0) + margin;
+    let mut others: Vec<&Row> = (0..rows.len())
+        .filter(|&other| is_kept[other] && other != index)
+        .map(|other| &rows[other])
+        .collect();
+    others.push(&rows[index]);
+    match maximum(&others, relaxation) {
+        // The solver's own tolerance must not decide.
+        Some(maximum) => maximum <= rows[index].bound + margin.max(1e-6 * relaxation),
         None => false,
     }
 }
 
-/// `max row_index · v` subject to all rows, that one relaxed.
-fn maximum(rows: &[Row], index: usize, relaxation: f64) -> Option<f64> {
-    let dim = rows[index].row.len();
+/// `max row · v` for the last row subject to all rows, that one relaxed.
+fn maximum(rows: &[&Row], relaxation: f64) -> Option<f64> {
+    let last = rows.last()?;
+    let dim = last.row.len();
     let entries: Vec<(usize, usize)> = (0..rows.len())
         .flat_map(|row| (0..dim).map(move |col| (row, col)))
         .collect();
     let mut a = SparseColumns::from_pattern(rows.len(), dim, &entries);
     let mut b = Vec::with_capacity(rows.len());
-    for (row, constraint) in rows.iter().enumerate() {
+    for (number, constraint) in rows.iter().enumerate() {
         for (col, &entry) in constraint.row.iter().enumerate() {
-            a.set(row, col, entry);
+            a.set(number, col, entry);
         }
-        b.push(constraint.bound + if row == index { relaxation } else { 0.0 });
+        b.push(
+            constraint.bound
+                + if number + 1 == rows.len() {
+                    relaxation
+                } else {
+                    0.0
+                },
+        );
     }
     let program = ConeProgram {
         p: SparseColumns::from_pattern(dim, dim, &[]),
-        q: rows[index].row.iter().map(|entry| -entry).collect(),
+        q: last.row.iter().map(|entry| -entry).collect(),
         a,
         b,
         cones: vec![Cone::Nonnegative(rows.len())],
@@ -67,8 +89,7 @@ fn maximum(rows: &[Row], index: usize, relaxation: f64) -> Option<f64> {
     let mut solver = QpSolver::new(program, settings).ok()?;
     match solver.solve() {
         Outcome::Solved => Some(
-            rows[index]
-                .row
+            last.row
                 .iter()
                 .zip(solver.solution())
                 .map(|(row, value)| row * value)
@@ -106,12 +127,57 @@ mod tests {
         rows.push(row(4, &[1.0, 1.0], 2.5));
         rows.push(row(5, &[1.0, 1.0], 1.5));
         rows.push(row(6, &[0.5, 0.0], 0.5));
-        let kept: Vec<usize> = needed_rows(rows).iter().map(|row| row.joint).collect();
+        let kept: Vec<usize> = needed_rows(rows, 0.0).iter().map(|row| row.joint).collect();
         assert_eq!(kept, [0, 1, 2, 3, 5]);
     }
 
     #[test]
     fn a_single_row_is_always_needed() {
-        assert_eq!(needed_rows(vec![row(0, &[2.0, 0.0], 1.0)]).len(), 1);
+        assert_eq!(needed_rows(vec![row(0, &[2.0, 0.0], 1.0)], 0.1).len(), 1);
+    }
+
+    #[test]
+    fn nearly_equal_rows_are_told_apart_only_by_a_margin_smaller_than_their_difference() {
+        let mut rows: Vec<Row> = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]
+            .iter()
+            .enumerate()
+            .map(|(joint, entries)| row(joint, entries, 1.0))
+            .collect();
+        rows.push(row(4, &[1.0, 0.01], 1.0));
+        assert_eq!(needed_rows(rows.clone(), 1e-3).len(), 5);
+        assert_eq!(needed_rows(rows, 0.02).len(), 4);
+    }
+
+    #[test]
+    fn dropped_rows_stay_within_the_margin_of_those_that_stay() {
+        // A many-sided polygon: each side is nearly implied by its neighbours.
+        let rows: Vec<Row> = (0..60)
+            .map(|side| {
+                let angle = std::f64::consts::TAU * f64::from(side) / 60.0;
+                row(side as usize, &[angle.cos(), angle.sin()], 1.0)
+            })
+            .collect();
+        let kept = needed_rows(rows.clone(), 0.02);
+        assert!(kept.len() < 40, "{} rows", kept.len());
+        // The kept sides' corners are their farthest points.
+        let angle = |row: &Row| {
+            row.row[1]
+                .atan2(row.row[0])
+                .rem_euclid(std::f64::consts::TAU)
+        };
+        let mut angles: Vec<f64> = kept.iter().map(angle).collect();
+        angles.sort_by(f64::total_cmp);
+        angles.push(angles[0] + std::f64::consts::TAU);
+        for pair in angles.windows(2) {
+            let half = 0.5 * (pair[1] - pair[0]);
+            let corner = [
+                (pair[0] + half).cos() / half.cos(),
+                (pair[0] + half).sin() / half.cos(),
+            ];
+            for row in &rows {
+                let value = row.row[0] * corner[0] + row.row[1] * corner[1];
+                assert!(value <= 1.0 + 0.02 + 1e-5, "{value}");
+            }
+        }
     }
 }

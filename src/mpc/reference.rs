@@ -121,6 +121,15 @@ impl Reference {
         &self.deviation
     }
 
+    /// The largest `row · z` along the trajectory.
+    pub fn farthest(&self, row: &[f64]) -> f64 {
+        let products = self
+            .state
+            .chunks_exact(2 * self.latent_dim)
+            .map(|state| state.iter().zip(row).map(|(z, r)| z * r).sum::<f64>());
+        products.fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// Writes `(z, dz)` at a time into `out`.
     pub fn state_at(&self, time_s: f64, out: &mut [f64]) {
         let width = 2 * self.latent_dim;

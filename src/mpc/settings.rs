@@ -46,6 +46,15 @@ pub enum MissingInput {
     Mean,
 }
 
+/// Which constraint rows a stage carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum RowSelection {
+    /// Those that can become active, see [`StageRows::new`](super::problem::StageRows::new).
+    Needed,
+    /// All of them.
+    All,
+}
+
 /// What the controller does while it has no plan to trust.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FallbackSettings {
@@ -106,6 +115,8 @@ pub struct MpcSettings {
     pub lift_prior_weight: f64,
     /// Largest change of a lifted torque, N m/s; none leaves it free.
     pub torque_rate_nm_s: Option<f64>,
+    /// Which rows of the constraints are kept.
+    pub rows: RowSelection,
     /// The conic solver.
     pub qp: QpSettings,
     /// What happens without a plan.
@@ -129,6 +140,7 @@ impl Default for MpcSettings {
             foot_friction: 0.6,
             lift_prior_weight: 1e-3,
             torque_rate_nm_s: None,
+            rows: RowSelection::Needed,
             qp: QpSettings::default(),
             fallback: FallbackSettings::default(),
         }

@@ -13,6 +13,10 @@ use super::problem::{Row, StageRows};
 use super::qp::{Cone, ConeProgram};
 use super::sparse::SparseColumns;
 
+/// Price of a slack in the program; the whole cost is scaled to it. The solver starts with all
+/// multipliers near one and needs two iterations more if it has to bring them to 100.
+const SLACK_PRICE: f64 = 10.0;
+
 /// One stage as the transcription sees it, in latent units.
 #[derive(Debug, Clone)]
 pub struct Stage {
@@ -149,15 +153,18 @@ impl Transcription {
     /// Writes the cost, which does not change from step to step.
     pub fn write_cost(&self, weights: &Weights<'_>, program: &mut ConeProgram) {
         let d = self.latent_dim;
+        let scale = SLACK_PRICE / weights.joint_penalty;
         for stage in 0..self.horizon {
             let factor = if stage + 1 == self.horizon {
-                weights.terminal
+                scale * weights.terminal
             } else {
-                1.0
+                scale
             };
             let (input, state) = (self.input_column(stage), self.state_column(stage));
             for index in 0..d {
-                program.p.set(input + index, input + index, weights.input);
+                program
+                    .p
+                    .set(input + index, input + index, scale * weights.input);
             }
             for index in 0..2 * d {
                 program
@@ -165,7 +172,7 @@ impl Transcription {
                     .set(state + index, state + index, factor * weights.state[index]);
             }
             if self.has_slack {
-                program.q[self.slack_column(stage)] = weights.joint_penalty;
+                program.q[self.slack_column(stage)] = SLACK_PRICE;
             }
         }
     }
@@ -208,16 +215,6 @@ impl Transcription {
         {
             *out = reference + scale * value;
         }
-    }
-
-    /// Largest slack of a solution, in half ranges of a joint.
-    pub fn largest_slack(&self, solution: &[f64]) -> f64 {
-        if !self.has_slack {
-            return 0.0;
-        }
-        (0..self.horizon)
-            .map(|stage| solution[self.slack_column(stage)])
-            .fold(0.0, f64::max)
     }
 
     fn stage_width(&self) -> usize {

@@ -151,14 +151,18 @@ fn feedback_brings_the_model_back_to_the_reference_faster_than_its_own_damping()
 fn without_a_recorded_input_the_reference_is_still_tracked() {
     let model = model(Equations::Nonlinear);
     for linearisation in [Linearisation::Reference, Linearisation::LastPlan] {
-        let settings = MpcSettings {
-            input_weight: 1e-3,
-            linearisation,
-            ..MpcSettings::default()
-        };
-        let distances = closed_loop(&model, settings, false);
-        let late = distances[40..].iter().copied().fold(0.0, f64::max);
-        assert!(late < 0.2 * distances[0], "{late} of {}", distances[0]);
+        for missing_input in [MissingInput::Estimate, MissingInput::Mean] {
+            let settings = MpcSettings {
+                input_weight: 1e-3,
+                linearisation,
+                missing_input,
+                ..MpcSettings::default()
+            };
+            let distances = closed_loop(&model, settings, false);
+            let late = distances[40..].iter().copied().fold(0.0, f64::max);
+            let start = distances[0];
+            assert!(late < 0.2 * start, "{late} of {start}: {missing_input:?}");
+        }
     }
 }
 

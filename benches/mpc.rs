@@ -1,0 +1,345 @@
+//! The controller's real-time iteration against the solver as it comes, on the same problems.
+//!
+//! ```text
+//! cargo bench --bench mpc                      the table
+//! cargo bench --bench mpc -- --steps 100000    growth of memory over so many steps instead
+//! cargo bench --bench mpc -- --dump FILE       the problems as JSON lines, for other solvers
+//! ```
+//!
+//! Drives the shipped model along the recorded jumps from measurements that are off the reference,
+//! so that limits become active. Each problem is solved by the controller (linearisation, solve and
+//! lift together) and, at once, by clarabel with its default settings, set up anew. Times are those
+//! of this thread's CPU clock where the system has one.
+
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use romc::mpc::{
+    Command, ConeProgram, Controller, Lift, Measurement, MpcSettings, Outcome, QpSettings,
+    QpSolver, ReferenceSamples, RowSelection, SolverProfile,
+};
+use romc::recording::Segment;
+
+const MODEL: &str = "models/go1-d4.json";
+const RECORDINGS: [&str; 3] = ["test_01", "test_02", "test_03"];
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    let value_of = |name: &str| {
+        arguments
+            .iter()
+            .position(|argument| argument == name)
+            .and_then(|at| arguments.get(at + 1))
+    };
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let model = romc::artifact::read(&root.join(MODEL)).expect("the shipped model is sound");
+    let segments: Vec<Segment> = RECORDINGS
+        .iter()
+        .flat_map(|name| {
+            let path = root.join(format!("examples/recordings/go1/{name}.csv.gz"));
+            romc::recording::read(&path)
+                .expect("the recordings are sound")
+                .segments
+        })
+        .collect();
+    if let Some(steps) = value_of("--steps") {
+        let steps = steps.parse().expect("--steps takes a number");
+        watch_memory(&model, &segments[0], steps);
+    } else if let Some(path) = value_of("--dump") {
+        dump(&model, &segments, Path::new(path));
+    } else {
+        compare(&model, &segments);
+    }
+}
+
+/// A controller at the beginning of a segment, with the recorded input as reference.
+fn controller(
+    model: &romc::model::ReducedModel,
+    segment: &Segment,
+    settings: MpcSettings,
+) -> Controller {
+    let mut controller = Controller::new(model, settings).expect("the shipped model is complete");
+    let input = segment
+        .input(controller.plant().robot())
+        .expect("no leg is stretched");
+    controller
+        .set_reference(ReferenceSamples {
+            time_s: &segment.time_s,
+            x: segment.x.as_slice(),
+            dx: segment.dx.as_slice(),
+            u: Some(input.as_slice()),
+            feet: &segment.feet,
+        })
+        .expect("the recordings are sound");
+    controller
+}
+
+/// The recorded state, pushed forwards, down and into a pitch that change slowly.
+fn pushed(segment: &Segment, sample: usize) -> ([f64; 18], [f64; 18]) {
+    let mut x: [f64; 18] = std::array::from_fn(|i| segment.x[(i, sample)]);
+    let mut dx: [f64; 18] = std::array::from_fn(|i| segment.dx[(i, sample)]);
+    let wave = (12.0 * segment.time_s[sample]).sin();
+    x[12] += 0.1 * wave;
+    x[14] -= 0.08 * wave;
+    x[16] += 0.3 * wave;
+    dx[14] -= 1.5 * wave;
+    (x, dx)
+}
+
+fn step(controller: &mut Controller, segment: &Segment, sample: usize, command: &mut Command) {
+    let (x, dx) = pushed(segment, sample);
+    let feet = segment.feet[sample];
+    let measurement = Measurement {
+        time_s: segment.time_s[sample],
+        x: &x,
+        dx: &dx,
+        feet,
+    };
+    controller.step_into(measurement, command);
+}
+
+#[derive(Default)]
+struct Times {
+    iteration: Vec<f64>,
+    setup: Vec<f64>,
+    solve: Vec<f64>,
+    all_rows: Vec<f64>,
+}
+
+fn compare(model: &romc::model::ReducedModel, segments: &[Segment]) {
+    println!("CPU time in us, median / 99th percentile; {MODEL}, stages of 10 ms");
+    println!("iteration: linearisation, solve and lift of the controller");
+    println!("defaults: clarabel's default settings, set up anew for the same program");
+    println!("all rows: the same for the program that has every constraint row");
+    println!(
+        "{:<18}{:>16}{:>17}{:>17}{:>17}{:>8}{:>8}{:>9}",
+        "",
+        "iteration",
+        "defaults setup",
+        "defaults solve",
+        "all rows solve",
+        "ratio",
+        "ratio",
+        "at limit"
+    );
+    for (lift, horizon) in [
+        (Lift::Transpose, 10),
+        (Lift::Transpose, 20),
+        (Lift::Transpose, 50),
+        (Lift::Consistent, 20),
+    ] {
+        let settings = MpcSettings {
+            horizon,
+            lift,
+            ..MpcSettings::default()
+        };
+        let mut times = Times::default();
+        let (mut at_limit, mut steps, mut disagreements) = (0, 0, 0);
+        for segment in segments {
+            let mut ours = controller(model, segment, settings);
+            let all = MpcSettings {
+                rows: RowSelection::All,
+                ..settings
+            };
+            let mut with_all = controller(model, segment, all);
+            let mut command = Command::zeros(model.latent_dim());
+            for sample in (0..segment.len() - 5).step_by(5) {
+                step(&mut with_all, segment, sample, &mut command);
+                times
+                    .iteration
+                    .push(timed(|| step(&mut ours, segment, sample, &mut command)));
+                steps += 1;
+                at_limit += usize::from(touches_a_limit(&ours, &command));
+                let (setup, solve, cost) = by_default(ours.solver().program());
+                times.setup.push(setup);
+                times.solve.push(solve);
+                times
+                    .all_rows
+                    .push(by_default(with_all.solver().program()).1);
+                let found = cost_of(ours.solver().program(), ours.solver().solution());
+                disagreements += usize::from((found - cost).abs() > 1e-4 * cost.abs().max(1.0));
+            }
+        }
+        println!(
+            "{:<18}{:>16}{:>17}{:>17}{:>17}{:>8.3}{:>8.3}{:>8.0}%",
+            format!(
+                "{} N {horizon}",
+                if lift == Lift::Transpose {
+                    "transpose"
+                } else {
+                    "consistent"
+                }
+            ),
+            both(&times.iteration),
+            both(&times.setup),
+            both(&times.solve),
+            both(&times.all_rows),
+            median(&times.iteration) / median(&times.solve),
+            median(&times.iteration) / median(&times.all_rows),
+            100.0 * at_limit as f64 / steps as f64,
+        );
+        if disagreements > 0 {
+            println!(
+                "  costs differ from the default solver's in {disagreements} of {steps} problems"
+            );
+        }
+    }
+}
+
+/// Times of setup and solve, and the cost found, with clarabel's default settings.
+fn by_default(program: &ConeProgram) -> (f64, f64, f64) {
+    let settings = QpSettings {
+        profile: SolverProfile::AsShipped,
+        ..QpSettings::default()
+    };
+    let mut solver = None;
+    let setup = timed(|| solver = QpSolver::new(program.clone(), settings).ok());
+    let mut solver = solver.expect("the controller has built the same program");
+    let mut outcome = Outcome::NumericalFailure;
+    let solve = timed(|| outcome = solver.solve());
+    assert_eq!(outcome, Outcome::Solved);
+    (setup, solve, cost_of(program, solver.solution()))
+}
+
+fn cost_of(program: &ConeProgram, x: &[f64]) -> f64 {
+    let mut px = vec![0.0; x.len()];
+    program.p.symmetric_multiply_add(x, &mut px);
+    x.iter()
+        .zip(&px)
+        .zip(&program.q)
+        .map(|((x, px), q)| x * (0.5 * px + q))
+        .sum()
+}
+
+fn touches_a_limit(controller: &Controller, command: &Command) -> bool {
+    let limits = controller.plant().robot().torque_limit_nm();
+    command.slack > 1e-4
+        || command
+            .torque_nm
+            .iter()
+            .zip(limits)
+            .any(|(torque, limit)| torque.abs() > 0.98 * limit)
+}
+
+fn watch_memory(model: &romc::model::ReducedModel, segment: &Segment, steps: usize) {
+    let mut controller = controller(model, segment, MpcSettings::default());
+    let mut command = Command::zeros(model.latent_dim());
+    let period = segment.len() / 5 - 1;
+    let mut after_warm_up = 0;
+    for number in 0..steps {
+        if number % period == 0 {
+            controller.reset();
+        }
+        step(
+            &mut controller,
+            segment,
+            5 * (number % period),
+            &mut command,
+        );
+        if number == steps / 10 {
+            after_warm_up = resident_kib();
+        }
+    }
+    let end = resident_kib();
+    println!(
+        "resident memory after {} steps {after_warm_up} KiB, after {steps} steps {end} KiB",
+        steps / 10
+    );
+    assert!(
+        end <= after_warm_up + 64,
+        "memory grew by {} KiB",
+        end - after_warm_up
+    );
+}
+
+fn dump(model: &romc::model::ReducedModel, segments: &[Segment], path: &Path) {
+    let file = std::fs::File::create(path).expect("the file can be made");
+    let mut out = std::io::BufWriter::new(file);
+    for segment in segments {
+        let mut controller = controller(model, segment, MpcSettings::default());
+        let mut command = Command::zeros(model.latent_dim());
+        for sample in (0..segment.len() - 5).step_by(5) {
+            step(&mut controller, segment, sample, &mut command);
+            let program = controller.solver().program();
+            let equalities = program.cones.first().map_or(0, |cone| cone.dim());
+            let matrix = |matrix: &romc::mpc::SparseColumns| {
+                serde_json::json!({
+                    "shape": [matrix.n_rows(), matrix.n_cols()],
+                    "indptr": matrix.column_start(),
+                    "indices": matrix.row_index(),
+                    "data": matrix.values(),
+                })
+            };
+            let problem = serde_json::json!({
+                "P": matrix(&program.p), "q": program.q, "A": matrix(&program.a), "b": program.b,
+                "equalities": equalities, "solution": controller.solver().solution(),
+            });
+            writeln!(out, "{problem}").expect("the disk has room");
+        }
+    }
+}
+
+/// CPU time of this thread in µs spent in `work`, wall time where there is no such clock.
+fn timed(work: impl FnOnce()) -> f64 {
+    let (cpu, wall) = (cpu_ns(), Instant::now());
+    work();
+    let wall_us = wall.elapsed().as_secs_f64() * 1e6;
+    match (cpu, cpu_ns()) {
+        (Some(before), Some(after)) if after > before => (after - before) as f64 * 1e-3,
+        _ => wall_us,
+    }
+}
+
+/// Nanoseconds that this thread has run.
+#[cfg(all(target_os = "linux", target_pointer_width = "64"))]
+fn cpu_ns() -> Option<u64> {
+    #[repr(C)]
+    struct Timespec {
+        seconds: i64,
+        nanoseconds: i64,
+    }
+    unsafe extern "C" {
+        fn clock_gettime(clock: i32, time: *mut Timespec) -> i32;
+    }
+    const CLOCK_THREAD_CPUTIME_ID: i32 = 3;
+    let mut time = Timespec {
+        seconds: 0,
+        nanoseconds: 0,
+    };
+    // SAFETY: the C library's own function, with a timespec of the layout that 64-bit Linux has.
+    let result = unsafe { clock_gettime(CLOCK_THREAD_CPUTIME_ID, &mut time) };
+    (result == 0).then_some(time.seconds as u64 * 1_000_000_000 + time.nanoseconds as u64)
+}
+
+#[cfg(not(all(target_os = "linux", target_pointer_width = "64")))]
+fn cpu_ns() -> Option<u64> {
+    None
+}
+
+fn resident_kib() -> u64 {
+    let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = text.lines().find(|line| line.starts_with("VmRSS:"));
+    line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok())
+        .unwrap_or(0)
+}
+
+fn sorted(values: &[f64]) -> Vec<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted
+}
+
+fn median(values: &[f64]) -> f64 {
+    sorted(values)[values.len() / 2]
+}
+
+fn both(values: &[f64]) -> String {
+    let sorted = sorted(values);
+    let rank = (0.99 * sorted.len() as f64).ceil() as usize;
+    format!(
+        "{:.0} / {:.0}",
+        sorted[sorted.len() / 2],
+        sorted[rank.max(1) - 1]
+    )
+}
