@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::artifact::ArtifactError;
+use crate::artifact::import::ImportError;
 use crate::backend::typeset::RenameError;
 use crate::backend::{EmitError, FolderError};
 use crate::lower::LowerError;
@@ -27,6 +28,8 @@ pub enum Error {
     #[error(transparent)]
     Artifact(#[from] ArtifactError),
     #[error(transparent)]
+    Import(Box<ImportError>),
+    #[error(transparent)]
     Train(#[from] TrainError),
     #[error(transparent)]
     Emit(#[from] EmitError),
@@ -49,4 +52,10 @@ pub enum Error {
     /// The file system refused an output.
     #[error("{path}: cannot write")]
     Write { path: PathBuf, source: io::Error },
+}
+
+impl From<ImportError> for Error {
+    fn from(error: ImportError) -> Self {
+        Self::Import(Box::new(error))
+    }
 }

@@ -31,6 +31,7 @@
 mod digest;
 mod error;
 mod export;
+pub mod import;
 mod manifest;
 mod matrices;
 mod print;

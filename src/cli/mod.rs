@@ -7,6 +7,7 @@
 pub mod args;
 mod compile;
 mod demo;
+mod import;
 mod inspect;
 mod inspect_model;
 mod inspect_recording;
@@ -60,6 +61,7 @@ fn execute(command: Command) -> Result<Answer, Error> {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
+        Command::Import(arguments) => import::run(&arguments),
         Command::Compile(arguments) => compile::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Mpc(arguments) => mpc::run(&arguments),

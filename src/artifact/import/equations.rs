@@ -1,0 +1,427 @@
+//! Reads equations of the latent accelerations as text.
+//!
+//! ```text
+//! # A comment.
+//! [contact]
+//! ddz1 = 0.36 - 0.16*dz1 - 0.91*dz2
+//!        - 0.75*sin(dz1) + 0.11*u1      # continues the line before
+//! ddz2 = 0
+//! [flight]
+//! ...
+//! ```
+//!
+//! Each section is a phase; each phase has `ddz1` to `ddzd`. A text without sections is one phase,
+//! which `--phase` names. A line without `=` continues the equation before it.
+
+use super::error::ImportError;
+use crate::model::{LatentVariable, MAX_LATENT_DIM};
+use crate::symbolic::{ExprId, ExprPool, ParseError};
+
+/// Largest text.
+pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
+
+/// One section.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Section {
+    /// `None` for a text without sections.
+    pub(super) phase: Option<String>,
+    pub(super) line: usize,
+    pub(super) equations: Vec<Equation>,
+}
+
+/// The right side of one equation and where it came from.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Equation {
+    /// Latent coordinate, from 0.
+    pub(super) output: usize,
+    /// Line of the left side, from 1.
+    pub(super) line: usize,
+    /// Pieces of the right side: line, column of the first character, text.
+    pieces: Vec<(usize, usize, String)>,
+}
+
+/// A text in sections, every one with the same left sides.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Sections {
+    pub(super) latent_dim: usize,
+    pub(super) sections: Vec<Section>,
+}
+
+/// Cuts a text into sections and equations, and checks that they are complete.
+pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Sections, ImportError> {
+    let text = std::str::from_utf8(bytes).map_err(|error| {
+        let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
+        let line = before.matches('\n').count() + 1;
+        let column = before
+            .rsplit('\n')
+            .next()
+            .map_or(0, |last| last.chars().count())
+            + 1;
+        refused(
+            file,
+            line,
+            column,
+            "bytes that are no text",
+            "equations in UTF-8",
+        )
+    })?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut reader = Reader {
+        file,
+        sections: Vec::new(),
+    };
+    for (index, line) in text.lines().enumerate() {
+        let line_without_comment = line.split('#').next().unwrap_or("");
+        reader.line(index + 1, line_without_comment)?;
+    }
+    reader.finish(text.lines().count())
+}
+
+fn refused(
+    file: &str,
+    line: usize,
+    column: usize,
+    found: impl Into<String>,
+    expected: impl Into<String>,
+) -> ImportError {
+    ImportError::Text {
+        file: file.to_owned(),
+        line,
+        column,
+        found: found.into(),
+        expected: expected.into(),
+    }
+}
+
+/// The start of a text in quotes, for messages.
+fn quote(text: &str) -> String {
+    let short: String = text.chars().take(40).collect();
+    format!("`{}`", short.escape_debug())
+}
+
+struct Reader<'f> {
+    file: &'f str,
+    sections: Vec<Section>,
+}
+
+impl Reader<'_> {
+    fn line(&mut self, number: usize, line: &str) -> Result<(), ImportError> {
+        let content = line.trim();
+        let column = line.chars().take_while(|c| c.is_whitespace()).count() + 1;
+        if content.is_empty() {
+            return Ok(());
+        }
+        if content.starts_with('[') {
+            return self.header(number, column, content);
+        }
+        if let Some((left, right)) = content.split_once('=') {
+            let start = column + left.chars().count() + 1;
+            return self.equation(number, column, left.trim(), start, right);
+        }
+        let open = self
+            .sections
+            .last_mut()
+            .and_then(|section| section.equations.last_mut());
+        match open {
+            Some(equation) => {
+                equation.pieces.push((number, column, content.to_owned()));
+                Ok(())
+            }
+            None => Err(refused(
+                self.file,
+                number,
+                column,
+                quote(content),
+                "a phase such as `[contact]` or an equation such as `ddz1 = 0.5*z1 + u1`",
+            )),
+        }
+    }
+
+    fn header(&mut self, number: usize, column: usize, content: &str) -> Result<(), ImportError> {
+        let name = content
+            .strip_prefix('[')
+            .and_then(|rest| rest.strip_suffix(']'));
+        let name = name.map(str::trim).filter(|name| !name.is_empty());
+        let Some(name) = name else {
+            let expected = "the name of a phase in brackets, such as `[contact]`";
+            return Err(refused(self.file, number, column, quote(content), expected));
+        };
+        let twice = |section: &Section| section.phase.as_deref() == Some(name);
+        if let Some(earlier) = self.sections.iter().find(|section| twice(section)) {
+            let found = format!("`[{name}]` again, as in line {}", earlier.line);
+            return Err(refused(self.file, number, column, found, "each phase once"));
+        }
+        if let Some(first) = self
+            .sections
+            .first()
+            .filter(|section| section.phase.is_none())
+        {
+            let expected = "the name of its phase in brackets before the first equation";
+            return Err(refused(self.file, first.line, 1, "an equation", expected));
+        }
+        self.sections.push(Section {
+            phase: Some(name.to_owned()),
+            line: number,
+            equations: Vec::new(),
+        });
+        Ok(())
+    }
+
+    fn equation(
+        &mut self,
+        number: usize,
+        column: usize,
+        left: &str,
+        start: usize,
+        right: &str,
+    ) -> Result<(), ImportError> {
+        let output = (left.strip_prefix('d'))
+            .and_then(|name| LatentVariable::from_name(name, MAX_LATENT_DIM))
+            .and_then(|variable| match variable {
+                LatentVariable::Dz(index) => Some(index),
+                LatentVariable::Z(_) | LatentVariable::U(_) => None,
+            });
+        let Some(output) = output else {
+            let expected = format!("the left side `ddz1` to `ddz{MAX_LATENT_DIM}`");
+            return Err(refused(self.file, number, column, quote(left), expected));
+        };
+        if self.sections.is_empty() {
+            self.sections.push(Section {
+                phase: None,
+                line: number,
+                equations: Vec::new(),
+            });
+        }
+        let section = self
+            .sections
+            .last_mut()
+            .expect("one was just made if there was none");
+        if let Some(earlier) = section
+            .equations
+            .iter()
+            .find(|other| other.output == output)
+        {
+            let found = format!("`{left}` again, as in line {}", earlier.line);
+            let expected = "each left side once a phase";
+            return Err(refused(self.file, number, column, found, expected));
+        }
+        section.equations.push(Equation {
+            output,
+            line: number,
+            pieces: vec![(number, start, right.to_owned())],
+        });
+        Ok(())
+    }
+
+    fn finish(mut self, lines: usize) -> Result<Sections, ImportError> {
+        let outputs = self.sections.iter().flat_map(|section| &section.equations);
+        let Some(last) = outputs.map(|equation| equation.output).max() else {
+            let expected = "equations such as `ddz1 = 0.5*z1 + u1`";
+            return Err(refused(
+                self.file,
+                lines.max(1),
+                1,
+                "the end of the text",
+                expected,
+            ));
+        };
+        let latent_dim = last + 1;
+        for section in &mut self.sections {
+            section.equations.sort_by_key(|equation| equation.output);
+            let complete = |output: &usize| {
+                let mut equations = section.equations.iter();
+                !equations.any(|equation| equation.output == *output)
+            };
+            if let Some(output) = (0..latent_dim).find(complete) {
+                let phase = match &section.phase {
+                    Some(phase) => format!("phase `[{phase}]`"),
+                    None => "equations".to_owned(),
+                };
+                let found = format!("{phase} without ddz{}", output + 1);
+                let expected = format!("ddz1 to ddz{latent_dim} (`ddz{} = 0` if none)", output + 1);
+                return Err(refused(self.file, section.line, 1, found, expected));
+            }
+        }
+        Ok(Sections {
+            latent_dim,
+            sections: self.sections,
+        })
+    }
+}
+
+impl Equation {
+    /// Builds the right side in a pool.
+    pub(super) fn parse(
+        &self,
+        file: &str,
+        latent_dim: usize,
+        pool: &mut ExprPool,
+    ) -> Result<ExprId, ImportError> {
+        let texts: Vec<&str> = self
+            .pieces
+            .iter()
+            .map(|(_, _, text)| text.as_str())
+            .collect();
+        let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
+        pool.parse(&texts.join("\n"), &known)
+            .map_err(|error| self.parse_error(file, latent_dim, error))
+    }
+
+    /// Line and column of a character of the right side, counted from 1 over all pieces.
+    fn place(&self, position: usize) -> (usize, usize) {
+        let mut rest = position.saturating_sub(1);
+        let mut place = (self.line, 1);
+        for (line, column, text) in &self.pieces {
+            let length = text.chars().count();
+            place = (*line, column + rest.min(length));
+            if rest <= length {
+                break;
+            }
+            // The line break between two pieces counts as well.
+            rest -= length + 1;
+        }
+        place
+    }
+
+    fn parse_error(&self, file: &str, latent_dim: usize, error: ParseError) -> ImportError {
+        let (position, found, expected) = match error {
+            ParseError::Character { position, found } => (
+                position,
+                format!("`{}`", found.escape_debug()),
+                "numbers, names, functions and + - * / ^ ( )".to_owned(),
+            ),
+            ParseError::Number { position, found } => {
+                (position, quote(&found), "a finite number".to_owned())
+            }
+            ParseError::Unexpected {
+                position,
+                found,
+                expected,
+            } => (position, found, expected.to_owned()),
+            ParseError::UnknownName { position, found } => (
+                position,
+                quote(&found),
+                match latent_dim {
+                    1 => "z1, dz1 or u1".to_owned(),
+                    d => format!("z1 to z{d}, dz1 to dz{d} or u1 to u{d}"),
+                },
+            ),
+            ParseError::UnknownFunction { position, found } => (
+                position,
+                quote(&found),
+                "sin, cos, tan, tanh, exp, log, sqrt, abs or sign".to_owned(),
+            ),
+            ParseError::TooLong { found, limit } => (
+                1,
+                format!("an equation of {found} bytes"),
+                format!("at most {limit}"),
+            ),
+            ParseError::TooDeep { position, limit } => (
+                position,
+                "too many open parentheses and exponents".to_owned(),
+                format!("at most {limit}"),
+            ),
+            ParseError::Exponent {
+                position,
+                found,
+                limit,
+            } => (
+                position,
+                format!("the exponent {found}"),
+                format!("at most {limit}"),
+            ),
+        };
+        let (line, column) = self.place(position);
+        refused(file, line, column, found, expected)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(text: &str) -> (usize, usize, String, String) {
+        let parsed = read("eq.txt", text.as_bytes()).and_then(|sections| {
+            let mut pool = ExprPool::new();
+            for section in &sections.sections {
+                for equation in &section.equations {
+                    equation.parse("eq.txt", sections.latent_dim, &mut pool)?;
+                }
+            }
+            Ok(())
+        });
+        match parsed.expect_err(text) {
+            ImportError::Text {
+                line,
+                column,
+                found,
+                expected,
+                ..
+            } => (line, column, found, expected),
+            other => panic!("{other}"),
+        }
+    }
+
+    #[test]
+    fn sections_and_continued_lines_are_read() {
+        let text = "# made by hand\r\n[contact]\r\nddz2 = z1\nddz1 = 1 -\n   dz2 # more\n[ flight ]\n\
+                    ddz1 = 0\nddz2=u1\n";
+        let sections = read("eq.txt", text.as_bytes()).expect("two phases");
+        assert_eq!(sections.latent_dim, 2);
+        let names: Vec<_> = sections
+            .sections
+            .iter()
+            .map(|s| s.phase.as_deref())
+            .collect();
+        assert_eq!(names, [Some("contact"), Some("flight")]);
+        let mut pool = ExprPool::new();
+        let first = &sections.sections[0].equations[0];
+        assert_eq!((first.output, first.line), (0, 4));
+        let expr = first.parse("eq.txt", 2, &mut pool).expect("an expression");
+        assert_eq!(pool.display(expr).to_string(), "1 - dz2");
+    }
+
+    #[test]
+    fn faults_are_told_with_line_and_column() {
+        for (text, line, column, found) in [
+            ("", 1, 1, "the end of the text"),
+            ("z1 + 2", 1, 1, "`z1 + 2`"),
+            ("ddz1 = z1 + z2", 1, 13, "`z2`"),
+            ("  dz1 = z1", 1, 3, "`dz1`"),
+            ("ddz1 = z1 +\n   é*z1", 2, 4, "`é`"),
+            ("ddz1 = sin z1", 1, 12, "`z1`"),
+            ("ddz1 = sinh(z1)", 1, 8, "`sinh`"),
+            ("ddz1 = z1 +", 1, 12, "end of text"),
+            ("ddz1 = z1\n + \n", 2, 3, "end of text"),
+            ("ddz1 = 1e999", 1, 8, "`1e999`"),
+            ("[contact\nddz1 = 1", 1, 1, "`[contact`"),
+            ("[]\nddz1 = 1", 1, 1, "`[]`"),
+            ("[a]\nddz1 = 1\n[a]", 3, 1, "`[a]` again, as in line 1"),
+            ("ddz1 = 1\n[a]\nddz1 = 1", 1, 1, "an equation"),
+            ("ddz1 = 1\nddz1 = 2", 2, 1, "`ddz1` again, as in line 1"),
+            ("[a]\nddz2 = 1", 1, 1, "phase `[a]` without ddz1"),
+            ("[a]\nddz1 = 1\n[b]\n", 3, 1, "phase `[b]` without ddz1"),
+            ("ddz1 = z1^2000", 1, 15, "the exponent 2000"),
+        ] {
+            let (at_line, at_column, what, _) = refusal(text);
+            assert_eq!(
+                (at_line, at_column, what.as_str()),
+                (line, column, found),
+                "{text}"
+            );
+        }
+        let bytes = b"ddz1 = 1\nddz2 = \xff";
+        let error = read("eq.txt", bytes).expect_err("no UTF-8");
+        assert!(
+            matches!(
+                error,
+                ImportError::Text {
+                    line: 2,
+                    column: 8,
+                    ..
+                }
+            ),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,226 @@
+//! The candidate terms of imported coefficients, and the order in which a file has them.
+
+use std::fs;
+use std::path::Path;
+
+use nalgebra::DMatrix;
+
+use super::error::ImportError;
+use super::options::{LibraryChoice, LibraryOrder, standard_text};
+use crate::model::{Library, LibraryError, StandardLibrary};
+
+/// Largest file with a list of terms.
+const MAX_TERMS_BYTES: u64 = 32 << 20;
+
+/// Number of terms that a choice has at a latent dimension.
+pub(super) fn dim(choice: &LibraryChoice, latent_dim: usize) -> Option<usize> {
+    match choice {
+        LibraryChoice::Standard(standard, _) => standard.term_count(latent_dim),
+        LibraryChoice::Terms(terms) => Some(terms.len()),
+    }
+}
+
+/// The library at a latent dimension.
+pub(super) fn build(choice: &LibraryChoice, latent_dim: usize) -> Result<Library, LibraryError> {
+    match choice {
+        LibraryChoice::Standard(standard, _) => Library::standard(latent_dim, *standard),
+        LibraryChoice::Terms(terms) => Library::from_terms(latent_dim, terms),
+    }
+}
+
+/// In words for messages: `15 terms (degree=1,trigonometric,inputs)`.
+pub(super) fn describe(choice: &LibraryChoice) -> String {
+    match choice {
+        LibraryChoice::Standard(standard, _) => standard_text(*standard),
+        LibraryChoice::Terms(terms) => format!("a list of {} terms", terms.len()),
+    }
+}
+
+/// The shorthands that have this many terms.
+pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String> {
+    let mut texts = Vec::new();
+    for degree in 0..=3 {
+        for (trigonometric, inputs) in [(true, true), (true, false), (false, true), (false, false)]
+        {
+            let standard = StandardLibrary {
+                degree,
+                trigonometric,
+                inputs,
+            };
+            if standard.term_count(latent_dim) == Some(term_count) {
+                texts.push(standard_text(standard));
+            }
+        }
+    }
+    texts
+}
+
+/// Puts the rows of Xi from the file's order into the model file's; the flag says whether any moved.
+pub(super) fn reorder(
+    choice: &LibraryChoice,
+    latent_dim: usize,
+    xi: DMatrix<f64>,
+) -> (DMatrix<f64>, bool) {
+    let LibraryChoice::Standard(standard, LibraryOrder::Paper) = choice else {
+        return (xi, false);
+    };
+    if !standard.trigonometric {
+        return (xi, false);
+    }
+    let inputs = if standard.inputs { latent_dim } else { 0 };
+    let sines = xi.nrows() - inputs - 4 * latent_dim;
+    let block = |row: usize| (row - sines) / latent_dim;
+    let in_file = |row: usize| match row.checked_sub(sines).map(|_| block(row)) {
+        // The model file has sin z, sin dz, cos z, cos dz; the file sin z, cos z, sin dz, cos dz.
+        Some(1) => row + latent_dim,
+        Some(2) => row - latent_dim,
+        _ => row,
+    };
+    let reordered = DMatrix::from_fn(xi.nrows(), xi.ncols(), |row, column| {
+        xi[(in_file(row), column)]
+    });
+    (reordered, true)
+}
+
+/// Reads a list of terms: a JSON list of texts, a JSON object with such a list under `library`, or
+/// one term a line (`#` starts a comment).
+///
+/// # Errors
+/// [`ImportError::Io`], [`ImportError::TooLarge`], [`ImportError::Text`].
+pub fn read_terms(path: &Path) -> Result<Vec<String>, ImportError> {
+    let io = |source| ImportError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let file = path.display().to_string();
+    if fs::metadata(path).map_err(io)?.len() > MAX_TERMS_BYTES {
+        return Err(ImportError::TooLarge {
+            file,
+            what: "the file".to_owned(),
+            max: MAX_TERMS_BYTES,
+            unit: "bytes",
+        });
+    }
+    let bytes = fs::read(path).map_err(io)?;
+    parse_terms(&file, &String::from_utf8_lossy(&bytes))
+}
+
+fn parse_terms(file: &str, text: &str) -> Result<Vec<String>, ImportError> {
+    let text = text.trim_start_matches('\u{feff}');
+    let refused = |line, column, found: String, expected: &str| ImportError::Text {
+        file: file.to_owned(),
+        line,
+        column,
+        found,
+        expected: expected.to_owned(),
+    };
+    if !text.trim_start().starts_with(['[', '{']) {
+        let lines = text
+            .lines()
+            .map(|line| line.split('#').next().unwrap_or(""));
+        let terms: Vec<String> = lines
+            .map(|line| line.trim().to_owned())
+            .filter(|line| !line.is_empty())
+            .collect();
+        return if terms.is_empty() {
+            Err(refused(1, 1, "no term".to_owned(), "one term a line"))
+        } else {
+            Ok(terms)
+        };
+    }
+    let value: serde_json::Value = serde_json::from_str(text).map_err(|error| {
+        refused(
+            error.line(),
+            error.column(),
+            "no JSON".to_owned(),
+            "a list of terms such as [\"1\", \"z1\", \"sin(z1)\"]",
+        )
+    })?;
+    let list = value.get("library").unwrap_or(&value);
+    let expected = "a list of terms, or an object with such a list under `library`";
+    let list = (list.as_array()).ok_or_else(|| refused(1, 1, kind_of(list), expected))?;
+    let texts = list.iter().enumerate().map(|(index, term)| {
+        let found = || {
+            refused(
+                1,
+                1,
+                format!("{} at [{index}]", kind_of(term)),
+                "a term as text",
+            )
+        };
+        term.as_str().map(str::to_owned).ok_or_else(found)
+    });
+    texts.collect()
+}
+
+fn kind_of(value: &serde_json::Value) -> String {
+    match value {
+        serde_json::Value::Null => "null",
+        serde_json::Value::Bool(_) => "true or false",
+        serde_json::Value::Number(_) => "a number",
+        serde_json::Value::String(_) => "a text",
+        serde_json::Value::Array(_) => "a list",
+        serde_json::Value::Object(_) => "an object",
+    }
+    .to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_in_the_order_of_the_paper_are_put_into_that_of_the_model_file() {
+        let standard = StandardLibrary {
+            degree: 2,
+            trigonometric: true,
+            inputs: true,
+        };
+        let library = Library::standard(2, standard).expect("a small library");
+        let paper: Vec<String> = [
+            "1 z1 z2 dz1 dz2 z1^2 z1*z2 z1*dz1 z1*dz2 z2^2 z2*dz1 z2*dz2 dz1^2 dz1*dz2 dz2^2",
+            "sin(z1) sin(z2) cos(z1) cos(z2) sin(dz1) sin(dz2) cos(dz1) cos(dz2) u1 u2",
+        ]
+        .iter()
+        .flat_map(|line| line.split(' ').map(str::to_owned))
+        .collect();
+        let xi = DMatrix::from_fn(paper.len(), 2, |row, column| (10 * row + column) as f64);
+        let choice = LibraryChoice::Standard(standard, LibraryOrder::Paper);
+        let (reordered, moved) = reorder(&choice, 2, xi.clone());
+        assert!(moved);
+        for (row, term) in library.terms().iter().enumerate() {
+            let in_file = paper.iter().position(|text| text == term.text());
+            let in_file = in_file.expect("the same terms");
+            assert_eq!(reordered.row(row), xi.row(in_file), "{}", term.text());
+        }
+        let author = LibraryChoice::Standard(standard, LibraryOrder::Author);
+        assert_eq!(reorder(&author, 2, xi.clone()), (xi, false));
+    }
+
+    #[test]
+    fn terms_are_read_from_lines_and_from_json() {
+        let expected = ["1", "z1", "sin(dz1)"];
+        for text in [
+            "1\n z1 # position\n\nsin(dz1)\n",
+            "[\"1\", \"z1\", \"sin(dz1)\"]",
+            "{ \"library\": [\"1\", \"z1\", \"sin(dz1)\"], \"phases\": {} }",
+        ] {
+            assert_eq!(parse_terms("terms", text).expect(text), expected);
+        }
+        for text in ["", "# only a comment", "[1]", "{}", "[\"1\",", "[[\"1\"]]"] {
+            assert!(
+                matches!(parse_terms("terms", text), Err(ImportError::Text { .. })),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn shorthands_are_suggested_by_their_number_of_terms() {
+        assert_eq!(
+            standards_with(15, 2),
+            ["degree=1,trigonometric,inputs", "degree=2"]
+        );
+        assert!(standards_with(16, 2).is_empty());
+    }
+}

@@ -1,0 +1,330 @@
+//! What the user says about a foreign file: everything that tensors do not carry.
+
+use std::path::Path;
+use std::str::FromStr;
+
+use serde::Serialize;
+
+use super::error::ImportError;
+use super::role::Mapping;
+use crate::model::{FeetRule, Scaling, StandardLibrary};
+use crate::robot::{ContactFlags, FOOT_DIM, Robot};
+
+/// The kinds of files that can be imported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Format {
+    /// Tensors in a safetensors file, such as a PyTorch state dict.
+    Safetensors,
+    /// NumPy arrays in an `.npz` file.
+    Npz,
+    /// Equations of the latent accelerations as text.
+    Equations,
+}
+
+impl Format {
+    /// The kind that a file's ending tells.
+    ///
+    /// # Errors
+    /// [`ImportError::UnknownFormat`], which says how to convert files of known other kinds.
+    pub fn of_path(path: &Path) -> Result<Self, ImportError> {
+        let ending = path
+            .extension()
+            .map(|ending| ending.to_string_lossy().to_lowercase());
+        let expected = match ending.as_deref() {
+            Some("safetensors") => return Ok(Format::Safetensors),
+            Some("npz") => return Ok(Format::Npz),
+            Some("txt" | "eq" | "equations") => return Ok(Format::Equations),
+            Some("pt" | "pth" | "ckpt" | "bin") => {
+                "a safetensors file: in Python, safetensors.torch.save_file(model.state_dict(), \
+                 \"model.safetensors\")"
+            }
+            Some("npy") => {
+                "an .npz file with all arrays: in Python, numpy.savez(\"model.npz\", ...)"
+            }
+            Some("h5" | "hdf5" | "keras" | "pb") => {
+                "an .npz file: in Python, numpy.savez(\"model.npz\", **{v.name: v.numpy() for v in \
+                 model.variables})"
+            }
+            Some("pkl" | "pickle" | "joblib") => {
+                "an .npz file: examples/pysindy/export_pysindy.py writes one from a fitted PySINDy \
+                 model"
+            }
+            Some(_) | None => {
+                "a file that ends in .safetensors, .npz or .txt (equations), or --format to say \
+                 what it is"
+            }
+        };
+        Err(ImportError::UnknownFormat {
+            file: path.display().to_string(),
+            found: match ending {
+                Some(ending) => format!("the ending `.{ending}`"),
+                None => "no ending".to_owned(),
+            },
+            expected,
+        })
+    }
+
+    /// Name for messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Safetensors => "safetensors",
+            Format::Npz => "npz",
+            Format::Equations => "equations",
+        }
+    }
+}
+
+/// How a file stores the weights of a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WeightVectors {
+    /// For row vectors, `z = x W` (TensorFlow, Keras): transposed on import.
+    Row,
+    /// For column vectors, `z = W x` (`torch.nn.Linear`): as in the model file.
+    Column,
+}
+
+/// How a file stores coefficients.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum XiLayout {
+    /// One row a candidate term, as in the model file.
+    TermsByLatent,
+    /// One row a latent coordinate (PySINDy): transposed on import.
+    LatentByTerms,
+}
+
+/// The candidate terms that the rows of Xi belong to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LibraryChoice {
+    /// The shorthand, and the order in which the file has its terms.
+    Standard(StandardLibrary, LibraryOrder),
+    /// A list of terms in the file's order.
+    Terms(Vec<String>),
+}
+
+/// In which order a file has the terms of the standard library.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LibraryOrder {
+    /// As in the published arrays: sin z, sin dz, cos z, cos dz.
+    #[default]
+    Author,
+    /// As appendix B of the paper lists them: sin z, cos z, sin dz, cos dz.
+    Paper,
+}
+
+/// Reads `degree=2,trigonometric,inputs`.
+///
+/// # Errors
+/// [`ImportError::Option`].
+pub fn parse_standard(text: &str) -> Result<StandardLibrary, ImportError> {
+    let refused = |part: &str| ImportError::Option {
+        option: "--library",
+        found: format!("{part:?}"),
+        expected: "degree=N, then trigonometric and inputs if the library has them, separated by \
+                   commas; or a file with the list of terms"
+            .to_owned(),
+    };
+    let mut degree = None;
+    let (mut trigonometric, mut inputs) = (false, false);
+    for part in text.split(',').map(str::trim) {
+        match part.split_once('=') {
+            Some(("degree", number)) if degree.is_none() => {
+                degree = Some(number.parse().map_err(|_| refused(part))?);
+            }
+            None if part == "trigonometric" && !trigonometric => trigonometric = true,
+            None if part == "inputs" && !inputs => inputs = true,
+            Some(_) | None => return Err(refused(part)),
+        }
+    }
+    Ok(StandardLibrary {
+        degree: degree.ok_or_else(|| refused(text))?,
+        trigonometric,
+        inputs,
+    })
+}
+
+/// The shorthand as [`parse_standard`] reads it.
+pub(super) fn standard_text(standard: StandardLibrary) -> String {
+    let mut text = format!("degree={}", standard.degree);
+    if standard.trigonometric {
+        text.push_str(",trigonometric");
+    }
+    if standard.inputs {
+        text.push_str(",inputs");
+    }
+    text
+}
+
+/// `--phase NAME=FEET`: a phase and the foot patterns that select it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PhaseRule {
+    /// Name of the phase.
+    pub name: String,
+    /// When it holds.
+    pub feet: FeetRule,
+}
+
+impl FromStr for PhaseRule {
+    type Err = ImportError;
+
+    fn from_str(text: &str) -> Result<Self, ImportError> {
+        let refused = || ImportError::Option {
+            option: "--phase",
+            found: format!("{text:?}"),
+            expected: "NAME=any, NAME=none, or NAME= and foot patterns in the order fr fl rr rl, \
+                       such as rear=0011,0001"
+                .to_owned(),
+        };
+        let (name, feet) = text.split_once('=').ok_or_else(refused)?;
+        let feet = match feet.trim() {
+            "any" => FeetRule::Any,
+            "none" => FeetRule::None,
+            patterns => FeetRule::Patterns(
+                (patterns.split(','))
+                    .map(|pattern| parse_pattern(pattern.trim()).ok_or_else(refused))
+                    .collect::<Result<_, _>>()?,
+            ),
+        };
+        let name = name.trim().to_owned();
+        if name.is_empty() {
+            return Err(refused());
+        }
+        Ok(PhaseRule { name, feet })
+    }
+}
+
+fn parse_pattern(text: &str) -> Option<ContactFlags> {
+    let flags: Option<Vec<bool>> = (text.chars())
+        .map(|c| match c {
+            '0' => Some(false),
+            '1' => Some(true),
+            _ => None,
+        })
+        .collect();
+    let flags: [bool; FOOT_DIM] = flags?.try_into().ok()?;
+    Some(flags)
+}
+
+/// A foot rule as [`PhaseRule`] reads it.
+pub(super) fn feet_text(feet: &FeetRule) -> String {
+    match feet {
+        FeetRule::Any => "any".to_owned(),
+        FeetRule::None => "none".to_owned(),
+        FeetRule::Patterns(patterns) => {
+            let text = |pattern: &ContactFlags| pattern.map(|down| if down { "1" } else { "0" });
+            let texts: Vec<String> = patterns.iter().map(|p| text(p).concat()).collect();
+            texts.join(",")
+        }
+    }
+}
+
+/// Everything that is said about a file; only the name is always needed.
+#[derive(Clone, Debug, Default)]
+pub struct ImportOptions {
+    /// Name of the model.
+    pub name: String,
+    /// Free text about it.
+    pub description: String,
+    /// The kind of file, if its ending does not tell.
+    pub format: Option<Format>,
+    /// Tensors by name; those not mentioned are found by their usual names.
+    pub mapping: Vec<Mapping>,
+    /// How weights are stored, if their shape does not tell or is to be checked.
+    pub weights: Option<WeightVectors>,
+    /// How coefficients are stored, if their shape does not tell or is to be checked.
+    pub xi_layout: Option<XiLayout>,
+    /// The candidate terms; equations bring their own.
+    pub library: Option<LibraryChoice>,
+    /// Number of latent coordinates, if shapes do not tell or is to be checked.
+    pub latent_dim: Option<usize>,
+    /// The phases in the order in which they are tried; `contact` and `flight` are known.
+    pub phases: Vec<PhaseRule>,
+    /// Scale factors; needed with an encoder or decoder.
+    pub scaling: Option<Scaling>,
+    /// The robot whose 18 coordinates the encoder takes.
+    pub robot: Option<&'static Robot>,
+    /// Sampling period of the training recordings, s.
+    pub sample_time_s: Option<f64>,
+}
+
+impl ImportOptions {
+    /// The rule of a phase: as given, or for `contact` and `flight` as usual.
+    pub(super) fn feet_of(&self, phase: &str) -> Option<FeetRule> {
+        let given = self.phases.iter().find(|rule| rule.name == phase);
+        match (given, phase) {
+            (Some(rule), _) => Some(rule.feet.clone()),
+            (None, _) if !self.phases.is_empty() => None,
+            (None, "contact") => Some(FeetRule::Any),
+            (None, "flight") => Some(FeetRule::None),
+            (None, _) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shorthand_reads_back_from_its_text() {
+        for degree in 0..4 {
+            for (trigonometric, inputs) in
+                [(false, false), (true, false), (false, true), (true, true)]
+            {
+                let standard = StandardLibrary {
+                    degree,
+                    trigonometric,
+                    inputs,
+                };
+                assert_eq!(
+                    parse_standard(&standard_text(standard)).expect("own text"),
+                    standard
+                );
+            }
+        }
+        for text in [
+            "",
+            "inputs",
+            "degree=1,degree=2",
+            "degree=-1",
+            "degree=1,cosines",
+        ] {
+            assert!(parse_standard(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn phase_rule_reads_back_from_its_text() {
+        let rear: PhaseRule = "rear=0011, 0001".parse().expect("two patterns");
+        assert_eq!(feet_text(&rear.feet), "0011,0001");
+        let contact: PhaseRule = "contact=any".parse().expect("a rule");
+        assert_eq!(contact.feet, FeetRule::Any);
+        for text in [
+            "",
+            "contact",
+            "=any",
+            "rear=",
+            "rear=001",
+            "rear=00112",
+            "rear=002x",
+        ] {
+            assert!(text.parse::<PhaseRule>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn format_of_other_files_says_how_to_convert_them() {
+        assert_eq!(
+            Format::of_path(Path::new("a/NET.SafeTensors")).expect("known"),
+            Format::Safetensors
+        );
+        for (name, hint) in [
+            ("net.pth", "save_file"),
+            ("net.h5", "savez"),
+            ("net", "--format"),
+        ] {
+            let error = Format::of_path(Path::new(name)).expect_err("another kind");
+            assert!(error.to_string().contains(hint), "{error}");
+        }
+    }
+}

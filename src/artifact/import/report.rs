@@ -1,0 +1,175 @@
+//! What an import did: which tensors it took for what, how it turned them, what it left.
+
+use std::fmt;
+
+use serde::{Serialize, Serializer};
+
+use super::options::Format;
+
+/// Everything that was decided on the way from a foreign file to a model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ImportReport {
+    /// The file.
+    pub file: String,
+    /// Its kind.
+    pub format: Format,
+    /// Number of latent coordinates.
+    pub latent_dim: usize,
+    /// Number of robot coordinates, if there is an encoder or decoder.
+    pub state_dim: Option<usize>,
+    /// Number of candidate terms.
+    pub library_dim: usize,
+    /// Tensors that became part of the model.
+    pub used: Vec<UsedTensor>,
+    /// Tensors that did not.
+    pub unused: Vec<UnusedTensor>,
+    /// Equations that became part of the model.
+    pub equations: Vec<ReadEquation>,
+    /// What else the user should know.
+    pub notes: Vec<Note>,
+}
+
+/// A tensor that became part of the model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct UsedTensor {
+    /// What it is used as, such as `encoder.weight`.
+    pub role: String,
+    /// Its name in the file.
+    pub tensor: String,
+    /// Its shape in the file.
+    pub shape: Vec<usize>,
+    /// Type of its numbers.
+    pub element: String,
+    /// Who said so.
+    pub chosen: Chosen,
+    /// How it was stored.
+    pub layout: Layout,
+}
+
+/// Who decided what a tensor is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Chosen {
+    /// `--map`.
+    Mapped,
+    /// Its name.
+    Guessed,
+}
+
+/// How a tensor was stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layout {
+    /// Weights for column vectors.
+    Column,
+    /// Weights for row vectors.
+    Row,
+    /// Coefficients, one row a term.
+    TermsByLatent,
+    /// Coefficients, one row a latent coordinate.
+    LatentByTerms,
+    /// A list of numbers, or a matrix that is the same both ways.
+    Plain,
+}
+
+impl fmt::Display for Layout {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Layout::Column => "column vectors (W x), as in the model file",
+            Layout::Row => "row vectors (x W), transposed",
+            Layout::TermsByLatent => "a row a term, as in the model file",
+            Layout::LatentByTerms => "a row a latent coordinate, transposed",
+            Layout::Plain => "as stored",
+        })
+    }
+}
+
+/// A tensor that the model has no use for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct UnusedTensor {
+    /// Its name in the file.
+    pub tensor: String,
+    /// Its shape in the file.
+    pub shape: Vec<usize>,
+}
+
+/// An equation that became a column of Xi.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ReadEquation {
+    /// Its phase.
+    pub phase: String,
+    /// Its left side, such as `ddz1`.
+    pub output: String,
+    /// Line of its start, from 1.
+    pub line: usize,
+    /// Number of its terms.
+    pub terms: usize,
+}
+
+/// A decision that a user may want to know of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Note {
+    /// A phase got the usual rule for its name.
+    UsualFeet {
+        /// The phase.
+        phase: String,
+        /// Its rule.
+        feet: String,
+    },
+    /// A map came without bias.
+    ZeroBias {
+        /// `encoder` or `decoder`.
+        part: &'static str,
+    },
+    /// There is no encoder, or no decoder.
+    NoMap {
+        /// `encoder` or `decoder`.
+        part: &'static str,
+    },
+    /// Encoder and decoder are stored in different ways.
+    MixedWeights,
+    /// Rows of Xi were put into the order of the published arrays.
+    PaperOrder,
+    /// A mask switched coefficients off.
+    Masked {
+        /// The phase.
+        phase: String,
+        /// How many coefficients became zero.
+        count: usize,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Note::UsualFeet { phase, feet } => {
+                write!(f, "phase {phase} holds for feet `{feet}`, as its name says")
+            }
+            Note::ZeroBias { part } => write!(f, "the {part} has no bias: zero"),
+            Note::NoMap { part: "encoder" } => {
+                f.write_str("no encoder: the model says nothing about a robot's coordinates")
+            }
+            Note::NoMap { part } => write!(f, "no {part}: latent states cannot be mapped back"),
+            Note::MixedWeights => f.write_str(
+                "encoder and decoder are stored in different ways, one for row and one for column \
+                 vectors",
+            ),
+            Note::PaperOrder => f.write_str(
+                "rows of Xi were put from the order of appendix B (sin z, cos z, sin dz, cos dz) \
+                 into that of the model file (sin z, sin dz, cos z, cos dz)",
+            ),
+            Note::Masked { phase, count } => {
+                write!(
+                    f,
+                    "the mask of phase {phase} switched {count} coefficients off"
+                )
+            }
+        }
+    }
+}
+
+impl Serialize for Note {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}

@@ -1,0 +1,194 @@
+//! Separates equations into candidate terms and their coefficients.
+//!
+//! A coefficient is the number in front of a term, bit for bit as it is written; sums inside a
+//! product with a number are multiplied out (`2*(0.5*z1 - u1)` is `z1 - 2*u1`), products of sums
+//! stay one term (`z1*(1 + dz1)`).
+
+use std::collections::HashMap;
+
+use crate::model::LatentVariable;
+use crate::symbolic::{ExprId, ExprPool, Function, Node, Number};
+
+/// Coefficients of one equation by term.
+pub(super) type Coefficients = HashMap<ExprId, Number>;
+
+/// Coefficients of `expr` as a sum over terms; `None` if one overflows.
+///
+/// A sum which `is_term` names is taken whole.
+pub(super) fn coefficients(
+    pool: &ExprPool,
+    expr: ExprId,
+    is_term: &dyn Fn(ExprId) -> bool,
+) -> Option<Coefficients> {
+    let mut found = Coefficients::new();
+    let mut open = vec![(Number::ONE, expr)];
+    while let Some((factor, expr)) = open.pop() {
+        let (inner, rest) = pool.split(expr);
+        let coefficient = multiply(factor, inner)?;
+        match pool.node(rest) {
+            Node::Sum(terms) if !is_term(rest) => {
+                open.extend(terms.iter().map(|&term| (coefficient, term)));
+            }
+            _ if coefficient.is_zero() => {}
+            _ => {
+                let sum = found.entry(rest).or_insert(Number::ZERO);
+                *sum = sum.checked_add(coefficient)?;
+            }
+        }
+    }
+    found.retain(|_, coefficient| !coefficient.is_zero());
+    Some(found)
+}
+
+/// The product, without touching a number that is multiplied by one.
+fn multiply(a: Number, b: Number) -> Option<Number> {
+    match (a.is_one(), b.is_one()) {
+        (true, _) => Some(b),
+        (false, true) => Some(a),
+        (false, false) => a.checked_mul(b),
+    }
+}
+
+/// Sorts terms as the standard library does: constant, z, dz, monomials by degree, sin z, sin dz,
+/// cos z, cos dz, anything else, u.
+pub(super) fn sort(pool: &ExprPool, latent_dim: usize, terms: &mut [ExprId]) {
+    let key = |expr: &ExprId| Key::of(pool, latent_dim, *expr);
+    terms.sort_by(|a, b| key(a).cmp(&key(b)).then_with(|| pool.compare(*a, *b)));
+}
+
+/// Place of a term; the derived order is that of the variants and their fields.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Key {
+    Constant,
+    /// Degree, then indices into (z, dz), each as often as its power.
+    Monomial(usize, Vec<usize>),
+    /// Function (sin, cos), then index into (z, dz).
+    Trigonometric(usize, usize),
+    Other,
+    Input(usize),
+}
+
+impl Key {
+    fn of(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Key {
+        if expr == ExprId::ONE {
+            return Key::Constant;
+        }
+        if let Some(LatentVariable::U(index)) = variable(pool, latent_dim, expr) {
+            return Key::Input(index);
+        }
+        if let Node::Apply(function, argument) = pool.node(expr) {
+            let state = state_index(pool, latent_dim, *argument);
+            return match (function, state) {
+                (Function::Sin, Some(index)) => Key::Trigonometric(0, index),
+                (Function::Cos, Some(index)) => Key::Trigonometric(1, index),
+                _ => Key::Other,
+            };
+        }
+        match monomial(pool, latent_dim, expr) {
+            Some(indices) => Key::Monomial(indices.len(), indices),
+            None => Key::Other,
+        }
+    }
+}
+
+fn variable(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<LatentVariable> {
+    let symbol = pool.as_symbol(expr)?;
+    LatentVariable::from_name(pool.symbol_name(symbol), latent_dim)
+}
+
+/// Index into (z, dz).
+fn state_index(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<usize> {
+    match variable(pool, latent_dim, expr)? {
+        LatentVariable::Z(index) => Some(index),
+        LatentVariable::Dz(index) => Some(latent_dim + index),
+        LatentVariable::U(_) => None,
+    }
+}
+
+/// Indices into (z, dz), rising, each as often as its power.
+fn monomial(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<Vec<usize>> {
+    let mut indices = Vec::new();
+    for &factor in pool.factors_of(expr) {
+        let (base, power) = match pool.node(factor) {
+            Node::Power(base, exponent) => {
+                let power = pool.as_number(*exponent)?.as_integer()?;
+                (*base, usize::try_from(power).ok()?)
+            }
+            _ => (factor, 1),
+        };
+        let index = state_index(pool, latent_dim, base)?;
+        indices.extend(std::iter::repeat_n(index, power));
+    }
+    indices.sort_unstable();
+    Some(indices)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn separate(text: &str) -> Vec<(String, f64)> {
+        let mut pool = ExprPool::new();
+        let expr = pool.parse(text, &|_| true).expect(text);
+        let found = coefficients(&pool, expr, &|_| false).expect("no overflow");
+        let mut terms: Vec<ExprId> = found.keys().copied().collect();
+        sort(&pool, 2, &mut terms);
+        let text = |term: &ExprId| pool.display(*term).to_string();
+        let pairs = terms.iter().map(|term| (text(term), found[term].to_f64()));
+        pairs.collect()
+    }
+
+    fn pairs(expected: &[(&str, f64)]) -> Vec<(String, f64)> {
+        expected.iter().map(|&(t, c)| (t.to_owned(), c)).collect()
+    }
+
+    #[test]
+    fn coefficients_are_the_numbers_as_written() {
+        assert_eq!(
+            separate("u2*3 - 0.1*z1 + 0.36 - sin(dz1)/4 + 1e-320*z2 + 1.7976931348623157e308*u1"),
+            pairs(&[
+                ("1", 0.36),
+                ("z1", -0.1),
+                ("z2", 1e-320),
+                ("sin(dz1)", -0.25),
+                ("u1", f64::MAX),
+                ("u2", 3.0),
+            ])
+        );
+    }
+
+    #[test]
+    fn products_with_numbers_are_multiplied_out_and_like_terms_added() {
+        assert_eq!(
+            separate("2*(0.5*z1 - 3*(u1 + 1)) + z1*(1 + dz1) + z1 + (z2 + u2)/2"),
+            pairs(&[
+                ("1", -6.0),
+                ("z1", 2.0),
+                ("z2", 0.5),
+                ("z1*(1 + dz1)", 1.0),
+                ("u1", -6.0),
+                ("u2", 0.5),
+            ])
+        );
+        assert_eq!(separate("2*(z1 + u1) - 2*z1 - u1*2"), []);
+    }
+
+    #[test]
+    fn terms_are_sorted_as_in_the_standard_library() {
+        let mut shuffled = vec!["u1", "u1*z1", "tanh(z1)"];
+        let standard = "1 z1 z2 dz1 dz2 z1^2 z1*z2 z1*dz1 z1*dz2 z2^2 z2*dz1 z2*dz2 dz1^2 dz1*dz2 \
+                        dz2^2 z1^3 z1^2*dz1 sin(z1) sin(z2) sin(dz1) sin(dz2) cos(z1) cos(z2) \
+                        cos(dz1) cos(dz2)";
+        shuffled.extend(standard.split_whitespace().rev());
+        let sorted: Vec<String> = separate(&shuffled.join(" + "))
+            .into_iter()
+            .map(|(term, _)| term)
+            .collect();
+        let count = standard.split_whitespace().count();
+        assert_eq!(
+            sorted[..count].join(" "),
+            standard.split_whitespace().collect::<Vec<_>>().join(" ")
+        );
+        assert_eq!(sorted.last().map(String::as_str), Some("u1"));
+    }
+}

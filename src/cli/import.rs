@@ -1,0 +1,183 @@
+//! `romc import`: a model trained elsewhere in, a model file out.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use nalgebra::DVector;
+use serde_json::json;
+
+use super::Answer;
+use super::args::{ImportArguments, LibraryArgument, StoredWeights, StoredXi, TermOrder};
+use super::output::{Table, check_output};
+use crate::artifact::import::{
+    Chosen, ImportError, ImportOptions, ImportReport, LibraryChoice, LibraryOrder, WeightVectors,
+    XiLayout, import, read_terms,
+};
+use crate::files::Overwrite;
+use crate::model::{ScaleFactors, Scaling};
+use crate::robot::Robot;
+use crate::{Error, artifact};
+
+/// Imports a model and writes it.
+///
+/// # Errors
+/// Whatever the importer refuses; [`Error::Exists`] for the model file.
+pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
+    let overwrite = Overwrite::when_forced(arguments.force);
+    check_output(Some(&arguments.output), overwrite)?;
+    let imported = import(&arguments.file, &options(arguments)?)?;
+    artifact::write_with(&arguments.output, &imported.model, overwrite)?;
+    let mut text = describe(&imported.report);
+    let _ = writeln!(
+        text,
+        "{}: model `{}`",
+        arguments.output.display(),
+        imported.model.name()
+    );
+    Ok(Answer {
+        text,
+        json: json!({
+            "command": "import",
+            "model": arguments.output.display().to_string(),
+            "name": imported.model.name(),
+            "digest": artifact::digest(&imported.model).to_string(),
+            "report": imported.report,
+        }),
+    })
+}
+
+fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
+    Ok(ImportOptions {
+        name: arguments
+            .name
+            .clone()
+            .unwrap_or_else(|| stem(&arguments.output)),
+        description: arguments.description.clone(),
+        format: arguments.format.map(Into::into),
+        mapping: arguments.map.clone(),
+        weights: arguments.weights.map(|stored| match stored {
+            StoredWeights::Row => WeightVectors::Row,
+            StoredWeights::Column => WeightVectors::Column,
+        }),
+        xi_layout: arguments.xi_layout.map(|stored| match stored {
+            StoredXi::TermsByLatent => XiLayout::TermsByLatent,
+            StoredXi::LatentByTerms => XiLayout::LatentByTerms,
+        }),
+        library: library(arguments)?,
+        latent_dim: arguments.latent_dim,
+        phases: arguments.phase.clone(),
+        scaling: scaling(arguments),
+        robot: arguments.robot.as_deref().map(Robot::by_name).transpose()?,
+        sample_time_s: arguments.sample_time,
+    })
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
+}
+
+fn library(arguments: &ImportArguments) -> Result<Option<LibraryChoice>, Error> {
+    let order = match arguments.library_order {
+        TermOrder::Author => LibraryOrder::Author,
+        TermOrder::Paper => LibraryOrder::Paper,
+    };
+    Ok(match &arguments.library {
+        None => None,
+        Some(LibraryArgument::Shorthand(standard)) => {
+            Some(LibraryChoice::Standard(*standard, order))
+        }
+        Some(LibraryArgument::File(path)) => {
+            if order == LibraryOrder::Paper {
+                return Err(ImportError::Option {
+                    option: "--library-order",
+                    found: "paper, with a file of terms".to_owned(),
+                    expected: "a library of the form degree=N,...".to_owned(),
+                }
+                .into());
+            }
+            Some(LibraryChoice::Terms(read_terms(path)?))
+        }
+    })
+}
+
+fn scaling(arguments: &ImportArguments) -> Option<Scaling> {
+    let factors = |given: &[f64]| match given {
+        [factor] => ScaleFactors::Uniform(*factor),
+        list => ScaleFactors::PerCoordinate(DVector::from_column_slice(list)),
+    };
+    let state = arguments.scaling.as_slice();
+    let input = match arguments.input_scaling.as_slice() {
+        [] => state,
+        input => input,
+    };
+    (!state.is_empty()).then(|| Scaling {
+        state: factors(state),
+        input: factors(input),
+    })
+}
+
+/// What the import did, for people.
+fn describe(report: &ImportReport) -> String {
+    let mut text = format!(
+        "{} ({}): {} latent coordinates, ",
+        report.file,
+        report.format.name(),
+        report.latent_dim
+    );
+    if let Some(state_dim) = report.state_dim {
+        let _ = write!(text, "{state_dim} robot coordinates, ");
+    }
+    let _ = writeln!(text, "{} candidate terms\n", report.library_dim);
+    if !report.used.is_empty() {
+        let mut table = Table::new(["part", "tensor", "shape", "type", "chosen", "stored as"]);
+        for used in &report.used {
+            table.row([
+                used.role.clone(),
+                used.tensor.clone(),
+                shape(&used.shape),
+                used.element.clone(),
+                match used.chosen {
+                    Chosen::Mapped => "by --map".to_owned(),
+                    Chosen::Guessed => "by name".to_owned(),
+                },
+                used.layout.to_string(),
+            ]);
+        }
+        let _ = writeln!(text, "{table}");
+    }
+    if !report.equations.is_empty() {
+        let mut table = Table::new(["equation", "phase", "line", "terms"]);
+        for equation in &report.equations {
+            table.row([
+                equation.output.clone(),
+                equation.phase.clone(),
+                equation.line.to_string(),
+                equation.terms.to_string(),
+            ]);
+        }
+        let _ = writeln!(text, "{table}");
+    }
+    for unused in &report.unused {
+        let _ = writeln!(
+            text,
+            "not used: {} ({})",
+            unused.tensor,
+            shape(&unused.shape)
+        );
+    }
+    for note in &report.notes {
+        let _ = writeln!(text, "note: {note}");
+    }
+    text
+}
+
+fn shape(dims: &[usize]) -> String {
+    let dims: Vec<String> = dims.iter().map(usize::to_string).collect();
+    match dims.is_empty() {
+        true => "1".to_owned(),
+        false => dims.join(" x "),
+    }
+}

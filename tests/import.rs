@@ -1,0 +1,19 @@
+//! Models trained elsewhere: every way to store one gives the same model, every fault is told.
+//!
+//! `fixtures/import` holds files that NumPy, safetensors and PySINDy wrote: `make.py` there says
+//! how.
+
+#[path = "import/command.rs"]
+mod command;
+#[path = "import/equations.rs"]
+mod equations;
+#[path = "import/faults.rs"]
+mod faults;
+#[path = "import/foreign.rs"]
+mod foreign;
+#[path = "import/hostile.rs"]
+mod hostile;
+#[path = "import/round_trip.rs"]
+mod round_trip;
+#[path = "import/store.rs"]
+mod store;

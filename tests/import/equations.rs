@@ -1,0 +1,254 @@
+//! Equations as text.
+
+use std::fmt::Write as _;
+
+use nalgebra::DVector;
+use proptest::prelude::*;
+use romc::artifact::import::*;
+use romc::model::{ReducedModel, StandardLibrary};
+
+use crate::store::*;
+
+/// A model's equations as a person would write them.
+fn text_of(model: &ReducedModel) -> String {
+    let mut text = "# written by a test\n".to_owned();
+    for (index, phase) in model.phases().iter().enumerate() {
+        let _ = writeln!(text, "[{}]", phase.name);
+        for output in 0..model.latent_dim() {
+            let _ = write!(text, "ddz{} = 0", output + 1);
+            let terms = model.active_terms(index, output).expect("in range");
+            for (coefficient, term) in terms {
+                let sign = if coefficient < 0.0 { '-' } else { '+' };
+                let _ = write!(
+                    text,
+                    "\n   {sign} {:?}*({})",
+                    coefficient.abs(),
+                    term.text()
+                );
+            }
+            text.push('\n');
+        }
+    }
+    text
+}
+
+fn import(text: &str, options: &ImportOptions) -> Result<Imported, ImportError> {
+    import_from_bytes("eq.txt", Format::Equations, text.as_bytes(), options)
+}
+
+/// `(coefficient bits, term)` of an output.
+fn active(model: &ReducedModel, phase: usize, output: usize) -> Vec<(u64, String)> {
+    let mut active: Vec<(u64, String)> = (model.active_terms(phase, output).expect("in range"))
+        .into_iter()
+        .map(|(coefficient, term)| (coefficient.to_bits(), term.text().to_owned()))
+        .collect();
+    active.sort();
+    active
+}
+
+const PAPER: &str = "
+# The two-dimensional model of the paper, equations (25) and (26).
+[contact]
+ddz1 = 0.36 - 0.16*dz1 - 0.91*dz2 - 0.75*sin(dz1) + 0.11*u1 - 0.05*u2
+ddz2 = -0.16 - 0.23*dz1 - 0.75*dz2
+       - 0.96*sin(dz2) + 0.14*u2
+[flight]
+ddz1 = 0.29 - 1.22*dz1 - sin(dz1) + 51.05*u1
+ddz2 = 0.42*dz1 + 0.52*sin(dz1)
+";
+
+#[test]
+fn equations_of_the_paper_give_its_coefficients_and_accelerations() {
+    let original = model("models/paper-2d.json");
+    let options = ImportOptions {
+        name: "paper".to_owned(),
+        ..ImportOptions::default()
+    };
+    let imported = import(PAPER, &options).expect("equations").model;
+    let terms: Vec<&str> = imported
+        .library()
+        .terms()
+        .iter()
+        .map(|t| t.text())
+        .collect();
+    assert_eq!(
+        terms,
+        ["1", "dz1", "dz2", "sin(dz1)", "sin(dz2)", "u1", "u2"]
+    );
+    for phase in 0..2 {
+        assert_eq!(imported.phases()[phase].feet, original.phases()[phase].feet);
+        for output in 0..2 {
+            assert_eq!(
+                active(&imported, phase, output),
+                active(&original, phase, output)
+            );
+        }
+    }
+    for seed in 0..200 {
+        let at = |k: usize| {
+            let value = |i: usize, _| ((seed * 7 + k * 3 + i) as f64 * 0.77).sin() * 3.0;
+            DVector::from_fn(2, value)
+        };
+        for phase in 0..2 {
+            let expected = original
+                .ddz(phase, &at(0), &at(1), &at(2))
+                .expect("evaluates");
+            let found = imported
+                .ddz(phase, &at(0), &at(1), &at(2))
+                .expect("evaluates");
+            assert_eq!(found, expected);
+        }
+    }
+}
+
+#[test]
+fn equations_with_a_library_give_the_same_model() {
+    for path in [
+        "models/paper-2d.json",
+        "tests/fixtures/models/dense-4.json",
+        "tests/fixtures/models/degree-3.json",
+        "tests/fixtures/models/every-function.json",
+        "tests/fixtures/models/no-flight-inputs.json",
+        "tests/fixtures/models/one-dimensional.json",
+    ] {
+        let original = model(path);
+        let imported = import(&text_of(&original), &options_of(&original))
+            .unwrap_or_else(|error| panic!("{path}: {error}"));
+        assert_same(&imported, &original, &["encoder", "decoder"]);
+    }
+}
+
+#[test]
+fn equations_without_a_library_keep_every_coefficient() {
+    for path in ["models/go1-d6.json", "tests/fixtures/models/degree-3.json"] {
+        let original = model(path);
+        let mut options = options_of(&original);
+        options.library = None;
+        let imported = import(&text_of(&original), &options)
+            .expect("equations")
+            .model;
+        for phase in 0..original.phases().len() {
+            for output in 0..original.latent_dim() {
+                assert_eq!(
+                    active(&imported, phase, output),
+                    active(&original, phase, output),
+                    "{path}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn equations_of_one_phase_need_no_section() {
+    let options = ImportOptions {
+        name: "one".to_owned(),
+        phases: vec!["stance=1111,0011".parse().expect("a rule")],
+        ..ImportOptions::default()
+    };
+    let imported = import("ddz1 = u1 - 2*z1\n", &options).expect("one phase");
+    assert_eq!(imported.model.phases()[0].name, "stance");
+    let read = &imported.report.equations[0];
+    assert_eq!((read.line, read.terms), (1, 2));
+    let without = ImportOptions {
+        phases: Vec::new(),
+        ..options
+    };
+    let error = import("ddz1 = u1 - 2*z1\n", &without).expect_err("of which phase?");
+    assert!(
+        matches!(error, ImportError::Text { line: 1, .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn equations_follow_the_order_of_the_phases_given() {
+    let options = ImportOptions {
+        name: "order".to_owned(),
+        phases: ["rear=0011", "contact=any", "flight=none"]
+            .map(|text| text.parse().expect("a rule"))
+            .to_vec(),
+        ..ImportOptions::default()
+    };
+    let text = "[flight]\nddz1 = -1\n[contact]\nddz1 = u1\n[rear]\nddz1 = 2*u1\n";
+    let imported = import(text, &options).expect("three phases").model;
+    let names: Vec<&str> = imported.phases().iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(names, ["rear", "contact", "flight"]);
+    assert_eq!(imported.phase_for([false, false, true, true]), Some(0));
+}
+
+#[test]
+fn equations_that_do_not_fit_the_options_are_refused() {
+    let base = ImportOptions {
+        name: "m".to_owned(),
+        ..ImportOptions::default()
+    };
+    let refusal =
+        |text: &str, options: ImportOptions| import(text, &options).expect_err(text).to_string();
+    let message = refusal("[stance]\nddz1 = 1\n", base.clone());
+    assert_eq!(
+        message,
+        "eq.txt: found equations (line 1) of phase `stance`, expected --phase stance=FEET (any, \
+         none, or patterns such as 0011 in the order fr fl rr rl)"
+    );
+    let library = LibraryChoice::Standard(StandardLibrary::default(), LibraryOrder::Author);
+    let given = ImportOptions {
+        library: Some(library),
+        ..base.clone()
+    };
+    assert_eq!(
+        refusal("[contact]\n\nddz1 = z1 + 2*tanh(z1)\n", given),
+        "eq.txt:3:1: found the term `tanh(z1)` in ddz1, expected the terms of --library only"
+    );
+    let latent = ImportOptions {
+        latent_dim: Some(2),
+        ..base.clone()
+    };
+    assert!(refusal("[contact]\nddz1 = z1\n", latent).starts_with("--latent-dim: found 2"));
+    let mapped = ImportOptions {
+        mapping: vec!["xi.contact=Xi".parse().expect("a mapping")],
+        ..base.clone()
+    };
+    assert!(refusal("[contact]\nddz1 = z1\n", mapped).starts_with("--map: found a file of"));
+    let more = ImportOptions {
+        phases: vec![
+            "contact=any".parse().expect("a rule"),
+            "flight=none".parse().expect("a rule"),
+        ],
+        ..base.clone()
+    };
+    assert!(refusal("[contact]\nddz1 = z1\n", more).starts_with("--phase: found flight"));
+    let huge = "[contact]\nddz1 = 1e200*(1e200*(z1 + u1) + 1)\n";
+    assert!(
+        refusal(huge, base.clone()).contains("eq.txt:2:1: found a coefficient of ddz1 beyond"),
+        "{}",
+        refusal(huge, base.clone())
+    );
+    assert!(matches!(
+        import("[contact]\nddz1 = 0\n", &base),
+        Err(ImportError::Model { .. })
+    ));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+
+    /// Whatever the coefficients, they arrive with all their bits.
+    #[test]
+    fn coefficients_of_equations_arrive_bit_for_bit(values in proptest::collection::vec(any::<f64>(), 7)) {
+        let finite = |value: &f64| value.is_finite() && *value != 0.0;
+        prop_assume!(values.iter().all(finite));
+        let terms = ["1", "z1", "dz1", "z1*dz1", "sin(z1)", "exp(-dz1^2)", "u1"];
+        let sum: Vec<String> = terms.iter().zip(&values)
+            .map(|(term, value)| format!("({value:e})*{term}"))
+            .collect();
+        let text = format!("[contact]\nddz1 = {}\n", sum.join(" + "));
+        let options = ImportOptions { name: "m".to_owned(), ..ImportOptions::default() };
+        let imported = import(&text, &options).expect("finite coefficients");
+        let found = imported.model.phases()[0].xi.as_slice();
+        prop_assert_eq!(found.len(), values.len());
+        for (found, expected) in found.iter().zip(&values) {
+            prop_assert_eq!(found.to_bits(), expected.to_bits());
+        }
+    }
+}
