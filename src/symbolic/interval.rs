@@ -175,15 +175,31 @@ impl Interval {
         }
     }
 
-    /// `x^exponent = exp(exponent log(x))` for the points of a positive base, and `0` at a base
-    /// of zero where the exponent is positive.
+    /// `x^exponent`, for all pairs of points for which that is real: exponents of a negative base
+    /// are integers.
     pub fn pow(self, exponent: Interval) -> Interval {
-        let positive = (exponent * self.log()).exp();
-        if self.contains(0.0) && exponent.hi > 0.0 {
-            positive.hull(Interval::point(0.0))
-        } else {
-            positive
+        if self.is_empty() || exponent.is_empty() {
+            return Interval::EMPTY;
         }
+        let non_negative = self.intersection(Interval::new(0.0, f64::INFINITY));
+        let power = non_negative.pow_non_negative(exponent);
+        if self.lo >= 0.0 || exponent.lo.ceil() > exponent.hi {
+            return power;
+        }
+        let magnitude = self.abs().pow_non_negative(exponent);
+        power.hull(magnitude).hull(-magnitude)
+    }
+
+    /// `exp(exponent log(x))` where `x` is positive, and the limits at zero.
+    fn pow_non_negative(self, exponent: Interval) -> Interval {
+        let mut power = (exponent * self.log()).exp();
+        if self.contains(0.0) && exponent.hi > 0.0 {
+            power = power.hull(Interval::point(0.0));
+        }
+        if self.contains(0.0) && exponent.contains(0.0) {
+            power = power.hull(Interval::point(1.0));
+        }
+        power
     }
 
     /// Square roots of the points that are not negative.

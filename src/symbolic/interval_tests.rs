@@ -99,6 +99,16 @@ fn tangent_over_a_pole_is_everything() {
 }
 
 #[test]
+fn power_of_negative_base_contains_the_integer_exponents() {
+    let power = interval(-2.0, -1.0).pow(interval(1.5, 3.5));
+    assert!(power.contains(4.0) && power.contains(-8.0));
+    assert!(interval(-2.0, -1.0).pow(Interval::point(0.5)).is_empty());
+    assert!(Interval::point(0.0).pow(interval(0.0, 1.0)).contains(1.0));
+    assert!(interval(-2.0, 4.0).pow(Interval::point(0.5)).contains(2.0));
+    assert!(interval(-2.0, 4.0).pow(Interval::point(0.5)).lo() >= 0.0);
+}
+
+#[test]
 fn images_contain_sampled_values() {
     type Pair = (fn(Interval) -> Interval, fn(f64) -> f64);
     let functions: [Pair; 9] = [

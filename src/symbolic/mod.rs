@@ -1,9 +1,21 @@
 //! The computer algebra system: hash-consed expressions and what can be asked of them.
 //!
 //! Texts and coefficients enter, canonical expressions ([`ExprId`]) live in an [`ExprPool`], and
-//! derivatives, rewritten forms, values and texts leave. Nothing of the crate is imported here.
-//! Read [`pool`](ExprPool) first for the invariants, then `build.rs` and `power.rs`, the
-//! constructors that keep them; `order.rs` says why equal sums print alike.
+//! derivatives, rewritten forms, values, bounds and texts leave. Nothing of the crate is imported
+//! here. Read the docs of [`ExprPool`] first for the invariants, then `build.rs` and `power.rs`,
+//! the constructors that keep them; `order.rs` says why equal sums print alike.
+//!
+//! | files | |
+//! |---|---|
+//! | `node`, `number`, `pool`, `intern`, `order` | what an expression is and how it is stored |
+//! | `build`, `power` | canonical constructors |
+//! | `lexer`, `parse`, `display` | the grammar of candidate terms, both ways |
+//! | `eval`, `interval`, `interval_eval`, `bounds` | values, and bounds over boxes |
+//! | `diff`, `jacobian`, `substitute` | derivatives and substitution |
+//! | `expand`, `collect`, `horner`, `poly`, `rational`, `trig`, `rules` | rewriting, each way when asked |
+//! | `simplify`, `cost`, `region` | choosing the cheapest of equal forms |
+//!
+//! No algorithm recurses on the machine's stack, and none iterates a hash map towards a result.
 //!
 //! ```
 //! use romc::symbolic::ExprPool;

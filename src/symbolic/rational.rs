@@ -8,7 +8,9 @@ use super::number::Number;
 use super::pool::ExprPool;
 
 /// Most steps of one polynomial division.
-const MAX_STEPS: usize = 2_000;
+const MAX_STEPS: usize = 500;
+/// Most different denominators that are brought together: the numerator grows with all of them.
+const MAX_DENOMINATORS: usize = 12;
 
 /// Exact coefficients by the exponents of common bases.
 type Monomials = BTreeMap<Vec<i64>, Number>;
@@ -18,7 +20,8 @@ impl ExprPool {
     /// divided by parts of the denominator where that leaves no remainder:
     /// `x/(x + y) + y/(x + y)` becomes `1`, `(x^2 - 1)/(x - 1)` becomes `1 + x`.
     ///
-    /// Nothing changes unless a sum or a function occurs in a denominator.
+    /// Nothing changes unless a sum or a function occurs in a denominator, or if there are too
+    /// many different ones.
     pub fn together(&mut self, expr: ExprId) -> ExprId {
         self.together_spending(expr, 10_000, &mut 100_000)
     }
@@ -41,7 +44,8 @@ impl ExprPool {
             }
         }
         let is_needed = |(base, _): &(ExprId, Number)| self.as_symbol(*base).is_none();
-        if !denominators.iter().any(is_needed) {
+        let is_manageable = denominators.len() <= MAX_DENOMINATORS;
+        if !is_manageable || !denominators.iter().any(is_needed) {
             return expr;
         }
         let powers: Vec<ExprId> = denominators
