@@ -291,6 +291,54 @@ fn train_writes_a_model_that_compiles_and_refuses_to_replace_it() {
 }
 
 #[test]
+fn shipped_models_come_from_the_command_in_their_provenance() {
+    let folder = folder();
+    let jumps = |set: &str, count: usize| -> Vec<String> {
+        let jump = |number| format!("examples/recordings/go1/{set}_{number:02}.csv.gz");
+        (1..=count).map(jump).collect()
+    };
+    let (training, validation) = (jumps("train", 14), jumps("validation", 3));
+    for dimension in ["4", "6"] {
+        let shipped = format!("models/go1-d{dimension}.json");
+        let again = path(&folder, &format!("go1-d{dimension}.json"));
+        let mut arguments = vec!["train"];
+        arguments.extend(training.iter().map(String::as_str));
+        arguments.push("--validation");
+        arguments.extend(validation.iter().map(String::as_str));
+        arguments.extend([
+            "--latent-dim",
+            dimension,
+            "--method",
+            "closed-form",
+            "--output",
+            &again,
+        ]);
+        done(&arguments);
+        let [shipped, again] =
+            [&shipped, &again].map(|path| romc::artifact::read(Path::new(path)).expect("a model"));
+        let command = shipped.provenance()["command"].as_str().expect("a command");
+        assert!(
+            command.contains("examples/recordings/go1/train_*.csv.gz"),
+            "{command}"
+        );
+        assert!(command.contains(&format!("--latent-dim {dimension} --method closed-form")));
+        let weights = |model: &romc::model::ReducedModel| {
+            model.encoder().expect("an encoder").weights().clone()
+        };
+        assert!((weights(&shipped) - weights(&again)).amax() < 1e-6);
+        for (shipped, again) in shipped.phases().iter().zip(again.phases()) {
+            let scale = shipped.xi.amax();
+            assert!(
+                (&shipped.xi - &again.xi).amax() < 1e-6 * scale,
+                "{}",
+                shipped.name
+            );
+            assert_eq!(shipped.active_count(), again.active_count());
+        }
+    }
+}
+
+#[test]
 fn simulate_writes_one_row_a_sample_without_nan() {
     let folder = folder();
     let table = path(&folder, "trajectories.csv");
