@@ -76,7 +76,9 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 
 const MODEL: &str = "models/go1-d4.json";
 const JUMP: &str = "examples/recordings/go1/test_01.csv.gz";
-const COMMANDS: [&str; 7] = ["demo", "inspect", "train", "import", "compile", "simulate", "mpc"];
+const COMMANDS: [&str; 7] = [
+    "demo", "inspect", "train", "import", "compile", "simulate", "mpc",
+];
 
 #[test]
 fn help_of_every_command_shows_an_example_that_starts_with_it() {
