@@ -176,6 +176,18 @@ fn generated_code_beyond_the_reduction_limit_equals_the_interpreter() {
 }
 
 #[test]
+fn selftests_of_generated_code_pass() {
+    let models = models::shipped();
+    let workshop = Workshop::new(&models, &LowerOptions::default());
+    for model in &models {
+        workshop.run_c_selftest(&c_compilers()[0], model.identifier().as_str());
+    }
+    for model in models.iter().filter(|model| model.latent_dim() <= 2) {
+        workshop.run_rust_selftest(model.identifier().as_str());
+    }
+}
+
+#[test]
 fn emission_twice_gives_identical_bytes() {
     let models: Vec<ReducedModel> = models::shipped();
     let (first, second) = (

@@ -152,6 +152,18 @@ pub enum Stmt {
         /// Where the cosines go.
         cosines: Span,
     },
+    /// Sine and cosine of one argument by the kernel's core, which notes arguments beyond
+    /// its limit for the whole block of lanes.
+    SinCosLane {
+        /// The argument.
+        argument: Expr,
+        /// New scalar for the sine.
+        sine: Ident,
+        /// New scalar for the cosine.
+        cosine: Ident,
+        /// Whether sine and cosine are read.
+        is_used: [bool; 2],
+    },
     /// A call of another generated function.
     Call(Ident, Vec<Argument>),
 }

@@ -29,8 +29,16 @@ pub trait Dialect {
     /// A mention of a parameter that nothing reads.
     fn discard(&self, parameter: &str) -> String;
 
+    /// Function `f(a, b, c) = a*b + c` for loops, in a language whose compilers never fuse the two
+    /// operations by themselves.
+    fn multiply_add(&self) -> Option<&'static str>;
+
     /// A call of the sine-and-cosine kernel, or of a generated function (`callee`).
     fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String;
+
+    /// The kernel's core on one printed argument of a lane: defines sine and cosine, and
+    /// notes an argument beyond its limit.
+    fn sin_cos_lane(&self, argument: &str, names: &[String; 2], is_used: [bool; 2]) -> Vec<String>;
 
     /// Definition of a constant table.
     fn table(&self, table: &ConstTable) -> String;

@@ -1,11 +1,12 @@
 //! Entries to functions of one target.
 
-use super::code::{Function, Parameter, Role};
+use super::code::{Function, Parameter, Role, Stmt};
 use super::dialect::Dialect;
 use super::entries::{Entry, ModelEntries};
 use super::ident::{Ident, Namer};
 use super::tables::Tables;
-use super::translate::{Names, translate};
+use super::translate::{Names, translate, translate_lanes};
+use crate::ir::Slot;
 
 /// The functions of a model in one target, with the tables that they share.
 #[derive(Debug)]
@@ -14,6 +15,8 @@ pub struct ModelFunctions {
     pub maps: Vec<Function>,
     /// Per phase: dynamics, dynamics with Jacobian, step.
     pub phases: Vec<[Function; 3]>,
+    /// Per phase: body of the loop over the lanes of a batch, if it runs in blocks.
+    pub lanes: Vec<Option<Vec<Stmt>>>,
     /// Constant tables.
     pub tables: Tables,
 }
@@ -39,9 +42,15 @@ impl ModelFunctions {
                 [dynamics, jacobian, step]
             })
             .collect();
+        let lanes = entries
+            .phases
+            .iter()
+            .map(|phase| lanes(&phase.dynamics, dialect, &mut tables))
+            .collect();
         Self {
             maps,
             phases,
+            lanes,
             tables,
         }
     }
@@ -50,6 +59,39 @@ impl ModelFunctions {
     pub fn all(&self) -> impl Iterator<Item = &Function> {
         self.maps.iter().chain(self.phases.iter().flatten())
     }
+}
+
+/// Points of a block: what the widest common registers hold.
+pub const N_LANES: usize = 8;
+
+/// The body of the loop over a block's lanes; arrays are called `z_lanes` and so on, the
+/// loop variable `lane`.
+fn lanes(entry: &Entry, dialect: &dyn Dialect, tables: &mut Tables) -> Option<Vec<Stmt>> {
+    let mut locals = Namer::new(dialect.reserved());
+    let lane = locals.mint("lane");
+    for taken in ["beyond", "count", "first", "point"] {
+        locals.mint(taken);
+    }
+    let mut parameters = |slots: &[Slot], role: Role| -> Vec<Parameter> {
+        slots
+            .iter()
+            .map(|slot| Parameter {
+                name: locals.mint(&format!("{}_lanes", slot.name)),
+                len: slot.len,
+                role,
+            })
+            .collect()
+    };
+    let inputs = parameters(entry.program.inputs(), Role::Input);
+    let outputs = parameters(entry.program.outputs(), Role::Output);
+    let names = Names {
+        inputs: &inputs,
+        outputs: &outputs,
+        callees: &[],
+        locals: &mut locals,
+        tables,
+    };
+    translate_lanes(&entry.program, names, lane)
 }
 
 fn function(

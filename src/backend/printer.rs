@@ -16,14 +16,20 @@ enum Precedence {
 }
 
 /// Prints statements in one dialect.
+#[derive(Clone, Copy)]
 pub struct Printer<'a> {
     dialect: &'a dyn Dialect,
+    /// Function that sums with a product are printed with.
+    multiply_add: Option<&'static str>,
 }
 
 impl<'a> Printer<'a> {
     /// A printer for a dialect.
     pub fn new(dialect: &'a dyn Dialect) -> Self {
-        Self { dialect }
+        Self {
+            dialect,
+            multiply_add: None,
+        }
     }
 
     /// A function with its documentation; ends without a newline.
@@ -39,6 +45,21 @@ impl<'a> Printer<'a> {
         text
     }
 
+    /// This printer for the bodies of loops.
+    fn in_loop(&self) -> Self {
+        Self {
+            multiply_add: self.dialect.multiply_add(),
+            ..*self
+        }
+    }
+
+    /// Statements of a loop's body at a depth of indentation; ends with a newline.
+    pub fn statements(&self, statements: &[Stmt], depth: usize) -> String {
+        let mut text = String::new();
+        self.in_loop().block(statements, depth, &mut text);
+        text
+    }
+
     /// A constant table.
     pub fn table(&self, table: &ConstTable) -> String {
         self.dialect.table(table)
@@ -50,7 +71,7 @@ impl<'a> Printer<'a> {
                 Stmt::For(variable, count, body) => {
                     let head = self.dialect.for_loop(&variable.to_string(), *count);
                     self.line(&format!("{head} {{"), depth, text);
-                    self.block(body, depth + 1, text);
+                    self.in_loop().block(body, depth + 1, text);
                     self.line("}", depth, text);
                 }
                 Stmt::Let(name, value) => {
@@ -74,7 +95,13 @@ impl<'a> Printer<'a> {
                     self.line(&self.dialect.declare(&name.to_string(), *len), depth, text);
                 }
                 Stmt::Assign(target, value) => self.assign(target, " = ", value, depth, text),
-                Stmt::AddAssign(target, value) => self.assign(target, " += ", value, depth, text),
+                Stmt::AddAssign(target, value) => match (self.multiply_add, value) {
+                    (Some(_), Expr::Infix(Infix::Mul, ..)) => {
+                        let sum = Expr::infix(Infix::Add, target.clone(), value.clone());
+                        self.assign(target, " = ", &sum, depth, text);
+                    }
+                    (Some(_) | None, value) => self.assign(target, " += ", value, depth, text),
+                },
                 Stmt::SinCos {
                     arguments,
                     sines,
@@ -86,6 +113,18 @@ impl<'a> Printer<'a> {
                         Argument::Write(cosines.clone()),
                     ];
                     self.line(&self.dialect.call(None, &arguments), depth, text);
+                }
+                Stmt::SinCosLane {
+                    argument,
+                    sine,
+                    cosine,
+                    is_used,
+                } => {
+                    let argument = self.expression(argument);
+                    let names = [sine.to_string(), cosine.to_string()];
+                    for line in self.dialect.sin_cos_lane(&argument, &names, *is_used) {
+                        self.line(&line, depth, text);
+                    }
                 }
                 Stmt::Call(callee, arguments) => {
                     let call = self.dialect.call(Some(&callee.to_string()), arguments);
@@ -135,6 +174,11 @@ impl<'a> Printer<'a> {
                 format!("{table}[{}][{}]", subscript(row), subscript(col))
             }
             Expr::Negate(a) => format!("-{}", self.operand(a, Precedence::Atom)),
+            Expr::Infix(Infix::Add | Infix::Sub, a, b)
+                if self.multiply_add.is_some() && (is_product(a) || is_product(b)) =>
+            {
+                self.multiply_added(expr)
+            }
             Expr::Infix(op, a, b) => {
                 // Sums and products group to the left; a right operand of the same kind keeps
                 // its parentheses, because floating-point sums do not associate.
@@ -160,6 +204,35 @@ impl<'a> Printer<'a> {
         }
     }
 
+    /// `a*b + c` and its like by the dialect's function; the same two roundings, unless the
+    /// target can fuse them.
+    fn multiply_added(&self, expr: &Expr) -> String {
+        let name = self.multiply_add.unwrap_or_default();
+        let (sign, product, rest) = match expr {
+            Expr::Infix(Infix::Add, c, product) if is_product(product) => ("", product, c),
+            Expr::Infix(Infix::Add, product, c) => ("", product, c),
+            Expr::Infix(Infix::Sub, c, product) if is_product(product) => ("-", product, c),
+            Expr::Infix(Infix::Sub, product, c) => {
+                let negated = self.operand(c, Precedence::Atom);
+                return self.call_multiply_add(name, "", product, &format!("-{negated}"));
+            }
+            _ => return String::new(),
+        };
+        self.call_multiply_add(name, sign, product, &self.expression(rest))
+    }
+
+    fn call_multiply_add(&self, name: &str, sign: &str, product: &Expr, rest: &str) -> String {
+        let Expr::Infix(_, a, b) = product else {
+            return String::new();
+        };
+        let first = if sign.is_empty() {
+            self.expression(a)
+        } else {
+            format!("{sign}{}", self.operand(a, Precedence::Atom))
+        };
+        format!("{name}({first}, {}, {rest})", self.expression(b))
+    }
+
     fn operand(&self, expr: &Expr, at_least: Precedence) -> String {
         let text = self.expression(expr);
         if precedence(expr) >= at_least {
@@ -182,6 +255,10 @@ fn precedence(expr: &Expr) -> Precedence {
         Expr::Infix(Infix::Add | Infix::Sub, ..) => Precedence::Sum,
         Expr::Infix(Infix::Mul | Infix::Div, ..) => Precedence::Product,
     }
+}
+
+fn is_product(expr: &Expr) -> bool {
+    matches!(expr, Expr::Infix(Infix::Mul, ..))
 }
 
 /// Whether the printed expression begins with a minus that would follow an operator.

@@ -50,17 +50,47 @@ pub(super) struct MatrixHome {
 pub(super) struct Translator<'a> {
     pub program: &'a Program,
     pub names: Names<'a>,
-    n_uses: Vec<usize>,
+    pub n_uses: Vec<usize>,
     /// How a value is read: a name, an element, or an expression to be nested once, and
     /// how deeply operations are nested in it.
     spelled: Vec<Option<(Expr, usize)>>,
     pub body: Vec<Stmt>,
     /// Values that were copied to an array.
     copies: Vec<(Vec<ValueId>, Ident)>,
+    /// Loop variable of a block of lanes.
+    pub lane: Option<Ident>,
 }
 
 /// Translates a program into the body of a function.
 pub fn translate(program: &Program, names: Names) -> Translation {
+    translate_as(program, names, None)
+}
+
+/// Translates a program into the body of a loop over the lanes of a block of points; inputs
+/// and outputs are `array[element][lane]`. Nothing if the program is better run point
+/// by point: it loops over tables itself, or calls functions that no compiler vectorises.
+pub fn translate_lanes(program: &Program, names: Names, lane: Ident) -> Option<Vec<Stmt>> {
+    let vectorises = program
+        .statements()
+        .iter()
+        .all(|statement| match statement {
+            Statement::Constant(_)
+            | Statement::Input { .. }
+            | Statement::Binary(..)
+            | Statement::SinCos { .. } => true,
+            Statement::Unary(op, _) => match op {
+                Unary::Neg | Unary::Sqrt | Unary::Abs => true,
+                Unary::Sign | Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log => false,
+            },
+            Statement::Accumulate { .. }
+            | Statement::Constants { .. }
+            | Statement::Separable { .. }
+            | Statement::Call { .. } => false,
+        });
+    vectorises.then(|| translate_as(program, names, Some(lane)).body)
+}
+
+fn translate_as(program: &Program, names: Names, lane: Option<Ident>) -> Translation {
     let live = program.live();
     let mut translator = Translator {
         program,
@@ -69,6 +99,7 @@ pub fn translate(program: &Program, names: Names) -> Translation {
         spelled: vec![None; program.n_values()],
         body: Vec::new(),
         copies: Vec::new(),
+        lane,
     };
     for (position, statement) in program.statements().iter().enumerate() {
         if live[position] {
@@ -107,6 +138,7 @@ impl Translator<'_> {
             Statement::Input { slot, index } => {
                 let parameter = &self.names.inputs[*slot];
                 let expr = match parameter.role {
+                    _ if self.lane.is_some() => self.lane_entry(parameter, *index),
                     Role::Scalar => Expr::Name(parameter.name.clone()),
                     Role::Input | Role::Output | Role::InOut => {
                         Expr::Element(parameter.name.clone(), Index::fixed(*index))
@@ -140,6 +172,15 @@ impl Translator<'_> {
         }
     }
 
+    /// Element of a parameter: `array[index]`, or `array[index][lane]` in a block of lanes.
+    fn lane_entry(&self, parameter: &Parameter, index: usize) -> Expr {
+        let (array, index) = (parameter.name.clone(), Index::fixed(index));
+        match &self.lane {
+            None => Expr::Element(array, index),
+            Some(lane) => Expr::Entry(array, index, Index::variable(lane)),
+        }
+    }
+
     /// Nests an operation into its only use, or gives it a name.
     fn define(&mut self, value: usize, expr: Expr, depth: usize) {
         if self.n_uses[value] <= 1 && depth < DEEPEST {
@@ -149,6 +190,22 @@ impl Translator<'_> {
             self.body.push(Stmt::Let(name.clone(), expr));
             self.spelled[value] = Some((Expr::Name(name), 0));
         }
+    }
+
+    /// A value that is mentioned more than once: a name or an element.
+    pub(super) fn named(&mut self, value: ValueId) -> Expr {
+        let (expr, depth) = self.read(value);
+        if depth == 0 {
+            return expr;
+        }
+        let name = self.names.locals.mint("t");
+        self.body.push(Stmt::Let(name.clone(), expr));
+        self.spell(value.index(), Expr::Name(name.clone()));
+        Expr::Name(name)
+    }
+
+    pub(super) fn spell(&mut self, value: usize, expr: Expr) {
+        self.spelled[value] = Some((expr, 0));
     }
 
     fn read(&self, value: ValueId) -> (Expr, usize) {
@@ -383,7 +440,7 @@ impl Translator<'_> {
         let mut assigned = Vec::new();
         for entry in self.program.results() {
             let output = &self.names.outputs[entry.slot];
-            let target = Expr::Element(output.name.clone(), Index::fixed(entry.index));
+            let target = self.lane_entry(output, entry.index);
             let (mut value, _) = self.read(entry.value);
             if value == target {
                 continue;

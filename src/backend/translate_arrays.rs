@@ -31,6 +31,12 @@ impl MatrixHome {
 impl Translator<'_> {
     pub(super) fn sin_cos(&mut self, first: usize, arguments: &[ValueId]) {
         let n = arguments.len();
+        if self.lane.is_some() {
+            for (k, &argument) in arguments.iter().enumerate() {
+                self.sin_cos_lane(first + k, first + n + k, argument);
+            }
+            return;
+        }
         let arguments = self.span(arguments);
         let sines = self.local_home(first, n, "s");
         let cosines = self.local_home(first + n, n, "c");
@@ -43,6 +49,19 @@ impl Translator<'_> {
 
     fn table(&mut self, id: TableId) -> Ident {
         self.names.tables.name(&self.program.tables()[id.index()])
+    }
+
+    fn sin_cos_lane(&mut self, sine_value: usize, cosine_value: usize, argument: ValueId) {
+        let argument = self.named(argument);
+        let [sine, cosine] = ["s", "c"].map(|name| self.names.locals.mint(name));
+        self.spell(sine_value, Expr::Name(sine.clone()));
+        self.spell(cosine_value, Expr::Name(cosine.clone()));
+        self.body.push(Stmt::SinCosLane {
+            argument,
+            sine,
+            cosine,
+            is_used: [sine_value, cosine_value].map(|value| self.n_uses[value] > 0),
+        });
     }
 
     /// A loop over four rows a time for each section of weights.

@@ -5,7 +5,7 @@ use super::code::{Expr, MathFunction, Stmt};
 /// Whether the statements call the sine-and-cosine kernel.
 pub fn calls_kernel(body: &[Stmt]) -> bool {
     body.iter().any(|statement| match statement {
-        Stmt::SinCos { .. } => true,
+        Stmt::SinCos { .. } | Stmt::SinCosLane { .. } => true,
         Stmt::For(_, _, body) => calls_kernel(body),
         Stmt::Let(..)
         | Stmt::LetArray(..)
@@ -22,6 +22,7 @@ pub fn calls_function(body: &[Stmt], function: MathFunction) -> bool {
         Stmt::Let(_, value) => applies(value, function),
         Stmt::LetArray(_, elements) => elements.iter().any(|value| applies(value, function)),
         Stmt::Assign(_, value) | Stmt::AddAssign(_, value) => applies(value, function),
+        Stmt::SinCosLane { argument, .. } => applies(argument, function),
         Stmt::For(_, _, body) => calls_function(body, function),
         Stmt::Declare(..) | Stmt::SinCos { .. } | Stmt::Call(..) => false,
     })

@@ -105,12 +105,80 @@ impl Workshop {
                     "--cfg",
                     "feature=\"std\"",
                 ])
-                .args(["--check-cfg", "cfg(feature, values(\"std\"))"])
+                .args([
+                    "--check-cfg",
+                    "cfg(feature, values(\"std\", \"libm\"))",
+                    "--check-cfg",
+                    "cfg(test)",
+                ])
                 .arg(driver)
                 .arg("-o")
                 .arg(&program),
         );
         self.run(&program, functions, points)
+    }
+
+    /// Compiles and runs the C self-test of a model, which also compares batches.
+    pub fn run_c_selftest(&self, compiler: &str, model: &str) {
+        let folder = self.path().join(model);
+        let program = folder.join("selftest");
+        succeed(
+            Command::new(compiler)
+                .args([
+                    "-std=c99",
+                    "-O2",
+                    "-Wall",
+                    "-Wextra",
+                    "-Wconversion",
+                    "-Wshadow",
+                ])
+                .args(["-pedantic", "-Werror"])
+                .args([
+                    folder.join(format!("{model}.c")),
+                    folder.join(format!("{model}_selftest.c")),
+                ])
+                .arg("-o")
+                .arg(&program)
+                .arg("-lm"),
+        );
+        succeed(&mut Command::new(program));
+    }
+
+    /// Compiles and runs the tests of a model's crate, without a package registry.
+    pub fn run_rust_selftest(&self, model: &str) {
+        let folder = self.path().join(model).join(model);
+        let library = folder.join(format!("lib{model}.rlib"));
+        let program = folder.join("selftest");
+        let rustc = || {
+            let mut command =
+                Command::new(std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_owned()));
+            command.args(["--edition", "2021", "-D", "warnings", "-C", "opt-level=1"]);
+            command.args([
+                "--check-cfg",
+                "cfg(feature, values(\"std\", \"libm\"))",
+                "--check-cfg",
+                "cfg(test)",
+            ]);
+            command
+        };
+        succeed(
+            rustc()
+                .args(["--crate-type", "lib", "--cfg", "feature=\"std\""])
+                .args(["--crate-name", model])
+                .arg(folder.join("src/lib.rs"))
+                .arg("-o")
+                .arg(&library),
+        );
+        succeed(
+            rustc()
+                .arg("--test")
+                .arg(folder.join("tests/selftest.rs"))
+                .arg("--extern")
+                .arg(format!("{model}={}", library.display()))
+                .arg("-o")
+                .arg(&program),
+        );
+        succeed(&mut Command::new(program));
     }
 
     fn run(&self, program: &Path, functions: &[Function], points: &[Vec<f64>]) -> Vec<Vec<f64>> {

@@ -164,6 +164,10 @@ impl Dialect for CDialect {
         format!("(void){parameter};")
     }
 
+    fn multiply_add(&self) -> Option<&'static str> {
+        None
+    }
+
     fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String {
         let passed: Vec<String> = arguments
             .iter()
@@ -180,6 +184,20 @@ impl Dialect for CDialect {
                 format!("{}_sin_cos({n}, {});", self.name, passed.join(", "))
             }
         }
+    }
+
+    fn sin_cos_lane(
+        &self,
+        argument: &str,
+        [sine, cosine]: &[String; 2],
+        _is_used: [bool; 2],
+    ) -> Vec<String> {
+        let (name, upper) = (&self.name, self.name.to_ascii_uppercase());
+        vec![
+            format!("double {sine}, {cosine};"),
+            format!("{name}_sin_cos_reduced({argument}, &{sine}, &{cosine});"),
+            format!("beyond |= (uint64_t)!(fabs({argument}) <= {upper}_ANGLE_LIMIT);"),
+        ]
     }
 
     fn table_base(&self, prefix: &str) -> String {

@@ -7,7 +7,7 @@ use askama::Template;
 
 use super::code::{Function, MathFunction};
 use super::entries::{ModelEntries, PhaseEntries};
-use super::functions::ModelFunctions;
+use super::functions::{ModelFunctions, N_LANES};
 use super::kernel::KernelText;
 use super::printer::Printer;
 use super::target::{EmitError, EmittedFile};
@@ -33,6 +33,7 @@ struct Source<'a> {
     banner: String,
     name: &'a str,
     latent_dim: usize,
+    n_lanes: usize,
     kernel: Option<String>,
     sign: bool,
     tables: Vec<String>,
@@ -73,6 +74,10 @@ struct PhaseText {
     cols: String,
     prototypes: Vec<String>,
     functions: Vec<String>,
+    /// Body of the loop over the lanes of a batch.
+    lanes: Option<String>,
+    /// Whether that loop has sines, whose arguments may be beyond the kernel's limit.
+    lanes_have_angles: bool,
 }
 
 /// The C files of a model; `provenance` is the text of the first line.
@@ -90,8 +95,12 @@ pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>
     let phases: Vec<PhaseText> = entries
         .phases
         .iter()
-        .zip(&functions.phases)
-        .map(|(phase, functions)| PhaseText::new(name, phase, functions, &dialect, &print))
+        .zip(functions.phases.iter().zip(&functions.lanes))
+        .map(|(phase, (functions, lanes))| PhaseText {
+            lanes: lanes.as_ref().map(|lanes| printer.statements(lanes, 3)),
+            lanes_have_angles: lanes.as_ref().is_some_and(|lanes| calls_kernel(lanes)),
+            ..PhaseText::new(name, phase, functions, &dialect, &print)
+        })
         .collect();
     let banner = format!("/* {provenance} */");
     let header = Header {
@@ -112,6 +121,7 @@ pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>
         banner: banner.clone(),
         name,
         latent_dim: entries.latent_dim,
+        n_lanes: N_LANES,
         kernel: uses_kernel.then(|| kernel(name)).transpose()?,
         sign: functions
             .all()
@@ -168,6 +178,8 @@ impl PhaseText {
             cols: numbers(&phase.pattern.cols),
             prototypes,
             functions: functions.iter().map(print).collect(),
+            lanes: None,
+            lanes_have_angles: false,
         }
     }
 }

@@ -117,9 +117,28 @@ impl Dialect for RustDialect {
         format!("let _ = {parameter};")
     }
 
+    fn multiply_add(&self) -> Option<&'static str> {
+        Some("math::mul_add")
+    }
+
     fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String {
         let passed: Vec<String> = arguments.iter().map(reference).collect();
         format!("{}({});", callee.unwrap_or("sin_cos"), passed.join(", "))
+    }
+
+    fn sin_cos_lane(&self, argument: &str, names: &[String; 2], is_used: [bool; 2]) -> Vec<String> {
+        let name = |which: usize| {
+            if is_used[which] {
+                names[which].as_str()
+            } else {
+                "_"
+            }
+        };
+        let (sine, cosine) = (name(0), name(1));
+        vec![
+            format!("let ({sine}, {cosine}) = sin_cos_reduced({argument});"),
+            format!("beyond |= u64::from(!(math::abs({argument}) <= ANGLE_LIMIT));"),
+        ]
     }
 
     fn table_base(&self, _prefix: &str) -> String {

@@ -8,7 +8,7 @@ use askama::Template;
 
 use super::code::Function;
 use super::entries::{ModelEntries, PhaseEntries};
-use super::functions::ModelFunctions;
+use super::functions::{ModelFunctions, N_LANES};
 use super::kernel::KernelText;
 use super::printer::Printer;
 use super::target::{EmitError, EmittedFile};
@@ -29,6 +29,8 @@ struct Lib<'a> {
     banner: String,
     model: &'a str,
     latent_dim: usize,
+    n_lanes: usize,
+    has_lanes: bool,
     state_dim: Option<usize>,
     kernel: Option<KernelText>,
     tables: Vec<String>,
@@ -44,6 +46,10 @@ struct PhaseText {
     rows: String,
     cols: String,
     functions: Vec<String>,
+    /// Body of the loop over the lanes of a batch.
+    lanes: Option<String>,
+    /// Whether that loop has sines, whose arguments may be beyond the kernel's limit.
+    lanes_have_angles: bool,
 }
 
 /// The crate of a model; `provenance` is the text of each file's first line.
@@ -61,6 +67,8 @@ pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>
         banner: format!("// {provenance}"),
         model: &entries.name,
         latent_dim: entries.latent_dim,
+        n_lanes: N_LANES,
+        has_lanes: functions.lanes.iter().any(Option::is_some),
         state_dim: entries.state_dim,
         kernel: uses_kernel.then(KernelText::new),
         tables: functions
@@ -72,8 +80,12 @@ pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>
         phases: entries
             .phases
             .iter()
-            .zip(&functions.phases)
-            .map(|(phase, functions)| PhaseText::new(phase, functions, &print))
+            .zip(functions.phases.iter().zip(&functions.lanes))
+            .map(|(phase, (functions, lanes))| PhaseText {
+                lanes: lanes.as_ref().map(|lanes| printer.statements(lanes, 3)),
+                lanes_have_angles: lanes.as_ref().is_some_and(|lanes| calls_kernel(lanes)),
+                ..PhaseText::new(phase, functions, &print)
+            })
             .collect(),
     };
     let cargo = Cargo {
@@ -105,6 +117,8 @@ impl PhaseText {
             rows: numbers(&phase.pattern.rows),
             cols: numbers(&phase.pattern.cols),
             functions: functions.iter().map(print).collect(),
+            lanes: None,
+            lanes_have_angles: false,
         }
     }
 }
