@@ -100,16 +100,40 @@ fn point() -> impl Strategy<Value = [f64; 3]> {
 struct Approximate {
     value: f64,
     error: f64,
+    /// There is surely no value: rounding cannot have caused it.
+    undefined: bool,
 }
 
 impl Approximate {
+    fn exact(value: f64) -> Approximate {
+        Approximate {
+            value,
+            error: 0.0,
+            undefined: false,
+        }
+    }
+
+    /// Marks the result of an operation of which an operand has no value.
+    fn undefined_if(self, undefined: bool) -> Approximate {
+        Approximate { undefined, ..self }
+    }
+
+    /// Whether the argument is below zero whatever its error.
+    fn is_surely_negative(self) -> bool {
+        self.value.is_finite() && self.value < -2.0 * self.error
+    }
+
     fn new(value: f64, error: f64) -> Approximate {
         let error = if value.is_finite() {
             error + value.abs() * f64::EPSILON
         } else {
             f64::INFINITY
         };
-        Approximate { value, error }
+        Approximate {
+            value,
+            error,
+            undefined: false,
+        }
     }
 
     fn is_reliable(self) -> bool {
@@ -118,6 +142,9 @@ impl Approximate {
 
     fn agrees_with(self, other: Approximate) -> bool {
         let tolerance = 8.0 * (self.error + other.error) + f64::MIN_POSITIVE;
+        if other.undefined {
+            return false;
+        }
         !other.error.is_finite() || (self.value - other.value).abs() <= tolerance
     }
 
@@ -126,6 +153,7 @@ impl Approximate {
             + other.value.abs() * self.error
             + self.error * other.error;
         Approximate::new(self.value * other.value, error)
+            .undefined_if(self.undefined || other.undefined)
     }
 
     fn reciprocal(self) -> Approximate {
@@ -135,7 +163,7 @@ impl Approximate {
         } else {
             f64::INFINITY
         };
-        Approximate::new(1.0 / self.value, error)
+        Approximate::new(1.0 / self.value, error).undefined_if(self.undefined)
     }
 
     fn apply(self, function: Function) -> Approximate {
@@ -166,14 +194,21 @@ impl Approximate {
             Function::Sign if x.abs() <= error && error > 0.0 => f64::INFINITY,
             Function::Sign => 0.0,
         };
+        let outside =
+            matches!(function, Function::Log | Function::Sqrt) && self.is_surely_negative();
         Approximate::new(value, error + f64::EPSILON * value.abs())
+            .undefined_if(self.undefined || outside)
     }
 
     fn power(self, exponent: Approximate) -> Approximate {
         let value = self.value.powf(exponent.value);
+        let undefined = self.undefined
+            || exponent.undefined
+            || (value.is_nan() && self.is_surely_negative() && exponent.value.is_finite());
         if self.value <= 2.0 * self.error {
             let exact = self.error == 0.0 && exponent.error == 0.0;
-            return Approximate::new(value, if exact { 0.0 } else { f64::INFINITY });
+            let error = if exact { 0.0 } else { f64::INFINITY };
+            return Approximate::new(value, error).undefined_if(undefined);
         }
         let log_error =
             exponent.value.abs() * self.error / self.value + self.value.ln().abs() * exponent.error;
@@ -181,6 +216,7 @@ impl Approximate {
             value,
             value * 2.0 * (2.0 * log_error).exp_m1() + 4.0 * f64::EPSILON * value,
         )
+        .undefined_if(undefined)
     }
 }
 
@@ -196,16 +232,14 @@ fn approximate(pool: &ExprPool, expr: ExprId, point: &[f64; 3]) -> Approximate {
     };
     pool.fold_up::<Approximate>(&[expr], |pool, node, child| match pool.node(node) {
         Node::Number(number) => Approximate::new(number.to_f64(), 0.0),
-        Node::Symbol(symbol) => Approximate {
-            value: at(*symbol),
-            error: 0.0,
-        },
+        Node::Symbol(symbol) => Approximate::exact(at(*symbol)),
         Node::Sum(terms) => {
             let parts: Vec<Approximate> = terms.iter().map(|term| child(*term)).collect();
             let value = parts.iter().map(|part| part.value).sum();
             let magnitude: f64 = parts.iter().map(|part| part.value.abs()).sum();
             let error: f64 = parts.iter().map(|part| part.error).sum();
             Approximate::new(value, error + magnitude * f64::EPSILON * parts.len() as f64)
+                .undefined_if(parts.iter().any(|part| part.undefined))
         }
         Node::Product(factors) => factors
             .iter()
@@ -219,13 +253,8 @@ fn approximate(pool: &ExprPool, expr: ExprId, point: &[f64; 3]) -> Approximate {
                 .and_then(|number| number.as_integer())
             {
                 Some(integer) => {
-                    let power = (0..integer.unsigned_abs().min(100_000)).fold(
-                        Approximate {
-                            value: 1.0,
-                            error: 0.0,
-                        },
-                        |power, _| power.times(base),
-                    );
+                    let power = (0..integer.unsigned_abs().min(100_000))
+                        .fold(Approximate::exact(1.0), |power, _| power.times(base));
                     if integer < 0 {
                         power.reciprocal()
                     } else {
@@ -444,7 +473,7 @@ proptest! {
 /// The value of a recipe, without any canonical form in between.
 fn direct_value(tree: &Tree, point: &[f64; 3]) -> Approximate {
     let value = |tree: &Tree| direct_value(tree, point);
-    let exact = |value: f64| Approximate { value, error: 0.0 };
+    let exact = Approximate::exact;
     match tree {
         Tree::Integer(value) => exact(*value as f64),
         Tree::Ratio(numerator, denominator) => {
@@ -479,10 +508,7 @@ fn direct_value(tree: &Tree, point: &[f64; 3]) -> Approximate {
             let (base, exponent) = (value(base), value(exponent));
             // An exponent that comes out whole by rounding decides about the domain: no test.
             if base.value <= 0.0 {
-                return Approximate {
-                    value: f64::NAN,
-                    error: f64::INFINITY,
-                };
+                return Approximate::new(f64::NAN, f64::INFINITY);
             }
             base.power(exponent)
         }
