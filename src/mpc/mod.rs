@@ -9,6 +9,20 @@
 //! with `linearise`), `transcribe` (the conic program), `qp` (clarabel, and the check of what it
 //! returns), `controller` (plan to command; what to do without a plan) and, if asked for, `lift`
 //! (torques that the ground can answer). [`along_recording`] runs it all on recorded jumps.
+//!
+//! ```
+//! use std::path::Path;
+//! use romc::mpc::{Controller, MpcSettings, ReferenceInput, along_recording};
+//!
+//! let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+//! let model = romc::artifact::read(&root.join("models/go1-d4.json"))?;
+//! let jump = romc::recording::read(&root.join("examples/recordings/go1/test_01.csv.gz"))?;
+//! let mut controller = Controller::new(&model, MpcSettings::default())?;
+//! let run = along_recording(&mut controller, &jump, ReferenceInput::Recorded, |_, _| {})?;
+//! assert_eq!(run.summary.limit_violations, 0);
+//! assert!(run.summary.torque_r2.contact > Some(0.85));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod along_recording;
 mod command;
