@@ -10,7 +10,7 @@
 //! | `node`, `number`, `pool`, `intern`, `order` | what an expression is and how it is stored |
 //! | `build`, `power` | canonical constructors |
 //! | `lexer`, `parse`, `display` | the grammar of candidate terms, both ways |
-//! | `eval`, `interval`, `interval_eval`, `bounds` | values, and bounds over boxes |
+//! | `eval`, `interval`, `rounding`, `interval_eval`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `jacobian`, `substitute` | derivatives and substitution |
 //! | `expand`, `collect`, `horner`, `poly`, `rational`, `trig`, `rules` | rewriting, each way when asked |
 //! | `simplify`, `cost`, `region` | choosing the cheapest of equal forms |
@@ -57,6 +57,7 @@ mod pool;
 mod power;
 mod rational;
 mod region;
+mod rounding;
 mod rules;
 mod simplify;
 mod substitute;

@@ -1,0 +1,155 @@
+//! Floating-point operations with directed rounding, for the bounds of intervals.
+//!
+//! The processor rounds to nearest; the rounding error of a sum or product, found exactly, tells
+//! whether the neighbour is needed. Rounding down is rounding up of the negative.
+
+/// Steps by which the value of an elementary function is widened.
+const FUNCTION_ULPS: usize = 4;
+
+/// `a - b` rounded up; infinite for infinities of the same sign, of which nothing is known.
+pub(super) fn sub_up(a: f64, b: f64) -> f64 {
+    let difference = a - b;
+    if difference.is_nan() {
+        return f64::INFINITY;
+    }
+    if !difference.is_finite() {
+        // A finite difference that overflows downward is still above the largest negative float.
+        return if difference == f64::NEG_INFINITY && a.is_finite() && b.is_finite() {
+            f64::MIN
+        } else {
+            difference
+        };
+    }
+    // The rounding error of a difference, exactly (Knuth's two-sum).
+    let b_rounded = a - difference;
+    let error = (a - (difference + b_rounded)) + (b_rounded - b);
+    if error > 0.0 || error.is_nan() {
+        difference.next_up()
+    } else {
+        difference
+    }
+}
+
+/// `a * b` rounded up, with `0 * inf = 0` as bounds of intervals need it.
+pub(super) fn mul_up(a: f64, b: f64) -> f64 {
+    if a == 0.0 || b == 0.0 {
+        return 0.0;
+    }
+    let product = a * b;
+    if !product.is_finite() {
+        let overflowed = a.is_finite() && b.is_finite();
+        return if product < 0.0 && overflowed {
+            f64::MIN
+        } else {
+            product
+        };
+    }
+    // The error of a product is exact in one fused operation, except near underflow.
+    if product.abs() < 1e-290 || a.mul_add(b, -product) > 0.0 {
+        product.next_up()
+    } else {
+        product
+    }
+}
+
+/// `1/x` rounded up for a positive `x`.
+pub(super) fn recip_up(x: f64) -> f64 {
+    let quotient = 1.0 / x;
+    if quotient.is_finite() && quotient * x == 1.0 && quotient.mul_add(x, -1.0) == 0.0 {
+        quotient
+    } else {
+        quotient.next_up()
+    }
+}
+
+/// `1/x` rounded down for a positive `x`.
+pub(super) fn recip_down(x: f64) -> f64 {
+    let quotient = 1.0 / x;
+    if quotient.is_infinite() {
+        f64::MAX
+    } else if quotient.mul_add(x, -1.0) == 0.0 {
+        quotient
+    } else {
+        quotient.next_down().max(0.0)
+    }
+}
+
+/// `x^exponent` rounded up for `x >= 0`.
+pub(super) fn power_up(x: f64, exponent: i64) -> f64 {
+    power(x, exponent, mul_up)
+}
+
+/// `x^exponent` rounded down for `x >= 0`.
+pub(super) fn power_down(x: f64, exponent: i64) -> f64 {
+    power(x, exponent, |a, b| (-mul_up(-a, b)).max(0.0))
+}
+
+/// A power by squaring, all factors non-negative and `product` monotone.
+fn power(x: f64, exponent: i64, product: impl Fn(f64, f64) -> f64) -> f64 {
+    let (mut result, mut square, mut remaining) = (1.0, x, exponent);
+    loop {
+        if remaining % 2 == 1 {
+            result = product(result, square);
+        }
+        remaining /= 2;
+        if remaining == 0 {
+            return result;
+        }
+        square = product(square, square);
+    }
+}
+
+/// Whether a computed square root is the exact one.
+pub(super) fn is_exact_root(root: f64, square: f64) -> bool {
+    root == f64::INFINITY
+        || (square > 1e-290 && root.mul_add(root, -square) == 0.0)
+        || square == 0.0
+}
+
+/// A lower bound of a function's value.
+pub(super) fn widen_down(value: f64) -> f64 {
+    if value == f64::INFINITY {
+        return f64::MAX;
+    }
+    (0..FUNCTION_ULPS).fold(value, |value, _| value.next_down())
+}
+
+/// An upper bound of a function's value.
+pub(super) fn widen_up(value: f64) -> f64 {
+    if value == f64::NEG_INFINITY {
+        return f64::MIN;
+    }
+    (0..FUNCTION_ULPS).fold(value, |value, _| value.next_up())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directed_operations_bracket_the_exact_result() {
+        // 0.1 + 0.2 as stored lies above the float 0.3.
+        assert_eq!(sub_up(0.1, -0.2), 0.3f64.next_up());
+        assert_eq!(-sub_up(-0.1, 0.2), 0.3);
+        assert_eq!(sub_up(1.5, 0.25), 1.25);
+        assert_eq!(mul_up(0.5, 3.0), 1.5);
+        assert!(mul_up(0.1, 0.1) > -mul_up(-0.1, 0.1));
+        assert_eq!(recip_up(4.0), recip_down(4.0));
+        assert_eq!(recip_up(3.0), recip_down(3.0).next_up().next_up());
+    }
+
+    #[test]
+    fn overflow_is_infinite_only_on_the_outer_side() {
+        assert_eq!(mul_up(1e200, 1e200), f64::INFINITY);
+        assert_eq!(mul_up(-1e200, 1e200), f64::MIN);
+        assert_eq!(mul_up(0.0, f64::INFINITY), 0.0);
+        assert_eq!(sub_up(f64::INFINITY, f64::INFINITY), f64::INFINITY);
+        assert_eq!(power_down(1e200, 2), f64::MAX);
+    }
+
+    #[test]
+    fn underflow_keeps_a_tiny_bound() {
+        assert!(mul_up(1e-200, 1e-200) > 0.0);
+        assert_eq!(power_down(1e-200, 2), 0.0);
+    }
+}
