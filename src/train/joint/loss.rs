@@ -129,7 +129,8 @@ impl<'a> JointLoss<'a> {
         }
     }
 
-    /// (16): with `M = [W_e^T W_d^T - I; b_e W_d^T + b_d]` it is `tr(M^T S M) / 18`, `S` the moment of `[x, 1]`.
+    /// (16): with `E = [W_e^T; b_e]` and `M = E W_d^T + [0; b_d] - [I; 0]` it is `tr(M^T S M) / 18`, `S` the moment
+    /// of `[x, 1]`. No matrix of samples is formed.
     fn reconstruction(&mut self, parameters: &Parameters, batch: &Batch) -> f64 {
         let Parameters {
             encoder,
@@ -138,28 +139,24 @@ impl<'a> JointLoss<'a> {
             decoder_bias,
             ..
         } = parameters;
-        let n = encoder.nrows();
-        let mut miss = DMatrix::zeros(n + 1, n);
-        encoder.mul_to(decoder, &mut miss.rows_mut(0, n));
-        (0..n).for_each(|i| miss[(i, i)] -= 1.0);
-        miss.row_mut(n)
-            .copy_from(&(decoder.tr_mul(encoder_bias) + decoder_bias).transpose());
-        let mut pull = &batch.state_moment * &miss;
+        let (n, d) = encoder.shape();
+        let mut extended = DMatrix::zeros(n + 1, d);
+        extended.rows_mut(0, n).copy_from(encoder);
+        extended.row_mut(n).tr_copy_from(encoder_bias);
+        let mut pull = &batch.state_moment * &extended * decoder; // S M
+        pull.ger(1.0, &batch.state_moment.column(n), decoder_bias, 1.0);
+        pull -= batch.state_moment.columns(0, n);
         for (mut column, weight) in pull.column_iter_mut().zip(self.coordinate_weights.iter()) {
             column *= weight / n as f64;
         }
-        let loss = miss.dot(&pull);
-        pull *= 2.0;
-        let (weights, bias) = (pull.rows(0, n), pull.row(n).transpose());
-        self.gradient
-            .encoder
-            .gemm(1.0, &weights, &decoder.transpose(), 1.0);
-        self.gradient.encoder_bias.gemv(1.0, decoder, &bias, 1.0);
-        self.gradient
-            .decoder
-            .gemm(1.0, &encoder.transpose(), &weights, 1.0);
-        self.gradient.decoder.ger(1.0, encoder_bias, &bias, 1.0);
-        self.gradient.decoder_bias += bias;
+        let seen = extended.tr_mul(&pull);
+        let loss = decoder.dot(&seen) + pull.row(n).tr_dot(decoder_bias)
+            - (0..n).map(|i| pull[(i, i)]).sum::<f64>();
+        let encoder_pull = &pull * decoder.transpose() * 2.0;
+        self.gradient.encoder += encoder_pull.rows(0, n);
+        self.gradient.encoder_bias += encoder_pull.row(n).transpose();
+        self.gradient.decoder += seen * 2.0;
+        self.gradient.decoder_bias += pull.row(n).transpose() * 2.0;
         loss
     }
 
