@@ -51,7 +51,7 @@ impl Schedule {
         epoch > 0
             && epoch < self.epochs
             && self.threshold_every > 0
-            && epoch % self.threshold_every == 0
+            && epoch.is_multiple_of(self.threshold_every)
     }
 }
 
