@@ -1,6 +1,6 @@
 //! Trains a model from the library, without the command line, and prints its figures on jumps it never saw.
 //!
-//! `cargo run --release --example train_model -- 4 [OUTPUT.json]`
+//! `cargo run --release --example train_model -- 4 [closed-form|joint|paper]`
 
 use std::sync::atomic::AtomicBool;
 
@@ -10,6 +10,7 @@ use romc::train::{self, Origin, Recordings, TrainOptions, Watch};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let latent_dim = std::env::args().nth(1).map_or(Ok(4), |text| text.parse())?;
+    let method = std::env::args().nth(2).unwrap_or("closed-form".into());
     let folder = "examples/recordings/go1";
     let read = |set: &str, count: usize| -> Result<Vec<Recording>, recording::RecordingError> {
         (1..=count)
@@ -19,23 +20,27 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (training, validation, test) =
         (read("train", 14)?, read("validation", 3)?, read("test", 3)?);
     let robot = Robot::by_name("go1")?;
-    let options = TrainOptions::new(format!("go1-d{latent_dim}"), latent_dim);
+    let name = format!("go1-d{latent_dim}");
+    let options = match method.as_str() {
+        "paper" => TrainOptions::paper(name, latent_dim),
+        _ => TrainOptions::new(name, latent_dim),
+    };
+    let train = if method == "closed-form" {
+        train::closed_form
+    } else {
+        train::joint
+    };
 
-    let output = std::env::args().nth(2);
-    let command = format!(
-        "cargo run --release -- train {folder}/train_*.csv.gz --validation {folder}/validation_*.csv.gz \
-         --latent-dim {latent_dim} --method closed-form --output models/go1-d{latent_dim}.json"
-    );
     let started = std::time::Instant::now();
     let (cancel, mut listener) = (AtomicBool::new(false), |_| ());
-    let trained = train::closed_form(
+    let trained = train(
         Recordings {
             training: &training,
             validation: &validation,
         },
         robot,
         &options,
-        &Origin::new(command, &training),
+        &Origin::new("cargo run --release --example train_model", &training),
         &mut Watch::new(&mut listener, &cancel),
     )?;
     println!(
@@ -43,9 +48,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         started.elapsed().as_secs_f64(),
         trained.report
     );
-    if let Some(output) = output {
-        romc::artifact::write(output.as_ref(), &trained.model)?;
-    }
     println!("test jumps: {:#?}", train::assess(&trained.model, &test)?);
     Ok(())
 }

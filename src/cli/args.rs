@@ -98,6 +98,17 @@ pub struct InspectArguments {
 pub enum TrainMethod {
     /// Encoder, decoder and coefficients each from a least-squares problem; seconds
     ClosedForm,
+    /// Encoder, decoder and coefficients together by Adam, as published; minutes
+    Joint,
+}
+
+/// Phases that a model tells apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PhaseSet {
+    /// Any foot down, no foot down
+    ContactFlight,
+    /// A front foot down, only rear feet down, no foot down
+    ContactRearFlight,
 }
 
 /// `romc train`
@@ -121,6 +132,8 @@ pub struct TrainArguments {
     /// How to learn
     #[arg(long, value_enum, default_value = "closed-form")]
     pub method: TrainMethod,
+    #[command(flatten)]
+    pub settings: TrainSettings,
     /// Robot that made the recordings
     #[arg(long, default_value = "go1")]
     pub robot: String,
@@ -132,6 +145,44 @@ pub struct TrainArguments {
     pub force: bool,
     #[command(flatten)]
     pub output_format: OutputArguments,
+}
+
+/// Settings of `romc train`; what is not given keeps the default of the method.
+#[derive(Debug, Default, Args)]
+pub struct TrainSettings {
+    /// Train exactly as published: one scale, no mask, no lift loss, Xi from ones (joint method)
+    #[arg(long)]
+    pub paper: bool,
+    /// Seed of all random choices
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Seeds to try, the best is kept (joint method)
+    #[arg(long, value_parser = at_least_one)]
+    pub seeds: Option<usize>,
+    /// Epochs of a step, refinement not counted (joint method)
+    #[arg(long, value_parser = at_least_one)]
+    pub epochs: Option<usize>,
+    /// Weight of the input energy that the latent input cannot carry
+    #[arg(long, value_name = "WEIGHT")]
+    pub lift_weight: Option<f64>,
+    /// Weight of body x, y, z in the reconstruction error
+    #[arg(long, value_name = "WEIGHT")]
+    pub body_weight: Option<f64>,
+    /// Validation error to give up for fewer terms, as a share of the least
+    #[arg(long, value_name = "SHARE")]
+    pub slack: Option<f64>,
+    /// Highest degree of the polynomial candidate terms
+    #[arg(long, value_name = "P")]
+    pub degree: Option<u32>,
+    /// Add sines and cosines of z and dz to the candidate terms
+    #[arg(long)]
+    pub trigonometric: bool,
+    /// Candidate terms of your own, separated by semicolons: "1; z1; dz1; u1; z1*dz2"
+    #[arg(long, value_name = "TERMS", conflicts_with_all = ["degree", "trigonometric"])]
+    pub terms: Option<String>,
+    /// Phases to tell apart
+    #[arg(long, value_enum)]
+    pub phases: Option<PhaseSet>,
 }
 
 /// Kinds of files that can be imported.

@@ -15,6 +15,7 @@ mod mpc;
 mod output;
 mod simulate;
 mod train;
+mod train_settings;
 mod trajectory;
 
 use std::io::{self, Write};

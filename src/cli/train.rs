@@ -2,17 +2,18 @@
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::json;
 
 use super::Answer;
 use super::args::{TrainArguments, TrainMethod};
 use super::output::{Table, check_output, read_recordings, significant, spinner};
+use super::train_settings;
 use crate::files::Overwrite;
 use crate::recording::Recording;
 use crate::robot::Robot;
-use crate::train::{Origin, Progress, Recordings, SetMetrics, TrainOptions, Trained, Watch};
+use crate::train::{Origin, Progress, Recordings, SetMetrics, Trained, Watch};
 use crate::{Error, artifact, train};
 
 /// Learns a model and writes it.
@@ -31,21 +32,34 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     };
     let all: Vec<Recording> = training.iter().chain(&validation).cloned().collect();
     let origin = Origin::new(command_line(arguments), &all);
-    let options = TrainOptions::new(model_name(arguments), arguments.latent_dim);
+    let options = train_settings::options(arguments, model_name(arguments));
 
     let bar = spinner("training");
     let mut listener = |news: Progress| match news {
         Progress::Stage { name, .. } => bar.set_message(name),
         Progress::Done { text, .. } => bar.set_message(text),
     };
-    let cancel = AtomicBool::new(false);
-    let mut watch = Watch::new(&mut listener, &cancel);
-    let trained = match arguments.method {
-        TrainMethod::ClosedForm => train::closed_form(sets, robot, &options, &origin, &mut watch)?,
+    let mut watch = Watch::new(&mut listener, stop_on_interrupt());
+    let learn = match arguments.method {
+        TrainMethod::ClosedForm => train::closed_form,
+        TrainMethod::Joint => train::joint,
     };
+    let trained = learn(sets, robot, &options, &origin, &mut watch)?;
     bar.finish_and_clear();
     artifact::write_with(&arguments.output, &trained.model, overwrite)?;
     Ok(answer(arguments, &trained))
+}
+
+/// Becomes true at the first Ctrl-C, so that a training ends with the best so far; the second one ends the process.
+fn stop_on_interrupt() -> &'static AtomicBool {
+    static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+    // Without a handler (there is one already) Ctrl-C ends the process at once, which leaves no half file either.
+    let _ = ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
+    &INTERRUPTED
 }
 
 fn model_name(arguments: &TrainArguments) -> String {
@@ -68,13 +82,20 @@ fn command_line(arguments: &TrainArguments) -> String {
     if !arguments.validation.is_empty() {
         let _ = write!(line, " --validation {}", paths(&arguments.validation));
     }
-    let TrainMethod::ClosedForm = arguments.method;
+    let method = match arguments.method {
+        TrainMethod::ClosedForm => "closed-form",
+        TrainMethod::Joint => "joint",
+    };
     let _ = write!(
         line,
-        " --latent-dim {} --method closed-form --output {}",
-        arguments.latent_dim,
-        arguments.output.display()
+        " --latent-dim {} --method {method}",
+        arguments.latent_dim
     );
+    if arguments.robot != "go1" {
+        let _ = write!(line, " --robot {}", arguments.robot);
+    }
+    line += &train_settings::as_flags(&arguments.settings);
+    let _ = write!(line, " --output {}", arguments.output.display());
     line
 }
 

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 
+use crate::ir::kernel::sin_cos;
 use crate::model::{LatentVariable, Library};
 use crate::symbolic::{ExprId, Function, Node, SymbolId};
 
@@ -28,6 +29,8 @@ enum Step {
     Product(Vec<usize>),
     Integer(usize, i32),
     Power(usize, usize),
+    Sine(usize), // followed by the cosine of the same argument, which is computed with it
+    Cosine(usize),
     Apply(Function, usize),
 }
 
@@ -124,6 +127,9 @@ impl Features {
         values.values.resize(self.steps.len(), Vec::new());
         for (index, step) in self.steps.iter().enumerate() {
             let (earlier, rest) = values.values.split_at_mut(index);
+            if let Step::Cosine(_) = step {
+                continue;
+            }
             let out = &mut rest[0];
             out.clear();
             match step {
@@ -144,6 +150,11 @@ impl Features {
                             .map(|(b, e)| b.powf(*e)),
                     );
                 }
+                Step::Sine(argument) => {
+                    let (sines, cosines) = rest.split_at_mut(1);
+                    both(&earlier[*argument], &mut sines[0], &mut cosines[0]);
+                }
+                Step::Cosine(_) => {} // done with its sine
                 Step::Apply(function, argument) => {
                     out.extend(earlier[*argument].iter().map(|v| function.evaluate(*v)))
                 }
@@ -165,6 +176,15 @@ fn fold(
         out.iter_mut()
             .zip(&earlier[part])
             .for_each(|(o, v)| *o = join(*o, *v));
+    }
+}
+
+/// Sines and cosines of all arguments.
+fn both(arguments: &[f64], sines: &mut Vec<f64>, cosines: &mut Vec<f64>) {
+    sines.resize(arguments.len(), 0.0);
+    cosines.resize(arguments.len(), 0.0);
+    for ((argument, sine), cosine) in arguments.iter().zip(sines).zip(cosines) {
+        (*sine, *cosine) = sin_cos(*argument);
     }
 }
 
@@ -214,6 +234,26 @@ impl Step {
                         earlier[*exponent][i] += a * values[own][i] * b.ln();
                     }
                 }
+            }
+            Step::Sine(argument) => {
+                let products = adjoint
+                    .iter()
+                    .zip(&values[own + 1])
+                    .map(|(a, cosine)| a * cosine);
+                earlier[*argument]
+                    .iter_mut()
+                    .zip(products)
+                    .for_each(|(e, product)| *e += product);
+            }
+            Step::Cosine(argument) => {
+                let products = adjoint
+                    .iter()
+                    .zip(&values[own - 1])
+                    .map(|(a, sine)| a * sine);
+                earlier[*argument]
+                    .iter_mut()
+                    .zip(products)
+                    .for_each(|(e, product)| *e -= product);
             }
             Step::Apply(function, argument) => {
                 for (i, a) in adjoint.iter().enumerate() {
@@ -265,11 +305,35 @@ impl Builder<'_> {
                 Step::Product(parts.iter().map(|&part| self.step(part)).collect())
             }
             Node::Power(base, exponent) => self.power(base, exponent),
+            Node::Apply(Function::Sin | Function::Cos, argument) => {
+                return self.sine_or_cosine(expression, argument);
+            }
             Node::Apply(function, argument) => Step::Apply(function, self.step(argument)),
         };
         self.steps.push(step);
         self.seen.insert(expression, self.steps.len() - 1);
         self.steps.len() - 1
+    }
+
+    /// Sine and cosine of one argument stand next to each other, whichever of them the library has.
+    fn sine_or_cosine(&mut self, expression: ExprId, argument: ExprId) -> usize {
+        let argument = self.step(argument);
+        let known = self
+            .steps
+            .iter()
+            .position(|step| *step == Step::Sine(argument));
+        let sine = known.unwrap_or_else(|| {
+            self.steps
+                .extend([Step::Sine(argument), Step::Cosine(argument)]);
+            self.steps.len() - 2
+        });
+        let is_sine = matches!(
+            self.library.pool().node(expression),
+            Node::Apply(Function::Sin, _)
+        );
+        let step = if is_sine { sine } else { sine + 1 };
+        self.seen.insert(expression, step);
+        step
     }
 
     fn variable(&self, symbol: SymbolId) -> usize {

@@ -8,6 +8,7 @@
 pub mod closed_form;
 pub mod dataset;
 pub mod features;
+pub mod joint;
 pub mod latent;
 pub mod metrics;
 pub mod progress;
@@ -20,6 +21,7 @@ pub mod weak;
 
 mod assemble;
 mod error;
+mod finish;
 mod options;
 #[cfg(test)]
 mod oscillator;
@@ -32,7 +34,10 @@ pub use assemble::{Origin, SourceFile};
 pub use closed_form::{Recordings, closed_form};
 pub use dataset::ScaleOptions;
 pub use error::TrainError;
+pub use joint::joint;
 pub use metrics::{SetMetrics, assess};
-pub use options::{EncoderOptions, LibraryChoice, RegressionOptions, TrainOptions};
+pub use options::{
+    EncoderOptions, JointOptions, LibraryChoice, RegressionOptions, TrainOptions, Transfer,
+};
 pub use progress::{Progress, Watch};
-pub use report::{PhaseTerms, TrainReport, Trained};
+pub use report::{PhaseTerms, SeedReport, TrainReport, Trained};

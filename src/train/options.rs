@@ -1,12 +1,16 @@
 //! What to train and how.
 
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
+use super::joint::{LossWeights, Schedule};
+use super::metrics::{BODY_X, BODY_Z};
 use super::sparse::Pruning;
-use crate::model::StandardLibrary;
+use crate::model::{Library, StandardLibrary};
 use crate::recording::PhaseRule;
+use crate::robot::STATE_DIM;
 
 /// Candidate terms to choose from.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +40,37 @@ pub struct TrainOptions {
     pub encoder: EncoderOptions,
     /// How Xi is fitted and chosen.
     pub regression: RegressionOptions,
+    /// Settings of the joint method only.
+    pub joint: JointOptions,
+}
+
+/// Settings of the joint training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointOptions {
+    /// Epochs, thresholding, step length.
+    pub schedule: Schedule,
+    /// Weights of the accelerations and of sparsity in the loss.
+    pub weights: LossWeights,
+    /// Samples of a batch; each phase of a jump is resampled to a multiple.
+    pub batch_rows: usize,
+    /// Value that all coefficients start at.
+    pub xi_start: f64,
+    /// How many seeds are tried, counting up from the seed of the training.
+    pub seeds: usize,
+    /// Seeds trained at the same time; the result does not depend on it.
+    pub threads: usize,
+    /// What follows the first step.
+    pub transfer: Transfer,
+}
+
+/// What follows the joint step on contact data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Transfer {
+    /// The published steps by Adam: decoder on whole jumps, then Xi of every phase.
+    Published,
+    /// Rotation of the basis, least-squares decoder, Xi chosen among regressions by rollouts.
+    Chosen,
 }
 
 /// Settings of the encoder.
@@ -91,7 +126,48 @@ impl TrainOptions {
             scaling: ScaleOptions::default(),
             encoder: EncoderOptions::default(),
             regression: RegressionOptions::default(),
+            joint: JointOptions::default(),
         }
+    }
+
+    /// The settings of the paper: one scale for everything, no mask, no lift loss, all coordinates alike, Xi starting
+    /// at ones, the published library and transfer steps, accelerations as recorded.
+    pub fn paper(name: impl Into<String>, latent_dim: usize) -> Self {
+        let plain = Self::new(name, latent_dim);
+        Self {
+            library: LibraryChoice::Standard(StandardLibrary::default()),
+            scaling: ScaleOptions::uniform(0.1),
+            encoder: EncoderOptions {
+                lift_weight: 0.0,
+                body_weight: 1.0,
+                least_std: 0.0,
+                rotate: false,
+                ..EncoderOptions::default()
+            },
+            regression: RegressionOptions {
+                smoothing: 1,
+                ..RegressionOptions::default()
+            },
+            joint: JointOptions {
+                xi_start: 1.0,
+                seeds: 1,
+                transfer: Transfer::Published,
+                ..JointOptions::default()
+            },
+            ..plain
+        }
+    }
+
+    /// The candidate terms.
+    ///
+    /// # Errors
+    /// [`TrainError::Model`] for a term that does not parse or a latent dimension out of range.
+    pub fn library(&self) -> Result<Library, TrainError> {
+        let library = match &self.library {
+            LibraryChoice::Standard(standard) => Library::standard(self.latent_dim, *standard),
+            LibraryChoice::Terms(terms) => Library::from_terms(self.latent_dim, terms),
+        };
+        library.map_err(|error| TrainError::Model(error.into()))
     }
 
     /// Complains about settings outside their range.
@@ -147,6 +223,34 @@ impl TrainOptions {
             });
         }
         Ok(())
+    }
+}
+
+impl EncoderOptions {
+    /// Weight of every coordinate in the reconstruction error, 18.
+    pub fn coordinate_weights(&self) -> DVector<f64> {
+        DVector::from_fn(STATE_DIM, |i, _| {
+            if (BODY_X..=BODY_Z).contains(&i) {
+                self.body_weight
+            } else {
+                1.0
+            }
+        })
+    }
+}
+
+impl Default for JointOptions {
+    /// The author's schedule and weights; Xi starts at 0, three seeds, all cores.
+    fn default() -> Self {
+        Self {
+            schedule: Schedule::default(),
+            weights: LossWeights::default(),
+            batch_rows: 100,
+            xi_start: 0.0,
+            seeds: 3,
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            transfer: Transfer::Chosen,
+        }
     }
 }
 

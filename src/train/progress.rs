@@ -38,6 +38,11 @@ impl<'a> Watch<'a> {
         self.cancel.load(Ordering::Relaxed)
     }
 
+    /// The flag itself, for threads that work for this training.
+    pub fn cancel_flag(&self) -> &'a AtomicBool {
+        self.cancel
+    }
+
     /// Announces a stage.
     pub fn stage(&mut self, name: &'static str, steps: usize) {
         (self.listener)(Progress::Stage { name, steps });

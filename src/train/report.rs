@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::joint::Losses;
 use super::metrics::SetMetrics;
 use super::select::Choice;
 use crate::model::ReducedModel;
@@ -24,10 +25,16 @@ pub struct TrainReport {
     pub lift_loss: f64,
     /// Active terms of every phase.
     pub active_terms: Vec<PhaseTerms>,
-    /// The regression that was chosen.
-    pub choice: Choice,
+    /// The regression that was chosen, where there was a choice.
+    pub choice: Option<Choice>,
     /// Candidates tried.
     pub candidates: usize,
+    /// The seeds of a joint training; the first is the one kept.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub seeds: Vec<SeedReport>,
+    /// Mean overlap (shared over all active terms) of the supports that two seeds found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub support_overlap: Option<f64>,
     /// Figures on the training recordings.
     pub training: SetMetrics,
     /// Figures on the validation recordings, if there were any.
@@ -40,5 +47,19 @@ pub struct PhaseTerms {
     /// Name of the phase.
     pub phase: String,
     /// Active terms.
+    pub active: usize,
+}
+
+/// What one seed of a joint training came to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SeedReport {
+    /// The seed.
+    pub seed: u64,
+    /// What seeds are compared by, less is better: the validation score of rollouts, or with the published method the
+    /// combined loss on the validation recordings.
+    pub score: f64,
+    /// Losses of the last epoch of the first step.
+    pub losses: Losses,
+    /// Active terms over all phases.
     pub active: usize,
 }

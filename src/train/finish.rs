@@ -1,0 +1,166 @@
+//! What every method does around its encoder: data sets, latent basis, decoder, chosen dynamics, figures.
+
+use nalgebra::DMatrix;
+
+use super::closed_form::Recordings;
+use super::dataset::{Dataset, Quantity};
+use super::error::TrainError;
+use super::features::Features;
+use super::latent::{Latent, least_squares_decoder};
+use super::metrics::{Assessed, BODY_X, BODY_Z, measure};
+use super::options::TrainOptions;
+use super::progress::Watch;
+use super::report::{PhaseTerms, TrainReport};
+use super::rollout::Candidate;
+use super::select::{Choice, Judge, select};
+use super::sparse::active_terms;
+use super::subspace::Moments;
+use super::varimax::{name_columns, varimax};
+use crate::model::AffineMap;
+use crate::robot::Robot;
+
+/// Training and validation jumps.
+pub(super) struct Sets {
+    pub training: Dataset,
+    pub validation: Dataset,
+}
+
+/// Numbers of a model before they are put together.
+pub(super) struct Fitted {
+    pub encoder: AffineMap,
+    pub decoder: AffineMap,
+    pub xi: Vec<DMatrix<f64>>,
+    /// The regression, if Xi was chosen among regressions, and how many were tried.
+    pub choice: Option<(Choice, usize)>,
+}
+
+impl Sets {
+    /// Cuts the recordings into phases, checks options and samples.
+    pub fn new(
+        recordings: Recordings<'_>,
+        robot: &Robot,
+        options: &TrainOptions,
+    ) -> Result<Self, TrainError> {
+        options.check()?;
+        let (scaling, smoothing) = (options.scaling.factors(), options.regression.smoothing);
+        let read = |set| Dataset::new(set, robot, &options.phases, &scaling, smoothing);
+        let training = read(recordings.training)?;
+        training.check_for_training()?;
+        Ok(Self {
+            training,
+            validation: read(recordings.validation)?,
+        })
+    }
+
+    /// Moments of the training samples.
+    pub fn moments(&self) -> Moments {
+        let gather = |quantity| self.training.gather(quantity, None);
+        Moments::new(&gather(Quantity::X), &gather(Quantity::U))
+    }
+
+    /// The jumps that candidates are judged by.
+    pub fn judged(&self) -> &Dataset {
+        if self.validation.jumps.is_empty() {
+            &self.training
+        } else {
+            &self.validation
+        }
+    }
+
+    /// The figures of fitted numbers.
+    pub fn report(&self, features: &Features, fitted: &Fitted, active: &[usize]) -> TrainReport {
+        let assessed = Assessed {
+            candidate: Candidate {
+                features,
+                xi: &fitted.xi,
+            },
+            encoder: &fitted.encoder,
+            decoder: &fitted.decoder,
+        };
+        let names = Robot::state_names();
+        let phases = self.training.phases.names().into_iter().zip(&fitted.xi);
+        let (choice, candidates) = fitted.choice.clone().unzip();
+        let validated = !self.validation.jumps.is_empty();
+        TrainReport {
+            encoded: active.iter().map(|&i| names[i].clone()).collect(),
+            lift_loss: lift_loss(&self.moments(), fitted.encoder.weights()),
+            active_terms: phases
+                .map(|(phase, xi)| PhaseTerms {
+                    phase,
+                    active: active_terms(xi),
+                })
+                .collect(),
+            choice,
+            candidates: candidates.unwrap_or(0),
+            seeds: Vec::new(),
+            support_overlap: None,
+            training: measure(assessed, &self.training),
+            validation: validated.then(|| measure(assessed, &self.validation)),
+        }
+    }
+}
+
+/// Coordinates that the encoder may look at.
+pub(super) fn active_coordinates(moments: &Moments, options: &TrainOptions) -> Vec<usize> {
+    let least_std = options.encoder.least_std * options.scaling.state;
+    moments.active_coordinates(least_std, options.encoder.least_input_share)
+}
+
+/// The encoder over a space with orthonormal `basis` (`18 x d`): rotated by varimax, latents in a telling order,
+/// `b_e = -W_e mean(x)`.
+pub(super) fn encoder_over(
+    training: &Dataset,
+    basis: &DMatrix<f64>,
+    options: &TrainOptions,
+) -> Result<AffineMap, TrainError> {
+    let x = training.gather(Quantity::X, None);
+    let std = x.column_variance().map(f64::sqrt);
+    let loadings = |basis: &DMatrix<f64>| DMatrix::from_diagonal(&std) * basis;
+    let mut basis = basis.clone();
+    if options.encoder.rotate {
+        basis *= varimax(&loadings(&basis));
+    }
+    let (order, signs) = name_columns(&loadings(&basis), &[BODY_X, BODY_Z]);
+    let mut weights = basis.select_columns(&order).transpose();
+    for (mut row, sign) in weights.row_iter_mut().zip(signs) {
+        row *= sign;
+    }
+    let bias = -(&weights * x.column_mean());
+    Ok(AffineMap::new("encoder", weights, bias)?)
+}
+
+/// Least-squares decoder and chosen dynamics for an encoder.
+pub(super) fn fit_dynamics(
+    sets: &Sets,
+    features: &Features,
+    encoder: AffineMap,
+    options: &TrainOptions,
+    watch: &mut Watch<'_>,
+) -> Result<Fitted, TrainError> {
+    let decoder = least_squares_decoder(&sets.training, &encoder)?;
+    let latent = Latent::of(&sets.training, &encoder);
+    let judged = Latent::of(sets.judged(), &encoder);
+    let judge = Judge::new(sets.judged(), &judged, options.regression.rollout_weight);
+    let selected = select(
+        &sets.training,
+        &latent,
+        features,
+        &judge,
+        &options.regression,
+        watch,
+    )?;
+    let choice = Some((selected.choice, selected.candidates));
+    Ok(Fitted {
+        encoder,
+        decoder,
+        xi: selected.xi,
+        choice,
+    })
+}
+
+/// Share of the training input's energy outside the encoder's row space.
+fn lift_loss(moments: &Moments, weights: &DMatrix<f64>) -> f64 {
+    let projection = super::latent::input_projection(weights);
+    let carried = &projection * &moments.input * weights.transpose();
+    1.0 - carried.trace() / moments.input.trace().max(f64::MIN_POSITIVE)
+}

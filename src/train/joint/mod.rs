@@ -1,0 +1,16 @@
+//! Joint training of encoder, decoder and dynamics by Adam, as published and improved.
+//!
+//! Enters: recordings and [`JointOptions`]. Leaves: a trained model. Read [`loss`] first (equations 9 to 20 and their
+//! gradient), then [`stages`] (the transfer steps of section IV-D) and [`joint`] (seeds, choice, assembly).
+
+pub mod batch;
+pub mod loss;
+pub mod parameters;
+pub mod stages;
+
+mod adam;
+mod run;
+
+pub use loss::{LossWeights, Losses};
+pub use run::joint;
+pub use stages::Schedule;

@@ -1,0 +1,343 @@
+//! A whole joint training: seeds in parallel, the best kept, figures and model.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Sender, channel};
+
+use nalgebra::DMatrix;
+
+use super::batch::{Batch, BatchOptions, batches};
+use super::loss::{JointLoss, LossWeights, Losses};
+use super::parameters::Parameters;
+use super::stages::{train_decoder, train_together, train_xi};
+use crate::model::AffineMap;
+use crate::robot::{Robot, STATE_DIM};
+use crate::train::assemble::{Origin, Parts, assemble};
+use crate::train::closed_form::Recordings;
+use crate::train::dataset::Quantity;
+use crate::train::error::TrainError;
+use crate::train::features::Features;
+use crate::train::finish::{Fitted, Sets, active_coordinates, encoder_over, fit_dynamics};
+use crate::train::options::{JointOptions, TrainOptions, Transfer};
+use crate::train::progress::Watch;
+use crate::train::random::Random;
+use crate::train::report::{SeedReport, Trained};
+use crate::train::sparse::active_terms;
+
+/// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
+///
+/// Every seed is trained on its own, on as many threads as the options say; the one of least score is kept. A
+/// cancelled training finishes with what the seeds have by then. Deterministic for a seed, on any number of threads.
+///
+/// # Errors
+/// [`TrainError`]: options out of range, too few samples, no stable model.
+pub fn joint(
+    recordings: Recordings<'_>,
+    robot: &'static Robot,
+    options: &TrainOptions,
+    origin: &Origin,
+    watch: &mut Watch<'_>,
+) -> Result<Trained, TrainError> {
+    let sets = Sets::new(recordings, robot, options)?;
+    let active = active_coordinates(&sets.moments(), options);
+    if options.latent_dim == 0 || options.latent_dim > active.len() {
+        return Err(TrainError::LatentDim {
+            requested: options.latent_dim,
+            active: active.len(),
+        });
+    }
+    let library = options.library()?;
+    let features = Features::new(&library);
+    let scaling = options.scaling.factors();
+    let batch_options = BatchOptions {
+        phases: &options.phases,
+        scaling: &scaling,
+        rows: options.joint.batch_rows,
+        smoothing: options.regression.smoothing,
+    };
+    let training = batches(recordings.training, robot, &batch_options)?;
+    let task = Task {
+        sets: &sets,
+        batches: &training,
+        features: &features,
+        active: &active,
+        options,
+    };
+    let runs = task.run_seeds(watch);
+
+    let validation = batches(recordings.validation, robot, &batch_options)?;
+    let judged = if validation.is_empty() {
+        &training
+    } else {
+        &validation
+    };
+    let mut finished = Vec::new();
+    for run in runs {
+        finished.push(task.finish(run, judged, watch)?);
+    }
+    let overlap = mean_overlap(&finished);
+    finished.sort_by(|(a, _), (b, _)| a.score.total_cmp(&b.score));
+    let (seeds, mut fitted): (Vec<SeedReport>, Vec<Fitted>) = finished.into_iter().unzip();
+    if fitted.is_empty() {
+        return Err(TrainError::Cancelled);
+    }
+    let fitted = fitted.swap_remove(0);
+    let mut report = sets.report(&features, &fitted, &active);
+    (report.seeds, report.support_overlap) = (seeds, overlap);
+    let parts = Parts {
+        library,
+        encoder: fitted.encoder,
+        decoder: fitted.decoder,
+        xi: fitted.xi,
+    };
+    let model = assemble(
+        parts,
+        &sets.training,
+        robot,
+        options,
+        "joint",
+        origin,
+        &report,
+    )?;
+    Ok(Trained { model, report })
+}
+
+/// What all seeds share.
+struct Task<'a> {
+    sets: &'a Sets,
+    batches: &'a [Batch],
+    features: &'a Features,
+    active: &'a [usize],
+    options: &'a TrainOptions,
+}
+
+/// Parameters of one seed; with the published transfer Xi of every phase.
+struct Run {
+    seed: u64,
+    parameters: Parameters,
+    xi: Vec<DMatrix<f64>>,
+    losses: Losses,
+}
+
+impl Task<'_> {
+    /// Trains all seeds on the threads of the options, in rounds; results are in the order of the seeds.
+    fn run_seeds(&self, watch: &mut Watch<'_>) -> Vec<Run> {
+        let JointOptions {
+            seeds,
+            threads,
+            ref schedule,
+            ..
+        } = self.options.joint;
+        watch.stage(
+            "training encoder, decoder and dynamics",
+            seeds * schedule.total(),
+        );
+        let seeds: Vec<u64> = (0..seeds as u64)
+            .map(|i| self.options.seed.wrapping_add(i))
+            .collect();
+        let cancel = watch.cancel_flag();
+        let mut runs = Vec::new();
+        for (round, group) in seeds.chunks(threads.max(1)).enumerate() {
+            let done_before = round * threads.max(1) * schedule.total();
+            let (sender, receiver) = channel();
+            std::thread::scope(|scope| {
+                let workers: Vec<_> = group
+                    .iter()
+                    .map(|&seed| {
+                        let sender = sender.clone();
+                        scope.spawn(move || self.run_seed(seed, cancel, &sender))
+                    })
+                    .collect();
+                drop(sender);
+                for (done, text) in receiver.iter().enumerate() {
+                    watch.done(done_before + done + 1, text);
+                }
+                runs.extend(
+                    workers
+                        .into_iter()
+                        .map(|worker| worker.join().expect("a seed does not panic")),
+                );
+            });
+        }
+        runs
+    }
+
+    fn run_seed(&self, seed: u64, cancel: &AtomicBool, news: &Sender<String>) -> Run {
+        let options = &self.options.joint;
+        let weights = LossWeights {
+            lift: self.options.encoder.lift_weight,
+            ..options.weights
+        };
+        let contact: Vec<&Batch> = self
+            .batches
+            .iter()
+            .filter(|batch| batch.phase == 0)
+            .collect();
+        let mut parameters = self.start(seed);
+        let coordinate_weights = self.options.encoder.coordinate_weights();
+        let mut loss = JointLoss::new(self.features, weights, coordinate_weights);
+        let mask: Vec<bool> = (0..STATE_DIM).map(|i| self.active.contains(&i)).collect();
+        let mut listener = |epoch: usize, losses: &Losses, active: usize| {
+            // Nobody listens any more if the training is being dropped; that ends soon by itself.
+            let _ = news.send(format!(
+                "seed {seed} epoch {epoch}: loss {:.3e}, decoder {:.3e}, {active} terms",
+                losses.total(&weights),
+                losses.decoder
+            ));
+            !cancel.load(Ordering::Relaxed)
+        };
+        let losses = train_together(
+            &mut parameters,
+            &contact,
+            &mut loss,
+            weights,
+            &mask,
+            &options.schedule,
+            &mut listener,
+        );
+        let mut run = Run {
+            seed,
+            parameters,
+            xi: Vec::new(),
+            losses,
+        };
+        if options.transfer == Transfer::Published {
+            self.transfer(&mut run, weights, cancel);
+        }
+        run
+    }
+
+    /// Where a seed starts: random maps, `b_e = 0` as published or `-W_e mean(x)`.
+    fn start(&self, seed: u64) -> Parameters {
+        let JointOptions {
+            xi_start, transfer, ..
+        } = self.options.joint;
+        let mut random = Random::new(seed);
+        let (d, p) = (self.options.latent_dim, self.features.library_dim());
+        let mut parameters = Parameters::random(STATE_DIM, d, p, xi_start, &mut random);
+        if transfer == Transfer::Chosen {
+            let mean = self
+                .sets
+                .training
+                .gather(Quantity::X, Some(0))
+                .column_mean();
+            parameters.encoder_bias = -(parameters.encoder.tr_mul(&mean));
+            parameters.decoder_bias = mean;
+        }
+        parameters
+    }
+
+    /// Steps two and three as published.
+    fn transfer(&self, run: &mut Run, weights: LossWeights, cancel: &AtomicBool) {
+        let schedule = &self.options.joint.schedule;
+        let mut listener = |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
+        let all: Vec<&Batch> = self.batches.iter().collect();
+        train_decoder(&mut run.parameters, &all, schedule, &mut listener);
+        for phase in 0..self.sets.training.phases.patterns.len() {
+            let own: Vec<&Batch> = self
+                .batches
+                .iter()
+                .filter(|batch| batch.phase == phase)
+                .collect();
+            let start = DMatrix::from_element(
+                self.features.library_dim(),
+                self.options.latent_dim,
+                self.options.joint.xi_start,
+            );
+            let (xi, _) = train_xi(
+                &run.parameters,
+                &own,
+                self.features,
+                weights,
+                schedule,
+                start,
+                &mut listener,
+            );
+            run.xi.push(xi);
+        }
+    }
+
+    /// The model numbers of a run, and what it is compared by.
+    fn finish(
+        &self,
+        run: Run,
+        judged: &[Batch],
+        watch: &mut Watch<'_>,
+    ) -> Result<(SeedReport, Fitted), TrainError> {
+        let (fitted, score) = match self.options.joint.transfer {
+            Transfer::Published => (published(&run)?, self.published_score(&run, judged)),
+            Transfer::Chosen => {
+                let basis = run.parameters.encoder.clone().qr().q();
+                let encoder = encoder_over(&self.sets.training, &basis, self.options)?;
+                let fitted = fit_dynamics(self.sets, self.features, encoder, self.options, watch)?;
+                let score = fitted
+                    .choice
+                    .as_ref()
+                    .map_or(f64::INFINITY, |(choice, _)| choice.score);
+                (fitted, score)
+            }
+        };
+        let active = fitted.xi.iter().map(active_terms).sum();
+        Ok((
+            SeedReport {
+                seed: run.seed,
+                score,
+                losses: run.losses,
+                active,
+            },
+            fitted,
+        ))
+    }
+
+    /// Mean combined loss over batches of all phases.
+    fn published_score(&self, run: &Run, judged: &[Batch]) -> f64 {
+        let weights = self.options.joint.weights;
+        let mut loss = JointLoss::new(
+            self.features,
+            weights,
+            self.options.encoder.coordinate_weights(),
+        );
+        let mut parameters = run.parameters.clone();
+        let mut total = 0.0;
+        for batch in judged {
+            parameters.xi.copy_from(&run.xi[batch.phase]);
+            total += loss.evaluate(&parameters, batch).total(&weights);
+        }
+        total / judged.len().max(1) as f64
+    }
+}
+
+/// The numbers as Adam left them.
+fn published(run: &Run) -> Result<Fitted, TrainError> {
+    let Parameters {
+        encoder,
+        encoder_bias,
+        decoder,
+        decoder_bias,
+        ..
+    } = &run.parameters;
+    Ok(Fitted {
+        encoder: AffineMap::new("encoder", encoder.transpose(), encoder_bias.clone())?,
+        decoder: AffineMap::new("decoder", decoder.transpose(), decoder_bias.clone())?,
+        xi: run.xi.clone(),
+        choice: None,
+    })
+}
+
+/// Mean over pairs of seeds of (terms active in both) / (terms active in either).
+fn mean_overlap(finished: &[(SeedReport, Fitted)]) -> Option<f64> {
+    let (mut sum, mut pairs) = (0.0, 0);
+    for (i, (_, first)) in finished.iter().enumerate() {
+        for (_, second) in &finished[i + 1..] {
+            let (mut both, mut either) = (0, 0);
+            for (a, b) in first.xi.iter().zip(&second.xi) {
+                for (a, b) in a.iter().zip(b.iter()) {
+                    both += usize::from(*a != 0.0 && *b != 0.0);
+                    either += usize::from(*a != 0.0 || *b != 0.0);
+                }
+            }
+            sum += f64::from(both as u32) / f64::from((either as u32).max(1));
+            pairs += 1;
+        }
+    }
+    (pairs > 0).then(|| sum / f64::from(pairs))
+}
