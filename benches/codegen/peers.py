@@ -133,7 +133,7 @@ def casadi_code(name, model):
     rows = casadi.cse([ddz, jacobian.T])
     text = ""
     for suffix, outputs in (("", [casadi.cse(ddz)]), ("_jac", rows)):
-        function = casadi.Function(f"{name}{suffix}_casadi", [z, dz, u], outputs)
+        function = casadi.Function(f"sx{suffix}_function", [z, dz, u], outputs)
         generator = casadi.CodeGenerator(f"{name}{suffix}_gen.c")
         generator.add(function)
         body = generator.dump().replace("casadi_", f"{name}{suffix}_casadi_")

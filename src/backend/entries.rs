@@ -1,7 +1,7 @@
 //! What is generated for a model: programs, with names, roles and documentation.
 
 use super::code::Role;
-use crate::ir::{Program, Slot};
+use crate::ir::{Program, Slot, Statement, Unary};
 use crate::lower::{self, JacobianPattern, LowerError, LowerOptions};
 use crate::model::{ModelError, ReducedModel, Signals};
 
@@ -62,6 +62,20 @@ pub struct ModelEntries {
     pub maps: Vec<Entry>,
     /// Phases in the order of the model.
     pub phases: Vec<PhaseEntries>,
+}
+
+impl PhaseEntries {
+    /// An angle beyond the kernel's limit for the test of batches, or one within it if the
+    /// accelerations have functions that overflow there.
+    pub fn far_angle(&self) -> &'static str {
+        let overflows = self.dynamics.program.statements().iter().any(|statement| {
+            matches!(
+                statement,
+                Statement::Unary(Unary::Exp | Unary::Tan | Unary::Tanh | Unary::Log, _)
+            )
+        });
+        if overflows { "0.125" } else { "9000.125" }
+    }
 }
 
 impl ModelEntries {

@@ -196,7 +196,9 @@ impl Dialect for CDialect {
         vec![
             format!("double {sine}, {cosine};"),
             format!("{name}_sin_cos_reduced({argument}, &{sine}, &{cosine});"),
-            format!("beyond |= (uint64_t)!(fabs({argument}) <= {upper}_ANGLE_LIMIT);"),
+            // A choice between numbers: compilers vectorise it where they do not vectorise a
+            // comparison that becomes an integer.
+            format!("beyond[lane] = fabs({argument}) <= {upper}_ANGLE_LIMIT ? beyond[lane] : 1.0;"),
         ]
     }
 

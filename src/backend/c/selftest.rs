@@ -17,7 +17,8 @@ struct SelfTest<'a> {
     points: usize,
     latent_dim: usize,
     tests: Vec<Test>,
-    phases: Vec<&'a str>,
+    /// Phases, each with an angle that its batches meet.
+    phases: Vec<(&'a str, &'static str)>,
 }
 
 struct Test {
@@ -65,7 +66,7 @@ pub(super) fn render(entries: &ModelEntries, banner: &str) -> Result<String, Emi
         phases: entries
             .phases
             .iter()
-            .map(|phase| phase.identifier.as_str())
+            .map(|phase| (phase.identifier.as_str(), phase.far_angle()))
             .collect(),
     };
     Ok(test.render()?)

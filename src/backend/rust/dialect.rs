@@ -137,7 +137,9 @@ impl Dialect for RustDialect {
         let (sine, cosine) = (name(0), name(1));
         vec![
             format!("let ({sine}, {cosine}) = sin_cos_reduced({argument});"),
-            format!("beyond |= u64::from(!(math::abs({argument}) <= ANGLE_LIMIT));"),
+            format!(
+                "beyond[lane] = if math::abs({argument}) <= ANGLE_LIMIT {{ beyond[lane] }} else {{ 1.0 }};"
+            ),
         ]
     }
 

@@ -16,7 +16,8 @@ struct SelfTest<'a> {
     tolerance: String,
     latent_dim: usize,
     tests: Vec<Test>,
-    phases: Vec<&'a str>,
+    /// Phases, each with an angle that its batches meet.
+    phases: Vec<(&'a str, &'static str)>,
 }
 
 struct Test {
@@ -41,7 +42,7 @@ pub(super) fn render(entries: &ModelEntries, banner: &str) -> Result<String, Emi
         phases: entries
             .phases
             .iter()
-            .map(|phase| phase.identifier.as_str())
+            .map(|phase| (phase.identifier.as_str(), phase.far_angle()))
             .collect(),
     };
     Ok(test.render()?)
