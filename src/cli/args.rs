@@ -281,7 +281,7 @@ pub struct ImportArguments {
     /// How coefficients are stored, if their shape does not tell
     #[arg(long, value_enum)]
     pub xi_layout: Option<StoredXi>,
-    /// Candidate terms: degree=N[,trigonometric][,inputs], or a file with the list of terms
+    /// Candidate terms: `degree=N[,trigonometric][,inputs]`, or a file with the list of terms
     #[arg(long, value_name = "LIBRARY", value_parser = library_argument)]
     pub library: Option<LibraryArgument>,
     /// Order of the sines and cosines of degree=N,trigonometric

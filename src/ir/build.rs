@@ -208,7 +208,7 @@ impl ProgramBuilder {
     /// The finished program.
     ///
     /// # Errors
-    /// What [`validate`] finds: a value used before its definition, a non-finite
+    /// What validation finds: a value used before its definition, a non-finite
     /// constant, a table whose shape does not fit its statement, a slot without elements.
     pub fn finish(self) -> Result<Program, IrError> {
         validate(&self.program)?;

@@ -16,7 +16,7 @@
 //! `S` is the covariance of the training inputs. How far the model's accelerations are to be
 //! believed, `R`, the reference tells itself: input and residual of a least-squares model are
 //! uncorrelated, so `Cov(y) = B S Bᵀ + R`, and `R` is what `B S Bᵀ` leaves of the sample covariance
-//! (in units of the standard deviations of `y`, eigenvalues not below [`RESIDUAL_FLOOR`]). Latents
+//! (in units of the standard deviations of `y`, eigenvalues not below `RESIDUAL_FLOOR`). Latents
 //! whose acceleration the model hardly explains then hardly count.
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};

@@ -126,7 +126,7 @@ impl StageRows {
     /// The rows for a model on its robot.
     ///
     /// Unless all are asked for, two kinds are left out, once: rows that the others imply to within
-    /// 2 % of the limit, and torque rows that in no phase an input within [`INPUT_REACH`] standard
+    /// 2 % of the limit, and torque rows that in no phase an input within `INPUT_REACH` standard
     /// deviations of the training inputs can reach. A plan may pass a limit that was left out, by
     /// 2 % or by asking for an input unlike any in training; the command is clamped and does not.
     pub fn new(plant: &Plant, settings: &MpcSettings) -> Self {
@@ -159,7 +159,7 @@ impl StageRows {
 }
 
 impl StageRows {
-    /// The same without the joint rows that no state within [`STATE_REACH`] standard deviations of
+    /// The same without the joint rows that no state within `STATE_REACH` standard deviations of
     /// some state of the reference reaches, the deviations being the reference's own.
     ///
     /// Joint limits are soft and positions in commands are clamped, so what is given up is only that
@@ -179,7 +179,7 @@ impl StageRows {
     }
 }
 
-/// Whether an input within [`INPUT_REACH`] standard deviations reaches a row's bound in some phase:
+/// Whether an input within `INPUT_REACH` standard deviations reaches a row's bound in some phase:
 /// the farthest that such inputs go along the row is `row · m + reach ‖Cᵀ row‖`.
 fn is_reachable(plant: &Plant, row: &Row) -> bool {
     let direction = DVector::from_column_slice(&row.row);

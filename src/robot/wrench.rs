@@ -20,7 +20,7 @@ impl Robot {
     ///
     /// # Errors
     /// [`RobotError::SingularLeg`] at full extension (see
-    /// [`SINGULAR_BOUND`](super::kinematics::SINGULAR_BOUND)),
+    /// [`SINGULAR_BOUND`]),
     /// [`RobotError::NotFinite`] for NaN or infinite arguments.
     pub fn foot_force(
         &self,

@@ -24,7 +24,7 @@ pub struct Recordings<'a> {
 ///
 /// The encoder's rows span the space of least reconstruction error and lift loss ([`find_subspace`]), rotated by
 /// varimax; its bias puts the mean of the training states at `z = 0`. The decoder is the least-squares one over all
-/// phases. Xi is chosen a phase among many regressions by rollouts ([`select`]). Deterministic.
+/// phases. Xi is chosen a phase among many regressions by rollouts ([`select`](super::select)). Deterministic.
 ///
 /// # Errors
 /// [`TrainError`]: options out of range, too few samples, too many latent coordinates, no stable model.

@@ -4,7 +4,7 @@
 //! [`EquationSystem`] a phase, made of [`Math`] trees in which fractions, roots,
 //! parentheses, signs and rounded coefficients have their final place. The LaTeX,
 //! Markdown and MathML backends spell the same trees. Read [`tree`] first, then
-//! [`expression`] (from the algebra to the tree) and [`equations`].
+//! [`expression()`] (from the algebra to the tree) and [`equations`].
 
 mod decimal;
 pub mod equations;

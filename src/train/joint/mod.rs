@@ -1,6 +1,6 @@
 //! Joint training of encoder, decoder and dynamics by Adam, as published and improved.
 //!
-//! Enters: recordings and [`JointOptions`]. Leaves: a trained model. Read [`loss`] first (equations 9 to 20 and their
+//! Enters: recordings and [`JointOptions`](super::JointOptions). Leaves: a trained model. Read [`loss`] first (equations 9 to 20 and their
 //! gradient), then [`stages`] (the transfer steps of section IV-D) and [`joint`] (seeds, choice, assembly).
 
 pub mod batch;
