@@ -52,10 +52,10 @@ pub fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
     write_with(path, recording, &WriteOptions::default())
 }
 
-/// [`write`] with a choice of notation and columns.
+/// [`write()`] with a choice of notation and columns.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_with(
     path: &Path,
     recording: &Recording,

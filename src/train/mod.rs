@@ -1,7 +1,7 @@
 //! Learning: recordings in, a reduced-order model with its figures out.
 //!
 //! Enters: recordings of jumps, a robot, [`TrainOptions`]. Leaves: a [`Trained`] model, whose provenance says how to
-//! repeat it, and a [`TrainReport`]. Read [`closed_form`] first: it walks from the dataset over the encoder's row
+//! repeat it, and a [`TrainReport`]. Read [`closed_form()`] first: it walks from the dataset over the encoder's row
 //! space ([`subspace`], [`varimax`]) and the decoder ([`latent`]) to the dynamics ([`weak`], [`sparse`], [`select`]),
 //! judged by [`rollout`]s.
 
