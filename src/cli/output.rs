@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn significant_keeps_four_digits() {
-        assert_eq!(significant(0.012345), "0.01234");
+        assert_eq!(significant(0.0123449), "0.01234");
         assert_eq!(significant(12.3456), "12.35");
         assert_eq!(significant(0.0), "0");
         assert_eq!(significant(1.23456e-7), "1.235e-7");
