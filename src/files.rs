@@ -40,12 +40,6 @@ pub fn write_whole(
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
     let beside = beside(path)?;
-    if let Some(folder) = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-    {
-        fs::create_dir_all(folder)?;
-    }
     let written = fill_file(&beside, fill).and_then(|()| fs::rename(&beside, path));
     if written.is_err() {
         // The first error is the one worth telling; a file that cannot be removed changes nothing.
