@@ -54,7 +54,9 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
     }
 }
 
-fn reduced_sin_cos(x: f64) -> (f64, f64) {
+/// Sine and cosine of `x` rad with `|x|` up to [`LIMIT`]; without a branch, so that loops over it vectorise.
+#[inline(always)]
+pub fn reduced_sin_cos(x: f64) -> (f64, f64) {
     let shifted = x * TWO_OVER_PI + ROUND;
     let quadrant = shifted.to_bits();
     let multiple = shifted - ROUND;

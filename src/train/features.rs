@@ -1,14 +1,15 @@
 //! The candidate library over whole batches of samples, forwards and backwards.
 //!
 //! Every term of the library becomes a few steps of one straight-line tape with shared subexpressions; each step is
-//! computed for all samples of a batch before the next one starts. The reverse sweep turns the gradient with respect
+//! computed for all samples of a batch before the next one starts, with the vector units of the machine. The reverse sweep turns the gradient with respect
 //! to the terms into the gradient with respect to `z`, `dz` and `u_lat`, exactly.
 
 use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
+use pulp::{Arch, Simd, WithSimd};
 
-use crate::ir::kernel::sin_cos;
+use crate::ir::kernel::{LIMIT, reduced_sin_cos, sin_cos};
 use crate::model::{LatentVariable, Library};
 use crate::symbolic::{ExprId, Function, Node, SymbolId};
 
@@ -108,25 +109,44 @@ impl Features {
                 .zip(column.iter())
                 .for_each(|(a, g)| *a += g);
         }
-        for index in (0..self.steps.len()).rev() {
-            let (earlier, rest) = values.adjoints.split_at_mut(index);
-            self.steps[index].pull_back(&values.values, index, &rest[0], earlier);
-            if let Step::Variable(column) = self.steps[index] {
-                gradient
-                    .column_mut(column)
-                    .iter_mut()
-                    .zip(&rest[0])
-                    .for_each(|(g, a)| *g += a);
-            }
-        }
+        Arch::new().dispatch(Backward {
+            steps: &self.steps,
+            values,
+            gradient: gradient.as_mut_slice(),
+        });
     }
 
     /// Computes every step for all samples; see [`Self::evaluate`] for the shape of `variables`.
     pub fn forward(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) {
+        Arch::new().dispatch(Forward {
+            steps: &self.steps,
+            variables,
+            values: &mut values.values,
+        });
+    }
+}
+
+/// All steps in their order, compiled for several vector units.
+struct Forward<'a> {
+    steps: &'a [Step],
+    variables: &'a DMatrix<f64>,
+    values: &'a mut Vec<Vec<f64>>,
+}
+
+impl WithSimd for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self {
+            steps,
+            variables,
+            values,
+        } = self;
         let n = variables.nrows();
-        values.values.resize(self.steps.len(), Vec::new());
-        for (index, step) in self.steps.iter().enumerate() {
-            let (earlier, rest) = values.values.split_at_mut(index);
+        values.resize(steps.len(), Vec::new());
+        for (index, step) in steps.iter().enumerate() {
+            let (earlier, rest) = values.split_at_mut(index);
             if let Step::Cosine(_) = step {
                 continue;
             }
@@ -138,7 +158,11 @@ impl Features {
                     out.extend_from_slice(variables.column(*column).as_slice())
                 }
                 Step::Sum(parts) => fold(out, earlier, parts, n, 0.0, |a, b| a + b),
+                Step::Product(parts) if let [a, b] = parts[..] => {
+                    out.extend(earlier[a].iter().zip(&earlier[b]).map(|(a, b)| a * b))
+                }
                 Step::Product(parts) => fold(out, earlier, parts, n, 1.0, |a, b| a * b),
+                Step::Integer(base, 2) => out.extend(earlier[*base].iter().map(|v| v * v)),
                 Step::Integer(base, exponent) => {
                     out.extend(earlier[*base].iter().map(|v| v.powi(*exponent)))
                 }
@@ -163,13 +187,38 @@ impl Features {
     }
 }
 
+/// All steps in the opposite order, compiled for several vector units.
+struct Backward<'a> {
+    steps: &'a [Step],
+    values: &'a mut FeatureValues,
+    gradient: &'a mut [f64],
+}
+
+impl WithSimd for Backward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let FeatureValues { values, adjoints } = self.values;
+        for (index, step) in self.steps.iter().enumerate().rev() {
+            let (earlier, rest) = adjoints.split_at_mut(index);
+            step.pull_back(values, index, &rest[0], earlier);
+            if let Step::Variable(column) = *step {
+                let n = rest[0].len();
+                add(&mut self.gradient[n * column..n * (column + 1)], &rest[0]);
+            }
+        }
+    }
+}
+
+#[inline(always)]
 fn fold(
     out: &mut Vec<f64>,
     earlier: &[Vec<f64>],
     parts: &[usize],
     n: usize,
     start: f64,
-    join: fn(f64, f64) -> f64,
+    join: impl Fn(f64, f64) -> f64,
 ) {
     out.resize(n, start);
     for &part in parts {
@@ -179,16 +228,28 @@ fn fold(
     }
 }
 
+#[inline(always)]
+fn add(out: &mut [f64], values: &[f64]) {
+    for (o, v) in out.iter_mut().zip(values) {
+        *o += v;
+    }
+}
+
 /// Sines and cosines of all arguments.
+#[inline(always)]
 fn both(arguments: &[f64], sines: &mut Vec<f64>, cosines: &mut Vec<f64>) {
     sines.resize(arguments.len(), 0.0);
     cosines.resize(arguments.len(), 0.0);
-    for ((argument, sine), cosine) in arguments.iter().zip(sines).zip(cosines) {
-        (*sine, *cosine) = sin_cos(*argument);
+    let each = arguments.iter().zip(sines).zip(cosines);
+    if arguments.iter().fold(0.0, |m: f64, v| m.max(v.abs())) <= LIMIT {
+        each.for_each(|((v, sine), cosine)| (*sine, *cosine) = reduced_sin_cos(*v));
+    } else {
+        each.for_each(|((v, sine), cosine)| (*sine, *cosine) = sin_cos(*v));
     }
 }
 
 impl Step {
+    #[inline(always)]
     /// Adds this step's adjoint, times its derivatives, to the adjoints of its operands.
     fn pull_back(
         &self,
@@ -201,24 +262,19 @@ impl Step {
             Step::Number(_) | Step::Variable(_) => {}
             Step::Sum(parts) => {
                 for &part in parts {
-                    earlier[part]
-                        .iter_mut()
-                        .zip(adjoint)
-                        .for_each(|(e, a)| *e += a);
+                    add(&mut earlier[part], adjoint);
                 }
             }
             Step::Product(parts) => {
                 for (position, &part) in parts.iter().enumerate() {
-                    for (i, a) in adjoint.iter().enumerate() {
-                        let others: f64 = parts
-                            .iter()
-                            .enumerate()
-                            .filter(|(other, _)| *other != position)
-                            .map(|(_, &other)| values[other][i])
-                            .product();
-                        earlier[part][i] += a * others;
-                    }
+                    let mut others = parts.clone();
+                    others.remove(position);
+                    add_times(&mut earlier[part], adjoint, values, &others);
                 }
+            }
+            Step::Integer(base, 2) => {
+                add_times(&mut earlier[*base], adjoint, values, &[*base]);
+                add_times(&mut earlier[*base], adjoint, values, &[*base]);
             }
             Step::Integer(base, exponent) => {
                 for (i, a) in adjoint.iter().enumerate() {
@@ -236,30 +292,42 @@ impl Step {
                 }
             }
             Step::Sine(argument) => {
-                let products = adjoint
-                    .iter()
-                    .zip(&values[own + 1])
-                    .map(|(a, cosine)| a * cosine);
-                earlier[*argument]
-                    .iter_mut()
-                    .zip(products)
-                    .for_each(|(e, product)| *e += product);
+                add_times(&mut earlier[*argument], adjoint, values, &[own + 1]);
             }
             Step::Cosine(argument) => {
-                let products = adjoint
-                    .iter()
-                    .zip(&values[own - 1])
-                    .map(|(a, sine)| a * sine);
-                earlier[*argument]
+                for ((e, a), sine) in earlier[*argument]
                     .iter_mut()
-                    .zip(products)
-                    .for_each(|(e, product)| *e -= product);
+                    .zip(adjoint)
+                    .zip(&values[own - 1])
+                {
+                    *e -= a * sine;
+                }
             }
             Step::Apply(function, argument) => {
                 for (i, a) in adjoint.iter().enumerate() {
                     earlier[*argument][i] +=
                         a * slope(*function, values[*argument][i], values[own][i]);
                 }
+            }
+        }
+    }
+}
+
+/// Adds to `out` the adjoint times the values of the steps `factors`.
+#[inline(always)]
+fn add_times(out: &mut [f64], adjoint: &[f64], values: &[Vec<f64>], factors: &[usize]) {
+    match *factors {
+        [factor] => {
+            for ((o, a), v) in out.iter_mut().zip(adjoint).zip(&values[factor]) {
+                *o += a * v;
+            }
+        }
+        _ => {
+            for (i, (o, a)) in out.iter_mut().zip(adjoint).enumerate() {
+                *o += a * factors
+                    .iter()
+                    .map(|&other| values[other][i])
+                    .product::<f64>();
             }
         }
     }

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use super::batch::Batch;
+use super::multiply::{Columns, add_product, add_transposed, product_into};
 use super::parameters::Parameters;
 use crate::train::features::{FeatureValues, Features};
 
@@ -190,43 +191,62 @@ impl<'a> JointLoss<'a> {
             self.variables = DMatrix::zeros(n, 3 * d);
             self.pulled = DMatrix::zeros(n, 3 * d);
         }
-        batch
-            .x
-            .mul_to(&parameters.encoder, &mut self.variables.columns_mut(0, d));
+        product_into(
+            &mut self.variables,
+            0,
+            Columns::all(&batch.x),
+            &parameters.encoder,
+        );
         for (i, bias) in parameters.encoder_bias.iter().enumerate() {
             self.variables.column_mut(i).add_scalar_mut(*bias);
         }
-        batch
-            .dx
-            .mul_to(&parameters.encoder, &mut self.variables.columns_mut(d, d));
-        batch.u.mul_to(
+        product_into(
+            &mut self.variables,
+            d,
+            Columns::all(&batch.dx),
+            &parameters.encoder,
+        );
+        product_into(
+            &mut self.variables,
+            2 * d,
+            Columns::all(&batch.u),
             &projection.weights,
-            &mut self.variables.columns_mut(2 * d, d),
         );
         let theta = self.features.evaluate(&self.variables, &mut self.values);
-        let predicted = &theta * &parameters.xi;
+        let mut predicted = DMatrix::zeros(n, d);
+        add_product(&mut predicted, 1.0, &theta, &parameters.xi);
 
         let mut latent_miss = predicted.clone();
-        latent_miss.gemm(-1.0, &batch.ddx, &parameters.encoder, 1.0);
+        add_product(&mut latent_miss, -1.0, &batch.ddx, &parameters.encoder);
         let ddz = latent_miss.norm_squared() / (n * d) as f64;
         latent_miss *= 2.0 * self.weights.ddz / (n * d) as f64;
-        self.gradient.encoder -= batch.ddx.tr_mul(&latent_miss);
+        let (ddx_columns, missed) = (Columns::all(&batch.ddx), Columns::all(&latent_miss));
+        add_transposed(&mut self.gradient.encoder, -1.0, ddx_columns, missed);
 
         // (18) over the moments of predictions and accelerations: no n x 18 matrix is formed.
         let scale = 2.0 * self.weights.ddx / (n * state_dim) as f64;
-        let shared = predicted.tr_mul(&batch.ddx); // d x 18
-        let own = predicted.tr_mul(&predicted);
+        let (mut shared, mut own) = (DMatrix::zeros(d, state_dim), DMatrix::zeros(d, d));
+        let predictions = Columns::all(&predicted);
+        add_transposed(&mut shared, 1.0, predictions, ddx_columns);
+        add_transposed(&mut own, 1.0, predictions, predictions);
         let own_decoded = &own * &parameters.decoder;
         let energy = parameters.decoder.dot(&own_decoded) - 2.0 * parameters.decoder.dot(&shared);
         let ddx = (energy + batch.ddx_energy) / (n * state_dim) as f64;
         self.gradient.decoder += (own_decoded - shared) * scale;
         let mut pull = latent_miss;
         let transposed = parameters.decoder.transpose();
-        pull.gemm(scale, &predicted, &(&parameters.decoder * &transposed), 1.0);
-        pull.gemm(-scale, &batch.ddx, &transposed, 1.0);
+        add_product(
+            &mut pull,
+            scale,
+            &predicted,
+            &(&parameters.decoder * &transposed),
+        );
+        add_product(&mut pull, -scale, &batch.ddx, &transposed);
 
-        self.gradient.xi += theta.tr_mul(&pull);
-        let theta_pull = &pull * parameters.xi.transpose();
+        let pulls = Columns::all(&pull);
+        add_transposed(&mut self.gradient.xi, 1.0, Columns::all(&theta), pulls);
+        let mut theta_pull = DMatrix::zeros(n, theta.ncols());
+        add_product(&mut theta_pull, 1.0, &pull, &parameters.xi.transpose());
         self.pulled.fill(0.0);
         self.features
             .backward(&theta_pull, &mut self.values, &mut self.pulled);
@@ -241,12 +261,21 @@ impl<'a> JointLoss<'a> {
         projection: &InputProjection,
     ) {
         let d = parameters.encoder.ncols();
-        let z = self.pulled.columns(0, d);
-        self.gradient.encoder += batch.x.tr_mul(&z) + batch.dx.tr_mul(&self.pulled.columns(d, d));
-        for (i, column) in z.column_iter().enumerate() {
+        for (samples, start) in [(&batch.x, 0), (&batch.dx, d)] {
+            let pulled = Columns::some(&self.pulled, start, d);
+            add_transposed(
+                &mut self.gradient.encoder,
+                1.0,
+                Columns::all(samples),
+                pulled,
+            );
+        }
+        for (i, column) in self.pulled.columns(0, d).column_iter().enumerate() {
             self.gradient.encoder_bias[i] += column.sum();
         }
-        let input = batch.u.tr_mul(&self.pulled.columns(2 * d, d));
+        let mut input = DMatrix::zeros(batch.u.ncols(), d);
+        let pulled = Columns::some(&self.pulled, 2 * d, d);
+        add_transposed(&mut input, 1.0, Columns::all(&batch.u), pulled);
         self.gradient.encoder += projection.pull_back(&parameters.encoder, &input);
     }
 

@@ -5,6 +5,7 @@
 
 pub mod batch;
 pub mod loss;
+mod multiply;
 pub mod parameters;
 pub mod stages;
 
