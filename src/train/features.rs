@@ -97,20 +97,13 @@ impl Features {
         values: &mut FeatureValues,
         gradient: &mut DMatrix<f64>,
     ) {
-        let n = theta_gradient.nrows();
         values.adjoints.resize(self.steps.len(), Vec::new());
         for adjoint in &mut values.adjoints {
-            adjoint.clear();
-            adjoint.resize(n, 0.0);
-        }
-        for (column, &step) in theta_gradient.column_iter().zip(&self.terms) {
-            values.adjoints[step]
-                .iter_mut()
-                .zip(column.iter())
-                .for_each(|(a, g)| *a += g);
+            adjoint.resize(theta_gradient.nrows(), 0.0);
         }
         Arch::new().dispatch(Backward {
-            steps: &self.steps,
+            features: self,
+            theta_gradient,
             values,
             gradient: gradient.as_mut_slice(),
         });
@@ -189,7 +182,8 @@ impl WithSimd for Forward<'_> {
 
 /// All steps in the opposite order, compiled for several vector units.
 struct Backward<'a> {
-    steps: &'a [Step],
+    features: &'a Features,
+    theta_gradient: &'a DMatrix<f64>,
     values: &'a mut FeatureValues,
     gradient: &'a mut [f64],
 }
@@ -200,11 +194,18 @@ impl WithSimd for Backward<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let FeatureValues { values, adjoints } = self.values;
-        for (index, step) in self.steps.iter().enumerate().rev() {
+        let n = self.theta_gradient.nrows();
+        for adjoint in adjoints.iter_mut() {
+            adjoint.fill(0.0);
+        }
+        let columns = self.theta_gradient.as_slice().chunks_exact(n);
+        for (column, &step) in columns.zip(&self.features.terms) {
+            add(&mut adjoints[step], column);
+        }
+        for (index, step) in self.features.steps.iter().enumerate().rev() {
             let (earlier, rest) = adjoints.split_at_mut(index);
             step.pull_back(values, index, &rest[0], earlier);
             if let Step::Variable(column) = *step {
-                let n = rest[0].len();
                 add(&mut self.gradient[n * column..n * (column + 1)], &rest[0]);
             }
         }
