@@ -43,12 +43,18 @@ pub enum Error {
     Sim(#[from] SimError),
     #[error(transparent)]
     Mpc(#[from] MpcError),
+    /// A file of settings that cannot be used; the message of its parser names line, key and what was expected.
+    #[error("{path}: {message}", path = path.display())]
+    Config { path: PathBuf, message: String },
     /// A file that romc would have to replace.
     #[error("{0}: already exists; pass --force to replace it, or choose another name")]
     Exists(PathBuf),
     /// An output in a folder that is not there.
     #[error("{path}: there is no folder `{folder}`; make it first", path = path.display(), folder = folder.display())]
     NoFolder { path: PathBuf, folder: PathBuf },
+    /// The file system refused an input.
+    #[error("{path}: cannot read", path = path.display())]
+    Read { path: PathBuf, source: io::Error },
     /// The file system refused an output.
     #[error("{path}: cannot write")]
     Write { path: PathBuf, source: io::Error },

@@ -293,6 +293,45 @@ fn train_writes_a_model_that_compiles_and_refuses_to_replace_it() {
 }
 
 #[test]
+fn train_takes_settings_from_a_file_and_flags_override_it() {
+    let folder = folder();
+    let (config, model) = (path(&folder, "train.toml"), path(&folder, "m.json"));
+    let with = |settings: &str, more: &[&str]| {
+        fs::write(&config, settings).expect("writable");
+        let mut arguments = vec!["train", "examples/recordings/go1/train_01.csv.gz"];
+        arguments.extend(["--config", &config, "--output", &model, "--force"]);
+        arguments.extend(more);
+        romc(&arguments)
+    };
+    let refused = |settings: &str| {
+        let output = with(settings, &[]);
+        assert_eq!(output.status.code(), Some(1), "{settings}");
+        let stderr = text(&output.stderr);
+        assert!(stderr.contains("train.toml"), "{stderr}");
+        stderr
+    };
+    assert!(refused("latent-dim = 2\nmethd = \"joint\"\n").contains("`methd`"));
+    assert!(refused("latent-dim = 0\n").contains("`latent-dim` is 0"));
+    assert!(refused("seed = 3\n").contains("`latent-dim` is missing"));
+    assert!(refused("latent-dim = \"two\"\n").contains("line 1"));
+
+    let output = with(
+        "latent-dim = 3\nslack = 0.3\nseeds = 2\n",
+        &["--latent-dim", "2", "--json"],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let value: Value = serde_json::from_str(&text(&output.stdout)).expect("one JSON value");
+    assert_eq!(value["latent_dim"], 2);
+    assert_eq!(value["report"]["seeds"].as_array().map(Vec::len), Some(2));
+    assert_eq!(value["report"]["support_overlap"], 1.0);
+    let written = text(&fs::read(&model).expect("a model"));
+    assert!(
+        written.contains("--latent-dim 2") && written.contains("--slack 0.3"),
+        "{written}"
+    );
+}
+
+#[test]
 fn shipped_models_come_from_the_command_in_their_provenance() {
     let folder = folder();
     let jumps = |set: &str, count: usize| -> Vec<String> {

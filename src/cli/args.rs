@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use serde::{Deserialize, Serialize};
 
 use crate::artifact::import::{Format, ImportError, Mapping, PhaseRule, parse_standard};
 use crate::backend::Target;
@@ -94,7 +95,8 @@ pub struct InspectArguments {
 }
 
 /// How a model is learned.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum TrainMethod {
     /// Encoder, decoder and coefficients each from a least-squares problem; seconds
     ClosedForm,
@@ -103,7 +105,8 @@ pub enum TrainMethod {
 }
 
 /// Phases that a model tells apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum PhaseSet {
     /// Any foot down, no foot down
     ContactFlight,
@@ -123,20 +126,14 @@ pub struct TrainArguments {
     /// Recordings that choose between candidate models
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     pub validation: Vec<PathBuf>,
-    /// Number of latent coordinates d
-    #[arg(long, value_name = "D", value_parser = at_least_one)]
-    pub latent_dim: usize,
     /// The model file to write
     #[arg(long, value_name = "MODEL.json")]
     pub output: PathBuf,
-    /// How to learn
-    #[arg(long, value_enum, default_value = "closed-form")]
-    pub method: TrainMethod,
+    /// Settings by their names below, as `latent-dim = 4`; flags given here override them
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
     #[command(flatten)]
     pub settings: TrainSettings,
-    /// Robot that made the recordings
-    #[arg(long, default_value = "go1")]
-    pub robot: String,
     /// Name of the model; the output file's stem unless given
     #[arg(long)]
     pub name: Option<String>,
@@ -148,15 +145,25 @@ pub struct TrainArguments {
 }
 
 /// Settings of `romc train`; what is not given keeps the default of the method.
-#[derive(Debug, Default, Args)]
+#[derive(Debug, Default, Clone, PartialEq, Args, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct TrainSettings {
+    /// Number of latent coordinates d
+    #[arg(long, value_name = "D", value_parser = at_least_one, required_unless_present = "config")]
+    pub latent_dim: Option<usize>,
+    /// How to learn (closed-form unless given)
+    #[arg(long, value_enum)]
+    pub method: Option<TrainMethod>,
+    /// Robot that made the recordings (go1 unless given)
+    #[arg(long)]
+    pub robot: Option<String>,
     /// Train exactly as published: one scale, no mask, no lift loss, Xi from ones (joint method)
     #[arg(long)]
     pub paper: bool,
     /// Seed of all random choices
     #[arg(long)]
     pub seed: Option<u64>,
-    /// Seeds to try, the best is kept (joint method)
+    /// Seeds to try, counting up from the seed; the best is kept (1 unless given, joint method 3)
     #[arg(long, value_parser = at_least_one)]
     pub seeds: Option<usize>,
     /// Epochs of a step, refinement not counted (joint method)

@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde_json::json;
 
 use super::Answer;
-use super::args::{TrainArguments, TrainMethod};
+use super::args::{TrainArguments, TrainMethod, TrainSettings};
 use super::output::{Table, check_output, read_recordings, significant, spinner};
 use super::train_settings;
 use crate::files::Overwrite;
 use crate::recording::Recording;
 use crate::robot::Robot;
-use crate::train::{Origin, Progress, Recordings, SetMetrics, Trained, Watch};
+use crate::train::{Origin, Progress, Recordings, SetMetrics, TrainReport, Trained, Watch};
 use crate::{Error, artifact, train};
 
 /// Learns a model and writes it.
@@ -23,7 +23,12 @@ use crate::{Error, artifact, train};
 pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(Some(&arguments.output), overwrite)?;
-    let robot = Robot::by_name(&arguments.robot)?;
+    let settings = train_settings::effective(arguments)?;
+    let latent_dim = settings
+        .latent_dim
+        .expect("checked by clap, or with the file");
+    let method = settings.method.unwrap_or(TrainMethod::ClosedForm);
+    let robot = Robot::by_name(settings.robot.as_deref().unwrap_or("go1"))?;
     let training = read_recordings(&arguments.recordings)?;
     let validation = read_recordings(&arguments.validation)?;
     let sets = Recordings {
@@ -31,8 +36,8 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         validation: &validation,
     };
     let all: Vec<Recording> = training.iter().chain(&validation).cloned().collect();
-    let origin = Origin::new(command_line(arguments), &all);
-    let options = train_settings::options(arguments, model_name(arguments));
+    let origin = Origin::new(command_line(arguments, &settings, method), &all);
+    let options = train_settings::options(&settings, latent_dim, model_name(arguments));
 
     let bar = spinner("training");
     let mut listener = |news: Progress| match news {
@@ -40,7 +45,7 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         Progress::Done { text, .. } => bar.set_message(text),
     };
     let mut watch = Watch::new(&mut listener, stop_on_interrupt());
-    let learn = match arguments.method {
+    let learn = match method {
         TrainMethod::ClosedForm => train::closed_form,
         TrainMethod::Joint => train::joint,
     };
@@ -73,7 +78,11 @@ fn model_name(arguments: &TrainArguments) -> String {
 }
 
 /// The command that repeats this training, as the provenance keeps it.
-fn command_line(arguments: &TrainArguments) -> String {
+fn command_line(
+    arguments: &TrainArguments,
+    settings: &TrainSettings,
+    method: TrainMethod,
+) -> String {
     let paths = |paths: &[PathBuf]| {
         let texts = paths.iter().map(|path| path.display().to_string());
         texts.collect::<Vec<_>>().join(" ")
@@ -82,19 +91,11 @@ fn command_line(arguments: &TrainArguments) -> String {
     if !arguments.validation.is_empty() {
         let _ = write!(line, " --validation {}", paths(&arguments.validation));
     }
-    let method = match arguments.method {
-        TrainMethod::ClosedForm => "closed-form",
-        TrainMethod::Joint => "joint",
+    let settings = TrainSettings {
+        method: Some(method),
+        ..settings.clone()
     };
-    let _ = write!(
-        line,
-        " --latent-dim {} --method {method}",
-        arguments.latent_dim
-    );
-    if arguments.robot != "go1" {
-        let _ = write!(line, " --robot {}", arguments.robot);
-    }
-    line += &train_settings::as_flags(&arguments.settings);
+    line += &train_settings::as_flags(&settings);
     let _ = write!(line, " --output {}", arguments.output.display());
     line
 }
@@ -130,11 +131,16 @@ fn answer(arguments: &TrainArguments, trained: &Trained) -> Answer {
         let name = format!("ddz R^2 in {} ({} terms)", terms.phase, terms.active);
         row(&name, "", &|set| set.ddz_r2.get(phase).copied());
     }
+    if let Some(overlap) = report.support_overlap {
+        let name = format!("overlap of supports, {} seeds", report.seeds.len());
+        table.row([name, String::new(), significant(overlap), String::new()]);
+    }
     let text = format!(
-        "{}: {} latent coordinates from {} recordings\n\n{table}",
+        "{}: {} latent coordinates from {} recordings\n\n{table}{}",
         arguments.output.display(),
-        arguments.latent_dim,
-        arguments.recordings.len()
+        trained.model.latent_dim(),
+        arguments.recordings.len(),
+        seed_table(report)
     );
     Answer {
         text,
@@ -142,8 +148,36 @@ fn answer(arguments: &TrainArguments, trained: &Trained) -> Answer {
             "command": "train",
             "model": arguments.output.display().to_string(),
             "name": trained.model.name(),
-            "latent_dim": arguments.latent_dim,
+            "latent_dim": trained.model.latent_dim(),
             "report": report,
         }),
     }
+}
+
+/// What each seed came to, the one kept first; empty for one seed.
+fn seed_table(report: &TrainReport) -> String {
+    if report.seeds.len() < 2 {
+        return String::new();
+    }
+    let mut table = Table::new([
+        "seed",
+        "decoder mean square",
+        "torque R^2",
+        "x after 0.1 s, m",
+        "z after 0.1 s, m",
+        "terms",
+        "latents follow",
+    ]);
+    for seed in &report.seeds {
+        table.row([
+            seed.seed.to_string(),
+            significant(seed.judged.decoder_mse),
+            significant(seed.judged.torque_r2),
+            significant(seed.judged.prediction_x_m),
+            significant(seed.judged.prediction_z_m),
+            seed.active.to_string(),
+            seed.dominant.join(", "),
+        ]);
+    }
+    format!("\n{table}")
 }

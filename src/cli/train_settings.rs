@@ -1,21 +1,27 @@
-//! The settings of `romc train`: from flags to options, and back to flags for the provenance.
+//! The settings of `romc train`: from flags and a file to options, and back to flags for the provenance.
 
-use std::fmt::{Display, Write as _};
+use std::fmt::Write as _;
+use std::fs;
 
-use super::args::{PhaseSet, TrainArguments, TrainSettings};
+use serde_json::Value;
+
+use super::args::{PhaseSet, TrainArguments, TrainMethod, TrainSettings};
+use crate::Error;
 use crate::model::StandardLibrary;
 use crate::recording::PhaseRule;
 use crate::train::{LibraryChoice, TrainOptions};
 
-/// The options that the flags describe.
-pub(super) fn options(arguments: &TrainArguments, name: String) -> TrainOptions {
-    let settings = &arguments.settings;
+/// The options that the settings describe.
+pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String) -> TrainOptions {
     let mut options = match settings.paper {
-        true => TrainOptions::paper(name, arguments.latent_dim),
-        false => TrainOptions::new(name, arguments.latent_dim),
+        true => TrainOptions::paper(name, latent_dim),
+        false => TrainOptions::new(name, latent_dim),
     };
+    if settings.method == Some(TrainMethod::Joint) && !settings.paper {
+        options.n_seeds = 3;
+    }
     set(&mut options.seed, settings.seed);
-    set(&mut options.joint.seeds, settings.seeds);
+    set(&mut options.n_seeds, settings.seeds);
     set(&mut options.joint.schedule.epochs, settings.epochs);
     set(&mut options.encoder.lift_weight, settings.lift_weight);
     set(&mut options.encoder.body_weight, settings.body_weight);
@@ -52,53 +58,89 @@ fn set<T>(option: &mut T, given: Option<T>) {
 
 /// The flags that were given, with a space before each.
 pub(super) fn as_flags(settings: &TrainSettings) -> String {
-    let mut line = String::new();
-    let mut flag = |name: &str, value: Option<&dyn Display>| {
-        if let Some(value) = value {
-            let _ = write!(line, " --{name} {value}");
-        }
+    let Ok(Value::Object(given)) = serde_json::to_value(settings) else {
+        unreachable!("settings are a struct of numbers, texts and switches");
     };
-    let shown = |value: &Option<f64>| value.map(|value| value.to_string());
-    flag("seed", settings.seed.as_ref().map(|v| v as &dyn Display));
-    flag("seeds", settings.seeds.as_ref().map(|v| v as &dyn Display));
-    flag(
-        "epochs",
-        settings.epochs.as_ref().map(|v| v as &dyn Display),
-    );
-    flag(
-        "lift-weight",
-        shown(&settings.lift_weight)
-            .as_ref()
-            .map(|v| v as &dyn Display),
-    );
-    flag(
-        "body-weight",
-        shown(&settings.body_weight)
-            .as_ref()
-            .map(|v| v as &dyn Display),
-    );
-    flag(
-        "slack",
-        shown(&settings.slack).as_ref().map(|v| v as &dyn Display),
-    );
-    flag(
-        "degree",
-        settings.degree.as_ref().map(|v| v as &dyn Display),
-    );
-    if let Some(terms) = &settings.terms {
-        flag("terms", Some(&format!("\"{terms}\"")));
-    }
-    match settings.phases {
-        Some(PhaseSet::ContactFlight) => flag("phases", Some(&"contact-flight")),
-        Some(PhaseSet::ContactRearFlight) => flag("phases", Some(&"contact-rear-flight")),
-        None => {}
-    }
-    let switches = [
-        ("paper", settings.paper),
-        ("trigonometric", settings.trigonometric),
-    ];
-    for (name, _) in switches.into_iter().filter(|(_, given)| *given) {
-        let _ = write!(line, " --{name}");
+    let mut line = String::new();
+    for (name, value) in given {
+        let written = match value {
+            Value::Bool(true) => write!(line, " --{name}"),
+            Value::Number(number) => match number.as_u64() {
+                Some(count) => write!(line, " --{name} {count}"),
+                None => write!(line, " --{name} {}", number.as_f64().unwrap_or(f64::NAN)),
+            },
+            Value::String(text) if text.contains(' ') => write!(line, " --{name} \"{text}\""),
+            Value::String(text) => write!(line, " --{name} {text}"),
+            Value::Null | Value::Bool(false) | Value::Array(_) | Value::Object(_) => Ok(()),
+        };
+        written.expect("writing to a string cannot fail");
     }
     line
+}
+
+/// The settings of the command line over those of its file, if it names one.
+///
+/// # Errors
+/// [`Error::Read`] and [`Error::Config`] for the file.
+pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Error> {
+    let given = &arguments.settings;
+    let Some(path) = &arguments.config else {
+        return Ok(given.clone());
+    };
+    let text = fs::read_to_string(path).map_err(|source| Error::Read {
+        path: path.clone(),
+        source,
+    })?;
+    let refuse = |message: String| Error::Config {
+        path: path.clone(),
+        message,
+    };
+    let file: TrainSettings =
+        toml::from_str(&text).map_err(|error| refuse(error.to_string().trim_end().to_owned()))?;
+    let settings = overlay(given, file);
+    check(&settings).map_err(refuse)?;
+    Ok(settings)
+}
+
+/// What clap checks of flags, for settings that came from a file.
+fn check(settings: &TrainSettings) -> Result<(), String> {
+    if settings.latent_dim.is_none() {
+        return Err("`latent-dim` is missing, here and on the command line".to_owned());
+    }
+    let counts = [
+        ("latent-dim", settings.latent_dim),
+        ("seeds", settings.seeds),
+        ("epochs", settings.epochs),
+    ];
+    if let Some((name, _)) = counts.iter().find(|(_, count)| *count == Some(0)) {
+        return Err(format!("`{name}` is 0, expected at least 1"));
+    }
+    if settings.terms.is_some() && (settings.degree.is_some() || settings.trigonometric) {
+        return Err(
+            "`terms` stands beside `degree` or `trigonometric`, expected one or the other"
+                .to_owned(),
+        );
+    }
+    Ok(())
+}
+
+/// Every setting from `above` where it is given there, else from `below`.
+fn overlay(above: &TrainSettings, below: TrainSettings) -> TrainSettings {
+    let above = above.clone();
+    TrainSettings {
+        latent_dim: above.latent_dim.or(below.latent_dim),
+        method: above.method.or(below.method),
+        robot: above.robot.or(below.robot),
+        paper: above.paper || below.paper,
+        seed: above.seed.or(below.seed),
+        seeds: above.seeds.or(below.seeds),
+        epochs: above.epochs.or(below.epochs),
+        lift_weight: above.lift_weight.or(below.lift_weight),
+        body_weight: above.body_weight.or(below.body_weight),
+        slack: above.slack.or(below.slack),
+        degree: above.degree.or(below.degree),
+        trigonometric: above.trigonometric || below.trigonometric,
+        terms: above.terms.or(below.terms),
+        phases: above.phases.or(below.phases),
+    }
 }

@@ -3,10 +3,13 @@
 use super::assemble::{Origin, Parts, assemble};
 use super::error::TrainError;
 use super::features::Features;
-use super::finish::{Sets, active_coordinates, encoder_over, fit_dynamics};
+use super::finish::{
+    Fitted, Sets, active_coordinates, check_latent_dim, encoder_over, fit_dynamics,
+};
 use super::options::TrainOptions;
+use super::overlap::support_overlap;
 use super::progress::Watch;
-use super::report::Trained;
+use super::report::{SeedReport, Trained};
 use super::subspace::{SubspaceOptions, find_subspace};
 use crate::recording::Recording;
 use crate::robot::Robot;
@@ -36,22 +39,42 @@ pub fn closed_form(
     watch: &mut Watch<'_>,
 ) -> Result<Trained, TrainError> {
     let sets = Sets::new(recordings, robot, options)?;
-    watch.stage("searching the latent space", 1);
     let moments = sets.moments();
     let active = active_coordinates(&moments, options);
-    let search = SubspaceOptions {
-        lift_weight: options.encoder.lift_weight,
-        coordinate_weights: options.encoder.coordinate_weights(),
-        iterations: 2000,
-        restarts: options.encoder.restarts,
-        seed: options.seed,
-    };
-    let subspace = find_subspace(&moments, &active, options.latent_dim, &search)?;
+    check_latent_dim(options, &active)?;
     let library = options.library()?;
     let features = Features::new(&library);
-    let encoder = encoder_over(&sets.training, &subspace.basis, options)?;
-    let fitted = fit_dynamics(&sets, &features, encoder, options, watch)?;
-    let report = sets.report(&features, &fitted, &active);
+    let mut tried = Vec::new();
+    for seed in options.seeds() {
+        watch.stage("searching the latent space", 1);
+        let search = SubspaceOptions {
+            lift_weight: options.encoder.lift_weight,
+            coordinate_weights: options.encoder.coordinate_weights(),
+            iterations: 2000,
+            restarts: options.encoder.restarts,
+            seed,
+        };
+        let subspace = find_subspace(&moments, &active, options.latent_dim, &search)?;
+        let encoder = encoder_over(&sets.training, &subspace.basis, options)?;
+        let fitted = fit_dynamics(&sets, &features, encoder, options, watch)?;
+        let score = fitted
+            .choice
+            .as_ref()
+            .map_or(f64::INFINITY, |(choice, _)| choice.score);
+        tried.push((
+            sets.seed_report(&features, &fitted, (seed, score), None),
+            fitted,
+        ));
+    }
+    let fits: Vec<&Fitted> = tried.iter().map(|(_, fitted)| fitted).collect();
+    let overlap = support_overlap(&library, &fits, &moments.state);
+    tried.sort_by(|(a, _), (b, _)| a.score.total_cmp(&b.score));
+    let (seeds, mut fits): (Vec<SeedReport>, Vec<Fitted>) = tried.into_iter().unzip();
+    let fitted = fits.swap_remove(0);
+    let mut report = sets.report(&features, &fitted, &active);
+    if seeds.len() > 1 {
+        (report.seeds, report.support_overlap) = (seeds, overlap);
+    }
     let parts = Parts {
         library,
         encoder: fitted.encoder,

@@ -6,11 +6,12 @@ use super::closed_form::Recordings;
 use super::dataset::{Dataset, Quantity};
 use super::error::TrainError;
 use super::features::Features;
+use super::joint::Losses;
 use super::latent::{Latent, least_squares_decoder};
 use super::metrics::{Assessed, BODY_X, BODY_Z, measure};
 use super::options::TrainOptions;
 use super::progress::Watch;
-use super::report::{PhaseTerms, TrainReport};
+use super::report::{PhaseTerms, SeedReport, TrainReport};
 use super::rollout::Candidate;
 use super::select::{Choice, Judge, select};
 use super::sparse::active_terms;
@@ -32,6 +33,19 @@ pub(super) struct Fitted {
     pub xi: Vec<DMatrix<f64>>,
     /// The regression, if Xi was chosen among regressions, and how many were tried.
     pub choice: Option<(Choice, usize)>,
+}
+
+impl Fitted {
+    fn assessed<'a>(&'a self, features: &'a Features) -> Assessed<'a> {
+        Assessed {
+            candidate: Candidate {
+                features,
+                xi: &self.xi,
+            },
+            encoder: &self.encoder,
+            decoder: &self.decoder,
+        }
+    }
 }
 
 impl Sets {
@@ -67,16 +81,36 @@ impl Sets {
         }
     }
 
+    /// The figures of what one seed came to.
+    pub fn seed_report(
+        &self,
+        features: &Features,
+        fitted: &Fitted,
+        (seed, score): (u64, f64),
+        losses: Option<Losses>,
+    ) -> SeedReport {
+        let std = self
+            .training
+            .gather(Quantity::X, None)
+            .column_variance()
+            .map(f64::sqrt);
+        let names = Robot::state_names();
+        let rows = fitted.encoder.weights().row_iter();
+        SeedReport {
+            seed,
+            score,
+            losses,
+            active: fitted.xi.iter().map(active_terms).sum(),
+            dominant: rows
+                .map(|row| names[row.transpose().component_mul(&std).iamax()].clone())
+                .collect(),
+            judged: measure(fitted.assessed(features), self.judged()),
+        }
+    }
+
     /// The figures of fitted numbers.
     pub fn report(&self, features: &Features, fitted: &Fitted, active: &[usize]) -> TrainReport {
-        let assessed = Assessed {
-            candidate: Candidate {
-                features,
-                xi: &fitted.xi,
-            },
-            encoder: &fitted.encoder,
-            decoder: &fitted.decoder,
-        };
+        let assessed = fitted.assessed(features);
         let names = Robot::state_names();
         let phases = self.training.phases.names().into_iter().zip(&fitted.xi);
         let (choice, candidates) = fitted.choice.clone().unzip();
@@ -104,6 +138,17 @@ impl Sets {
 pub(super) fn active_coordinates(moments: &Moments, options: &TrainOptions) -> Vec<usize> {
     let least_std = options.encoder.least_std * options.scaling.state;
     moments.active_coordinates(least_std, options.encoder.least_input_share)
+}
+
+/// Complains about no latent coordinate, or more than the encoder may look at.
+pub(super) fn check_latent_dim(options: &TrainOptions, active: &[usize]) -> Result<(), TrainError> {
+    if options.latent_dim == 0 || options.latent_dim > active.len() {
+        return Err(TrainError::LatentDim {
+            requested: options.latent_dim,
+            active: active.len(),
+        });
+    }
+    Ok(())
 }
 
 /// The encoder over a space with orthonormal `basis` (`18 x d`): rotated by varimax, latents in a telling order,

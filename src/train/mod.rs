@@ -25,6 +25,7 @@ mod finish;
 mod options;
 #[cfg(test)]
 mod oscillator;
+mod overlap;
 mod prune;
 mod random;
 mod report;

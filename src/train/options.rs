@@ -34,6 +34,8 @@ pub struct TrainOptions {
     pub phases: PhaseRule,
     /// Seed of every random choice.
     pub seed: u64,
+    /// How many seeds are tried, counting up from `seed`; the best is kept.
+    pub n_seeds: usize,
     /// Factors from SI to scaled units.
     pub scaling: ScaleOptions,
     /// Which coordinates the encoder looks at, and what it is to carry.
@@ -55,8 +57,6 @@ pub struct JointOptions {
     pub batch_rows: usize,
     /// Value that all coefficients start at.
     pub xi_start: f64,
-    /// How many seeds are tried, counting up from the seed of the training.
-    pub seeds: usize,
     /// Seeds trained at the same time; the result does not depend on it.
     pub threads: usize,
     /// What follows the first step.
@@ -123,6 +123,7 @@ impl TrainOptions {
             }),
             phases: PhaseRule::two_phase().with_min_samples(5),
             seed: 1,
+            n_seeds: 1,
             scaling: ScaleOptions::default(),
             encoder: EncoderOptions::default(),
             regression: RegressionOptions::default(),
@@ -150,12 +151,17 @@ impl TrainOptions {
             },
             joint: JointOptions {
                 xi_start: 1.0,
-                seeds: 1,
                 transfer: Transfer::Published,
                 ..JointOptions::default()
             },
             ..plain
         }
+    }
+
+    /// The seeds to try.
+    pub fn seeds(&self) -> Vec<u64> {
+        let count = self.n_seeds.max(1) as u64;
+        (0..count).map(|i| self.seed.wrapping_add(i)).collect()
     }
 
     /// The candidate terms.
@@ -240,14 +246,13 @@ impl EncoderOptions {
 }
 
 impl Default for JointOptions {
-    /// The author's schedule and weights; Xi starts at 0, three seeds, all cores.
+    /// The author's schedule and weights; Xi starts at 0, all cores.
     fn default() -> Self {
         Self {
             schedule: Schedule::default(),
             weights: LossWeights::default(),
             batch_rows: 100,
             xi_start: 0.0,
-            seeds: 3,
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             transfer: Transfer::Chosen,
         }

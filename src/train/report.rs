@@ -29,10 +29,10 @@ pub struct TrainReport {
     pub choice: Option<Choice>,
     /// Candidates tried.
     pub candidates: usize,
-    /// The seeds of a joint training; the first is the one kept.
+    /// The seeds that were tried, where there were several; the first is the one kept.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub seeds: Vec<SeedReport>,
-    /// Mean overlap (shared over all active terms) of the supports that two seeds found.
+    /// Mean over pairs of seeds of (coefficients active in both) / (active in either), latent coordinates matched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub support_overlap: Option<f64>,
     /// Figures on the training recordings.
@@ -50,7 +50,7 @@ pub struct PhaseTerms {
     pub active: usize,
 }
 
-/// What one seed of a joint training came to.
+/// What one seed came to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SeedReport {
     /// The seed.
@@ -58,8 +58,13 @@ pub struct SeedReport {
     /// What seeds are compared by, less is better: the validation score of rollouts, or with the published method the
     /// combined loss on the validation recordings.
     pub score: f64,
-    /// Losses of the last epoch of the first step.
-    pub losses: Losses,
+    /// Losses of the last epoch of the first step of a joint training.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub losses: Option<Losses>,
     /// Active terms over all phases.
     pub active: usize,
+    /// For every latent coordinate the robot coordinate that moves it most on the training jumps.
+    pub dominant: Vec<String>,
+    /// Figures on the validation recordings, or on the training recordings where there are none.
+    pub judged: SetMetrics,
 }

@@ -16,12 +16,14 @@ use crate::train::closed_form::Recordings;
 use crate::train::dataset::Quantity;
 use crate::train::error::TrainError;
 use crate::train::features::Features;
-use crate::train::finish::{Fitted, Sets, active_coordinates, encoder_over, fit_dynamics};
+use crate::train::finish::{
+    Fitted, Sets, active_coordinates, check_latent_dim, encoder_over, fit_dynamics,
+};
 use crate::train::options::{JointOptions, TrainOptions, Transfer};
+use crate::train::overlap::support_overlap;
 use crate::train::progress::Watch;
 use crate::train::random::Random;
 use crate::train::report::{SeedReport, Trained};
-use crate::train::sparse::active_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
 ///
@@ -39,12 +41,7 @@ pub fn joint(
 ) -> Result<Trained, TrainError> {
     let sets = Sets::new(recordings, robot, options)?;
     let active = active_coordinates(&sets.moments(), options);
-    if options.latent_dim == 0 || options.latent_dim > active.len() {
-        return Err(TrainError::LatentDim {
-            requested: options.latent_dim,
-            active: active.len(),
-        });
-    }
+    check_latent_dim(options, &active)?;
     let library = options.library()?;
     let features = Features::new(&library);
     let scaling = options.scaling.factors();
@@ -74,7 +71,8 @@ pub fn joint(
     for run in runs {
         finished.push(task.finish(run, judged, watch)?);
     }
-    let overlap = mean_overlap(&finished);
+    let fits: Vec<&Fitted> = finished.iter().map(|(_, fitted)| fitted).collect();
+    let overlap = support_overlap(&library, &fits, &sets.moments().state);
     finished.sort_by(|(a, _), (b, _)| a.score.total_cmp(&b.score));
     let (seeds, mut fitted): (Vec<SeedReport>, Vec<Fitted>) = finished.into_iter().unzip();
     if fitted.is_empty() {
@@ -122,18 +120,15 @@ impl Task<'_> {
     /// Trains all seeds on the threads of the options, in rounds; results are in the order of the seeds.
     fn run_seeds(&self, watch: &mut Watch<'_>) -> Vec<Run> {
         let JointOptions {
-            seeds,
             threads,
             ref schedule,
             ..
         } = self.options.joint;
+        let seeds = self.options.seeds();
         watch.stage(
             "training encoder, decoder and dynamics",
-            seeds * schedule.total(),
+            seeds.len() * schedule.total(),
         );
-        let seeds: Vec<u64> = (0..seeds as u64)
-            .map(|i| self.options.seed.wrapping_add(i))
-            .collect();
         let cancel = watch.cancel_flag();
         let mut runs = Vec::new();
         for (round, group) in seeds.chunks(threads.max(1)).enumerate() {
@@ -276,16 +271,11 @@ impl Task<'_> {
                 (fitted, score)
             }
         };
-        let active = fitted.xi.iter().map(active_terms).sum();
-        Ok((
-            SeedReport {
-                seed: run.seed,
-                score,
-                losses: run.losses,
-                active,
-            },
-            fitted,
-        ))
+        let seed = (run.seed, score);
+        let report = self
+            .sets
+            .seed_report(self.features, &fitted, seed, Some(run.losses));
+        Ok((report, fitted))
     }
 
     /// Mean combined loss over batches of all phases.
@@ -321,23 +311,4 @@ fn published(run: &Run) -> Result<Fitted, TrainError> {
         xi: run.xi.clone(),
         choice: None,
     })
-}
-
-/// Mean over pairs of seeds of (terms active in both) / (terms active in either).
-fn mean_overlap(finished: &[(SeedReport, Fitted)]) -> Option<f64> {
-    let (mut sum, mut pairs) = (0.0, 0);
-    for (i, (_, first)) in finished.iter().enumerate() {
-        for (_, second) in &finished[i + 1..] {
-            let (mut both, mut either) = (0, 0);
-            for (a, b) in first.xi.iter().zip(&second.xi) {
-                for (a, b) in a.iter().zip(b.iter()) {
-                    both += usize::from(*a != 0.0 && *b != 0.0);
-                    either += usize::from(*a != 0.0 || *b != 0.0);
-                }
-            }
-            sum += f64::from(both as u32) / f64::from((either as u32).max(1));
-            pairs += 1;
-        }
-    }
-    (pairs > 0).then(|| sum / f64::from(pairs))
 }
