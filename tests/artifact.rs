@@ -202,6 +202,113 @@ fn missing_file_is_refused_with_its_name() {
     assert!(artifact::describe(&error).starts_with("no/such/model.json: cannot read"));
 }
 
+/// The three-phase fixture with an encoder and a decoder of two layers.
+fn with_layers() -> Value {
+    let mut value = fixture("three-phases");
+    let rows = |rows: usize, cols: usize| -> Vec<Vec<f64>> {
+        let entry = |i: usize, j: usize| (1.3 * i as f64 + 0.7 * j as f64 + 0.2).sin();
+        (0..rows)
+            .map(|i| (0..cols).map(|j| entry(i, j)).collect())
+            .collect()
+    };
+    let d = value["latent_dim"].as_u64().expect("a number") as usize;
+    value["encoder"] = json!({ "layers": [
+        { "weights": rows(20, 18), "bias": vec![0.1; 20], "activation": "elu" },
+        { "weights": rows(d, 20), "bias": vec![0.0; d] },
+    ] });
+    value["decoder"] = json!({ "layers": [
+        { "weights": rows(5, d), "bias": vec![-0.1; 5], "activation": "tanh" },
+        { "weights": rows(18, 5), "bias": vec![0.0; 18], "activation": "linear" },
+    ] });
+    value
+}
+
+#[test]
+fn layers_are_read_and_written_with_their_activations() {
+    let model = read_value(&with_layers()).expect("a sound model");
+    let encoder = model.encoder_map().expect("an encoder");
+    let d = model.latent_dim();
+    assert_eq!(encoder.summary(), format!("18 -> 20 elu -> {d}"));
+    let decoder = model.decoder_map().expect("a decoder");
+    assert_eq!(decoder.summary(), format!("{d} -> 5 tanh -> 18"));
+    let text = artifact::to_text(&model);
+    let back = artifact::read_from_bytes("back.json", text.as_bytes()).expect("reads back");
+    assert_eq!(back, model);
+    assert!(matches!(
+        model.encoder(),
+        Err(ModelError::Nonlinear {
+            part: "encoder",
+            ..
+        })
+    ));
+}
+
+#[test]
+fn one_linear_layer_is_written_as_the_affine_map_it_is() {
+    let plain = fixture("three-phases");
+    let mut value = plain.clone();
+    value["encoder"] = json!({ "layers": [plain["encoder"].clone()] });
+    let model = read_value(&value).expect("a sound model");
+    assert_eq!(model, read_value(&plain).expect("a sound model"));
+}
+
+#[test]
+fn layers_that_are_wrong_are_refused_at_their_place() {
+    let changed = |change: &dyn Fn(&mut Value)| {
+        let mut value = with_layers();
+        change(&mut value);
+        read_value(&value).expect_err("refused").to_string()
+    };
+    let message = changed(&|v| v["encoder"]["layers"][0]["activation"] = json!("gelu"));
+    assert!(message.contains("file.json"), "{message}");
+    let found = read_value(&{
+        let mut value = with_layers();
+        value["encoder"]["layers"][0]["activation"] = json!("gelu");
+        value
+    });
+    match found {
+        Err(ArtifactError::Model { source, .. }) => {
+            assert!(matches!(*source, ModelError::UnknownActivation { .. }));
+        }
+        other => panic!("{other:?}"),
+    }
+    let message = changed(&|v| v["encoder"]["weights"] = json!([[1.0]]));
+    assert!(message.contains("`layers` beside `weights`"), "{message}");
+    let message = changed(&|v| {
+        array(v, "/decoder/layers/1/weights/3").pop();
+    });
+    assert!(
+        message.contains("`decoder.layers[1].weights`[3]: found 4 numbers, expected 5"),
+        "{message}"
+    );
+    let message = changed(&|v| v["encoder"]["layers"] = json!([]));
+    assert!(message.contains("file.json"), "{message}");
+    let message = changed(&|v| v["encoder"]["layers"][1]["gain"] = json!(1));
+    assert!(message.contains("gain"), "{message}");
+    let narrow = read_value(&{
+        let mut value = with_layers();
+        value["encoder"]["layers"][0]["weights"] = json!(vec![vec![0.5; 18]]);
+        value["encoder"]["layers"][0]["bias"] = json!([0.0]);
+        for row in array(&mut value, "/encoder/layers/1/weights") {
+            *row = json!([1.0]);
+        }
+        value
+    });
+    match narrow {
+        Err(ArtifactError::Model { source, .. }) => {
+            assert!(matches!(
+                *source,
+                ModelError::NarrowLayer {
+                    layer: 0,
+                    found: 1,
+                    ..
+                }
+            ));
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
 #[test]
 fn empty_truncated_and_foreign_files_are_refused_with_line_and_column() {
     let whole = fixture("three-phases").to_string();

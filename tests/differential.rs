@@ -10,7 +10,8 @@ mod models;
 use drivers::{Workshop, c_compilers, contents};
 use functions::{Function, Random, functions as functions_of};
 use nalgebra::DVector;
-use romc::lower::{Form, LowerOptions, dynamics_jacobian};
+use romc::ir::Interpreter;
+use romc::lower::{self, Form, LowerOptions, dynamics_jacobian};
 use romc::model::{LatentVariable, ReducedModel};
 use romc::sim::CompiledModel;
 
@@ -125,6 +126,70 @@ fn generated_code_with_tables_equals_the_interpreter_bit_for_bit() {
     let random_models = (1000..1000 + n_random_models()).map(models::random);
     let models = models::shipped().into_iter().chain(random_models).collect();
     check_c_and_rust(&Case::new(models, 100, Form::Tables));
+}
+
+#[test]
+fn generated_maps_of_nonlinear_models_equal_the_interpreter_bit_for_bit() {
+    let models = (0..5).map(models::random_nonlinear).collect();
+    let case = Case::new(models, 50, Form::Automatic);
+    check_c_and_rust(&case);
+    let workshop = case.workshop();
+    for model in &case.models {
+        workshop.run_c_selftest(&c_compilers()[0], model.identifier().as_str());
+    }
+    workshop.run_rust_selftest(case.models[0].identifier().as_str());
+}
+
+#[test]
+fn lowered_maps_of_nonlinear_models_equal_the_models_own_evaluation() {
+    for model in (0..40).map(models::random_nonlinear) {
+        let n = model.state_dim().expect("an encoder");
+        let mut random = Random(17);
+        for _ in 0..20 {
+            let mut vector = |len: usize| DVector::from_fn(len, |_, _| random.between(-2.0, 2.0));
+            let (x, dx, u) = (vector(n), vector(n), vector(n));
+            let d = model.latent_dim();
+            let (z, dz, u_lat) = (vector(d), vector(d), vector(d));
+            let projected = model.project_input_at(&x, &u).expect("full rank");
+            let pairs = [
+                (lower::encode(&model), vec![&x], model.encode(&x)),
+                (
+                    lower::encode_velocity(&model),
+                    vec![&x, &dx],
+                    model.encode_velocity_at(&x, &dx),
+                ),
+                (lower::decode(&model), vec![&z], model.decode(&z)),
+                (
+                    lower::decode_velocity(&model),
+                    vec![&z, &dz],
+                    model.decode_velocity_at(&z, &dz),
+                ),
+                (
+                    lower::lift_input(&model),
+                    vec![&x, &u_lat],
+                    model.lift_input_at(&x, &u_lat),
+                ),
+                (lower::project_input(&model), vec![&x, &u], Ok(projected)),
+            ];
+            for (program, arguments, expected) in pairs {
+                let (program, expected) = (program.expect("lowers"), expected.expect("fits"));
+                let mut found = DVector::zeros(expected.len());
+                let read: Vec<&[f64]> = arguments.iter().map(|v| v.as_slice()).collect();
+                Interpreter::new(&program).run(&read, &mut [found.as_mut_slice()]);
+                let error = (&found - &expected).amax();
+                let scale = 1.0 + expected.amax();
+                assert!(
+                    error <= 1e-9 * scale,
+                    "{} {}: {found} {expected}",
+                    model.name(),
+                    program.name()
+                );
+            }
+            let lifted = model.lift_input_at(&x, &u_lat).expect("fits");
+            let back = model.project_input_at(&x, &lifted).expect("full rank");
+            assert!((back - &u_lat).amax() < 1e-9, "{}", model.name());
+        }
+    }
 }
 
 #[test]

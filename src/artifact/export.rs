@@ -1,13 +1,13 @@
 //! From a model to the file's grammar.
 
 use super::manifest::{
-    AffineEntry, FactorsEntry, FeetEntry, LibraryEntry, Manifest, Pairs, PhaseEntry, SCHEMA,
-    ScalingEntry, SignalsEntry, StandardEntry, StatisticsEntry,
+    FactorsEntry, FeetEntry, LayerEntry, LibraryEntry, Manifest, MapEntry, Pairs, PhaseEntry,
+    SCHEMA, ScalingEntry, SignalsEntry, StandardEntry, StatisticsEntry,
 };
 use super::matrices::to_rows;
 use crate::model::{
-    AffineMap, FeetRule, InputStatistics, Library, LibrarySource, Phase, ReducedModel,
-    ScaleFactors, Scaling, Signals,
+    FeetRule, InputStatistics, Library, LibrarySource, Phase, ReducedModel, ScaleFactors, Scaling,
+    Signals, StateMap,
 };
 
 /// All that a model file says about the model.
@@ -27,8 +27,8 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
         state: model.state().map(signals_entry),
         input: model.input().map(signals_entry),
         scaling: model.scaling().ok().map(scaling_entry),
-        encoder: model.encoder().ok().map(affine_entry),
-        decoder: model.decoder().ok().map(affine_entry),
+        encoder: model.encoder_map().ok().map(map_entry),
+        decoder: model.decoder_map().ok().map(map_entry),
         latent_dim: model.latent_dim(),
         library: library_entry(model.library()),
         phases: model.phases().iter().map(phase_entry).collect(),
@@ -62,10 +62,20 @@ fn factors_entry(factors: &ScaleFactors) -> FactorsEntry {
     }
 }
 
-fn affine_entry(map: &AffineMap) -> AffineEntry {
-    AffineEntry {
-        weights: to_rows(map.weights()),
-        bias: map.bias().as_slice().to_vec(),
+fn map_entry(map: &StateMap) -> MapEntry {
+    if let Some(affine) = map.as_affine() {
+        return MapEntry::Affine {
+            weights: to_rows(affine.weights()),
+            bias: affine.bias().as_slice().to_vec(),
+        };
+    }
+    let layers = map.layers().iter().map(|layer| LayerEntry {
+        weights: to_rows(layer.map.weights()),
+        bias: layer.map.bias().as_slice().to_vec(),
+        activation: layer.activation.name().to_owned(),
+    });
+    MapEntry::Layers {
+        layers: layers.collect(),
     }
 }
 

@@ -11,6 +11,7 @@ use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use crate::model::Activation;
 use crate::robot::ContactFlags;
 
 /// Name and version of the format.
@@ -34,9 +35,9 @@ pub(super) struct Manifest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scaling: Option<ScalingEntry>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub encoder: Option<AffineEntry>,
+    pub encoder: Option<MapEntry>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub decoder: Option<AffineEntry>,
+    pub decoder: Option<MapEntry>,
     pub latent_dim: usize,
     pub library: LibraryEntry,
     pub phases: Vec<PhaseEntry>,
@@ -70,11 +71,68 @@ pub(super) struct ScalingEntry {
     pub input: FactorsEntry,
 }
 
+/// An encoder or decoder: one affine map, or a chain of layers with activations.
+#[derive(Serialize, Deserialize)]
+#[serde(try_from = "MapFields", untagged)]
+pub(super) enum MapEntry {
+    Affine { weights: Rows, bias: Vec<f64> },
+    Layers { layers: Vec<LayerEntry> },
+}
+
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct AffineEntry {
+pub(super) struct LayerEntry {
     pub weights: Rows,
     pub bias: Vec<f64>,
+    #[serde(default = "linear")]
+    pub activation: String,
+}
+
+fn linear() -> String {
+    Activation::Linear.name().to_owned()
+}
+
+/// All keys that an encoder or decoder may have, before it is known which kind it is.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MapFields {
+    #[serde(default, deserialize_with = "present")]
+    weights: Option<Rows>,
+    #[serde(default, deserialize_with = "present")]
+    bias: Option<Vec<f64>>,
+    #[serde(default, deserialize_with = "present")]
+    layers: Option<Vec<LayerEntry>>,
+}
+
+/// A value that may be left out, but not be `null`.
+fn present<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+    deserializer: D,
+) -> Result<Option<T>, D::Error> {
+    T::deserialize(deserializer).map(Some)
+}
+
+impl TryFrom<MapFields> for MapEntry {
+    type Error = &'static str;
+
+    fn try_from(fields: MapFields) -> Result<Self, &'static str> {
+        match fields {
+            MapFields {
+                weights: None,
+                bias: None,
+                layers: Some(layers),
+            } => Ok(Self::Layers { layers }),
+            MapFields {
+                layers: Some(_), ..
+            } => Err("found `layers` beside `weights` or `bias`, expected one of the two"),
+            MapFields { weights: None, .. } => Err("missing field `weights`"),
+            MapFields { bias: None, .. } => Err("missing field `bias`"),
+            MapFields {
+                weights: Some(weights),
+                bias: Some(bias),
+                layers: None,
+            } => Ok(Self::Affine { weights, bias }),
+        }
+    }
 }
 
 #[derive(Serialize, Deserialize)]

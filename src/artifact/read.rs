@@ -9,13 +9,13 @@ use serde_json::Value;
 
 use super::error::ArtifactError;
 use super::manifest::{
-    AffineEntry, FactorsEntry, FeetEntry, LibraryEntry, Manifest, PhaseEntry, SCHEMA, SchemaProbe,
-    SignalsEntry, StatisticsEntry,
+    FactorsEntry, FeetEntry, LibraryEntry, Manifest, MapEntry, PhaseEntry, Rows, SCHEMA,
+    SchemaProbe, SignalsEntry, StatisticsEntry,
 };
 use super::matrices::from_rows;
 use crate::model::{
-    AffineMap, FeetRule, InputStatistics, Library, ModelError, Phase, ReducedModel, ScaleFactors,
-    Scaling, Signals, StandardLibrary,
+    Activation, AffineMap, FeetRule, InputStatistics, Layer, Library, ModelError, Phase,
+    ReducedModel, ScaleFactors, Scaling, Signals, StandardLibrary, StateMap,
 };
 use crate::robot::{Robot, STATE_DIM};
 
@@ -145,10 +145,10 @@ fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactErro
         });
     }
     if let Some(entry) = &manifest.encoder {
-        builder = builder.encoder(affine_of(file, "encoder", entry, known_dim)?);
+        builder = builder.encoder(map_of(file, "encoder", entry, known_dim)?);
     }
     if let Some(entry) = &manifest.decoder {
-        builder = builder.decoder(affine_of(file, "decoder", entry, Some(latent_dim))?);
+        builder = builder.decoder(map_of(file, "decoder", entry, Some(latent_dim))?);
     }
     for (index, entry) in manifest.phases.into_iter().enumerate() {
         builder = builder.phase(phase_of(file, index, entry, latent_dim)?);
@@ -193,14 +193,46 @@ fn factors_of(entry: FactorsEntry) -> ScaleFactors {
     }
 }
 
+/// An encoder or decoder; a chain of one linear layer is the affine map.
+fn map_of(
+    file: &str,
+    tensor: &str,
+    entry: &MapEntry,
+    columns: Option<usize>,
+) -> Result<StateMap, ArtifactError> {
+    let refused = |source: ModelError| ArtifactError::Model {
+        file: file.to_owned(),
+        source: Box::new(source),
+    };
+    let entries = match entry {
+        MapEntry::Affine { weights, bias } => {
+            return affine_of(file, tensor, (weights, bias), columns).map(StateMap::from);
+        }
+        MapEntry::Layers { layers } => layers,
+    };
+    let mut layers: Vec<Layer> = Vec::with_capacity(entries.len());
+    for (index, entry) in entries.iter().enumerate() {
+        let name = format!("{tensor}.layers[{index}]");
+        // What the layer before gives, this one takes.
+        let columns = layers
+            .last()
+            .map(|layer| layer.map.output_dim())
+            .or(columns);
+        let activation: Activation = entry.activation.parse().map_err(refused)?;
+        let map = affine_of(file, &name, (&entry.weights, &entry.bias), columns)?;
+        layers.push(Layer { map, activation });
+    }
+    StateMap::new(tensor, layers).map_err(refused)
+}
+
 fn affine_of(
     file: &str,
     tensor: &str,
-    entry: &AffineEntry,
+    (weights, bias): (&Rows, &[f64]),
     columns: Option<usize>,
 ) -> Result<AffineMap, ArtifactError> {
-    let weights = from_rows(file, &format!("{tensor}.weights"), &entry.weights, columns)?;
-    let bias = DVector::from_column_slice(&entry.bias);
+    let weights = from_rows(file, &format!("{tensor}.weights"), weights, columns)?;
+    let bias = DVector::from_column_slice(bias);
     AffineMap::new(tensor, weights, bias).map_err(|source| ArtifactError::Model {
         file: file.to_owned(),
         source: Box::new(source),

@@ -3,7 +3,7 @@
 use super::code::Role;
 use crate::ir::{Program, Slot, Statement, Unary};
 use crate::lower::{self, JacobianPattern, LowerError, LowerOptions};
-use crate::model::{ModelError, ReducedModel, Signals};
+use crate::model::{ModelError, ReducedModel, Signals, StateMap};
 
 /// Longest equation that documentation spells out, in terms.
 const MOST_TERMS: usize = 40;
@@ -110,10 +110,16 @@ impl ModelEntries {
 fn map_entries(model: &ReducedModel) -> Result<Vec<Entry>, LowerError> {
     let (state, input) = (model.state(), model.input());
     let n = "robot coordinates in SI units";
+    let is_curved = |map: Result<&StateMap, ModelError>| map.is_ok_and(|m| m.as_affine().is_none());
+    let equations = MapEquations {
+        curved_encoder: is_curved(model.encoder_map()),
+        curved_decoder: is_curved(model.decoder_map()),
+    };
+    let (at_x, at_z) = equations.points();
     let candidates = [
         (
             lower::encode(model),
-            "Latent coordinates: z = W_e (s_x x) + b_e.".to_owned(),
+            equations.encode(),
             format!(
                 "x: {n}. z: latent coordinates (scaled).{}",
                 elements("x", state)
@@ -121,12 +127,12 @@ fn map_entries(model: &ReducedModel) -> Result<Vec<Entry>, LowerError> {
         ),
         (
             lower::encode_velocity(model),
-            "Latent velocities: dz = W_e (s_x dx); velocities take no bias.".to_owned(),
-            format!("dx: velocities of the {n}. dz: latent velocities (scaled)."),
+            equations.encode_velocity(),
+            format!("{at_x}dx: velocities of the {n}. dz: latent velocities (scaled)."),
         ),
         (
             lower::decode(model),
-            "Robot coordinates: x = (W_d z + b_d) / s_x.".to_owned(),
+            equations.decode(),
             format!(
                 "z: latent coordinates (scaled). x: {n}.{}",
                 elements("x", state)
@@ -134,22 +140,22 @@ fn map_entries(model: &ReducedModel) -> Result<Vec<Entry>, LowerError> {
         ),
         (
             lower::decode_velocity(model),
-            "Robot velocities: dx = (W_d dz) / s_x; velocities take no bias.".to_owned(),
-            format!("dz: latent velocities (scaled). dx: velocities of the {n}."),
+            equations.decode_velocity(),
+            format!("{at_z}dz: latent velocities (scaled). dx: velocities of the {n}."),
         ),
         (
             lower::project_input(model),
-            "Latent inputs: u_lat = pinv(W_e^T) (s_u u).".to_owned(),
+            equations.project_input(),
             format!(
-                "u: generalised inputs in SI units. u_lat: latent inputs (scaled).{}",
+                "{at_x}u: generalised inputs in SI units. u_lat: latent inputs (scaled).{}",
                 elements("u", input)
             ),
         ),
         (
             lower::lift_input(model),
-            "Generalised inputs: u = (W_e^T u_lat) / s_u.".to_owned(),
+            equations.lift_input(),
             format!(
-                "u_lat: latent inputs (scaled). u: generalised inputs in SI units.{}",
+                "{at_x}u_lat: latent inputs (scaled). u: generalised inputs in SI units.{}",
                 elements("u", input)
             ),
         ),
@@ -158,7 +164,7 @@ fn map_entries(model: &ReducedModel) -> Result<Vec<Entry>, LowerError> {
     for (program, title, units) in candidates {
         match program {
             Ok(program) => {
-                let docs = vec![title, units, shapes(&program)];
+                let docs = vec![title.to_owned(), units, shapes(&program)];
                 entries.push(entry(program.name().to_owned(), program, docs));
             }
             Err(LowerError::Model(ModelError::Missing { .. })) => {}
@@ -166,6 +172,71 @@ fn map_entries(model: &ReducedModel) -> Result<Vec<Entry>, LowerError> {
         }
     }
     Ok(entries)
+}
+
+/// The equations of the maps in words of the documentation, for linear and nonlinear models.
+struct MapEquations {
+    curved_encoder: bool,
+    curved_decoder: bool,
+}
+
+impl MapEquations {
+    /// What the first argument of the encoder's and the decoder's functions is, if they take one.
+    fn points(&self) -> (&'static str, &'static str) {
+        let x = "x: robot coordinates at which the Jacobian is taken, SI units. ";
+        let z = "z: latent coordinates at which the Jacobian is taken (scaled). ";
+        (
+            if self.curved_encoder { x } else { "" },
+            if self.curved_decoder { z } else { "" },
+        )
+    }
+
+    fn encode(&self) -> &'static str {
+        match self.curved_encoder {
+            false => "Latent coordinates: z = W_e (s_x x) + b_e.",
+            true => "Latent coordinates: z = E(s_x x) with the nonlinear encoder E.",
+        }
+    }
+
+    fn encode_velocity(&self) -> &'static str {
+        match self.curved_encoder {
+            false => "Latent velocities: dz = W_e (s_x dx); velocities take no bias.",
+            true => "Latent velocities: dz = J (s_x dx) with J, the encoder's Jacobian at s_x x.",
+        }
+    }
+
+    fn decode(&self) -> &'static str {
+        match self.curved_decoder {
+            false => "Robot coordinates: x = (W_d z + b_d) / s_x.",
+            true => "Robot coordinates: x = D(z) / s_x with the nonlinear decoder D.",
+        }
+    }
+
+    fn decode_velocity(&self) -> &'static str {
+        match self.curved_decoder {
+            false => "Robot velocities: dx = (W_d dz) / s_x; velocities take no bias.",
+            true => "Robot velocities: dx = (J dz) / s_x with J, the decoder's Jacobian at z.",
+        }
+    }
+
+    fn project_input(&self) -> &'static str {
+        match self.curved_encoder {
+            false => "Latent inputs: u_lat = pinv(W_e^T) (s_u u).",
+            true => {
+                "Latent inputs: u_lat = pinv(J^T) (s_u u) with J, the encoder's Jacobian at s_x x, \
+                 by the normal equations; not finite where J has not full row rank."
+            }
+        }
+    }
+
+    fn lift_input(&self) -> &'static str {
+        match self.curved_encoder {
+            false => "Generalised inputs: u = (W_e^T u_lat) / s_u.",
+            true => {
+                "Generalised inputs: u = (J^T u_lat) / s_u with J, the encoder's Jacobian at s_x x."
+            }
+        }
+    }
 }
 
 fn phase_entries(

@@ -9,7 +9,7 @@ use super::Answer;
 use super::output::{Table, significant};
 use crate::Error;
 use crate::artifact;
-use crate::model::{FeetRule, Phase, ReducedModel};
+use crate::model::{FeetRule, Phase, ReducedModel, StateMap};
 use crate::robot::Robot;
 
 /// Library terms that still fit as a pattern in a terminal.
@@ -53,6 +53,11 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
                 .collect();
             let _ = writeln!(text, "  z{} = {} ...", latent + 1, parts.join(", "));
         }
+    } else if let Ok(encoder) = model.encoder_map() {
+        let _ = writeln!(text, "  encoder {}", encoder.summary());
+        if let Ok(decoder) = model.decoder_map() {
+            let _ = writeln!(text, "  decoder {}", decoder.summary());
+        }
     } else {
         text.push_str("latent-only: no encoder, so it says nothing about a robot's coordinates\n");
     }
@@ -69,6 +74,8 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
             "library": model.library().terms().iter().map(|term| term.text()).collect::<Vec<_>>(),
             "phases": model.phases().iter().map(phase_json).collect::<Vec<_>>(),
             "dominant_coordinates": dominant,
+            "encoder": model.encoder_map().ok().map(StateMap::summary),
+            "decoder": model.decoder_map().ok().map(StateMap::summary),
             "provenance": model.provenance(),
         }),
     })

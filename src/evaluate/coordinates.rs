@@ -23,7 +23,7 @@ impl CoordinateSums {
     /// # Errors
     /// [`ModelError::Missing`] for a latent-only model.
     pub fn new(model: &ReducedModel) -> Result<Self, ModelError> {
-        let state_dim = model.decoder()?.output_dim();
+        let state_dim = model.decoder_map()?.output_dim();
         Ok(Self {
             sums: vec![FitSums::default(); state_dim],
             windows: 0,

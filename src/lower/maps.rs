@@ -1,8 +1,13 @@
 //! The maps between robot and latent coordinates, with the scaling folded in.
+//!
+//! Each says what it is for a linear model. With a nonlinear encoder or decoder the weights are the
+//! Jacobian at a state, which is then the first input: `x` of the encoder's maps, `z` of the
+//! decoder's.
 
 use nalgebra::DMatrix;
 
 use super::error::LowerError;
+use super::network;
 use super::sums::{Term, linear_combination};
 use crate::ir::{Program, ProgramBuilder};
 use crate::model::ReducedModel;
@@ -12,6 +17,9 @@ use crate::model::ReducedModel;
 /// # Errors
 /// [`LowerError::Model`] if the model has no encoder or scaling.
 pub fn encode(model: &ReducedModel) -> Result<Program, LowerError> {
+    if model.encoder_map()?.as_affine().is_none() {
+        return network::encode(model);
+    }
     let bias = model.encoder()?.bias().as_slice();
     affine("encode", ("x", "z"), &encoder_weights(model)?, Some(bias))
 }
@@ -21,6 +29,9 @@ pub fn encode(model: &ReducedModel) -> Result<Program, LowerError> {
 /// # Errors
 /// As [`encode`].
 pub fn encode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
+    if model.encoder_map()?.as_affine().is_none() {
+        return network::encode_velocity(model);
+    }
     affine(
         "encode_velocity",
         ("dx", "dz"),
@@ -34,6 +45,9 @@ pub fn encode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
 /// # Errors
 /// [`LowerError::Model`] if the model has no decoder or scaling.
 pub fn decode(model: &ReducedModel) -> Result<Program, LowerError> {
+    if model.decoder_map()?.as_affine().is_none() {
+        return network::decode(model);
+    }
     let factors = model.state_factors()?;
     let bias = model.decoder()?.bias().component_div(&factors);
     affine(
@@ -49,6 +63,9 @@ pub fn decode(model: &ReducedModel) -> Result<Program, LowerError> {
 /// # Errors
 /// As [`decode`].
 pub fn decode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
+    if model.decoder_map()?.as_affine().is_none() {
+        return network::decode_velocity(model);
+    }
     affine(
         "decode_velocity",
         ("dz", "dx"),
@@ -62,6 +79,9 @@ pub fn decode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
 /// # Errors
 /// As [`encode`].
 pub fn project_input(model: &ReducedModel) -> Result<Program, LowerError> {
+    if model.encoder_map()?.as_affine().is_none() {
+        return network::project_input(model);
+    }
     let factors = model.input_factors()?;
     let projection = model.input_projection()?;
     let weights = DMatrix::from_fn(projection.nrows(), projection.ncols(), |row, col| {
@@ -75,6 +95,9 @@ pub fn project_input(model: &ReducedModel) -> Result<Program, LowerError> {
 /// # Errors
 /// As [`encode`].
 pub fn lift_input(model: &ReducedModel) -> Result<Program, LowerError> {
+    if model.encoder_map()?.as_affine().is_none() {
+        return network::lift_input(model);
+    }
     let factors = model.input_factors()?;
     let encoder = model.encoder()?.weights();
     let weights = DMatrix::from_fn(encoder.ncols(), encoder.nrows(), |row, col| {

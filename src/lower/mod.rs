@@ -13,6 +13,8 @@ mod dynamics;
 mod error;
 mod expression;
 mod maps;
+mod network;
+mod solve;
 mod step;
 mod sums;
 

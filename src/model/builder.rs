@@ -5,7 +5,6 @@ use std::collections::HashMap;
 use nalgebra::DMatrix;
 use serde_json::{Map, Value};
 
-use super::affine::AffineMap;
 use super::error::{ModelError, check_finite, check_shape};
 use super::identifier::Identifier;
 use super::library::Library;
@@ -13,6 +12,7 @@ use super::phase::{FeetRule, Phase, all_patterns};
 use super::rom::ReducedModel;
 use super::scaling::Scaling;
 use super::signals::Signals;
+use super::state_map::StateMap;
 use super::statistics::InputStatistics;
 use crate::robot::Robot;
 
@@ -35,8 +35,8 @@ pub struct ModelBuilder {
     state: Option<Signals>,
     input: Option<Signals>,
     scaling: Option<Scaling>,
-    encoder: Option<AffineMap>,
-    decoder: Option<AffineMap>,
+    encoder: Option<StateMap>,
+    decoder: Option<StateMap>,
     robot: Option<&'static Robot>,
     sample_time_s: Option<f64>,
     provenance: Map<String, Value>,
@@ -137,15 +137,17 @@ impl ModelBuilder {
         self
     }
 
-    /// Sets the encoder (scaled units, `latent_dim x state_dim`).
-    pub fn encoder(mut self, encoder: AffineMap) -> Self {
-        self.encoder = Some(encoder);
+    /// Sets the encoder, an [`AffineMap`](super::AffineMap) or a [`StateMap`] (scaled units,
+    /// `latent_dim x state_dim`).
+    pub fn encoder(mut self, encoder: impl Into<StateMap>) -> Self {
+        self.encoder = Some(encoder.into());
         self
     }
 
-    /// Sets the decoder (scaled units, `state_dim x latent_dim`).
-    pub fn decoder(mut self, decoder: AffineMap) -> Self {
-        self.decoder = Some(decoder);
+    /// Sets the decoder, an [`AffineMap`](super::AffineMap) or a [`StateMap`] (scaled units,
+    /// `state_dim x latent_dim`).
+    pub fn decoder(mut self, decoder: impl Into<StateMap>) -> Self {
+        self.decoder = Some(decoder.into());
         self
     }
 
@@ -183,7 +185,8 @@ impl ModelBuilder {
             scaling.state.check("state", state_dim)?;
             scaling.input.check("input", state_dim)?;
         }
-        let input_projection = match &self.encoder {
+        let linear = self.encoder.as_ref().and_then(StateMap::as_affine);
+        let input_projection = match linear {
             Some(encoder) => Some(pinv_of_transpose(encoder.weights())?),
             None => None,
         };
@@ -293,8 +296,8 @@ impl ModelBuilder {
             .map(|_| crate::robot::STATE_DIM)
             .or(named(&self.state))
             .or(named(&self.input))
-            .or(self.encoder.as_ref().map(AffineMap::input_dim))
-            .or(self.decoder.as_ref().map(AffineMap::output_dim));
+            .or(self.encoder.as_ref().map(StateMap::input_dim))
+            .or(self.decoder.as_ref().map(StateMap::output_dim));
         if (self.encoder.is_some() || self.decoder.is_some()) && self.scaling.is_none() {
             let part = if self.encoder.is_some() {
                 "encoder"
@@ -317,12 +320,11 @@ impl ModelBuilder {
             });
         }
         if let Some(encoder) = &self.encoder {
-            let found = encoder.weights().shape();
-            check_shape("encoder.weights", found, (latent_dim, dim))?;
+            check_map("encoder", encoder, (latent_dim, dim))?;
+            check_widths(encoder, latent_dim)?;
         }
         if let Some(decoder) = &self.decoder {
-            let found = decoder.weights().shape();
-            check_shape("decoder.weights", found, (dim, latent_dim))?;
+            check_map("decoder", decoder, (dim, latent_dim))?;
         }
         Ok(Some(dim))
     }
@@ -397,6 +399,57 @@ fn check_robot_names(
     Ok(())
 }
 
+/// Checks what enters the first layer and what leaves the last; `expected` is the Jacobian's shape.
+fn check_map(name: &str, map: &StateMap, expected: (usize, usize)) -> Result<(), ModelError> {
+    if let Some(affine) = map.as_affine() {
+        return check_shape(
+            &format!("{name}.weights"),
+            affine.weights().shape(),
+            expected,
+        );
+    }
+    let last = map.layers().len() - 1;
+    let ends = [(0, None, Some(expected.1)), (last, Some(expected.0), None)];
+    for (layer, rows, columns) in ends {
+        let found = map.layers()[layer].map.weights().shape();
+        let expected = (rows.unwrap_or(found.0), columns.unwrap_or(found.1));
+        check_shape(&format!("{name}.layers[{layer}].weights"), found, expected)?;
+    }
+    Ok(())
+}
+
+/// No layer of an encoder may be narrower than the latent space, or its Jacobian never has full
+/// rank.
+fn check_widths(encoder: &StateMap, latent_dim: usize) -> Result<(), ModelError> {
+    let widths = encoder.layers().iter().map(|layer| layer.map.output_dim());
+    match widths.enumerate().find(|&(_, width)| width < latent_dim) {
+        None => Ok(()),
+        Some((layer, found)) => Err(ModelError::NarrowLayer {
+            layer,
+            found,
+            expected: latent_dim,
+        }),
+    }
+}
+
+/// `pinv(J^T)` of a nonlinear encoder's Jacobian at a state.
+pub(super) fn pinv_of_jacobian(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
+    pinv_of_transpose(jacobian).map_err(|error| match error {
+        ModelError::RankDeficient {
+            smallest,
+            largest,
+            expected,
+            tolerance,
+        } => ModelError::SingularJacobian {
+            smallest,
+            largest,
+            expected,
+            tolerance,
+        },
+        other => other,
+    })
+}
+
 /// `pinv(W_e^T)`, `latent_dim x state_dim`, from the singular values of `W_e = U S V^T`:
 /// `pinv(W_e^T) = U S^-1 V^T`.
 fn pinv_of_transpose(weights: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
@@ -428,6 +481,20 @@ fn pinv_of_transpose(weights: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError>
     let v_t = svd.v_t.expect("asked for the right singular vectors");
     let inverse = svd.singular_values.map(|value| 1.0 / value);
     let projection = u * DMatrix::from_diagonal(&inverse) * v_t / largest_entry;
+    let projection = refined(projection, weights);
     check_finite("pinv(encoder.weights^T)", &projection)?;
     Ok(projection)
+}
+
+/// Removes what the iteration of the singular values left over, which can be 1e-10 even for well
+/// conditioned matrices: a Newton step on `P W_e^T = I` squares the residual.
+fn refined(projection: DMatrix<f64>, weights: &DMatrix<f64>) -> DMatrix<f64> {
+    const NEGLIGIBLE: f64 = 1e-13;
+    let dim = projection.nrows();
+    let residual = DMatrix::identity(dim, dim) - &projection * weights.transpose();
+    if residual.amax() <= NEGLIGIBLE {
+        return projection;
+    }
+    let step = &residual * &projection;
+    projection + step
 }

@@ -278,6 +278,70 @@ pub enum ModelError {
         /// What needs it.
         purpose: &'static str,
     },
+    /// Something needs a linear encoder or decoder, and the model's has activations.
+    #[error("model {model}: found a nonlinear {part}, expected a linear one ({purpose} needs it)")]
+    Nonlinear {
+        /// Name of the model.
+        model: String,
+        /// `encoder` or `decoder`.
+        part: &'static str,
+        /// What needs it to be linear.
+        purpose: &'static str,
+    },
+    /// The Jacobian of a nonlinear encoder has not full row rank at a state.
+    #[error(
+        "encoder at this state: found singular values of its Jacobian from {smallest:e} to {largest:e}, expected full row rank {expected} (smallest above {tolerance:e} times the largest)"
+    )]
+    SingularJacobian {
+        /// Smallest singular value.
+        smallest: f64,
+        /// Largest singular value.
+        largest: f64,
+        /// Number of latent coordinates.
+        expected: usize,
+        /// Relative tolerance.
+        tolerance: f64,
+    },
+    /// A map has no layer, or too many.
+    #[error("`{tensor}.layers`: found {found} layers, expected 1 to {max}")]
+    LayerCount {
+        /// `encoder` or `decoder`.
+        tensor: String,
+        /// How many there are.
+        found: usize,
+        /// How many there may be.
+        max: usize,
+    },
+    /// A layer has too many units.
+    #[error("`{tensor}`: found {found} units, expected at most {max}")]
+    LayerWidth {
+        /// Path of the tensor in the model file.
+        tensor: String,
+        /// Its rows.
+        found: usize,
+        /// How many there may be.
+        max: usize,
+    },
+    /// A hidden layer of the encoder has fewer units than there are latent coordinates.
+    #[error(
+        "`encoder.layers[{layer}]`: found {found} units, expected at least {expected}, one a latent coordinate"
+    )]
+    NarrowLayer {
+        /// Index of the layer.
+        layer: usize,
+        /// Its units.
+        found: usize,
+        /// Number of latent coordinates.
+        expected: usize,
+    },
+    /// An activation is not known.
+    #[error("found the activation {found:?}, expected one of {expected}")]
+    UnknownActivation {
+        /// The name.
+        found: String,
+        /// All names.
+        expected: String,
+    },
     /// A vector has the wrong length.
     #[error("{what}: found {found} entries, expected {expected}")]
     Dimension {

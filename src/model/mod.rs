@@ -32,22 +32,26 @@
 //! # }
 //! ```
 
+mod activation;
 mod affine;
 mod builder;
 mod error;
 mod evaluation;
 mod identifier;
 mod library;
+mod maps;
 mod phase;
 mod rom;
 mod scaling;
 mod signals;
 mod standard;
+mod state_map;
 mod statistics;
 
 #[cfg(test)]
 mod tests;
 
+pub use activation::Activation;
 pub use affine::AffineMap;
 pub use builder::{ModelBuilder, RANK_TOLERANCE};
 pub use error::{Dimensions, ModelError, SignalPart};
@@ -61,4 +65,5 @@ pub use rom::{LatentEquations, ReducedModel};
 pub use scaling::{ScaleFactors, Scaling};
 pub use signals::Signals;
 pub use standard::{MAX_DEGREE, StandardLibrary};
+pub use state_map::{Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};
 pub use statistics::{InputStatistics, LatentInputStatistics};

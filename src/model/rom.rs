@@ -9,11 +9,13 @@
 //! - `ddz = Xi^T Theta(z, dz, u_lat)` with the Xi of the phase that the feet select.
 //!
 //! `project(lift(u_lat)) == u_lat`, because an encoder has full row rank; the reverse does not hold.
+//!
+//! These are the linear maps. A nonlinear encoder or decoder ([`StateMap`]) has a Jacobian `J` at a
+//! state instead of `W`; `maps.rs` states what becomes of the equations.
 
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Map, Value};
 
-use super::affine::AffineMap;
 use super::builder::ModelBuilder;
 use super::error::ModelError;
 use super::identifier::Identifier;
@@ -21,7 +23,8 @@ use super::library::{CandidateTerm, Library};
 use super::phase::Phase;
 use super::scaling::Scaling;
 use super::signals::Signals;
-use super::statistics::{InputStatistics, LatentInputStatistics};
+use super::state_map::StateMap;
+use super::statistics::InputStatistics;
 use crate::robot::{ContactFlags, Robot};
 use crate::symbolic::{ExprId, ExprPool};
 
@@ -38,9 +41,9 @@ pub struct ReducedModel {
     pub(super) state: Option<Signals>,
     pub(super) input: Option<Signals>,
     pub(super) scaling: Option<Scaling>,
-    pub(super) encoder: Option<AffineMap>,
-    pub(super) decoder: Option<AffineMap>,
-    /// `pinv(W_e^T)`, `latent_dim x input_dim`; there when the encoder is.
+    pub(super) encoder: Option<StateMap>,
+    pub(super) decoder: Option<StateMap>,
+    /// `pinv(W_e^T)`, `latent_dim x input_dim`; there when the encoder is, and is linear.
     pub(super) input_projection: Option<DMatrix<f64>>,
     pub(super) robot: Option<&'static Robot>,
     pub(super) sample_time_s: Option<f64>,
@@ -94,8 +97,8 @@ impl ReducedModel {
 
     /// Number of robot coordinates, `n`; `None` for a latent-only model.
     pub fn state_dim(&self) -> Option<usize> {
-        let encoder = self.encoder.as_ref().map(AffineMap::input_dim);
-        let decoder = self.decoder.as_ref().map(AffineMap::output_dim);
+        let encoder = self.encoder.as_ref().map(StateMap::input_dim);
+        let decoder = self.decoder.as_ref().map(StateMap::output_dim);
         encoder
             .or(decoder)
             .or(self.state.as_ref().map(Signals::dim))
@@ -139,30 +142,6 @@ impl ReducedModel {
         self.input.as_ref()
     }
 
-    /// The encoder, in scaled units: `W_e` is `latent_dim x state_dim`.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] for a latent-only model.
-    pub fn encoder(&self) -> Result<&AffineMap, ModelError> {
-        self.require(
-            &self.encoder,
-            "encoder",
-            "going from robot to latent coordinates",
-        )
-    }
-
-    /// The decoder, in scaled units: `W_d` is `state_dim x latent_dim`.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the model has none.
-    pub fn decoder(&self) -> Result<&AffineMap, ModelError> {
-        self.require(
-            &self.decoder,
-            "decoder",
-            "going from latent to robot coordinates",
-        )
-    }
-
     /// The scale factors.
     ///
     /// # Errors
@@ -189,14 +168,6 @@ impl ReducedModel {
     /// As [`ReducedModel::state_factors`].
     pub fn input_factors(&self) -> Result<DVector<f64>, ModelError> {
         Ok(self.scaling()?.input.expand(self.require_state_dim()?))
-    }
-
-    /// `pinv(W_e^T)`, `latent_dim x state_dim`, in scaled units.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] for a latent-only model.
-    pub fn input_projection(&self) -> Result<&DMatrix<f64>, ModelError> {
-        self.require(&self.input_projection, "encoder", "projecting inputs")
     }
 
     /// The robot whose coordinates the model speaks of.
@@ -228,78 +199,6 @@ impl ReducedModel {
             "input_statistics",
             "weighing inputs",
         )
-    }
-
-    /// Mean and covariance of `u_lat` in one phase: those of `u` through `pinv(W_e^T) s_u`.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::input_statistics`] and [`ReducedModel::project_input`].
-    pub fn latent_input_statistics(
-        &self,
-        phase: usize,
-    ) -> Result<LatentInputStatistics, ModelError> {
-        let statistics = self.input_statistics(phase)?;
-        let projection = self.input_projection()? * DMatrix::from_diagonal(&self.input_factors()?);
-        Ok(LatentInputStatistics {
-            mean: &projection * &statistics.mean,
-            covariance: &projection * &statistics.covariance * projection.transpose(),
-        })
-    }
-
-    /// `z = W_e (s_x x) + b_e`; `x` in SI units.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] for a latent-only model, [`ModelError::Dimension`].
-    pub fn encode(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        self.encoder()?.apply(&self.scaled_state(x)?)
-    }
-
-    /// `dz = W_e (s_x dx)`, and the same for accelerations; `dx` in SI units.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::encode`].
-    pub fn encode_velocity(&self, dx: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        self.encoder()?.apply_linear(&self.scaled_state(dx)?)
-    }
-
-    /// `x = (W_d z + b_d) / s_x`, SI units.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the model has no decoder or scaling, [`ModelError::Dimension`].
-    pub fn decode(&self, z: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        let scaled = self.decoder()?.apply(z)?;
-        Ok(scaled.component_div(&self.state_factors()?))
-    }
-
-    /// `dx = (W_d dz) / s_x`, SI units, and the same for accelerations.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::decode`].
-    pub fn decode_velocity(&self, dz: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        let scaled = self.decoder()?.apply_linear(dz)?;
-        Ok(scaled.component_div(&self.state_factors()?))
-    }
-
-    /// Projects a generalised input: `u_lat = pinv(W_e^T) (s_u u)`; `u` in SI units.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::encode`].
-    pub fn project_input(&self, u: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        let projection = self.input_projection()?;
-        ModelError::check_dimension("generalised input u", u.len(), projection.ncols())?;
-        Ok(projection * u.component_mul(&self.input_factors()?))
-    }
-
-    /// Lifts a latent input to a generalised input: `u = (W_e^T u_lat) / s_u`, SI units.
-    ///
-    /// From the power balance under `dz = W_e dx`; joint torques (N m) are the leading entries.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::encode`].
-    pub fn lift_input(&self, u_lat: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        let weights = self.encoder()?.weights();
-        ModelError::check_dimension("latent input u_lat", u_lat.len(), weights.nrows())?;
-        Ok(weights.tr_mul(u_lat).component_div(&self.input_factors()?))
     }
 
     /// Latent acceleration `ddz = Xi^T Theta(z, dz, u_lat)` of one phase, term by term in library
@@ -381,19 +280,13 @@ impl ReducedModel {
         })
     }
 
-    fn scaled_state(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        let factors = self.state_factors()?;
-        ModelError::check_dimension("robot state", x.len(), factors.len())?;
-        Ok(x.component_mul(&factors))
-    }
-
     fn require_state_dim(&self) -> Result<usize, ModelError> {
         let dim = self.state_dim();
         self.require(&dim, "encoder", "a vector in robot coordinates")
             .copied()
     }
 
-    fn require<'a, T>(
+    pub(super) fn require<'a, T>(
         &self,
         part: &'a Option<T>,
         name: &'static str,

@@ -109,6 +109,30 @@ fn maps_refuse_vectors_of_the_wrong_length() {
 }
 
 #[test]
+fn projection_is_exact_where_the_singular_values_converge_slowly() {
+    // nalgebra's singular vectors of this matrix, of condition 2.8, are off by 1e-12.
+    let columns = [
+        [
+            -0.7769688438189468,
+            -1.2577828226251595,
+            -0.2436841260084793,
+        ],
+        [-1.7533789315191364, 0.6605775258285481, 0.6714783108199709],
+        [1.254574296880164, -0.32936693043632614, -0.730563380709926],
+        [0.4684458419054671, 1.1601105402889815, -0.7118258863694065],
+        [0.14041738823712316, -1.6122611753765324, 0.7541141701265696],
+    ];
+    let encoder = DMatrix::from_fn(3, 5, |row, col| columns[col][row]);
+    let scaling = Scaling {
+        state: ScaleFactors::Uniform(1.0),
+        input: ScaleFactors::Uniform(1.0),
+    };
+    let model = linear_model(encoder.clone(), encoder.transpose(), scaling).unwrap();
+    let identity = model.input_projection().unwrap() * encoder.transpose();
+    assert!((identity - DMatrix::identity(3, 3)).amax() < 1e-14);
+}
+
+#[test]
 fn latent_input_statistics_follow_the_projection() {
     let model = example();
     let n = 3;

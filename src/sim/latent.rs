@@ -1,12 +1,15 @@
 //! A recorded segment as the model sees it: latent states, latent inputs, phases.
 
-use nalgebra::{DMatrix, DVectorView};
+use nalgebra::{DMatrix, DVector};
 
 use super::error::SimError;
 use crate::model::ReducedModel;
 use crate::recording::Segment;
 
 /// Latent samples of one recorded segment; every matrix is `latent_dim x n`, a column a sample.
+///
+/// The equations are those of a linear model; a nonlinear encoder's Jacobian at the sample's `x`
+/// takes the place of `W_e`, and accelerations have the term `dJ/dt dx`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LatentSegment {
     /// Increasing times, in s.
@@ -31,22 +34,23 @@ impl LatentSegment {
     /// be computed, [`SimError::NoPhase`] with the row whose feet no phase covers.
     pub fn encode(model: &ReducedModel, segment: &Segment) -> Result<Self, SimError> {
         let input = segment.input(model.robot()?)?;
-        let columns = |matrix: &DMatrix<f64>,
-                       map: &dyn Fn(DVectorView<f64>) -> Result<_, SimError>|
-         -> Result<DMatrix<f64>, SimError> {
-            let mut out = DMatrix::zeros(model.latent_dim(), matrix.ncols());
-            for (mut to, from) in out.column_iter_mut().zip(matrix.column_iter()) {
-                to.copy_from(&map(from)?);
+        let samples = |map: &dyn Fn(usize) -> Result<DVector<f64>, SimError>| {
+            let mut out = DMatrix::zeros(model.latent_dim(), segment.x.ncols());
+            for (sample, mut to) in out.column_iter_mut().enumerate() {
+                to.copy_from(&map(sample)?);
             }
-            Ok(out)
+            Ok::<_, SimError>(out)
         };
-        let velocity = |dx: DVectorView<f64>| Ok(model.encode_velocity(&dx.into_owned())?);
+        let x = |k| segment.x.column(k).into_owned();
+        let dx = |k| segment.dx.column(k).into_owned();
+        let ddx = |k| segment.ddx.column(k).into_owned();
+        let u = |k| input.column(k).into_owned();
         Ok(Self {
             time_s: segment.time_s.clone(),
-            z: columns(&segment.x, &|x| Ok(model.encode(&x.into_owned())?))?,
-            dz: columns(&segment.dx, &velocity)?,
-            ddz: columns(&segment.ddx, &velocity)?,
-            u_lat: columns(&input, &|u| Ok(model.project_input(&u.into_owned())?))?,
+            z: samples(&|k| Ok(model.encode(&x(k))?))?,
+            dz: samples(&|k| Ok(model.encode_velocity_at(&x(k), &dx(k))?))?,
+            ddz: samples(&|k| Ok(model.encode_acceleration_at(&x(k), &dx(k), &ddx(k))?))?,
+            u_lat: samples(&|k| Ok(model.project_input_at(&x(k), &u(k))?))?,
             phase: phases(model, segment)?,
         })
     }

@@ -4,7 +4,10 @@ use std::path::Path;
 
 use nalgebra::{DMatrix, DVector};
 use romc::artifact;
-use romc::model::{AffineMap, FeetRule, Library, Phase, ReducedModel, ScaleFactors, Scaling};
+use romc::model::{
+    Activation, AffineMap, FeetRule, Layer, Library, Phase, ReducedModel, ScaleFactors, Scaling,
+    StateMap,
+};
 
 use super::functions::Random;
 
@@ -75,6 +78,62 @@ pub fn random(seed: u64) -> ReducedModel {
             });
     }
     builder.build().expect("a valid model")
+}
+
+/// A model with random layers: depth, widths and activations vary with the seed.
+pub fn random_nonlinear(seed: u64) -> ReducedModel {
+    let mut random = Random(seed.wrapping_mul(0x7654_3211) + 1);
+    let d = 1 + random.below(6);
+    let n = d + 1 + random.below(12);
+    let library = Library::from_terms(d, &["z1".into(), "dz1".into(), "u1^2".into()]);
+    let xi = DMatrix::from_fn(3, d, |i, j| 0.5 * i as f64 - 0.25 * j as f64);
+    let factors = DVector::from_fn(n, |_, _| random.between(0.1, 1.0));
+    let encoder = random_map(&mut random, seed as usize, n, d);
+    let decoder = random_map(&mut random, seed as usize + 1, d, n);
+    ReducedModel::builder(format!("nonlinear{seed}"), library.expect("three terms"))
+        .phase(Phase {
+            name: "contact".to_owned(),
+            feet: FeetRule::Any,
+            xi,
+        })
+        .encoder(encoder)
+        .decoder(decoder)
+        .scaling(Scaling {
+            state: ScaleFactors::PerCoordinate(factors),
+            input: ScaleFactors::Uniform(0.3),
+        })
+        .build()
+        .expect("a valid model")
+}
+
+/// One of the shapes of networks: one curved layer, hidden layers, a curved last layer.
+fn random_map(random: &mut Random, shape: usize, from: usize, to: usize) -> StateMap {
+    use Activation::{Elu, Linear, Sigmoid, Tanh};
+    let activations: &[Activation] = [
+        &[Elu, Linear][..],
+        &[Tanh, Sigmoid, Linear],
+        &[Sigmoid, Tanh],
+        &[Elu, Elu, Linear],
+        &[Tanh],
+    ][shape % 5];
+    let mut layers = Vec::new();
+    let mut cols = from;
+    for (index, &activation) in activations.iter().enumerate() {
+        let is_last = index + 1 == activations.len();
+        let rows = if is_last {
+            to
+        } else {
+            from.max(to) + random.below(9)
+        };
+        // About unit variance of each sum, so that no unit saturates.
+        let size = 1.7 / (cols as f64).sqrt();
+        let weights = DMatrix::from_fn(rows, cols, |_, _| random.between(-size, size));
+        let bias = DVector::from_fn(rows, |_, _| random.between(-0.5, 0.5));
+        let map = AffineMap::new("map", weights, bias).expect("shapes fit");
+        layers.push(Layer { map, activation });
+        cols = rows;
+    }
+    StateMap::new("map", layers).expect("layers fit")
 }
 
 fn random_term(random: &mut Random, d: usize, polynomial: bool) -> String {

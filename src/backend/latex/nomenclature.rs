@@ -1,7 +1,7 @@
 //! What each symbol of the equations means.
 
 use crate::backend::typeset::{Decimal, Quantity, Rounding, SymbolTable, Variable};
-use crate::model::{ReducedModel, ScaleFactors};
+use crate::model::{Activation, ReducedModel, ScaleFactors, StateMap};
 
 use super::escape::TexText;
 use super::math::{NumberStyle, TexNumber, TexSymbol};
@@ -26,6 +26,7 @@ pub(super) fn entries(
     numbers: NumberStyle,
 ) -> Vec<Entry> {
     let dim = model.latent_dim();
+    let has_layers = model.encoder_map().is_ok();
     let mut list: Vec<Entry> = (1..=dim)
         .map(|index| Entry {
             symbol: symbol(symbols, Quantity::Position, index),
@@ -36,6 +37,7 @@ pub(super) fn entries(
         symbol: range(symbols, Quantity::Velocity, dim),
         meaning: match model.encoder() {
             Ok(_) => r"latent velocities, $\dot{\mathbf{z}} = \mathbf{W}_e (\mathbf{s}_x \dot{\mathbf{x}})$".to_owned(),
+            Err(_) if has_layers => r"latent velocities, $\dot{\mathbf{z}} = \mathbf{J} (\mathbf{s}_x \dot{\mathbf{x}})$".to_owned(),
             Err(_) => "latent velocities".to_owned(),
         },
     });
@@ -43,11 +45,16 @@ pub(super) fn entries(
         symbol: range(symbols, Quantity::Input, dim),
         meaning: match model.encoder() {
             Ok(_) => r"latent inputs, $\mathbf{u}_{\mathrm{lat}} = (\mathbf{W}_e^{\mathsf{T}})^{+} (\mathbf{s}_u \mathbf{u})$, lifted by $\mathbf{s}_u \mathbf{u} = \mathbf{W}_e^{\mathsf{T}} \mathbf{u}_{\mathrm{lat}}$".to_owned(),
+            Err(_) if has_layers => r"latent inputs, $\mathbf{u}_{\mathrm{lat}} = (\mathbf{J}^{\mathsf{T}})^{+} (\mathbf{s}_u \mathbf{u})$, lifted by $\mathbf{s}_u \mathbf{u} = \mathbf{J}^{\mathsf{T}} \mathbf{u}_{\mathrm{lat}}$".to_owned(),
             Err(_) => "latent inputs".to_owned(),
         },
     });
     if model.encoder().is_ok() {
         list.extend(robot_entries(model, numbers));
+    } else if let Ok(encoder) = model.encoder_map() {
+        list.push(robot_state());
+        list.push(layers(encoder));
+        list.extend(scale_factors(model, numbers));
     }
     list
 }
@@ -105,10 +112,7 @@ fn coordinate(model: &ReducedModel, row: usize, numbers: NumberStyle) -> String 
 
 fn robot_entries(model: &ReducedModel, numbers: NumberStyle) -> Vec<Entry> {
     let mut list = vec![
-        Entry {
-            symbol: r"$\mathbf{x}$, $\mathbf{u}$".to_owned(),
-            meaning: "robot state and generalised input in SI units".to_owned(),
-        },
+        robot_state(),
         Entry {
             symbol: r"$\mathbf{W}_e$, $\mathbf{b}_e$".to_owned(),
             meaning:
@@ -116,6 +120,41 @@ fn robot_entries(model: &ReducedModel, numbers: NumberStyle) -> Vec<Entry> {
                     .to_owned(),
         },
     ];
+    list.extend(scale_factors(model, numbers));
+    list
+}
+
+fn robot_state() -> Entry {
+    Entry {
+        symbol: r"$\mathbf{x}$, $\mathbf{u}$".to_owned(),
+        meaning: "robot state and generalised input in SI units".to_owned(),
+    }
+}
+
+/// A nonlinear encoder by the widths of its layers; its weights stay in the model file.
+fn layers(encoder: &StateMap) -> Entry {
+    let widths = encoder.layers().iter().map(|layer| {
+        let width = layer.map.output_dim();
+        match layer.activation {
+            Activation::Linear => width.to_string(),
+            Activation::Elu | Activation::Tanh | Activation::Sigmoid => {
+                format!("{width} ({})", layer.activation)
+            }
+        }
+    });
+    let widths: Vec<String> = widths.collect();
+    Entry {
+        symbol: r"$\mathbf{E}$, $\mathbf{J}$".to_owned(),
+        meaning: format!(
+            r"nonlinear encoder, $\mathbf{{z}} = \mathbf{{E}}(\mathbf{{s}}_x \mathbf{{x}})$, and its Jacobian at $\mathbf{{s}}_x \mathbf{{x}}$; inputs {}, layers {}",
+            encoder.input_dim(),
+            widths.join(", ")
+        ),
+    }
+}
+
+fn scale_factors(model: &ReducedModel, numbers: NumberStyle) -> Vec<Entry> {
+    let mut list = Vec::new();
     if let Ok(scaling) = model.scaling() {
         for (symbol, factors) in [("x", &scaling.state), ("u", &scaling.input)] {
             let value = match factors {

@@ -1,0 +1,130 @@
+//! Activations of layers, with their exact derivatives.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::error::ModelError;
+
+/// What a layer applies to each of its units.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Activation {
+    /// `a`
+    #[default]
+    Linear,
+    /// `a` for positive `a`, else `exp(a) - 1` (alpha = 1).
+    Elu,
+    /// `tanh(a)`
+    Tanh,
+    /// `1 / (1 + exp(-a))`
+    Sigmoid,
+}
+
+impl Activation {
+    /// All activations, in the order in which they are listed.
+    pub const ALL: [Activation; 4] = [Self::Linear, Self::Elu, Self::Tanh, Self::Sigmoid];
+
+    /// The name in model files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Elu => "elu",
+            Self::Tanh => "tanh",
+            Self::Sigmoid => "sigmoid",
+        }
+    }
+
+    /// `phi(a)`.
+    pub fn value(self, a: f64) -> f64 {
+        match self {
+            Self::Linear => a,
+            Self::Elu if a > 0.0 => a,
+            Self::Elu => a.exp_m1(),
+            Self::Tanh => a.tanh(),
+            Self::Sigmoid => sigmoid(a),
+        }
+    }
+
+    /// `phi'(a)`.
+    pub fn slope(self, a: f64) -> f64 {
+        match self {
+            Self::Linear => 1.0,
+            Self::Elu if a > 0.0 => 1.0,
+            Self::Elu => a.exp(),
+            Self::Tanh => 1.0 - a.tanh() * a.tanh(),
+            Self::Sigmoid => sigmoid(a) * (1.0 - sigmoid(a)),
+        }
+    }
+
+    /// `phi''(a)`; of elu at zero, where it jumps, that of the negative side.
+    pub fn curvature(self, a: f64) -> f64 {
+        match self {
+            Self::Linear => 0.0,
+            Self::Elu if a > 0.0 => 0.0,
+            Self::Elu => a.exp(),
+            Self::Tanh => -2.0 * a.tanh() * (1.0 - a.tanh() * a.tanh()),
+            Self::Sigmoid => {
+                let s = sigmoid(a);
+                s * (1.0 - s) * (1.0 - 2.0 * s)
+            }
+        }
+    }
+}
+
+fn sigmoid(a: f64) -> f64 {
+    1.0 / (1.0 + (-a).exp())
+}
+
+impl fmt::Display for Activation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Activation {
+    type Err = ModelError;
+
+    fn from_str(name: &str) -> Result<Self, ModelError> {
+        let known = Self::ALL.into_iter().find(|known| known.name() == name);
+        known.ok_or_else(|| ModelError::UnknownActivation {
+            found: name.chars().take(40).collect(),
+            expected: Self::ALL.map(Self::name).join(", "),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_and_curvatures_equal_central_differences() {
+        let h = 1e-5;
+        for phi in Activation::ALL {
+            for a in [-3.0, -0.7, -0.02, 0.3, 2.5] {
+                let slope = (phi.value(a + h) - phi.value(a - h)) / (2.0 * h);
+                assert!((phi.slope(a) - slope).abs() < 1e-9, "{phi} at {a}");
+                let curvature = (phi.slope(a + h) - phi.slope(a - h)) / (2.0 * h);
+                assert!((phi.curvature(a) - curvature).abs() < 1e-9, "{phi} at {a}");
+            }
+        }
+    }
+
+    #[test]
+    fn large_arguments_stay_finite() {
+        for phi in Activation::ALL {
+            for a in [-800.0, 800.0] {
+                assert!(phi.value(a).is_finite(), "{phi} at {a}");
+                assert!(phi.slope(a).is_finite(), "{phi} at {a}");
+            }
+        }
+    }
+
+    #[test]
+    fn names_are_read_back_and_others_refused() {
+        for phi in Activation::ALL {
+            assert_eq!(phi.name().parse(), Ok(phi));
+        }
+        let refused = "gelu".parse::<Activation>().unwrap_err();
+        assert!(refused.to_string().contains("linear, elu, tanh, sigmoid"));
+    }
+}

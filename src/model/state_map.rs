@@ -1,0 +1,325 @@
+//! Chains of affine layers with activations: encoders and decoders, linear or not.
+//!
+//! With `a_k = W_k y_(k-1) + b_k` and `y_k = phi_k(a_k)`, the map takes `y_0` to `y_L`; its Jacobian
+//! is `J = D_L W_L ... D_1 W_1` with `D_k = diag(phi_k'(a_k))`. An affine map is the chain of one
+//! linear layer.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::activation::Activation;
+use super::affine::AffineMap;
+use super::error::ModelError;
+
+/// Most layers of a map.
+pub const MAX_LAYERS: usize = 16;
+/// Most units of a layer.
+pub const MAX_LAYER_WIDTH: usize = 1024;
+
+/// One layer: `y -> phi(W y + b)`, the activation applied to each unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layer {
+    /// `W` and `b`.
+    pub map: AffineMap,
+    /// `phi`.
+    pub activation: Activation,
+}
+
+/// A smooth map between scaled coordinates: an encoder or a decoder.
+///
+/// Positions go through [`StateMap::apply`]; velocities and accelerations through its first and
+/// second time derivative, which for a linear map are `W dx` and `W ddx`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StateMap {
+    layers: Vec<Layer>,
+}
+
+impl From<AffineMap> for StateMap {
+    fn from(map: AffineMap) -> Self {
+        let activation = Activation::Linear;
+        Self {
+            layers: vec![Layer { map, activation }],
+        }
+    }
+}
+
+impl StateMap {
+    /// The chain of these layers, the first applied first; `tensor` names it in errors.
+    ///
+    /// # Errors
+    /// [`ModelError::LayerCount`] unless there are 1 to [`MAX_LAYERS`]; [`ModelError::Shape`] if a
+    /// layer does not take what the layer before it gives; [`ModelError::LayerWidth`] if one has
+    /// more than [`MAX_LAYER_WIDTH`] units.
+    pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self, ModelError> {
+        if !(1..=MAX_LAYERS).contains(&layers.len()) {
+            return Err(ModelError::LayerCount {
+                tensor: tensor.to_owned(),
+                found: layers.len(),
+                max: MAX_LAYERS,
+            });
+        }
+        for (index, layer) in layers.iter().enumerate() {
+            let (rows, columns) = layer.map.weights().shape();
+            if rows > MAX_LAYER_WIDTH {
+                return Err(ModelError::LayerWidth {
+                    tensor: format!("{tensor}.layers[{index}].weights"),
+                    found: rows,
+                    max: MAX_LAYER_WIDTH,
+                });
+            }
+            let expected = match index {
+                0 => columns,
+                _ => layers[index - 1].map.output_dim(),
+            };
+            let name = format!("{tensor}.layers[{index}].weights");
+            super::error::check_shape(&name, (rows, columns), (rows, expected))?;
+        }
+        Ok(Self { layers })
+    }
+
+    /// The layers, the first applied first.
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    /// The map as an affine one, if it is a single linear layer.
+    pub fn as_affine(&self) -> Option<&AffineMap> {
+        match self.layers.as_slice() {
+            [only] if only.activation == Activation::Linear => Some(&only.map),
+            _ => None,
+        }
+    }
+
+    /// Number of coordinates that enter.
+    pub fn input_dim(&self) -> usize {
+        self.layers[0].map.input_dim()
+    }
+
+    /// Number of coordinates that leave.
+    pub fn output_dim(&self) -> usize {
+        self.last().map.output_dim()
+    }
+
+    /// Shape of the Jacobian, `output_dim x input_dim`.
+    pub fn shape(&self) -> (usize, usize) {
+        (self.output_dim(), self.input_dim())
+    }
+
+    /// How positions map.
+    ///
+    /// # Errors
+    /// [`ModelError::Dimension`] if `x` is not `input_dim` long.
+    pub fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        let mut y = self.layers[0].map.apply(x)?;
+        activate(&self.layers[0], &mut y);
+        for layer in &self.layers[1..] {
+            y = layer.map.apply(&y)?;
+            activate(layer, &mut y);
+        }
+        Ok(y)
+    }
+
+    /// How velocities map: `J(x) dx`.
+    ///
+    /// # Errors
+    /// [`ModelError::Dimension`] if `x` or `dx` is not `input_dim` long.
+    pub fn apply_velocity(
+        &self,
+        x: &DVector<f64>,
+        dx: &DVector<f64>,
+    ) -> Result<DVector<f64>, ModelError> {
+        let (mut y, mut dy) = (x.clone(), dx.clone());
+        for layer in &self.layers {
+            let a = layer.map.apply(&y)?;
+            dy = layer.map.apply_linear(&dy)?;
+            dy.zip_apply(&a, |dy, a| *dy *= layer.activation.slope(a));
+            y = a.map(|a| layer.activation.value(a));
+        }
+        Ok(dy)
+    }
+
+    /// How accelerations map: `J(x) ddx + dJ/dt dx`.
+    ///
+    /// Each layer takes `ddy -> phi''(a) (W dy)^2 + phi'(a) W ddy`.
+    ///
+    /// # Errors
+    /// [`ModelError::Dimension`] if an argument is not `input_dim` long.
+    pub fn apply_acceleration(
+        &self,
+        x: &DVector<f64>,
+        dx: &DVector<f64>,
+        ddx: &DVector<f64>,
+    ) -> Result<DVector<f64>, ModelError> {
+        let (mut y, mut dy, mut ddy) = (x.clone(), dx.clone(), ddx.clone());
+        for layer in &self.layers {
+            let a = layer.map.apply(&y)?;
+            let da = layer.map.apply_linear(&dy)?;
+            let dda = layer.map.apply_linear(&ddy)?;
+            let phi = layer.activation;
+            ddy = DVector::from_fn(a.len(), |i, _| {
+                phi.curvature(a[i]) * da[i] * da[i] + phi.slope(a[i]) * dda[i]
+            });
+            dy = da.zip_map(&a, |da, a| phi.slope(a) * da);
+            y = a.map(|a| phi.value(a));
+        }
+        Ok(ddy)
+    }
+
+    /// The Jacobian `J(x) = dy/dx`, `output_dim x input_dim`.
+    ///
+    /// # Errors
+    /// [`ModelError::Dimension`] if `x` is not `input_dim` long.
+    pub fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
+        let mut y = x.clone();
+        let mut jacobian = None;
+        for layer in &self.layers {
+            let a = layer.map.apply(&y)?;
+            let mut product = match jacobian {
+                None => layer.map.weights().clone(),
+                Some(before) => layer.map.weights() * before,
+            };
+            for (mut row, &a) in product.row_iter_mut().zip(&a) {
+                row *= layer.activation.slope(a);
+            }
+            jacobian = Some(product);
+            y = a.map(|a| layer.activation.value(a));
+        }
+        Ok(jacobian.expect("a map has a layer"))
+    }
+
+    /// The layers in words: `18 -> 32 elu -> 4`.
+    pub fn summary(&self) -> String {
+        let mut text = self.input_dim().to_string();
+        for layer in &self.layers {
+            text.push_str(&format!(" -> {}", layer.map.output_dim()));
+            if layer.activation != Activation::Linear {
+                text.push_str(&format!(" {}", layer.activation));
+            }
+        }
+        text
+    }
+
+    fn last(&self) -> &Layer {
+        self.layers.last().expect("a map has a layer")
+    }
+}
+
+fn activate(layer: &Layer, a: &mut DVector<f64>) {
+    if layer.activation != Activation::Linear {
+        a.apply(|a| *a = layer.activation.value(*a));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wave(rows: usize, cols: usize, seed: f64) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, cols, |i, j| {
+            (seed + 1.7 * i as f64 + 0.9 * j as f64 + 0.3 * (i * j) as f64).sin()
+        })
+    }
+
+    fn chain(activations: &[Activation]) -> StateMap {
+        let widths = [5, 7, 6, 3];
+        let layers = activations.iter().enumerate().map(|(k, &activation)| {
+            let output = if k + 1 == activations.len() {
+                3
+            } else {
+                widths[k + 1]
+            };
+            let input = widths[k];
+            let bias = DVector::from_fn(output, |i, _| (0.4 * i as f64 - k as f64).cos());
+            let map = AffineMap::new("encoder", wave(output, input, k as f64), bias);
+            Layer {
+                map: map.expect("shapes fit"),
+                activation,
+            }
+        });
+        StateMap::new("encoder", layers.collect()).expect("a chain")
+    }
+
+    fn all() -> Vec<StateMap> {
+        use Activation::{Elu, Linear, Sigmoid, Tanh};
+        vec![
+            chain(&[Linear]),
+            chain(&[Tanh]),
+            chain(&[Elu, Linear]),
+            chain(&[Elu, Tanh, Linear]),
+            chain(&[Sigmoid, Elu, Tanh]),
+        ]
+    }
+
+    fn vector(seed: f64) -> DVector<f64> {
+        DVector::from_fn(5, |i, _| (seed + 2.3 * i as f64).sin())
+    }
+
+    #[test]
+    fn jacobian_and_velocity_equal_central_differences() {
+        let (x, dx) = (vector(0.2), vector(1.4));
+        let h = 1e-6;
+        for map in all() {
+            let forward = map.apply(&(&x + &dx * h)).unwrap();
+            let backward = map.apply(&(&x - &dx * h)).unwrap();
+            let expected = (forward - backward) / (2.0 * h);
+            let found = map.apply_velocity(&x, &dx).unwrap();
+            assert!((&found - &expected).amax() < 1e-8, "{found} {expected}");
+            let product = map.jacobian(&x).unwrap() * &dx;
+            assert!((&found - product).amax() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn acceleration_equals_central_difference_of_velocity_along_a_parabola() {
+        let (x, dx, ddx) = (vector(0.2), vector(1.4), vector(-0.7));
+        let h = 1e-5;
+        for map in all() {
+            let velocity = |t: f64| {
+                let at = &x + &dx * t + &ddx * (0.5 * t * t);
+                map.apply_velocity(&at, &(&dx + &ddx * t)).unwrap()
+            };
+            let expected = (velocity(h) - velocity(-h)) / (2.0 * h);
+            let found = map.apply_acceleration(&x, &dx, &ddx).unwrap();
+            assert!((&found - &expected).amax() < 1e-7, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn single_linear_layer_is_the_affine_map() {
+        let map = chain(&[Activation::Linear]);
+        let affine = map.as_affine().expect("linear").clone();
+        let x = vector(0.5);
+        assert_eq!(map.apply(&x), affine.apply(&x));
+        assert_eq!(
+            map.apply_velocity(&vector(3.0), &x),
+            affine.apply_linear(&x)
+        );
+        assert!(chain(&[Activation::Tanh]).as_affine().is_none());
+    }
+
+    #[test]
+    fn summary_names_widths_and_activations() {
+        let map = chain(&[Activation::Elu, Activation::Tanh, Activation::Linear]);
+        assert_eq!(map.summary(), "5 -> 7 elu -> 6 tanh -> 3");
+    }
+
+    #[test]
+    fn layers_that_do_not_fit_are_refused() {
+        let layer = |rows, cols| Layer {
+            map: AffineMap::new("m", wave(rows, cols, 0.0), DVector::zeros(rows)).unwrap(),
+            activation: Activation::Elu,
+        };
+        let found = StateMap::new("encoder", vec![layer(4, 5), layer(2, 3)]);
+        assert!(
+            matches!(&found, Err(ModelError::Shape { tensor, .. })
+                if tensor == "encoder.layers[1].weights"),
+            "{found:?}"
+        );
+        let found = StateMap::new("encoder", Vec::new());
+        assert!(matches!(
+            found,
+            Err(ModelError::LayerCount { found: 0, .. })
+        ));
+        let found = StateMap::new("encoder", vec![layer(MAX_LAYER_WIDTH + 1, 2)]);
+        assert!(matches!(found, Err(ModelError::LayerWidth { .. })));
+    }
+}
