@@ -212,13 +212,14 @@ fn with_layers() -> Value {
             .collect()
     };
     let d = value["latent_dim"].as_u64().expect("a number") as usize;
+    let n = value["state"]["names"].as_array().expect("a list").len();
     value["encoder"] = json!({ "layers": [
-        { "weights": rows(20, 18), "bias": vec![0.1; 20], "activation": "elu" },
+        { "weights": rows(20, n), "bias": vec![0.1; 20], "activation": "elu" },
         { "weights": rows(d, 20), "bias": vec![0.0; d] },
     ] });
     value["decoder"] = json!({ "layers": [
         { "weights": rows(5, d), "bias": vec![-0.1; 5], "activation": "tanh" },
-        { "weights": rows(18, 5), "bias": vec![0.0; 18], "activation": "linear" },
+        { "weights": rows(n, 5), "bias": vec![0.0; n], "activation": "linear" },
     ] });
     value
 }
@@ -228,9 +229,9 @@ fn layers_are_read_and_written_with_their_activations() {
     let model = read_value(&with_layers()).expect("a sound model");
     let encoder = model.encoder_map().expect("an encoder");
     let d = model.latent_dim();
-    assert_eq!(encoder.summary(), format!("18 -> 20 elu -> {d}"));
+    assert_eq!(encoder.summary(), format!("5 -> 20 elu -> {d}"));
     let decoder = model.decoder_map().expect("a decoder");
-    assert_eq!(decoder.summary(), format!("{d} -> 5 tanh -> 18"));
+    assert_eq!(decoder.summary(), format!("{d} -> 5 tanh -> 5"));
     let text = artifact::to_text(&model);
     let back = artifact::read_from_bytes("back.json", text.as_bytes()).expect("reads back");
     assert_eq!(back, model);
@@ -287,7 +288,7 @@ fn layers_that_are_wrong_are_refused_at_their_place() {
     assert!(message.contains("gain"), "{message}");
     let narrow = read_value(&{
         let mut value = with_layers();
-        value["encoder"]["layers"][0]["weights"] = json!(vec![vec![0.5; 18]]);
+        value["encoder"]["layers"][0]["weights"] = json!([[0.5, 0.25, 0.1, -0.5, 1.0]]);
         value["encoder"]["layers"][0]["bias"] = json!([0.0]);
         for row in array(&mut value, "/encoder/layers/1/weights") {
             *row = json!([1.0]);
