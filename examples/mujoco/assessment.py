@@ -96,3 +96,26 @@ def table(rows):
             f"| {a.largest_tilt_rad:.3f} |"
         )
     return "\n".join(lines)
+
+
+def repetition_faults(reference, repeated, other_contact):
+    """Why a run does not count as a repetition of a reference jump; empty if it does.
+
+    It counts if only feet touch the floor, the longest flight lasts more than half the
+    reference's, the apex rises by more than half the reference's, the distance ends within 35 %
+    of the reference's, roll and pitch stay under 0.7 rad and the trunk ends higher than 0.2 m.
+    """
+    faults = []
+    if other_contact:
+        faults.append("fell")
+    if repeated.flight_s <= 0.5 * reference.flight_s:
+        faults.append(f"flight {repeated.flight_s:.2f} of {reference.flight_s:.2f} s")
+    if repeated.apex_rise_m <= 0.5 * reference.apex_rise_m:
+        faults.append(f"apex +{repeated.apex_rise_m:.2f} of {reference.apex_rise_m:.2f} m")
+    if abs(repeated.distance_m - reference.distance_m) > 0.35 * reference.distance_m:
+        faults.append(f"distance {repeated.distance_m:.2f} of {reference.distance_m:.2f} m")
+    if repeated.largest_tilt_rad >= MAX_TILT_RAD:
+        faults.append(f"tilt {repeated.largest_tilt_rad:.2f} rad")
+    if repeated.final_height_m <= MIN_FINAL_HEIGHT_M:
+        faults.append(f"ends {repeated.final_height_m:.2f} m high")
+    return faults

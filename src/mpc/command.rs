@@ -128,8 +128,9 @@ impl Source {
 pub struct Command {
     /// Feed-forward torques, N m, within the robot's limits whatever happened.
     pub torque_nm: [f64; JOINT_DIM],
-    /// Desired joint positions, rad, within the robot's limits: the decoded plan at the end of the
-    /// step.
+    /// Desired joint positions, rad, within the robot's limits: the decoded reference at the end of
+    /// the step. The plan begins at the measurement, so its own posture would leave a joint PD
+    /// nothing to correct.
     pub joint_position_rad: [f64; JOINT_DIM],
     /// Desired joint velocities, rad/s.
     pub joint_velocity_rad_s: [f64; JOINT_DIM],

@@ -46,6 +46,8 @@ pub struct Controller {
     consistent: Option<ConsistentLift>,
     reference: Option<Reference>,
     plan: Plan,
+    /// Latent state of the posture that is commanded.
+    posture: Vec<f64>,
     memory: Memory,
 }
 
@@ -119,6 +121,7 @@ impl Controller {
                 .map(|phase| phase.latent_root.clone())
                 .collect(),
             plan: Plan::new(d, settings.horizon, settings.step_s),
+            posture: vec![0.0; 2 * d],
             memory: Memory::new(d),
             reference: None,
             rows,
@@ -392,8 +395,12 @@ impl Controller {
 
     /// Writes a stage of the plan into the command; false if its input cannot be lifted.
     fn write_plan(&mut self, stage: usize, command: &mut Command) -> bool {
-        let (input, end) = (self.plan.input(stage), self.plan.end(stage));
-        let (z, dz) = end.split_at(self.plant.latent_dim());
+        let (Some(reference), Some(end_s)) = (&self.reference, self.plan.end_s(stage)) else {
+            return false;
+        };
+        reference.state_at(end_s, &mut self.posture);
+        let (z, dz) = self.posture.split_at(self.plant.latent_dim());
+        let input = self.plan.input(stage);
         command.u_lat.copy_from_slice(input);
         command.phase = Some(self.plan.phase());
         command.joint_position_rad = self.plant.clamp_joints(self.plant.decode_joints(z));

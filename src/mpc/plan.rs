@@ -61,6 +61,11 @@ impl Plan {
         (passed > -0.5).then(|| (passed + 1e-6).floor().max(0.0) as usize)
     }
 
+    /// The instant at which a stage ends, s; none without a plan.
+    pub fn end_s(&self, stage: usize) -> Option<f64> {
+        Some(self.start_s? + (stage + 1) as f64 * self.step_s)
+    }
+
     /// Input of a stage.
     pub fn input(&self, stage: usize) -> &[f64] {
         &self.inputs[stage * self.latent_dim..][..self.latent_dim]

@@ -93,7 +93,8 @@ pub struct MpcSettings {
     /// How torques are made from the latent input.
     pub lift: Lift,
     /// Weight `w_u` of the input deviation, measured by the inverse covariance of the training
-    /// inputs.
+    /// inputs. Closed loops want it above one: `examples/mujoco/closed_loop.py` succeeds in 24 of 33
+    /// runs at 1, 32 at 10, 33 at 20 and 32 at 30.
     pub input_weight: f64,
     /// Weight of velocities against positions, `w_v`.
     pub velocity_weight: f64,
@@ -129,7 +130,7 @@ impl Default for MpcSettings {
             horizon: 20,
             step_s: 0.01,
             lift: Lift::Transpose,
-            input_weight: 1.0,
+            input_weight: 20.0,
             velocity_weight: 0.02,
             terminal_weight: 1.0,
             linearisation: Linearisation::Reference,

@@ -1,0 +1,261 @@
+"""Drives a simulated Go1 with generated controllers, over recorded jumps and perturbations."""
+
+import argparse
+import concurrent.futures
+import csv
+import json
+import pathlib
+import sys
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from PIL import Image
+
+from assessment import assess, longest_flight, repetition_faults
+from film_strip import render
+from followers import Jump, LatentMpc, Replay, TorquesOnly, WithoutFeedback
+from perturbations import NOMINAL, PERTURBATIONS, Motors, perturbed_simulation
+from recording_format import read_recording, states_of
+from robot_model import RobotModel
+from romc_controller import RomcController, build_controller
+from simulation import CONTROL_STEP_S
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+RECORDINGS = ROOT / "examples/recordings/go1"
+ROBOT = "go1"
+EXAMPLE = """example:
+  cargo build --release
+  MUJOCO_GL=egl python closed_loop.py --out-dir ../../out/closed_loop
+drives the shipped model go1-d6; add --model for others. Writes closed_loop.csv (a row a run),
+closed_loop.json, table.txt and a film strip per test jump, recorded above and driven below."""
+QUICK = ("payload +1 kg", "push 25 N, 0.1 s")
+FRAMES = 8
+LEAST_SHARE = 0.9
+LEAST_WITHOUT_INPUT = 2
+
+# Who drives, and whether that depends on the model.
+WITH_INPUT, WITHOUT_INPUT = "MPC", "MPC, no recorded input"
+FOLLOWERS = {
+    WITH_INPUT: True,
+    WITHOUT_INPUT: True,
+    "MPC, feedback off": True,
+    "recorded torques + PD": False,
+    "recorded torques alone": False,
+    "PD alone": False,
+}
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A generated controller: its shared library, and the model it was made of."""
+
+    model: str
+    library: pathlib.Path
+    identifier: str
+    latent_dim: int
+
+
+@dataclass
+class Outcome:
+    """One run: what drove which jump under what, and how it ended."""
+
+    model: str
+    follower: str
+    perturbation: str
+    jump: str
+    success: bool
+    faults: str
+    flight_s: float
+    apex_rise_m: float
+    distance_m: float
+    largest_tilt_rad: float
+    final_height_m: float
+    torque_share: float
+    steps_without_plan: int
+    median_step_us: float
+
+
+def main():
+    arguments = parse_arguments()
+    arguments.out_dir.mkdir(parents=True, exist_ok=True)
+    plants = [build(path, arguments) for path in arguments.model]
+    jumps = [read_jump(path) for path in sorted(RECORDINGS.glob("test_*.csv.gz"))]
+    perturbations = [NOMINAL]
+    perturbations += [p for p in PERTURBATIONS if not arguments.quick or p.name in QUICK]
+    tasks = [
+        (follower, plant, perturbation, jump)
+        for follower, has_model in FOLLOWERS.items()
+        for plant in (plants if has_model else [None])
+        for perturbation in perturbations
+        for jump in jumps
+    ]
+    with concurrent.futures.ProcessPoolExecutor(arguments.jobs) as pool:
+        outcomes = [outcome for outcome, _ in pool.map(run, tasks)]
+    text = table(outcomes, perturbations)
+    print(text)
+    write_outcomes(arguments.out_dir, outcomes, text)
+    if not arguments.no_pictures:
+        for jump in jumps:
+            _, states = run((WITH_INPUT, plants[0], NOMINAL, jump))
+            write_strip(arguments.out_dir / f"{jump.name}.png", jump, states)
+    missed = missed_aims(outcomes, len(plants))
+    for aim in missed:
+        print(f"MISSED {aim}", file=sys.stderr)
+    sys.exit(1 if missed else 0)
+
+
+def parse_arguments():
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog=EXAMPLE, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--model", type=pathlib.Path, action="append", help="model file (default: go1-d6)"
+    )
+    parser.add_argument("--romc", type=pathlib.Path, default=ROOT / "target/release/romc")
+    parser.add_argument("--out-dir", type=pathlib.Path, default=ROOT / "out/closed_loop")
+    parser.add_argument("--quick", action="store_true", help="two perturbations instead of all")
+    parser.add_argument("--no-pictures", action="store_true", help="no film strips")
+    parser.add_argument("--jobs", type=int, help="runs at a time (default: one a core)")
+    arguments = parser.parse_args()
+    arguments.model = arguments.model or [ROOT / "models/go1-d6.json"]
+    return arguments
+
+
+def build(model, arguments):
+    """Generates and compiles the controller of a model file, in a folder of its own."""
+    content = json.loads(model.read_text(encoding="utf-8"))
+    folder = arguments.out_dir / "controllers" / model.stem
+    library, identifier = build_controller(arguments.romc, model, content["name"], folder)
+    return Plant(model.stem, library, identifier, content["latent_dim"])
+
+
+def read_jump(path):
+    """A recorded jump."""
+    columns = read_recording(path)
+    x, dx, _, torque_nm, feet = states_of(columns)
+    return Jump(path.name.removesuffix(".csv.gz"), columns["Time"], x, dx, torque_nm, feet)
+
+
+def run(task):
+    """One closed-loop run; returns its Outcome and the states (rows, 18)."""
+    follower_name, plant, perturbation, jump = task
+    robot = RobotModel(ROBOT)
+    takeoff_s = jump.time_s[longest_flight(jump.feet)[0]]
+    simulation = perturbed_simulation(ROBOT, perturbation, jump.x[0], jump.dx[0], takeoff_s)
+    controller = make_controller(follower_name, plant, jump, robot)
+    follower = make_follower(follower_name, controller, jump)
+    motors = Motors(follower, perturbation, robot.torque_limit_nm)
+    log = simulation.run(motors, jump.time_s[-1])
+    reference = assess(ROBOT, jump.time_s, jump.x, jump.dx, jump.torque_nm, jump.feet)
+    times = np.arange(len(log.x)) * CONTROL_STEP_S
+    repeated = assess(ROBOT, times, log.x, log.dx, log.torque_nm, log.feet())
+    faults = repetition_faults(reference, repeated, log.other_contact.any())
+    statuses = getattr(follower, "statuses", {})
+    outcome = Outcome(
+        model=plant.model if plant else "",
+        follower=follower_name,
+        perturbation=perturbation.name,
+        jump=jump.name,
+        success=not faults,
+        faults="; ".join(faults),
+        flight_s=repeated.flight_s,
+        apex_rise_m=repeated.apex_rise_m,
+        distance_m=repeated.distance_m,
+        largest_tilt_rad=repeated.largest_tilt_rad,
+        final_height_m=repeated.final_height_m,
+        torque_share=repeated.torque_share,
+        steps_without_plan=sum(n for s, n in statuses.items() if s < 0 or s >= 10),
+        median_step_us=float(np.median(getattr(follower, "solve_us", []) or [0.0])),
+    )
+    if controller:
+        controller.close()
+    return outcome, log.x
+
+
+def make_controller(follower_name, plant, jump, robot):
+    """The generated controller with its reference set; none for followers without a model."""
+    if not FOLLOWERS[follower_name]:
+        return None
+    controller = RomcController(plant.library, plant.identifier, plant.latent_dim)
+    u = None if follower_name == WITHOUT_INPUT else jump.inputs(robot)
+    controller.set_reference(jump.time_s, jump.x, jump.dx, u, jump.feet)
+    return controller
+
+
+def make_follower(name, controller, jump):
+    if name in (WITH_INPUT, WITHOUT_INPUT):
+        return LatentMpc(controller)
+    if name == "MPC, feedback off":
+        return WithoutFeedback(controller, jump)
+    if name == "recorded torques alone":
+        return TorquesOnly(jump)
+    return Replay(jump, with_torques=name == "recorded torques + PD")
+
+
+def table(outcomes, perturbations):
+    """Successes of runs, a row a perturbation and a column a follower."""
+    names = [p.name for p in perturbations]
+    width = max(map(len, names)) + 2
+    lines = ["successful runs of all runs", ""]
+    lines.append(" " * width + "".join(f"{name:>24}" for name in FOLLOWERS))
+
+    def cells(chosen):
+        counts = []
+        for follower in FOLLOWERS:
+            runs = [o.success for o in outcomes if o.follower == follower and chosen(o)]
+            counts.append(f"{sum(runs)} of {len(runs)}")
+        return "".join(f"{count:>24}" for count in counts)
+
+    for name in names:
+        lines.append(f"{name:<{width}}" + cells(lambda o, name=name: o.perturbation == name))
+    lines.append(f"{'all':<{width}}" + cells(lambda o: True))
+    models = sorted({o.model for o in outcomes if o.model})
+    for model in models if len(models) > 1 else []:
+        lines.append(f"{model:<{width}}" + cells(lambda o, model=model: o.model == model))
+    return "\n".join(lines)
+
+
+def write_outcomes(folder, outcomes, text):
+    rows = [asdict(outcome) for outcome in outcomes]
+    with open(folder / "closed_loop.csv", "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    (folder / "closed_loop.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    (folder / "table.txt").write_text(text + "\n", encoding="utf-8")
+
+
+def write_strip(path, jump, states):
+    """Recorded jump above, driven one below, at the same times."""
+    robot = RobotModel(ROBOT)
+    rows = np.linspace(0, min(len(jump.x), len(states)) - 1, FRAMES).astype(int)
+    strips = [np.hstack(render(robot, x[rows])) for x in (jump.x, states)]
+    Image.fromarray(np.vstack(strips)).save(path)
+
+
+def missed_aims(outcomes, models):
+    """Which of the aims that the documentation states these runs do not reach."""
+
+    def share(follower, chosen=lambda o: True):
+        runs = [o.success for o in outcomes if o.follower == follower and chosen(o)]
+        return sum(runs) / len(runs)
+
+    def nominal(outcome):
+        return outcome.perturbation == NOMINAL.name
+
+    missed = []
+    if share(WITH_INPUT, nominal) < 1.0:
+        missed.append(f"{WITH_INPUT}: all nominal runs succeed")
+    if share(WITH_INPUT) < LEAST_SHARE:
+        missed.append(f"{WITH_INPUT}: {LEAST_SHARE:.0%} of all runs succeed")
+    for baseline in list(FOLLOWERS)[2:]:
+        if share(baseline) >= share(WITH_INPUT):
+            missed.append(f"{WITH_INPUT}: more runs succeed than with {baseline}")
+    succeeded = [o.success for o in outcomes if o.follower == WITHOUT_INPUT and nominal(o)]
+    if sum(succeeded) < LEAST_WITHOUT_INPUT * models:
+        missed.append(f"{WITHOUT_INPUT}: {LEAST_WITHOUT_INPUT} nominal runs a model succeed")
+    return missed
+
+
+if __name__ == "__main__":
+    main()
