@@ -13,6 +13,7 @@ use crate::mpc::MpcError;
 use crate::recording::RecordingError;
 use crate::robot::RobotError;
 use crate::sim::SimError;
+use crate::study::StudyError;
 use crate::train::TrainError;
 
 /// What can go wrong between a recording and a torque.
@@ -41,6 +42,8 @@ pub enum Error {
     Lower(#[from] LowerError),
     #[error(transparent)]
     Sim(#[from] SimError),
+    #[error(transparent)]
+    Study(#[from] StudyError),
     #[error(transparent)]
     Mpc(#[from] MpcError),
     /// A file of settings that cannot be used; the message of its parser names line, key and what was expected.

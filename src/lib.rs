@@ -13,6 +13,7 @@ pub mod mpc;
 pub mod recording;
 pub mod robot;
 pub mod sim;
+pub mod study;
 pub mod symbolic;
 pub mod train;
 

@@ -76,8 +76,8 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 
 const MODEL: &str = "models/go1-d4.json";
 const JUMP: &str = "examples/recordings/go1/test_01.csv.gz";
-const COMMANDS: [&str; 7] = [
-    "demo", "inspect", "train", "import", "compile", "simulate", "mpc",
+const COMMANDS: [&str; 8] = [
+    "demo", "inspect", "train", "study", "import", "compile", "simulate", "mpc",
 ];
 
 #[test]
@@ -329,6 +329,67 @@ fn train_takes_settings_from_a_file_and_flags_override_it() {
         written.contains("--latent-dim 2") && written.contains("--slack 0.3"),
         "{written}"
     );
+}
+
+#[test]
+fn study_in_parts_and_resumed_equals_the_whole() {
+    let folder = folder();
+    let out = |name: &str| path(&folder, name);
+    let run = |extra: &[&str], out: &str| {
+        let jump = |number| format!("examples/recordings/go1/train_{number:02}.csv.gz");
+        let jumps: Vec<String> = (1..=3).map(jump).collect();
+        let mut arguments = vec!["study"];
+        arguments.extend(jumps.iter().map(String::as_str));
+        arguments.extend(["--latent-dims", "1..2", "--seeds", "2", "--out-dir", out]);
+        arguments.extend(extra);
+        romc(&arguments)
+    };
+    let ok =
+        |output: &Output| assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let (whole, first, second) = (out("whole"), out("first"), out("second"));
+    ok(&run(&[], &whole));
+    let expected = contents(Path::new(&whole));
+    assert_eq!(
+        expected.len(),
+        4 + 3,
+        "four models, the plan and two tables"
+    );
+
+    let part = run(&["--shard", "1/2"], &first);
+    ok(&part);
+    assert!(text(&part.stdout).contains("not trained yet: d = 1 seed 2; d = 2 seed 2"));
+    ok(&run(&["--shard", "2/2"], &second));
+    let joined = out("joined");
+    done(&["study", "--merge", &first, &second, "--out-dir", &joined]);
+    let relative = |files: Vec<(PathBuf, Vec<u8>)>| -> Vec<(PathBuf, Vec<u8>)> {
+        let name = |path: PathBuf| PathBuf::from(path.file_name().expect("a file"));
+        files
+            .into_iter()
+            .map(|(path, bytes)| (name(path), bytes))
+            .collect()
+    };
+    assert_eq!(
+        relative(contents(Path::new(&joined))),
+        relative(expected.clone())
+    );
+
+    ok(&run(&[], &first));
+    assert_eq!(
+        relative(contents(Path::new(&first))),
+        relative(expected),
+        "resumed"
+    );
+    let other = run(&["--method", "joint"], &first);
+    assert_eq!(other.status.code(), Some(1));
+    assert!(text(&other.stderr).contains("another study (the methods differ)"));
+    for wrong in ["0..3", "4..19", "x", "3..2"] {
+        assert_eq!(
+            romc(&["study", "a.csv", "--latent-dims", wrong])
+                .status
+                .code(),
+            Some(2)
+        );
+    }
 }
 
 #[test]

@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 use crate::artifact::import::{Format, ImportError, Mapping, PhaseRule, parse_standard};
 use crate::backend::Target;
 use crate::model::StandardLibrary;
+use crate::robot::STATE_DIM;
+use crate::study::Shard;
 
 /// The reduced-order model compiler: from recorded jumps to equations, code and torques.
 #[derive(Debug, Parser)]
@@ -31,6 +33,8 @@ pub enum Command {
     Inspect(InspectArguments),
     /// Learn a model from recordings
     Train(TrainArguments),
+    /// Train every latent dimension with several seeds: accuracy against complexity
+    Study(StudyArguments),
     /// Take over a model trained elsewhere: safetensors, npz, PySINDy, equations as text
     Import(ImportArguments),
     /// Compile a model to LaTeX, C and Rust
@@ -48,6 +52,7 @@ impl Command {
             Self::Demo(arguments) => arguments.output_format.json,
             Self::Inspect(arguments) => arguments.output_format.json,
             Self::Train(arguments) => arguments.output_format.json,
+            Self::Study(arguments) => arguments.output_format.json,
             Self::Import(arguments) => arguments.output_format.json,
             Self::Compile(arguments) => arguments.output_format.json,
             Self::Simulate(arguments) => arguments.output_format.json,
@@ -191,6 +196,53 @@ pub struct TrainSettings {
     #[arg(long, value_enum)]
     pub phases: Option<PhaseSet>,
 }
+
+/// `romc study`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc study examples/recordings/go1/train_*.csv.gz \\\n      --validation examples/recordings/go1/validation_*.csv.gz --latent-dims 1..18 --seeds 5\n\nA stopped study goes on when the same command is given again. On a cluster, `--shard 3/8` computes a part,\n`romc study --merge part1 part2 --out-dir whole` joins parts."
+)]
+pub struct StudyArguments {
+    /// Recordings to learn from
+    #[arg(value_name = "RECORDING", required_unless_present = "merge")]
+    pub recordings: Vec<PathBuf>,
+    /// Recordings that choose between candidate models and give the figures
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    pub validation: Vec<PathBuf>,
+    /// Latent dimensions: `4`, `1..18` (both ends counted) or `2,4,6`
+    #[arg(long, value_name = "DIMS", default_value = "1..18", value_parser = dimensions)]
+    pub latent_dims: Dimensions,
+    /// Seeds a dimension
+    #[arg(long, default_value_t = 5, value_parser = at_least_one)]
+    pub seeds: usize,
+    /// How to learn (closed-form unless given)
+    #[arg(long, value_enum)]
+    pub method: Option<TrainMethod>,
+    /// Train as published (joint method)
+    #[arg(long)]
+    pub paper: bool,
+    /// Settings of `romc train`, except `latent-dim`, `seed` and `seeds`
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
+    /// Weight of the complexity in the combined loss 2 E_dec + 2 lambda log |Xi|
+    #[arg(long, default_value_t = 0.001)]
+    pub lambda: f64,
+    /// Compute only this part of the study, such as 3/8
+    #[arg(long, value_name = "PART", value_parser = Shard::parse, conflicts_with = "merge")]
+    pub shard: Option<Shard>,
+    /// Join the finished parts in these folders instead of training
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["recordings", "validation", "config"])]
+    pub merge: Vec<PathBuf>,
+    /// Folder of the study
+    #[arg(long, value_name = "DIR", default_value = "out/study")]
+    pub out_dir: PathBuf,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// Latent dimensions of a study, ascending.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Dimensions(pub Vec<usize>);
 
 /// Kinds of files that can be imported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -476,6 +528,25 @@ fn positive_width(text: &str) -> Result<f64, String> {
         Ok(width) if width.is_finite() && width > 0.0 => Ok(width),
         _ => Err("expected a positive width in em".to_owned()),
     }
+}
+
+fn dimensions(text: &str) -> Result<Dimensions, String> {
+    let expected =
+        || format!("found `{text}`, expected 4, 1..18 or 2,4,6, each from 1 to {STATE_DIM}");
+    let number = |text: &str| match text.trim().parse::<usize>() {
+        Ok(d) if (1..=STATE_DIM).contains(&d) => Ok(d),
+        _ => Err(expected()),
+    };
+    let mut found = match text.split_once("..") {
+        Some((first, last)) => (number(first)?..=number(last)?).collect(),
+        None => text.split(',').map(number).collect::<Result<Vec<_>, _>>()?,
+    };
+    found.sort_unstable();
+    found.dedup();
+    if found.is_empty() {
+        return Err(expected());
+    }
+    Ok(Dimensions(found))
 }
 
 fn at_least_one(text: &str) -> Result<usize, String> {

@@ -14,6 +14,7 @@ mod inspect_recording;
 mod mpc;
 mod output;
 mod simulate;
+mod study;
 mod train;
 mod train_settings;
 mod trajectory;
@@ -62,6 +63,7 @@ fn execute(command: Command) -> Result<Answer, Error> {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
         Command::Compile(arguments) => compile::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),

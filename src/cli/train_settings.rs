@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
+use std::path::Path;
 
 use serde_json::Value;
 
@@ -87,26 +88,41 @@ pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Err
     let Some(path) = &arguments.config else {
         return Ok(given.clone());
     };
+    let settings = overlay(given, read(path)?);
+    if settings.latent_dim.is_none() {
+        return Err(refused(
+            path,
+            "`latent-dim` is missing, here and on the command line",
+        ));
+    }
+    Ok(settings)
+}
+
+/// The settings of a file.
+///
+/// # Errors
+/// [`Error::Read`] and [`Error::Config`].
+pub(super) fn read(path: &Path) -> Result<TrainSettings, Error> {
     let text = fs::read_to_string(path).map_err(|source| Error::Read {
-        path: path.clone(),
+        path: path.to_owned(),
         source,
     })?;
-    let refuse = |message: String| Error::Config {
-        path: path.clone(),
-        message,
-    };
-    let file: TrainSettings =
-        toml::from_str(&text).map_err(|error| refuse(error.to_string().trim_end().to_owned()))?;
-    let settings = overlay(given, file);
-    check(&settings).map_err(refuse)?;
+    let settings =
+        toml::from_str(&text).map_err(|error| refused(path, error.to_string().trim_end()))?;
+    check(&settings).map_err(|message| refused(path, &message))?;
     Ok(settings)
+}
+
+/// A file of settings that cannot be used.
+pub(super) fn refused(path: &Path, message: &str) -> Error {
+    Error::Config {
+        path: path.to_owned(),
+        message: message.to_owned(),
+    }
 }
 
 /// What clap checks of flags, for settings that came from a file.
 fn check(settings: &TrainSettings) -> Result<(), String> {
-    if settings.latent_dim.is_none() {
-        return Err("`latent-dim` is missing, here and on the command line".to_owned());
-    }
     let counts = [
         ("latent-dim", settings.latent_dim),
         ("seeds", settings.seeds),

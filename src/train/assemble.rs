@@ -25,7 +25,7 @@ pub(super) struct Parts {
 }
 
 /// Where a training's numbers come from.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
     /// The command line that repeats the training.
     pub command: String,

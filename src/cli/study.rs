@@ -1,0 +1,185 @@
+//! `romc study`: trainings over latent dimensions and seeds, joined and summarised.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::Answer;
+use super::args::{StudyArguments, TrainMethod, TrainSettings};
+use super::output::{Table, read_recordings, significant, spinner, write_file};
+use super::train_settings;
+use crate::Error;
+use crate::files::Overwrite;
+use crate::recording::Recording;
+use crate::robot::Robot;
+use crate::study::{self, Plan, Shard, Spread, Store, Summary, cells_csv};
+use crate::train::{Origin, Recordings};
+
+/// Trains what is missing, or joins parts, and writes the tables of the study.
+///
+/// # Errors
+/// Whatever reading refuses; [`Error::Study`] for folders of another study.
+pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
+    let store = if arguments.merge.is_empty() {
+        trained(arguments)?
+    } else {
+        merged(arguments)?
+    };
+    let cells = store.cells()?;
+    let summary = Summary::of(&cells, arguments.lambda);
+    let write = |name: &str, text: String| {
+        write_file(
+            &arguments.out_dir.join(name),
+            text.as_bytes(),
+            Overwrite::Replace,
+        )
+    };
+    write("cells.csv", cells_csv(&cells, arguments.lambda))?;
+    write("summary.csv", summary.csv())?;
+    Ok(answer(&arguments.out_dir, &store, &summary))
+}
+
+fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
+    let parts = arguments.merge.iter().map(|folder| Store::open(folder));
+    let parts = parts.collect::<Result<Vec<_>, _>>()?;
+    let plan = parts.first().expect("clap asks for at least one").plan();
+    let store = Store::create(&arguments.out_dir, plan.clone())?;
+    for part in &parts {
+        store.merge(part)?;
+    }
+    Ok(store)
+}
+
+fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
+    let settings = settings(arguments)?;
+    let robot = Robot::by_name(settings.robot.as_deref().unwrap_or("go1"))?;
+    let training = read_recordings(&arguments.recordings)?;
+    let validation = read_recordings(&arguments.validation)?;
+    let plan = plan(arguments, &settings, &training, &validation);
+    let store = Store::create(&arguments.out_dir, plan)?;
+    let bar = spinner("training");
+    let total = store.plan().cells().len();
+    let options = |d: usize| train_settings::options(&settings, d, format!("d{d}"));
+    let finished = |_| {
+        let left = store.missing().len();
+        bar.set_message(format!("{} of {total} models trained", total - left));
+    };
+    let sets = Recordings {
+        training: &training,
+        validation: &validation,
+    };
+    let shard = arguments.shard.unwrap_or(Shard::WHOLE);
+    study::run(&store, shard, sets, robot, &options, &finished)?;
+    bar.finish_and_clear();
+    Ok(store)
+}
+
+/// The settings of the file with those of the command line over them.
+fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
+    let mut settings = match &arguments.config {
+        None => TrainSettings::default(),
+        Some(path) => {
+            let settings = train_settings::read(path)?;
+            let fixed = [
+                ("latent-dim", settings.latent_dim.is_some()),
+                ("seed", settings.seed.is_some()),
+                ("seeds", settings.seeds.is_some()),
+            ];
+            if let Some((name, _)) = fixed.iter().find(|(_, given)| *given) {
+                let message = format!("`{name}` is not a setting of a study, which runs over them");
+                return Err(train_settings::refused(path, &message));
+            }
+            settings
+        }
+    };
+    settings.paper |= arguments.paper;
+    settings.method = arguments
+        .method
+        .or(settings.method)
+        .or(Some(TrainMethod::ClosedForm));
+    Ok(settings)
+}
+
+fn plan(
+    arguments: &StudyArguments,
+    settings: &TrainSettings,
+    training: &[Recording],
+    validation: &[Recording],
+) -> Plan {
+    let all: Vec<Recording> = training.iter().chain(validation).cloned().collect();
+    let method = match settings.method {
+        Some(TrainMethod::Joint) => "joint",
+        Some(TrainMethod::ClosedForm) | None => "closed-form",
+    };
+    Plan {
+        latent_dims: arguments.latent_dims.0.clone(),
+        seeds: arguments.seeds,
+        method: method.to_owned(),
+        settings: train_settings::as_flags(settings),
+        recordings: Origin::new("", &all)
+            .recordings
+            .into_iter()
+            .map(|file| file.digest)
+            .collect(),
+        training: training.len(),
+        romc: env!("CARGO_PKG_VERSION").to_owned(),
+    }
+}
+
+fn answer(folder: &Path, store: &Store, summary: &Summary) -> Answer {
+    let mut table = Table::new([
+        "d",
+        "models",
+        "decoder mean square",
+        "active in contact",
+        "L_mod",
+        "x after 0.1 s, m",
+        "z after 0.1 s, m",
+        "torque R^2",
+    ]);
+    let cell =
+        |Spread { mean, std }: Spread| format!("{} +- {}", significant(mean), significant(std));
+    for row in &summary.dimensions {
+        table.row([
+            row.latent_dim.to_string(),
+            row.trained.to_string(),
+            cell(row.decoder_mse),
+            cell(row.active),
+            cell(row.combined_loss),
+            cell(row.prediction_x_m),
+            cell(row.prediction_z_m),
+            cell(row.torque_r2),
+        ]);
+    }
+    let (missing, total) = (store.missing(), store.plan().cells().len());
+    let best = summary.best();
+    let mut text = format!(
+        "{}: {} of {total} trainings finished\n\n{table}",
+        folder.display(),
+        total - missing.len()
+    );
+    if let Some(best) = best {
+        text += &format!(
+            "\nleast L_mod = 2 E_dec + 2 * {} * log |Xi| at d = {best}\n",
+            summary.lambda
+        );
+    }
+    let names: Vec<String> = missing
+        .iter()
+        .map(|id| format!("d = {} seed {}", id.latent_dim, id.seed))
+        .collect();
+    if !names.is_empty() {
+        text += &format!("\nnot trained yet: {}\n", names.join("; "));
+    }
+    Answer {
+        text,
+        json: json!({
+            "command": "study",
+            "folder": folder.display().to_string(),
+            "plan": store.plan(),
+            "summary": summary,
+            "least_combined_loss_at": best,
+            "missing": missing,
+        }),
+    }
+}

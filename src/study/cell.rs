@@ -1,0 +1,78 @@
+//! What one training of a study came to.
+
+use serde::{Deserialize, Serialize};
+
+use super::plan::CellId;
+use crate::train::{SetMetrics, TrainReport};
+
+/// One training and its outcome.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// Which training.
+    pub id: CellId,
+    /// What it came to.
+    pub outcome: Outcome,
+}
+
+/// Figures, or why there are none.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// A model was found.
+    Trained(Figures),
+    /// Training refused, for this reason; the same settings would refuse again.
+    Refused(String),
+}
+
+/// Figures of one model, on the validation jumps where there are any, else on the training jumps.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Figures {
+    /// Mean square of `x - decode(encode(x))`, scaled units (16).
+    pub decoder_mse: f64,
+    /// Active coefficients in the first phase (contact), as the paper counts them.
+    pub active: usize,
+    /// Active coefficients over all phases.
+    pub active_all_phases: usize,
+    /// Coefficient of determination of the joint torques of the plain lift from projected inputs.
+    pub torque_r2: f64,
+    /// Root mean square error of body x over predictions of 0.1 s, m.
+    pub prediction_x_m: f64,
+    /// The same of body z.
+    pub prediction_z_m: f64,
+}
+
+impl Figures {
+    /// The figures of a finished training.
+    pub fn of(report: &TrainReport) -> Self {
+        let set: &SetMetrics = report.validation.as_ref().unwrap_or(&report.training);
+        let active = report.active_terms.iter().map(|phase| phase.active);
+        Self {
+            decoder_mse: set.decoder_mse,
+            active: active.clone().next().unwrap_or(0),
+            active_all_phases: active.sum(),
+            torque_r2: set.torque_r2,
+            prediction_x_m: set.prediction_x_m,
+            prediction_z_m: set.prediction_z_m,
+        }
+    }
+
+    /// Whether all of them are numbers.
+    pub fn is_finite(&self) -> bool {
+        let Self {
+            decoder_mse,
+            torque_r2,
+            prediction_x_m,
+            prediction_z_m,
+            ..
+        } = self;
+        let values = [decoder_mse, torque_r2, prediction_x_m, prediction_z_m];
+        values.iter().all(|value| value.is_finite())
+    }
+
+    /// `L_mod = 2 E_dec + 2 lambda log |Xi|` (29), natural logarithm.
+    pub fn combined_loss(&self, lambda: f64) -> f64 {
+        2.0 * self.decoder_mse + 2.0 * lambda * (self.active.max(1) as f64).ln()
+    }
+}

@@ -1,0 +1,20 @@
+//! Accuracy against complexity: one training for every latent dimension and seed (figures 10 and 11 of the paper).
+//!
+//! Enters: a [`Plan`] and recordings. Leaves: a folder with one file a training, each written whole, so that a stopped
+//! study goes on where it was and parts computed on several machines can be joined; and their [`Summary`]. Read
+//! [`plan`] first, then [`run()`](run()).
+
+pub mod plan;
+
+mod cell;
+mod error;
+mod run;
+mod store;
+mod summary;
+
+pub use cell::{Cell, Figures, Outcome};
+pub use error::StudyError;
+pub use plan::{CellId, Plan, Shard};
+pub use run::run;
+pub use store::Store;
+pub use summary::{DimensionSummary, Spread, Summary, cells_csv};

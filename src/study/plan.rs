@@ -1,0 +1,141 @@
+//! Which trainings a study consists of.
+
+use serde::{Deserialize, Serialize};
+
+use super::error::StudyError;
+use crate::robot::STATE_DIM;
+
+/// Seeds of the closed form leave out every jump whose number has this remainder of the seed.
+pub const FOLDS: usize = 5;
+
+/// What a study trains; parts of one study have equal plans.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Latent dimensions, ascending.
+    pub latent_dims: Vec<usize>,
+    /// Seeds, counted from 1.
+    pub seeds: usize,
+    /// `closed-form` or `joint`.
+    pub method: String,
+    /// The settings of the training as flags.
+    pub settings: String,
+    /// Digests of the recordings, training then validation.
+    pub recordings: Vec<String>,
+    /// Of all recordings, how many are for training.
+    pub training: usize,
+    /// Version of romc that trains.
+    pub romc: String,
+}
+
+/// One training of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CellId {
+    /// Number of latent coordinates.
+    pub latent_dim: usize,
+    /// Seed, from 1.
+    pub seed: u64,
+}
+
+impl Plan {
+    /// Complains about dimensions and seeds that no training can have.
+    ///
+    /// # Errors
+    /// [`StudyError::Range`].
+    pub fn check(&self) -> Result<(), StudyError> {
+        let refuse =
+            |found: String, expected: &'static str| Err(StudyError::Range { found, expected });
+        if self.latent_dims.is_empty() || self.seeds == 0 {
+            return refuse(
+                format!(
+                    "{} latent dimensions and {} seeds",
+                    self.latent_dims.len(),
+                    self.seeds
+                ),
+                "at least one of each",
+            );
+        }
+        match self
+            .latent_dims
+            .iter()
+            .find(|d| !(1..=STATE_DIM).contains(*d))
+        {
+            Some(d) => refuse(format!("latent dimension {d}"), "1 to 18"),
+            None => Ok(()),
+        }
+    }
+
+    /// All trainings, by dimension and then seed.
+    pub fn cells(&self) -> Vec<CellId> {
+        let seeds = 1..=self.seeds as u64;
+        let of = |&latent_dim: &usize| seeds.clone().map(move |seed| CellId { latent_dim, seed });
+        self.latent_dims.iter().flat_map(of).collect()
+    }
+}
+
+/// Part `index` (from 1) of `count` parts of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    index: usize,
+    count: usize,
+}
+
+impl Shard {
+    /// The whole study.
+    pub const WHOLE: Self = Self { index: 1, count: 1 };
+
+    /// Reads `3/8`.
+    ///
+    /// # Errors
+    /// What was expected, if it is anything else.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let expected = || format!("found `{text}`, expected a part such as 3/8");
+        let (index, count) = text.split_once('/').ok_or_else(expected)?;
+        let number = |text: &str| text.parse::<usize>().map_err(|_| expected());
+        let (index, count) = (number(index)?, number(count)?);
+        if (1..=count).contains(&index) {
+            Ok(Self { index, count })
+        } else {
+            Err(expected())
+        }
+    }
+
+    /// The cells of this part: every `count`-th, so that all parts have dimensions of all sizes.
+    pub fn of(self, cells: &[CellId]) -> Vec<CellId> {
+        cells
+            .iter()
+            .skip(self.index - 1)
+            .step_by(self.count)
+            .copied()
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_together_are_the_whole_and_share_nothing() {
+        let cells: Vec<CellId> = (1..=7)
+            .map(|seed| CellId {
+                latent_dim: 2,
+                seed,
+            })
+            .collect();
+        let mut joined: Vec<CellId> = (1..=3)
+            .flat_map(|index| Shard { index, count: 3 }.of(&cells))
+            .collect();
+        joined.sort();
+        assert_eq!(joined, cells);
+    }
+
+    #[test]
+    fn shard_out_of_range_is_refused_with_what_was_found() {
+        for text in ["0/3", "4/3", "3", "a/b", "1/0", "-1/2"] {
+            assert!(Shard::parse(text).expect_err(text).contains(text));
+        }
+        assert_eq!(Shard::parse("2/8"), Ok(Shard { index: 2, count: 8 }));
+    }
+}

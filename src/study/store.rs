@@ -1,0 +1,250 @@
+//! The folder of a study: its plan, and one file a finished training.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::cell::Cell;
+use super::error::StudyError;
+use super::plan::{CellId, Plan};
+use crate::files::write_whole;
+
+const PLAN: &str = "study.json";
+
+/// A folder with the finished trainings of one plan.
+#[derive(Clone, Debug)]
+pub struct Store {
+    folder: PathBuf,
+    plan: Plan,
+}
+
+impl Store {
+    /// The store of `plan` in `folder`, which is made if it is not there.
+    ///
+    /// # Errors
+    /// [`StudyError::OtherStudy`] if the folder has trainings of another plan, [`StudyError::File`].
+    pub fn create(folder: &Path, plan: Plan) -> Result<Self, StudyError> {
+        plan.check()?;
+        fs::create_dir_all(folder).map_err(|source| StudyError::File {
+            path: folder.to_owned(),
+            action: "make the folder",
+            source,
+        })?;
+        let path = folder.join(PLAN);
+        if path.exists() {
+            let found: Plan = read_json(&path)?;
+            if let Some(difference) = difference(&found, &plan) {
+                return Err(StudyError::OtherStudy { path, difference });
+            }
+        } else {
+            write_json(&path, &plan)?;
+        }
+        let folder = folder.to_owned();
+        Ok(Self { folder, plan })
+    }
+
+    /// The store that is in `folder`.
+    ///
+    /// # Errors
+    /// [`StudyError::File`] and [`StudyError::Broken`] for its plan.
+    pub fn open(folder: &Path) -> Result<Self, StudyError> {
+        let plan: Plan = read_json(&folder.join(PLAN))?;
+        plan.check()?;
+        let folder = folder.to_owned();
+        Ok(Self { folder, plan })
+    }
+
+    /// What is trained.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// A finished training, if it is there.
+    ///
+    /// # Errors
+    /// [`StudyError::Broken`] if the file holds something else.
+    pub fn get(&self, id: CellId) -> Result<Option<Cell>, StudyError> {
+        let path = self.path(id);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let cell: Cell = read_json(&path)?;
+        if cell.id != id {
+            let message = format!(
+                "holds latent dimension {} and seed {}, expected {} and {}",
+                cell.id.latent_dim, cell.id.seed, id.latent_dim, id.seed
+            );
+            return Err(StudyError::Broken { path, message });
+        }
+        Ok(Some(cell))
+    }
+
+    /// Keeps a finished training; the file appears whole.
+    ///
+    /// # Errors
+    /// [`StudyError::File`].
+    pub fn put(&self, cell: &Cell) -> Result<(), StudyError> {
+        write_json(&self.path(cell.id), cell)
+    }
+
+    /// All finished trainings in the order of the plan.
+    ///
+    /// # Errors
+    /// As [`Self::get`].
+    pub fn cells(&self) -> Result<Vec<Cell>, StudyError> {
+        let found = self.plan.cells().into_iter().map(|id| self.get(id));
+        Ok(found
+            .collect::<Result<Vec<_>, _>>()?
+            .into_iter()
+            .flatten()
+            .collect())
+    }
+
+    /// Trainings of the plan that are not finished.
+    pub fn missing(&self) -> Vec<CellId> {
+        let cells = self.plan.cells().into_iter();
+        cells.filter(|id| !self.path(*id).exists()).collect()
+    }
+
+    /// Takes over all finished trainings of another part of the same study.
+    ///
+    /// # Errors
+    /// [`StudyError::OtherStudy`], [`StudyError::Contradiction`].
+    pub fn merge(&self, part: &Store) -> Result<(), StudyError> {
+        if let Some(difference) = difference(&part.plan, &self.plan) {
+            let path = part.folder.join(PLAN);
+            return Err(StudyError::OtherStudy { path, difference });
+        }
+        for cell in part.cells()? {
+            match self.get(cell.id)? {
+                None => self.put(&cell)?,
+                Some(own) if own == cell => {}
+                Some(_) => {
+                    return Err(StudyError::Contradiction {
+                        first: self.path(cell.id),
+                        second: part.path(cell.id),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn path(&self, CellId { latent_dim, seed }: CellId) -> PathBuf {
+        self.folder
+            .join(format!("cell-d{latent_dim:02}-s{seed:02}.json"))
+    }
+}
+
+/// What of two plans is not the same.
+fn difference(found: &Plan, expected: &Plan) -> Option<&'static str> {
+    let parts = [
+        ("the versions of romc", found.romc != expected.romc),
+        ("the methods", found.method != expected.method),
+        ("the settings", found.settings != expected.settings),
+        (
+            "the recordings",
+            (&found.recordings, found.training) != (&expected.recordings, expected.training),
+        ),
+        (
+            "the latent dimensions",
+            found.latent_dims != expected.latent_dims,
+        ),
+        ("the numbers of seeds", found.seeds != expected.seeds),
+    ];
+    parts
+        .into_iter()
+        .find(|(_, differs)| *differs)
+        .map(|(name, _)| name)
+}
+
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, StudyError> {
+    let text = fs::read_to_string(path).map_err(|source| StudyError::File {
+        path: path.to_owned(),
+        action: "read",
+        source,
+    })?;
+    serde_json::from_str(&text).map_err(|error| StudyError::Broken {
+        path: path.to_owned(),
+        message: error.to_string(),
+    })
+}
+
+fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), StudyError> {
+    let refuse = |source| StudyError::File {
+        path: path.to_owned(),
+        action: "write",
+        source,
+    };
+    let mut text = serde_json::to_string_pretty(value).map_err(|error| refuse(error.into()))?;
+    text.push('\n');
+    write_whole(path, |out| out.write_all(text.as_bytes())).map_err(refuse)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::cell::Outcome;
+
+    fn plan() -> Plan {
+        Plan {
+            latent_dims: vec![1, 2],
+            seeds: 2,
+            method: "closed-form".to_owned(),
+            settings: String::new(),
+            recordings: vec!["sha256:1".to_owned()],
+            training: 1,
+            romc: "0.1.0".to_owned(),
+        }
+    }
+
+    fn cell(latent_dim: usize, seed: u64, reason: &str) -> Cell {
+        Cell {
+            id: CellId { latent_dim, seed },
+            outcome: Outcome::Refused(reason.to_owned()),
+        }
+    }
+
+    #[test]
+    fn merged_parts_hold_the_cells_of_both_and_name_what_is_missing() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let open =
+            |name: &str| Store::create(&folder.path().join(name), plan()).expect("a new folder");
+        let (a, b, whole) = (open("a"), open("b"), open("whole"));
+        a.put(&cell(1, 1, "x")).expect("writable");
+        b.put(&cell(2, 2, "y")).expect("writable");
+        b.put(&cell(1, 1, "x")).expect("writable");
+        whole.merge(&a).expect("equal plans");
+        whole.merge(&b).expect("equal plans, equal cells");
+        assert_eq!(
+            whole.cells().expect("whole"),
+            [cell(1, 1, "x"), cell(2, 2, "y")]
+        );
+        let missing = [(1, 2), (2, 1)].map(|(latent_dim, seed)| CellId { latent_dim, seed });
+        assert_eq!(whole.missing(), missing);
+    }
+
+    #[test]
+    fn contradicting_parts_and_other_plans_are_refused() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let a = Store::create(&folder.path().join("a"), plan()).expect("a new folder");
+        let b = Store::create(&folder.path().join("b"), plan()).expect("a new folder");
+        a.put(&cell(1, 1, "x")).expect("writable");
+        b.put(&cell(1, 1, "z")).expect("writable");
+        assert!(matches!(a.merge(&b), Err(StudyError::Contradiction { .. })));
+        let other = Plan {
+            settings: " --lift-weight 0".to_owned(),
+            ..plan()
+        };
+        let refused = Store::create(&folder.path().join("a"), other).expect_err("another study");
+        assert!(matches!(
+            refused,
+            StudyError::OtherStudy {
+                difference: "the settings",
+                ..
+            }
+        ));
+    }
+}

@@ -1,0 +1,221 @@
+//! Means and spreads over the seeds of a study, and the tables of it.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use super::cell::{Cell, Figures, Outcome};
+
+/// Mean and standard deviation over seeds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation (divided by n - 1), 0 for one seed.
+    pub std: f64,
+}
+
+impl Spread {
+    /// Of some values; `None` without any.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        (!values.is_empty()).then(|| Self {
+            mean,
+            std: (squares / (n - 1.0).max(1.0)).sqrt(),
+        })
+    }
+}
+
+/// What the seeds of one latent dimension came to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DimensionSummary {
+    /// Number of latent coordinates.
+    pub latent_dim: usize,
+    /// Trainings that gave a model.
+    pub trained: usize,
+    /// Trainings that refused.
+    pub refused: usize,
+    /// Mean square of the decoder's error, scaled units.
+    pub decoder_mse: Spread,
+    /// Active coefficients in contact.
+    pub active: Spread,
+    /// `2 E_dec + 2 lambda log |Xi|` (29).
+    pub combined_loss: Spread,
+    /// Coefficient of determination of the torques of the plain lift.
+    pub torque_r2: Spread,
+    /// Predictions of 0.1 s, body x, m.
+    pub prediction_x_m: Spread,
+    /// Predictions of 0.1 s, body z, m.
+    pub prediction_z_m: Spread,
+}
+
+/// A whole study by latent dimension.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Weight of the complexity in (29).
+    pub lambda: f64,
+    /// Ascending; dimensions without any model are left out.
+    pub dimensions: Vec<DimensionSummary>,
+}
+
+impl Summary {
+    /// Of finished trainings.
+    pub fn of(cells: &[Cell], lambda: f64) -> Self {
+        let mut dims: Vec<usize> = cells.iter().map(|cell| cell.id.latent_dim).collect();
+        dims.sort_unstable();
+        dims.dedup();
+        let dimensions = dims.into_iter().filter_map(|d| dimension(cells, d, lambda));
+        Self {
+            lambda,
+            dimensions: dimensions.collect(),
+        }
+    }
+
+    /// The latent dimension of least combined loss (29).
+    pub fn best(&self) -> Option<usize> {
+        let loss = |row: &&DimensionSummary| row.combined_loss.mean;
+        let best = self
+            .dimensions
+            .iter()
+            .min_by(|a, b| loss(a).total_cmp(&loss(b)));
+        best.map(|row| row.latent_dim)
+    }
+
+    /// One row a latent dimension: means and standard deviations.
+    pub fn csv(&self) -> String {
+        let mut text = String::from("latent_dim,trained,refused");
+        let columns = [
+            "decoder_mse",
+            "active",
+            "combined_loss",
+            "torque_r2",
+            "prediction_x_m",
+            "prediction_z_m",
+        ];
+        for column in columns {
+            let _ = write!(text, ",{column}_mean,{column}_std");
+        }
+        text.push('\n');
+        for row in &self.dimensions {
+            let _ = write!(text, "{},{},{}", row.latent_dim, row.trained, row.refused);
+            let spreads = [
+                row.decoder_mse,
+                row.active,
+                row.combined_loss,
+                row.torque_r2,
+                row.prediction_x_m,
+                row.prediction_z_m,
+            ];
+            for Spread { mean, std } in spreads {
+                let _ = write!(text, ",{mean},{std}");
+            }
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// One row a training, in the order of the plan.
+pub fn cells_csv(cells: &[Cell], lambda: f64) -> String {
+    let mut text = String::from(
+        "latent_dim,seed,decoder_mse,active,active_all_phases,combined_loss,torque_r2,prediction_x_m,prediction_z_m,refused\n",
+    );
+    for Cell { id, outcome } in cells {
+        let _ = write!(text, "{},{}", id.latent_dim, id.seed);
+        let _ = match outcome {
+            Outcome::Trained(figures) => writeln!(
+                text,
+                ",{},{},{},{},{},{},{},",
+                figures.decoder_mse,
+                figures.active,
+                figures.active_all_phases,
+                figures.combined_loss(lambda),
+                figures.torque_r2,
+                figures.prediction_x_m,
+                figures.prediction_z_m
+            ),
+            Outcome::Refused(reason) => {
+                writeln!(text, ",,,,,,,,\"{}\"", reason.replace('"', "\"\""))
+            }
+        };
+    }
+    text
+}
+
+fn dimension(cells: &[Cell], latent_dim: usize, lambda: f64) -> Option<DimensionSummary> {
+    let own = cells.iter().filter(|cell| cell.id.latent_dim == latent_dim);
+    let (mut figures, mut refused): (Vec<&Figures>, usize) = (Vec::new(), 0);
+    for cell in own {
+        match &cell.outcome {
+            Outcome::Trained(found) => figures.push(found),
+            Outcome::Refused(_) => refused += 1,
+        }
+    }
+    let spread = |value: &dyn Fn(&Figures) -> f64| {
+        Spread::of(&figures.iter().map(|found| value(found)).collect::<Vec<_>>())
+    };
+    Some(DimensionSummary {
+        latent_dim,
+        trained: figures.len(),
+        refused,
+        decoder_mse: spread(&|found| found.decoder_mse)?,
+        active: spread(&|found| found.active as f64)?,
+        combined_loss: spread(&|found| found.combined_loss(lambda))?,
+        torque_r2: spread(&|found| found.torque_r2)?,
+        prediction_x_m: spread(&|found| found.prediction_x_m)?,
+        prediction_z_m: spread(&|found| found.prediction_z_m)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::plan::CellId;
+
+    #[test]
+    fn summary_means_over_seeds_and_counts_refusals() {
+        let trained = |seed: u64, decoder_mse: f64, active: usize| Cell {
+            id: CellId {
+                latent_dim: 2,
+                seed,
+            },
+            outcome: Outcome::Trained(Figures {
+                decoder_mse,
+                active,
+                active_all_phases: active,
+                torque_r2: 0.5,
+                prediction_x_m: 0.01,
+                prediction_z_m: 0.02,
+            }),
+        };
+        let refused = Cell {
+            id: CellId {
+                latent_dim: 2,
+                seed: 3,
+            },
+            outcome: Outcome::Refused("no \"stable\" model".to_owned()),
+        };
+        let cells = [trained(1, 1.0, 10), trained(2, 3.0, 20), refused];
+        let summary = Summary::of(&cells, 0.5);
+        let row = &summary.dimensions[0];
+        assert_eq!((row.trained, row.refused), (2, 1));
+        assert_eq!(
+            row.decoder_mse,
+            Spread {
+                mean: 2.0,
+                std: 2.0_f64.sqrt()
+            }
+        );
+        let expected = (2.0 + 10.0_f64.ln() + 6.0 + 20.0_f64.ln()) / 2.0;
+        assert!((row.combined_loss.mean - expected).abs() < 1e-12);
+        let table = cells_csv(&cells, 0.5);
+        assert_eq!(table.lines().count(), 4);
+        assert!(table.contains("\"no \"\"stable\"\" model\""), "{table}");
+        assert!(
+            table.lines().all(|line| line.matches(',').count() == 9),
+            "{table}"
+        );
+    }
+}
