@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::artifact::import::{Format, ImportError, Mapping, PhaseRule, parse_standard};
 use crate::backend::Target;
-use crate::model::StandardLibrary;
+use crate::model::{Activation, StandardLibrary};
 use crate::robot::STATE_DIM;
 use crate::study::Shard;
 
@@ -337,6 +337,9 @@ pub struct ImportArguments {
     /// How weights are stored, if their shape does not tell
     #[arg(long, value_enum)]
     pub weights: Option<StoredWeights>,
+    /// What is between the layers of an encoder or decoder that has several: elu, tanh, sigmoid
+    #[arg(long, value_name = "NAME")]
+    pub activation: Option<Activation>,
     /// How coefficients are stored, if their shape does not tell
     #[arg(long, value_enum)]
     pub xi_layout: Option<StoredXi>,

@@ -59,6 +59,7 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
             StoredWeights::Row => WeightVectors::Row,
             StoredWeights::Column => WeightVectors::Column,
         }),
+        activation: arguments.activation,
         xi_layout: arguments.xi_layout.map(|stored| match stored {
             StoredXi::TermsByLatent => XiLayout::TermsByLatent,
             StoredXi::LatentByTerms => XiLayout::LatentByTerms,

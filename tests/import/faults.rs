@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use romc::artifact::import::*;
-use romc::model::{ModelError, Scaling};
+use romc::model::{Activation, ModelError, Scaling};
 use zip::CompressionMethod;
 
 use crate::store::*;
@@ -211,8 +211,72 @@ fn import_of_a_deeper_network_names_its_layers() {
     assert_eq!(
         message(deeper, |_| {}),
         "m.safetensors: found `encoder.0.weight` (64 x 5), `encoder.2.weight` (2 x 64), the layers \
-         of a deeper encoder, expected one linear layer, which is all that a model file holds"
+         of a deeper encoder, expected one linear layer, or --activation elu, tanh or sigmoid to say \
+         what is between them"
     );
+}
+
+fn wave(rows: usize, cols: usize, seed: f64) -> DMatrix<f64> {
+    DMatrix::from_fn(rows, cols, |i, j| {
+        (seed + 1.3 * i as f64 + 0.7 * j as f64 + 0.4 * (i * j) as f64).sin()
+    })
+}
+
+/// Tensors of an encoder 5 -> 4 -> 2 and a decoder 2 -> 3 -> 5, as PyTorch's Sequential names them.
+fn deeper(stored: &mut Vec<Stored>, is_row: bool) {
+    stored.retain(|tensor| !tensor.name.contains("coder"));
+    for (name, rows, cols) in [
+        ("net.encoder.0", 4, 5),
+        ("net.encoder.2", 2, 4),
+        ("net.decoder.0", 3, 2),
+        ("net.decoder.10", 5, 3),
+    ] {
+        let weights = wave(rows, cols, 0.3);
+        let weights = if is_row { weights.transpose() } else { weights };
+        stored.push(plain(&format!("{name}.weight"), &weights));
+        let bias: Vec<f64> = (0..rows).map(|i| 0.1 * i as f64 - 0.2).collect();
+        stored.push(list(&format!("{name}.bias"), &bias));
+    }
+}
+
+#[test]
+fn import_of_layers_with_an_activation_makes_the_network_they_are() {
+    let mut options = options();
+    options.activation = Some(Activation::Elu);
+    for is_row in [false, true] {
+        let mut stored = small();
+        deeper(&mut stored, is_row);
+        let imported = run(&stored, &options).expect("a chain of layers");
+        let encoder = imported.model.encoder_map().expect("an encoder");
+        assert_eq!(encoder.summary(), "5 -> 4 elu -> 2");
+        let decoder = imported.model.decoder_map().expect("a decoder");
+        assert_eq!(decoder.summary(), "2 -> 3 elu -> 5");
+
+        let x = DVector::from_row_slice(&[3.0, -4.0, 1.0, 7.0, -2.0]);
+        let bias = |rows: usize| DVector::from_fn(rows, |i, _| 0.1 * i as f64 - 0.2);
+        let hidden = wave(4, 5, 0.3) * &x * 0.1 + bias(4);
+        let hidden = hidden.map(|a| if a > 0.0 { a } else { a.exp() - 1.0 });
+        let expected = wave(2, 4, 0.3) * hidden + bias(2);
+        let found = imported.model.encode(&x).expect("fits");
+        assert!((found - expected).amax() < 1e-14);
+    }
+}
+
+#[test]
+fn import_of_layers_that_are_no_chain_or_of_one_layer_is_refused() {
+    let broken = |stored: &mut Vec<Stored>| {
+        deeper(stored, false);
+        stored.retain(|tensor| tensor.name != "net.encoder.2.weight");
+        stored.push(plain("net.encoder.2.weight", &wave(2, 3, 0.3)));
+    };
+    let elu = |options: &mut ImportOptions| options.activation = Some(Activation::Elu);
+    let text = message(broken, elu);
+    assert!(
+        text.contains("each taking what the one before gives") && text.contains("(2 x 3)"),
+        "{text}"
+    );
+    let text = message(|_| {}, elu);
+    assert!(text.starts_with("--activation: found elu"), "{text}");
 }
 
 #[test]

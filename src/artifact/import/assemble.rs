@@ -1,5 +1,7 @@
 //! From assigned tensors to the parts of a model.
 
+mod layers;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::assign::{Assigned, Assignment, assign};
@@ -10,7 +12,9 @@ use super::options::{ImportOptions, LibraryChoice, feet_text};
 use super::report::{Layout, Note, UnusedTensor, UsedTensor};
 use super::role::{Part, Role};
 use super::tensors::{Array, Element, TensorFile};
-use crate::model::{AffineMap, InputStatistics, Library, ModelError, Phase, ScaleFactors, Scaling};
+use crate::model::{
+    AffineMap, InputStatistics, Library, ModelError, Phase, ScaleFactors, Scaling, StateMap,
+};
 use crate::robot::STATE_DIM;
 
 /// The parts of a model that a file has.
@@ -18,8 +22,8 @@ use crate::robot::STATE_DIM;
 pub(super) struct Parts {
     pub(super) library: Library,
     pub(super) phases: Vec<Phase>,
-    pub(super) encoder: Option<AffineMap>,
-    pub(super) decoder: Option<AffineMap>,
+    pub(super) encoder: Option<StateMap>,
+    pub(super) decoder: Option<StateMap>,
     pub(super) scaling: Option<Scaling>,
     pub(super) statistics: Vec<(String, InputStatistics)>,
 }
@@ -71,6 +75,7 @@ impl<'f> Assembly<'_, 'f> {
     fn parts(&mut self) -> Result<Parts, ImportError> {
         let encoder = self.map(Part::Encoder)?;
         let decoder = self.map(Part::Decoder)?;
+        self.check_activation(&[&encoder, &decoder])?;
         let weights: Vec<Layout> = (self.news.used.iter())
             .filter(|used| used.role.ends_with(".weight"))
             .map(|used| used.layout)
@@ -89,6 +94,20 @@ impl<'f> Assembly<'_, 'f> {
             scaling,
             statistics,
         })
+    }
+
+    /// Complains about an activation that there is no place for.
+    fn check_activation(&self, maps: &[&Option<StateMap>]) -> Result<(), ImportError> {
+        let is_deep = |map: &&Option<StateMap>| map.as_ref().is_some_and(|m| m.layers().len() > 1);
+        match self.options.activation {
+            Some(activation) if !maps.iter().any(is_deep) => Err(ImportError::Option {
+                option: "--activation",
+                found: format!("{activation}, but no map with several layers"),
+                expected: "tensors of layers, such as encoder.0.weight and encoder.2.weight"
+                    .to_owned(),
+            }),
+            _ => Ok(()),
+        }
     }
 
     fn find(&self, role: &Role) -> Option<Assigned<'f>> {
@@ -128,7 +147,19 @@ impl<'f> Assembly<'_, 'f> {
     }
 
     /// Encoder or decoder, if the file has its weights.
-    fn map(&mut self, part: Part) -> Result<Option<AffineMap>, ImportError> {
+    fn map(&mut self, part: Part) -> Result<Option<StateMap>, ImportError> {
+        let tensors = self.layers_of(part);
+        if !tensors.is_empty() {
+            let Some(activation) = self.options.activation else {
+                let found: Vec<String> = tensors.iter().map(|a| a.info.describe()).collect();
+                return Err(ImportError::Layers {
+                    file: self.tensors.file().to_owned(),
+                    part: part.name(),
+                    found: found.join(", "),
+                });
+            };
+            return self.network(part, &tensors, activation).map(Some);
+        }
         let bias = self.find(&Role::Bias(part));
         let Some(weights) = self.find(&Role::Weights(part)) else {
             if bias.is_some() {
@@ -167,7 +198,8 @@ impl<'f> Assembly<'_, 'f> {
             }
         };
         let map = AffineMap::new(part.name(), matrix, bias);
-        map.map(Some).map_err(|source| self.model_error(source))
+        map.map(|map| Some(map.into()))
+            .map_err(|source| self.model_error(source))
     }
 
     /// A tensor that is a list of `length` numbers.

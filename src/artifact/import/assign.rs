@@ -48,7 +48,25 @@ pub(super) fn assign<'f>(
     check_mapped_phases(options, &phases)?;
 
     let mut guessed = Vec::new();
+    if options.activation.is_some() {
+        for part in [Part::Encoder, Part::Decoder] {
+            guessed.extend(layers(part, &used, &guesses));
+        }
+    }
+    let has_layers = |part: Part, lists: [&[Assigned<'_>]; 2]| {
+        lists
+            .into_iter()
+            .flatten()
+            .any(|assigned| matches!(assigned.role, Role::LayerWeights(found, _) if found == part))
+    };
     for role in roles(&phases) {
+        let layered = match role {
+            Role::Weights(part) | Role::Bias(part) => has_layers(part, [&used, &guessed]),
+            _ => false,
+        };
+        if layered {
+            continue;
+        }
         if used.iter().any(|assigned| assigned.role == role) {
             continue;
         }
@@ -207,6 +225,48 @@ fn roles(phases: &[PhaseRule]) -> Vec<Role> {
         roles.extend(of_phase.map(|role| role(name.clone())));
     }
     roles
+}
+
+/// The layers of a map whose names differ in their numbers only, if there are several and nothing
+/// is mapped.
+fn layers<'f>(
+    part: Part,
+    used: &[Assigned<'f>],
+    guesses: &[(Guess, &'f TensorInfo)],
+) -> Vec<Assigned<'f>> {
+    let is_mapped = used.iter().any(|assigned| match assigned.role {
+        Role::Weights(found) | Role::LayerWeights(found, _) => found == part,
+        _ => false,
+    });
+    let of = |wanted: Guess| -> Vec<(Vec<u64>, &'f TensorInfo)> {
+        let fitting = guesses.iter().filter(|(guess, _)| *guess == wanted);
+        let mut list: Vec<_> = fitting
+            .map(|&(_, info)| (names::numbers(&info.name), info))
+            .collect();
+        list.sort_by(|a, b| a.0.cmp(&b.0));
+        list
+    };
+    let weights = of(Guess::Weights(part));
+    let one_network = |pair: &[(Vec<u64>, &TensorInfo)]| {
+        pair[0].0 != pair[1].0 && names::are_layers(&pair[0].1.name, &pair[1].1.name)
+    };
+    if is_mapped || weights.len() < 2 || !weights.windows(2).all(one_network) {
+        return Vec::new();
+    }
+    let biases = of(Guess::Bias(part));
+    let mut list = Vec::new();
+    for (layer, (numbers, info)) in weights.iter().enumerate() {
+        let assigned = |role, info| Assigned {
+            role,
+            info,
+            chosen: Chosen::Guessed,
+        };
+        list.push(assigned(Role::LayerWeights(part, layer), *info));
+        if let Some((_, bias)) = biases.iter().find(|(found, _)| found == numbers) {
+            list.push(assigned(Role::LayerBias(part, layer), *bias));
+        }
+    }
+    list
 }
 
 /// The one tensor whose name suggests a role.

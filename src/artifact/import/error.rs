@@ -159,7 +159,7 @@ pub enum ImportError {
     },
     /// A network of several layers.
     #[error(
-        "{file}: found {found}, the layers of a deeper {part}, expected one linear layer, which is all that a model file holds"
+        "{file}: found {found}, the layers of a deeper {part}, expected one linear layer, or --activation elu, tanh or sigmoid to say what is between them"
     )]
     Layers {
         /// The file.

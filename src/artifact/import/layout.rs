@@ -26,7 +26,8 @@ impl Subject<'_> {
         }
     }
 
-    fn orientation_error(&self, option: &'static str) -> ImportError {
+    /// Complains that the shape fits both ways.
+    pub(super) fn orientation_error(&self, option: &'static str) -> ImportError {
         ImportError::Orientation {
             file: self.file.to_owned(),
             tensor: self.info.name.clone(),

@@ -113,6 +113,12 @@ pub(super) fn are_layers(first: &str, second: &str) -> bool {
     without_numbers(first) == without_numbers(second)
 }
 
+/// The numbers in a name, which tell the layer: `encoder.2.weight` has `[2]`.
+pub(super) fn numbers(name: &str) -> Vec<u64> {
+    let words = words(name.strip_suffix(":0").unwrap_or(name));
+    words.iter().filter_map(|word| word.parse().ok()).collect()
+}
+
 /// Whether these words name this phase: `rear stance` names `rear_stance` and `RearStance`.
 pub(super) fn name_phase(found: &[String], phase: &str) -> bool {
     found.concat() == words(phase).concat()

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::error::ImportError;
 use super::role::Mapping;
-use crate::model::{FeetRule, Scaling, StandardLibrary};
+use crate::model::{Activation, FeetRule, Scaling, StandardLibrary};
 use crate::robot::{ContactFlags, FOOT_DIM, Robot};
 
 /// The kinds of files that can be imported.
@@ -231,6 +231,8 @@ pub struct ImportOptions {
     pub mapping: Vec<Mapping>,
     /// How weights are stored, if their shape does not tell or is to be checked.
     pub weights: Option<WeightVectors>,
+    /// What is between the layers of an encoder or decoder that has several.
+    pub activation: Option<Activation>,
     /// How coefficients are stored, if their shape does not tell or is to be checked.
     pub xi_layout: Option<XiLayout>,
     /// The candidate terms; equations bring their own.

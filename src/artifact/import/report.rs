@@ -121,6 +121,13 @@ pub enum Note {
         /// `encoder` or `decoder`.
         part: &'static str,
     },
+    /// A map has several layers.
+    Layers {
+        /// `encoder` or `decoder`.
+        part: &'static str,
+        /// Widths and activations.
+        layers: String,
+    },
     /// There is no encoder, or no decoder.
     NoMap {
         /// `encoder` or `decoder`.
@@ -146,6 +153,7 @@ impl fmt::Display for Note {
                 write!(f, "phase {phase} holds for feet `{feet}`, as its name says")
             }
             Note::ZeroBias { part } => write!(f, "the {part} has no bias: zero"),
+            Note::Layers { part, layers } => write!(f, "the {part} has layers {layers}"),
             Note::NoMap { part: "encoder" } => {
                 f.write_str("no encoder: the model says nothing about a robot's coordinates")
             }

@@ -31,6 +31,10 @@ pub enum Role {
     Weights(Part),
     /// `b_e` or `b_d`.
     Bias(Part),
+    /// Weights of one of several layers; the number tells their order.
+    LayerWeights(Part, usize),
+    /// Bias of one of several layers.
+    LayerBias(Part, usize),
     /// Coefficients of a phase.
     Xi(String),
     /// 0 for the coefficients of a phase that training switched off, 1 for the others.
@@ -45,8 +49,8 @@ pub enum Role {
     InputScaling,
 }
 
-const EXPECTED: &str = "encoder.weight, encoder.bias, decoder.weight, decoder.bias, xi.PHASE, \
-                        mask.PHASE, input_mean.PHASE, input_covariance.PHASE, scaling.state or \
+const EXPECTED: &str = "encoder.weight, encoder.bias, decoder.weight, decoder.bias (of a layer \
+                        encoder.0.weight and so on), xi.PHASE, mask.PHASE, input_mean.PHASE, input_covariance.PHASE, scaling.state or \
                         scaling.input";
 
 impl fmt::Display for Role {
@@ -54,6 +58,8 @@ impl fmt::Display for Role {
         match self {
             Role::Weights(part) => write!(f, "{}.weight", part.name()),
             Role::Bias(part) => write!(f, "{}.bias", part.name()),
+            Role::LayerWeights(part, layer) => write!(f, "{}.{layer}.weight", part.name()),
+            Role::LayerBias(part, layer) => write!(f, "{}.{layer}.bias", part.name()),
             Role::Xi(phase) => write!(f, "xi.{phase}"),
             Role::Mask(phase) => write!(f, "mask.{phase}"),
             Role::InputMean(phase) => write!(f, "input_mean.{phase}"),
@@ -81,6 +87,7 @@ impl FromStr for Role {
             ("encoder", "bias") => Ok(Role::Bias(Part::Encoder)),
             ("decoder", "weight" | "weights") => Ok(Role::Weights(Part::Decoder)),
             ("decoder", "bias") => Ok(Role::Bias(Part::Decoder)),
+            ("encoder" | "decoder", _) => layer_role(head, tail).ok_or_else(unknown),
             ("scaling", "state") => Ok(Role::StateScaling),
             ("scaling", "input") => Ok(Role::InputScaling),
             ("xi", _) => Ok(Role::Xi(phase)),
@@ -92,6 +99,21 @@ impl FromStr for Role {
     }
 }
 
+/// `0.weight` of an encoder or decoder.
+fn layer_role(head: &str, tail: &str) -> Option<Role> {
+    let part = match head {
+        "encoder" => Part::Encoder,
+        _ => Part::Decoder,
+    };
+    let (number, tensor) = tail.split_once('.')?;
+    let number = number.parse().ok()?;
+    match tensor {
+        "weight" | "weights" => Some(Role::LayerWeights(part, number)),
+        "bias" => Some(Role::LayerBias(part, number)),
+        _ => None,
+    }
+}
+
 impl Role {
     /// The phase that the tensor belongs to, if it belongs to one.
     pub fn phase(&self) -> Option<&str> {
@@ -100,7 +122,12 @@ impl Role {
             | Role::Mask(phase)
             | Role::InputMean(phase)
             | Role::InputCovariance(phase) => Some(phase),
-            Role::Weights(_) | Role::Bias(_) | Role::StateScaling | Role::InputScaling => None,
+            Role::Weights(_)
+            | Role::Bias(_)
+            | Role::LayerWeights(..)
+            | Role::LayerBias(..)
+            | Role::StateScaling
+            | Role::InputScaling => None,
         }
     }
 }
@@ -144,6 +171,8 @@ mod tests {
             Role::Weights(Part::Decoder),
             Role::Bias(Part::Encoder),
             Role::Bias(Part::Decoder),
+            Role::LayerWeights(Part::Encoder, 0),
+            Role::LayerBias(Part::Decoder, 12),
             Role::Xi(contact()),
             Role::Mask(contact()),
             Role::InputMean(contact()),

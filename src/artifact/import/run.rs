@@ -16,7 +16,7 @@ use super::options::{Format, ImportOptions};
 use super::report::{ImportReport, ReadEquation};
 use super::safetensors;
 use super::tensors::{TensorFile, short_name};
-use crate::model::{AffineMap, ReducedModel, Signals};
+use crate::model::{ReducedModel, Signals, StateMap};
 use crate::robot::Robot;
 
 /// Largest file that is read.
@@ -162,8 +162,8 @@ fn finish(
             },
         });
     }
-    let state_dim = (parts.encoder.as_ref().map(AffineMap::input_dim))
-        .or(parts.decoder.as_ref().map(AffineMap::output_dim));
+    let state_dim = (parts.encoder.as_ref().map(StateMap::input_dim))
+        .or(parts.decoder.as_ref().map(StateMap::output_dim));
     let mut builder = ReducedModel::builder(options.name.clone(), parts.library)
         .description(options.description.clone())
         .phases(parts.phases)
