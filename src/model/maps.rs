@@ -71,6 +71,32 @@ impl ReducedModel {
         self.require(&self.input_projection, "encoder", "projecting inputs")
     }
 
+    /// The linear model whose maps have the same value and the same Jacobian at the state `x` (SI
+    /// units) and, for the decoder, at `z = E(s_x x)`; the dynamics are the same. A linear map
+    /// stays as it is.
+    ///
+    /// Positions, velocities and inputs of the two models agree at `x` and drift apart away from
+    /// it as the maps curve.
+    ///
+    /// # Errors
+    /// As [`ReducedModel::encode`], and [`ModelError::RankDeficient`] where the encoder's Jacobian
+    /// has not full row rank.
+    pub fn linearised_at(&self, x: &DVector<f64>) -> Result<ReducedModel, ModelError> {
+        let scaled = self.scaled_state(x)?;
+        let encoder = self.encoder_map()?;
+        let z = encoder.apply(&scaled)?;
+        let mut builder = self.clone().into_builder();
+        if encoder.as_affine().is_none() {
+            builder = builder.encoder(tangent("encoder", encoder, &scaled)?);
+        }
+        if let Some(decoder) = &self.decoder
+            && decoder.as_affine().is_none()
+        {
+            builder = builder.decoder(tangent("decoder", decoder, &z)?);
+        }
+        builder.build()
+    }
+
     /// The encoder's Jacobian in SI units, `d z / d x = J_E diag(s_x)`, `latent_dim x state_dim`.
     ///
     /// # Errors
@@ -304,4 +330,11 @@ impl ReducedModel {
             purpose,
         }
     }
+}
+
+/// `y -> J(at) y + (map(at) - J(at) at)`.
+fn tangent(tensor: &str, map: &StateMap, at: &DVector<f64>) -> Result<AffineMap, ModelError> {
+    let jacobian = map.jacobian(at)?;
+    let bias = map.apply(at)? - &jacobian * at;
+    AffineMap::new(tensor, jacobian, bias)
 }

@@ -133,6 +133,52 @@ fn projection_is_exact_where_the_singular_values_converge_slowly() {
 }
 
 #[test]
+fn linearised_model_agrees_with_the_nonlinear_one_at_its_state() {
+    let layer = |rows: usize, cols: usize, activation| Layer {
+        map: AffineMap::new(
+            "map",
+            DMatrix::from_fn(rows, cols, |i, j| {
+                (1.1 + 2.0 * i as f64 + 0.6 * j as f64).sin()
+            }),
+            DVector::from_fn(rows, |i, _| 0.2 - 0.1 * i as f64),
+        )
+        .unwrap(),
+        activation,
+    };
+    let encoder = vec![
+        layer(4, 3, Activation::Elu),
+        layer(2, 4, Activation::Linear),
+    ];
+    let decoder = vec![
+        layer(5, 2, Activation::Tanh),
+        layer(3, 5, Activation::Linear),
+    ];
+    let model = example()
+        .into_builder()
+        .encoder(StateMap::new("encoder", encoder).unwrap())
+        .decoder(StateMap::new("decoder", decoder).unwrap())
+        .build()
+        .unwrap();
+    let x = DVector::from_row_slice(&[4.0, -3.0, 1.5]);
+    let v = DVector::from_row_slice(&[0.3, 1.0, -2.0]);
+    let linear = model.linearised_at(&x).unwrap();
+    assert!(linear.is_linear() && !model.is_linear());
+    let z = model.encode(&x).unwrap();
+    assert_close(&linear.encode(&x).unwrap(), z.as_slice());
+    let expected = model.encode_velocity_at(&x, &v).unwrap();
+    assert_close(&linear.encode_velocity(&v).unwrap(), expected.as_slice());
+    let expected = model.project_input_at(&x, &v).unwrap();
+    assert_close(&linear.project_input(&v).unwrap(), expected.as_slice());
+    let expected = model.lift_input_at(&x, &z).unwrap();
+    assert_close(&linear.lift_input(&z).unwrap(), expected.as_slice());
+    let expected = model.decode(&z).unwrap();
+    assert_close(&linear.decode(&z).unwrap(), expected.as_slice());
+    let expected = model.decode_velocity_at(&z, &z).unwrap();
+    assert_close(&linear.decode_velocity(&z).unwrap(), expected.as_slice());
+    assert_eq!(example().linearised_at(&x).unwrap(), example());
+}
+
+#[test]
 fn latent_input_statistics_follow_the_projection() {
     let model = example();
     let n = 3;
