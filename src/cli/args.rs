@@ -109,6 +109,18 @@ pub enum TrainMethod {
     Joint,
 }
 
+/// How the window of predictions is integrated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BpttIntegrator {
+    /// Explicit Euler
+    Euler,
+    /// Midpoint rule
+    Rk2,
+    /// Classical Runge-Kutta
+    Rk4,
+}
+
 /// Phases that a model tells apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -180,6 +192,21 @@ pub struct TrainSettings {
     /// Weight of body x, y, z in the reconstruction error
     #[arg(long, value_name = "WEIGHT")]
     pub body_weight: Option<f64>,
+    /// Weight of the loss over a window of predictions, 0 for none (joint method)
+    #[arg(long, value_name = "WEIGHT")]
+    pub bptt_weight: Option<f64>,
+    /// Steps of that window (5 unless given)
+    #[arg(long, value_name = "STEPS", value_parser = at_least_one)]
+    pub bptt_window: Option<usize>,
+    /// Samples a step of that window (5 unless given: 10 ms at 500 Hz)
+    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
+    pub bptt_stride: Option<usize>,
+    /// Weight of a prediction against the one a step earlier (0.9 unless given)
+    #[arg(long, value_name = "FACTOR")]
+    pub bptt_decay: Option<f64>,
+    /// How predictions are integrated (rk2 unless given)
+    #[arg(long, value_enum)]
+    pub bptt_integrator: Option<BpttIntegrator>,
     /// Validation error to give up for fewer terms, as a share of the least
     #[arg(long, value_name = "SHARE")]
     pub slack: Option<f64>,

@@ -6,11 +6,11 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::args::{PhaseSet, TrainArguments, TrainMethod, TrainSettings};
+use super::args::{BpttIntegrator, PhaseSet, TrainArguments, TrainMethod, TrainSettings};
 use crate::Error;
 use crate::model::StandardLibrary;
 use crate::recording::PhaseRule;
-use crate::train::{LibraryChoice, TrainOptions};
+use crate::train::{Integrator, LibraryChoice, TrainOptions};
 
 /// The options that the settings describe.
 pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String) -> TrainOptions {
@@ -24,6 +24,16 @@ pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String)
     set(&mut options.seed, settings.seed);
     set(&mut options.n_seeds, settings.seeds);
     set(&mut options.joint.schedule.epochs, settings.epochs);
+    set(&mut options.joint.weights.bptt, settings.bptt_weight);
+    set(&mut options.joint.unroll.window, settings.bptt_window);
+    set(&mut options.joint.unroll.stride, settings.bptt_stride);
+    set(&mut options.joint.unroll.decay, settings.bptt_decay);
+    let integrator = settings.bptt_integrator.map(|integrator| match integrator {
+        BpttIntegrator::Euler => Integrator::Euler,
+        BpttIntegrator::Rk2 => Integrator::Rk2,
+        BpttIntegrator::Rk4 => Integrator::Rk4,
+    });
+    set(&mut options.joint.unroll.integrator, integrator);
     set(&mut options.encoder.lift_weight, settings.lift_weight);
     set(&mut options.encoder.body_weight, settings.body_weight);
     set(&mut options.regression.slack, settings.slack);
@@ -127,6 +137,8 @@ fn check(settings: &TrainSettings) -> Result<(), String> {
         ("latent-dim", settings.latent_dim),
         ("seeds", settings.seeds),
         ("epochs", settings.epochs),
+        ("bptt-window", settings.bptt_window),
+        ("bptt-stride", settings.bptt_stride),
     ];
     if let Some((name, _)) = counts.iter().find(|(_, count)| *count == Some(0)) {
         return Err(format!("`{name}` is 0, expected at least 1"));
@@ -153,6 +165,11 @@ fn overlay(above: &TrainSettings, below: TrainSettings) -> TrainSettings {
         epochs: above.epochs.or(below.epochs),
         lift_weight: above.lift_weight.or(below.lift_weight),
         body_weight: above.body_weight.or(below.body_weight),
+        bptt_weight: above.bptt_weight.or(below.bptt_weight),
+        bptt_window: above.bptt_window.or(below.bptt_window),
+        bptt_stride: above.bptt_stride.or(below.bptt_stride),
+        bptt_decay: above.bptt_decay.or(below.bptt_decay),
+        bptt_integrator: above.bptt_integrator.or(below.bptt_integrator),
         slack: above.slack.or(below.slack),
         degree: above.degree.or(below.degree),
         trigonometric: above.trigonometric || below.trigonometric,

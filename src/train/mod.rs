@@ -35,7 +35,7 @@ pub use assemble::{Origin, SourceFile};
 pub use closed_form::{Recordings, closed_form};
 pub use dataset::ScaleOptions;
 pub use error::TrainError;
-pub use joint::joint;
+pub use joint::{Integrator, Unroll, joint};
 pub use metrics::{SetMetrics, assess};
 pub use options::{
     EncoderOptions, JointOptions, LibraryChoice, RegressionOptions, TrainOptions, Transfer,

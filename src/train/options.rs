@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
-use super::joint::{LossWeights, Schedule};
+use super::joint::{LossWeights, Schedule, Unroll};
 use super::metrics::{BODY_X, BODY_Z};
 use super::sparse::Pruning;
 use crate::model::{Library, StandardLibrary};
@@ -59,6 +59,8 @@ pub struct JointOptions {
     pub xi_start: f64,
     /// Seeds trained at the same time; the result does not depend on it.
     pub threads: usize,
+    /// Window of the loss over predictions, which counts only if `weights.bptt` is not 0.
+    pub unroll: Unroll,
     /// What follows the first step.
     pub transfer: Transfer,
 }
@@ -192,6 +194,21 @@ impl TrainOptions {
         above_zero("body-weight", body_weight)?;
         at_least_zero("mask-std", least_std)?;
         at_least_zero("mask-input-share", least_input_share)?;
+        at_least_zero("bptt-weight", self.joint.weights.bptt)?;
+        let Unroll {
+            window,
+            stride,
+            decay,
+            ..
+        } = self.joint.unroll;
+        above_zero("bptt-window", window as f64)?;
+        above_zero("bptt-stride", stride as f64)?;
+        in_range(
+            "bptt-decay",
+            decay,
+            decay > 0.0 && decay <= 1.0,
+            "above 0 and at most 1",
+        )?;
         at_least_zero("slack", self.regression.slack)?;
         at_least_zero("rollout-weight", self.regression.rollout_weight)?;
         for ridge in &self.regression.ridges {
@@ -254,6 +271,7 @@ impl Default for JointOptions {
             batch_rows: 100,
             xi_start: 0.0,
             threads: std::thread::available_parallelism().map_or(1, usize::from),
+            unroll: Unroll::default(),
             transfer: Transfer::Chosen,
         }
     }

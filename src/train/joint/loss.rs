@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::batch::Batch;
 use super::multiply::{Columns, add_product, add_transposed, product_into};
 use super::parameters::Parameters;
+use super::unroll::{Pulls, Unroll, Window};
 use crate::train::features::{FeatureValues, Features};
 
 /// Weights of the terms of the loss (equation 20).
@@ -19,16 +20,20 @@ pub struct LossWeights {
     pub l1: f64,
     /// Of the share of the input's energy that the latent input cannot carry.
     pub lift: f64,
+    /// Of predictions over a window (41).
+    #[serde(default)]
+    pub bptt: f64,
 }
 
 impl Default for LossWeights {
-    /// The author's weights; no lift loss.
+    /// The author's weights; no lift loss, no window.
     fn default() -> Self {
         Self {
             ddz: 1e-4,
             ddx: 1e-6,
             l1: 1e-6,
             lift: 0.0,
+            bptt: 0.0,
         }
     }
 }
@@ -46,6 +51,9 @@ pub struct Losses {
     pub l1: f64,
     /// `||u - W_e^T u_lat||^2 / ||u||^2`.
     pub lift: f64,
+    /// Mean square of `z - z_pred` over a window (41); 0 unless it has a weight.
+    #[serde(default)]
+    pub bptt: f64,
 }
 
 impl Losses {
@@ -56,6 +64,7 @@ impl Losses {
             + weights.ddx * self.ddx
             + weights.l1 * self.l1
             + weights.lift * self.lift
+            + weights.bptt * self.bptt
     }
 
     /// Sum of two sets of losses, for averages over batches.
@@ -66,6 +75,7 @@ impl Losses {
             ddx: self.ddx + share * other.ddx,
             l1: self.l1 + share * other.l1,
             lift: self.lift + share * other.lift,
+            bptt: self.bptt + share * other.bptt,
         }
     }
 }
@@ -74,6 +84,7 @@ impl Losses {
 pub struct JointLoss<'a> {
     features: &'a Features,
     weights: LossWeights,
+    unroll: Unroll,
     coordinate_weights: DVector<f64>,
     values: FeatureValues,
     variables: DMatrix<f64>, // n x 3d: z, dz, u_lat
@@ -92,12 +103,18 @@ impl<'a> JointLoss<'a> {
         Self {
             features,
             weights,
+            unroll: Unroll::default(),
             coordinate_weights,
             values: FeatureValues::default(),
             variables: DMatrix::zeros(0, 3 * d),
             pulled: DMatrix::zeros(0, 3 * d),
             gradient: Parameters::zeros(n, d, features.library_dim()),
         }
+    }
+
+    /// Sets the window of (41), which counts only with a weight.
+    pub fn with_unroll(self, unroll: Unroll) -> Self {
+        Self { unroll, ..self }
     }
 
     /// Changes the weights, as refinement does when it drops the L1 term.
@@ -119,7 +136,7 @@ impl<'a> JointLoss<'a> {
         let decoder = self.reconstruction(parameters, batch);
         let projection = InputProjection::new(&parameters.encoder);
         let lift = self.lift(parameters, batch, &projection);
-        let (ddz, ddx) = self.dynamics(parameters, batch, &projection);
+        let (ddz, ddx, bptt) = self.dynamics(parameters, batch, &projection);
         let l1 = self.sparsity(parameters);
         Losses {
             decoder,
@@ -127,6 +144,7 @@ impl<'a> JointLoss<'a> {
             ddx,
             l1,
             lift,
+            bptt,
         }
     }
 
@@ -178,13 +196,13 @@ impl<'a> JointLoss<'a> {
         1.0 - carried.trace() / total
     }
 
-    /// (17) and (18), backwards through the library, the encoder and the pseudo-inverse.
+    /// (17), (18) and (41), backwards through the library, the encoder and the pseudo-inverse.
     fn dynamics(
         &mut self,
         parameters: &Parameters,
         batch: &Batch,
         projection: &InputProjection,
-    ) -> (f64, f64) {
+    ) -> (f64, f64, f64) {
         let (n, d) = (batch.len(), parameters.encoder.ncols());
         let state_dim = batch.x.ncols();
         if self.variables.nrows() != n {
@@ -250,8 +268,26 @@ impl<'a> JointLoss<'a> {
         self.pulled.fill(0.0);
         self.features
             .backward(&theta_pull, &mut self.values, &mut self.pulled);
+        let bptt = self.predictions(parameters, batch);
         self.pull_through_encoder(parameters, batch, projection);
-        (ddz, ddx)
+        (ddz, ddx, bptt)
+    }
+
+    /// (41), if it has a weight.
+    fn predictions(&mut self, parameters: &Parameters, batch: &Batch) -> f64 {
+        if self.weights.bptt == 0.0 {
+            return 0.0;
+        }
+        let samples = Window {
+            variables: &self.variables,
+            xi: &parameters.xi,
+            step_s: batch.step_s,
+        };
+        let mut pulls = Pulls {
+            variables: &mut self.pulled,
+            xi: &mut self.gradient.xi,
+        };
+        (self.unroll).evaluate(self.features, samples, self.weights.bptt, &mut pulls)
     }
 
     fn pull_through_encoder(
@@ -351,12 +387,19 @@ mod tests {
             ddx: 0.4,
             l1: 0.3,
             lift: 0.9,
+            bptt: 0.8,
+        };
+        let unroll = Unroll {
+            window: 3,
+            stride: 2,
+            ..Unroll::default()
         };
         JointLoss::new(
             features,
             weights,
             DVector::from_fn(7, |i, _| 1.0 + i as f64),
         )
+        .with_unroll(unroll)
     }
 
     #[test]

@@ -8,6 +8,7 @@ pub mod loss;
 mod multiply;
 pub mod parameters;
 pub mod stages;
+pub mod unroll;
 
 mod adam;
 mod run;
@@ -15,3 +16,4 @@ mod run;
 pub use loss::{LossWeights, Losses};
 pub use run::joint;
 pub use stages::Schedule;
+pub use unroll::{Integrator, Unroll};

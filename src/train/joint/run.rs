@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use super::batch::{Batch, BatchOptions, batches};
 use super::loss::{JointLoss, LossWeights, Losses};
 use super::parameters::Parameters;
-use super::stages::{train_decoder, train_together, train_xi};
+use super::stages::{train_decoder, train_together, train_xi, train_xi_unrolled};
 use crate::model::AffineMap;
 use crate::robot::{Robot, STATE_DIM};
 use crate::train::assemble::{Origin, Parts, assemble};
@@ -169,7 +169,8 @@ impl Task<'_> {
             .collect();
         let mut parameters = self.start(seed);
         let coordinate_weights = self.options.encoder.coordinate_weights();
-        let mut loss = JointLoss::new(self.features, weights, coordinate_weights);
+        let mut loss =
+            JointLoss::new(self.features, weights, coordinate_weights).with_unroll(options.unroll);
         let mask: Vec<bool> = (0..STATE_DIM).map(|i| self.active.contains(&i)).collect();
         let mut listener = |epoch: usize, losses: &Losses, active: usize| {
             // Nobody listens any more if the training is being dropped; that ends soon by itself.
@@ -238,15 +239,34 @@ impl Task<'_> {
                 self.options.latent_dim,
                 self.options.joint.xi_start,
             );
-            let (xi, _) = train_xi(
-                &run.parameters,
-                &own,
-                self.features,
-                weights,
-                schedule,
-                start,
-                &mut listener,
-            );
+            let xi = if weights.bptt == 0.0 {
+                train_xi(
+                    &run.parameters,
+                    &own,
+                    self.features,
+                    weights,
+                    schedule,
+                    start,
+                    &mut listener,
+                )
+                .0
+            } else {
+                let coordinate_weights = self.options.encoder.coordinate_weights();
+                let mut loss = JointLoss::new(self.features, weights, coordinate_weights)
+                    .with_unroll(self.options.joint.unroll);
+                let parameters = Parameters {
+                    xi: start,
+                    ..run.parameters.clone()
+                };
+                train_xi_unrolled(
+                    &parameters,
+                    &own,
+                    &mut loss,
+                    weights,
+                    schedule,
+                    &mut listener,
+                )
+            };
             run.xi.push(xi);
         }
     }

@@ -208,6 +208,41 @@ pub fn train_xi(
     (xi, last)
 }
 
+/// Xi alone where the loss has predictions over a window (41), which no moments express; else as [`train_xi`].
+pub fn train_xi_unrolled(
+    start: &Parameters,
+    batches: &[&Batch],
+    loss: &mut JointLoss<'_>,
+    weights: LossWeights,
+    schedule: &Schedule,
+    listener: &mut Listener<'_>,
+) -> DMatrix<f64> {
+    let mut parameters = start.clone();
+    let mut support = parameters.xi.map(|_| true);
+    let mut optimiser = Adam::new(parameters.xi.len(), schedule.learning_rate);
+    for epoch in 0..schedule.total() {
+        if schedule.thresholds_at(epoch) {
+            drop_small(&mut parameters.xi, &mut support, schedule.threshold);
+        }
+        let refining = epoch >= schedule.epochs;
+        loss.set_weights(LossWeights {
+            l1: if refining { 0.0 } else { weights.l1 },
+            ..weights
+        });
+        let mut mean = Losses::default();
+        for batch in batches {
+            let share = 1.0 / batches.len() as f64;
+            mean = mean.plus(&loss.evaluate(&parameters, batch), share);
+            optimiser.step(parameters.xi.as_mut_slice(), loss.gradient().xi.as_slice());
+            keep_support(&mut parameters.xi, &support);
+        }
+        if !listener(epoch + 1, &mean, active(&support)) {
+            break;
+        }
+    }
+    parameters.xi
+}
+
 /// (17) and (18) of one batch as quadratic functions of Xi.
 struct XiMoments {
     gram: DMatrix<f64>,   // theta^T theta
@@ -358,6 +393,7 @@ mod tests {
             ddx: 0.3,
             l1: 0.01,
             lift: 0.0,
+            bptt: 0.0,
         };
         let mut go = |_: usize, _: &Losses, _: usize| true;
         let (fast, _) = train_xi(
@@ -393,6 +429,7 @@ mod tests {
             ddx: 0.0,
             l1: 0.0,
             lift: 0.0,
+            bptt: 0.0,
         };
         let mut loss = JointLoss::new(&features, weights, DVector::from_element(6, 1.0));
         let (mut first, mut second) = (Adam::new(slow.decoder.len(), 1e-2), Adam::new(6, 1e-2));

@@ -1,0 +1,360 @@
+//! The loss over a window of predictions (appendix D of the paper, equations 40 and 41), and its exact gradient.
+//!
+//! From every sample of a batch the model is integrated over a window and its latent positions are held against the
+//! encoded ones. All starts of a batch are integrated together; the reverse sweep goes back through every stage.
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use crate::train::features::{FeatureValues, Features};
+
+/// How predictions are integrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Integrator {
+    /// Explicit Euler.
+    Euler,
+    /// Midpoint rule.
+    Rk2,
+    /// Classical Runge-Kutta.
+    Rk4,
+}
+
+/// Shape of the window.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Unroll {
+    /// Steps predicted from every sample.
+    pub window: usize,
+    /// Samples a step: 5 at 500 Hz are the published 10 ms.
+    pub stride: usize,
+    /// Weight of a prediction against the one a step earlier, above 0 and at most 1.
+    pub decay: f64,
+    /// How a step is integrated.
+    pub integrator: Integrator,
+}
+
+impl Default for Unroll {
+    /// The author's variant: five steps of 10 ms by a second-order rule, decay 0.9.
+    fn default() -> Self {
+        Self {
+            window: 5,
+            stride: 5,
+            decay: 0.9,
+            integrator: Integrator::Rk2,
+        }
+    }
+}
+
+impl Integrator {
+    /// Per stage: where in the step it stands, as the share of the earlier stage's slope too, and its weight.
+    fn stages(self) -> &'static [(f64, f64)] {
+        match self {
+            Self::Euler => &[(0.0, 1.0)],
+            Self::Rk2 => &[(0.0, 0.0), (0.5, 1.0)],
+            Self::Rk4 => &[
+                (0.0, 1.0 / 6.0),
+                (0.5, 1.0 / 3.0),
+                (0.5, 1.0 / 3.0),
+                (1.0, 1.0 / 6.0),
+            ],
+        }
+    }
+}
+
+/// Samples of one batch as the loss sees them.
+#[derive(Clone, Copy, Debug)]
+pub struct Window<'a> {
+    /// `n x 3d`: z, dz, u_lat.
+    pub variables: &'a DMatrix<f64>,
+    /// `library_dim x d`.
+    pub xi: &'a DMatrix<f64>,
+    /// Time between samples.
+    pub step_s: f64,
+}
+
+/// Gradients that the loss adds to.
+#[derive(Debug)]
+pub struct Pulls<'a> {
+    /// With respect to the variables, `n x 3d`.
+    pub variables: &'a mut DMatrix<f64>,
+    /// With respect to the coefficients.
+    pub xi: &'a mut DMatrix<f64>,
+}
+
+/// One evaluation of the dynamics for all starts, kept for the reverse sweep.
+struct Stage {
+    values: FeatureValues,
+    theta: DMatrix<f64>,
+    inputs: Range<usize>, // rows of u_lat
+}
+
+impl Unroll {
+    /// Mean over starts, coordinates and (decaying) steps of `(z_pred - z)^2`; 0 for a batch shorter than the window.
+    ///
+    /// Adds `weight` times its gradient to `pulls`. Inputs are those recorded at the time of each stage, or the sample
+    /// before it.
+    pub fn evaluate(
+        &self,
+        features: &Features,
+        samples: Window<'_>,
+        weight: f64,
+        pulls: &mut Pulls<'_>,
+    ) -> f64 {
+        let d = features.latent_dim();
+        let reach = self.window * self.stride;
+        let Some(starts) = samples
+            .variables
+            .nrows()
+            .checked_sub(reach)
+            .filter(|n| *n > 0)
+        else {
+            return 0.0;
+        };
+        let h = samples.step_s * self.stride as f64;
+        let scale = 1.0 / (self.window * starts * d) as f64;
+        let mut state = samples.variables.view((0, 0), (starts, 2 * d)).into_owned();
+        let (mut steps, mut misses, mut loss) = (Vec::new(), Vec::new(), 0.0);
+        for step in 0..self.window {
+            steps.push(self.forward(features, samples, step, h, &mut state));
+            let target = samples
+                .variables
+                .view(((step + 1) * self.stride, 0), (starts, d));
+            let miss = state.columns(0, d) - target;
+            loss += scale * self.decay.powi(step as i32) * miss.norm_squared();
+            misses.push(miss);
+        }
+        let mut pull = DMatrix::zeros(starts, 2 * d);
+        for (step, (mut stages, miss)) in steps.into_iter().zip(misses).enumerate().rev() {
+            let miss = miss * (2.0 * weight * scale * self.decay.powi(step as i32));
+            let mut target = (pulls.variables).view_mut(((step + 1) * self.stride, 0), (starts, d));
+            target -= &miss;
+            let mut position = pull.columns_mut(0, d);
+            position += miss;
+            self.backward(features, samples, (&mut stages, h), &mut pull, pulls);
+        }
+        let mut start = pulls.variables.view_mut((0, 0), (starts, 2 * d));
+        start += pull;
+        loss
+    }
+
+    /// One step of all starts; `state` is `starts x 2d`.
+    fn forward(
+        &self,
+        features: &Features,
+        samples: Window<'_>,
+        step: usize,
+        h: f64,
+        state: &mut DMatrix<f64>,
+    ) -> Vec<Stage> {
+        let (starts, d) = (state.nrows(), features.latent_dim());
+        let (before, mut slope) = (state.clone(), DMatrix::zeros(starts, 2 * d));
+        let mut stages = Vec::new();
+        for &(at, share) in self.integrator.stages() {
+            let now = &before + &slope * (h * at);
+            let first = step * self.stride + (at * self.stride as f64) as usize;
+            let inputs = first..first + starts;
+            let mut variables = DMatrix::zeros(starts, 3 * d);
+            variables.columns_mut(0, 2 * d).copy_from(&now);
+            variables
+                .columns_mut(2 * d, d)
+                .copy_from(&samples.variables.view((first, 2 * d), (starts, d)));
+            let mut values = FeatureValues::default();
+            let theta = features.evaluate(&variables, &mut values);
+            slope.columns_mut(0, d).copy_from(&now.columns(d, d));
+            slope.columns_mut(d, d).copy_from(&(&theta * samples.xi));
+            *state += &slope * (h * share);
+            stages.push(Stage {
+                values,
+                theta,
+                inputs,
+            });
+        }
+        stages
+    }
+
+    /// Turns the gradient with respect to the state after a step into the one before it.
+    fn backward(
+        &self,
+        features: &Features,
+        samples: Window<'_>,
+        (stages, h): (&mut [Stage], f64),
+        pull: &mut DMatrix<f64>,
+        pulls: &mut Pulls<'_>,
+    ) {
+        let (starts, d) = (pull.nrows(), features.latent_dim());
+        let after = pull.clone();
+        let mut onto_earlier = DMatrix::zeros(starts, 2 * d);
+        let weights = self.integrator.stages();
+        for (stage, &(at, share)) in stages.iter_mut().zip(weights).rev() {
+            let slope = &after * (h * share) + &onto_earlier;
+            let acceleration = slope.columns(d, d);
+            *pulls.xi += stage.theta.tr_mul(&acceleration);
+            let theta_pull = acceleration * samples.xi.transpose();
+            let mut variables = DMatrix::zeros(starts, 3 * d);
+            features.backward(&theta_pull, &mut stage.values, &mut variables);
+            let mut inputs = (pulls.variables).view_mut((stage.inputs.start, 2 * d), (starts, d));
+            inputs += variables.columns(2 * d, d);
+            let mut own = variables.columns(0, 2 * d).into_owned();
+            let mut velocity = own.columns_mut(d, d);
+            velocity += slope.columns(0, d);
+            onto_earlier = &own * (h * at);
+            *pull += own;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Library, StandardLibrary};
+    use crate::train::random::Random;
+
+    const STEP_S: f64 = 0.1;
+
+    fn setup() -> (Features, DMatrix<f64>, DMatrix<f64>) {
+        let standard = StandardLibrary {
+            degree: 2,
+            trigonometric: true,
+            inputs: true,
+        };
+        let features = Features::new(&Library::standard(2, standard).expect("small library"));
+        let mut random = Random::new(8);
+        let xi = random.matrix(features.library_dim(), 2, 0.4);
+        (features, random.matrix(20, 6, 0.8), xi)
+    }
+
+    fn loss(
+        unroll: &Unroll,
+        features: &Features,
+        variables: &DMatrix<f64>,
+        xi: &DMatrix<f64>,
+    ) -> f64 {
+        let samples = Window {
+            variables,
+            xi,
+            step_s: STEP_S,
+        };
+        let (mut a, mut b) = (DMatrix::zeros(20, 6), xi.clone());
+        unroll.evaluate(
+            features,
+            samples,
+            1.0,
+            &mut Pulls {
+                variables: &mut a,
+                xi: &mut b,
+            },
+        )
+    }
+
+    #[test]
+    fn gradient_agrees_with_finite_differences_for_every_integrator() {
+        let (features, mut variables, mut xi) = setup();
+        for integrator in [Integrator::Euler, Integrator::Rk2, Integrator::Rk4] {
+            let unroll = Unroll {
+                window: 3,
+                stride: 2,
+                decay: 0.7,
+                integrator,
+            };
+            let (mut to_variables, mut to_xi) = (DMatrix::zeros(20, 6), xi.map(|_| 0.0));
+            let samples = Window {
+                variables: &variables,
+                xi: &xi,
+                step_s: STEP_S,
+            };
+            let mut pulls = Pulls {
+                variables: &mut to_variables,
+                xi: &mut to_xi,
+            };
+            unroll.evaluate(&features, samples, 0.3, &mut pulls);
+            let agree = |above: f64, below: f64, exact: f64| {
+                let difference = 0.3 * (above - below) / 2e-6;
+                let close = (difference - exact).abs() < 1e-6 * exact.abs().max(0.1);
+                assert!(close, "{integrator:?}: {difference} {exact}");
+            };
+            for i in 0..variables.len() {
+                let kept = variables[i];
+                variables[i] = kept + 1e-6;
+                let above = loss(&unroll, &features, &variables, &xi);
+                variables[i] = kept - 1e-6;
+                let below = loss(&unroll, &features, &variables, &xi);
+                variables[i] = kept;
+                agree(above, below, to_variables[i]);
+            }
+            for i in 0..xi.len() {
+                let kept = xi[i];
+                xi[i] = kept + 1e-6;
+                let above = loss(&unroll, &features, &variables, &xi);
+                xi[i] = kept - 1e-6;
+                let below = loss(&unroll, &features, &variables, &xi);
+                xi[i] = kept;
+                agree(above, below, to_xi[i]);
+            }
+        }
+    }
+
+    #[test]
+    fn loss_of_the_true_model_falls_with_the_order_of_the_integrator() {
+        // ddz = -z has z = cos t: the library's row of z1 has coefficient -1.
+        let standard = StandardLibrary {
+            degree: 1,
+            trigonometric: false,
+            inputs: true,
+        };
+        let library = Library::standard(1, standard).expect("small library");
+        let features = Features::new(&library);
+        let row = library
+            .terms()
+            .iter()
+            .position(|term| term.text() == "z1")
+            .expect("z1");
+        let mut xi = DMatrix::zeros(library.len(), 1);
+        xi[(row, 0)] = -1.0;
+        let variables = DMatrix::from_fn(60, 3, |i, column| {
+            let t = i as f64 * 0.02;
+            [t.cos(), -t.sin(), 0.0][column]
+        });
+        let loss = |integrator| {
+            let unroll = Unroll {
+                window: 4,
+                stride: 5,
+                decay: 1.0,
+                integrator,
+            };
+            let samples = Window {
+                variables: &variables,
+                xi: &xi,
+                step_s: 0.02,
+            };
+            let (mut a, mut b) = (variables.clone(), xi.clone());
+            unroll.evaluate(
+                &features,
+                samples,
+                1.0,
+                &mut Pulls {
+                    variables: &mut a,
+                    xi: &mut b,
+                },
+            )
+        };
+        let [euler, rk2, rk4] = [Integrator::Euler, Integrator::Rk2, Integrator::Rk4].map(loss);
+        assert!(
+            euler > 100.0 * rk2 && rk2 > 1e4 * rk4,
+            "{euler} {rk2} {rk4}"
+        );
+        assert!(rk4 < 1e-12, "{rk4}");
+    }
+
+    #[test]
+    fn batch_shorter_than_the_window_adds_nothing() {
+        let (features, variables, xi) = setup();
+        let unroll = Unroll {
+            window: 4,
+            stride: 5,
+            ..Unroll::default()
+        };
+        assert_eq!(loss(&unroll, &features, &variables, &xi), 0.0);
+    }
+}
