@@ -1,4 +1,4 @@
-"""Drives a simulated Go1 with generated controllers, over recorded jumps and perturbations."""
+"""Drives a simulated Go1 with the latent controller, over recorded jumps and perturbations."""
 
 import argparse
 import concurrent.futures
@@ -17,18 +17,19 @@ from followers import Jump, LatentMpc, Replay, TorquesOnly, WithoutFeedback
 from perturbations import NOMINAL, PERTURBATIONS, Motors, perturbed_simulation
 from recording_format import read_recording, states_of
 from robot_model import RobotModel
-from romc_controller import RomcController, build_controller
+from romc_controller import RomcController
 from simulation import CONTROL_STEP_S
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 RECORDINGS = ROOT / "examples/recordings/go1"
+LIBRARY = ROOT / "target/release/examples/libromc_mujoco.so"
 ROBOT = "go1"
 EXAMPLE = """example:
-  cargo build --release
+  cargo build --release --example romc_mujoco
   MUJOCO_GL=egl python closed_loop.py --out-dir ../../out/closed_loop
 drives the shipped model go1-d6; add --model for others. Writes closed_loop.csv (a row a run),
 closed_loop.json, table.txt and a film strip per test jump, recorded above and driven below."""
-QUICK = ("payload +1 kg", "push 25 N, 0.1 s")
+QUICK = ("payload +2 kg", "torque x0.9")
 FRAMES = 8
 LEAST_SHARE = 0.9
 LEAST_WITHOUT_INPUT = 2
@@ -43,16 +44,6 @@ FOLLOWERS = {
     "recorded torques alone": False,
     "PD alone": False,
 }
-
-
-@dataclass(frozen=True)
-class Plant:
-    """A generated controller: its shared library, and the model it was made of."""
-
-    model: str
-    library: pathlib.Path
-    identifier: str
-    latent_dim: int
 
 
 @dataclass
@@ -78,14 +69,16 @@ class Outcome:
 def main():
     arguments = parse_arguments()
     arguments.out_dir.mkdir(parents=True, exist_ok=True)
-    plants = [build(path, arguments) for path in arguments.model]
+    if not arguments.library.is_file():
+        raise SystemExit(f"no {arguments.library}: cargo build --release --example romc_mujoco")
+    models = [(path.resolve(), arguments.library.resolve()) for path in arguments.model]
     jumps = [read_jump(path) for path in sorted(RECORDINGS.glob("test_*.csv.gz"))]
     perturbations = [NOMINAL]
     perturbations += [p for p in PERTURBATIONS if not arguments.quick or p.name in QUICK]
     tasks = [
-        (follower, plant, perturbation, jump)
+        (follower, model, perturbation, jump)
         for follower, has_model in FOLLOWERS.items()
-        for plant in (plants if has_model else [None])
+        for model in (models if has_model else [None])
         for perturbation in perturbations
         for jump in jumps
     ]
@@ -96,9 +89,9 @@ def main():
     write_outcomes(arguments.out_dir, outcomes, text)
     if not arguments.no_pictures:
         for jump in jumps:
-            _, states = run((WITH_INPUT, plants[0], NOMINAL, jump))
+            _, states = run((WITH_INPUT, models[0], NOMINAL, jump))
             write_strip(arguments.out_dir / f"{jump.name}.png", jump, states)
-    missed = missed_aims(outcomes, len(plants))
+    missed = missed_aims(outcomes, len(models))
     for aim in missed:
         print(f"MISSED {aim}", file=sys.stderr)
     sys.exit(1 if missed else 0)
@@ -111,7 +104,7 @@ def parse_arguments():
     parser.add_argument(
         "--model", type=pathlib.Path, action="append", help="model file (default: go1-d6)"
     )
-    parser.add_argument("--romc", type=pathlib.Path, default=ROOT / "target/release/romc")
+    parser.add_argument("--library", type=pathlib.Path, default=LIBRARY, help="built from library.rs")
     parser.add_argument("--out-dir", type=pathlib.Path, default=ROOT / "out/closed_loop")
     parser.add_argument("--quick", action="store_true", help="two perturbations instead of all")
     parser.add_argument("--no-pictures", action="store_true", help="no film strips")
@@ -119,14 +112,6 @@ def parse_arguments():
     arguments = parser.parse_args()
     arguments.model = arguments.model or [ROOT / "models/go1-d6.json"]
     return arguments
-
-
-def build(model, arguments):
-    """Generates and compiles the controller of a model file, in a folder of its own."""
-    content = json.loads(model.read_text(encoding="utf-8"))
-    folder = arguments.out_dir / "controllers" / model.stem
-    library, identifier = build_controller(arguments.romc, model, content["name"], folder)
-    return Plant(model.stem, library, identifier, content["latent_dim"])
 
 
 def read_jump(path):
@@ -137,12 +122,15 @@ def read_jump(path):
 
 
 def run(task):
-    """One closed-loop run; returns its Outcome and the states (rows, 18)."""
-    follower_name, plant, perturbation, jump = task
+    """One closed-loop run; returns its Outcome and the states (rows, 18).
+
+    A task is who drives, (model file, library) or None, the perturbation and the jump.
+    """
+    follower_name, model, perturbation, jump = task
     robot = RobotModel(ROBOT)
     takeoff_s = jump.time_s[longest_flight(jump.feet)[0]]
     simulation = perturbed_simulation(ROBOT, perturbation, jump.x[0], jump.dx[0], takeoff_s)
-    controller = make_controller(follower_name, plant, jump, robot)
+    controller = make_controller(follower_name, model, jump, robot)
     follower = make_follower(follower_name, controller, jump)
     motors = Motors(follower, perturbation, robot.torque_limit_nm)
     log = simulation.run(motors, jump.time_s[-1])
@@ -152,7 +140,7 @@ def run(task):
     faults = repetition_faults(reference, repeated, log.other_contact.any())
     statuses = getattr(follower, "statuses", {})
     outcome = Outcome(
-        model=plant.model if plant else "",
+        model=model[0].stem if model else "",
         follower=follower_name,
         perturbation=perturbation.name,
         jump=jump.name,
@@ -172,11 +160,12 @@ def run(task):
     return outcome, log.x
 
 
-def make_controller(follower_name, plant, jump, robot):
+def make_controller(follower_name, model, jump, robot):
     """The generated controller with its reference set; none for followers without a model."""
     if not FOLLOWERS[follower_name]:
         return None
-    controller = RomcController(plant.library, plant.identifier, plant.latent_dim)
+    path, library = model
+    controller = RomcController(library, path)
     u = None if follower_name == WITHOUT_INPUT else jump.inputs(robot)
     controller.set_reference(jump.time_s, jump.x, jump.dx, u, jump.feet)
     return controller

@@ -75,7 +75,7 @@ class Follower:
 
 
 class LatentMpc(Follower):
-    """The generated controller."""
+    """The latent controller."""
 
     def __init__(self, controller):
         super().__init__()
