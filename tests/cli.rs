@@ -124,7 +124,7 @@ fn demo_makes_equations_code_and_commands_and_tells_how_well_it_does() {
     }
     let whole = &value["rollouts"]["full"]["coordinates"];
     let learned = whole["body.z"]["rms"].as_f64().expect("a number");
-    let aslip = value["aslip_rms_m"]["full"]["body.z"]
+    let aslip = value["rollouts"]["baselines"][0]["rms_m"]["full"]["body.z"]
         .as_f64()
         .expect("a number");
     assert!(learned < aslip, "{learned} against {aslip}");

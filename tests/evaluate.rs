@@ -53,7 +53,7 @@ fn restarting_at_every_sample_leaves_only_the_decoders_error() {
     let options = IntegrationOptions::default();
     let restarted = rollout(&compiled, &latent, Restart::Every(0.002), &options).expect("runs");
     let mut sums = CoordinateSums::new(&model).expect("a decoder");
-    sums.add_rollout(&model, segment, &restarted)
+    sums.add_rollout(&model, segment, &latent, &restarted)
         .expect("decodes");
     let mut pointwise = PointwiseSums::new(&model);
     pointwise.add(&model, segment, &latent).expect("evaluates");

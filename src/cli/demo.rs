@@ -12,15 +12,13 @@ use super::Answer;
 use super::args::{DemoArguments, EquationArguments};
 use super::mpc::NamedRun;
 use super::output::{Table, significant, spinner};
-use super::simulate::Evaluation;
-use super::{compile, mpc as mpc_command};
+use super::{compile, mpc as mpc_command, simulate};
 use crate::backend::{EmittedFile, Target};
-use crate::evaluate::{Aslip, AslipSums, CoordinateSums, FitSums};
+use crate::evaluate::Assessment;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::mpc::{Lift, MpcSettings, ReferenceInput};
 use crate::recording::Recording;
-use crate::sim::Restart;
 use crate::{Error, artifact, recording};
 
 /// The shipped model that the demo works with.
@@ -62,8 +60,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let targets = [Target::Latex, Target::C, Target::Rust];
     let mut files = compile::emit(&model, &targets, &EquationArguments::default())?;
     progress.set_message("rolling the model out");
-    let evaluation = Evaluation::over(&model, &jumps, RESTART_S)?;
-    let aslip = aslip(&model, &jumps)?;
+    let evaluation = Assessment::over(&model, &jumps, RESTART_S)?;
     progress.set_message("running the controller");
     let control = Control::along(&model, &jumps)?;
     let commands = mpc_command::command_table(&model, &control.transpose);
@@ -76,7 +73,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let results = Results {
         jumps: jumps.len(),
         evaluation,
-        aslip,
+        model: &model,
         control,
         self_test,
         made,
@@ -155,37 +152,28 @@ fn self_test(model: &ReducedModel, folder: &Path) -> SelfTest {
     }
 }
 
-/// The pendulum's residuals over the same jumps: whole, and restarted.
-fn aslip(model: &ReducedModel, jumps: &[Recording]) -> Result<[AslipSums; 2], Error> {
-    let mut sums = [AslipSums::default(); 2];
-    for segment in jumps.iter().flat_map(|jump| &jump.segments) {
-        for (restart, sums) in [Restart::Never, Restart::Every(RESTART_S)]
-            .iter()
-            .zip(&mut sums)
-        {
-            Aslip::PUBLISHED.add_rollout(model.robot()?, segment, *restart, sums)?;
-        }
-    }
-    Ok(sums)
-}
-
 /// Everything the demo has to tell.
-struct Results {
+struct Results<'a> {
     jumps: usize,
-    evaluation: Evaluation,
-    aslip: [AslipSums; 2],
+    evaluation: Assessment<'a>,
+    model: &'a ReducedModel,
     control: Control,
     self_test: SelfTest,
     made: Vec<(PathBuf, usize)>,
 }
 
-impl Results {
+impl Results<'_> {
     fn text(&self, folder: &Path) -> String {
         let mut text = format!(
             "romc demo: model {} on {} recorded jumps of a simulated Go1 that its training did not see\n\n",
             MODEL.0, self.jumps
         );
-        let _ = writeln!(text, "{}\n{}", self.figures(), self.commands());
+        let _ = writeln!(
+            text,
+            "{}\n{}",
+            simulate::baseline_table(&self.evaluation),
+            self.commands()
+        );
         let _ = writeln!(
             text,
             "self-test of the emitted C: {}\n",
@@ -197,29 +185,6 @@ impl Results {
             let _ = writeln!(text, "  {name} ({bytes} bytes)");
         }
         text
-    }
-
-    /// Prediction errors of the model beside those of the pendulum.
-    fn figures(&self) -> Table {
-        let mut table = Table::new(["rms error, m", "model", "ASLIP, published constants"]);
-        let rms = |sums: FitSums| {
-            sums.fit()
-                .map_or("-".to_owned(), |fit| significant(fit.rms))
-        };
-        for (name, whole, short) in [
-            ("body.x", self.aslip[0].x, self.aslip[1].x),
-            ("body.z", self.aslip[0].z, self.aslip[1].z),
-        ] {
-            let cell = |fits: &CoordinateSums| {
-                let fit = self.evaluation.fit(fits, name);
-                fit.map_or("-".to_owned(), |fit| significant(fit.rms))
-            };
-            let (full, restarted) = (&self.evaluation.full, &self.evaluation.restarted);
-            table.row([format!("{name}, whole jump"), cell(full), rms(whole)]);
-            let title = format!("{name}, restarted every {RESTART_S} s");
-            table.row([title, cell(restarted), rms(short)]);
-        }
-        table
     }
 
     /// What the controller commanded, with each lift.
@@ -256,16 +221,11 @@ impl Results {
     }
 
     fn json(&self) -> Value {
-        let rms = |sums: FitSums| sums.fit().map(|fit| fit.rms);
         let runs = |runs: &[NamedRun]| runs.iter().map(mpc_command::run_json).collect::<Vec<_>>();
         json!({
             "command": "demo",
             "model": MODEL.0,
-            "rollouts": self.evaluation.json(RESTART_S),
-            "aslip_rms_m": {
-                "full": { "body.x": rms(self.aslip[0].x), "body.z": rms(self.aslip[0].z) },
-                "restarted": { "body.x": rms(self.aslip[1].x), "body.z": rms(self.aslip[1].z) },
-            },
+            "rollouts": simulate::figures_json(self.model, &self.evaluation),
             "mpc": {
                 "transpose": runs(&self.control.transpose),
                 "consistent": runs(&self.control.consistent),

@@ -3,10 +3,9 @@
 use std::fmt::Write as _;
 
 use crate::Error;
+use crate::evaluate::SegmentRun;
 use crate::model::ReducedModel;
-use crate::recording::Segment;
 use crate::robot::Robot;
-use crate::sim::{LatentSegment, Rollout};
 
 /// One row a sample: time, phase, recorded and predicted latent state and coordinates.
 ///
@@ -40,11 +39,15 @@ impl TrajectoryTable {
         &mut self,
         model: &ReducedModel,
         index: usize,
-        segment: &Segment,
-        latent: &LatentSegment,
-        full: &Rollout,
-        restarted: &Rollout,
+        run: &SegmentRun<'_>,
     ) -> Result<(), Error> {
+        let SegmentRun {
+            segment,
+            latent,
+            full,
+            restarted,
+            ..
+        } = run;
         let [full, restarted] = [full, restarted].map(|rollout| {
             let mut columns = vec![None; latent.len()];
             for (sample, window, column) in rollout.predictions() {

@@ -48,33 +48,37 @@ impl Aslip {
         }
     }
 
-    /// Adds the residuals of the pendulum's body x and z over a segment, in m.
+    /// Rolls the pendulum out over a segment, from the recorded state at each start.
     ///
     /// The pendulum is driven by the same recorded forces as a learned model, turned into the world
     /// frame, and switches between contact and flight as recorded.
     ///
     /// # Errors
     /// [`SimError::Recording`] if a leg in contact is singular, [`SimError::Solver`].
-    pub fn add_rollout(
+    pub fn rollout(
         &self,
         robot: &Robot,
         segment: &Segment,
         restart: Restart,
-        sums: &mut AslipSums,
-    ) -> Result<(), SimError> {
+    ) -> Result<AslipRollout, SimError> {
         let stances = stances(robot, segment)?;
-        for window in restart_windows(&segment.time_s, restart) {
-            self.add_window(segment, &stances, window, sums)?;
+        let mut position_m = vec![None; segment.len()];
+        let windows = restart_windows(&segment.time_s, restart);
+        for window in &windows {
+            self.roll_window(segment, &stances, window.clone(), &mut position_m)?;
         }
-        Ok(())
+        Ok(AslipRollout {
+            windows,
+            position_m,
+        })
     }
 
-    fn add_window(
+    fn roll_window(
         &self,
         segment: &Segment,
         stances: &[Option<Stance>],
         window: Range<usize>,
-        sums: &mut AslipSums,
+        position_m: &mut [Option<Vector2<f64>>],
     ) -> Result<(), SimError> {
         let (x, z) = (BODY_X, BODY_Z);
         let start = window.start;
@@ -84,6 +88,7 @@ impl Aslip {
             segment.dx[(x, start)],
             segment.dx[(z, start)],
         ];
+        position_m[start] = Some(Vector2::new(state[0], state[1]));
         let mut first = start;
         while first < window.end {
             let down = stances[first].is_some();
@@ -91,11 +96,12 @@ impl Aslip {
             let end = first + same.count();
             let times = &segment.time_s[first..(end + 1).min(window.end)];
             let states = self.integrate_span(&stances[first..end], times, &state)?;
-            let fresh = if first == start { 0 } else { 1 };
-            for column in fresh..states.ncols() {
-                let sample = first + column;
-                sums.x.add(segment.x[(x, sample)], states[(0, column)]);
-                sums.z.add(segment.x[(z, sample)], states[(1, column)]);
+            for column in 1..states.ncols() {
+                let reached = Vector2::new(states[(0, column)], states[(1, column)]);
+                position_m[first + column] = Some(reached);
+            }
+            if states.ncols() < times.len() {
+                return Ok(());
             }
             state.copy_from_slice(states.column(states.ncols() - 1).as_slice());
             first = end;
@@ -145,8 +151,17 @@ impl Aslip {
     }
 }
 
-const BODY_X: usize = JOINT_DIM;
-const BODY_Z: usize = JOINT_DIM + 2;
+pub(super) const BODY_X: usize = JOINT_DIM;
+pub(super) const BODY_Z: usize = JOINT_DIM + 2;
+
+/// Positions that the pendulum predicts for one segment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AslipRollout {
+    /// Samples between restarts.
+    pub windows: Vec<Range<usize>>,
+    /// Predicted body x and z, m, a sample; none after a divergence.
+    pub position_m: Vec<Option<Vector2<f64>>>,
+}
 
 /// Residuals of the pendulum.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -157,17 +172,32 @@ pub struct AslipSums {
     pub z: FitSums,
 }
 
+impl AslipSums {
+    /// Adds the residuals of a rollout of `segment`.
+    pub fn add(&mut self, segment: &Segment, rollout: &AslipRollout) {
+        for (sample, position) in rollout.position_m.iter().enumerate() {
+            if let Some(position) = position {
+                self.x.add(segment.x[(BODY_X, sample)], position.x);
+                self.z.add(segment.x[(BODY_Z, sample)], position.y);
+            }
+        }
+    }
+}
+
 /// What holds the pendulum while a foot is down, in the world's plane of x and z.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Stance {
+pub(super) struct Stance {
     /// Mean position of the feet in contact at the sample where the contact began.
-    foot_m: Vector2<f64>,
+    pub(super) foot_m: Vector2<f64>,
     /// Force of the legs on the body.
-    force_n: Vector2<f64>,
+    pub(super) force_n: Vector2<f64>,
 }
 
 /// The stance of every sample; `None` in flight.
-fn stances(robot: &Robot, segment: &Segment) -> Result<Vec<Option<Stance>>, RecordingError> {
+pub(super) fn stances(
+    robot: &Robot,
+    segment: &Segment,
+) -> Result<Vec<Option<Stance>>, RecordingError> {
     let wrench = segment.wrench(robot)?;
     let mut stances = Vec::with_capacity(segment.len());
     let mut foot_m = None;
@@ -250,9 +280,10 @@ mod tests {
     fn rms_z(segment: &Segment) -> f64 {
         let robot = Robot::by_name("go1").expect("known");
         let mut sums = AslipSums::default();
-        Aslip::PUBLISHED
-            .add_rollout(robot, segment, Restart::Never, &mut sums)
+        let rollout = Aslip::PUBLISHED
+            .rollout(robot, segment, Restart::Never)
             .expect("runs");
+        sums.add(segment, &rollout);
         sums.z.fit().expect("samples").rms
     }
 

@@ -11,6 +11,8 @@ use crate::sim::{LatentSegment, Rollout};
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoordinateSums {
     sums: Vec<FitSums>,
+    /// The same, a phase apart.
+    by_phase: Vec<Vec<FitSums>>,
     /// Rollout windows added so far.
     pub windows: usize,
     /// Windows that diverged; their samples after that have no prediction and do not count.
@@ -26,12 +28,13 @@ impl CoordinateSums {
         let state_dim = model.decoder_map()?.output_dim();
         Ok(Self {
             sums: vec![FitSums::default(); state_dim],
+            by_phase: vec![vec![FitSums::default(); state_dim]; model.phases().len()],
             windows: 0,
             diverged: 0,
         })
     }
 
-    /// Decodes a rollout of `segment` and adds its residuals.
+    /// Decodes a rollout of `segment`, encoded as `latent`, and adds its residuals.
     ///
     /// # Errors
     /// [`ModelError::Missing`] for a latent-only model.
@@ -39,11 +42,13 @@ impl CoordinateSums {
         &mut self,
         model: &ReducedModel,
         segment: &Segment,
+        latent: &LatentSegment,
         rollout: &Rollout,
     ) -> Result<(), ModelError> {
         for (sample, window, column) in rollout.predictions() {
             let x = model.decode(&window.z.column(column).into_owned())?;
-            self.add_sample(&segment.x.column(sample).into_owned(), &x);
+            let phase = latent.phase[sample];
+            self.add_sample(phase, &segment.x.column(sample).into_owned(), &x);
         }
         self.windows += rollout.windows.len();
         self.diverged += (rollout.windows.iter())
@@ -52,15 +57,26 @@ impl CoordinateSums {
         Ok(())
     }
 
-    fn add_sample(&mut self, recorded: &DVector<f64>, predicted: &DVector<f64>) {
-        for ((sums, &y), &y_hat) in self.sums.iter_mut().zip(recorded).zip(predicted) {
+    fn add_sample(&mut self, phase: usize, recorded: &DVector<f64>, predicted: &DVector<f64>) {
+        let of_phase = &mut self.by_phase[phase];
+        let sums = self.sums.iter_mut().zip(of_phase);
+        for (((sums, of_phase), &y), &y_hat) in sums.zip(recorded).zip(predicted) {
             sums.add(y, y_hat);
+            of_phase.add(y, y_hat);
         }
     }
 
     /// Fit of each coordinate, in the order of the state; `None` before the first sample.
     pub fn fits(&self) -> Vec<Option<Fit>> {
         self.sums.iter().map(FitSums::fit).collect()
+    }
+
+    /// Fit of each coordinate over the samples of one phase.
+    ///
+    /// # Panics
+    /// If the model has no such phase.
+    pub fn phase_fits(&self, phase: usize) -> Vec<Option<Fit>> {
+        self.by_phase[phase].iter().map(FitSums::fit).collect()
     }
 }
 

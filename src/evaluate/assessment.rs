@@ -1,0 +1,144 @@
+//! Everything that a model and recordings show together, in one pass.
+
+use super::aslip::AslipRollout;
+use super::baseline::Baseline;
+use super::coordinates::{CoordinateSums, PointwiseSums};
+use super::lift::{LiftSums, combined_loss};
+use super::linearised::{LinearisedPhase, linearise_phases};
+use super::metrics::Fit;
+use crate::Error;
+use crate::model::ReducedModel;
+use crate::recording::{Recording, Segment};
+use crate::robot::Robot;
+use crate::sim::{CompiledModel, IntegrationOptions, LatentSegment, Restart, Rollout, rollout};
+
+/// What was recorded and predicted for one segment.
+#[derive(Debug, Clone)]
+pub struct SegmentRun<'a> {
+    /// The recorded samples.
+    pub segment: &'a Segment,
+    /// The same as the model sees them.
+    pub latent: LatentSegment,
+    /// The model's rollout over the whole segment.
+    pub full: Rollout,
+    /// The model's rollouts between restarts.
+    pub restarted: Rollout,
+    /// The baselines' rollouts over the whole segment, in the order of [`Assessment::baselines`].
+    pub baselines: Vec<AslipRollout>,
+}
+
+/// A model held against recordings.
+#[derive(Debug, Clone)]
+pub struct Assessment<'a> {
+    /// Names of the robot's coordinates.
+    pub names: Vec<String>,
+    /// Their units.
+    pub units: Vec<String>,
+    /// Time between restarts, in s.
+    pub restart_every_s: f64,
+    /// Rollouts, a segment.
+    pub runs: Vec<SegmentRun<'a>>,
+    /// Residuals of rollouts over whole segments.
+    pub full: CoordinateSums,
+    /// Residuals of restarted rollouts.
+    pub restarted: CoordinateSums,
+    /// Decoder and latent accelerations.
+    pub pointwise: PointwiseSums,
+    /// Template models under the same recorded forces.
+    pub baselines: Vec<Baseline>,
+    /// Linearisation of each phase.
+    pub linearised: Vec<Option<LinearisedPhase>>,
+    /// What the plain lift loses.
+    pub lift: LiftSums,
+    /// Active terms, all phases together.
+    pub active_terms: usize,
+}
+
+impl<'a> Assessment<'a> {
+    /// Simulates `model` over all segments of `recordings` and measures it.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for a latent-only model, [`Error::Sim`] and [`Error::Recording`] for samples
+    /// that cannot be encoded or integrated.
+    pub fn over(
+        model: &ReducedModel,
+        recordings: &'a [Recording],
+        restart_every_s: f64,
+    ) -> Result<Self, Error> {
+        let segments: Vec<&Segment> = (recordings.iter())
+            .flat_map(|recording| &recording.segments)
+            .collect();
+        let compiled = CompiledModel::new(model)?;
+        let signals = model.state();
+        let mut assessment = Self {
+            names: signals.map_or_else(
+                || Robot::state_names().to_vec(),
+                |state| state.names.clone(),
+            ),
+            units: signals.map_or_else(
+                || Robot::state_units().to_vec(),
+                |state| state.units.clone(),
+            ),
+            restart_every_s,
+            runs: Vec::with_capacity(segments.len()),
+            full: CoordinateSums::new(model)?,
+            restarted: CoordinateSums::new(model)?,
+            pointwise: PointwiseSums::new(model),
+            baselines: Baseline::all(model.robot()?, &segments)?,
+            linearised: Vec::new(),
+            lift: LiftSums::default(),
+            active_terms: model.phases().iter().map(|p| p.active_count()).sum(),
+        };
+        for segment in segments {
+            assessment.add(model, &compiled, segment)?;
+        }
+        let latent: Vec<&LatentSegment> = assessment.runs.iter().map(|run| &run.latent).collect();
+        assessment.linearised = linearise_phases(&compiled, &latent);
+        Ok(assessment)
+    }
+
+    fn add(
+        &mut self,
+        model: &ReducedModel,
+        compiled: &CompiledModel,
+        segment: &'a Segment,
+    ) -> Result<(), Error> {
+        let restart = Restart::Every(self.restart_every_s);
+        let latent = LatentSegment::encode(model, segment)?;
+        let options = IntegrationOptions::default();
+        let full = rollout(compiled, &latent, Restart::Never, &options)?;
+        let restarted = rollout(compiled, &latent, restart, &options)?;
+        self.full.add_rollout(model, segment, &latent, &full)?;
+        (self.restarted).add_rollout(model, segment, &latent, &restarted)?;
+        self.pointwise.add(model, segment, &latent)?;
+        self.lift.add(model, segment)?;
+        let robot = model.robot()?;
+        let baselines = (self.baselines.iter_mut())
+            .map(|baseline| baseline.add(robot, segment, restart))
+            .collect::<Result<_, _>>()?;
+        self.runs.push(SegmentRun {
+            segment,
+            latent,
+            full,
+            restarted,
+            baselines,
+        });
+        Ok(())
+    }
+
+    /// Mean square of `decode(encode(x)) - x` over all coordinates, in scaled units (equation 16).
+    pub fn decoder_mean_square(&self) -> Option<f64> {
+        self.pointwise.decoder.fit().map(|fit| fit.rms.powi(2))
+    }
+
+    /// The combined loss of equation (29).
+    pub fn combined_loss(&self) -> Option<f64> {
+        combined_loss(self.decoder_mean_square()?, self.active_terms)
+    }
+
+    /// Fit of the coordinate with this name.
+    pub fn fit(&self, sums: &CoordinateSums, name: &str) -> Option<Fit> {
+        let index = self.names.iter().position(|known| known == name)?;
+        sums.fits()[index]
+    }
+}

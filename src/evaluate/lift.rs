@@ -1,0 +1,157 @@
+//! What the plain lift `u = W_e^T u_lat` alone loses, without any controller.
+
+use nalgebra::DVector;
+
+use super::metrics::FitSums;
+use crate::model::ReducedModel;
+use crate::recording::Segment;
+use crate::robot::{JOINT_DIM, Robot};
+use crate::sim::SimError;
+
+/// Lifted force and moment, in N and N m together, below which their inconsistency means nothing.
+const SMALL_FORCE_N: f64 = 1.0;
+/// Recorded torques beyond this multiple of the robot's limits are no torques of the robot.
+const IMPLAUSIBLE: f64 = 2.0;
+
+/// Torques of exactly projected and lifted inputs against the recorded ones.
+///
+/// Per sample `u_lat = pinv(W_e^T) s_u u`, `u_lift = W_e^T u_lat / s_u`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LiftSums {
+    contact: Vec<FitSums>,
+    flight: Vec<FitSums>,
+    inconsistency: (f64, usize),
+}
+
+impl Default for LiftSums {
+    fn default() -> Self {
+        Self {
+            contact: vec![FitSums::default(); JOINT_DIM],
+            flight: vec![FitSums::default(); JOINT_DIM],
+            inconsistency: (0.0, 0),
+        }
+    }
+}
+
+impl LiftSums {
+    /// Adds every sample of a segment whose torques can be the robot's.
+    ///
+    /// # Errors
+    /// [`SimError::Model`] for a latent-only model, [`SimError::Recording`] if the body wrench cannot
+    /// be computed.
+    pub fn add(&mut self, model: &ReducedModel, segment: &Segment) -> Result<(), SimError> {
+        let robot = model.robot()?;
+        let limits = robot.torque_limit_nm();
+        let input = segment.input(robot)?;
+        for sample in 0..segment.len() {
+            let torque = segment.torque(sample);
+            let mut pairs = torque.iter().zip(limits);
+            if pairs.any(|(torque, limit)| torque.abs() > IMPLAUSIBLE * limit) {
+                continue;
+            }
+            let x = segment.x.column(sample).into_owned();
+            let u_lat = model.project_input_at(&x, &input.column(sample).into_owned())?;
+            let lifted = model.lift_input_at(&x, &u_lat)?;
+            let down = segment.feet[sample].contains(&true);
+            let sums = if down {
+                &mut self.contact
+            } else {
+                &mut self.flight
+            };
+            for (joint, sums) in sums.iter_mut().enumerate() {
+                sums.add(torque[joint], lifted[joint]);
+            }
+            if down {
+                self.add_inconsistency(robot, segment, sample, &lifted);
+            }
+        }
+        Ok(())
+    }
+
+    fn add_inconsistency(
+        &mut self,
+        robot: &Robot,
+        segment: &Segment,
+        sample: usize,
+        lifted: &DVector<f64>,
+    ) {
+        let torque = std::array::from_fn(|joint| lifted[joint]);
+        let feet = segment.feet[sample];
+        // a leg stretched to its singularity has no force map: nothing to compare there
+        let Ok(produced) = robot.body_wrench(&segment.joints(sample), &torque, feet) else {
+            return;
+        };
+        let force = lifted.rows(JOINT_DIM, 6).into_owned();
+        if force.norm() > SMALL_FORCE_N {
+            self.inconsistency.0 += (&force - produced).norm() / force.norm();
+            self.inconsistency.1 += 1;
+        }
+    }
+
+    /// Coefficient of determination of the torques over all joints jointly, with a foot down.
+    pub fn torque_r2_contact(&self) -> Option<f64> {
+        jointly(&self.contact)
+    }
+
+    /// The same without a foot down.
+    pub fn torque_r2_flight(&self) -> Option<f64> {
+        jointly(&self.flight)
+    }
+
+    /// Mean of `|F_lift - G tau_lift| / |F_lift|` over samples with a foot down: how far the lifted
+    /// body wrench is from what the lifted torques produce.
+    pub fn inconsistency(&self) -> Option<f64> {
+        let (sum, count) = self.inconsistency;
+        (count > 0).then(|| sum / count as f64)
+    }
+}
+
+fn jointly(joints: &[FitSums]) -> Option<f64> {
+    let mut total = FitSums::default();
+    joints
+        .iter()
+        .for_each(|sums| total.merge_keeping_means(sums));
+    total.fit().and_then(|fit| fit.r2)
+}
+
+/// The combined loss `L_mod = 2 E_dec + 2 lambda ln |Xi|` with `lambda = 0.001` (equation 29), of the
+/// decoder's mean square (scaled units) and the number of active terms in all phases.
+/// None for a model without terms.
+pub fn combined_loss(decoder_mean_square: f64, active_terms: usize) -> Option<f64> {
+    const LAMBDA: f64 = 0.001;
+    let logarithm = (active_terms > 0).then(|| (active_terms as f64).ln())?;
+    Some(2.0 * decoder_mean_square + 2.0 * LAMBDA * logarithm)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{artifact, recording};
+
+    #[test]
+    fn combined_loss_follows_equation_29() {
+        let loss = combined_loss(0.01, 10).expect("terms");
+        assert!((loss - (0.02 + 0.002 * 10f64.ln())).abs() < 1e-15);
+        assert_eq!(combined_loss(0.01, 0), None);
+    }
+
+    #[test]
+    fn more_latent_coordinates_lose_less_of_the_torques() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let jump = recording::read(&root.join("examples/recordings/go1/test_01.csv.gz"));
+        let jump = jump.expect("shipped");
+        let [two, six] = ["go1-d2", "go1-d6"].map(|name| {
+            let model = artifact::read(&root.join(format!("models/{name}.json"))).expect("shipped");
+            let mut sums = LiftSums::default();
+            for segment in &jump.segments {
+                sums.add(&model, segment).expect("legs are bent");
+            }
+            sums
+        });
+        assert!(six.torque_r2_contact() > two.torque_r2_contact());
+        assert!(six.torque_r2_contact().expect("contact") > 0.9);
+        assert!(six.inconsistency().expect("contact") < 1.0);
+    }
+}

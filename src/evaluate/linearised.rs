@@ -1,0 +1,133 @@
+//! The phases' linearisations at their mean point: stability and gain of the inputs.
+
+use nalgebra::{Complex, DMatrix};
+
+use crate::sim::{CompiledModel, LatentSegment};
+
+/// Share of the largest singular value below which a direction of the input counts as without effect.
+pub const RANK_THRESHOLD: f64 = 0.01;
+
+/// One phase, linearised at the mean of the recorded `(z, dz, u_lat)` of that phase.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearisedPhase {
+    /// Recorded samples in the phase.
+    pub samples: usize,
+    /// Eigenvalues of `A = [0 I; d ddz/dz  d ddz/d dz]`, in 1/s, by falling real part.
+    pub eigenvalues: Vec<Complex<f64>>,
+    /// Singular values of the input gain `B = d ddz / d u_lat`, falling.
+    pub input_singular_values: Vec<f64>,
+}
+
+impl LinearisedPhase {
+    /// Largest real part of the eigenvalues, in 1/s: small deviations grow as `exp(a t)`.
+    pub fn growth_rate(&self) -> Option<f64> {
+        self.eigenvalues.first().map(|value| value.re)
+    }
+
+    /// Ratio of the largest and the smallest singular value of the input gain; none where the
+    /// smallest is 0.
+    pub fn input_condition(&self) -> Option<f64> {
+        let largest = self.input_singular_values.first()?;
+        let smallest = self.input_singular_values.last()?;
+        (*smallest > 0.0).then(|| largest / smallest)
+    }
+
+    /// Number of singular values of the input gain above [`RANK_THRESHOLD`] of the largest.
+    pub fn input_effective_rank(&self) -> usize {
+        let largest = self.input_singular_values.first().copied().unwrap_or(0.0);
+        let counts = |value: &&f64| **value > 0.0 && **value >= RANK_THRESHOLD * largest;
+        self.input_singular_values.iter().filter(counts).count()
+    }
+}
+
+/// Each phase of a model, linearised at its mean over the recorded samples; none for a phase that no
+/// sample is in, or whose Jacobian there is not finite.
+pub fn linearise_phases(
+    model: &CompiledModel,
+    segments: &[&LatentSegment],
+) -> Vec<Option<LinearisedPhase>> {
+    let mut model = model.clone();
+    (0..model.n_phases())
+        .map(|phase| linearise_phase(&mut model, segments, phase))
+        .collect()
+}
+
+fn linearise_phase(
+    model: &mut CompiledModel,
+    segments: &[&LatentSegment],
+    phase: usize,
+) -> Option<LinearisedPhase> {
+    let d = model.latent_dim();
+    let (mut mean, mut samples) = (vec![0.0; 3 * d], 0);
+    for segment in segments {
+        for sample in (0..segment.len()).filter(|&k| segment.phase[k] == phase) {
+            let values = [&segment.z, &segment.dz, &segment.u_lat];
+            for (index, total) in mean.iter_mut().enumerate() {
+                *total += values[index / d][(index % d, sample)];
+            }
+            samples += 1;
+        }
+    }
+    if samples == 0 {
+        return None;
+    }
+    mean.iter_mut().for_each(|total| *total /= samples as f64);
+    let (mut ddz, mut jacobian) = (vec![0.0; d], DMatrix::zeros(d, 3 * d));
+    let (z, rest) = mean.split_at(d);
+    let (dz, u_lat) = rest.split_at(d);
+    model.jacobian(phase, z, dz, u_lat, &mut ddz, &mut jacobian);
+    if jacobian.iter().any(|value| !value.is_finite()) {
+        return None;
+    }
+    let mut state = DMatrix::zeros(2 * d, 2 * d);
+    state.view_mut((0, d), (d, d)).fill_with_identity();
+    (state.view_mut((d, 0), (d, 2 * d))).copy_from(&jacobian.columns(0, 2 * d));
+    let mut eigenvalues: Vec<_> = state.complex_eigenvalues().iter().copied().collect();
+    eigenvalues.sort_by(|a, b| b.re.total_cmp(&a.re).then(b.im.total_cmp(&a.im)));
+    let gain = jacobian.columns(2 * d, d).into_owned();
+    let mut input_singular_values: Vec<f64> = gain.singular_values().iter().copied().collect();
+    input_singular_values.sort_by(|a, b| b.total_cmp(a));
+    Some(LinearisedPhase {
+        samples,
+        eigenvalues,
+        input_singular_values,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{FeetRule, Library, Phase, ReducedModel};
+
+    #[test]
+    fn damped_oscillator_has_its_textbook_eigenvalues_and_gain() {
+        let terms = ["z1", "dz1", "u1"].map(str::to_owned);
+        let library = Library::from_terms(1, &terms).expect("terms parse");
+        let model = ReducedModel::builder("hopper", library)
+            .phase(Phase {
+                name: "contact".to_owned(),
+                feet: FeetRule::Any,
+                xi: DMatrix::from_column_slice(3, 1, &[-40.0, -2.0, 3.0]),
+            })
+            .build()
+            .expect("valid");
+        let compiled = CompiledModel::new(&model).expect("compiles");
+        let row = DMatrix::from_row_slice(1, 2, &[0.1, 0.2]);
+        let segment = LatentSegment {
+            time_s: vec![0.0, 0.002],
+            z: row.clone(),
+            dz: row.clone(),
+            ddz: row.clone(),
+            u_lat: row,
+            phase: vec![0, 0],
+        };
+        let found = linearise_phases(&compiled, &[&segment]);
+        let phase = found[0].as_ref().expect("two samples");
+        // s^2 + 2 s + 40 = 0
+        assert!((phase.growth_rate().expect("one pair") + 1.0).abs() < 1e-12);
+        assert!((phase.eigenvalues[0].im - 39f64.sqrt()).abs() < 1e-9);
+        assert_eq!(phase.input_singular_values, [3.0]);
+        assert_eq!(phase.input_condition(), Some(1.0));
+        assert_eq!(phase.input_effective_rank(), 1);
+    }
+}
