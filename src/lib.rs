@@ -11,6 +11,7 @@ pub mod lower;
 pub mod model;
 pub mod mpc;
 pub mod recording;
+pub mod report;
 pub mod robot;
 pub mod sim;
 pub mod study;

@@ -43,6 +43,8 @@ pub enum Command {
     Simulate(SimulateArguments),
     /// Run the latent-space controller along a recording
     Mpc(MpcArguments),
+    /// Put equations, errors, baselines and the controller's torques on one HTML page
+    Report(ReportArguments),
 }
 
 impl Command {
@@ -57,6 +59,7 @@ impl Command {
             Self::Compile(arguments) => arguments.output_format.json,
             Self::Simulate(arguments) => arguments.output_format.json,
             Self::Mpc(arguments) => arguments.output_format.json,
+            Self::Report(arguments) => arguments.output_format.json,
         }
     }
 }
@@ -540,6 +543,34 @@ pub struct MpcArguments {
     #[arg(long, value_name = "FILE.csv")]
     pub output: Option<PathBuf>,
     /// Replace an existing output file
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// `romc report`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc report models/go1-d4.json examples/recordings/go1/test_*.csv.gz --output report.html"
+)]
+pub struct ReportArguments {
+    /// Model file
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Recordings that the model is held against
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    /// The page to write
+    #[arg(long, value_name = "FILE.html")]
+    pub output: PathBuf,
+    /// Also write each figure as SVG, PDF and CSV into this folder
+    #[arg(long, value_name = "DIR")]
+    pub figures: Option<PathBuf>,
+    /// Time between restarts from the recorded state, in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = positive_seconds)]
+    pub restart_every: f64,
+    /// Replace an existing page, or write into a folder that holds files romc did not make
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]

@@ -13,6 +13,7 @@ mod inspect_model;
 mod inspect_recording;
 mod mpc;
 mod output;
+mod report;
 mod simulate;
 mod study;
 mod train;
@@ -52,7 +53,7 @@ pub fn run() -> ExitCode {
     match printed {
         Ok(text) => print(&text),
         Err(error) => {
-            report(&error);
+            tell(&error);
             ExitCode::FAILURE
         }
     }
@@ -68,6 +69,7 @@ fn execute(command: Command) -> Result<Answer, Error> {
         Command::Compile(arguments) => compile::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Mpc(arguments) => mpc::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
     }
 }
 
@@ -88,7 +90,7 @@ fn print(text: &str) -> ExitCode {
 }
 
 /// Prints an error and its chain of causes to stderr.
-fn report(error: &Error) {
+fn tell(error: &Error) {
     eprintln!("error: {error}");
     let mut source = std::error::Error::source(error);
     while let Some(cause) = source {

@@ -101,7 +101,8 @@ pub fn run_all(
     Ok(runs)
 }
 
-fn answer(arguments: &MpcArguments, runs: &[NamedRun]) -> Answer {
+/// The figures of runs, a row each.
+pub fn run_table(runs: &[NamedRun]) -> Table {
     let header = [
         "recording",
         "steps",
@@ -134,6 +135,11 @@ fn answer(arguments: &MpcArguments, runs: &[NamedRun]) -> Answer {
             format!("{:.0}", summary.step_us.p99),
         ]);
     }
+    table
+}
+
+fn answer(arguments: &MpcArguments, runs: &[NamedRun]) -> Answer {
+    let table = run_table(runs);
     let mut text = format!(
         "{}: latent MPC, {} stages of {} s\n\n{table}\n",
         arguments.model.display(),

@@ -81,6 +81,16 @@ impl Table {
         self
     }
 
+    /// Titles of the columns.
+    pub fn header(&self) -> &[String] {
+        &self.header
+    }
+
+    /// The rows so far.
+    pub fn rows(&self) -> &[Vec<String>] {
+        &self.rows
+    }
+
     fn width(&self, column: usize) -> usize {
         std::iter::once(&self.header)
             .chain(&self.rows)

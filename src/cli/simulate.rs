@@ -113,7 +113,7 @@ fn r2_cell(fit: Option<Fit>) -> String {
 }
 
 /// Fit of every coordinate, whole and restarted.
-fn coordinate_table(assessment: &Assessment<'_>) -> Table {
+pub fn coordinate_table(assessment: &Assessment<'_>) -> Table {
     let every = format!("restarted every {} s", assessment.restart_every_s);
     let mut table = Table::new(["coordinate", "unit", "full rms", "R^2", &every, "R^2"]);
     let (full, restarted) = (assessment.full.fits(), assessment.restarted.fits());
@@ -131,7 +131,7 @@ fn coordinate_table(assessment: &Assessment<'_>) -> Table {
 }
 
 /// Restarted residuals of every coordinate, a column a phase.
-fn phase_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
+pub fn phase_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     let mut header = vec!["coordinate".to_owned(), "unit".to_owned()];
     header.extend(model.phases().iter().map(|phase| phase.name.clone()));
     let mut table = Table::new(header);
@@ -181,7 +181,7 @@ fn baseline_sums(baseline: &Baseline, is_full: bool, name: &str) -> FitSums {
 }
 
 /// Latent accelerations, stability and input gain of each phase.
-fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
+pub fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     let mut table = Table::new([
         "phase",
         "samples",

@@ -1,0 +1,222 @@
+//! `romc report`: one page that tells whether a model is any good, and its figures as files.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::Answer;
+use super::args::ReportArguments;
+use super::mpc::{NamedRun, run_all, run_table};
+use super::output::{Table, check_output, read_recordings, significant, spinner, write_file};
+use super::simulate::{baseline_table, coordinate_table, dynamics_table, phase_table};
+use crate::backend::{EmittedFile, write_files};
+use crate::evaluate::Assessment;
+use crate::files::Overwrite;
+use crate::model::ReducedModel;
+use crate::mpc::{Lift, MpcSettings, ReferenceInput};
+use crate::recording::Recording;
+use crate::report::figures::{csv, pdf, standalone_svg};
+use crate::report::{Content, PageOptions, PageTable, all_figures, page};
+use crate::{Error, artifact};
+
+/// Writes the page, and the figures if a folder for them is given.
+///
+/// # Errors
+/// Whatever reading, simulating, controlling or writing refuses.
+pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
+    let overwrite = Overwrite::when_forced(arguments.force);
+    check_output(Some(&arguments.output), overwrite)?;
+    let model = artifact::read(&arguments.model)?;
+    let recordings = read_recordings(&arguments.recordings)?;
+    let made = make(
+        &model,
+        &recordings,
+        arguments.restart_every,
+        &commands(arguments),
+    )?;
+    write_file(&arguments.output, made.page.as_bytes(), overwrite)?;
+    let mut text = format!(
+        "{}: {} kB, {} figures\n",
+        arguments.output.display(),
+        made.page.len() / 1000,
+        made.n_figures
+    );
+    let mut written = Vec::new();
+    if let Some(folder) = &arguments.figures {
+        written = write_files(folder, &made.files, overwrite)?;
+        let _ = writeln!(
+            text,
+            "{}: {} files, each figure as .svg, .pdf and .csv",
+            folder.display(),
+            written.len()
+        );
+    }
+    Ok(Answer {
+        text,
+        json: json!({
+            "command": "report",
+            "model": arguments.model.display().to_string(),
+            "output": arguments.output.display().to_string(),
+            "bytes": made.page.len(),
+            "figures": written.iter().map(|path| path.display().to_string()).collect::<Vec<_>>(),
+        }),
+    })
+}
+
+/// A report in memory.
+pub struct Made {
+    /// The page.
+    pub page: String,
+    /// Every figure as SVG, PDF and CSV.
+    pub files: Vec<EmittedFile>,
+    /// Number of figures.
+    pub n_figures: usize,
+}
+
+/// Assesses the model, runs the controller and draws everything.
+///
+/// # Errors
+/// Whatever simulating, controlling or typesetting refuses.
+pub fn make(
+    model: &ReducedModel,
+    recordings: &[Recording],
+    restart_every_s: f64,
+    commands: &[String],
+) -> Result<Made, Error> {
+    let progress = spinner("rolling the model out");
+    let assessment = Assessment::over(model, recordings, restart_every_s)?;
+    progress.set_message("running the controller");
+    let along = |lift| {
+        let settings = MpcSettings {
+            lift,
+            ..MpcSettings::default()
+        };
+        run_all(model, recordings, settings, ReferenceInput::Recorded)
+    };
+    let (plain, consistent) = (along(Lift::Transpose)?, along(Lift::Consistent)?);
+    progress.set_message("drawing");
+    let content = Content {
+        model,
+        assessment: &assessment,
+        runs: &consistent,
+    };
+    let figures = all_figures(&content)?;
+    let options = PageOptions {
+        commands: commands.to_vec(),
+        ..options(model, &assessment, &plain, &consistent)
+    };
+    let page = page(&content, &figures, &options)?;
+    let mut files = Vec::new();
+    for figure in figures.iter() {
+        let id = &figure.id;
+        files.push(EmittedFile::new(
+            format!("{id}.svg"),
+            standalone_svg(figure),
+        ));
+        files.push(EmittedFile::new(format!("{id}.pdf"), pdf(figure)));
+        files.push(EmittedFile::new(format!("{id}.csv"), csv(figure)));
+    }
+    progress.finish_and_clear();
+    Ok(Made {
+        page,
+        files,
+        n_figures: figures.iter().count(),
+    })
+}
+
+fn options(
+    model: &ReducedModel,
+    assessment: &Assessment<'_>,
+    plain: &[NamedRun],
+    consistent: &[NamedRun],
+) -> PageOptions {
+    let every = assessment.restart_every_s;
+    let rms = |sums, name: &str| {
+        let fit = assessment.fit(sums, name);
+        fit.map_or("-".to_owned(), |fit| format!("{} m", significant(fit.rms)))
+    };
+    let optional = |value: Option<f64>| value.map_or("-".to_owned(), significant);
+    let card = |name: &str, value: String| (name.to_owned(), value);
+    PageOptions {
+        headline: vec![
+            card("latent coordinates", model.latent_dim().to_string()),
+            card(
+                "active terms, all phases",
+                assessment.active_terms.to_string(),
+            ),
+            card("body.z error, whole jump", rms(&assessment.full, "body.z")),
+            card(
+                &format!("body.z error, restarted every {every} s"),
+                rms(&assessment.restarted, "body.z"),
+            ),
+            card(
+                "torque R² of the plain lift, contact",
+                optional(assessment.lift.torque_r2_contact()),
+            ),
+            card("L_mod (29)", optional(assessment.combined_loss())),
+        ],
+        coordinates: vec![
+            page_table("Errors of every coordinate", &coordinate_table(assessment)),
+            page_table(
+                &format!("Root mean square errors by phase, restarted every {every} s"),
+                &phase_table(model, assessment),
+            ),
+        ],
+        baselines: vec![page_table(
+            "Body position: the model and the pendulum",
+            &baseline_table(assessment),
+        )],
+        baseline_notes: (assessment.baselines.iter())
+            .map(|b| format!("{}: {}.", b.name, b.template.constants()))
+            .collect(),
+        dynamics: vec![page_table(
+            "Each phase of the model",
+            &dynamics_table(model, assessment),
+        )],
+        control: vec![
+            page_table("Plain lift, u = W_eᵀ u_lat", &run_table(plain)),
+            page_table("Consistent lift", &run_table(consistent)),
+        ],
+        commands: Vec::new(),
+    }
+}
+
+fn page_table(caption: &str, table: &Table) -> PageTable {
+    PageTable {
+        caption: caption.to_owned(),
+        header: table.header().to_vec(),
+        rows: table.rows().to_vec(),
+    }
+}
+
+/// The commands whose output the page shows.
+fn commands(arguments: &ReportArguments) -> Vec<String> {
+    let paths = |paths: &[PathBuf]| {
+        let quoted = paths.iter().map(|path| quoted(path));
+        quoted.collect::<Vec<_>>().join(" ")
+    };
+    let (model, recordings) = (quoted(&arguments.model), paths(&arguments.recordings));
+    let every = arguments.restart_every;
+    vec![
+        format!(
+            "romc report {model} {recordings} --restart-every {every} --output {}",
+            quoted(&arguments.output)
+        ),
+        format!("romc simulate {model} {recordings} --restart-every {every}"),
+        format!("romc mpc {model} {recordings} --lift transpose"),
+        format!("romc mpc {model} {recordings} --lift consistent"),
+        format!("romc compile {model} --emit latex --out-dir out"),
+    ]
+}
+
+/// A path as a shell takes it.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |letter: char| letter.is_alphanumeric() || "-_./".contains(letter);
+    if text.chars().all(plain) {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', r"'\''"))
+    }
+}

@@ -1,0 +1,399 @@
+//! Which figures a report has, from an assessment and the controller's runs.
+
+use std::path::PathBuf;
+
+use nalgebra::DVector;
+
+use super::figures::{Figure, HeatMap, LinePlot, Panel, Role, Series};
+use crate::evaluate::{Assessment, SegmentRun};
+use crate::model::{ModelError, ReducedModel};
+use crate::mpc::Run;
+use crate::robot::{JOINT_DIM, Robot};
+use crate::sim::Rollout;
+
+/// Segments that get figures of their own; tables cover all.
+const MAX_SEGMENTS: usize = 3;
+const PANEL: (f64, f64) = (240.0, 150.0);
+const WIDE_PANEL: (f64, f64) = (360.0, 210.0);
+
+/// What a report is made from.
+#[derive(Debug, Clone, Copy)]
+pub struct Content<'a> {
+    /// The model.
+    pub model: &'a ReducedModel,
+    /// The model held against the recordings.
+    pub assessment: &'a Assessment<'a>,
+    /// The controller along each recording, with the lift that keeps torques and forces consistent.
+    pub runs: &'a [(PathBuf, Run)],
+}
+
+/// Figures of one section of the page.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct AllFigures {
+    /// The encoder's weights.
+    pub encoder: Vec<Figure>,
+    /// Joints and body against the recording.
+    pub coordinates: Vec<Figure>,
+    /// Latent accelerations.
+    pub accelerations: Vec<Figure>,
+    /// The model beside the template models.
+    pub baselines: Vec<Figure>,
+    /// Torques commanded by the controller, and its latent trajectory.
+    pub control: Vec<Figure>,
+}
+
+impl AllFigures {
+    /// All figures, in the order of the page.
+    pub fn iter(&self) -> impl Iterator<Item = &Figure> {
+        (self.encoder.iter())
+            .chain(&self.coordinates)
+            .chain(&self.accelerations)
+            .chain(&self.baselines)
+            .chain(&self.control)
+    }
+}
+
+/// The figures of a report.
+///
+/// # Errors
+/// [`ModelError`] for a model without encoder or decoder.
+pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
+    let mut figures = AllFigures::default();
+    let Content {
+        model, assessment, ..
+    } = *content;
+    if let Some(run) = assessment.runs.first() {
+        figures.encoder.push(encoder(model, assessment, run)?);
+    }
+    for (index, run) in assessment.runs.iter().take(MAX_SEGMENTS).enumerate() {
+        let place = Place::of(index, run);
+        let [joints, body] = coordinates(model, assessment, run, &place)?;
+        figures.coordinates.extend([joints, body]);
+        (figures.accelerations).push(accelerations(model, assessment, run, &place)?);
+        (figures.baselines).push(baselines(model, assessment, run, &place)?);
+    }
+    for (index, (path, run)) in content.runs.iter().take(MAX_SEGMENTS).enumerate() {
+        let place = Place {
+            suffix: (index + 1).to_string(),
+            words: stem(path),
+        };
+        figures.control.push(torques(run, &place));
+        figures.control.push(latent_tracking(model, run, &place));
+    }
+    Ok(figures)
+}
+
+/// Which jump a figure shows.
+struct Place {
+    suffix: String,
+    words: String,
+}
+
+impl Place {
+    fn of(index: usize, run: &SegmentRun<'_>) -> Self {
+        Self {
+            suffix: (index + 1).to_string(),
+            words: format!(
+                "{}, from row {}",
+                stem(&run.segment.path),
+                run.segment.first_row
+            ),
+        }
+    }
+}
+
+fn stem(path: &std::path::Path) -> String {
+    let name = path.file_name().map(|name| name.to_string_lossy());
+    name.map_or(String::new(), |name| {
+        name.trim_end_matches(".gz")
+            .trim_end_matches(".csv")
+            .to_owned()
+    })
+}
+
+/// Figures 6, 9 and 15 of the paper.
+fn encoder(
+    model: &ReducedModel,
+    assessment: &Assessment<'_>,
+    run: &SegmentRun<'_>,
+) -> Result<Figure, ModelError> {
+    let x = run.segment.x.column(0).into_owned();
+    // d z / d x in SI units; without the scaling it is W_e of a linear encoder
+    let weights = model.encoder_jacobian(&x)?;
+    let factors = model.state_factors()?;
+    let rows = assessment.names.len();
+    let d = model.latent_dim();
+    let at = |row: usize, column: usize| weights[(column, row)] / factors[row];
+    let values = (0..rows * d).map(|k| at(k / d, k % d)).collect();
+    let what = if model.is_linear() {
+        "Magnitudes of the encoder's weights"
+    } else {
+        "Magnitudes of the encoder's Jacobian at the first sample"
+    };
+    Ok(Figure {
+        id: "encoder".to_owned(),
+        caption: format!("{what}: how much of each coordinate a latent one takes (scaled units)."),
+        x_label: String::new(),
+        panel_size: (120.0 + 40.0 * d.min(18) as f64, 330.0),
+        columns: 1,
+        panels: vec![Panel::Heat(HeatMap {
+            title: format!("{rows} coordinates, {d} latent"),
+            rows: assessment.names.clone(),
+            columns: (1..=d).map(|index| format!("z{index}")).collect(),
+            values,
+        })],
+        legend: Vec::new(),
+    })
+}
+
+/// A value of every sample; none where a rollout did not get.
+type Samples = Vec<Option<DVector<f64>>>;
+
+/// What a function makes of every predicted sample.
+fn predicted(
+    run: &SegmentRun<'_>,
+    rollout: &Rollout,
+    value: &dyn Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>, ModelError>,
+) -> Result<Samples, ModelError> {
+    let mut samples = vec![None; run.latent.len()];
+    for (sample, window, column) in rollout.predictions() {
+        let (z, dz) = (
+            window.z.column(column).into_owned(),
+            window.dz.column(column).into_owned(),
+        );
+        samples[sample] = Some(value(sample, &z, &dz)?);
+    }
+    Ok(samples)
+}
+
+fn series(run: &SegmentRun<'_>, role: Role, value: impl Fn(usize) -> Option<f64>) -> Series {
+    let times = run.latent.time_s.iter().enumerate();
+    Series {
+        role,
+        points: times.map(|(k, &time)| (time, value(k))).collect(),
+    }
+}
+
+/// Times without a foot down.
+fn flights(run: &SegmentRun<'_>) -> Vec<(f64, f64)> {
+    let time = &run.segment.time_s;
+    let mut spans: Vec<(f64, f64)> = Vec::new();
+    let mut airborne = false;
+    for (sample, feet) in run.segment.feet.iter().enumerate() {
+        let in_air = !feet.contains(&true);
+        match (spans.last_mut(), in_air, airborne) {
+            (Some(span), true, true) => span.1 = time[sample],
+            (_, true, _) => spans.push((time[sample], time[sample])),
+            (_, false, _) => {}
+        }
+        airborne = in_air;
+    }
+    spans
+}
+
+fn rollout_legend(assessment: &Assessment<'_>) -> Vec<(Role, String)> {
+    vec![
+        (Role::Recorded, "recorded".to_owned()),
+        (Role::Full, "model, whole jump".to_owned()),
+        (
+            Role::Restarted,
+            format!("model, restarted every {} s", assessment.restart_every_s),
+        ),
+    ]
+}
+
+/// Figures 7, 13 and 14 of the paper: joints, then body.
+fn coordinates(
+    model: &ReducedModel,
+    assessment: &Assessment<'_>,
+    run: &SegmentRun<'_>,
+    place: &Place,
+) -> Result<[Figure; 2], ModelError> {
+    let decode = |_: usize, z: &DVector<f64>, _: &DVector<f64>| model.decode(z);
+    let full = predicted(run, &run.full, &decode)?;
+    let restarted = predicted(run, &run.restarted, &decode)?;
+    let panel = |row: usize| {
+        let of = |samples: &Samples, k: usize| samples[k].as_ref().map(|x| x[row]);
+        Panel::Lines(LinePlot {
+            title: format!("{}, {}", assessment.names[row], assessment.units[row]),
+            series: vec![
+                series(run, Role::Recorded, |k| Some(run.segment.x[(row, k)])),
+                series(run, Role::Full, |k| of(&full, k)),
+                series(run, Role::Restarted, |k| of(&restarted, k)),
+            ],
+            shaded: flights(run),
+        })
+    };
+    let figure = |id: &str, what: &str, rows: std::ops::Range<usize>| Figure {
+        id: format!("{id}_{}", place.suffix),
+        caption: format!(
+            "{what} of {}: recorded, and decoded from the model's rollouts. Grey: flight.",
+            place.words
+        ),
+        x_label: "time, s".to_owned(),
+        panel_size: PANEL,
+        columns: 3,
+        panels: rows.map(panel).collect(),
+        legend: rollout_legend(assessment),
+    };
+    Ok([
+        figure("joints", "Joint angles", 0..JOINT_DIM),
+        figure(
+            "body",
+            "Body position and orientation",
+            JOINT_DIM..assessment.names.len(),
+        ),
+    ])
+}
+
+/// Figure 12 of the paper.
+fn accelerations(
+    model: &ReducedModel,
+    assessment: &Assessment<'_>,
+    run: &SegmentRun<'_>,
+    place: &Place,
+) -> Result<Figure, ModelError> {
+    let ddz = |k: usize, z: &DVector<f64>, dz: &DVector<f64>| {
+        let u_lat = run.latent.u_lat.column(k).into_owned();
+        model.ddz(run.latent.phase[k], z, dz, &u_lat)
+    };
+    let full = predicted(run, &run.full, &ddz)?;
+    let restarted = predicted(run, &run.restarted, &ddz)?;
+    let panel = |row: usize| {
+        let of = |samples: &Samples, k: usize| samples[k].as_ref().map(|x| x[row]);
+        Panel::Lines(LinePlot {
+            title: format!("d²z{}/dt²", row + 1),
+            series: vec![
+                series(run, Role::Recorded, |k| Some(run.latent.ddz[(row, k)])),
+                series(run, Role::Full, |k| of(&full, k)),
+                series(run, Role::Restarted, |k| of(&restarted, k)),
+            ],
+            shaded: flights(run),
+        })
+    };
+    Ok(Figure {
+        id: format!("latent_accelerations_{}", place.suffix),
+        caption: format!(
+            "Latent accelerations of {} (scaled units): encoded from the recording, and by the model along its rollouts.",
+            place.words
+        ),
+        x_label: "time, s".to_owned(),
+        panel_size: PANEL,
+        columns: 3,
+        panels: (0..model.latent_dim()).map(panel).collect(),
+        legend: rollout_legend(assessment),
+    })
+}
+
+/// Figure 8 of the paper, with the fitted pendulum beside the published one.
+fn baselines(
+    model: &ReducedModel,
+    assessment: &Assessment<'_>,
+    run: &SegmentRun<'_>,
+    place: &Place,
+) -> Result<Figure, ModelError> {
+    let decode = |_: usize, z: &DVector<f64>, _: &DVector<f64>| model.decode(z);
+    let full = predicted(run, &run.full, &decode)?;
+    let roles = [Role::Baseline, Role::SecondBaseline];
+    let panel = |row: usize, axis: usize, title: &str| {
+        let mut lines = vec![
+            series(run, Role::Recorded, |k| Some(run.segment.x[(row, k)])),
+            series(run, Role::Full, |k| full[k].as_ref().map(|x| x[row])),
+        ];
+        for (role, rollout) in roles.into_iter().zip(&run.baselines) {
+            lines.push(series(run, role, |k| {
+                rollout.position_m[k].map(|position| position[axis])
+            }));
+        }
+        Panel::Lines(LinePlot {
+            title: title.to_owned(),
+            series: lines,
+            shaded: flights(run),
+        })
+    };
+    let mut legend = rollout_legend(assessment);
+    legend.truncate(2);
+    let names = assessment.baselines.iter().map(|b| b.name.to_owned());
+    legend.extend(roles.into_iter().zip(names));
+    Ok(Figure {
+        id: format!("aslip_{}", place.suffix),
+        caption: format!(
+            "Body position of {}: the learned model and the pendulum under the same recorded forces.",
+            place.words
+        ),
+        x_label: "time, s".to_owned(),
+        panel_size: WIDE_PANEL,
+        columns: 2,
+        panels: vec![
+            panel(JOINT_DIM, 0, "body.x, m"),
+            panel(JOINT_DIM + 2, 1, "body.z, m"),
+        ],
+        legend,
+    })
+}
+
+/// Commanded torques beside the recorded ones.
+fn torques(run: &Run, place: &Place) -> Figure {
+    let panel = |joint: usize| {
+        let line = |role, value: &dyn Fn(usize) -> f64| Series {
+            role,
+            points: (0..run.rows.len())
+                .map(|k| (run.rows[k].time_s, Some(value(k))))
+                .collect(),
+        };
+        Panel::Lines(LinePlot {
+            title: format!("{}, N m", Robot::state_names()[joint]),
+            series: vec![
+                line(Role::Recorded, &|k| run.rows[k].recorded_torque_nm[joint]),
+                line(Role::Full, &|k| run.rows[k].torque_nm[joint]),
+            ],
+            shaded: Vec::new(),
+        })
+    };
+    Figure {
+        id: format!("torques_{}", place.suffix),
+        caption: format!(
+            "Joint torques along {}: recorded, and commanded by the latent controller (consistent lift).",
+            place.words
+        ),
+        x_label: "time, s".to_owned(),
+        panel_size: PANEL,
+        columns: 3,
+        panels: (0..JOINT_DIM).map(panel).collect(),
+        legend: vec![
+            (Role::Recorded, "recorded".to_owned()),
+            (Role::Full, "commanded".to_owned()),
+        ],
+    }
+}
+
+/// The controller's latent inputs.
+fn latent_tracking(model: &ReducedModel, run: &Run, place: &Place) -> Figure {
+    let panel = |latent: usize| {
+        let line = |role, value: &dyn Fn(usize) -> Option<f64>| Series {
+            role,
+            points: (0..run.rows.len())
+                .map(|k| (run.rows[k].time_s, value(k)))
+                .collect(),
+        };
+        Panel::Lines(LinePlot {
+            title: format!("u{}", latent + 1),
+            series: vec![line(Role::Full, &|k| {
+                run.rows[k].u_lat.get(latent).copied()
+            })],
+            shaded: Vec::new(),
+        })
+    };
+    Figure {
+        id: format!("latent_inputs_{}", place.suffix),
+        caption: format!(
+            "Latent inputs that the controller chose along {} (scaled units).",
+            place.words
+        ),
+        x_label: "time, s".to_owned(),
+        panel_size: PANEL,
+        columns: 3,
+        panels: (0..model.latent_dim()).map(panel).collect(),
+        legend: vec![(Role::Full, "commanded".to_owned())],
+    }
+}

@@ -1,0 +1,278 @@
+//! From a panel to marks on a plane; y grows downwards, lengths are points.
+
+use super::figure::{HeatMap, LinePlot, Panel, Role};
+use super::ticks::{padded, ticks};
+
+/// Space left of the axes, for their numbers.
+const LEFT: f64 = 38.0;
+/// Space above, for the title.
+const TOP: f64 = 17.0;
+/// Space below, for numbers and label.
+const BOTTOM: f64 = 26.0;
+const RIGHT: f64 = 8.0;
+/// Points of a line that are drawn; CSV has them all.
+const MAX_POINTS: usize = 240;
+/// Size of letters.
+pub(super) const FONT: f64 = 9.0;
+
+/// Where a text is held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Anchor {
+    /// At its left end.
+    Start,
+    /// In its middle.
+    Middle,
+    /// At its right end.
+    End,
+}
+
+/// With what a mark is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Paint {
+    /// The frame.
+    Axis,
+    /// Lines across the frame.
+    Grid,
+    /// The ground of a flight.
+    Shade,
+    /// A magnitude from 0 to 1.
+    Heat(f64),
+}
+
+/// One thing to draw.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Mark {
+    /// A filled rectangle: corner, width, height.
+    Rectangle([f64; 4], Paint),
+    /// A straight line between two points.
+    Rule([f64; 4], Paint),
+    /// A data line.
+    Line(Vec<(f64, f64)>, Role),
+    /// A text at the left end of its baseline, or as anchored.
+    Text(f64, f64, Anchor, String),
+}
+
+/// A panel as marks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PanelDrawing {
+    /// Width.
+    pub width: f64,
+    /// Height.
+    pub height: f64,
+    /// What to draw, the first below the others.
+    pub marks: Vec<Mark>,
+}
+
+/// Draws one panel in the given size; `x_label` stands below its axis.
+pub fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> PanelDrawing {
+    let marks = match panel {
+        Panel::Lines(plot) => draw_lines(plot, size, x_label),
+        Panel::Heat(map) => draw_heat(map, size, x_label),
+    };
+    PanelDrawing {
+        width: size.0,
+        height: size.1,
+        marks,
+    }
+}
+
+/// Data coordinates to those of the panel.
+struct Axes {
+    x: (f64, f64),
+    y: (f64, f64),
+    size: (f64, f64),
+}
+
+impl Axes {
+    fn x_at(&self, value: f64) -> f64 {
+        let share = (value - self.x.0) / (self.x.1 - self.x.0);
+        LEFT + share * (self.size.0 - LEFT - RIGHT)
+    }
+
+    fn y_at(&self, value: f64) -> f64 {
+        let share = (value - self.y.0) / (self.y.1 - self.y.0);
+        self.bottom() - share * (self.bottom() - TOP)
+    }
+
+    fn bottom(&self) -> f64 {
+        self.size.1 - BOTTOM
+    }
+
+    fn right(&self) -> f64 {
+        self.size.0 - RIGHT
+    }
+}
+
+fn draw_lines(plot: &LinePlot, size: (f64, f64), x_label: &str) -> Vec<Mark> {
+    let points = || plot.series.iter().flat_map(|series| &series.points);
+    let (first, last) = (points().map(|p| p.0)).fold((f64::INFINITY, f64::NEG_INFINITY), |r, x| {
+        (r.0.min(x), r.1.max(x))
+    });
+    let axes = Axes {
+        x: if last > first {
+            (first, last)
+        } else {
+            padded(points().map(|point| point.0))
+        },
+        y: padded(visible(plot)),
+        size,
+    };
+    let mut marks = Vec::new();
+    for &(from, to) in &plot.shaded {
+        let (from, to) = (axes.x_at(from.max(axes.x.0)), axes.x_at(to.min(axes.x.1)));
+        let rectangle = [from, TOP, (to - from).max(0.0), axes.bottom() - TOP];
+        marks.push(Mark::Rectangle(rectangle, Paint::Shade));
+    }
+    draw_axes(&axes, x_label, &mut marks);
+    let title = plot.title.clone();
+    marks.push(Mark::Text(LEFT, TOP - 6.0, Anchor::Start, title));
+    for series in &plot.series {
+        for stretch in thinned(&series.points).split(|point| point.1.is_none()) {
+            let line: Vec<(f64, f64)> = (stretch.iter())
+                .filter_map(|&(x, y)| {
+                    // what leaves the frame is cut at its edge
+                    let y = y?.clamp(axes.y.0, axes.y.1);
+                    Some((axes.x_at(x), axes.y_at(y)))
+                })
+                .collect();
+            if line.len() > 1 {
+                marks.push(Mark::Line(line, series.role));
+            }
+        }
+    }
+    marks
+}
+
+/// Values that the range of y follows: a prediction that runs away does not flatten the record.
+fn visible(plot: &LinePlot) -> impl Iterator<Item = f64> {
+    let recorded = plot
+        .series
+        .iter()
+        .find(|series| series.role == Role::Recorded);
+    let bounds = recorded.map(|series| padded(series.points.iter().filter_map(|p| p.1)));
+    let values = plot.series.iter().flat_map(|series| &series.points);
+    values.filter_map(move |point| {
+        let value = point.1?;
+        Some(bounds.map_or(value, |(low, high)| {
+            let reach = high - low;
+            value.clamp(low - reach, high + reach)
+        }))
+    })
+}
+
+/// At most [`MAX_POINTS`] points, evenly chosen, the last always among them; gaps stay.
+fn thinned(points: &[(f64, Option<f64>)]) -> Vec<(f64, Option<f64>)> {
+    let stride = points.len().div_ceil(MAX_POINTS).max(1);
+    let last = points.len().saturating_sub(1);
+    (points.iter().enumerate())
+        .filter(|(index, point)| index % stride == 0 || *index == last || point.1.is_none())
+        .map(|(_, point)| *point)
+        .collect()
+}
+
+fn draw_axes(axes: &Axes, x_label: &str, marks: &mut Vec<Mark>) {
+    let (bottom, right) = (axes.bottom(), axes.right());
+    let (values, places) = ticks(axes.y.0, axes.y.1, 4);
+    for value in values {
+        let y = axes.y_at(value);
+        marks.push(Mark::Rule([LEFT, y, right, y], Paint::Grid));
+        let text = format!("{value:.places$}");
+        marks.push(Mark::Text(LEFT - 4.0, y + 3.0, Anchor::End, text));
+    }
+    let (values, places) = ticks(axes.x.0, axes.x.1, 4);
+    for value in values {
+        let x = axes.x_at(value);
+        marks.push(Mark::Rule([x, bottom, x, bottom + 3.0], Paint::Axis));
+        let text = format!("{value:.places$}");
+        marks.push(Mark::Text(x, bottom + 12.0, Anchor::Middle, text));
+    }
+    marks.push(Mark::Rule([LEFT, bottom, right, bottom], Paint::Axis));
+    marks.push(Mark::Rule([LEFT, TOP, LEFT, bottom], Paint::Axis));
+    let label = x_label.to_owned();
+    marks.push(Mark::Text(right, bottom + 22.0, Anchor::End, label));
+}
+
+fn draw_heat(map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec<Mark> {
+    let left = LEFT + 22.0;
+    let (width, height) = (size.0 - left - RIGHT, size.1 - TOP - BOTTOM);
+    let cell = (
+        width / map.columns.len().max(1) as f64,
+        height / map.rows.len().max(1) as f64,
+    );
+    let largest = map.values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let mut marks = vec![Mark::Text(
+        left,
+        TOP - 6.0,
+        Anchor::Start,
+        map.title.clone(),
+    )];
+    for (row, name) in map.rows.iter().enumerate() {
+        let y = TOP + row as f64 * cell.1;
+        let middle = y + 0.5 * cell.1 + 3.0;
+        marks.push(Mark::Text(left - 4.0, middle, Anchor::End, name.clone()));
+        for column in 0..map.columns.len() {
+            let value = map.values[row * map.columns.len() + column].abs();
+            let share = if largest > 0.0 { value / largest } else { 0.0 };
+            let x = left + column as f64 * cell.0;
+            // a hair of overlap closes the seams between cells
+            let rectangle = [x, y, cell.0 - 1.0, cell.1 - 1.0];
+            marks.push(Mark::Rectangle(rectangle, Paint::Heat(share)));
+        }
+    }
+    let bottom = TOP + height;
+    for (column, name) in map.columns.iter().enumerate() {
+        let x = left + (column as f64 + 0.5) * cell.0;
+        marks.push(Mark::Text(x, bottom + 11.0, Anchor::Middle, name.clone()));
+    }
+    let label = x_label.to_owned();
+    marks.push(Mark::Text(
+        size.0 - RIGHT,
+        bottom + 22.0,
+        Anchor::End,
+        label,
+    ));
+    marks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::figures::Series;
+
+    #[test]
+    fn thinned_line_keeps_its_ends_and_gaps() {
+        let points: Vec<_> = (0..1000)
+            .map(|k| (f64::from(k), (k != 501).then_some(f64::from(k))))
+            .collect();
+        let thin = thinned(&points);
+        assert!(thin.len() <= MAX_POINTS + 2);
+        assert_eq!(thin.first(), points.first());
+        assert_eq!(thin.last(), points.last());
+        assert!(thin.iter().any(|point| point.1.is_none()));
+    }
+
+    #[test]
+    fn every_mark_of_a_runaway_prediction_stays_inside_the_frame() {
+        let line = |role, values: [f64; 3]| Series {
+            role,
+            points: (0..3).map(|k| (k as f64, Some(values[k]))).collect(),
+        };
+        let plot = LinePlot {
+            title: "body.z, m".to_owned(),
+            series: vec![
+                line(Role::Recorded, [0.2, 0.3, 0.25]),
+                line(Role::Full, [0.2, 1e9, -1e9]),
+            ],
+            shaded: vec![(1.0, 9.0)],
+        };
+        let drawing = draw_panel(&Panel::Lines(plot), (240.0, 150.0), "time, s");
+        let lines = drawing.marks.iter().filter_map(|mark| match mark {
+            Mark::Line(points, _) => Some(points),
+            Mark::Rectangle(..) | Mark::Rule(..) | Mark::Text(..) => None,
+        });
+        let points: Vec<_> = lines.flatten().collect();
+        assert_eq!(points.len(), 6);
+        let inside = |p: &&(f64, f64)| (0.0..=240.0).contains(&p.0) && (0.0..=150.0).contains(&p.1);
+        assert!(points.iter().all(inside));
+    }
+}

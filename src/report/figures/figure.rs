@@ -1,0 +1,131 @@
+//! What a figure holds.
+
+/// What a line stands for; it picks colour and dashes, the same in every figure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// Measured, or encoded from what was measured.
+    Recorded,
+    /// Predicted over the whole recording.
+    Full,
+    /// Predicted between restarts.
+    Restarted,
+    /// A template model, or the first of two things compared.
+    Baseline,
+    /// A second template model.
+    SecondBaseline,
+}
+
+impl Role {
+    /// Every role.
+    pub const ALL: [Self; 5] = [
+        Self::Recorded,
+        Self::Full,
+        Self::Restarted,
+        Self::Baseline,
+        Self::SecondBaseline,
+    ];
+
+    /// Class of its lines in SVG.
+    pub fn class(self) -> &'static str {
+        match self {
+            Self::Recorded => "recorded",
+            Self::Full => "full",
+            Self::Restarted => "restarted",
+            Self::Baseline => "baseline",
+            Self::SecondBaseline => "baseline2",
+        }
+    }
+
+    /// Colour on white, as red, green and blue from 0 to 255.
+    pub fn colour(self) -> [u8; 3] {
+        match self {
+            Self::Recorded => [31, 95, 168],
+            Self::Full => [194, 87, 12],
+            Self::Restarted => [35, 122, 62],
+            Self::Baseline => [123, 63, 160],
+            Self::SecondBaseline => [110, 110, 110],
+        }
+    }
+
+    /// Lengths of dashes and gaps, so that lines differ in grey print too; empty for a full line.
+    pub fn dashes(self) -> &'static [f64] {
+        match self {
+            Self::Recorded => &[],
+            Self::Full => &[6.0, 2.5],
+            Self::Restarted => &[2.0, 1.6],
+            Self::Baseline => &[8.0, 2.0, 2.0, 2.0],
+            Self::SecondBaseline => &[1.0, 2.0],
+        }
+    }
+}
+
+/// One line: points in the order of x; a point without y breaks the line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// What it stands for.
+    pub role: Role,
+    /// Pairs of x and y.
+    pub points: Vec<(f64, Option<f64>)>,
+}
+
+/// Lines over one axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinePlot {
+    /// What is drawn, with its unit, such as `body.x, m`.
+    pub title: String,
+    /// The lines.
+    pub series: Vec<Series>,
+    /// Ranges of x with a grey ground, such as flight.
+    pub shaded: Vec<(f64, f64)>,
+}
+
+/// Magnitudes of a matrix as shades.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeatMap {
+    /// What is drawn.
+    pub title: String,
+    /// Names of the rows.
+    pub rows: Vec<String>,
+    /// Names of the columns.
+    pub columns: Vec<String>,
+    /// Values, a row after the other.
+    pub values: Vec<f64>,
+}
+
+/// One frame of a figure.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Panel {
+    /// Lines.
+    Lines(LinePlot),
+    /// Shades.
+    Heat(HeatMap),
+}
+
+impl Panel {
+    /// Its title.
+    pub fn title(&self) -> &str {
+        match self {
+            Self::Lines(plot) => &plot.title,
+            Self::Heat(map) => &map.title,
+        }
+    }
+}
+
+/// Panels that belong together, with a caption and a legend.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// Stem of its files.
+    pub id: String,
+    /// What it shows, as a paper's caption.
+    pub caption: String,
+    /// The common axis below, such as `time, s`.
+    pub x_label: String,
+    /// Size of a panel in points: width and height.
+    pub panel_size: (f64, f64),
+    /// Panels side by side when drawn on a page of their own.
+    pub columns: usize,
+    /// The panels.
+    pub panels: Vec<Panel>,
+    /// What the lines stand for, in the order of the legend.
+    pub legend: Vec<(Role, String)>,
+}

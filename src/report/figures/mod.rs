@@ -1,0 +1,17 @@
+//! Figures: data that draws itself as SVG and PDF and lists itself as CSV.
+//!
+//! A [`Figure`] holds numbers and words. `draw.rs` turns its panels into a list of marks, once;
+//! `svg.rs` and `pdf.rs` spell the same marks. Start with `figure.rs`.
+
+mod csv;
+mod draw;
+mod figure;
+mod pdf;
+mod svg;
+mod ticks;
+
+pub use csv::csv;
+pub use draw::{Anchor, Mark, Paint, PanelDrawing, draw_panel};
+pub use figure::{Figure, HeatMap, LinePlot, Panel, Role, Series};
+pub use pdf::pdf;
+pub use svg::{panel_svg, standalone_svg};

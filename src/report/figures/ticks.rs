@@ -1,0 +1,59 @@
+//! Round numbers along an axis.
+
+/// Round values within `low..=high`, about `count` of them, and the decimal places that they need.
+pub fn ticks(low: f64, high: f64, count: usize) -> (Vec<f64>, usize) {
+    let rough = (high - low) / count.max(1) as f64;
+    if !rough.is_finite() || rough <= 0.0 {
+        return (vec![low], 2);
+    }
+    let power = 10f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .map(|factor| factor * power)
+        .into_iter()
+        .find(|step| *step >= rough * 0.999)
+        .unwrap_or(10.0 * power);
+    let places = (-step.log10().floor()).max(0.0) as usize;
+    let first = (low / step - 1e-9).ceil() as i64;
+    let last = (high / step + 1e-9).floor() as i64;
+    let values = (first..=last).map(|index| index as f64 * step).collect();
+    (values, places)
+}
+
+/// The range of values with a margin; a range around a constant.
+pub fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = values
+        .filter(|value| value.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(value), high.max(value))
+        });
+    if low > high {
+        return (0.0, 1.0);
+    }
+    let margin = 0.06 * (high - low);
+    if margin > 0.0 {
+        (low - margin, high + margin)
+    } else {
+        let around = 0.05 * low.abs() + 1e-6;
+        (low - around, high + around)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        assert_eq!(ticks(-0.13, 0.52, 4).0, [0.0, 0.2, 0.4]);
+        let (values, places) = ticks(0.301, 0.309, 3);
+        assert_eq!(places, 3);
+        assert!(values.iter().all(|v| (0.301..=0.309).contains(v)));
+    }
+
+    #[test]
+    fn constant_values_get_a_range() {
+        let (low, high) = padded([2.0, 2.0].into_iter());
+        assert!(low < 2.0 && high > 2.0);
+        assert_eq!(padded(std::iter::empty()), (0.0, 1.0));
+    }
+}
