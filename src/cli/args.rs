@@ -45,6 +45,10 @@ pub enum Command {
     Mpc(MpcArguments),
     /// Put equations, errors, baselines and the controller's torques on one HTML page
     Report(ReportArguments),
+    /// Write man pages, one a command
+    Manual(ManualArguments),
+    /// Print completions for a shell
+    Completions(CompletionsArguments),
 }
 
 impl Command {
@@ -60,6 +64,8 @@ impl Command {
             Self::Simulate(arguments) => arguments.output_format.json,
             Self::Mpc(arguments) => arguments.output_format.json,
             Self::Report(arguments) => arguments.output_format.json,
+            Self::Manual(arguments) => arguments.output_format.json,
+            Self::Completions(arguments) => arguments.output_format.json,
         }
     }
 }
@@ -573,6 +579,35 @@ pub struct ReportArguments {
     /// Replace an existing page, or write into a folder that holds files romc did not make
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// `romc manual`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc manual --out-dir ~/.local/share/man/man1 && man romc-compile"
+)]
+pub struct ManualArguments {
+    /// Folder for the pages
+    #[arg(long, value_name = "DIR")]
+    pub out_dir: PathBuf,
+    /// Replace files in the folder that romc did not make
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// `romc completions`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc completions bash > ~/.local/share/bash-completion/completions/romc"
+)]
+pub struct CompletionsArguments {
+    /// The shell: bash, zsh, fish, elvish or powershell
+    #[arg(value_enum, value_name = "SHELL")]
+    pub shell: clap_complete::Shell,
     #[command(flatten)]
     pub output_format: OutputArguments,
 }

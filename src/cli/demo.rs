@@ -12,7 +12,7 @@ use super::Answer;
 use super::args::{DemoArguments, EquationArguments};
 use super::mpc::NamedRun;
 use super::output::{Table, significant, spinner};
-use super::{compile, mpc as mpc_command, simulate};
+use super::{compile, mpc as mpc_command, report, simulate};
 use crate::backend::{EmittedFile, Target};
 use crate::evaluate::Assessment;
 use crate::files::Overwrite;
@@ -65,6 +65,15 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let control = Control::along(&model, &jumps)?;
     let commands = mpc_command::command_table(&model, &control.transpose);
     files.push(EmittedFile::new("commands.csv", commands));
+    progress.set_message("drawing the report");
+    let report = report::page_of(
+        &model,
+        &evaluation,
+        &control.transpose,
+        &control.consistent,
+        &["romc demo".to_owned()],
+    )?;
+    files.push(EmittedFile::new("report.html", report.page));
     let made = compile::write(&arguments.out_dir, &files, overwrite)?;
     progress.set_message("checking the C code");
     let self_test = self_test(&model, &arguments.out_dir);

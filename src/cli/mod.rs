@@ -11,6 +11,7 @@ mod import;
 mod inspect;
 mod inspect_model;
 mod inspect_recording;
+mod manual;
 mod mpc;
 mod output;
 mod report;
@@ -70,6 +71,8 @@ fn execute(command: Command) -> Result<Answer, Error> {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Mpc(arguments) => mpc::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
+        Command::Manual(arguments) => manual::pages(&arguments),
+        Command::Completions(arguments) => Ok(manual::completions(&arguments)),
     }
 }
 

@@ -78,7 +78,7 @@ pub struct Made {
 ///
 /// # Errors
 /// Whatever simulating, controlling or typesetting refuses.
-pub fn make(
+fn make(
     model: &ReducedModel,
     recordings: &[Recording],
     restart_every_s: f64,
@@ -96,15 +96,32 @@ pub fn make(
     };
     let (plain, consistent) = (along(Lift::Transpose)?, along(Lift::Consistent)?);
     progress.set_message("drawing");
+    let made = page_of(model, &assessment, &plain, &consistent, commands);
+    progress.finish_and_clear();
+    made
+}
+
+/// Draws what was assessed, and the controller's runs with the plain and with the consistent lift.
+///
+/// # Errors
+/// [`Error::Model`] for a model without encoder or decoder, [`Error::Emit`] for one that cannot be
+/// typeset.
+pub fn page_of(
+    model: &ReducedModel,
+    assessment: &Assessment<'_>,
+    plain: &[NamedRun],
+    consistent: &[NamedRun],
+    commands: &[String],
+) -> Result<Made, Error> {
     let content = Content {
         model,
-        assessment: &assessment,
-        runs: &consistent,
+        assessment,
+        runs: consistent,
     };
     let figures = all_figures(&content)?;
     let options = PageOptions {
         commands: commands.to_vec(),
-        ..options(model, &assessment, &plain, &consistent)
+        ..options(model, assessment, plain, consistent)
     };
     let page = page(&content, &figures, &options)?;
     let mut files = Vec::new();
@@ -117,7 +134,6 @@ pub fn make(
         files.push(EmittedFile::new(format!("{id}.pdf"), pdf(figure)));
         files.push(EmittedFile::new(format!("{id}.csv"), csv(figure)));
     }
-    progress.finish_and_clear();
     Ok(Made {
         page,
         files,

@@ -153,7 +153,7 @@ type Samples = Vec<Option<DVector<f64>>>;
 fn predicted(
     run: &SegmentRun<'_>,
     rollout: &Rollout,
-    value: &dyn Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>, ModelError>,
+    value: impl Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>, ModelError>,
 ) -> Result<Samples, ModelError> {
     let mut samples = vec![None; run.latent.len()];
     for (sample, window, column) in rollout.predictions() {
@@ -210,8 +210,8 @@ fn coordinates(
     place: &Place,
 ) -> Result<[Figure; 2], ModelError> {
     let decode = |_: usize, z: &DVector<f64>, _: &DVector<f64>| model.decode(z);
-    let full = predicted(run, &run.full, &decode)?;
-    let restarted = predicted(run, &run.restarted, &decode)?;
+    let full = predicted(run, &run.full, decode)?;
+    let restarted = predicted(run, &run.restarted, decode)?;
     let panel = |row: usize| {
         let of = |samples: &Samples, k: usize| samples[k].as_ref().map(|x| x[row]);
         Panel::Lines(LinePlot {
@@ -257,8 +257,8 @@ fn accelerations(
         let u_lat = run.latent.u_lat.column(k).into_owned();
         model.ddz(run.latent.phase[k], z, dz, &u_lat)
     };
-    let full = predicted(run, &run.full, &ddz)?;
-    let restarted = predicted(run, &run.restarted, &ddz)?;
+    let full = predicted(run, &run.full, ddz)?;
+    let restarted = predicted(run, &run.restarted, ddz)?;
     let panel = |row: usize| {
         let of = |samples: &Samples, k: usize| samples[k].as_ref().map(|x| x[row]);
         Panel::Lines(LinePlot {
@@ -293,7 +293,7 @@ fn baselines(
     place: &Place,
 ) -> Result<Figure, ModelError> {
     let decode = |_: usize, z: &DVector<f64>, _: &DVector<f64>| model.decode(z);
-    let full = predicted(run, &run.full, &decode)?;
+    let full = predicted(run, &run.full, decode)?;
     let roles = [Role::Baseline, Role::SecondBaseline];
     let panel = |row: usize, axis: usize, title: &str| {
         let mut lines = vec![

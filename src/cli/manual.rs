@@ -1,0 +1,77 @@
+//! `romc manual` and `romc completions`: what a shell and `man` want to know about the commands.
+
+use clap::CommandFactory as _;
+use serde_json::json;
+
+use super::Answer;
+use super::args::{Arguments, CompletionsArguments, ManualArguments};
+use crate::Error;
+use crate::backend::{EmittedFile, write_files};
+use crate::files::Overwrite;
+
+/// Writes `romc.1` and `romc-COMMAND.1` for each command.
+///
+/// # Errors
+/// [`Error::Folder`] for files in the folder that romc did not make; [`Error::Write`] if a page
+/// cannot be made.
+pub fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
+    let mut root = Arguments::command();
+    root.build();
+    let mut files = vec![file(&arguments.out_dir, "romc", root.clone())?];
+    for command in root.get_subcommands() {
+        if command.get_name() == "help" {
+            continue;
+        }
+        let name = format!("romc-{}", command.get_name());
+        files.push(file(&arguments.out_dir, &name, command.clone())?);
+    }
+    let overwrite = Overwrite::when_forced(arguments.force);
+    let written = write_files(&arguments.out_dir, &files, overwrite)?;
+    let paths: Vec<String> = (written.iter())
+        .map(|path| path.display().to_string())
+        .collect();
+    Ok(Answer {
+        text: format!("{}\n", paths.join("\n")),
+        json: json!({ "command": "manual", "files": paths }),
+    })
+}
+
+fn file(
+    folder: &std::path::Path,
+    name: &str,
+    command: clap::Command,
+) -> Result<EmittedFile, Error> {
+    let path = format!("{name}.1");
+    let mut page = Vec::new();
+    let title = name.to_uppercase();
+    let command = command.display_name(name.to_owned());
+    clap_mangen::Man::new(command)
+        .title(title)
+        // a date would make every build's pages differ
+        .date("")
+        .render(&mut page)
+        .map_err(|source| Error::Write {
+            path: folder.join(&path),
+            source,
+        })?;
+    Ok(EmittedFile::new(
+        path,
+        String::from_utf8_lossy(&page).into_owned(),
+    ))
+}
+
+/// The completions of one shell.
+pub fn completions(arguments: &CompletionsArguments) -> Answer {
+    let mut script = Vec::new();
+    let mut command = Arguments::command();
+    clap_complete::generate(arguments.shell, &mut command, "romc", &mut script);
+    let text = String::from_utf8_lossy(&script).into_owned();
+    Answer {
+        json: json!({
+            "command": "completions",
+            "shell": arguments.shell.to_string(),
+            "script": text,
+        }),
+        text,
+    }
+}
