@@ -127,13 +127,12 @@ fn draw_lines(plot: &LinePlot, size: (f64, f64), x_label: &str) -> Vec<Mark> {
     let title = plot.title.clone();
     marks.push(Mark::Text(LEFT, TOP - 6.0, Anchor::Start, title));
     for series in &plot.series {
-        for stretch in thinned(&series.points).split(|point| point.1.is_none()) {
+        // a line ends where it leaves the frame
+        let inside = |y: f64| (axes.y.0..=axes.y.1).contains(&y);
+        let points = thinned(&series.points);
+        for stretch in points.split(|point| !point.1.is_some_and(inside)) {
             let line: Vec<(f64, f64)> = (stretch.iter())
-                .filter_map(|&(x, y)| {
-                    // what leaves the frame is cut at its edge
-                    let y = y?.clamp(axes.y.0, axes.y.1);
-                    Some((axes.x_at(x), axes.y_at(y)))
-                })
+                .filter_map(|&(x, y)| Some((axes.x_at(x), axes.y_at(y?))))
                 .collect();
             if line.len() > 1 {
                 marks.push(Mark::Line(line, series.role));
@@ -261,7 +260,7 @@ mod tests {
             title: "body.z, m".to_owned(),
             series: vec![
                 line(Role::Recorded, [0.2, 0.3, 0.25]),
-                line(Role::Full, [0.2, 1e9, -1e9]),
+                line(Role::Full, [0.2, 0.21, -1e9]),
             ],
             shaded: vec![(1.0, 9.0)],
         };
@@ -271,7 +270,8 @@ mod tests {
             Mark::Rectangle(..) | Mark::Rule(..) | Mark::Text(..) => None,
         });
         let points: Vec<_> = lines.flatten().collect();
-        assert_eq!(points.len(), 6);
+        // three recorded, two before the prediction leaves
+        assert_eq!(points.len(), 5);
         let inside = |p: &&(f64, f64)| (0.0..=240.0).contains(&p.0) && (0.0..=150.0).contains(&p.1);
         assert!(points.iter().all(inside));
     }
