@@ -261,7 +261,7 @@ pub struct StudyArguments {
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
     /// Weight of the complexity in the combined loss 2 E_dec + 2 lambda log |Xi|
-    #[arg(long, default_value_t = 0.001)]
+    #[arg(long, default_value_t = crate::study::LAMBDA)]
     pub lambda: f64,
     /// Compute only this part of the study, such as 3/8
     #[arg(long, value_name = "PART", value_parser = Shard::parse, conflicts_with = "merge")]
@@ -570,6 +570,9 @@ pub struct ReportArguments {
     /// The page to write
     #[arg(long, value_name = "FILE.html")]
     pub output: PathBuf,
+    /// Folder of a finished `romc study`, to show figures 10 and 11
+    #[arg(long, value_name = "DIR")]
+    pub study: Option<PathBuf>,
     /// Also write each figure as SVG, PDF and CSV into this folder
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,

@@ -69,8 +69,8 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let report = report::page_of(
         &model,
         &evaluation,
-        &control.transpose,
-        &control.consistent,
+        [&control.transpose, &control.consistent],
+        None,
         &["romc demo".to_owned()],
     )?;
     files.push(EmittedFile::new("report.html", report.page));

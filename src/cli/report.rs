@@ -18,6 +18,7 @@ use crate::mpc::{Lift, MpcSettings, ReferenceInput};
 use crate::recording::Recording;
 use crate::report::figures::{csv, pdf, standalone_svg};
 use crate::report::{Content, PageOptions, PageTable, all_figures, page};
+use crate::study::{LAMBDA, Store, Summary};
 use crate::{Error, artifact};
 
 /// Writes the page, and the figures if a folder for them is given.
@@ -29,12 +30,11 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     check_output(Some(&arguments.output), overwrite)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings)?;
-    let made = make(
-        &model,
-        &recordings,
-        arguments.restart_every,
-        &commands(arguments),
-    )?;
+    let study = match &arguments.study {
+        None => None,
+        Some(folder) => Some(Summary::of(&Store::open(folder)?.cells()?, LAMBDA)),
+    };
+    let made = make(&model, &recordings, study.as_ref(), arguments)?;
     write_file(&arguments.output, made.page.as_bytes(), overwrite)?;
     let mut text = format!(
         "{}: {} kB, {} figures\n",
@@ -81,11 +81,11 @@ pub struct Made {
 fn make(
     model: &ReducedModel,
     recordings: &[Recording],
-    restart_every_s: f64,
-    commands: &[String],
+    study: Option<&Summary>,
+    arguments: &ReportArguments,
 ) -> Result<Made, Error> {
     let progress = spinner("rolling the model out");
-    let assessment = Assessment::over(model, recordings, restart_every_s)?;
+    let assessment = Assessment::over(model, recordings, arguments.restart_every)?;
     progress.set_message("running the controller");
     let along = |lift| {
         let settings = MpcSettings {
@@ -96,7 +96,8 @@ fn make(
     };
     let (plain, consistent) = (along(Lift::Transpose)?, along(Lift::Consistent)?);
     progress.set_message("drawing");
-    let made = page_of(model, &assessment, &plain, &consistent, commands);
+    let commands = commands(arguments);
+    let made = page_of(model, &assessment, [&plain, &consistent], study, &commands);
     progress.finish_and_clear();
     made
 }
@@ -109,14 +110,15 @@ fn make(
 pub fn page_of(
     model: &ReducedModel,
     assessment: &Assessment<'_>,
-    plain: &[NamedRun],
-    consistent: &[NamedRun],
+    [plain, consistent]: [&[NamedRun]; 2],
+    study: Option<&Summary>,
     commands: &[String],
 ) -> Result<Made, Error> {
     let content = Content {
         model,
         assessment,
         runs: consistent,
+        study,
     };
     let figures = all_figures(&content)?;
     let options = PageOptions {
@@ -214,9 +216,12 @@ fn commands(arguments: &ReportArguments) -> Vec<String> {
     };
     let (model, recordings) = (quoted(&arguments.model), paths(&arguments.recordings));
     let every = arguments.restart_every;
+    let study = (arguments.study.as_ref()).map_or(String::new(), |folder| {
+        format!(" --study {}", quoted(folder))
+    });
     vec![
         format!(
-            "romc report {model} {recordings} --restart-every {every} --output {}",
+            "romc report {model} {recordings} --restart-every {every}{study} --output {}",
             quoted(&arguments.output)
         ),
         format!("romc simulate {model} {recordings} --restart-every {every}"),

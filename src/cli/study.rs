@@ -11,6 +11,8 @@ use super::train_settings;
 use crate::Error;
 use crate::files::Overwrite;
 use crate::recording::Recording;
+use crate::report::figures::{csv, pdf, standalone_svg};
+use crate::report::study_figures;
 use crate::robot::Robot;
 use crate::study::{self, Plan, Shard, Spread, Store, Summary, cells_csv};
 use crate::train::{Origin, Recordings};
@@ -36,6 +38,11 @@ pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
     };
     write("cells.csv", cells_csv(&cells, arguments.lambda))?;
     write("summary.csv", summary.csv())?;
+    for figure in &study_figures(&summary) {
+        write(&format!("{}.svg", figure.id), standalone_svg(figure))?;
+        write(&format!("{}.pdf", figure.id), pdf(figure))?;
+        write(&format!("{}.csv", figure.id), csv(figure))?;
+    }
     Ok(answer(&arguments.out_dir, &store, &summary))
 }
 

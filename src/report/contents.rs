@@ -4,12 +4,14 @@ use std::path::PathBuf;
 
 use nalgebra::DVector;
 
+use super::complexity::study_figures;
 use super::figures::{Figure, HeatMap, LinePlot, Panel, Role, Series};
 use crate::evaluate::{Assessment, SegmentRun};
 use crate::model::{ModelError, ReducedModel};
 use crate::mpc::Run;
 use crate::robot::{JOINT_DIM, Robot};
 use crate::sim::Rollout;
+use crate::study::Summary;
 
 /// Segments that get figures of their own; tables cover all.
 const MAX_SEGMENTS: usize = 3;
@@ -25,6 +27,8 @@ pub struct Content<'a> {
     pub assessment: &'a Assessment<'a>,
     /// The controller along each recording, with the lift that keeps torques and forces consistent.
     pub runs: &'a [(PathBuf, Run)],
+    /// A study over the latent dimension, if there is one.
+    pub study: Option<&'a Summary>,
 }
 
 /// Figures of one section of the page.
@@ -40,6 +44,8 @@ pub struct AllFigures {
     pub baselines: Vec<Figure>,
     /// Torques commanded by the controller, and its latent trajectory.
     pub control: Vec<Figure>,
+    /// Accuracy against complexity.
+    pub study: Vec<Figure>,
 }
 
 impl AllFigures {
@@ -50,6 +56,7 @@ impl AllFigures {
             .chain(&self.accelerations)
             .chain(&self.baselines)
             .chain(&self.control)
+            .chain(&self.study)
     }
 }
 
@@ -79,6 +86,9 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
         };
         figures.control.push(torques(run, &place));
         figures.control.push(latent_tracking(model, run, &place));
+    }
+    if let Some(summary) = content.study {
+        figures.study = study_figures(summary);
     }
     Ok(figures)
 }

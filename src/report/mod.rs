@@ -4,9 +4,11 @@
 //! `contents.rs` picks what is drawn, `figures/` draws it, `page.rs` places it. Start with
 //! `page.rs`.
 
+mod complexity;
 mod contents;
 pub mod figures;
 mod page;
 
+pub use complexity::study_figures;
 pub use contents::{AllFigures, Content, all_figures};
 pub use page::{PageOptions, PageTable, page};

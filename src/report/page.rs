@@ -53,7 +53,7 @@ pub fn page(
     options: &PageOptions,
 ) -> Result<String, EmitError> {
     let model = content.model;
-    let sections = vec![
+    let mut sections = vec![
         section(
             "latent",
             "What the latent coordinates are",
@@ -93,6 +93,15 @@ pub fn page(
             &options.control,
         ),
     ];
+    if !figures.study.is_empty() {
+        sections.push(section(
+            "study",
+            "How many latent coordinates",
+            &[STUDY_WORDS],
+            &figures.study,
+            &[],
+        ));
+    }
     let typeset = Typeset::new(model, &SymbolTable::default(), Rounding::default())?;
     let page = Page {
         name: HtmlText(model.name()).to_string(),
@@ -128,6 +137,8 @@ const COORDINATE_WORDS: &str = "The model is started from the recorded state and
 const DYNAMICS_WORDS: &str = "Eigenvalues belong to each phase's linearisation at its mean state: a positive real part means that small deviations grow at that rate. The input gain is the matrix by which latent inputs accelerate the latent coordinates; its rank counts singular values above 1 % of the largest.";
 const BASELINE_WORDS: &str = "The actuated spring-loaded inverted pendulum under the same forces, with the published constants and with the constants that fit the accelerations of these very recordings best.";
 const CONTROL_WORDS: &str = "At each control step the controller sees the recorded state and plans along the recording. Its commands are not fed back to a robot: this tells what it would have commanded where the robot really was.";
+
+const STUDY_WORDS: &str = "One model for every latent dimension and seed, judged on recordings that were not trained on. With more coordinates the decoder errs less and the equations grow.";
 
 fn phases(content: &Content<'_>, typeset: &Typeset) -> Vec<PhaseView> {
     let options = LatexOptions {

@@ -5,6 +5,9 @@ use serde::{Deserialize, Serialize};
 use super::plan::CellId;
 use crate::train::{SetMetrics, TrainReport};
 
+/// The published weight of complexity in (29).
+pub const LAMBDA: f64 = 0.001;
+
 /// One training and its outcome.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

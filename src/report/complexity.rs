@@ -1,0 +1,132 @@
+//! Accuracy against complexity over the latent dimension: figures 10 and 11 of the paper.
+
+use super::figures::{Figure, LinePlot, Panel, Role, Series};
+use crate::study::{DimensionSummary, Spread, Summary};
+
+const PANEL: (f64, f64) = (360.0, 210.0);
+
+/// Figures 10 (decoder error and active coefficients) and 11 (combined loss) of a study; bars are one standard deviation
+/// over the seeds to either side.
+pub fn study_figures(summary: &Summary) -> Vec<Figure> {
+    let figure = |id: &str, caption: String, panels: Vec<Panel>| Figure {
+        id: id.to_owned(),
+        caption,
+        x_label: "latent coordinates".to_owned(),
+        panel_size: PANEL,
+        columns: 2,
+        panels,
+        legend: vec![
+            (Role::Recorded, "mean over seeds".to_owned()),
+            (Role::SecondBaseline, "standard deviation".to_owned()),
+        ],
+    };
+    let rows = &summary.dimensions;
+    let over_dimensions = vec![
+        panel("log10 of decoder mean square, scaled units", rows, |row| {
+            logarithm(row.decoder_mse)
+        }),
+        panel("active coefficients in contact", rows, |row| {
+            range(row.active)
+        }),
+        panel("x after 0.1 s, mm", rows, |row| {
+            millimetres(row.prediction_x_m)
+        }),
+        panel("z after 0.1 s, mm", rows, |row| {
+            millimetres(row.prediction_z_m)
+        }),
+    ];
+    let combined = panel("combined loss", rows, |row| range(row.combined_loss));
+    vec![
+        figure(
+            "complexity",
+            "Accuracy against complexity over the latent dimension (figure 10 of the paper)"
+                .to_owned(),
+            over_dimensions,
+        ),
+        figure(
+            "combined-loss",
+            format!(
+                "Combined loss 2 E_dec + 2 lambda log |Xi| with lambda = {} (figure 11 of the paper)",
+                summary.lambda
+            ),
+            vec![combined],
+        ),
+    ]
+}
+
+/// Lower end, middle and upper end of a bar.
+type Bar = [f64; 3];
+
+fn range(Spread { mean, std }: Spread) -> Bar {
+    [mean - std, mean, mean + std]
+}
+
+fn millimetres(spread: Spread) -> Bar {
+    range(spread).map(|metres| 1000.0 * metres)
+}
+
+/// Logarithms of a bar; one that reaches below zero ends at a tenth of its middle.
+fn logarithm(spread: Spread) -> Bar {
+    let [low, mean, high] = range(spread);
+    [low.max(0.1 * mean), mean, high].map(f64::log10)
+}
+
+fn panel(title: &str, rows: &[DimensionSummary], bar: impl Fn(&DimensionSummary) -> Bar) -> Panel {
+    let (mut means, mut bars) = (Vec::new(), Vec::new());
+    for row in rows {
+        let (x, [low, mean, high]) = (row.latent_dim as f64, bar(row));
+        means.push((x, Some(mean)));
+        bars.extend([(x, Some(low)), (x, Some(high)), (x, None)]);
+    }
+    let series = |role, points| Series { role, points };
+    Panel::Lines(LinePlot {
+        title: title.to_owned(),
+        series: vec![
+            series(Role::SecondBaseline, bars),
+            series(Role::Recorded, means),
+        ],
+        shaded: Vec::new(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_reach_a_standard_deviation_to_either_side_and_do_not_join() {
+        let spread = |mean, std| Spread { mean, std };
+        let row = |latent_dim, active| DimensionSummary {
+            latent_dim,
+            trained: 5,
+            refused: 0,
+            decoder_mse: spread(1e-4, 2e-4),
+            active,
+            combined_loss: spread(1.0, 0.0),
+            torque_r2: spread(0.9, 0.0),
+            prediction_x_m: spread(0.002, 0.001),
+            prediction_z_m: spread(0.002, 0.001),
+        };
+        let summary = Summary {
+            lambda: 0.001,
+            dimensions: vec![row(1, spread(10.0, 2.0)), row(2, spread(20.0, 3.0))],
+        };
+        let figures = study_figures(&summary);
+        let Panel::Lines(active) = &figures[0].panels[1] else {
+            panic!("a line plot");
+        };
+        let bars = &active.series[0].points;
+        assert_eq!(
+            bars[..3],
+            [(1.0, Some(8.0)), (1.0, Some(12.0)), (1.0, None)]
+        );
+        assert_eq!(
+            active.series[1].points,
+            [(1.0, Some(10.0)), (2.0, Some(20.0))]
+        );
+        let Panel::Lines(decoder) = &figures[0].panels[0] else {
+            panic!("a line plot");
+        };
+        assert_eq!(decoder.series[0].points[0], (1.0, Some(-5.0)));
+    }
+}
