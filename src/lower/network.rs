@@ -1,7 +1,7 @@
 //! The maps of nonlinear encoders and decoders.
 //!
-//! A layer's products with its weights go through a table ([`Statement::Accumulate`]
-//! (crate::ir::Statement)); activations and their slopes are scalar operations without branches.
+//! A layer's products with its weights go through a table, [`crate::ir::Statement::Accumulate`];
+//! activations and their slopes are scalar operations without branches.
 //! Velocities run forwards through the layers, lifted inputs backwards; the projection takes the
 //! Jacobian row by row and solves with it.
 
