@@ -112,7 +112,9 @@ pub fn run_table(runs: &[NamedRun]) -> Table {
         "torque R^2 contact",
         "flight",
         "rms N m",
+        "lift R^2 contact",
         "limit violations",
+        "friction violations",
         "median us",
         "p99 us",
     ];
@@ -130,7 +132,11 @@ pub fn run_table(runs: &[NamedRun]) -> Table {
             optional(summary.torque_r2.contact),
             optional(summary.torque_r2.flight),
             optional(summary.torque_rms_nm),
+            optional(summary.lift_r2.contact),
             summary.limit_violations.to_string(),
+            summary
+                .friction_violations
+                .map_or("-".to_owned(), |count| count.to_string()),
             format!("{:.0}", summary.step_us.p50),
             format!("{:.0}", summary.step_us.p99),
         ]);
@@ -185,6 +191,7 @@ pub fn run_json((path, run): &NamedRun) -> Value {
         "torque_r2": {
             "contact": summary.torque_r2.contact, "flight": summary.torque_r2.flight,
         },
+        "lift_r2": { "contact": summary.lift_r2.contact, "flight": summary.lift_r2.flight },
         "torque_rms_nm": summary.torque_rms_nm,
         "tracking_rms": summary.tracking_rms,
         "limit_violations": summary.limit_violations,

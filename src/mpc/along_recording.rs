@@ -99,6 +99,7 @@ pub fn along_recording(
             progress(rows.len(), total);
         }
     }
+    tally.lift = lift_comparison(controller, recording)?;
     Ok(Run {
         summary: tally.summary(),
         rows,

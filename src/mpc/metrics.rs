@@ -38,6 +38,9 @@ pub struct Summary {
     pub step_us: StepTimes,
     /// Agreement of commanded and recorded torques, see [`Comparison::r2`].
     pub torque_r2: ByContact,
+    /// The same for torques that the lift alone makes of projected recorded inputs, at every sample;
+    /// see [`lift_comparison`](super::lift_comparison).
+    pub lift_r2: ByContact,
     /// Root mean square of commanded minus recorded torques over all steps and joints, N m.
     pub torque_rms_nm: Option<f64>,
     /// Root mean square over all steps, stages and latents of planned minus reference position, in
@@ -137,6 +140,7 @@ pub(super) struct Tally {
     times_us: Vec<f64>,
     inconsistency: (f64, usize),
     pub(super) torque: Comparison,
+    pub(super) lift: Comparison,
     pub(super) tracking: MeanSquare,
     pub(super) limit_violations: usize,
     pub(super) friction_violations: Option<usize>,
@@ -183,6 +187,7 @@ impl Tally {
             failed: self.failed,
             step_us: step_times(&self.times_us),
             torque_r2: self.torque.r2(),
+            lift_r2: self.lift.r2(),
             torque_rms_nm: self.torque.rms(),
             tracking_rms: (self.tracking.count > 0)
                 .then(|| (self.tracking.sum / self.tracking.count as f64).sqrt()),

@@ -152,3 +152,65 @@ fn hardware_jump_gets_torques_within_the_limits_with_either_lift() {
         }
     }
 }
+
+/// Every recording of a Go1 that comes with romc, and the hardware jump where there is one.
+fn go1_recordings() -> Vec<Recording> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folders = ["go1", "go1-noisy"].map(|set| root.join("examples/recordings").join(set));
+    let mut paths: Vec<_> = folders
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(folder).expect("recordings come with romc"))
+        .map(|entry| entry.expect("a readable folder").path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "gz"))
+        .collect();
+    paths.sort();
+    let hardware = root.join("../shared/data/go1_hardware_jump.csv");
+    if hardware.exists() {
+        paths.push(hardware);
+    }
+    paths
+        .iter()
+        .map(|path| romc::recording::read(path).expect("a sound recording"))
+        .collect()
+}
+
+#[test]
+fn shipped_models_stay_within_limits_and_friction_at_every_step_of_every_recording() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let recordings = go1_recordings();
+    assert!(recordings.len() >= 25);
+    for (name, least_lift_r2) in [("go1-d4", 0.94), ("go1-d6", 0.97)] {
+        let model = romc::artifact::read(&root.join(format!("models/{name}.json"))).expect("sound");
+        for lift in [Lift::Transpose, Lift::Consistent] {
+            let settings = MpcSettings {
+                lift,
+                ..MpcSettings::default()
+            };
+            let mut controller = Controller::new(&model, settings).expect("complete");
+            let mut steps = 0;
+            for recording in &recordings {
+                let run = along_recording(
+                    &mut controller,
+                    recording,
+                    ReferenceInput::Recorded,
+                    |_, _| {},
+                )
+                .expect("a sound recording");
+                let summary = run.summary;
+                let path = recording.path.display();
+                steps += summary.steps;
+                assert_eq!(summary.limit_violations, 0, "{name} {lift:?} {path}");
+                assert!(
+                    !summary.friction_violations.is_some_and(|count| count > 0),
+                    "{name} {lift:?} {path}: {summary:?}"
+                );
+                let is_test = path.to_string().contains("go1/test_");
+                if is_test && lift == Lift::Consistent {
+                    let r2 = summary.lift_r2.contact.expect("feet touch the ground");
+                    assert!(r2 >= least_lift_r2, "{name} {path}: {r2}");
+                }
+            }
+            assert!(steps > 3000, "{steps}");
+        }
+    }
+}
