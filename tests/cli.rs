@@ -351,8 +351,8 @@ fn study_in_parts_and_resumed_equals_the_whole() {
     let expected = contents(Path::new(&whole));
     assert_eq!(
         expected.len(),
-        4 + 3,
-        "four models, the plan and two tables"
+        4 + 3 + 6,
+        "four models, the plan, two tables, two figures in three forms"
     );
 
     let part = run(&["--shard", "1/2"], &first);
