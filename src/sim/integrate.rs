@@ -27,8 +27,8 @@ pub struct IntegrationOptions {
 impl Default for IntegrationOptions {
     fn default() -> Self {
         Self {
-            relative_tolerance: 1e-9,
-            absolute_tolerance: 1e-11,
+            relative_tolerance: 1e-11,
+            absolute_tolerance: 1e-13,
             divergence_bound: 1e6,
             explicit_steps_per_time: 50,
         }
