@@ -1,0 +1,120 @@
+"""Other solvers on the controller's problems: times, iterations, distance from its solution.
+
+    cargo bench --bench mpc -- --dump problems.jsonl
+    python -m venv venv && venv/bin/pip install -r benches/mpc_solvers/requirements.txt
+    venv/bin/python benches/mpc_solvers/compare.py problems.jsonl
+
+Each solver is set up once a jump (the rows that matter differ between jumps) and then only updated,
+as the controller does it; times are those of this thread's CPU clock for update and solve. The controller's own are printed by the bench.
+"""
+
+import json
+import sys
+import time
+
+import numpy as np
+import osqp
+import piqp
+from scipy import sparse
+
+INFINITY = 1e20
+
+
+def matrix(stored):
+    parts = (stored["data"], stored["indices"], stored["indptr"])
+    return sparse.csc_matrix(parts, shape=stored["shape"])
+
+
+def read(path):
+    """Problems min x'Px/2 + q'x subject to Ax = b in the first rows, Ax <= b in the others."""
+    with open(path, encoding="utf-8") as lines:
+        for line in lines:
+            stored = json.loads(line)
+            yield {
+                "P": matrix(stored["P"]),
+                "q": np.array(stored["q"]),
+                "A": matrix(stored["A"]),
+                "b": np.array(stored["b"]),
+                "equalities": stored["equalities"],
+                "solution": np.array(stored["solution"]),
+            }
+
+
+class Osqp:
+    def __init__(self, tolerance):
+        self.settings = {"eps_abs": tolerance, "eps_rel": tolerance, "max_iter": 20000}
+        self.solver = None
+
+    def solve(self, problem):
+        upper = problem["b"]
+        lower = np.full_like(upper, -INFINITY)
+        lower[: problem["equalities"]] = upper[: problem["equalities"]]
+        if self.solver is None:
+            self.solver = osqp.OSQP()
+            self.solver.setup(
+                problem["P"], problem["q"], problem["A"], lower, upper, verbose=False, **self.settings
+            )
+        else:
+            self.solver.update(
+                q=problem["q"], l=lower, u=upper, Px=problem["P"].data, Ax=problem["A"].data
+            )
+        result = self.solver.solve()
+        return result.x, result.info.iter
+
+
+class Piqp:
+    def __init__(self, tolerance):
+        self.tolerance = tolerance
+        self.solver = None
+
+    def solve(self, problem):
+        n = problem["equalities"]
+        rows = problem["A"].tocsr()
+        equal, other = rows[:n].tocsc(), rows[n:].tocsc()
+        arguments = (problem["P"], problem["q"], equal, problem["b"][:n], other)
+        lower = np.full(other.shape[0], -np.inf)
+        if self.solver is None:
+            self.solver = piqp.SparseSolver()
+            self.solver.settings.eps_abs = self.tolerance
+            self.solver.settings.eps_rel = self.tolerance
+            self.solver.setup(*arguments, lower, problem["b"][n:])
+        else:
+            self.solver.update(*arguments, lower, problem["b"][n:])
+        self.solver.solve()
+        return np.array(self.solver.result.x), self.solver.result.info.iter
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    problems = list(read(sys.argv[1]))
+    solvers = {
+        "OSQP 1e-3": Osqp(1e-3),
+        "OSQP 1e-6": Osqp(1e-6),
+        "PIQP 1e-6": Piqp(1e-6),
+        "PIQP 1e-8": Piqp(1e-8),
+    }
+    print(f"{len(problems)} problems; CPU time of update and solve in us; `off` is the largest")
+    print("distance of an unknown from the controller's, all unknowns being scaled to about one")
+    print(f"{'':<12}{'median':>9}{'p99':>9}{'iterations':>12}{'median off':>12}{'p99 off':>10}")
+    for name, solver in solvers.items():
+        times, iterations, off = [], [], []
+        pattern = None
+        for problem in problems:
+            if pattern != (problem["A"].shape, problem["A"].nnz):
+                pattern = (problem["A"].shape, problem["A"].nnz)
+                solver.solver = None
+                solver.solve(problem)
+            started = time.thread_time_ns()
+            x, count = solver.solve(problem)
+            times.append((time.thread_time_ns() - started) * 1e-3)
+            iterations.append(count)
+            off.append(np.abs(x - problem["solution"]).max())
+        print(
+            f"{name:<12}{np.median(times):>9.0f}{np.percentile(times, 99):>9.0f}"
+            f"{np.median(iterations):>12.0f}{np.median(off):>12.1e}{np.percentile(off, 99):>10.1e}"
+        )
+
+
+if __name__ == "__main__":
+    main()
