@@ -134,11 +134,61 @@ fn demo_makes_equations_code_and_commands_and_tells_how_well_it_does() {
         "go1_d4.h",
         "go1_d4/src/lib.rs",
         "commands.csv",
+        "report.html",
     ] {
         assert!(Path::new(&out).join(name).is_file(), "{name}");
     }
     let table = done(&["demo", "--out-dir", &out]);
     assert!(table.contains("ASLIP") && table.contains("self-test of the emitted C: passed"));
+}
+
+#[test]
+fn report_is_one_page_without_requests_and_its_figures_are_files() {
+    let folder = folder();
+    let (page, figures) = (path(&folder, "report.html"), path(&folder, "figures"));
+    let value = json(&[
+        "report",
+        MODEL,
+        JUMP,
+        "--output",
+        &page,
+        "--figures",
+        &figures,
+    ]);
+    let html = std::fs::read_to_string(&page).expect("a page");
+    assert_eq!(value["bytes"], html.len());
+    assert!(html.len() < 3_000_000);
+    for elsewhere in ["src=", "url(", "@import", "http://", "https://"] {
+        assert!(!html.contains(elsewhere), "{elsewhere}");
+    }
+    for part in [
+        "<math",
+        "ASLIP, fitted constants",
+        "Copy LaTeX",
+        "romc simulate",
+    ] {
+        assert!(html.contains(part), "{part}");
+    }
+    for id in ["encoder", "joints_1", "body_1", "aslip_1", "torques_1"] {
+        for kind in ["svg", "pdf", "csv"] {
+            let file = Path::new(&figures).join(format!("{id}.{kind}"));
+            assert!(file.is_file(), "{}", file.display());
+        }
+    }
+}
+
+#[test]
+fn manual_has_a_page_for_every_command_and_completions_know_them() {
+    let folder = folder();
+    let out = path(&folder, "man");
+    done(&["manual", "--out-dir", &out]);
+    let script = done(&["completions", "bash"]);
+    for command in ["train", "compile", "report", "mpc"] {
+        let page = Path::new(&out).join(format!("romc-{command}.1"));
+        let text = std::fs::read_to_string(page).expect("a page");
+        assert!(text.contains(&format!("romc {command}")), "{command}");
+        assert!(script.contains(command), "{command}");
+    }
 }
 
 #[test]
