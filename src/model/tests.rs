@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, SVD};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 use super::*;
 use crate::robot::ContactFlags;
@@ -278,7 +279,7 @@ fn arbitrary_lift() -> impl Strategy<Value = (DMatrix<f64>, Vec<f64>, Vec<f64>)>
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 300, rng_seed: RngSeed::Fixed(7), ..ProptestConfig::default() })]
 
     #[test]
     fn projection_of_a_lifted_input_is_that_input(

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use nalgebra::DVector;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use romc::artifact::import::*;
 use romc::model::{ReducedModel, StandardLibrary};
 
@@ -231,7 +232,7 @@ fn equations_that_do_not_fit_the_options_are_refused() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 96, rng_seed: RngSeed::Fixed(7), ..ProptestConfig::default() })]
 
     /// Whatever the coefficients, they arrive with all their bits.
     #[test]

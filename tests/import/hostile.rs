@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use romc::artifact::import::*;
 use romc::model::Scaling;
 use zip::CompressionMethod;
@@ -57,7 +58,7 @@ const EQUATIONS: &str = "# two phases\n[contact]\nddz1 = 0.5*z1 - 2*(u1 + dz1)\n
                          [flight]\nddz1 = -9.81\n";
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 400, rng_seed: RngSeed::Fixed(7), ..ProptestConfig::default() })]
 
     #[test]
     fn damaged_safetensors_never_panic(bytes in damaged(safetensors(&stored()))) {
