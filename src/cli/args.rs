@@ -261,7 +261,7 @@ pub struct StudyArguments {
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
     /// Weight of the complexity in the combined loss 2 E_dec + 2 lambda log |Xi|
-    #[arg(long, default_value_t = crate::study::LAMBDA)]
+    #[arg(long, default_value_t = crate::evaluate::LAMBDA)]
     pub lambda: f64,
     /// Compute only this part of the study, such as 3/8
     #[arg(long, value_name = "PART", value_parser = Shard::parse, conflicts_with = "merge")]

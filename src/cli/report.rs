@@ -11,14 +11,14 @@ use super::mpc::{NamedRun, run_all, run_table};
 use super::output::{Table, check_output, read_recordings, significant, spinner, write_file};
 use super::simulate::{baseline_table, coordinate_table, dynamics_table, phase_table};
 use crate::backend::{EmittedFile, write_files};
-use crate::evaluate::Assessment;
+use crate::evaluate::{Assessment, LAMBDA};
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::mpc::{Lift, MpcSettings, ReferenceInput};
 use crate::recording::Recording;
 use crate::report::figures::{csv, pdf, standalone_svg};
 use crate::report::{Content, PageOptions, PageTable, all_figures, page};
-use crate::study::{LAMBDA, Store, Summary};
+use crate::study::{Store, Summary};
 use crate::{Error, artifact};
 
 /// Writes the page, and the figures if a folder for them is given.

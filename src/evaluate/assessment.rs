@@ -3,7 +3,7 @@
 use super::aslip::AslipRollout;
 use super::baseline::Baseline;
 use super::coordinates::{CoordinateSums, PointwiseSums};
-use super::lift::{LiftSums, combined_loss};
+use super::lift::{LAMBDA, LiftSums, combined_loss};
 use super::linearised::{LinearisedPhase, linearise_phases};
 use super::metrics::Fit;
 use crate::Error;
@@ -133,7 +133,7 @@ impl<'a> Assessment<'a> {
 
     /// The combined loss of equation (29).
     pub fn combined_loss(&self) -> Option<f64> {
-        combined_loss(self.decoder_mean_square()?, self.active_terms)
+        combined_loss(self.decoder_mean_square()?, self.active_terms, LAMBDA)
     }
 
     /// Fit of the coordinate with this name.

@@ -114,13 +114,15 @@ fn jointly(joints: &[FitSums]) -> Option<f64> {
     total.fit().and_then(|fit| fit.r2)
 }
 
-/// The combined loss `L_mod = 2 E_dec + 2 lambda ln |Xi|` with `lambda = 0.001` (equation 29), of the
-/// decoder's mean square (scaled units) and the number of active terms in all phases.
+/// The published weight of complexity in the combined loss (29).
+pub const LAMBDA: f64 = 0.001;
+
+/// The combined loss `L_mod = 2 E_dec + 2 lambda ln |Xi|` (equation 29), of the decoder's mean square
+/// (scaled units) and the number of active terms in all phases.
 /// None for a model without terms.
-pub fn combined_loss(decoder_mean_square: f64, active_terms: usize) -> Option<f64> {
-    const LAMBDA: f64 = 0.001;
+pub fn combined_loss(decoder_mean_square: f64, active_terms: usize, lambda: f64) -> Option<f64> {
     let logarithm = (active_terms > 0).then(|| (active_terms as f64).ln())?;
-    Some(2.0 * decoder_mean_square + 2.0 * LAMBDA * logarithm)
+    Some(2.0 * decoder_mean_square + 2.0 * lambda * logarithm)
 }
 
 #[cfg(test)]
@@ -132,9 +134,9 @@ mod tests {
 
     #[test]
     fn combined_loss_follows_equation_29() {
-        let loss = combined_loss(0.01, 10).expect("terms");
+        let loss = combined_loss(0.01, 10, LAMBDA).expect("terms");
         assert!((loss - (0.02 + 0.002 * 10f64.ln())).abs() < 1e-15);
-        assert_eq!(combined_loss(0.01, 0), None);
+        assert_eq!(combined_loss(0.01, 0, LAMBDA), None);
     }
 
     #[test]

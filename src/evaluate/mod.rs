@@ -17,6 +17,6 @@ pub use aslip::{Aslip, AslipRollout, AslipSums};
 pub use assessment::{Assessment, SegmentRun};
 pub use baseline::{Baseline, Template, fit_aslip};
 pub use coordinates::{CoordinateSums, PointwiseSums};
-pub use lift::{LiftSums, combined_loss};
+pub use lift::{LAMBDA, LiftSums, combined_loss};
 pub use linearised::{LinearisedPhase, RANK_THRESHOLD, linearise_phases};
 pub use metrics::{Fit, FitSums};

@@ -3,10 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::plan::CellId;
+use crate::evaluate::combined_loss;
 use crate::train::{SetMetrics, TrainReport};
-
-/// The published weight of complexity in (29).
-pub const LAMBDA: f64 = 0.001;
 
 /// One training and its outcome.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,8 +72,10 @@ impl Figures {
         values.iter().all(|value| value.is_finite())
     }
 
-    /// `L_mod = 2 E_dec + 2 lambda log |Xi|` (29), natural logarithm.
+    /// `L_mod = 2 E_dec + 2 lambda ln |Xi|` (29), over the active coefficients of all phases; without any, the
+    /// logarithm counts as 0.
     pub fn combined_loss(&self, lambda: f64) -> f64 {
-        2.0 * self.decoder_mse + 2.0 * lambda * (self.active.max(1) as f64).ln()
+        combined_loss(self.decoder_mse, self.active_all_phases.max(1), lambda)
+            .expect("at least one coefficient")
     }
 }

@@ -12,7 +12,7 @@ mod run;
 mod store;
 mod summary;
 
-pub use cell::{Cell, Figures, LAMBDA, Outcome};
+pub use cell::{Cell, Figures, Outcome};
 pub use error::StudyError;
 pub use plan::{CellId, Plan, Shard};
 pub use run::run;

@@ -41,7 +41,7 @@ pub struct DimensionSummary {
     pub decoder_mse: Spread,
     /// Active coefficients in contact.
     pub active: Spread,
-    /// `2 E_dec + 2 lambda log |Xi|` (29).
+    /// `2 E_dec + 2 lambda ln |Xi|` (29), over all phases.
     pub combined_loss: Spread,
     /// Coefficient of determination of the torques of the plain lift.
     pub torque_r2: Spread,
