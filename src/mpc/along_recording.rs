@@ -4,13 +4,13 @@
 //! This is not a closed loop, the robot does not feel the commands. It asks what the controller
 //! would have commanded where the robot really was, and compares with what was commanded then.
 
-use super::command::{Command, Source, Status};
-use super::controller::{Controller, Measurement};
 use super::error::MpcError;
-use super::lift::{Footing, foot_forces};
 use super::metrics::{Comparison, Summary, Tally};
-use super::reference::ReferenceSamples;
-use super::settings::Lift;
+use super::online::lift::foot_forces;
+use super::online::problem::upright;
+use super::online::{
+    Command, ControlError, Controller, Footing, Lift, Measurement, ReferenceSamples, Source, Status,
+};
 use crate::recording::{Recording, Segment};
 use crate::robot::{ContactFlags, JOINT_DIM, Robot, STATE_DIM};
 
@@ -218,7 +218,7 @@ fn set_reference(
     segment: &Segment,
     reference_input: ReferenceInput,
     input: &[f64],
-) -> Result<(), MpcError> {
+) -> Result<(), ControlError> {
     controller.set_reference(ReferenceSamples {
         time_s: &segment.time_s,
         x: segment.x.as_slice(),
@@ -342,7 +342,7 @@ fn friction_violated(
         Lift::Transpose => {
             let coefficient = settings.body_friction?;
             let lifted = plant.lift(&command.u_lat);
-            let rotation = super::problem::upright(footing.attitude_rad);
+            let rotation = upright(footing.attitude_rad);
             let force =
                 rotation.map(|row| (0..3).map(|k| row[k] * lifted[JOINT_DIM + k]).sum::<f64>());
             Some(force[0].hypot(force[1]) > coefficient * force[2] + tolerance_n)

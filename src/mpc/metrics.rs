@@ -1,6 +1,6 @@
 //! What a run comes to: counts, times and the agreement of torques.
 
-use super::command::{Command, Status};
+use super::online::{Command, Status};
 use crate::robot::{ContactFlags, JOINT_DIM};
 
 /// A figure for steps with and without ground contact; none where there were too few steps.

@@ -4,8 +4,9 @@
 //! statistics; a reference trajectory; measurements. Out: a [`Command`] a control step, whose torques
 //! are within the robot's limits whatever happened, and a [`Status`] that says what did.
 //!
-//! Read `problem` first, which states the optimal control problem. From there one torque is made by
-//! `reference` (what to follow, encoded), `horizon` (phases and linearised dynamics of the stages,
+//! `of_model` takes from the model what the controller needs; `online` is the controller itself,
+//! the folder that is emitted for a robot. Read `online/problem` first, which states the optimal
+//! control problem. From there one torque is made by `reference` (what to follow, encoded), `horizon` (phases and linearised dynamics of the stages,
 //! with `linearise`), `transcribe` (the conic program), `qp` (clarabel, and the check of what it
 //! returns), `controller` (plan to command; what to do without a plan) and, if asked for, `lift`
 //! (torques that the ground can answer). [`along_recording`] runs it all on recorded jumps.
@@ -25,36 +26,12 @@
 //! ```
 
 mod along_recording;
-mod command;
-mod controller;
 mod error;
-pub mod estimate;
-mod horizon;
-mod lift;
-pub mod linearise;
 mod metrics;
-mod plan;
-mod plant;
-pub mod problem;
-mod prune;
-mod qp;
-mod reference;
-mod settings;
-mod sparse;
-mod transcribe;
+mod of_model;
+mod online;
 
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
-pub use command::{Command, Source, Status};
-pub use controller::{Controller, Measurement};
 pub use error::MpcError;
-pub use lift::{ConsistentLift, Footing, LiftFailure};
 pub use metrics::{ByContact, Comparison, StepTimes, Summary};
-pub use plan::Plan;
-pub use plant::{Plant, PlantPhase};
-pub use qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, SolverProfile};
-pub use reference::{Reference, ReferenceSamples};
-pub use settings::{
-    Drift, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput, MpcSettings,
-    RowSelection,
-};
-pub use sparse::SparseColumns;
+pub use online::*;

@@ -3,8 +3,8 @@
 use nalgebra::DVector;
 use romc::model::ReducedModel;
 use romc::mpc::{
-    Command, Controller, Drift, Linearisation, Measurement, MissingInput, MpcError, MpcSettings,
-    ReferenceSamples, Source, Status,
+    Command, ControlError, Controller, Drift, Linearisation, Measurement, MissingInput, MpcError,
+    MpcSettings, ReferenceSamples, Source, Status,
 };
 use romc::robot::ContactFlags;
 use romc::sim::CompiledModel;
@@ -376,7 +376,7 @@ fn stage_rows_keep_only_what_can_be_active() {
 fn settings_out_of_range_are_refused_by_name() {
     let model = model(Equations::Linear);
     let refused = |settings| match Controller::new(&model, settings) {
-        Err(MpcError::Setting { name, .. }) => name,
+        Err(MpcError::Control(ControlError::Setting { name, .. })) => name,
         other => panic!("{other:?}"),
     };
     assert_eq!(
@@ -422,7 +422,7 @@ fn references_that_do_not_fit_are_refused_and_the_old_one_stays() {
     assert!(
         matches!(
             error,
-            MpcError::ReferenceValue {
+            ControlError::ReferenceValue {
                 name: "dx",
                 sample: 7,
                 coordinate: 4,
@@ -437,7 +437,7 @@ fn references_that_do_not_fit_are_refused_and_the_old_one_stays() {
         .set_reference(bad_time.samples())
         .expect_err("time jumps back");
     assert!(
-        matches!(error, MpcError::ReferenceTime { sample: 9, .. }),
+        matches!(error, ControlError::ReferenceTime { sample: 9, .. }),
         "{error}"
     );
     let short = ReferenceSamples {
@@ -450,7 +450,7 @@ fn references_that_do_not_fit_are_refused_and_the_old_one_stays() {
     assert!(
         matches!(
             error,
-            MpcError::ReferenceShape {
+            ControlError::ReferenceShape {
                 name: "x",
                 found: 7217,
                 expected: 7218
@@ -466,7 +466,7 @@ fn references_that_do_not_fit_are_refused_and_the_old_one_stays() {
         .set_reference(feet)
         .expect_err("one sample of feet is missing");
     assert!(
-        matches!(error, MpcError::ReferenceShape { name: "feet", .. }),
+        matches!(error, ControlError::ReferenceShape { name: "feet", .. }),
         "{error}"
     );
     let single = ReferenceSamples {
@@ -480,7 +480,7 @@ fn references_that_do_not_fit_are_refused_and_the_old_one_stays() {
     assert!(
         matches!(
             error,
-            MpcError::ReferenceLen {
+            ControlError::ReferenceLen {
                 found: 1,
                 expected: 2
             }

@@ -1,5 +1,6 @@
 //! The stages of the horizon at a control step: phases, reference, linearised dynamics.
 
+use super::dynamics::LatentDynamics;
 use super::linearise::{Lineariser, StageModel};
 use super::plan::Plan;
 use super::plant::Plant;
@@ -8,7 +9,6 @@ use super::reference::Reference;
 use super::settings::{Drift, Linearisation, MpcSettings};
 use super::transcribe::Stage;
 use crate::robot::ContactFlags;
-use crate::sim::CompiledModel;
 
 /// How the feet's phase relates to the reference's at a control step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,7 +86,7 @@ impl Horizon {
     pub fn prepare(
         &mut self,
         scene: &Scene<'_>,
-        dynamics: &mut CompiledModel,
+        dynamics: &mut dyn LatentDynamics,
         time_s: f64,
         feet: ContactFlags,
     ) -> Contact {
@@ -196,7 +196,7 @@ impl Horizon {
     fn linearise(
         &mut self,
         scene: &Scene<'_>,
-        dynamics: &mut CompiledModel,
+        dynamics: &mut dyn LatentDynamics,
         index: usize,
         start_s: f64,
     ) {

@@ -1,10 +1,10 @@
 //! The trajectory that the controller follows, in latent coordinates.
 
-use super::error::MpcError;
+use super::dynamics::LatentDynamics;
+use super::error::ControlError;
 use super::estimate::{Motion, estimate_input};
 use super::plant::{Plant, add_product};
 use crate::robot::{ContactFlags, FOOT_DIM, STATE_DIM};
-use crate::sim::CompiledModel;
 
 /// A trajectory in SI units as its user has it: samples one after the other.
 #[derive(Debug, Clone, Copy)]
@@ -48,11 +48,11 @@ impl Reference {
     /// Encodes a trajectory.
     ///
     /// # Errors
-    /// [`MpcError::ReferenceLen`] below two samples, [`MpcError::ReferenceShape`] if array lengths
-    /// disagree, [`MpcError::ReferenceValue`] for values that are not finite,
-    /// [`MpcError::ReferenceTime`] if time does not increase and [`MpcError::ReferencePhase`] if a
+    /// [`ControlError::ReferenceLen`] below two samples, [`ControlError::ReferenceShape`] if array lengths
+    /// disagree, [`ControlError::ReferenceValue`] for values that are not finite,
+    /// [`ControlError::ReferenceTime`] if time does not increase and [`ControlError::ReferencePhase`] if a
     /// foot pattern selects no phase.
-    pub fn new(plant: &Plant, samples: ReferenceSamples<'_>) -> Result<Self, MpcError> {
+    pub fn new(plant: &Plant, samples: ReferenceSamples<'_>) -> Result<Self, ControlError> {
         check(plant, &samples)?;
         let d = plant.latent_dim();
         let count = samples.time_s.len();
@@ -84,7 +84,7 @@ impl Reference {
 
     /// Gives a trajectory that comes without its input the one that the model finds behind its
     /// accelerations.
-    pub(super) fn estimate_input(&mut self, plant: &Plant, dynamics: &mut CompiledModel) {
+    pub(super) fn estimate_input(&mut self, plant: &Plant, dynamics: &mut dyn LatentDynamics) {
         let phase: Vec<usize> = self
             .feet
             .iter()
@@ -263,10 +263,10 @@ fn deviations(state: &[f64], latent_dim: usize) -> Vec<f64> {
     deviation
 }
 
-fn check(plant: &Plant, samples: &ReferenceSamples<'_>) -> Result<(), MpcError> {
+fn check(plant: &Plant, samples: &ReferenceSamples<'_>) -> Result<(), ControlError> {
     let count = samples.time_s.len();
     if count < 2 {
-        return Err(MpcError::ReferenceLen {
+        return Err(ControlError::ReferenceLen {
             found: count,
             expected: 2,
         });
@@ -279,7 +279,7 @@ fn check(plant: &Plant, samples: &ReferenceSamples<'_>) -> Result<(), MpcError> 
     for (name, values) in arrays {
         let Some(values) = values else { continue };
         if values.len() != count * STATE_DIM {
-            return Err(MpcError::ReferenceShape {
+            return Err(ControlError::ReferenceShape {
                 name,
                 found: values.len(),
                 expected: count * STATE_DIM,
@@ -289,7 +289,7 @@ fn check(plant: &Plant, samples: &ReferenceSamples<'_>) -> Result<(), MpcError> 
     }
     if samples.feet.len() != count {
         let (found, expected) = (samples.feet.len() * FOOT_DIM, count * FOOT_DIM);
-        return Err(MpcError::ReferenceShape {
+        return Err(ControlError::ReferenceShape {
             name: "feet",
             found,
             expected,
@@ -298,7 +298,7 @@ fn check(plant: &Plant, samples: &ReferenceSamples<'_>) -> Result<(), MpcError> 
     check_finite("time_s", samples.time_s, 1)?;
     for (sample, pair) in samples.time_s.windows(2).enumerate() {
         if pair[1] <= pair[0] {
-            return Err(MpcError::ReferenceTime {
+            return Err(ControlError::ReferenceTime {
                 sample,
                 before: pair[0],
                 after: pair[1],
@@ -307,16 +307,16 @@ fn check(plant: &Plant, samples: &ReferenceSamples<'_>) -> Result<(), MpcError> 
     }
     for (sample, &feet) in samples.feet.iter().enumerate() {
         if plant.phase_for(feet).is_none() {
-            return Err(MpcError::ReferencePhase { sample, feet });
+            return Err(ControlError::ReferencePhase { sample, feet });
         }
     }
     Ok(())
 }
 
-fn check_finite(name: &'static str, values: &[f64], width: usize) -> Result<(), MpcError> {
+fn check_finite(name: &'static str, values: &[f64], width: usize) -> Result<(), ControlError> {
     match values.iter().position(|value| !value.is_finite()) {
         None => Ok(()),
-        Some(index) => Err(MpcError::ReferenceValue {
+        Some(index) => Err(ControlError::ReferenceValue {
             name,
             sample: index / width,
             coordinate: index % width,

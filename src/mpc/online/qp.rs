@@ -17,7 +17,7 @@ use clarabel::solver::{
     DefaultSettings, DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT,
 };
 
-use super::error::MpcError;
+use super::error::ControlError;
 use super::sparse::SparseColumns;
 
 /// One factor of the cone that holds the slack `s = b − A x`.
@@ -153,8 +153,8 @@ impl QpSolver {
     /// Builds a solver for the program's pattern; its values are the first data.
     ///
     /// # Errors
-    /// [`MpcError::Solver`] if the sizes of the program's parts disagree or clarabel refuses it.
-    pub fn new(program: ConeProgram, settings: QpSettings) -> Result<Self, MpcError> {
+    /// [`ControlError::Solver`] if the sizes of the program's parts disagree or clarabel refuses it.
+    pub fn new(program: ConeProgram, settings: QpSettings) -> Result<Self, ControlError> {
         let cones: Vec<SupportedConeT<f64>> =
             program.cones.iter().map(|&cone| supported(cone)).collect();
         let solver = DefaultSolver::new(
@@ -165,7 +165,7 @@ impl QpSolver {
             &cones,
             clarabel_settings(&settings),
         )
-        .map_err(|error| MpcError::Solver {
+        .map_err(|error| ControlError::Solver {
             reason: error.to_string(),
         })?;
         Ok(Self {

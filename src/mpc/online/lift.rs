@@ -18,7 +18,7 @@
 
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector};
 
-use super::error::MpcError;
+use super::error::ControlError;
 use super::plant::{Plant, PlantPhase};
 use super::problem::upright;
 use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver};
@@ -74,8 +74,8 @@ impl ConsistentLift {
     /// Prepares the lift.
     ///
     /// # Errors
-    /// [`MpcError::Solver`] if the conic solver refuses the program.
-    pub fn new(plant: &Plant, settings: &MpcSettings) -> Result<Self, MpcError> {
+    /// [`ControlError::Solver`] if the conic solver refuses the program.
+    pub fn new(plant: &Plant, settings: &MpcSettings) -> Result<Self, ControlError> {
         let projection = plant.projection_matrix();
         let row = |latent: usize| projection.row(latent);
         Ok(Self {
@@ -221,7 +221,7 @@ impl ConsistentLift {
 }
 
 /// The upright force of each foot in contact by its leg's torques, or none if a leg is singular.
-pub(super) fn foot_forces(
+pub(crate) fn foot_forces(
     plant: &Plant,
     footing: &Footing,
 ) -> Option<[Option<Matrix3<f64>>; FOOT_DIM]> {

@@ -5,7 +5,9 @@ use std::time::Instant;
 use nalgebra::{DMatrix, SVector};
 
 use super::command::{Command, Source, Status};
-use super::error::MpcError;
+use super::dynamics::LatentDynamics;
+use super::error::ControlError;
+use super::fallback::Memory;
 use super::horizon::{Contact, Horizon, Scene};
 use super::lift::{ConsistentLift, Footing, LiftFailure};
 use super::plan::Plan;
@@ -15,9 +17,7 @@ use super::qp::{Outcome, QpSolver};
 use super::reference::{Reference, ReferenceSamples};
 use super::settings::{Lift, MissingInput, MpcSettings, RowSelection};
 use super::transcribe::{StepData, Transcription, Weights};
-use crate::model::ReducedModel;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
-use crate::sim::CompiledModel;
 
 /// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the
 /// rows that were left out may hide.
@@ -34,9 +34,9 @@ const SMALL_FORCE_N: f64 = 1.0;
 /// measurements make sense again, so do commands.
 #[derive(Debug)]
 pub struct Controller {
-    plant: Plant,
-    dynamics: CompiledModel,
-    settings: MpcSettings,
+    pub(super) plant: Plant,
+    dynamics: Box<dyn LatentDynamics>,
+    pub(super) settings: MpcSettings,
     /// Rows for any reference; the transcription has those that matter near the present one.
     rows: StageRows,
     transcription: Transcription,
@@ -44,41 +44,11 @@ pub struct Controller {
     roots: Vec<DMatrix<f64>>,
     horizon: Horizon,
     consistent: Option<ConsistentLift>,
-    reference: Option<Reference>,
-    plan: Plan,
+    pub(super) reference: Option<Reference>,
+    pub(super) plan: Plan,
     /// Latent state of the posture that is commanded.
     posture: Vec<f64>,
-    memory: Memory,
-}
-
-/// What a fallback goes back to.
-#[derive(Debug, Clone)]
-struct Memory {
-    time_s: Option<f64>,
-    measured: Vec<f64>,
-    input: Vec<f64>,
-    footing: Option<Footing>,
-    joint_velocity: [f64; JOINT_DIM],
-    /// Feed-forward part of the last torques, without a hold's damping.
-    feed_forward_nm: [f64; JOINT_DIM],
-    joint_position: Option<[f64; JOINT_DIM]>,
-    /// Measurements in a row that were not believed.
-    disbelieved: usize,
-}
-
-impl Memory {
-    fn new(latent_dim: usize) -> Self {
-        Self {
-            time_s: None,
-            measured: vec![0.0; 2 * latent_dim],
-            input: vec![0.0; latent_dim],
-            footing: None,
-            joint_velocity: [0.0; JOINT_DIM],
-            feed_forward_nm: [0.0; JOINT_DIM],
-            joint_position: None,
-            disbelieved: 0,
-        }
-    }
+    pub(super) memory: Memory,
 }
 
 /// One measurement.
@@ -95,15 +65,17 @@ pub struct Measurement<'a> {
 }
 
 impl Controller {
-    /// Builds a controller.
+    /// Builds a controller of a plant and its latent dynamics.
     ///
     /// # Errors
-    /// [`MpcError::Setting`] for settings out of range, those of [`Plant::new`] if the model lacks
-    /// something, [`MpcError::Lower`] if its dynamics do not compile and [`MpcError::Solver`] if the
+    /// [`ControlError::Setting`] for settings out of range and [`ControlError::Solver`] if the
     /// solver refuses the problem.
-    pub fn new(model: &ReducedModel, settings: MpcSettings) -> Result<Self, MpcError> {
+    pub fn with_plant(
+        plant: Plant,
+        dynamics: Box<dyn LatentDynamics>,
+        settings: MpcSettings,
+    ) -> Result<Self, ControlError> {
         settings.check()?;
-        let plant = Plant::new(model)?;
         let d = plant.latent_dim();
         let rows = StageRows::new(&plant, &settings);
         let horizon = Horizon::new(d, settings.horizon, rows.friction.clone());
@@ -113,7 +85,7 @@ impl Controller {
             Lift::Consistent => Some(ConsistentLift::new(&plant, &settings)?),
         };
         Ok(Self {
-            dynamics: CompiledModel::new(model)?,
+            dynamics,
             solver: QpSolver::new(program, settings.qp)?,
             roots: plant
                 .phases()
@@ -169,10 +141,10 @@ impl Controller {
     ///
     /// # Errors
     /// As [`Reference::new`] and [`QpSolver::new`]; the old reference stays.
-    pub fn set_reference(&mut self, samples: ReferenceSamples<'_>) -> Result<(), MpcError> {
+    pub fn set_reference(&mut self, samples: ReferenceSamples<'_>) -> Result<(), ControlError> {
         let mut reference = Reference::new(&self.plant, samples)?;
         if !reference.has_input() && self.settings.missing_input == MissingInput::Estimate {
-            reference.estimate_input(&self.plant, &mut self.dynamics);
+            reference.estimate_input(&self.plant, self.dynamics.as_mut());
         }
         let d = self.plant.latent_dim();
         let deviation = reference.deviation();
@@ -321,7 +293,7 @@ impl Controller {
         let (time_s, feet) = (measurement.time_s, measurement.feet);
         let contact = self
             .horizon
-            .prepare(&scene, &mut self.dynamics, time_s, feet);
+            .prepare(&scene, self.dynamics.as_mut(), time_s, feet);
         let last = self.settings.horizon - 1;
         let step = StepData {
             stages: self.horizon.stages(),
@@ -394,7 +366,7 @@ impl Controller {
     }
 
     /// Writes a stage of the plan into the command; false if its input cannot be lifted.
-    fn write_plan(&mut self, stage: usize, command: &mut Command) -> bool {
+    pub(super) fn write_plan(&mut self, stage: usize, command: &mut Command) -> bool {
         let (Some(reference), Some(end_s)) = (&self.reference, self.plan.end_s(stage)) else {
             return false;
         };
@@ -438,70 +410,5 @@ impl Controller {
         let produced = map * SVector::<f64, JOINT_DIM>::from(*torque_nm);
         let force = SVector::<f64, 6>::from_fn(|axis, _| lifted[JOINT_DIM + axis]);
         (force.norm() > SMALL_FORCE_N).then(|| (force - produced).norm() / force.norm())
-    }
-
-    /// The command without a plan of this step.
-    fn fall_back(&mut self, time_s: f64, command: &mut Command) {
-        let now = if time_s.is_finite() {
-            Some(time_s)
-        } else {
-            self.memory.time_s
-        };
-        let stages = self
-            .settings
-            .fallback
-            .plan_stages
-            .min(self.settings.horizon);
-        let stage = now
-            .and_then(|now| self.plan.stage_at(now))
-            .filter(|&stage| stage < stages);
-        match stage {
-            Some(stage) if self.write_plan(stage, command) => command.source = Source::ShiftedPlan,
-            Some(_) | None => self.hold(now, command),
-        }
-    }
-
-    /// Posture held, torque fading, joints damped.
-    fn hold(&mut self, now: Option<f64>, command: &mut Command) {
-        let fallback = &self.settings.fallback;
-        let fade = (-self.settings.step_s / fallback.torque_decay_s).exp();
-        // Velocities of a measurement that was refused must not become torques.
-        let damping = match command.status {
-            Status::NotFinite | Status::WrongDimension | Status::MeasurementJump => 0.0,
-            _ => fallback.damping_nm_s,
-        };
-        self.memory
-            .feed_forward_nm
-            .iter_mut()
-            .for_each(|torque| *torque *= fade);
-        let torque = std::array::from_fn(|joint| {
-            self.memory.feed_forward_nm[joint] - damping * self.memory.joint_velocity[joint]
-        });
-        command.torque_nm = self.plant.clamp_torque(torque);
-        command.joint_position_rad = match self.memory.joint_position {
-            Some(position) => position,
-            None => self.posture(now),
-        };
-        command.joint_velocity_rad_s = [0.0; JOINT_DIM];
-        command.u_lat.fill(0.0);
-        command.source = Source::Hold;
-    }
-
-    /// A posture to hold when no command has been given yet: the reference's at the time.
-    fn posture(&mut self, now: Option<f64>) -> [f64; JOINT_DIM] {
-        let d = self.plant.latent_dim();
-        let middle = self
-            .plant
-            .robot()
-            .joint_limit_rad()
-            .map(|(lower, upper)| 0.5 * (lower + upper));
-        match (&self.reference, now) {
-            (Some(reference), Some(now)) => {
-                reference.state_at(now, &mut self.memory.measured);
-                self.plant
-                    .clamp_joints(self.plant.decode_joints(&self.memory.measured[..d]))
-            }
-            _ => middle,
-        }
     }
 }

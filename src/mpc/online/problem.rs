@@ -240,7 +240,7 @@ pub(super) fn joint_rows(plant: &Plant) -> Vec<Row> {
 
 /// Rotation from the body frame to an upright frame with the same heading, `R_y(pitch) R_x(roll)`,
 /// row-major.
-pub(super) fn upright(attitude: [f64; 2]) -> [[f64; 3]; 3] {
+pub(crate) fn upright(attitude: [f64; 2]) -> [[f64; 3]; 3] {
     let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) =
         (attitude[0].sin_cos(), attitude[1].sin_cos());
     [

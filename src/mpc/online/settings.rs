@@ -1,6 +1,6 @@
 //! What a user can choose about the controller, with the values that it starts from.
 
-use super::error::MpcError;
+use super::error::ControlError;
 use super::qp::QpSettings;
 
 /// How a latent input becomes joint torques.
@@ -156,10 +156,10 @@ impl MpcSettings {
     /// Checks every number.
     ///
     /// # Errors
-    /// [`MpcError::Setting`] names the first one that is out of its range.
-    pub fn check(&self) -> Result<(), MpcError> {
+    /// [`ControlError::Setting`] names the first one that is out of its range.
+    pub fn check(&self) -> Result<(), ControlError> {
         if self.horizon == 0 || self.horizon > MAX_HORIZON {
-            return Err(MpcError::Setting {
+            return Err(ControlError::Setting {
                 name: "horizon",
                 found: self.horizon as f64,
                 expected: "1 to 500 stages",
@@ -183,7 +183,7 @@ impl MpcSettings {
         ];
         for (name, found) in positive {
             if !(found.is_finite() && found > 0.0) {
-                return Err(MpcError::Setting {
+                return Err(ControlError::Setting {
                     name,
                     found,
                     expected: "a positive number",
@@ -192,7 +192,7 @@ impl MpcSettings {
         }
         let damping = self.fallback.damping_nm_s;
         if !(damping.is_finite() && damping >= 0.0) {
-            return Err(MpcError::Setting {
+            return Err(ControlError::Setting {
                 name: "fallback.damping_nm_s",
                 found: damping,
                 expected: "zero or a positive number",

@@ -21,8 +21,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
+use super::dynamics::LatentDynamics;
 use super::plant::{Plant, PlantPhase};
-use crate::sim::CompiledModel;
 
 /// Half width of the window in which velocities are fitted by a straight line, s.
 const HALF_WINDOW_S: f64 = 0.016 + 1e-9;
@@ -52,7 +52,7 @@ struct Evidence {
 /// Latent inputs, `latent_dim` a sample.
 pub(super) fn estimate_input(
     plant: &Plant,
-    dynamics: &mut CompiledModel,
+    dynamics: &mut dyn LatentDynamics,
     motion: &Motion<'_>,
 ) -> Vec<f64> {
     let d = plant.latent_dim();

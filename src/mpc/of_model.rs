@@ -1,0 +1,136 @@
+//! From a model to what the controller runs on: its numbers and its programs.
+//!
+//! The one place where the controller meets [`ReducedModel`]; what it makes is data.
+
+use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
+
+use super::error::MpcError;
+use super::online::{Controller, LatentDynamics, MpcSettings, Plant, PlantParts, PlantPhase};
+use crate::model::ReducedModel;
+use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
+use crate::sim::CompiledModel;
+
+/// Share of the mean variance that is added to every variance, so that a direction in which the
+/// training inputs never moved has a finite weight.
+const VARIANCE_FLOOR: f64 = 1e-6;
+
+impl LatentDynamics for CompiledModel {
+    fn jacobian(
+        &mut self,
+        phase: usize,
+        z: &[f64],
+        dz: &[f64],
+        u_lat: &[f64],
+        ddz: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    ) {
+        CompiledModel::jacobian(self, phase, z, dz, u_lat, ddz, jacobian);
+    }
+}
+
+impl Controller {
+    /// A controller of a model.
+    ///
+    /// # Errors
+    /// [`MpcError::Control`] for settings out of range or a problem that the solver refuses, those
+    /// of [`Plant::new`] if the model lacks something and [`MpcError::Lower`] if its dynamics do
+    /// not compile.
+    pub fn new(model: &ReducedModel, settings: MpcSettings) -> Result<Self, MpcError> {
+        let plant = Plant::new(model)?;
+        let dynamics = Box::new(CompiledModel::new(model)?);
+        Ok(Self::with_plant(plant, dynamics, settings)?)
+    }
+}
+
+impl Plant {
+    /// Reads off a model what the controller needs.
+    ///
+    /// # Errors
+    /// [`MpcError::Model`] if the model has no encoder, decoder, scaling, robot or input
+    /// statistics, [`MpcError::StateDim`] if it is not over the robot's 18 coordinates, and
+    /// [`MpcError::Statistics`] if a covariance cannot be factorised.
+    pub fn new(model: &ReducedModel) -> Result<Self, MpcError> {
+        let robot = model.robot()?;
+        let (encoder, decoder) = (model.encoder()?, model.decoder()?);
+        if encoder.input_dim() != STATE_DIM {
+            return Err(MpcError::StateDim {
+                found: encoder.input_dim(),
+                expected: STATE_DIM,
+            });
+        }
+        let state_factors = model.state_factors()?;
+        let input_factors = model.input_factors()?;
+        let scaled_columns = |matrix: &DMatrix<f64>, factors: &DVector<f64>| {
+            DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, col| {
+                matrix[(row, col)] * factors[col]
+            })
+        };
+        let scaled_rows = |matrix: &DMatrix<f64>, factors: &DVector<f64>| {
+            DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, col| {
+                matrix[(row, col)] / factors[row]
+            })
+        };
+        let mut phases = Vec::with_capacity(model.phases().len());
+        for phase in 0..model.phases().len() {
+            phases.push(phase_of(model, phase)?);
+        }
+        Ok(Self::from_parts(PlantParts {
+            robot,
+            encoder: scaled_columns(encoder.weights(), &state_factors),
+            encoder_bias: encoder.bias().clone(),
+            decoder: scaled_rows(decoder.weights(), &state_factors),
+            decoder_bias: decoder.bias().component_div(&state_factors),
+            lift: scaled_rows(&encoder.weights().transpose(), &input_factors),
+            projection: scaled_columns(model.input_projection()?, &input_factors),
+            phases,
+            phase_of_feet: std::array::from_fn(|bits| model.phase_for(pattern(bits))),
+        })?)
+    }
+}
+
+fn phase_of(model: &ReducedModel, phase: usize) -> Result<PlantPhase, MpcError> {
+    let name = model.phases()[phase].name.clone();
+    let latent = model.latent_input_statistics(phase)?;
+    let input = model.input_statistics(phase)?;
+    let unusable = || MpcError::Statistics {
+        phase: name.clone(),
+    };
+    let latent_root = Cholesky::new(with_floor(latent.covariance))
+        .ok_or_else(unusable)?
+        .unpack();
+    let torque_covariance = with_floor(
+        input
+            .covariance
+            .view((0, 0), (JOINT_DIM, JOINT_DIM))
+            .into_owned(),
+    );
+    let torque_precision = Cholesky::new(torque_covariance)
+        .ok_or_else(unusable)?
+        .inverse();
+    Ok(PlantPhase {
+        is_grounded: model.phase_for([false; 4]) != Some(phase),
+        torque_mean: SVector::from_fn(|joint, _| input.mean[joint]),
+        torque_precision: SMatrix::from_fn(|row, col| torque_precision[(row, col)]),
+        latent_mean: latent.mean,
+        latent_root,
+        name,
+    })
+}
+
+fn with_floor(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
+    let dim = covariance.nrows();
+    let mean_variance = covariance.trace() / dim as f64;
+    let floor = if mean_variance > 0.0 {
+        VARIANCE_FLOOR * mean_variance
+    } else {
+        VARIANCE_FLOOR
+    };
+    for index in 0..dim {
+        covariance[(index, index)] += floor;
+    }
+    covariance
+}
+
+fn pattern(bits: usize) -> ContactFlags {
+    std::array::from_fn(|foot| bits >> foot & 1 == 1)
+}

@@ -1,0 +1,106 @@
+//! What is commanded when a step has no plan to trust.
+//!
+//! First the last good plan, shifted, for as many stages as the settings allow; then a hold: the
+//! posture stays, the feed-forward torque fades, the joints are damped.
+
+use super::command::{Command, Source, Status};
+use super::controller::Controller;
+use super::lift::Footing;
+use crate::robot::JOINT_DIM;
+
+/// What a fallback goes back to.
+#[derive(Debug, Clone)]
+pub(super) struct Memory {
+    pub time_s: Option<f64>,
+    pub measured: Vec<f64>,
+    pub input: Vec<f64>,
+    pub footing: Option<Footing>,
+    pub joint_velocity: [f64; JOINT_DIM],
+    /// Feed-forward part of the last torques, without a hold's damping.
+    pub feed_forward_nm: [f64; JOINT_DIM],
+    pub joint_position: Option<[f64; JOINT_DIM]>,
+    /// Measurements in a row that were not believed.
+    pub disbelieved: usize,
+}
+
+impl Memory {
+    pub(super) fn new(latent_dim: usize) -> Self {
+        Self {
+            time_s: None,
+            measured: vec![0.0; 2 * latent_dim],
+            input: vec![0.0; latent_dim],
+            footing: None,
+            joint_velocity: [0.0; JOINT_DIM],
+            feed_forward_nm: [0.0; JOINT_DIM],
+            joint_position: None,
+            disbelieved: 0,
+        }
+    }
+}
+
+impl Controller {
+    /// The command without a plan of this step.
+    pub(super) fn fall_back(&mut self, time_s: f64, command: &mut Command) {
+        let now = if time_s.is_finite() {
+            Some(time_s)
+        } else {
+            self.memory.time_s
+        };
+        let stages = self
+            .settings
+            .fallback
+            .plan_stages
+            .min(self.settings.horizon);
+        let stage = now
+            .and_then(|now| self.plan.stage_at(now))
+            .filter(|&stage| stage < stages);
+        match stage {
+            Some(stage) if self.write_plan(stage, command) => command.source = Source::ShiftedPlan,
+            Some(_) | None => self.hold(now, command),
+        }
+    }
+
+    /// Posture held, torque fading, joints damped.
+    fn hold(&mut self, now: Option<f64>, command: &mut Command) {
+        let fallback = &self.settings.fallback;
+        let fade = (-self.settings.step_s / fallback.torque_decay_s).exp();
+        // Velocities of a measurement that was refused must not become torques.
+        let damping = match command.status {
+            Status::NotFinite | Status::WrongDimension | Status::MeasurementJump => 0.0,
+            _ => fallback.damping_nm_s,
+        };
+        self.memory
+            .feed_forward_nm
+            .iter_mut()
+            .for_each(|torque| *torque *= fade);
+        let torque = std::array::from_fn(|joint| {
+            self.memory.feed_forward_nm[joint] - damping * self.memory.joint_velocity[joint]
+        });
+        command.torque_nm = self.plant.clamp_torque(torque);
+        command.joint_position_rad = match self.memory.joint_position {
+            Some(position) => position,
+            None => self.posture(now),
+        };
+        command.joint_velocity_rad_s = [0.0; JOINT_DIM];
+        command.u_lat.fill(0.0);
+        command.source = Source::Hold;
+    }
+
+    /// A posture to hold when no command has been given yet: the reference's at the time.
+    fn posture(&mut self, now: Option<f64>) -> [f64; JOINT_DIM] {
+        let d = self.plant.latent_dim();
+        let middle = self
+            .plant
+            .robot()
+            .joint_limit_rad()
+            .map(|(lower, upper)| 0.5 * (lower + upper));
+        match (&self.reference, now) {
+            (Some(reference), Some(now)) => {
+                reference.state_at(now, &mut self.memory.measured);
+                self.plant
+                    .clamp_joints(self.plant.decode_joints(&self.memory.measured[..d]))
+            }
+            _ => middle,
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! The numbers of one model on one robot, in SI units on the robot's side.
+//!
+//! Everything the controller needs besides the latent dynamics: the affine maps with their scale
+//! factors multiplied in, limits, and for each phase the distribution of the training inputs.
+
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+use super::error::ControlError;
+use crate::robot::{ContactFlags, JOINT_DIM, Robot, STATE_DIM};
+
+/// Maps, limits and input statistics of a model on its robot.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    latent_dim: usize,
+    parts: PlantParts,
+}
+
+/// The numbers of a [`Plant`], with scale factors multiplied in: SI units on the robot's side.
+#[derive(Debug, Clone)]
+pub struct PlantParts {
+    /// The robot.
+    pub robot: &'static Robot,
+    /// `W_e s_x`, `latent_dim × 18`.
+    pub encoder: DMatrix<f64>,
+    /// `b_e`, `latent_dim`.
+    pub encoder_bias: DVector<f64>,
+    /// `W_d / s_x`, `18 × latent_dim`.
+    pub decoder: DMatrix<f64>,
+    /// `b_d / s_x`, 18.
+    pub decoder_bias: DVector<f64>,
+    /// `W_eᵀ / s_u`, `18 × latent_dim`.
+    pub lift: DMatrix<f64>,
+    /// `pinv(W_eᵀ) s_u`, `latent_dim × 18`.
+    pub projection: DMatrix<f64>,
+    /// The model's phases, in its order.
+    pub phases: Vec<PlantPhase>,
+    /// The phase that each foot pattern selects, bit `k` of the position for foot `k`.
+    pub phase_of_feet: [Option<usize>; 16],
+}
+
+/// What the training inputs of one phase looked like.
+#[derive(Debug, Clone)]
+pub struct PlantPhase {
+    /// Name of the phase.
+    pub name: String,
+    /// Whether it has feet on the ground: another phase, or none, is selected by no foot.
+    pub is_grounded: bool,
+    /// Mean latent input, `latent_dim`.
+    pub latent_mean: DVector<f64>,
+    /// Lower Cholesky factor of the latent input's covariance, `latent_dim` square.
+    pub latent_root: DMatrix<f64>,
+    /// Mean torques, N m.
+    pub torque_mean: SVector<f64, JOINT_DIM>,
+    /// Inverse covariance of the torques, 1/(N m)².
+    pub torque_precision: SMatrix<f64, JOINT_DIM, JOINT_DIM>,
+}
+
+impl Plant {
+    /// A plant of given numbers.
+    ///
+    /// # Errors
+    /// [`ControlError::Shape`] if a map or a phase's statistics do not have the shape that the
+    /// encoder's number of rows asks for.
+    pub fn from_parts(parts: PlantParts) -> Result<Self, ControlError> {
+        parts.check()?;
+        Ok(Self {
+            latent_dim: parts.encoder.nrows(),
+            parts,
+        })
+    }
+
+    /// The robot.
+    pub fn robot(&self) -> &'static Robot {
+        self.parts.robot
+    }
+
+    /// Number of latent coordinates.
+    pub fn latent_dim(&self) -> usize {
+        self.latent_dim
+    }
+
+    /// All phases, in the model's order.
+    pub fn phases(&self) -> &[PlantPhase] {
+        &self.parts.phases
+    }
+
+    /// The phase that a foot pattern selects, or none.
+    pub fn phase_for(&self, feet: ContactFlags) -> Option<usize> {
+        let bits = feet
+            .iter()
+            .enumerate()
+            .map(|(foot, &down)| usize::from(down) << foot)
+            .sum::<usize>();
+        self.parts.phase_of_feet[bits]
+    }
+
+    /// `z = W_e s_x x + b_e`; `x` in SI units (18), `z` is overwritten.
+    pub fn encode(&self, x: &[f64], z: &mut [f64]) {
+        z.copy_from_slice(self.parts.encoder_bias.as_slice());
+        add_product(&self.parts.encoder, x, z);
+    }
+
+    /// `dz = W_e s_x dx`; `dx` in SI units (18), `dz` is overwritten.
+    pub fn encode_velocity(&self, dx: &[f64], dz: &mut [f64]) {
+        dz.fill(0.0);
+        add_product(&self.parts.encoder, dx, dz);
+    }
+
+    /// Joint positions, rad, that the decoder gives for `z`.
+    pub fn decode_joints(&self, z: &[f64]) -> [f64; JOINT_DIM] {
+        std::array::from_fn(|joint| {
+            self.parts.decoder_bias[joint] + row_product(&self.parts.decoder, joint, z)
+        })
+    }
+
+    /// Joint velocities, rad/s, that the decoder gives for `dz`.
+    pub fn decode_joint_velocities(&self, dz: &[f64]) -> [f64; JOINT_DIM] {
+        std::array::from_fn(|joint| row_product(&self.parts.decoder, joint, dz))
+    }
+
+    /// `u_lat = pinv(W_eᵀ) s_u u`; `u` in SI units (18), `u_lat` is overwritten.
+    pub fn project(&self, u: &[f64], u_lat: &mut [f64]) {
+        u_lat.fill(0.0);
+        add_product(&self.parts.projection, u, u_lat);
+    }
+
+    /// `u = W_eᵀ u_lat / s_u` in SI units: 12 torques, force, moment.
+    pub fn lift(&self, u_lat: &[f64]) -> [f64; STATE_DIM] {
+        std::array::from_fn(|input| row_product(&self.parts.lift, input, u_lat))
+    }
+
+    /// The matrix of [`Plant::lift`], `18 × latent_dim`.
+    pub fn lift_matrix(&self) -> &DMatrix<f64> {
+        &self.parts.lift
+    }
+
+    /// The matrix of [`Plant::project`], `latent_dim × 18`.
+    pub fn projection_matrix(&self) -> &DMatrix<f64> {
+        &self.parts.projection
+    }
+
+    /// The matrix of the decoder in SI units, `18 × latent_dim`.
+    pub fn decoder_matrix(&self) -> &DMatrix<f64> {
+        &self.parts.decoder
+    }
+
+    /// The bias of the decoder in SI units, 18.
+    pub fn decoder_bias(&self) -> &DVector<f64> {
+        &self.parts.decoder_bias
+    }
+
+    /// The torques within the robot's limits that are nearest to these; zero for what is not a
+    /// number.
+    pub fn clamp_torque(&self, torque_nm: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
+        std::array::from_fn(|joint| {
+            let limit = self.parts.robot.torque_limit_nm()[joint];
+            if torque_nm[joint].is_nan() {
+                0.0
+            } else {
+                torque_nm[joint].clamp(-limit, limit)
+            }
+        })
+    }
+
+    /// The joint positions within the robot's limits that are nearest to these.
+    pub fn clamp_joints(&self, joints_rad: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
+        std::array::from_fn(|joint| {
+            let (lower, upper) = self.parts.robot.joint_limit_rad()[joint];
+            joints_rad[joint].clamp(lower, upper)
+        })
+    }
+}
+
+/// `out += M v`, without allocating.
+pub(super) fn add_product(matrix: &DMatrix<f64>, vector: &[f64], out: &mut [f64]) {
+    for (col, factor) in vector.iter().enumerate() {
+        for (out, entry) in out.iter_mut().zip(matrix.column(col).iter()) {
+            *out += entry * factor;
+        }
+    }
+}
+
+/// Row `row` of `M v`.
+fn row_product(matrix: &DMatrix<f64>, row: usize, vector: &[f64]) -> f64 {
+    vector
+        .iter()
+        .enumerate()
+        .map(|(col, factor)| matrix[(row, col)] * factor)
+        .sum()
+}
+
+impl PlantParts {
+    /// Checks every shape against the encoder's number of rows.
+    fn check(&self) -> Result<(), ControlError> {
+        let d = self.encoder.nrows();
+        let mut shapes = vec![
+            ("encoder", self.encoder.shape(), (d, STATE_DIM)),
+            ("encoder bias", self.encoder_bias.shape(), (d, 1)),
+            ("decoder", self.decoder.shape(), (STATE_DIM, d)),
+            ("decoder bias", self.decoder_bias.shape(), (STATE_DIM, 1)),
+            ("lift", self.lift.shape(), (STATE_DIM, d)),
+            ("projection", self.projection.shape(), (d, STATE_DIM)),
+        ];
+        for phase in &self.phases {
+            shapes.push(("latent mean", phase.latent_mean.shape(), (d, 1)));
+            shapes.push(("latent root", phase.latent_root.shape(), (d, d)));
+        }
+        for phase in self.phase_of_feet.into_iter().flatten() {
+            shapes.push((
+                "phases",
+                (self.phases.len().min(phase + 1), 1),
+                (phase + 1, 1),
+            ));
+        }
+        match shapes
+            .into_iter()
+            .find(|(_, found, expected)| found != expected)
+        {
+            None => Ok(()),
+            Some((name, found, expected)) => Err(ControlError::Shape {
+                name,
+                found,
+                expected,
+            }),
+        }
+    }
+}
