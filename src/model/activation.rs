@@ -55,6 +55,31 @@ impl Activation {
         }
     }
 
+    /// `phi(a)` with its first three derivatives; of elu at zero, where those from the second on jump, the ones of
+    /// the negative side.
+    pub fn jet(self, a: f64) -> [f64; 4] {
+        match self {
+            Self::Linear => [a, 1.0, 0.0, 0.0],
+            Self::Elu if a > 0.0 => [a, 1.0, 0.0, 0.0],
+            Self::Elu => {
+                let below = a.exp_m1();
+                let slope = below + 1.0;
+                [below, slope, slope, slope]
+            }
+            Self::Tanh => {
+                let t = a.tanh();
+                let slope = 1.0 - t * t;
+                [t, slope, -2.0 * t * slope, slope * (6.0 * t * t - 2.0)]
+            }
+            Self::Sigmoid => {
+                let s = sigmoid(a);
+                let slope = s * (1.0 - s);
+                let third = slope * (1.0 - 6.0 * slope);
+                [s, slope, slope * (1.0 - 2.0 * s), third]
+            }
+        }
+    }
+
     /// `phi''(a)`; of elu at zero, where it jumps, that of the negative side.
     pub fn curvature(self, a: f64) -> f64 {
         match self {
@@ -110,9 +135,26 @@ mod tests {
     }
 
     #[test]
+    fn jet_has_the_value_and_the_derivatives() {
+        let h = 1e-5;
+        for phi in Activation::ALL {
+            for a in [-3.0, -0.7, -0.02, 0.3, 2.5] {
+                let [value, slope, curvature, third] = phi.jet(a);
+                assert!((value - phi.value(a)).abs() < 1e-15, "{phi} at {a}");
+                assert!((slope - phi.slope(a)).abs() < 1e-15, "{phi} at {a}");
+                assert!((curvature - phi.curvature(a)).abs() < 1e-15, "{phi} at {a}");
+                let difference = (phi.curvature(a + h) - phi.curvature(a - h)) / (2.0 * h);
+                assert!((third - difference).abs() < 1e-8, "{phi} at {a}");
+            }
+            assert!(phi.jet(-0.0)[2] == phi.curvature(0.0));
+        }
+    }
+
+    #[test]
     fn large_arguments_stay_finite() {
         for phi in Activation::ALL {
             for a in [-800.0, 800.0] {
+                assert!(phi.jet(a).iter().all(|v| v.is_finite()), "{phi} at {a}");
                 assert!(phi.value(a).is_finite(), "{phi} at {a}");
                 assert!(phi.slope(a).is_finite(), "{phi} at {a}");
             }

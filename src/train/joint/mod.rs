@@ -6,6 +6,7 @@
 pub mod batch;
 pub mod loss;
 mod multiply;
+pub mod network;
 pub mod parameters;
 pub mod stages;
 pub mod unroll;

@@ -1,0 +1,443 @@
+//! Networks on batches of samples, forwards and backwards, with their time derivatives and Jacobians.
+//!
+//! Samples are rows. A layer takes `y` to `phi(a)`, `a = y W + b`; along a trajectory its first and second time
+//! derivative go to `phi' da` and `phi'' da^2 + phi' dda` with `da = dy W`, `dda = ddy W`. The three stand below one
+//! another in one matrix (a *stack* of 3 n rows), so that a layer is one product. The rows of the Jacobian come from a
+//! sweep in the other direction ([`Network::jacobian`]), one for each output, stacked the same way. The reverse sweeps
+//! of both are exact; of elu at zero, where `phi''` jumps, the derivatives of the negative side are taken.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::model::Activation;
+use crate::train::joint::multiply::{Columns, add_product, add_transposed};
+use crate::train::random::Random;
+
+/// One layer: `y -> phi(y W + b)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dense {
+    /// `W`, inputs x outputs.
+    pub weights: DMatrix<f64>,
+    /// `b`, one an output.
+    pub bias: DVector<f64>,
+    /// `phi`.
+    pub activation: Activation,
+}
+
+/// Layers in the order in which they are applied, or gradients with respect to them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Network {
+    /// At least one.
+    pub layers: Vec<Dense>,
+}
+
+/// What a forward pass leaves behind for the sweeps back.
+#[derive(Clone, Debug, Default)]
+pub struct Tape {
+    samples: usize,
+    layers: Vec<Recorded>,
+}
+
+#[derive(Clone, Debug)]
+struct Recorded {
+    entering: DMatrix<f64>,         // stack x inputs
+    affine: DMatrix<f64>,           // stack x outputs: a, da, dda
+    derivatives: [DMatrix<f64>; 3], // samples x outputs: phi', phi'', phi'''
+}
+
+/// Jacobians of all samples, with what the way back needs.
+#[derive(Clone, Debug)]
+pub struct Jacobians {
+    /// Row `i n + s` is the gradient of output `i` at sample `s`: `(outputs n) x inputs`.
+    pub rows: DMatrix<f64>,
+    at_affine: Vec<DMatrix<f64>>, // a layer: derivative of every output with respect to a
+    at_output: Vec<DMatrix<f64>>, // the same with respect to phi(a); empty for the last layer
+}
+
+impl Dense {
+    fn zeros(inputs: usize, outputs: usize, activation: Activation) -> Self {
+        Self {
+            weights: DMatrix::zeros(inputs, outputs),
+            bias: DVector::zeros(outputs),
+            activation,
+        }
+    }
+}
+
+impl Network {
+    /// Layers between `widths`, all but the last with `activation`: weights uniform within
+    /// `sqrt(6 / (fan in + fan out))` (Glorot and Bengio 2010), biases 0.
+    pub fn random(widths: &[usize], activation: Activation, random: &mut Random) -> Self {
+        let last = widths.len().saturating_sub(2);
+        let layers = widths.windows(2).enumerate().map(|(index, pair)| {
+            let bound = (6.0 / (pair[0] + pair[1]) as f64).sqrt();
+            let phi = if index == last {
+                Activation::Linear
+            } else {
+                activation
+            };
+            Dense {
+                weights: random.matrix(pair[0], pair[1], bound),
+                ..Dense::zeros(0, pair[1], phi)
+            }
+        });
+        Self {
+            layers: layers.collect(),
+        }
+    }
+
+    /// A gradient of zeros for this network.
+    pub fn zeros_like(&self) -> Self {
+        let layers = self.layers.iter().map(|layer| {
+            let (inputs, outputs) = layer.weights.shape();
+            Dense::zeros(inputs, outputs, layer.activation)
+        });
+        Self {
+            layers: layers.collect(),
+        }
+    }
+
+    /// Weights and bias of every layer as slices, in a fixed order.
+    pub fn blocks(&self) -> impl Iterator<Item = &[f64]> {
+        self.layers
+            .iter()
+            .flat_map(|layer| [layer.weights.as_slice(), layer.bias.as_slice()])
+    }
+
+    /// The same, to be changed.
+    pub fn blocks_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
+        self.layers
+            .iter_mut()
+            .flat_map(|layer| [layer.weights.as_mut_slice(), layer.bias.as_mut_slice()])
+    }
+
+    /// Values of `samples` samples, with their time derivatives where `entering` stacks them.
+    ///
+    /// `entering` has `samples` rows (values) or 3 times as many (values, first, second derivatives); the result has
+    /// as many rows.
+    pub fn forward(&self, entering: DMatrix<f64>, samples: usize, tape: &mut Tape) -> DMatrix<f64> {
+        tape.samples = samples;
+        tape.layers.clear();
+        let mut y = entering;
+        for layer in &self.layers {
+            let mut affine = DMatrix::zeros(y.nrows(), layer.weights.ncols());
+            add_product(&mut affine, 1.0, &y, &layer.weights);
+            for (mut column, bias) in affine.column_iter_mut().zip(layer.bias.iter()) {
+                column.rows_mut(0, samples).add_scalar_mut(*bias);
+            }
+            let (leaving, derivatives) = activate(layer.activation, &affine, samples);
+            tape.layers.push(Recorded {
+                entering: std::mem::replace(&mut y, leaving),
+                affine,
+                derivatives,
+            });
+        }
+        y
+    }
+
+    /// Adds to `gradient` what `pull`, the gradient with respect to the result of [`Self::forward`], means for the
+    /// layers; returns the gradient with respect to what entered.
+    ///
+    /// `at_affine` (one matrix a layer, or none) is added to the gradient with respect to `a`; it comes from
+    /// [`Self::pull_back_jacobian`].
+    pub fn backward(
+        &self,
+        tape: &Tape,
+        pull: DMatrix<f64>,
+        at_affine: &[DMatrix<f64>],
+        gradient: &mut Network,
+    ) -> DMatrix<f64> {
+        let mut pull = pull;
+        for (index, (layer, recorded)) in self.layers.iter().zip(&tape.layers).enumerate().rev() {
+            if layer.activation != Activation::Linear {
+                deactivate(recorded, tape.samples, &mut pull);
+            }
+            if let Some(extra) = at_affine.get(index) {
+                let mut values = pull.rows_mut(0, tape.samples);
+                values += extra;
+            }
+            let own = &mut gradient.layers[index];
+            let (entering, pulled) = (Columns::all(&recorded.entering), Columns::all(&pull));
+            add_transposed(&mut own.weights, 1.0, entering, pulled);
+            for (bias, column) in own.bias.iter_mut().zip(pull.column_iter()) {
+                *bias += column.rows(0, tape.samples).sum();
+            }
+            pull = times(&pull, &layer.weights.transpose());
+        }
+        pull
+    }
+
+    /// Jacobians at the samples of the last forward pass.
+    pub fn jacobian(&self, tape: &Tape) -> Jacobians {
+        let n = tape.samples;
+        let outputs = self.layers.last().map_or(0, |layer| layer.bias.len());
+        let mut at_affine = vec![DMatrix::zeros(0, 0); self.layers.len()];
+        let mut at_output = at_affine.clone();
+        let mut sensitivity = DMatrix::zeros(outputs * n, outputs);
+        for i in 0..outputs {
+            sensitivity.view_mut((i * n, i), (n, 1)).fill(1.0);
+        }
+        for (index, (layer, recorded)) in self.layers.iter().zip(&tape.layers).enumerate().rev() {
+            if layer.activation != Activation::Linear {
+                let slopes = &recorded.derivatives[0];
+                let sloped = times_each(&sensitivity, slopes);
+                at_output[index] = std::mem::replace(&mut sensitivity, sloped);
+            }
+            let before = times(&sensitivity, &layer.weights.transpose());
+            at_affine[index] = std::mem::replace(&mut sensitivity, before);
+        }
+        Jacobians {
+            rows: sensitivity,
+            at_affine,
+            at_output,
+        }
+    }
+
+    /// Adds to `gradient` what `pull`, the gradient with respect to [`Jacobians::rows`], means for the layers.
+    ///
+    /// Returns the gradient with respect to `a` of every layer, which is to be given to [`Self::backward`].
+    pub fn pull_back_jacobian(
+        &self,
+        tape: &Tape,
+        jacobians: &Jacobians,
+        pull: &DMatrix<f64>,
+        gradient: &mut Network,
+    ) -> Vec<DMatrix<f64>> {
+        let mut onto_affine = Vec::with_capacity(self.layers.len());
+        let mut pull = pull.clone();
+        for (index, (layer, recorded)) in self.layers.iter().zip(&tape.layers).enumerate() {
+            let own = &mut gradient.layers[index].weights;
+            let at_affine = &jacobians.at_affine[index];
+            // rows = at_affine W^T
+            add_transposed(own, 1.0, Columns::all(&pull), Columns::all(at_affine));
+            pull = times(&pull, &layer.weights);
+            let [slopes, curvatures, _] = &recorded.derivatives;
+            if layer.activation == Activation::Linear {
+                onto_affine.push(DMatrix::zeros(tape.samples, layer.bias.len()));
+                continue;
+            }
+            let product = pull.component_mul(&jacobians.at_output[index]);
+            onto_affine.push(summed(&product, tape.samples).component_mul(curvatures));
+            pull = times_each(&pull, slopes);
+        }
+        onto_affine
+    }
+}
+
+/// `a b`.
+fn times(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut product = DMatrix::zeros(a.nrows(), b.ncols());
+    add_product(&mut product, 1.0, a, b);
+    product
+}
+
+/// Every block of `stack` times `factors`, entry by entry.
+fn times_each(stack: &DMatrix<f64>, factors: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = factors.nrows();
+    let mut product = stack.clone();
+    for (mut column, factors) in product.column_iter_mut().zip(factors.column_iter()) {
+        let column = column.as_mut_slice();
+        for block in column.chunks_exact_mut(n) {
+            for (value, factor) in block.iter_mut().zip(factors.as_slice()) {
+                *value *= factor;
+            }
+        }
+    }
+    product
+}
+
+/// Sum of the blocks of `n` rows.
+fn summed(stack: &DMatrix<f64>, n: usize) -> DMatrix<f64> {
+    let mut sum = DMatrix::zeros(n, stack.ncols());
+    for start in (0..stack.nrows()).step_by(n.max(1)) {
+        sum += stack.rows(start, n);
+    }
+    sum
+}
+
+/// `phi` on a stack, and its derivatives at the values; no derivatives for a linear layer.
+fn activate(
+    phi: Activation,
+    affine: &DMatrix<f64>,
+    n: usize,
+) -> (DMatrix<f64>, [DMatrix<f64>; 3]) {
+    let mut leaving = affine.clone();
+    if phi == Activation::Linear {
+        return (leaving, std::array::from_fn(|_| DMatrix::zeros(0, 0)));
+    }
+    let mut derivatives: [_; 3] = std::array::from_fn(|_| DMatrix::zeros(n, affine.ncols()));
+    for (index, mut column) in leaving.column_iter_mut().enumerate() {
+        let column = column.as_mut_slice();
+        let (values, rates) = column.split_at_mut(n);
+        let [slopes, curvatures, thirds] = derivatives
+            .each_mut()
+            .map(|matrix| &mut matrix.as_mut_slice()[n * index..n * (index + 1)]);
+        for (s, value) in values.iter_mut().enumerate() {
+            [*value, slopes[s], curvatures[s], thirds[s]] = phi.jet(*value);
+        }
+        if !rates.is_empty() {
+            let (first, second) = rates.split_at_mut(n);
+            for (s, (da, dda)) in first.iter_mut().zip(second).enumerate() {
+                *dda = curvatures[s] * *da * *da + slopes[s] * *dda;
+                *da *= slopes[s];
+            }
+        }
+    }
+    (leaving, derivatives)
+}
+
+/// The gradient with respect to `phi` of a stack becomes the one with respect to the stack of `a`.
+fn deactivate(recorded: &Recorded, n: usize, pull: &mut DMatrix<f64>) {
+    let [slopes, curvatures, thirds] = &recorded.derivatives;
+    for (index, mut column) in pull.column_iter_mut().enumerate() {
+        let at = |matrix: &DMatrix<f64>, s: usize| matrix.as_slice()[n * index + s];
+        let column = column.as_mut_slice();
+        let (values, rates) = column.split_at_mut(n);
+        for (s, value) in values.iter_mut().enumerate() {
+            *value *= at(slopes, s);
+        }
+        if rates.is_empty() {
+            continue;
+        }
+        let affine = recorded.affine.column(index);
+        let (_, rates_of_affine) = affine.as_slice().split_at(n);
+        let (da, dda) = rates_of_affine.split_at(n);
+        let (first, second) = rates.split_at_mut(n);
+        for s in 0..n {
+            let (pull_first, pull_second) = (first[s], second[s]);
+            let (slope, curvature) = (at(slopes, s), at(curvatures, s));
+            values[s] += curvature * da[s] * pull_first
+                + (at(thirds, s) * da[s] * da[s] + curvature * dda[s]) * pull_second;
+            first[s] = slope * pull_first + 2.0 * curvature * da[s] * pull_second;
+            second[s] = slope * pull_second;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{AffineMap, Layer, StateMap};
+
+    const N: usize = 3;
+
+    fn networks() -> Vec<Network> {
+        let mut random = Random::new(3);
+        let mut all = Vec::new();
+        for phi in Activation::ALL {
+            all.push(Network::random(&[5, 6, 4, 2], phi, &mut random));
+            let mut last_curved = Network::random(&[5, 4, 2], phi, &mut random);
+            last_curved.layers[1].activation = phi;
+            all.push(last_curved);
+        }
+        for network in &mut all {
+            for layer in &mut network.layers {
+                // Off zero, where the second derivative of elu jumps.
+                layer.bias.iter_mut().for_each(|b| *b = random.signed());
+            }
+        }
+        all
+    }
+
+    fn as_map(network: &Network) -> StateMap {
+        let layers = network.layers.iter().map(|layer| Layer {
+            map: AffineMap::new("m", layer.weights.transpose(), layer.bias.clone()).unwrap(),
+            activation: layer.activation,
+        });
+        StateMap::new("m", layers.collect()).unwrap()
+    }
+
+    fn close(found: f64, expected: f64) -> bool {
+        (found - expected).abs() < 1e-6 * expected.abs().max(1.0)
+    }
+
+    #[test]
+    fn forward_and_jacobian_equal_those_of_the_model() {
+        let mut random = Random::new(4);
+        for network in networks() {
+            let map = as_map(&network);
+            let stack = random.matrix(3 * N, 5, 1.0);
+            let mut tape = Tape::default();
+            let leaving = network.forward(stack.clone(), N, &mut tape);
+            let jacobians = network.jacobian(&tape);
+            for s in 0..N {
+                let [x, dx, ddx] = [0, 1, 2].map(|k| stack.row(k * N + s).transpose());
+                let row = |k: usize| leaving.row(k * N + s).transpose();
+                assert!((row(0) - map.apply(&x).unwrap()).amax() < 1e-14);
+                assert!((row(1) - map.apply_velocity(&x, &dx).unwrap()).amax() < 1e-14);
+                let acceleration = map.apply_acceleration(&x, &dx, &ddx).unwrap();
+                assert!((row(2) - acceleration).amax() < 1e-13);
+                let jacobian = map.jacobian(&x).unwrap();
+                for i in 0..2 {
+                    assert!((jacobians.rows.row(i * N + s) - jacobian.row(i)).amax() < 1e-14);
+                }
+            }
+            let mut values = Tape::default();
+            let alone = network.forward(stack.rows(0, N).into_owned(), N, &mut values);
+            assert_eq!(alone, leaving.rows(0, N));
+        }
+    }
+
+    #[test]
+    fn gradient_agrees_with_finite_differences_for_every_activation() {
+        let mut random = Random::new(5);
+        for network in networks() {
+            let stack = random.matrix(3 * N, 5, 1.0);
+            let on_values = random.matrix(3 * N, 2, 1.0);
+            let on_jacobian = random.matrix(2 * N, 5, 1.0);
+            let loss = |network: &Network, stack: &DMatrix<f64>| {
+                let mut tape = Tape::default();
+                let leaving = network.forward(stack.clone(), N, &mut tape);
+                leaving.dot(&on_values) + network.jacobian(&tape).rows.dot(&on_jacobian)
+            };
+            let mut tape = Tape::default();
+            network.forward(stack.clone(), N, &mut tape);
+            let jacobians = network.jacobian(&tape);
+            let mut gradient = network.zeros_like();
+            let onto =
+                network.pull_back_jacobian(&tape, &jacobians, &on_jacobian, &mut gradient);
+            let entering = network.backward(&tape, on_values.clone(), &onto, &mut gradient);
+            let h = 1e-6;
+            for (block, exact) in gradient.blocks().enumerate() {
+                for (entry, exact) in exact.iter().enumerate() {
+                    let at = |step: f64| {
+                        let mut moved = network.clone();
+                        let mut blocks = moved.blocks_mut();
+                        blocks.nth(block).expect("as many blocks")[entry] += step;
+                        drop(blocks);
+                        loss(&moved, &stack)
+                    };
+                    let difference = (at(h) - at(-h)) / (2.0 * h);
+                    assert!(close(*exact, difference), "{exact} {difference}");
+                }
+            }
+            for entry in 0..stack.len() {
+                let at = |step: f64| {
+                    let mut moved = stack.clone();
+                    moved[entry] += step;
+                    loss(&network, &moved)
+                };
+                let difference = (at(h) - at(-h)) / (2.0 * h);
+                assert!(close(entering[entry], difference), "{difference}");
+            }
+        }
+    }
+
+    #[test]
+    fn values_alone_have_the_gradient_of_the_whole_stack() {
+        let mut random = Random::new(6);
+        for network in networks() {
+            let (x, pull) = (random.matrix(N, 5, 1.0), random.matrix(N, 2, 1.0));
+            let mut tape = Tape::default();
+            network.forward(x.clone(), N, &mut tape);
+            let mut alone = network.zeros_like();
+            network.backward(&tape, pull.clone(), &[], &mut alone);
+            let stack = x.insert_rows(N, 2 * N, 0.0);
+            network.forward(stack, N, &mut tape);
+            let mut whole = network.zeros_like();
+            network.backward(&tape, pull.insert_rows(N, 2 * N, 0.0), &[], &mut whole);
+            assert!(alone.blocks().zip(whole.blocks()).all(|(a, b)| {
+                a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-13)
+            }));
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! Latent inputs under a Jacobian of its own at every sample, forwards and backwards.
+//!
+//! `u_lat = pinv(J^T) u = (J J^T)^-1 J u`. The Gram matrices are as small as the latent space and factored one by one.
+
+use nalgebra::DMatrix;
+
+/// Added to the diagonal of `J J^T`, as for a linear encoder.
+const DAMPING: f64 = 1e-12;
+
+/// Latent inputs of a batch.
+#[derive(Clone, Debug)]
+pub struct InputProjections {
+    /// `n x d`.
+    pub u_lat: DMatrix<f64>,
+    /// Sum over samples of `(J u) . u_lat`: the energy of the inputs that the latent inputs carry.
+    pub carried: f64,
+    factors: Vec<f64>, // Cholesky factors, d x d a sample, row-major
+}
+
+impl InputProjections {
+    /// Projects `u` (`n x 18`) by the Jacobians whose rows are stacked in `rows` (`(d n) x 18`).
+    pub fn new(rows: &DMatrix<f64>, u: &DMatrix<f64>) -> Self {
+        let n = u.nrows();
+        let d = rows.nrows() / n.max(1);
+        let mut u_lat = DMatrix::zeros(n, d);
+        let mut grams = vec![DMatrix::zeros(n, 1); d * d];
+        for (jacobian, input) in rows.column_iter().zip(u.column_iter()) {
+            let (jacobian, input) = (jacobian.as_slice(), input.as_slice());
+            for (i, row) in jacobian.chunks_exact(n).enumerate() {
+                for (sum, (j, u)) in u_lat.column_mut(i).iter_mut().zip(row.iter().zip(input)) {
+                    *sum += j * u;
+                }
+                for (k, other) in jacobian.chunks_exact(n).take(i + 1).enumerate() {
+                    let gram = grams[i * d + k].as_mut_slice();
+                    for (sum, (a, b)) in gram.iter_mut().zip(row.iter().zip(other)) {
+                        *sum += a * b;
+                    }
+                }
+            }
+        }
+        let (mut factors, mut carried) = (vec![0.0; n * d * d], 0.0);
+        let mut right = vec![0.0; d];
+        for (s, factor) in factors.chunks_exact_mut(d * d).enumerate() {
+            for (entry, gram) in factor.iter_mut().zip(&grams) {
+                *entry = gram[s];
+            }
+            factorise(factor, d);
+            (0..d).for_each(|i| right[i] = u_lat[(s, i)]);
+            solve(factor, &mut right);
+            for (i, value) in right.iter().enumerate() {
+                carried += u_lat[(s, i)] * value;
+                u_lat[(s, i)] = *value;
+            }
+        }
+        Self {
+            u_lat,
+            carried,
+            factors,
+        }
+    }
+
+    /// Gradient with respect to the Jacobians (`(d n) x 18`) of a function whose gradient with respect to `u_lat` is
+    /// `pull` (`n x d`), plus `-lift` times [`Self::carried`].
+    ///
+    /// With `w = (J J^T)^-1 pull`, `v = u_lat` and the rest `r = u - J^T v` it is
+    /// `w r^T - v (J^T w)^T - 2 lift v r^T`.
+    pub fn pull_back(
+        &self,
+        rows: &DMatrix<f64>,
+        u: &DMatrix<f64>,
+        pull: &DMatrix<f64>,
+        lift: f64,
+    ) -> DMatrix<f64> {
+        let (n, d) = self.u_lat.shape();
+        let mut solved = pull.clone();
+        let mut right = vec![0.0; d];
+        for (s, factor) in self.factors.chunks_exact(d * d).enumerate() {
+            (0..d).for_each(|i| right[i] = pull[(s, i)]);
+            solve(factor, &mut right);
+            (0..d).for_each(|i| solved[(s, i)] = right[i]);
+        }
+        let mut onto = DMatrix::zeros(d * n, u.ncols());
+        let (mut rest, mut crossed) = (vec![0.0; n], vec![0.0; n]);
+        for ((mut onto, row), input) in onto
+            .column_iter_mut()
+            .zip(rows.column_iter())
+            .zip(u.column_iter())
+        {
+            rest.copy_from_slice(input.as_slice());
+            crossed.fill(0.0);
+            for (i, jacobian) in row.as_slice().chunks_exact(n).enumerate() {
+                let (v, w) = (self.u_lat.column(i), solved.column(i));
+                for s in 0..n {
+                    rest[s] -= jacobian[s] * v[s];
+                    crossed[s] += jacobian[s] * w[s];
+                }
+            }
+            for (i, onto) in onto.as_mut_slice().chunks_exact_mut(n).enumerate() {
+                let (v, w) = (self.u_lat.column(i), solved.column(i));
+                for s in 0..n {
+                    onto[s] = (w[s] - 2.0 * lift * v[s]) * rest[s] - v[s] * crossed[s];
+                }
+            }
+        }
+        onto
+    }
+}
+
+/// Cholesky factor in place of a Gram matrix whose lower triangle is given, row-major; damped.
+fn factorise(matrix: &mut [f64], d: usize) {
+    for i in 0..d {
+        matrix[i * d + i] += DAMPING;
+        for k in 0..=i {
+            let known: f64 = (0..k).map(|m| matrix[i * d + m] * matrix[k * d + m]).sum();
+            let left = matrix[i * d + k] - known;
+            matrix[i * d + k] = if i == k {
+                left.max(DAMPING).sqrt()
+            } else {
+                left / matrix[k * d + k]
+            };
+        }
+    }
+}
+
+/// Solves `L L^T x = right` in place.
+fn solve(factor: &[f64], right: &mut [f64]) {
+    let d = right.len();
+    for i in 0..d {
+        let known: f64 = (0..i).map(|k| factor[i * d + k] * right[k]).sum();
+        right[i] = (right[i] - known) / factor[i * d + i];
+    }
+    for i in (0..d).rev() {
+        let known: f64 = (i + 1..d).map(|k| factor[k * d + i] * right[k]).sum();
+        right[i] = (right[i] - known) / factor[i * d + i];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::random::Random;
+
+    const N: usize = 4;
+    const D: usize = 3;
+
+    #[test]
+    fn latent_inputs_and_carried_energy_equal_their_definitions() {
+        let mut random = Random::new(8);
+        let (rows, u) = (random.matrix(D * N, 7, 1.0), random.matrix(N, 7, 1.0));
+        let found = InputProjections::new(&rows, &u);
+        let mut carried = 0.0;
+        for s in 0..N {
+            let jacobian = DMatrix::from_fn(D, 7, |i, j| rows[(i * N + s, j)]);
+            let u = u.row(s).transpose();
+            let projection = jacobian.transpose().pseudo_inverse(1e-12).unwrap();
+            let expected = projection * &u;
+            assert!((found.u_lat.row(s).transpose() - &expected).amax() < 1e-9);
+            carried += (jacobian.transpose() * expected).norm_squared();
+        }
+        assert!((found.carried - carried).abs() < 1e-9);
+    }
+
+    #[test]
+    fn pull_back_agrees_with_finite_differences() {
+        let mut random = Random::new(9);
+        let (rows, u) = (random.matrix(D * N, 7, 1.0), random.matrix(N, 7, 1.0));
+        let (pull, lift) = (random.matrix(N, D, 1.0), 0.7);
+        let exact = InputProjections::new(&rows, &u).pull_back(&rows, &u, &pull, lift);
+        for entry in 0..rows.len() {
+            let at = |step: f64| {
+                let mut moved = rows.clone();
+                moved[entry] += step;
+                let found = InputProjections::new(&moved, &u);
+                found.u_lat.dot(&pull) - lift * found.carried
+            };
+            let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
+            let close = (difference - exact[entry]).abs() < 1e-6 * exact[entry].abs().max(1.0);
+            assert!(close, "{difference} {}", exact[entry]);
+        }
+    }
+}
