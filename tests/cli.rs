@@ -382,6 +382,65 @@ fn train_takes_settings_from_a_file_and_flags_override_it() {
 }
 
 #[test]
+fn trained_networks_go_through_every_command() {
+    let folder = folder();
+    let (config, model) = (path(&folder, "train.toml"), path(&folder, "curved.json"));
+    let (jump, test) = (
+        "examples/recordings/go1/train_01.csv.gz",
+        "examples/recordings/go1/test_01.csv.gz",
+    );
+    fs::write(&config, "latent-dim = 2\nencoder-layers = [8, 6]\n").expect("writable");
+    let with = |more: &[&str]| {
+        let mut arguments = vec!["train", jump, "--config", &config, "--output", &model];
+        arguments.extend(["--force", "--epochs", "5", "--seeds", "1"]);
+        arguments.extend(more);
+        romc(&arguments)
+    };
+    let output = with(&["--decoder-layers", "linear", "--activation", "tanh"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let inspected = json(&["inspect", &model]).to_string();
+    assert!(
+        inspected.contains("18 -> 8 tanh -> 6 tanh -> 2"),
+        "{inspected}"
+    );
+    assert!(inspected.contains("--method joint") && inspected.contains("--encoder-layers 8,6"));
+    assert!(inspected.contains("--decoder-layers linear"), "{inspected}");
+    done(&["simulate", &model, test]);
+    done(&[
+        "compile",
+        &model,
+        "--emit",
+        "c,rust,latex",
+        "--out-dir",
+        &path(&folder, "out"),
+    ]);
+    let figures = json(&["mpc", &model, test]);
+    assert_eq!(figures["runs"][0]["limit_violations"], 0, "{figures}");
+    done(&[
+        "report",
+        &model,
+        test,
+        "--output",
+        &path(&folder, "report.html"),
+    ]);
+
+    for (more, named) in [
+        (&["--method", "closed-form"][..], "--method joint"),
+        (&["--encoder-layers", "8,1"], "encoder-layers"),
+        (
+            &["--encoder-layers", "linear", "--activation", "elu"],
+            "activation",
+        ),
+        (&["--decoder-layers", "8;6"], "32,16"),
+    ] {
+        let output = with(more);
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{stderr}");
+        assert!(stderr.contains(named), "{stderr}");
+    }
+}
+
+#[test]
 fn study_in_parts_and_resumed_equals_the_whole() {
     let folder = folder();
     let out = |name: &str| path(&folder, name);

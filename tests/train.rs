@@ -3,9 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+use romc::artifact;
+use romc::model::Activation;
 use romc::recording::{self, Recording};
 use romc::robot::Robot;
-use romc::train::{self, Origin, Progress, Recordings, TrainError, TrainOptions, Trained, Watch};
+use romc::sim::{CompiledModel, IntegrationOptions, LatentSegment, Restart, rollout};
+use romc::train::{
+    self, Origin, Progress, Recordings, TrainError, TrainOptions, Trained, Transfer, Watch,
+};
 
 fn jumps(set: &str, count: usize) -> Vec<Recording> {
     (1..=count)
@@ -180,4 +185,111 @@ fn cancelled_training_ends_without_a_model_when_none_is_complete() {
         &mut Watch::new(&mut listener, &cancel),
     );
     assert!(matches!(result, Err(TrainError::Cancelled)));
+}
+
+fn joint(training: &[Recording], options: &TrainOptions, news: &mut Vec<String>) -> Trained {
+    let cancel = AtomicBool::new(false);
+    let mut listener = |progress: Progress| {
+        if let Progress::Done { text, .. } = progress {
+            news.push(text);
+        }
+    };
+    let recordings = Recordings {
+        training,
+        validation: &[],
+    };
+    let origin = Origin::new("romc train", training);
+    let mut watch = Watch::new(&mut listener, &cancel);
+    train::joint(recordings, go1(), options, &origin, &mut watch).expect("trains")
+}
+
+fn few_epochs(activation: Activation) -> TrainOptions {
+    let mut options = TrainOptions::new("curved", 2);
+    options.joint.schedule.epochs = 6;
+    options.joint.schedule.refinement = 2;
+    options.joint.maps.encoder_layers = vec![8, 6];
+    options.joint.maps.decoder_layers = vec![6, 8];
+    options.joint.maps.activation = activation;
+    options
+}
+
+/// The loss of an epoch, as the progress tells it.
+fn loss(news: &str) -> f64 {
+    let after = news.split("loss ").nth(1).expect("the loss is told");
+    let number = after.split(',').next().expect("a number");
+    number.parse().expect("a number")
+}
+
+#[test]
+fn joint_training_of_networks_lowers_the_loss_and_gives_a_model_that_simulates() {
+    let training = jumps("train", 3);
+    for activation in [Activation::Elu, Activation::Tanh, Activation::Sigmoid] {
+        let mut news = Vec::new();
+        let Trained { model, report } = joint(&training, &few_epochs(activation), &mut news);
+        let epochs: Vec<&String> = news.iter().filter(|text| text.contains("epoch")).collect();
+        assert_eq!(epochs.len(), 8, "{news:?}");
+        assert!(
+            loss(epochs[7]) < 0.5 * loss(epochs[0]),
+            "{activation}: {epochs:?}"
+        );
+
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("curved.json");
+        artifact::write(&path, &model).expect("writable");
+        let read = artifact::read(&path).expect("a model file");
+        let encoder = read.encoder_map().expect("trained");
+        assert_eq!(
+            encoder.summary(),
+            format!("18 -> 8 {activation} -> 6 {activation} -> 2")
+        );
+        assert_eq!(encoder, model.encoder_map().expect("trained"));
+        let figures = train::assess(&read, &training).expect("fits the recordings");
+        let close = (figures.decoder_mse / report.training.decoder_mse - 1.0).abs() < 1e-9;
+        assert!(close, "{figures:?} {:?}", report.training);
+
+        let compiled = CompiledModel::new(&read).expect("compiles");
+        let latent = LatentSegment::encode(&read, &training[0].segments[0]).expect("encodes");
+        let options = IntegrationOptions::default();
+        let predicted = rollout(&compiled, &latent, Restart::Every(0.1), &options);
+        assert_eq!(predicted.expect("integrates").diverged_at_s(), None);
+    }
+}
+
+#[test]
+fn joint_training_of_networks_is_the_same_on_any_number_of_threads() {
+    let training = jumps("train", 2);
+    let with = |threads: usize, transfer: Transfer| {
+        let mut options = few_epochs(Activation::Tanh);
+        options.n_seeds = 3;
+        options.joint.threads = threads;
+        options.joint.transfer = transfer;
+        artifact::to_text(&joint(&training, &options, &mut Vec::new()).model)
+    };
+    for transfer in [Transfer::Chosen, Transfer::Published] {
+        assert_eq!(with(1, transfer), with(3, transfer), "{transfer:?}");
+    }
+}
+
+#[test]
+fn hidden_layers_are_refused_where_they_make_no_sense() {
+    let refused = |options: &TrainOptions, name: &str| {
+        let error = train_with(&jumps("train", 1), &[], options).expect_err("no sense");
+        let expected = matches!(&error, TrainError::Option { option, .. } if *option == name);
+        assert!(expected, "{error}");
+    };
+    let mut options = few_epochs(Activation::Elu);
+    refused(&options, "encoder-layers or decoder-layers");
+    options.joint.maps.encoder_layers = vec![8, 1];
+    let training = jumps("train", 1);
+    let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
+    let recordings = Recordings {
+        training: &training,
+        validation: &[],
+    };
+    let mut watch = Watch::new(&mut listener, &cancel);
+    let narrow = train::joint(recordings, go1(), &options, &Origin::default(), &mut watch);
+    assert!(
+        matches!(&narrow, Err(TrainError::Option { option: "encoder-layers", found, .. }) if found == "[8, 1]"),
+        "{narrow:?}"
+    );
 }

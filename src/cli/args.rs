@@ -1,6 +1,7 @@
 //! What can be typed: the commands, their options, and an example for each.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use serde::{Deserialize, Serialize};
@@ -118,6 +119,38 @@ pub enum TrainMethod {
     Joint,
 }
 
+/// What the hidden layers of a nonlinear encoder or decoder apply to each unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HiddenActivation {
+    /// a, below zero exp(a) - 1
+    Elu,
+    /// Hyperbolic tangent
+    Tanh,
+    /// 1 / (1 + exp(-a))
+    Sigmoid,
+}
+
+/// Widths of hidden layers in their order: `32,16`, or `linear` for none; a list of numbers in a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Widths(pub Vec<usize>);
+
+impl FromStr for Widths {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "linear" {
+            return Ok(Self(Vec::new()));
+        }
+        let widths = text.split(',').map(|width| at_least_one(width.trim()));
+        let widths: Result<Vec<usize>, String> = widths.collect();
+        widths
+            .map(Self)
+            .map_err(|_| format!("found `{text}`, expected widths such as 32,16, or `linear`"))
+    }
+}
+
 /// How the window of predictions is integrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -195,6 +228,15 @@ pub struct TrainSettings {
     /// Epochs of a step, refinement not counted (joint method)
     #[arg(long, value_parser = at_least_one)]
     pub epochs: Option<usize>,
+    /// Widths of the encoder's hidden layers, such as 32,16; a linear layer to z follows (joint method)
+    #[arg(long, value_name = "WIDTHS")]
+    pub encoder_layers: Option<Widths>,
+    /// Widths of the decoder's hidden layers, or `linear` (those of the encoder backwards unless given)
+    #[arg(long, value_name = "WIDTHS")]
+    pub decoder_layers: Option<Widths>,
+    /// Activation of the hidden layers (elu unless given)
+    #[arg(long, value_enum)]
+    pub activation: Option<HiddenActivation>,
     /// Weight of the input energy that the latent input cannot carry
     #[arg(long, value_name = "WEIGHT")]
     pub lift_weight: Option<f64>,

@@ -27,6 +27,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::Error;
+use crate::train::TrainError;
 use args::{Arguments, Command};
 
 /// What a command has to say: to people and to programs.
@@ -40,7 +41,7 @@ pub struct Answer {
 
 /// Parses the process's arguments, runs the command, prints its answer.
 ///
-/// Wrong usage ends the process with exit code 2 (by clap); a failed run gives 1.
+/// Wrong usage gives exit code 2 (by clap, or for an option of a training that is out of range); a failed run gives 1.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let json = arguments.command.wants_json();
@@ -55,7 +56,10 @@ pub fn run() -> ExitCode {
         Ok(text) => print(&text),
         Err(error) => {
             tell(&error);
-            ExitCode::FAILURE
+            match error {
+                Error::Train(TrainError::Option { .. }) => ExitCode::from(2),
+                _ => ExitCode::FAILURE,
+            }
         }
     }
 }

@@ -100,10 +100,8 @@ fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
         }
     };
     settings.paper |= arguments.paper;
-    settings.method = arguments
-        .method
-        .or(settings.method)
-        .or(Some(TrainMethod::ClosedForm));
+    settings.method = arguments.method.or(settings.method);
+    settings.method = Some(train_settings::method(&settings));
     Ok(settings)
 }
 

@@ -27,7 +27,7 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let latent_dim = settings
         .latent_dim
         .expect("checked by clap, or with the file");
-    let method = settings.method.unwrap_or(TrainMethod::ClosedForm);
+    let method = train_settings::method(&settings);
     let robot = Robot::by_name(settings.robot.as_deref().unwrap_or("go1"))?;
     let training = read_recordings(&arguments.recordings)?;
     let validation = read_recordings(&arguments.validation)?;

@@ -6,11 +6,13 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::args::{BpttIntegrator, PhaseSet, TrainArguments, TrainMethod, TrainSettings};
+use super::args::{
+    BpttIntegrator, HiddenActivation, PhaseSet, TrainArguments, TrainMethod, TrainSettings,
+};
 use crate::Error;
-use crate::model::StandardLibrary;
+use crate::model::{Activation, StandardLibrary};
 use crate::recording::PhaseRule;
-use crate::train::{Integrator, LibraryChoice, TrainOptions};
+use crate::train::{Integrator, LibraryChoice, MapOptions, TrainError, TrainOptions};
 
 /// The options that the settings describe.
 pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String) -> TrainOptions {
@@ -18,7 +20,7 @@ pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String)
         true => TrainOptions::paper(name, latent_dim),
         false => TrainOptions::new(name, latent_dim),
     };
-    if settings.method == Some(TrainMethod::Joint) && !settings.paper {
+    if method(settings) == TrainMethod::Joint && !settings.paper {
         options.n_seeds = 3;
     }
     set(&mut options.seed, settings.seed);
@@ -34,6 +36,7 @@ pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String)
         BpttIntegrator::Rk4 => Integrator::Rk4,
     });
     set(&mut options.joint.unroll.integrator, integrator);
+    options.joint.maps = maps(settings);
     set(&mut options.encoder.lift_weight, settings.lift_weight);
     set(&mut options.encoder.body_weight, settings.body_weight);
     set(&mut options.regression.slack, settings.slack);
@@ -42,6 +45,36 @@ pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String)
         options.phases = PhaseRule::three_phase().with_min_samples(options.phases.min_samples);
     }
     options
+}
+
+/// The layers of encoder and decoder; the decoder mirrors the encoder unless it is described itself.
+fn maps(settings: &TrainSettings) -> MapOptions {
+    let encoder_layers: Vec<usize> = match &settings.encoder_layers {
+        Some(widths) => widths.0.clone(),
+        None => Vec::new(),
+    };
+    let decoder_layers = match &settings.decoder_layers {
+        Some(widths) => widths.0.clone(),
+        None => encoder_layers.iter().rev().copied().collect(),
+    };
+    MapOptions {
+        encoder_layers,
+        decoder_layers,
+        activation: match settings.activation {
+            Some(HiddenActivation::Elu) | None => Activation::Elu,
+            Some(HiddenActivation::Tanh) => Activation::Tanh,
+            Some(HiddenActivation::Sigmoid) => Activation::Sigmoid,
+        },
+    }
+}
+
+/// The method that is asked for; hidden layers are learned by the joint one only.
+pub(super) fn method(settings: &TrainSettings) -> TrainMethod {
+    let default = match maps(settings).is_linear() {
+        true => TrainMethod::ClosedForm,
+        false => TrainMethod::Joint,
+    };
+    settings.method.unwrap_or(default)
 }
 
 fn library(settings: &TrainSettings, default: LibraryChoice) -> LibraryChoice {
@@ -82,7 +115,12 @@ pub(super) fn as_flags(settings: &TrainSettings) -> String {
             },
             Value::String(text) if text.contains(' ') => write!(line, " --{name} \"{text}\""),
             Value::String(text) => write!(line, " --{name} {text}"),
-            Value::Null | Value::Bool(false) | Value::Array(_) | Value::Object(_) => Ok(()),
+            Value::Array(widths) if widths.is_empty() => write!(line, " --{name} linear"),
+            Value::Array(widths) => {
+                let widths: Vec<String> = widths.iter().map(Value::to_string).collect();
+                write!(line, " --{name} {}", widths.join(","))
+            }
+            Value::Null | Value::Bool(false) | Value::Object(_) => Ok(()),
         };
         written.expect("writing to a string cannot fail");
     }
@@ -96,9 +134,11 @@ pub(super) fn as_flags(settings: &TrainSettings) -> String {
 pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Error> {
     let given = &arguments.settings;
     let Some(path) = &arguments.config else {
+        check_activation(given)?;
         return Ok(given.clone());
     };
     let settings = overlay(given, read(path)?);
+    check_activation(&settings)?;
     if settings.latent_dim.is_none() {
         return Err(refused(
             path,
@@ -106,6 +146,18 @@ pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Err
         ));
     }
     Ok(settings)
+}
+
+/// An activation is of hidden layers only.
+fn check_activation(settings: &TrainSettings) -> Result<(), Error> {
+    match settings.activation {
+        Some(activation) if maps(settings).is_linear() => Err(Error::Train(TrainError::Option {
+            option: "activation",
+            found: format!("{activation:?} without hidden layers"),
+            expected: "`--encoder-layers` or `--decoder-layers` beside it",
+        })),
+        Some(_) | None => Ok(()),
+    }
 }
 
 /// The settings of a file.
@@ -143,6 +195,15 @@ fn check(settings: &TrainSettings) -> Result<(), String> {
     if let Some((name, _)) = counts.iter().find(|(_, count)| *count == Some(0)) {
         return Err(format!("`{name}` is 0, expected at least 1"));
     }
+    let layers = [
+        ("encoder-layers", &settings.encoder_layers),
+        ("decoder-layers", &settings.decoder_layers),
+    ];
+    for (name, widths) in layers {
+        if widths.as_ref().is_some_and(|widths| widths.0.contains(&0)) {
+            return Err(format!("`{name}` has a 0, expected widths of at least 1"));
+        }
+    }
     if settings.terms.is_some() && (settings.degree.is_some() || settings.trigonometric) {
         return Err(
             "`terms` stands beside `degree` or `trigonometric`, expected one or the other"
@@ -163,6 +224,9 @@ fn overlay(above: &TrainSettings, below: TrainSettings) -> TrainSettings {
         seed: above.seed.or(below.seed),
         seeds: above.seeds.or(below.seeds),
         epochs: above.epochs.or(below.epochs),
+        encoder_layers: above.encoder_layers.or(below.encoder_layers),
+        decoder_layers: above.decoder_layers.or(below.decoder_layers),
+        activation: above.activation.or(below.activation),
         lift_weight: above.lift_weight.or(below.lift_weight),
         body_weight: above.body_weight.or(below.body_weight),
         bptt_weight: above.bptt_weight.or(below.bptt_weight),

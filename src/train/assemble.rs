@@ -9,8 +9,8 @@ use super::error::TrainError;
 use super::options::TrainOptions;
 use super::report::TrainReport;
 use crate::model::{
-    AffineMap, FeetRule, InputStatistics, Library, Phase, ReducedModel, ScaleFactors, Scaling,
-    Signals,
+    FeetRule, InputStatistics, Library, Phase, ReducedModel, ScaleFactors, Scaling, Signals,
+    StateMap,
 };
 use crate::recording::Recording;
 use crate::recording::phases::FeetPattern;
@@ -19,8 +19,8 @@ use crate::robot::Robot;
 /// The trained parts of a model.
 pub(super) struct Parts {
     pub library: Library,
-    pub encoder: AffineMap,
-    pub decoder: AffineMap,
+    pub encoder: StateMap,
+    pub decoder: StateMap,
     pub xi: Vec<DMatrix<f64>>,
 }
 

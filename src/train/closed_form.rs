@@ -6,6 +6,7 @@ use super::features::Features;
 use super::finish::{
     Fitted, Sets, active_coordinates, check_latent_dim, encoder_over, fit_dynamics,
 };
+use super::latent::least_squares_decoder;
 use super::options::TrainOptions;
 use super::overlap::support_overlap;
 use super::progress::Watch;
@@ -38,6 +39,14 @@ pub fn closed_form(
     origin: &Origin,
     watch: &mut Watch<'_>,
 ) -> Result<Trained, TrainError> {
+    let maps = &options.joint.maps;
+    if !maps.is_linear() {
+        return Err(TrainError::Option {
+            option: "encoder-layers or decoder-layers",
+            found: format!("{:?} and {:?}", maps.encoder_layers, maps.decoder_layers),
+            expected: "none with the closed form, which learns linear maps; take `--method joint`",
+        });
+    }
     let sets = Sets::new(recordings, robot, options)?;
     let moments = sets.moments();
     let active = active_coordinates(&moments, options);
@@ -55,8 +64,9 @@ pub fn closed_form(
             seed,
         };
         let subspace = find_subspace(&moments, &active, options.latent_dim, &search)?;
-        let encoder = encoder_over(&sets.training, &subspace.basis, options)?;
-        let fitted = fit_dynamics(&sets, &features, encoder, options, watch)?;
+        let encoder = encoder_over(&sets.training, &subspace.basis, options)?.into();
+        let decoder = least_squares_decoder(&sets.training, &encoder)?.into();
+        let fitted = fit_dynamics(&sets, &features, (encoder, decoder), options, watch)?;
         let score = fitted
             .choice
             .as_ref()

@@ -7,7 +7,7 @@ use super::dataset::{Dataset, Quantity};
 use super::error::TrainError;
 use super::features::Features;
 use super::joint::Losses;
-use super::latent::{Latent, least_squares_decoder};
+use super::latent::{Latent, lift_samples, mean_jacobian};
 use super::metrics::{Assessed, BODY_X, BODY_Z, measure};
 use super::options::TrainOptions;
 use super::progress::Watch;
@@ -17,7 +17,7 @@ use super::select::{Choice, Judge, select};
 use super::sparse::active_terms;
 use super::subspace::Moments;
 use super::varimax::{name_columns, varimax};
-use crate::model::AffineMap;
+use crate::model::{AffineMap, StateMap};
 use crate::robot::Robot;
 
 /// Training and validation jumps.
@@ -28,8 +28,10 @@ pub(super) struct Sets {
 
 /// Numbers of a model before they are put together.
 pub(super) struct Fitted {
-    pub encoder: AffineMap,
-    pub decoder: AffineMap,
+    pub encoder: StateMap,
+    pub decoder: StateMap,
+    /// `W_e`, of a nonlinear encoder the mean of its Jacobian over the training samples.
+    pub weights: DMatrix<f64>,
     pub xi: Vec<DMatrix<f64>>,
     /// The regression, if Xi was chosen among regressions, and how many were tried.
     pub choice: Option<(Choice, usize)>,
@@ -95,7 +97,7 @@ impl Sets {
             .column_variance()
             .map(f64::sqrt);
         let names = Robot::state_names();
-        let rows = fitted.encoder.weights().row_iter();
+        let rows = fitted.weights.row_iter();
         SeedReport {
             seed,
             score,
@@ -108,6 +110,20 @@ impl Sets {
         }
     }
 
+    /// Share of the training input's energy that the latent input cannot carry.
+    fn lift_loss(&self, encoder: &StateMap) -> f64 {
+        if let Some(linear) = encoder.as_affine() {
+            return lift_loss(&self.moments(), linear.weights());
+        }
+        let latent = Latent::of(&self.training, encoder);
+        let (mut missed, mut total) = (0.0, 0.0);
+        for (jump, samples) in self.training.jumps.iter().zip(&latent) {
+            missed += (lift_samples(encoder, &jump.x, &samples.u_lat) - &jump.u).norm_squared();
+            total += jump.u.norm_squared();
+        }
+        missed / total.max(f64::MIN_POSITIVE)
+    }
+
     /// The figures of fitted numbers.
     pub fn report(&self, features: &Features, fitted: &Fitted, active: &[usize]) -> TrainReport {
         let assessed = fitted.assessed(features);
@@ -117,7 +133,7 @@ impl Sets {
         let validated = !self.validation.jumps.is_empty();
         TrainReport {
             encoded: active.iter().map(|&i| names[i].clone()).collect(),
-            lift_loss: lift_loss(&self.moments(), fitted.encoder.weights()),
+            lift_loss: self.lift_loss(&fitted.encoder),
             active_terms: phases
                 .map(|(phase, xi)| PhaseTerms {
                     phase,
@@ -159,30 +175,46 @@ pub(super) fn encoder_over(
     options: &TrainOptions,
 ) -> Result<AffineMap, TrainError> {
     let x = training.gather(Quantity::X, None);
-    let std = x.column_variance().map(f64::sqrt);
-    let loadings = |basis: &DMatrix<f64>| DMatrix::from_diagonal(&std) * basis;
-    let mut basis = basis.clone();
-    if options.encoder.rotate {
-        basis *= varimax(&loadings(&basis));
-    }
-    let (order, signs) = name_columns(&loadings(&basis), &[BODY_X, BODY_Z]);
-    let mut weights = basis.select_columns(&order).transpose();
-    for (mut row, sign) in weights.row_iter_mut().zip(signs) {
-        row *= sign;
-    }
+    let weights = telling_basis(training, basis, options).0.transpose();
     let bias = -(&weights * x.column_mean());
     Ok(AffineMap::new("encoder", weights, bias)?)
 }
 
-/// Least-squares decoder and chosen dynamics for an encoder.
+/// `basis T` (`18 x d`) and the orthogonal `T` (`d x d`) for which its columns are simple in the sense of varimax, in a
+/// telling order and with telling signs.
+pub(super) fn telling_basis(
+    training: &Dataset,
+    basis: &DMatrix<f64>,
+    options: &TrainOptions,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let x = training.gather(Quantity::X, None);
+    let std = x.column_variance().map(f64::sqrt);
+    let loadings = |basis: &DMatrix<f64>| DMatrix::from_diagonal(&std) * basis;
+    let mut basis = basis.clone();
+    let mut turn = DMatrix::identity(basis.ncols(), basis.ncols());
+    if options.encoder.rotate {
+        turn = varimax(&loadings(&basis));
+        basis *= &turn;
+    }
+    let (order, signs) = name_columns(&loadings(&basis), &[BODY_X, BODY_Z]);
+    let named = |matrix: DMatrix<f64>| {
+        let mut named = matrix.select_columns(&order);
+        for (mut column, sign) in named.column_iter_mut().zip(&signs) {
+            column *= *sign;
+        }
+        named
+    };
+    (named(basis), named(turn))
+}
+
+/// Chosen dynamics for an encoder and its decoder.
 pub(super) fn fit_dynamics(
     sets: &Sets,
     features: &Features,
-    encoder: AffineMap,
+    (encoder, decoder): (StateMap, StateMap),
     options: &TrainOptions,
     watch: &mut Watch<'_>,
 ) -> Result<Fitted, TrainError> {
-    let decoder = least_squares_decoder(&sets.training, &encoder)?;
     let latent = Latent::of(&sets.training, &encoder);
     let judged = Latent::of(sets.judged(), &encoder);
     let judge = Judge::new(sets.judged(), &judged, options.regression.rollout_weight);
@@ -196,6 +228,7 @@ pub(super) fn fit_dynamics(
     )?;
     let choice = Some((selected.choice, selected.candidates));
     Ok(Fitted {
+        weights: mean_jacobian(&encoder, &sets.training.gather(Quantity::X, None)),
         encoder,
         decoder,
         xi: selected.xi,

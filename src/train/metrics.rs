@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use super::dataset::{Dataset, Scaling};
 use super::error::TrainError;
 use super::features::Features;
-use super::latent::{Latent, affine};
+use super::latent::{Latent, lift_samples, map_samples};
 use super::rollout::{Candidate, Window, predict, restarted, whole};
-use crate::model::{AffineMap, FeetRule, ReducedModel};
+use crate::model::{FeetRule, ReducedModel, StateMap};
 use crate::recording::phases::{FeetPattern, PhasePattern};
 use crate::recording::{PhaseRule, Recording};
 use crate::robot::JOINT_DIM;
@@ -29,7 +29,7 @@ pub struct SetMetrics {
     pub decoder_mse: f64,
     /// Coefficient of determination of `ddz` a phase, over all latent coordinates together.
     pub ddz_r2: Vec<f64>,
-    /// Coefficient of determination of the 12 joint torques of `W_e^T pinv(W_e^T) u` against the recorded ones.
+    /// Coefficient of determination of the 12 joint torques of `W_e^T pinv(W_e^T) u` (`J^T pinv(J^T) u`) against the recorded ones.
     pub torque_r2: f64,
     /// Root mean square error of body x over predictions of 0.1 s.
     pub prediction_x_m: f64,
@@ -47,9 +47,9 @@ pub(super) struct Assessed<'a> {
     /// Library and coefficients.
     pub candidate: Candidate<'a>,
     /// Encoder, scaled units.
-    pub encoder: &'a AffineMap,
+    pub encoder: &'a StateMap,
     /// Decoder, scaled units.
-    pub decoder: &'a AffineMap,
+    pub decoder: &'a StateMap,
 }
 
 /// Measures a finished model on recordings.
@@ -78,8 +78,8 @@ pub fn assess(model: &ReducedModel, recordings: &[Recording]) -> Result<SetMetri
             features: &features,
             xi: &xi,
         },
-        encoder: model.encoder()?,
-        decoder: model.decoder()?,
+        encoder: model.encoder_map()?,
+        decoder: model.decoder_map()?,
     };
     Ok(measure(assessed, &dataset))
 }
@@ -122,7 +122,7 @@ fn body_rms(
     let mut squares = [0.0; 2];
     let mut count = 0;
     for (window, prediction) in windows.iter().zip(&predictions) {
-        let decoded = affine(model.decoder, prediction);
+        let decoded = map_samples(model.decoder, prediction);
         let truth = dataset.jumps[window.jump]
             .x
             .columns(window.start + 1, window.steps);
@@ -141,7 +141,7 @@ fn body_rms(
 fn decoder_mse(model: Assessed<'_>, dataset: &Dataset, latent: &[Latent]) -> f64 {
     let (mut square, mut count) = (0.0, 0);
     for (jump, samples) in dataset.jumps.iter().zip(latent) {
-        square += (affine(model.decoder, &samples.z) - &jump.x).norm_squared();
+        square += (map_samples(model.decoder, &samples.z) - &jump.x).norm_squared();
         count += jump.x.len();
     }
     square / count.max(1) as f64
@@ -158,10 +158,12 @@ fn ddz_r2(candidate: Candidate<'_>, dataset: &Dataset, latent: &[Latent], phase:
     )
 }
 
-fn torque_r2(encoder: &AffineMap, dataset: &Dataset, latent: &[Latent]) -> f64 {
-    let lifted: Vec<_> = latent
+fn torque_r2(encoder: &StateMap, dataset: &Dataset, latent: &[Latent]) -> f64 {
+    let lifted: Vec<_> = dataset
+        .jumps
         .iter()
-        .map(|samples| encoder.weights().tr_mul(&samples.u_lat))
+        .zip(latent)
+        .map(|(jump, samples)| lift_samples(encoder, &jump.x, &samples.u_lat))
         .collect();
     let total = dataset.samples(None);
     let (mut predicted, mut recorded) = (

@@ -8,7 +8,7 @@ use super::error::TrainError;
 use super::joint::{LossWeights, Schedule, Unroll};
 use super::metrics::{BODY_X, BODY_Z};
 use super::sparse::Pruning;
-use crate::model::{Library, StandardLibrary};
+use crate::model::{Activation, Library, MAX_LAYER_WIDTH, MAX_LAYERS, StandardLibrary};
 use crate::recording::PhaseRule;
 use crate::robot::STATE_DIM;
 
@@ -63,6 +63,61 @@ pub struct JointOptions {
     pub unroll: Unroll,
     /// What follows the first step.
     pub transfer: Transfer,
+    /// Shape of encoder and decoder.
+    pub maps: MapOptions,
+}
+
+/// Layers of encoder and decoder; without hidden layers both are affine maps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MapOptions {
+    /// Widths of the encoder's hidden layers; a linear layer to the latent coordinates follows.
+    pub encoder_layers: Vec<usize>,
+    /// Widths of the decoder's hidden layers; a linear layer to the state follows.
+    pub decoder_layers: Vec<usize>,
+    /// Activation of the hidden layers.
+    pub activation: Activation,
+}
+
+impl Default for MapOptions {
+    /// Affine maps.
+    fn default() -> Self {
+        Self {
+            encoder_layers: Vec::new(),
+            decoder_layers: Vec::new(),
+            activation: Activation::Elu,
+        }
+    }
+}
+
+impl MapOptions {
+    /// Whether encoder and decoder are affine maps.
+    pub fn is_linear(&self) -> bool {
+        self.encoder_layers.is_empty() && self.decoder_layers.is_empty()
+    }
+
+    fn check(&self, latent_dim: usize) -> Result<(), TrainError> {
+        let each = [
+            ("encoder-layers", &self.encoder_layers, latent_dim.max(1)),
+            ("decoder-layers", &self.decoder_layers, 1),
+        ];
+        for (option, widths, least) in each {
+            let refused = |expected| TrainError::Option {
+                option,
+                found: format!("{widths:?}"),
+                expected,
+            };
+            if widths.len() >= MAX_LAYERS {
+                return Err(refused("at most 15 hidden layers"));
+            }
+            if widths.iter().any(|width| *width > MAX_LAYER_WIDTH) {
+                return Err(refused("layers of at most 1024 units"));
+            }
+            if widths.iter().any(|width| *width < least) {
+                return Err(refused("layers at least as wide as the latent space"));
+            }
+        }
+        Ok(())
+    }
 }
 
 /// What follows the joint step on contact data.
@@ -194,6 +249,7 @@ impl TrainOptions {
         above_zero("body-weight", body_weight)?;
         at_least_zero("mask-std", least_std)?;
         at_least_zero("mask-input-share", least_input_share)?;
+        self.joint.maps.check(self.latent_dim)?;
         at_least_zero("bptt-weight", self.joint.weights.bptt)?;
         let Unroll {
             window,
@@ -273,6 +329,7 @@ impl Default for JointOptions {
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             unroll: Unroll::default(),
             transfer: Transfer::Chosen,
+            maps: MapOptions::default(),
         }
     }
 }

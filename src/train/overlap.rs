@@ -23,11 +23,7 @@ pub(super) fn support_overlap(
     let mut overlaps = Vec::new();
     for (i, first) in runs.iter().enumerate() {
         for second in &runs[i + 1..] {
-            let partner = match_latents(
-                first.encoder.weights(),
-                second.encoder.weights(),
-                state_covariance,
-            );
+            let partner = match_latents(&first.weights, &second.weights, state_covariance);
             overlaps.push(overlap(library, first, second, &partner));
         }
     }
@@ -139,8 +135,9 @@ mod tests {
             AffineMap::new("encoder", w, bias).expect("finite")
         };
         Fitted {
-            decoder: map(weights.transpose()),
-            encoder: map(weights),
+            decoder: map(weights.transpose()).into(),
+            encoder: map(weights.clone()).into(),
+            weights,
             xi: vec![xi],
             choice: None,
         }

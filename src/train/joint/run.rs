@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 
 use super::batch::{Batch, BatchOptions, batches};
 use super::loss::{JointLoss, LossWeights, Losses};
+use super::network::run::{NetworkTask, TrainedNetworks};
 use super::parameters::Parameters;
 use super::stages::{train_decoder, train_together, train_xi, train_xi_unrolled};
 use crate::model::AffineMap;
@@ -19,6 +20,7 @@ use crate::train::features::Features;
 use crate::train::finish::{
     Fitted, Sets, active_coordinates, check_latent_dim, encoder_over, fit_dynamics,
 };
+use crate::train::latent::least_squares_decoder;
 use crate::train::options::{JointOptions, TrainOptions, Transfer};
 use crate::train::overlap::support_overlap;
 use crate::train::progress::Watch;
@@ -108,12 +110,23 @@ struct Task<'a> {
     options: &'a TrainOptions,
 }
 
-/// Parameters of one seed; with the published transfer Xi of every phase.
+/// What one seed has learned.
 struct Run {
     seed: u64,
+    learned: Learned,
+    losses: Losses,
+}
+
+/// Linear and nonlinear maps are trained by code of their own: that of linear ones works on moments of the batches.
+enum Learned {
+    Linear(LinearMaps),
+    Networks(TrainedNetworks),
+}
+
+/// Parameters of linear maps; with the published transfer Xi of every phase.
+struct LinearMaps {
     parameters: Parameters,
     xi: Vec<DMatrix<f64>>,
-    losses: Losses,
 }
 
 impl Task<'_> {
@@ -162,6 +175,46 @@ impl Task<'_> {
             lift: self.options.encoder.lift_weight,
             ..options.weights
         };
+        let mut tell = |epoch: usize, losses: &Losses, active: usize| {
+            // Nobody listens any more if the training is being dropped; that ends soon by itself.
+            let _ = news.send(format!(
+                "seed {seed} epoch {epoch}: loss {:.3e}, decoder {:.3e}, {active} terms",
+                losses.total(&weights),
+                losses.decoder
+            ));
+        };
+        let (learned, losses) = if options.maps.is_linear() {
+            let (maps, losses) = self.learn_linear(seed, weights, cancel, &mut tell);
+            (Learned::Linear(maps), losses)
+        } else {
+            let (maps, losses) = self.networks().learn(seed, weights, cancel, &mut tell);
+            (Learned::Networks(maps), losses)
+        };
+        Run {
+            seed,
+            learned,
+            losses,
+        }
+    }
+
+    fn networks(&self) -> NetworkTask<'_> {
+        NetworkTask {
+            sets: self.sets,
+            batches: self.batches,
+            features: self.features,
+            active: self.active,
+            options: self.options,
+        }
+    }
+
+    fn learn_linear(
+        &self,
+        seed: u64,
+        weights: LossWeights,
+        cancel: &AtomicBool,
+        tell: &mut dyn FnMut(usize, &Losses, usize),
+    ) -> (LinearMaps, Losses) {
+        let options = &self.options.joint;
         let contact: Vec<&Batch> = self
             .batches
             .iter()
@@ -173,12 +226,7 @@ impl Task<'_> {
             JointLoss::new(self.features, weights, coordinate_weights).with_unroll(options.unroll);
         let mask: Vec<bool> = (0..STATE_DIM).map(|i| self.active.contains(&i)).collect();
         let mut listener = |epoch: usize, losses: &Losses, active: usize| {
-            // Nobody listens any more if the training is being dropped; that ends soon by itself.
-            let _ = news.send(format!(
-                "seed {seed} epoch {epoch}: loss {:.3e}, decoder {:.3e}, {active} terms",
-                losses.total(&weights),
-                losses.decoder
-            ));
+            tell(epoch, losses, active);
             !cancel.load(Ordering::Relaxed)
         };
         let losses = train_together(
@@ -190,16 +238,14 @@ impl Task<'_> {
             &options.schedule,
             &mut listener,
         );
-        let mut run = Run {
-            seed,
+        let mut maps = LinearMaps {
             parameters,
             xi: Vec::new(),
-            losses,
         };
         if options.transfer == Transfer::Published {
-            self.transfer(&mut run, weights, cancel);
+            self.transfer(&mut maps, weights, cancel);
         }
-        run
+        (maps, losses)
     }
 
     /// Where a seed starts: random maps, `b_e = 0` as published or `-W_e mean(x)`.
@@ -223,7 +269,7 @@ impl Task<'_> {
     }
 
     /// Steps two and three as published.
-    fn transfer(&self, run: &mut Run, weights: LossWeights, cancel: &AtomicBool) {
+    fn transfer(&self, run: &mut LinearMaps, weights: LossWeights, cancel: &AtomicBool) {
         let schedule = &self.options.joint.schedule;
         let mut listener = |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
         let all: Vec<&Batch> = self.batches.iter().collect();
@@ -278,17 +324,18 @@ impl Task<'_> {
         judged: &[Batch],
         watch: &mut Watch<'_>,
     ) -> Result<(SeedReport, Fitted), TrainError> {
-        let (fitted, score) = match self.options.joint.transfer {
-            Transfer::Published => (published(&run)?, self.published_score(&run, judged)),
-            Transfer::Chosen => {
-                let basis = run.parameters.encoder.clone().qr().q();
-                let encoder = encoder_over(&self.sets.training, &basis, self.options)?;
-                let fitted = fit_dynamics(self.sets, self.features, encoder, self.options, watch)?;
-                let score = fitted
-                    .choice
-                    .as_ref()
-                    .map_or(f64::INFINITY, |(choice, _)| choice.score);
-                (fitted, score)
+        let fitted = match &run.learned {
+            Learned::Linear(maps) => self.finish_linear(maps, watch)?,
+            Learned::Networks(maps) => self.networks().finish(maps, watch)?,
+        };
+        let score = match (self.options.joint.transfer, &run.learned) {
+            (Transfer::Chosen, _) => fitted
+                .choice
+                .as_ref()
+                .map_or(f64::INFINITY, |(choice, _)| choice.score),
+            (Transfer::Published, Learned::Linear(maps)) => self.published_score(maps, judged),
+            (Transfer::Published, Learned::Networks(maps)) => {
+                self.networks().published_score(maps, judged)
             }
         };
         let seed = (run.seed, score);
@@ -298,8 +345,25 @@ impl Task<'_> {
         Ok((report, fitted))
     }
 
+    fn finish_linear(
+        &self,
+        maps: &LinearMaps,
+        watch: &mut Watch<'_>,
+    ) -> Result<Fitted, TrainError> {
+        match self.options.joint.transfer {
+            Transfer::Published => published(maps),
+            Transfer::Chosen => {
+                let basis = maps.parameters.encoder.clone().qr().q();
+                let encoder = encoder_over(&self.sets.training, &basis, self.options)?.into();
+                let decoder = least_squares_decoder(&self.sets.training, &encoder)?.into();
+                let maps = (encoder, decoder);
+                fit_dynamics(self.sets, self.features, maps, self.options, watch)
+            }
+        }
+    }
+
     /// Mean combined loss over batches of all phases.
-    fn published_score(&self, run: &Run, judged: &[Batch]) -> f64 {
+    fn published_score(&self, run: &LinearMaps, judged: &[Batch]) -> f64 {
         let weights = self.options.joint.weights;
         let mut loss = JointLoss::new(
             self.features,
@@ -317,7 +381,7 @@ impl Task<'_> {
 }
 
 /// The numbers as Adam left them.
-fn published(run: &Run) -> Result<Fitted, TrainError> {
+fn published(run: &LinearMaps) -> Result<Fitted, TrainError> {
     let Parameters {
         encoder,
         encoder_bias,
@@ -326,8 +390,9 @@ fn published(run: &Run) -> Result<Fitted, TrainError> {
         ..
     } = &run.parameters;
     Ok(Fitted {
-        encoder: AffineMap::new("encoder", encoder.transpose(), encoder_bias.clone())?,
-        decoder: AffineMap::new("decoder", decoder.transpose(), decoder_bias.clone())?,
+        weights: encoder.transpose(),
+        encoder: AffineMap::new("encoder", encoder.transpose(), encoder_bias.clone())?.into(),
+        decoder: AffineMap::new("decoder", decoder.transpose(), decoder_bias.clone())?.into(),
         xi: run.xi.clone(),
         choice: None,
     })

@@ -47,7 +47,7 @@ impl Schedule {
         self.epochs + self.refinement
     }
 
-    fn thresholds_at(&self, epoch: usize) -> bool {
+    pub(super) fn thresholds_at(&self, epoch: usize) -> bool {
         epoch > 0
             && epoch < self.epochs
             && self.threshold_every > 0
@@ -335,21 +335,21 @@ fn mask_rows(encoder: &mut DMatrix<f64>, mask: &[bool]) {
     }
 }
 
-fn drop_small(xi: &mut DMatrix<f64>, support: &mut DMatrix<bool>, threshold: f64) {
+pub(super) fn drop_small(xi: &mut DMatrix<f64>, support: &mut DMatrix<bool>, threshold: f64) {
     for (value, kept) in xi.iter_mut().zip(support.iter_mut()) {
         *kept &= value.abs() >= threshold;
     }
     keep_support(xi, support);
 }
 
-fn keep_support(xi: &mut DMatrix<f64>, support: &DMatrix<bool>) {
+pub(super) fn keep_support(xi: &mut DMatrix<f64>, support: &DMatrix<bool>) {
     xi.iter_mut()
         .zip(support.iter())
         .filter(|(_, kept)| !**kept)
         .for_each(|(value, _)| *value = 0.0);
 }
 
-fn active(support: &DMatrix<bool>) -> usize {
+pub(super) fn active(support: &DMatrix<bool>) -> usize {
     support.iter().filter(|kept| **kept).count()
 }
 

@@ -255,11 +255,7 @@ fn summed(stack: &DMatrix<f64>, n: usize) -> DMatrix<f64> {
 }
 
 /// `phi` on a stack, and its derivatives at the values; no derivatives for a linear layer.
-fn activate(
-    phi: Activation,
-    affine: &DMatrix<f64>,
-    n: usize,
-) -> (DMatrix<f64>, [DMatrix<f64>; 3]) {
+fn activate(phi: Activation, affine: &DMatrix<f64>, n: usize) -> (DMatrix<f64>, [DMatrix<f64>; 3]) {
     let mut leaving = affine.clone();
     if phi == Activation::Linear {
         return (leaving, std::array::from_fn(|_| DMatrix::zeros(0, 0)));
@@ -393,8 +389,7 @@ mod tests {
             network.forward(stack.clone(), N, &mut tape);
             let jacobians = network.jacobian(&tape);
             let mut gradient = network.zeros_like();
-            let onto =
-                network.pull_back_jacobian(&tape, &jacobians, &on_jacobian, &mut gradient);
+            let onto = network.pull_back_jacobian(&tape, &jacobians, &on_jacobian, &mut gradient);
             let entering = network.backward(&tape, on_values.clone(), &onto, &mut gradient);
             let h = 1e-6;
             for (block, exact) in gradient.blocks().enumerate() {
@@ -435,9 +430,12 @@ mod tests {
             network.forward(stack, N, &mut tape);
             let mut whole = network.zeros_like();
             network.backward(&tape, pull.insert_rows(N, 2 * N, 0.0), &[], &mut whole);
-            assert!(alone.blocks().zip(whole.blocks()).all(|(a, b)| {
-                a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-13)
-            }));
+            assert!(
+                alone
+                    .blocks()
+                    .zip(whole.blocks())
+                    .all(|(a, b)| { a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-13) })
+            );
         }
     }
 }

@@ -5,7 +5,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::layers::{Network, Tape};
+use super::layers::{Jacobians, Network, Tape};
 use super::projection::InputProjections;
 use crate::model::Activation;
 use crate::train::features::{FeatureValues, Features};
@@ -118,12 +118,44 @@ pub struct NetworkLoss<'a> {
 }
 
 /// Samples in latent coordinates, as a forward pass leaves them.
-struct Encoded {
-    stack: DMatrix<f64>, // z, dz, ddz: 3n x d
-    jacobians: super::layers::Jacobians,
+pub(super) struct Encoded {
+    /// `z`, `dz`, `ddz`: `3n x d`.
+    pub stack: DMatrix<f64>,
+    /// `z`, `dz`, `u_lat`: `n x 3d`.
+    pub variables: DMatrix<f64>,
+    jacobians: Jacobians,
     rows: DMatrix<f64>, // of the Jacobians between x and z
     projections: InputProjections,
-    variables: DMatrix<f64>, // n x 3d
+}
+
+/// (9), (11), (12) and (13) at every sample.
+pub(super) fn encode(
+    parameters: &NetworkParameters,
+    batch: &Batch,
+    frame: &Frame,
+    tape: &mut Tape,
+) -> Encoded {
+    let n = batch.len();
+    let mut stack = (parameters.encoder).forward(frame.enter(batch), n, tape);
+    stack *= frame.latent;
+    let d = stack.ncols();
+    let jacobians = parameters.encoder.jacobian(tape);
+    let mut rows = jacobians.rows.clone();
+    frame.scale_jacobian(&mut rows);
+    let projections = InputProjections::new(&rows, &batch.u);
+    let mut variables = DMatrix::zeros(n, 3 * d);
+    for (start, block) in [(0, stack.rows(0, n)), (d, stack.rows(n, n))] {
+        variables.columns_mut(start, d).copy_from(&block);
+    }
+    let mut inputs = variables.columns_mut(2 * d, d);
+    inputs.copy_from(&projections.u_lat);
+    Encoded {
+        stack,
+        variables,
+        jacobians,
+        rows,
+        projections,
+    }
 }
 
 impl<'a> NetworkLoss<'a> {
@@ -159,6 +191,11 @@ impl<'a> NetworkLoss<'a> {
         self.weights = weights;
     }
 
+    /// The library.
+    pub fn features(&self) -> &'a Features {
+        self.features
+    }
+
     /// The maps around the networks.
     pub fn frame(&self) -> &Frame {
         &self.frame
@@ -174,10 +211,8 @@ impl<'a> NetworkLoss<'a> {
         self.gradient.clear();
         let (n, d) = (batch.len(), self.features.latent_dim());
         let xi = &parameters.xi[batch.phase];
-        let encoded = self.encode(parameters, batch);
-        let theta = self
-            .features
-            .evaluate(&encoded.variables, &mut self.values);
+        let encoded = encode(parameters, batch, &self.frame, &mut self.encoder_tape);
+        let theta = self.features.evaluate(&encoded.variables, &mut self.values);
         let mut predicted = DMatrix::zeros(n, d);
         add_product(&mut predicted, 1.0, &theta, xi);
         let (decoder, ddx, mut pull) = self.decode(parameters, batch, &encoded, &predicted);
@@ -187,7 +222,8 @@ impl<'a> NetworkLoss<'a> {
         miss *= 2.0 * self.weights.ddz / (n * d) as f64;
         let onto_predicted = pull.rows(2 * n, n) + &miss;
         pull.rows_mut(2 * n, n).copy_from(&-miss); // from here on with respect to ddz
-        let (bptt, pulled) = self.pull_through_library(batch, &encoded, (xi, &theta), &onto_predicted);
+        let (bptt, pulled) =
+            self.pull_through_library(batch, &encoded, (xi, &theta), &onto_predicted);
         let l1 = self.sparsity(xi, batch.phase);
         for (block, start) in [(0, 0), (n, d)] {
             let mut rows = pull.rows_mut(block, n);
@@ -202,31 +238,6 @@ impl<'a> NetworkLoss<'a> {
             l1,
             lift,
             bptt,
-        }
-    }
-
-    /// (9), (11), (12) and (13) at every sample.
-    fn encode(&mut self, parameters: &NetworkParameters, batch: &Batch) -> Encoded {
-        let (n, d) = (batch.len(), self.features.latent_dim());
-        let entering = self.frame.enter(batch);
-        let mut stack = (parameters.encoder).forward(entering, n, &mut self.encoder_tape);
-        stack *= self.frame.latent;
-        let jacobians = parameters.encoder.jacobian(&self.encoder_tape);
-        let mut rows = jacobians.rows.clone();
-        self.frame.scale_jacobian(&mut rows);
-        let projections = InputProjections::new(&rows, &batch.u);
-        let mut variables = DMatrix::zeros(n, 3 * d);
-        variables.columns_mut(0, d).copy_from(&stack.rows(0, n));
-        variables.columns_mut(d, d).copy_from(&stack.rows(n, n));
-        variables
-            .columns_mut(2 * d, d)
-            .copy_from(&projections.u_lat);
-        Encoded {
-            stack,
-            jacobians,
-            rows,
-            projections,
-            variables,
         }
     }
 
@@ -404,7 +415,10 @@ mod tests {
                     .with_unroll(unroll());
             loss.evaluate(&parameters, &batch);
             let mut gradient = loss.gradient().clone();
-            assert!(gradient.xi[0].amax() == 0.0 && gradient.encoder.layers[0].weights.row(4).amax() == 0.0);
+            assert!(
+                gradient.xi[0].amax() == 0.0
+                    && gradient.encoder.layers[0].weights.row(4).amax() == 0.0
+            );
             let count = all(&mut gradient).len();
             for block in 0..count {
                 for entry in 0..all(&mut gradient)[block].len() {
@@ -442,8 +456,9 @@ mod tests {
         parameters.encoder.layers[0].weights = linear.encoder.clone();
         parameters.decoder.layers[0].weights = linear.decoder.clone();
         let plain = Frame::plain(&[true; 7]);
-        let mut found = NetworkLoss::new(&features, WEIGHTS, coordinate_weights(), plain, &parameters)
-            .with_unroll(unroll());
+        let mut found =
+            NetworkLoss::new(&features, WEIGHTS, coordinate_weights(), plain, &parameters)
+                .with_unroll(unroll());
         let mut expected =
             JointLoss::new(&features, WEIGHTS, coordinate_weights()).with_unroll(unroll());
         let losses = found.evaluate(&parameters, &batch);
@@ -451,7 +466,11 @@ mod tests {
         let (a, b) = (losses.total(&WEIGHTS), reference.total(&WEIGHTS));
         assert!((a - b).abs() < 1e-9 * b && (losses.lift - reference.lift).abs() < 1e-9);
         let (found, expected) = (found.gradient(), expected.gradient());
-        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9 * b.abs().max(1.0));
+        let near = |a: &[f64], b: &[f64]| {
+            a.iter()
+                .zip(b)
+                .all(|(a, b)| (a - b).abs() < 1e-9 * b.abs().max(1.0))
+        };
         let maps = found.encoder.blocks().chain(found.decoder.blocks());
         let each = maps.chain([found.xi[1].as_slice()]).zip(expected.blocks());
         each.for_each(|(a, b)| assert!(near(a, b)));

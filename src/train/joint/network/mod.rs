@@ -5,6 +5,9 @@
 //! (`u_lat = pinv(J^T) u` at every sample), [`loss`] and [`stages`]. Batches, losses' names and weights, schedule and
 //! Adam are those of the linear training beside it.
 
+pub mod fold;
 pub mod layers;
 pub mod loss;
 pub mod projection;
+pub mod run;
+pub mod stages;
