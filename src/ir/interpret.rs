@@ -1,46 +1,70 @@
 //! Runs programs: the reference for generated code, and what simulation and
 //! control run.
 
-use super::kernel::sin_cos;
 use super::program::{Binary, Group, Program, Slopes, Slot, Statement, Table, Unary, ValueId};
+use super::real::Real;
 
 /// Runs one program as often as asked; owns the memory of all its values, so that
 /// a run allocates nothing.
+///
+/// Numbers are `f64` unless another [`Real`] is named: `Interpreter::<f32>::of(&program)` is the
+/// reference for generated code in single precision.
 #[derive(Clone, Debug)]
-pub struct Interpreter {
+pub struct Interpreter<T = f64> {
     inputs: Vec<Slot>,
     outputs: Vec<Slot>,
     /// (slot, index, value) of each input element that the program reads.
     loads: Vec<(usize, usize, usize)>,
-    steps: Vec<Step>,
-    tables: Vec<Table>,
-    callees: Vec<Callee>,
+    steps: Vec<Step<T>>,
+    tables: Vec<Entries<T>>,
+    callees: Vec<Callee<T>>,
     /// (slot, index, value) of each output element.
     stores: Vec<(usize, usize, usize)>,
     /// Constants are set once; every other value is computed before it is read.
-    values: Vec<f64>,
+    values: Vec<T>,
+}
+
+/// A constant table in the numbers of the run.
+#[derive(Clone, Debug)]
+struct Entries<T> {
+    cols: usize,
+    entries: Box<[T]>,
+}
+
+impl<T: Real> Entries<T> {
+    fn new(table: &Table) -> Self {
+        Self {
+            cols: table.cols(),
+            entries: table.entries().iter().map(|&x| T::constant(x)).collect(),
+        }
+    }
+
+    fn row(&self, row: usize) -> &[T] {
+        &self.entries[row * self.cols..(row + 1) * self.cols]
+    }
 }
 
 /// A statement that computes something, with positions in the values.
 #[derive(Clone, Debug)]
-enum Step {
+enum Step<T> {
     Unary(Unary, usize, usize),
     Binary(Binary, usize, usize, usize),
+    Square(usize, usize),
     SinCos(Box<[usize]>, usize),
     Accumulate(usize, Box<[Box<[usize]>]>, usize),
     Constants(usize, usize),
-    Separable(Box<SeparableStep>, usize),
+    Separable(Box<SeparableStep<T>>, usize),
     Call(usize, Box<[usize]>, usize),
 }
 
 /// Sums of functions of one variable each; positions in the values.
 #[derive(Clone, Debug)]
-struct SeparableStep {
+struct SeparableStep<T> {
     start: Box<[usize]>,
     base: Option<Box<[usize]>>,
     groups: Box<[GroupStep]>,
     /// One product sum a column, reused by every row.
-    columns: Vec<f64>,
+    columns: Vec<T>,
 }
 
 #[derive(Clone, Debug)]
@@ -59,23 +83,33 @@ enum SlopeStep {
 
 /// A program run inside another one.
 #[derive(Clone, Debug)]
-struct Callee {
-    interpreter: Interpreter,
-    arguments: Vec<f64>,
-    results: Vec<f64>,
+struct Callee<T> {
+    interpreter: Interpreter<T>,
+    arguments: Vec<T>,
+    results: Vec<T>,
 }
 
 impl Interpreter {
-    /// Prepares a program for runs.
+    /// Prepares a program for runs in double precision.
     pub fn new(program: &Program) -> Self {
-        let mut values = vec![0.0; program.n_values()];
+        Self::of(program)
+    }
+}
+
+impl<T: Real> Interpreter<T> {
+    /// Prepares a program for runs on a kind of numbers.
+    pub fn of(program: &Program) -> Self {
+        let mut values = vec![T::constant(0.0); program.n_values()];
         let (mut loads, mut steps) = (Vec::new(), Vec::new());
         for (position, statement) in program.statements().iter().enumerate() {
             let first = program.values_of(position).start;
             match statement {
-                Statement::Constant(constant) => values[first] = *constant,
+                Statement::Constant(constant) => values[first] = T::constant(*constant),
                 Statement::Input { slot, index } => loads.push((*slot, *index, first)),
                 Statement::Unary(op, a) => steps.push(Step::Unary(*op, a.index(), first)),
+                Statement::Binary(Binary::Mul, a, b) if a == b => {
+                    steps.push(Step::Square(a.index(), first));
+                }
                 Statement::Binary(op, a, b) => {
                     steps.push(Step::Binary(*op, a.index(), b.index(), first));
                 }
@@ -113,7 +147,7 @@ impl Interpreter {
             outputs: program.outputs().to_vec(),
             loads,
             steps,
-            tables: program.tables().to_vec(),
+            tables: program.tables().iter().map(Entries::new).collect(),
             callees: program.callees().iter().map(Callee::new).collect(),
             stores,
             values,
@@ -124,7 +158,7 @@ impl Interpreter {
     ///
     /// # Panics
     /// If the number or a length of the slices differs from the program's slots.
-    pub fn run(&mut self, inputs: &[&[f64]], outputs: &mut [&mut [f64]]) {
+    pub fn run(&mut self, inputs: &[&[T]], outputs: &mut [&mut [T]]) {
         assert_eq!(inputs.len(), self.inputs.len(), "one slice an input slot");
         assert_eq!(
             outputs.len(),
@@ -150,13 +184,14 @@ impl Interpreter {
         let values = &mut self.values;
         for step in &mut self.steps {
             match step {
-                Step::Unary(op, a, result) => values[*result] = unary(*op, values[*a]),
+                Step::Unary(op, a, result) => values[*result] = T::unary(*op, values[*a]),
                 Step::Binary(op, a, b, result) => {
                     values[*result] = binary(*op, values[*a], values[*b]);
                 }
+                Step::Square(a, result) => values[*result] = values[*a].square(),
                 Step::SinCos(arguments, first) => {
                     for (k, &argument) in arguments.iter().enumerate() {
-                        let (sine, cosine) = sin_cos(values[argument]);
+                        let (sine, cosine) = values[argument].sin_cos();
                         values[*first + k] = sine;
                         values[*first + arguments.len() + k] = cosine;
                     }
@@ -165,7 +200,7 @@ impl Interpreter {
                     accumulate(&self.tables[*table], sections, *first, values);
                 }
                 Step::Constants(table, first) => {
-                    let entries = self.tables[*table].entries();
+                    let entries = &self.tables[*table].entries;
                     values[*first..*first + entries.len()].copy_from_slice(entries);
                 }
                 Step::Separable(step, first) => step.run(&self.tables, *first, values),
@@ -183,13 +218,13 @@ impl Interpreter {
     }
 }
 
-impl Callee {
+impl<T: Real> Callee<T> {
     fn new(program: &Program) -> Self {
         let len = |slots: &[Slot]| slots.iter().map(|slot| slot.len).sum();
         Self {
-            interpreter: Interpreter::new(program),
-            arguments: vec![0.0; len(program.inputs())],
-            results: vec![0.0; len(program.outputs())],
+            interpreter: Interpreter::of(program),
+            arguments: vec![T::constant(0.0); len(program.inputs())],
+            results: vec![T::constant(0.0); len(program.outputs())],
         }
     }
 
@@ -213,20 +248,7 @@ fn positions(values: &[ValueId]) -> Box<[usize]> {
     values.iter().map(|value| value.index()).collect()
 }
 
-fn unary(op: Unary, a: f64) -> f64 {
-    match op {
-        Unary::Neg => -a,
-        Unary::Sqrt => a.sqrt(),
-        Unary::Abs => a.abs(),
-        Unary::Sign => f64::from(i8::from(a > 0.0) - i8::from(a < 0.0)),
-        Unary::Tan => a.tan(),
-        Unary::Tanh => a.tanh(),
-        Unary::Exp => a.exp(),
-        Unary::Log => a.ln(),
-    }
-}
-
-fn binary(op: Binary, a: f64, b: f64) -> f64 {
+fn binary<T: Real>(op: Binary, a: T, b: T) -> T {
     match op {
         Binary::Add => a + b,
         Binary::Sub => a - b,
@@ -235,34 +257,39 @@ fn binary(op: Binary, a: f64, b: f64) -> f64 {
     }
 }
 
-fn accumulate(table: &Table, sections: &[Box<[usize]>], first: usize, values: &mut [f64]) {
-    let cols = table.cols();
+fn accumulate<T: Real>(
+    table: &Entries<T>,
+    sections: &[Box<[usize]>],
+    first: usize,
+    values: &mut [T],
+) {
+    let cols = table.cols;
     values[first..first + cols].copy_from_slice(table.row(0));
     let mut row = 1;
     for weights in sections {
         let blocks = weights.chunks_exact(4);
         let rest = blocks.remainder();
         for block in blocks {
-            let w: [f64; 4] = std::array::from_fn(|k| values[block[k]]);
-            let rows: [&[f64]; 4] = std::array::from_fn(|k| table.row(row + k));
+            let w: [T; 4] = std::array::from_fn(|k| values[block[k]]);
+            let rows: [&[T]; 4] = std::array::from_fn(|k| table.row(row + k));
             for (j, y) in values[first..first + cols].iter_mut().enumerate() {
                 let front = rows[0][j] * w[0] + rows[1][j] * w[1];
                 let back = rows[2][j] * w[2] + rows[3][j] * w[3];
-                *y += front + back;
+                *y = *y + (front + back);
             }
             row += 4;
         }
         for &weight in rest {
             let w = values[weight];
             for (y, t) in values[first..first + cols].iter_mut().zip(table.row(row)) {
-                *y += t * w;
+                *y = *y + *t * w;
             }
             row += 1;
         }
     }
 }
 
-impl SeparableStep {
+impl<T: Real> SeparableStep<T> {
     fn new(start: &[ValueId], base: Option<&[ValueId]>, groups: &[Group], cols: usize) -> Self {
         let group = |group: &Group| GroupStep {
             table: group.table.index(),
@@ -277,15 +304,15 @@ impl SeparableStep {
             start: positions(start),
             base: base.map(positions),
             groups: groups.iter().map(group).collect(),
-            columns: vec![0.0; cols],
+            columns: vec![T::constant(0.0); cols],
         }
     }
 
-    fn run(&mut self, tables: &[Table], first: usize, values: &mut [f64]) {
+    fn run(&mut self, tables: &[Entries<T>], first: usize, values: &mut [T]) {
         let (rows, cols) = (self.start.len(), self.columns.len());
         for r in 0..rows {
             for i in 0..cols {
-                let mut sum: Option<f64> = None;
+                let mut sum: Option<T> = None;
                 let mut slope = self.base.as_ref().map(|base| values[base[r * cols + i]]);
                 for group in &self.groups {
                     let t = tables[group.table].row(r)[i];
@@ -300,8 +327,8 @@ impl SeparableStep {
                         (SlopeStep::Minus(slopes), Some(slope)) => slope - t * values[slopes[i]],
                     });
                 }
-                self.columns[i] = sum.unwrap_or(0.0);
-                values[first + rows + r * cols + i] = slope.unwrap_or(0.0);
+                self.columns[i] = sum.unwrap_or(T::constant(0.0));
+                values[first + rows + r * cols + i] = slope.unwrap_or(T::constant(0.0));
             }
             values[first + r] = lane_sum(values[self.start[r]], &self.columns);
         }
@@ -309,18 +336,18 @@ impl SeparableStep {
 }
 
 /// `start` plus all columns, associated as [`Statement::Separable`] says.
-fn lane_sum(start: f64, columns: &[f64]) -> f64 {
+fn lane_sum<T: Real>(start: T, columns: &[T]) -> T {
     let blocks = columns.len() / 4;
     let mut sum = start;
     if blocks > 0 {
         let lane = |l: usize| tree_sum(columns, l, 0, blocks);
-        sum += (lane(0) + lane(1)) + (lane(2) + lane(3));
+        sum = sum + ((lane(0) + lane(1)) + (lane(2) + lane(3)));
     }
-    columns[4 * blocks..].iter().fold(sum, |sum, q| sum + q)
+    columns[4 * blocks..].iter().fold(sum, |sum, &q| sum + q)
 }
 
 /// The columns `4 k + lane` for `k` from `low` to below `high`, in a balanced tree.
-fn tree_sum(columns: &[f64], lane: usize, low: usize, high: usize) -> f64 {
+fn tree_sum<T: Real>(columns: &[T], lane: usize, low: usize, high: usize) -> T {
     if high - low == 1 {
         return columns[4 * low + lane];
     }
@@ -426,7 +453,7 @@ mod tests {
     #[test]
     fn sign_is_zero_at_zero_and_for_nan() {
         assert_eq!(
-            [-2.0, -0.0, 0.0, 3.0, f64::NAN].map(|a| unary(Unary::Sign, a)),
+            [-2.0, -0.0, 0.0, 3.0, f64::NAN].map(|a| f64::unary(Unary::Sign, a)),
             [-1.0, 0.0, 0.0, 1.0, 0.0]
         );
     }

@@ -22,7 +22,10 @@
 mod build;
 mod interpret;
 pub mod kernel;
+pub mod kernel_single;
 mod program;
+mod real;
+mod rounded;
 mod validate;
 
 pub use build::ProgramBuilder;
@@ -30,4 +33,6 @@ pub use interpret::Interpreter;
 pub use program::{
     Binary, Group, Program, ResultEntry, Slopes, Slot, Statement, Table, TableId, Unary, ValueId,
 };
+pub use real::Real;
+pub use rounded::{Range, Rounded};
 pub use validate::IrError;

@@ -1,0 +1,89 @@
+//! The kinds of numbers on which a program can be run.
+
+use std::fmt::Debug;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use super::program::Unary;
+use super::{kernel, kernel_single};
+
+/// A number that programs compute with: `f64`, `f32`, or [`Rounded`](super::Rounded), which
+/// bounds what `f32` loses.
+///
+/// Each operator rounds once, as generated code does with contraction off.
+pub trait Real:
+    Copy
+    + Debug
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// A constant of a program.
+    fn constant(value: f64) -> Self;
+
+    /// `a * a`.
+    #[inline]
+    fn square(self) -> Self {
+        self * self
+    }
+
+    /// A function of one number.
+    fn unary(op: Unary, a: Self) -> Self;
+
+    /// Sine and cosine by the kernel of this precision.
+    fn sin_cos(self) -> (Self, Self);
+}
+
+impl Real for f64 {
+    #[inline]
+    fn constant(value: f64) -> Self {
+        value
+    }
+
+    #[inline]
+    fn unary(op: Unary, a: f64) -> f64 {
+        match op {
+            Unary::Neg => -a,
+            Unary::Sqrt => a.sqrt(),
+            Unary::Abs => a.abs(),
+            Unary::Sign => f64::from(i8::from(a > 0.0) - i8::from(a < 0.0)),
+            Unary::Tan => a.tan(),
+            Unary::Tanh => a.tanh(),
+            Unary::Exp => a.exp(),
+            Unary::Log => a.ln(),
+        }
+    }
+
+    #[inline]
+    fn sin_cos(self) -> (f64, f64) {
+        kernel::sin_cos(self)
+    }
+}
+
+impl Real for f32 {
+    /// The nearest single-precision number; infinite beyond the largest.
+    #[inline]
+    fn constant(value: f64) -> Self {
+        value as f32
+    }
+
+    #[inline]
+    fn unary(op: Unary, a: f32) -> f32 {
+        match op {
+            Unary::Neg => -a,
+            Unary::Sqrt => a.sqrt(),
+            Unary::Abs => a.abs(),
+            Unary::Sign => f32::from(i8::from(a > 0.0) - i8::from(a < 0.0)),
+            Unary::Tan => a.tan(),
+            Unary::Tanh => a.tanh(),
+            Unary::Exp => a.exp(),
+            Unary::Log => a.ln(),
+        }
+    }
+
+    #[inline]
+    fn sin_cos(self) -> (f32, f32) {
+        kernel_single::sin_cos(self)
+    }
+}

@@ -1,0 +1,493 @@
+//! How far single precision may be from the exact value: a bound that the interpreter computes.
+//!
+//! A [`Rounded`] stands for all states of a box at once. It holds the range of exact values, the
+//! range of what single precision computes, and a bound on the difference. Each operator adds its
+//! own rounding to what it inherits, with `u = 2^-24` for an operation rounded to nearest:
+//!
+//! `|fl(a' b') - a b| <= |a' - a| |b'| + |a| |b' - b| + u |a' b'|`, and alike for the others
+//! (Higham, Accuracy and Stability of Numerical Algorithms, 2002, chapter 3).
+//!
+//! The bound also holds where compilers fuse a product with a sum, which rounds less often, and where a
+//! processor replaces numbers below the least normal one by zero.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use super::program::Unary;
+use super::real::Real;
+
+/// Largest relative error of one operation rounded to nearest in single precision.
+const UNIT: f64 = 1.0 / (1u64 << 24) as f64;
+/// Least normal number: what a processor that flushes to zero may lose.
+const TINY: f64 = f32::MIN_POSITIVE as f64;
+/// Units by which the sine-and-cosine kernel or a library's sine may be off: two of the last place.
+const SIN_COS_UNITS: f64 = 4.0;
+/// Units by which another library function may be off: four of the last place.
+const LIBRARY_UNITS: f64 = 8.0;
+/// What an operation of this module itself may lose, in double precision.
+const OWN: f64 = 1.0 / (1u64 << 50) as f64;
+
+/// The numbers from `low` to `high`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Least number.
+    pub low: f64,
+    /// Largest number.
+    pub high: f64,
+}
+
+impl Range {
+    /// From `-magnitude` to `magnitude`.
+    pub fn within(magnitude: f64) -> Self {
+        Self {
+            low: -magnitude,
+            high: magnitude,
+        }
+    }
+
+    /// One number.
+    pub fn point(value: f64) -> Self {
+        Self {
+            low: value,
+            high: value,
+        }
+    }
+
+    /// Largest absolute value.
+    pub fn magnitude(self) -> f64 {
+        self.low.abs().max(self.high.abs())
+    }
+
+    fn hull(self, other: Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+        }
+    }
+
+    fn has_zero(self) -> bool {
+        self.low <= 0.0 && self.high >= 0.0
+    }
+
+    /// Each end moved outwards by a share of itself, so that signs stay.
+    fn widened(self, share: f64) -> Self {
+        Self {
+            low: self.low - share * self.low.abs(),
+            high: self.high + share * self.high.abs(),
+        }
+    }
+
+    /// With zero, if an end is so small that a processor may flush it.
+    fn flushed(self) -> Self {
+        let end = |x: f64| if x.abs() < TINY { 0.0 } else { x };
+        let ends = Self {
+            low: end(self.low),
+            high: end(self.high),
+        };
+        self.hull(ends)
+    }
+
+    fn sum(self, other: Self) -> Self {
+        Self {
+            low: self.low + other.low,
+            high: self.high + other.high,
+        }
+    }
+
+    fn product(self, other: Self) -> Self {
+        let corners = [
+            self.low * other.low,
+            self.low * other.high,
+            self.high * other.low,
+            self.high * other.high,
+        ];
+        Self {
+            low: corners.into_iter().fold(f64::INFINITY, f64::min),
+            high: corners.into_iter().fold(f64::NEG_INFINITY, f64::max),
+        }
+    }
+
+    fn absolute(self) -> Self {
+        let least = if self.has_zero() {
+            0.0
+        } else {
+            self.low.abs().min(self.high.abs())
+        };
+        Self {
+            low: least,
+            high: self.magnitude(),
+        }
+    }
+
+    fn squared(self) -> Self {
+        let absolute = self.absolute();
+        Self {
+            low: absolute.low * absolute.low,
+            high: absolute.high * absolute.high,
+        }
+    }
+
+    /// `1 / self`, which must not hold zero.
+    fn reciprocal(self) -> Self {
+        Self {
+            low: 1.0 / self.high,
+            high: 1.0 / self.low,
+        }
+    }
+
+    fn mapped(self, increasing: impl Fn(f64) -> f64) -> Self {
+        Self {
+            low: increasing(self.low),
+            high: increasing(self.high),
+        }
+    }
+
+    fn negated(self) -> Self {
+        Self {
+            low: -self.high,
+            high: -self.low,
+        }
+    }
+
+    /// All cosines of the range.
+    fn cosine(self) -> Self {
+        let (first, last) = (self.low / TAU, self.high / TAU);
+        let mut range = Self::point(self.low.cos()).hull(Self::point(self.high.cos()));
+        let slack = 1e-9;
+        if (last + slack).floor() > (first - slack).floor() {
+            range.high = 1.0;
+        }
+        if (last + 0.5 + slack).floor() > (first + 0.5 - slack).floor() {
+            range.low = -1.0;
+        }
+        range
+    }
+
+    fn sine(self) -> Self {
+        self.sum(Self::point(-FRAC_PI_2)).cosine()
+    }
+}
+
+/// What single precision makes of a value, over all states of a box.
+#[derive(Clone, Copy, Debug)]
+pub struct Rounded {
+    exact: Range,
+    computed: Range,
+    error: f64,
+}
+
+impl Rounded {
+    /// An input that single precision represents, somewhere in a range.
+    pub fn input(range: Range) -> Self {
+        Self {
+            exact: range,
+            computed: range,
+            error: 0.0,
+        }
+    }
+
+    /// Bound on the difference between computed and exact value; `None` if there is none, because
+    /// a divisor may vanish, a value may overflow, or a root or logarithm may leave its domain.
+    pub fn bound(self) -> Option<f64> {
+        self.error.is_finite().then_some(self.error * (1.0 + 1e-6))
+    }
+
+    const UNBOUNDED: Self = Self {
+        exact: Range {
+            low: f64::NEG_INFINITY,
+            high: f64::INFINITY,
+        },
+        computed: Range {
+            low: f64::NEG_INFINITY,
+            high: f64::INFINITY,
+        },
+        error: f64::INFINITY,
+    };
+
+    /// A result that inherits an error and is then rounded to within `units`.
+    fn rounded(exact: Range, before: Range, inherited: f64, units: f64) -> Self {
+        let exact = exact.widened(OWN);
+        let computed = before.widened(units * UNIT + OWN).flushed();
+        let error = inherited + units * UNIT * before.magnitude() + TINY;
+        let apart = (computed.high - exact.low).max(exact.high - computed.low);
+        let all = [exact.low, exact.high, error, computed.low, computed.high];
+        if all.iter().any(|x| !x.is_finite()) || computed.magnitude() > f64::from(f32::MAX) {
+            return Self::UNBOUNDED;
+        }
+        Self {
+            exact,
+            computed,
+            error: error.min(apart) * (1.0 + OWN),
+        }
+    }
+
+    fn is_unbounded(self) -> bool {
+        self.error.is_infinite()
+    }
+
+    fn hull(self) -> Range {
+        self.exact.hull(self.computed)
+    }
+
+    fn sqrt(self) -> Self {
+        if self.hull().low < 0.0 {
+            return Self::UNBOUNDED;
+        }
+        let roots = self.exact.low.sqrt() + self.computed.low.sqrt();
+        let inherited = (self.error / roots).min(self.error.sqrt());
+        let (exact, computed) = (
+            self.exact.mapped(f64::sqrt),
+            self.computed.mapped(f64::sqrt),
+        );
+        Self::rounded(exact, computed, inherited, 1.0)
+    }
+
+    fn sign(self) -> Self {
+        let of = |range: Range| range.mapped(|x| f64::from(i8::from(x > 0.0) - i8::from(x < 0.0)));
+        let (exact, computed) = (of(self.exact), of(self.computed));
+        Self {
+            exact,
+            computed,
+            error: (computed.high - exact.low).max(exact.high - computed.low),
+        }
+    }
+
+    fn tan(self) -> Self {
+        let hull = self.hull();
+        let branch = |x: f64| (x / std::f64::consts::PI + 0.5).floor();
+        if branch(hull.low) != branch(hull.high) {
+            return Self::UNBOUNDED;
+        }
+        let steepest = hull.mapped(f64::tan).magnitude();
+        let inherited = self.error * (1.0 + steepest * steepest);
+        self.library(f64::tan, inherited)
+    }
+
+    fn log(self) -> Self {
+        let hull = self.hull();
+        if hull.low <= 0.0 {
+            return Self::UNBOUNDED;
+        }
+        self.library(f64::ln, self.error / hull.low)
+    }
+
+    /// An increasing function of the library.
+    fn library(self, function: fn(f64) -> f64, inherited: f64) -> Self {
+        let (exact, computed) = (self.exact.mapped(function), self.computed.mapped(function));
+        Self::rounded(exact, computed, inherited, LIBRARY_UNITS)
+    }
+}
+
+impl Add for Rounded {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        let (exact, computed) = (
+            self.exact.sum(other.exact),
+            self.computed.sum(other.computed),
+        );
+        Self::rounded(exact, computed, self.error + other.error, 1.0)
+    }
+}
+
+impl Sub for Rounded {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl Mul for Rounded {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        if self.is_unbounded() || other.is_unbounded() {
+            return Self::UNBOUNDED;
+        }
+        let (exact, computed) = (
+            self.exact.product(other.exact),
+            self.computed.product(other.computed),
+        );
+        let inherited =
+            self.error * other.computed.magnitude() + self.exact.magnitude() * other.error;
+        Self::rounded(exact, computed, inherited, 1.0)
+    }
+}
+
+impl Div for Rounded {
+    type Output = Self;
+
+    /// `|a'/b' - a/b| <= (|a' - a| + |a/b| |b' - b|) / |b'|`
+    fn div(self, other: Self) -> Self {
+        if self.is_unbounded() || other.is_unbounded() || other.hull().has_zero() {
+            return Self::UNBOUNDED;
+        }
+        let (above, below) = (other.exact.reciprocal(), other.computed.reciprocal());
+        let (exact, computed) = (self.exact.product(above), self.computed.product(below));
+        let inherited = (self.error + exact.magnitude() * other.error) * below.magnitude();
+        Self::rounded(exact, computed, inherited, 1.0)
+    }
+}
+
+impl Neg for Rounded {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        Self {
+            exact: self.exact.negated(),
+            computed: self.computed.negated(),
+            error: self.error,
+        }
+    }
+}
+
+impl Real for Rounded {
+    fn constant(value: f64) -> Self {
+        let computed = f64::from(value as f32);
+        if !computed.is_finite() {
+            return Self::UNBOUNDED;
+        }
+        Self {
+            exact: Range::point(value),
+            computed: Range::point(computed).flushed(),
+            error: (value - computed).abs() + if computed.abs() < TINY { TINY } else { 0.0 },
+        }
+    }
+
+    fn square(self) -> Self {
+        if self.is_unbounded() {
+            return Self::UNBOUNDED;
+        }
+        let inherited = self.error * (self.exact.magnitude() + self.computed.magnitude());
+        Self::rounded(self.exact.squared(), self.computed.squared(), inherited, 1.0)
+    }
+
+    fn unary(op: Unary, a: Self) -> Self {
+        if a.is_unbounded() {
+            return Self::UNBOUNDED;
+        }
+        match op {
+            Unary::Neg => -a,
+            Unary::Sqrt => a.sqrt(),
+            Unary::Abs => Self {
+                exact: a.exact.absolute(),
+                computed: a.computed.absolute(),
+                error: a.error,
+            },
+            Unary::Sign => a.sign(),
+            Unary::Tan => a.tan(),
+            // The slope of tanh is 1 - tanh^2.
+            Unary::Tanh => {
+                let least = a.hull().absolute().low.tanh();
+                a.library(f64::tanh, a.error * (1.0 - least * least))
+            }
+            Unary::Exp => a.library(f64::exp, a.error * a.hull().high.exp()),
+            Unary::Log => a.log(),
+        }
+    }
+
+    fn sin_cos(self) -> (Self, Self) {
+        if self.is_unbounded() {
+            return (Self::UNBOUNDED, Self::UNBOUNDED);
+        }
+        let of = |function: fn(Range) -> Range| {
+            let (exact, computed) = (function(self.exact), function(self.computed));
+            Self::rounded(exact, computed, self.error, SIN_COS_UNITS)
+        };
+        (of(Range::sine), of(Range::cosine))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Binary, Interpreter, Program, ProgramBuilder};
+    use super::*;
+
+    /// y = (sin(3 x0) x1 - x0^2, tanh(x1) / (1 + x0^2), sqrt(x0^2 + x1^2)).
+    fn program() -> Program {
+        let mut builder = ProgramBuilder::new("test");
+        let x = builder.input("x", 2);
+        let (one, three) = (builder.constant(1.0), builder.constant(3.1));
+        let argument = builder.binary(Binary::Mul, three, x[0]);
+        let (sines, _) = builder.sin_cos(&[argument]);
+        let square = builder.binary(Binary::Mul, x[0], x[0]);
+        let product = builder.binary(Binary::Mul, sines[0], x[1]);
+        let first = builder.binary(Binary::Sub, product, square);
+        let below = builder.binary(Binary::Add, one, square);
+        let above = builder.unary(Unary::Tanh, x[1]);
+        let second = builder.binary(Binary::Div, above, below);
+        let other = builder.binary(Binary::Mul, x[1], x[1]);
+        let sum = builder.binary(Binary::Add, square, other);
+        let third = builder.unary(Unary::Sqrt, sum);
+        builder.output("y", &[first, second, third]);
+        builder.finish().expect("valid program")
+    }
+
+    fn bounds(program: &Program, box_: Range) -> [Option<f64>; 3] {
+        let mut y = [Rounded::UNBOUNDED; 3];
+        let x = [Rounded::input(box_); 2];
+        Interpreter::<Rounded>::of(program).run(&[&x], &mut [&mut y]);
+        y.map(Rounded::bound)
+    }
+
+    #[test]
+    fn single_precision_stays_within_the_bound_of_its_box_and_not_far_below() {
+        let program = program();
+        let (mut double, mut single) = (
+            Interpreter::new(&program),
+            Interpreter::<f32>::of(&program),
+        );
+        for magnitude in [0.1_f64, 1.0, 10.0] {
+            let bounds = bounds(&program, Range::within(magnitude)).map(|b| b.expect("a bound"));
+            let mut worst = [0.0_f64; 3];
+            let mut state = 1u64;
+            for _ in 0..20_000 {
+                let x: [f32; 2] = std::array::from_fn(|_| {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                    (magnitude * ((state >> 11) as f64 / (1u64 << 52) as f64 - 1.0)) as f32
+                });
+                let (mut y, mut exact) = ([0.0_f32; 3], [0.0_f64; 3]);
+                single.run(&[&x], &mut [&mut y]);
+                double.run(&[&x.map(f64::from)], &mut [&mut exact]);
+                for k in 0..3 {
+                    worst[k] = worst[k].max((f64::from(y[k]) - exact[k]).abs());
+                }
+            }
+            for k in 0..3 {
+                assert!(worst[k] <= bounds[k], "{magnitude}: {worst:?} {bounds:?}");
+            }
+            assert!(worst[0] > 0.05 * bounds[0], "{worst:?} {bounds:?}");
+        }
+    }
+
+    #[test]
+    fn bound_is_absent_where_a_divisor_may_vanish_or_a_value_overflow() {
+        let mut builder = ProgramBuilder::new("test");
+        let x = builder.input("x", 1);
+        let one = builder.constant(1.0);
+        let quotient = builder.binary(Binary::Div, one, x[0]);
+        let exponential = builder.unary(Unary::Exp, x[0]);
+        let logarithm = builder.unary(Unary::Log, x[0]);
+        builder.output("y", &[quotient, exponential, logarithm]);
+        let program = builder.finish().expect("valid program");
+        let at = |low: f64, high: f64| {
+            let mut y = [Rounded::UNBOUNDED; 3];
+            let x = [Rounded::input(Range { low, high })];
+            Interpreter::<Rounded>::of(&program).run(&[&x], &mut [&mut y]);
+            y.map(|y| y.bound().is_some())
+        };
+        assert_eq!(at(-1.0, 1.0), [false, true, false]);
+        assert_eq!(at(0.5, 100.0), [true, false, true]);
+    }
+
+    #[test]
+    fn ranges_of_sines_hold_their_extrema() {
+        let range = |low, high| Range { low, high };
+        assert_eq!(range(-0.5, 0.5).cosine().high, 1.0);
+        assert!(range(-0.5, 0.5).cosine().low > 0.87);
+        assert_eq!(range(1.0, 2.0).sine().high, 1.0);
+        assert_eq!(range(4.0, 5.0).sine().low, -1.0);
+        assert_eq!(range(-30.0, 30.0).sine(), range(-1.0, 1.0));
+    }
+}
