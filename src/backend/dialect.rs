@@ -1,12 +1,16 @@
 //! What targets spell differently.
 
 use super::code::{Argument, ConstTable, Function, MathFunction, Parameter};
+use super::literal::Literal;
 
 /// Spelling of a target language. The printer owns precedence and parentheses, the
 /// dialect everything that differs between languages.
 pub trait Dialect {
     /// Words that no variable may be called.
     fn reserved(&self) -> &'static [&'static str];
+
+    /// A number in the target's precision.
+    fn literal(&self, literal: Literal) -> String;
 
     /// A function applied to a printed argument.
     fn apply(&self, function: MathFunction, argument: &str) -> String;

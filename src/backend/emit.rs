@@ -6,6 +6,7 @@ use super::entries::ModelEntries;
 use super::latex::LatexOptions;
 use super::markdown::MarkdownOptions;
 use super::mathml::MathmlOptions;
+use super::precision::Precision;
 use super::target::{EmitError, EmittedFile};
 use super::{c, latex, markdown, mathml, rust};
 use crate::lower::LowerOptions;
@@ -78,6 +79,8 @@ pub struct EmitOptions {
     pub markdown: MarkdownOptions,
     /// How equations are set in MathML.
     pub mathml: MathmlOptions,
+    /// Floating-point numbers of generated code.
+    pub precision: Precision,
     /// Digest of the model file, for the first line of generated code.
     pub digest: Option<String>,
 }
@@ -88,22 +91,21 @@ pub struct EmitOptions {
 ///
 /// # Errors
 /// [`EmitError::Lower`] if a phase cannot be lowered, [`EmitError::Symbol`] if a variable
-/// has no symbol in print.
+/// has no symbol in print, [`EmitError::BeyondSingle`] for a constant that single precision
+/// cannot hold.
 pub fn emit(
     model: &ReducedModel,
     targets: &[Target],
     options: &EmitOptions,
 ) -> Result<Vec<EmittedFile>, EmitError> {
     let code = targets.iter().any(|target| target.is_code());
-    let entries = code
-        .then(|| ModelEntries::new(model, &options.lower))
-        .transpose()?;
+    let entries = code.then(|| code_entries(model, options)).transpose()?;
     let provenance = provenance(model, options.digest.as_deref());
     let mut files = Vec::new();
     for target in targets {
         let emitted = match (target, &entries) {
-            (Target::C, Some(entries)) => c::emit(entries, &provenance)?,
-            (Target::Rust, Some(entries)) => rust::emit(entries, &provenance)?,
+            (Target::C, Some(entries)) => c::emit(entries, &provenance, options.precision)?,
+            (Target::Rust, Some(entries)) => rust::emit(entries, &provenance, options.precision)?,
             (Target::C | Target::Rust, None) => Vec::new(),
             (Target::Latex, _) => latex::emit(model, &options.latex)?,
             (Target::Markdown, _) => markdown::emit(model, &options.markdown)?,
@@ -112,6 +114,16 @@ pub fn emit(
         files.extend(emitted);
     }
     Ok(files)
+}
+
+/// What is generated as code, with the error of single precision in the documentation.
+fn code_entries(model: &ReducedModel, options: &EmitOptions) -> Result<ModelEntries, EmitError> {
+    let mut entries = ModelEntries::new(model, &options.lower)?;
+    options.precision.check(&entries)?;
+    if options.precision == Precision::Single {
+        entries.state_bounds();
+    }
+    Ok(entries)
 }
 
 /// The first line of generated code, without comment signs.

@@ -1,6 +1,7 @@
 //! What is generated for a model: programs, with names, roles and documentation.
 
 use super::code::Role;
+use super::precision::{Precision, stated_bounds};
 use crate::ir::{Program, Slot, Statement, Unary};
 use crate::lower::{self, JacobianPattern, LowerError, LowerOptions};
 use crate::model::{ModelError, ReducedModel, Signals, StateMap};
@@ -67,14 +68,18 @@ pub struct ModelEntries {
 impl PhaseEntries {
     /// An angle beyond the kernel's limit for the test of batches, or one within it if the
     /// accelerations have functions that overflow there.
-    pub fn far_angle(&self) -> &'static str {
+    pub fn far_angle(&self, precision: Precision) -> f64 {
         let overflows = self.dynamics.program.statements().iter().any(|statement| {
             matches!(
                 statement,
                 Statement::Unary(Unary::Exp | Unary::Tan | Unary::Tanh | Unary::Log, _)
             )
         });
-        if overflows { "0.125" } else { "9000.125" }
+        match (overflows, precision) {
+            (true, _) => 0.125,
+            (false, Precision::Double) => 9000.125,
+            (false, Precision::Single) => 160.125,
+        }
     }
 }
 
@@ -95,6 +100,17 @@ impl ModelEntries {
             maps: map_entries(model)?,
             phases,
         })
+    }
+
+    /// Adds to the documentation of each function how far single precision may be off.
+    pub fn state_bounds(&mut self) {
+        let phases = self.phases.iter_mut();
+        let of_phases =
+            phases.flat_map(|phase| [&mut phase.dynamics, &mut phase.jacobian, &mut phase.step]);
+        for entry in self.maps.iter_mut().chain(of_phases) {
+            let bounds = stated_bounds(entry);
+            entry.docs.push(bounds);
+        }
     }
 
     /// All entries in the order in which they are generated.

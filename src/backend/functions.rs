@@ -61,9 +61,6 @@ impl ModelFunctions {
     }
 }
 
-/// Points of a block: what the widest common registers hold.
-pub const N_LANES: usize = 8;
-
 /// The body of the loop over a block's lanes; arrays are called `z_lanes` and so on, the
 /// loop variable `lane`.
 fn lanes(entry: &Entry, dialect: &dyn Dialect, tables: &mut Tables) -> Option<Vec<Stmt>> {

@@ -1,7 +1,8 @@
 //! The constants of the sine-and-cosine kernel as text.
 
 use super::literal::Literal;
-use crate::ir::kernel;
+use super::precision::Precision;
+use crate::ir::{kernel, kernel_single};
 
 /// Spelled constants, in the order in which kernels use them.
 #[derive(Clone, Debug)]
@@ -21,32 +22,49 @@ pub struct KernelText {
 }
 
 impl KernelText {
-    /// The constants in double precision.
-    pub fn new() -> Self {
-        let text = |value: f64| {
-            Literal::new(value)
-                .expect("the kernel's constants are finite")
-                .to_string()
+    /// The constants in a precision, each spelled by `spell`.
+    pub fn new(precision: Precision, spell: &dyn Fn(Literal) -> String) -> Self {
+        match precision {
+            Precision::Double => Self::spelled(
+                spell,
+                [kernel::LIMIT, kernel::TWO_OVER_PI, kernel::ROUND],
+                [&kernel::PI_2, &kernel::SIN, &kernel::COS],
+            ),
+            Precision::Single => {
+                let wide = |values: [f32; 3]| values.map(f64::from);
+                Self::spelled(
+                    spell,
+                    wide([
+                        kernel_single::LIMIT,
+                        kernel_single::TWO_OVER_PI,
+                        kernel_single::ROUND,
+                    ]),
+                    [
+                        &wide(kernel_single::PI_2),
+                        &wide(kernel_single::SIN),
+                        &wide(kernel_single::COS),
+                    ],
+                )
+            }
+        }
+    }
+
+    fn spelled(spell: &dyn Fn(Literal) -> String, single: [f64; 3], lists: [&[f64]; 3]) -> Self {
+        let text =
+            |value: f64| spell(Literal::new(value).expect("the kernel's constants are finite"));
+        let signed = |&value: &f64| match value < 0.0 {
+            true => format!("({})", text(value)),
+            false => text(value),
         };
-        let signed = |values: &[f64]| -> Vec<String> {
-            values
-                .iter()
-                .map(|&value| {
-                    if value < 0.0 {
-                        format!("({})", text(value))
-                    } else {
-                        text(value)
-                    }
-                })
-                .collect()
-        };
+        let [pi_2, sin, cos] = lists.map(|values| values.iter().map(signed).collect());
+        let [limit, two_over_pi, round] = single.map(text);
         Self {
-            limit: text(kernel::LIMIT),
-            two_over_pi: text(kernel::TWO_OVER_PI),
-            round: text(kernel::ROUND),
-            pi_2: signed(&kernel::PI_2),
-            sin: signed(&kernel::SIN),
-            cos: signed(&kernel::COS),
+            limit,
+            two_over_pi,
+            round,
+            pi_2,
+            sin,
+            cos,
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use super::precision::Precision;
+
 /// A finite number, spelled with the fewest digits that read back to the same bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Literal(f64);
@@ -13,6 +15,14 @@ impl Literal {
     /// The literal of a number; `None` if it is infinite or not a number.
     pub fn new(value: f64) -> Option<Self> {
         value.is_finite().then_some(Self(value))
+    }
+
+    /// The number with the fewest digits that read back to the nearest number of a precision.
+    pub fn digits(self, precision: Precision) -> String {
+        match precision {
+            Precision::Double => self.to_string(),
+            Precision::Single => format!("{:?}", self.0 as f32),
+        }
     }
 
     /// Whether the literal begins with a minus.
@@ -39,6 +49,18 @@ mod tests {
             let text = literal.to_string();
             let back: f64 = text.parse().expect("a number");
             assert_eq!(back.to_bits(), value.to_bits(), "{text}");
+            assert!(text.contains(['.', 'e']), "{text} would be an integer in C");
+        }
+    }
+
+    #[test]
+    fn literal_in_single_precision_reads_back_to_the_nearest_number() {
+        for value in [0.36, 1.0 / 3.0, 1e-44, 16_777_217.0, 1e16] {
+            let text = Literal::new(value)
+                .expect("finite")
+                .digits(Precision::Single);
+            let back: f32 = text.parse().expect("a number");
+            assert_eq!(back.to_bits(), (value as f32).to_bits(), "{text}");
             assert!(text.contains(['.', 'e']), "{text} would be an integer in C");
         }
     }

@@ -18,6 +18,7 @@ pub mod latex;
 mod literal;
 pub mod markdown;
 pub mod mathml;
+mod precision;
 mod printer;
 mod rust;
 mod tables;
@@ -31,4 +32,5 @@ mod wrap;
 
 pub use emit::{EmitOptions, Target, emit};
 pub use folder::{FolderError, write_files};
+pub use precision::{Precision, worst_errors};
 pub use target::{EmitError, EmittedFile};

@@ -70,18 +70,12 @@ const LONGEST_STEP_S: f64 = 0.01;
 /// Magnitudes of inputs for which bounds are stated.
 const MAGNITUDES: [f64; 2] = [1.0, 10.0];
 
-/// Sentences that bound what single precision loses in a function, for its documentation.
+/// A sentence that bounds what single precision loses in a function, for its documentation.
 ///
 /// The bounds are those of [`Rounded`] over all inputs up to a magnitude.
 pub fn stated_bounds(entry: &Entry) -> String {
     let has_step = entry.parameters.iter().any(|p| p.name == "h");
-    let step = if has_step {
-        format!(" and steps up to {LONGEST_STEP_S} s")
-    } else {
-        String::new()
-    };
-    let mut text = "Single precision: ".to_owned();
-    for (k, magnitude) in MAGNITUDES.into_iter().enumerate() {
+    let of_magnitude = |magnitude: f64| -> String {
         let outputs = worst_errors(entry, |name| match name {
             "h" => Range {
                 low: 0.0,
@@ -89,33 +83,27 @@ pub fn stated_bounds(entry: &Entry) -> String {
             },
             _ => Range::within(magnitude),
         });
-        let bounds: Vec<String> = outputs
-            .iter()
-            .map(|(name, bound)| match bound {
-                Some(bound) => format!("{name} {}", rounded_up(*bound)),
-                None => format!("{name} without a bound"),
-            })
-            .collect();
-        let (lead, tail) = match k {
-            0 => ("with inputs up to ", ""),
-            _ => ("; up to ", ""),
-        };
-        let step = if k == 0 { step.as_str() } else { "" };
-        text.push_str(&format!(
-            "{lead}{magnitude}{step} in magnitude, within {} of the exact value{tail}",
-            bounds.join(", ")
-        ));
-    }
-    text.push('.');
-    text
+        let bounds = outputs.iter().map(|(name, bound)| match bound {
+            Some(bound) => format!("{name} {}", rounded_up(*bound)),
+            None => format!("{name} without bound"),
+        });
+        bounds.collect::<Vec<_>>().join(", ")
+    };
+    let [small, large] = MAGNITUDES.map(of_magnitude);
+    let step = if has_step {
+        format!(" and h up to {LONGEST_STEP_S}")
+    } else {
+        String::new()
+    };
+    format!(
+        "Largest error of single precision, for inputs up to {} in magnitude{step}: {small}; up to {}: {large}.",
+        MAGNITUDES[0], MAGNITUDES[1]
+    )
 }
 
 /// The largest bound of each output's elements over the given ranges of the inputs; outputs
 /// without elements are left out.
-pub fn worst_errors(
-    entry: &Entry,
-    range: impl Fn(&str) -> Range,
-) -> Vec<(String, Option<f64>)> {
+pub fn worst_errors(entry: &Entry, range: impl Fn(&str) -> Range) -> Vec<(String, Option<f64>)> {
     let ranges: Vec<Vec<Range>> = entry
         .program
         .inputs()
@@ -126,9 +114,9 @@ pub fn worst_errors(
         .into_iter()
         .zip(entry.program.outputs())
         .map(|(bounds, slot)| {
-            let worst = bounds.into_iter().try_fold(0.0, |worst: f64, bound| {
-                bound.map(|bound| worst.max(bound))
-            });
+            let worst = bounds
+                .into_iter()
+                .try_fold(0.0, |worst: f64, bound| bound.map(|bound| worst.max(bound)));
             (slot.name.clone(), worst)
         })
         .collect()

@@ -167,7 +167,7 @@ impl<'a> Printer<'a> {
     /// An expression.
     pub fn expression(&self, expr: &Expr) -> String {
         match expr {
-            Expr::Literal(literal) => literal.to_string(),
+            Expr::Literal(literal) => self.dialect.literal(*literal),
             Expr::Name(name) => name.to_string(),
             Expr::Element(array, index) => format!("{array}[{}]", subscript(index)),
             Expr::Entry(table, row, col) => {

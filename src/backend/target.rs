@@ -39,6 +39,14 @@ pub enum EmitError {
         /// The names that there are.
         expected: String,
     },
+    /// A constant is beyond the largest single-precision number.
+    #[error("`{function}` has the constant {value:e}, beyond what single precision holds (3.4e38)")]
+    BeyondSingle {
+        /// The function, without the model's name.
+        function: String,
+        /// The constant.
+        value: f64,
+    },
     /// A template failed to render.
     #[error("a template failed")]
     Template(#[from] askama::Error),

@@ -491,12 +491,33 @@ pub struct CompileArguments {
     #[arg(long, value_name = "DIR")]
     pub out_dir: PathBuf,
     #[command(flatten)]
+    pub code: CodeArguments,
+    #[command(flatten)]
     pub equations: EquationArguments,
     /// Write into a folder that holds files romc did not make
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]
     pub output_format: OutputArguments,
+}
+
+/// Floating-point numbers of generated code.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum PrecisionChoice {
+    /// 64 bits: `double` and `f64`
+    #[default]
+    F64,
+    /// 32 bits: `float` and `f32`; each function states the bound of its rounding errors
+    F32,
+}
+
+/// How code is generated.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Generated code")]
+pub struct CodeArguments {
+    /// Floating-point numbers of C and Rust
+    #[arg(long, value_enum, default_value = "f64")]
+    pub precision: PrecisionChoice,
 }
 
 /// How equations are printed.

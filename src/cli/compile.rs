@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::args::{CompileArguments, EquationArguments};
+use super::args::{CodeArguments, CompileArguments, EquationArguments, PrecisionChoice};
 use super::output::Table;
 use crate::backend::latex::{LatexOptions, NumberStyle};
 use crate::backend::markdown::MarkdownOptions;
 use crate::backend::mathml::MathmlOptions;
 use crate::backend::typeset::{Rounding, SymbolTable};
-use crate::backend::{self, EmitOptions, EmittedFile, Target};
+use crate::backend::{self, EmitOptions, EmittedFile, Precision, Target};
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::{Error, artifact};
@@ -24,7 +24,12 @@ use crate::{Error, artifact};
 pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let model = artifact::read(&arguments.model)?;
     let overwrite = Overwrite::when_forced(arguments.force);
-    let files = emit(&model, &arguments.emit, &arguments.equations)?;
+    let files = emit(
+        &model,
+        &arguments.emit,
+        &arguments.code,
+        &arguments.equations,
+    )?;
     let written = write(&arguments.out_dir, &files, overwrite)?;
     let mut table = Table::new(["file", "bytes"]);
     for (path, bytes) in &written {
@@ -65,6 +70,7 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
 pub fn emit(
     model: &ReducedModel,
     targets: &[Target],
+    code: &CodeArguments,
     equations: &EquationArguments,
 ) -> Result<Vec<EmittedFile>, Error> {
     let digest = Some(artifact::digest(model).short());
@@ -78,6 +84,10 @@ pub fn emit(
     let markdown = MarkdownOptions::default();
     let mathml = MathmlOptions::default();
     let options = EmitOptions {
+        precision: match code.precision {
+            PrecisionChoice::F64 => Precision::Double,
+            PrecisionChoice::F32 => Precision::Single,
+        },
         latex: LatexOptions {
             rounding,
             numbers: match equations.siunitx {

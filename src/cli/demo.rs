@@ -9,7 +9,7 @@ use std::process::Command;
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::args::{DemoArguments, EquationArguments};
+use super::args::{CodeArguments, DemoArguments, EquationArguments};
 use super::mpc::NamedRun;
 use super::output::{Table, significant, spinner};
 use super::{compile, mpc as mpc_command, report, simulate};
@@ -58,7 +58,12 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
 
     progress.set_message("compiling equations and code");
     let targets = [Target::Latex, Target::C, Target::Rust];
-    let mut files = compile::emit(&model, &targets, &EquationArguments::default())?;
+    let mut files = compile::emit(
+        &model,
+        &targets,
+        &CodeArguments::default(),
+        &EquationArguments::default(),
+    )?;
     progress.set_message("rolling the model out");
     let evaluation = Assessment::over(&model, &jumps, RESTART_S)?;
     progress.set_message("running the controller");

@@ -360,7 +360,12 @@ impl Real for Rounded {
             return Self::UNBOUNDED;
         }
         let inherited = self.error * (self.exact.magnitude() + self.computed.magnitude());
-        Self::rounded(self.exact.squared(), self.computed.squared(), inherited, 1.0)
+        Self::rounded(
+            self.exact.squared(),
+            self.computed.squared(),
+            inherited,
+            1.0,
+        )
     }
 
     fn unary(op: Unary, a: Self) -> Self {
@@ -434,17 +439,17 @@ mod tests {
     #[test]
     fn single_precision_stays_within_the_bound_of_its_box_and_not_far_below() {
         let program = program();
-        let (mut double, mut single) = (
-            Interpreter::new(&program),
-            Interpreter::<f32>::of(&program),
-        );
+        let (mut double, mut single) =
+            (Interpreter::new(&program), Interpreter::<f32>::of(&program));
         for magnitude in [0.1_f64, 1.0, 10.0] {
             let bounds = bounds(&program, Range::within(magnitude)).map(|b| b.expect("a bound"));
             let mut worst = [0.0_f64; 3];
             let mut state = 1u64;
             for _ in 0..20_000 {
                 let x: [f32; 2] = std::array::from_fn(|_| {
-                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
                     (magnitude * ((state >> 11) as f64 / (1u64 << 52) as f64 - 1.0)) as f32
                 });
                 let (mut y, mut exact) = ([0.0_f32; 3], [0.0_f64; 3]);

@@ -3,6 +3,7 @@
 use crate::backend::code::{Argument, ConstTable, Function, MathFunction, Parameter, Role, Span};
 use crate::backend::dialect::Dialect;
 use crate::backend::literal::Literal;
+use crate::backend::precision::Precision;
 use crate::backend::wrap::{braced, comment_lines};
 
 /// C99 with the names of one model.
@@ -10,6 +11,8 @@ use crate::backend::wrap::{braced, comment_lines};
 pub struct CDialect {
     /// Identifier of the model, the beginning of all external and helper names.
     pub name: String,
+    /// Floating-point numbers of the code.
+    pub precision: Precision,
 }
 
 /// Keywords of C and C++, and the library names that generated files use.
@@ -128,32 +131,38 @@ impl Dialect for CDialect {
         &RESERVED
     }
 
+    fn literal(&self, literal: Literal) -> String {
+        format!("{}{}", literal.digits(self.precision), self.suffix())
+    }
+
     fn apply(&self, function: MathFunction, argument: &str) -> String {
-        match function {
-            MathFunction::Sqrt => format!("sqrt({argument})"),
-            MathFunction::Abs => format!("fabs({argument})"),
-            MathFunction::Sign => format!("{}_sign({argument})", self.name),
-            MathFunction::Tan => format!("tan({argument})"),
-            MathFunction::Tanh => format!("tanh({argument})"),
-            MathFunction::Exp => format!("exp({argument})"),
-            MathFunction::Log => format!("log({argument})"),
-        }
+        let name = match function {
+            MathFunction::Sqrt => "sqrt",
+            MathFunction::Abs => "fabs",
+            MathFunction::Sign => return format!("{}_sign({argument})", self.name),
+            MathFunction::Tan => "tan",
+            MathFunction::Tanh => "tanh",
+            MathFunction::Exp => "exp",
+            MathFunction::Log => "log",
+        };
+        format!("{name}{}({argument})", self.suffix())
     }
 
     fn let_scalar(&self, name: &str, value: &str) -> String {
-        format!("const double {name} = {value};")
+        format!("const {} {name} = {value};", self.real())
     }
 
     fn let_array(&self, name: &str, elements: &[String]) -> String {
         format!(
-            "const double {name}[{}] = {};",
+            "const {} {name}[{}] = {};",
+            self.real(),
             elements.len(),
             braced(elements, " ")
         )
     }
 
     fn declare(&self, name: &str, len: usize) -> String {
-        format!("double {name}[{len}];")
+        format!("{} {name}[{len}];", self.real())
     }
 
     fn for_loop(&self, variable: &str, count: usize) -> String {
@@ -193,12 +202,15 @@ impl Dialect for CDialect {
         _is_used: [bool; 2],
     ) -> Vec<String> {
         let (name, upper) = (&self.name, self.name.to_ascii_uppercase());
+        let suffix = self.suffix();
         vec![
-            format!("double {sine}, {cosine};"),
+            format!("{} {sine}, {cosine};", self.real()),
             format!("{name}_sin_cos_reduced({argument}, &{sine}, &{cosine});"),
             // A choice between numbers: compilers vectorise it where they do not vectorise a
             // comparison that becomes an integer.
-            format!("beyond[lane] = fabs({argument}) <= {upper}_ANGLE_LIMIT ? beyond[lane] : 1.0;"),
+            format!(
+                "beyond[lane] = fabs{suffix}({argument}) <= {upper}_ANGLE_LIMIT ? beyond[lane] : 1.0{suffix};"
+            ),
         ]
     }
 
@@ -211,12 +223,13 @@ impl Dialect for CDialect {
             .entries
             .chunks(table.cols)
             .map(|row| {
-                let row: Vec<String> = row.iter().map(Literal::to_string).collect();
+                let row: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
                 format!("    {}", braced(&row, "\n     "))
             })
             .collect();
         format!(
-            "static const double {}[{}][{}] = {{\n{},\n}};",
+            "static const {} {}[{}][{}] = {{\n{},\n}};",
+            self.real(),
             table.name,
             table.rows,
             table.cols,
@@ -225,11 +238,11 @@ impl Dialect for CDialect {
     }
 
     fn parameter(&self, parameter: &Parameter) -> String {
-        let name = &parameter.name;
+        let (name, real) = (&parameter.name, self.real());
         match parameter.role {
-            Role::Input => format!("const double *restrict {name}"),
-            Role::Output | Role::InOut => format!("double *restrict {name}"),
-            Role::Scalar => format!("double {name}"),
+            Role::Input => format!("const {real} *restrict {name}"),
+            Role::Output | Role::InOut => format!("{real} *restrict {name}"),
+            Role::Scalar => format!("{real} {name}"),
         }
     }
 
@@ -249,6 +262,22 @@ impl Dialect for CDialect {
 }
 
 impl CDialect {
+    /// The type of numbers.
+    pub fn real(&self) -> &'static str {
+        match self.precision {
+            Precision::Double => "double",
+            Precision::Single => "float",
+        }
+    }
+
+    /// What literals and library functions of that type end with.
+    pub fn suffix(&self) -> &'static str {
+        match self.precision {
+            Precision::Double => "",
+            Precision::Single => "f",
+        }
+    }
+
     /// The documented prototype for the header; `restrict` is left to the definition, so
     /// that C++ can include it.
     pub fn prototype(&self, function: &Function) -> String {

@@ -6,9 +6,11 @@ mod selftest;
 use askama::Template;
 
 use super::code::{Function, MathFunction};
+use super::dialect::Dialect;
 use super::entries::{ModelEntries, PhaseEntries};
-use super::functions::{ModelFunctions, N_LANES};
+use super::functions::ModelFunctions;
 use super::kernel::KernelText;
+use super::precision::Precision;
 use super::printer::Printer;
 use super::target::{EmitError, EmittedFile};
 use super::usage::{calls_function, calls_kernel};
@@ -21,6 +23,7 @@ struct Header<'a> {
     banner: String,
     model: &'a str,
     upper: String,
+    is_single: bool,
     latent_dim: usize,
     state_dim: Option<usize>,
     maps: Vec<String>,
@@ -32,6 +35,9 @@ struct Header<'a> {
 struct Source<'a> {
     banner: String,
     name: &'a str,
+    real: &'static str,
+    /// What numbers of that type end with.
+    f: &'static str,
     latent_dim: usize,
     n_lanes: usize,
     kernel: Option<String>,
@@ -46,12 +52,15 @@ struct Source<'a> {
 struct Kernel<'a> {
     name: &'a str,
     upper: String,
-    limit: String,
-    two_over_pi: String,
-    round: String,
-    pi_2: Vec<String>,
-    sin: Vec<String>,
-    cos: Vec<String>,
+    real: &'static str,
+    /// What numbers of that type end with.
+    f: &'static str,
+    /// An unsigned integer as wide.
+    bits: &'static str,
+    /// From bit 1 to the sign.
+    to_sign: u32,
+    is_single: bool,
+    k: KernelText,
 }
 
 #[derive(Template)]
@@ -84,10 +93,15 @@ struct PhaseText {
 ///
 /// # Errors
 /// [`EmitError::Template`] if a template fails.
-pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>, EmitError> {
+pub fn emit(
+    entries: &ModelEntries,
+    provenance: &str,
+    precision: Precision,
+) -> Result<Vec<EmittedFile>, EmitError> {
     let name = entries.identifier.as_str();
     let dialect = CDialect {
         name: name.to_owned(),
+        precision,
     };
     let functions = ModelFunctions::new(entries, &dialect, &format!("{name}_"));
     let printer = Printer::new(&dialect);
@@ -107,6 +121,7 @@ pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>
         banner: banner.clone(),
         model: &entries.name,
         upper: name.to_ascii_uppercase(),
+        is_single: precision == Precision::Single,
         latent_dim: entries.latent_dim,
         state_dim: entries.state_dim,
         maps: functions
@@ -120,9 +135,11 @@ pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>
     let source = Source {
         banner: banner.clone(),
         name,
+        real: dialect.real(),
+        f: dialect.suffix(),
         latent_dim: entries.latent_dim,
-        n_lanes: N_LANES,
-        kernel: uses_kernel.then(|| kernel(name)).transpose()?,
+        n_lanes: precision.lanes(),
+        kernel: uses_kernel.then(|| kernel(&dialect)).transpose()?,
         sign: functions
             .all()
             .any(|function| calls_function(&function.body, MathFunction::Sign)),
@@ -143,7 +160,7 @@ pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>
         EmittedFile::new(format!("{name}.c"), finished(source.render()?)),
         EmittedFile::new(
             format!("{name}_selftest.c"),
-            finished(selftest::render(entries, &banner)?),
+            finished(selftest::render(entries, &dialect, &banner)?),
         ),
         EmittedFile::new("CMakeLists.txt", finished(cmake.render()?)),
     ])
@@ -168,7 +185,7 @@ impl PhaseText {
             .iter()
             .map(|function| dialect.prototype(function))
             .collect();
-        prototypes.push(batch_prototype(name, &phase.identifier));
+        prototypes.push(batch_prototype(dialect, &phase.identifier));
         Self {
             identifier: phase.identifier.clone(),
             upper: format!("{name}_{}", phase.identifier).to_ascii_uppercase(),
@@ -184,7 +201,8 @@ impl PhaseText {
     }
 }
 
-fn batch_prototype(name: &str, phase: &str) -> String {
+fn batch_prototype(dialect: &CDialect, phase: &str) -> String {
+    let (name, real) = (&dialect.name, dialect.real());
     let docs = [
         format!("{name}_{phase}_dynamics at `count` points."),
         "Points are contiguous per variable: element k of point p is z[k * count + p], and alike \
@@ -192,23 +210,27 @@ fn batch_prototype(name: &str, phase: &str) -> String {
             .to_owned(),
     ];
     format!(
-        "{}void {name}_{phase}_dynamics_batch(size_t count, const double *z, const double *dz,\n    \
-         const double *u_lat, double *ddz);",
+        "{}void {name}_{phase}_dynamics_batch(size_t count, const {real} *z, const {real} *dz,\n    \
+         const {real} *u_lat, {real} *ddz);",
         dialect::documentation(&docs)
     )
 }
 
-fn kernel(name: &str) -> Result<String, EmitError> {
-    let text = KernelText::new();
+fn kernel(dialect: &CDialect) -> Result<String, EmitError> {
+    let name = dialect.name.as_str();
+    let (bits, to_sign) = match dialect.precision {
+        Precision::Double => ("uint64_t", 62),
+        Precision::Single => ("uint32_t", 30),
+    };
     let kernel = Kernel {
         name,
         upper: name.to_ascii_uppercase(),
-        limit: text.limit,
-        two_over_pi: text.two_over_pi,
-        round: text.round,
-        pi_2: text.pi_2,
-        sin: text.sin,
-        cos: text.cos,
+        real: dialect.real(),
+        f: dialect.suffix(),
+        bits,
+        to_sign,
+        is_single: dialect.precision == Precision::Single,
+        k: KernelText::new(dialect.precision, &|literal| dialect.literal(literal)),
     };
     Ok(kernel.render()?)
 }

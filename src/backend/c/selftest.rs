@@ -3,22 +3,42 @@
 use askama::Template;
 
 use crate::backend::code::Role;
-use crate::backend::entries::{Entry, ModelEntries};
+use crate::backend::entries::{Entry, ModelEntries, PhaseEntries};
+use crate::backend::literal::Literal;
+use crate::backend::precision::{Precision, rounded_up};
 use crate::backend::target::EmitError;
-use crate::backend::vectors::{N_POINTS, ParameterVectors, TOLERANCE_F64, vectors};
+use crate::backend::vectors::{
+    N_POINTS, ParameterVectors, TOLERANCE_F64, batch_tolerance, vectors,
+};
 use crate::backend::wrap::braced;
+
+use super::dialect::CDialect;
+use crate::backend::dialect::Dialect;
 
 #[derive(Template)]
 #[template(path = "c/selftest.askama", config = "templates/askama.toml")]
 struct SelfTest<'a> {
     banner: &'a str,
     name: &'a str,
+    real: &'static str,
+    /// What numbers of that type end with.
+    f: &'static str,
+    is_single: bool,
+    /// Relative tolerance of double precision.
     tolerance: String,
     points: usize,
     latent_dim: usize,
     tests: Vec<Test>,
-    /// Phases, each with an angle that its batches meet.
-    phases: Vec<(&'a str, &'static str)>,
+    phases: Vec<Batch<'a>>,
+}
+
+/// The batch of a phase.
+struct Batch<'a> {
+    phase: &'a str,
+    /// An angle that the batch meets.
+    far_angle: String,
+    /// Absolute tolerance of single precision.
+    tolerance: String,
 }
 
 struct Test {
@@ -34,6 +54,8 @@ struct Test {
 /// A constant array with one row a point.
 struct Array {
     name: String,
+    /// Type of its elements.
+    real: &'static str,
     rows: usize,
     cols: usize,
     entries: String,
@@ -50,30 +72,58 @@ struct Check {
     name: String,
     len: usize,
     expected: String,
+    /// Absolute tolerance of single precision.
+    tolerance: String,
 }
 
-pub(super) fn render(entries: &ModelEntries, banner: &str) -> Result<String, EmitError> {
+pub(super) fn render(
+    entries: &ModelEntries,
+    dialect: &CDialect,
+    banner: &str,
+) -> Result<String, EmitError> {
+    let precision = dialect.precision;
+    let batch = |phase: &'_ PhaseEntries| {
+        let far_angle = phase.far_angle(precision);
+        (
+            format!("{far_angle:?}{}", dialect.suffix()),
+            match precision {
+                Precision::Double => String::new(),
+                Precision::Single => rounded_up(batch_tolerance(phase, far_angle)),
+            },
+        )
+    };
     let test = SelfTest {
         banner,
         name: &entries.identifier,
+        real: dialect.real(),
+        f: dialect.suffix(),
+        is_single: precision == Precision::Single,
         tolerance: format!("{TOLERANCE_F64:?}"),
         points: N_POINTS,
         latent_dim: entries.latent_dim,
         tests: entries
             .all()
-            .map(|entry| Test::new(&entries.identifier, entry))
+            .map(|entry| Test::new(dialect, entry))
             .collect(),
         phases: entries
             .phases
             .iter()
-            .map(|phase| (phase.identifier.as_str(), phase.far_angle()))
+            .map(|phase| {
+                let (far_angle, tolerance) = batch(phase);
+                Batch {
+                    phase: phase.identifier.as_str(),
+                    far_angle,
+                    tolerance,
+                }
+            })
             .collect(),
     };
     Ok(test.render()?)
 }
 
 impl Test {
-    fn new(model: &str, entry: &Entry) -> Self {
+    fn new(dialect: &CDialect, entry: &Entry) -> Self {
+        let model = &dialect.name;
         let mut test = Self {
             name: entry.name.clone(),
             function: format!("{model}_{}", entry.name),
@@ -83,26 +133,34 @@ impl Test {
             checks: Vec::new(),
         };
         let mut arguments = Vec::new();
-        for vectors in vectors(entry) {
-            arguments.push(test.parameter(&vectors));
+        for vectors in vectors(entry, dialect.precision) {
+            arguments.push(test.parameter(dialect, &vectors));
         }
         test.arguments = arguments.join(", ");
         test
     }
 
     /// Adds the arrays of a parameter and returns the argument.
-    fn parameter(&mut self, vectors: &ParameterVectors) -> String {
+    fn parameter(&mut self, dialect: &CDialect, vectors: &ParameterVectors) -> String {
         let name = &vectors.name;
         let (before, after) = (format!("{name}_in"), format!("{name}_expected"));
         if !vectors.before.is_empty() {
-            self.array(&before, vectors.len, &vectors.before);
+            let spell = |value: f64| match Literal::new(value) {
+                Some(literal) => dialect.literal(literal),
+                None => format!("{value:?}"),
+            };
+            let rows = rows(vectors.len, &vectors.before, &spell);
+            self.array(&before, dialect.real(), vectors.len, rows);
         }
         if !vectors.after.is_empty() {
-            self.array(&after, vectors.len, &vectors.after);
+            // What is expected has all digits in either precision.
+            let rows = rows(vectors.len, &vectors.after, &|value| format!("{value:?}"));
+            self.array(&after, "double", vectors.len, rows);
             self.checks.push(Check {
                 name: name.clone(),
                 len: vectors.len,
                 expected: after,
+                tolerance: rounded_up(vectors.tolerance_single),
             });
         }
         match vectors.role {
@@ -120,19 +178,23 @@ impl Test {
         }
     }
 
-    fn array(&mut self, name: &str, cols: usize, values: &[f64]) {
-        let rows: Vec<String> = values
-            .chunks(cols)
-            .map(|row| {
-                let texts: Vec<String> = row.iter().map(|value| format!("{value:?}")).collect();
-                format!("\n        {}", braced(&texts, "\n         "))
-            })
-            .collect();
+    fn array(&mut self, name: &str, real: &'static str, cols: usize, rows: Vec<String>) {
         self.arrays.push(Array {
             name: name.to_owned(),
+            real,
             rows: rows.len(),
             cols,
             entries: format!("{{{}\n    }}", rows.join(",")),
         });
     }
+}
+
+fn rows(cols: usize, values: &[f64], spell: &dyn Fn(f64) -> String) -> Vec<String> {
+    values
+        .chunks(cols)
+        .map(|row| {
+            let texts: Vec<String> = row.iter().map(|&value| spell(value)).collect();
+            format!("\n        {}", braced(&texts, "\n         "))
+        })
+        .collect()
 }

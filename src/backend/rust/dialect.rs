@@ -3,11 +3,25 @@
 use crate::backend::code::{Argument, ConstTable, Function, MathFunction, Parameter, Role, Span};
 use crate::backend::dialect::Dialect;
 use crate::backend::literal::Literal;
+use crate::backend::precision::Precision;
 use crate::backend::wrap::{braced, comment_lines};
 
 /// Rust without `std` or allocation.
 #[derive(Clone, Copy, Debug)]
-pub struct RustDialect;
+pub struct RustDialect {
+    /// Floating-point numbers of the code.
+    pub precision: Precision,
+}
+
+impl RustDialect {
+    /// The type of numbers.
+    pub fn real(&self) -> &'static str {
+        match self.precision {
+            Precision::Double => "f64",
+            Precision::Single => "f32",
+        }
+    }
+}
 
 /// Keywords of Rust and the names that generated crates use themselves.
 const RESERVED: [&str; 62] = [
@@ -80,6 +94,10 @@ impl Dialect for RustDialect {
         &RESERVED
     }
 
+    fn literal(&self, literal: Literal) -> String {
+        literal.digits(self.precision)
+    }
+
     fn apply(&self, function: MathFunction, argument: &str) -> String {
         let name = match function {
             MathFunction::Sqrt => "sqrt",
@@ -99,14 +117,15 @@ impl Dialect for RustDialect {
 
     fn let_array(&self, name: &str, elements: &[String]) -> String {
         format!(
-            "let {name}: [f64; {}] = [{}];",
+            "let {name}: [{}; {}] = [{}];",
+            self.real(),
             elements.len(),
             elements.join(", ")
         )
     }
 
     fn declare(&self, name: &str, len: usize) -> String {
-        format!("let mut {name} = [0.0_f64; {len}];")
+        format!("let mut {name} = [0.0_{}; {len}];", self.real())
     }
 
     fn for_loop(&self, variable: &str, count: usize) -> String {
@@ -152,14 +171,15 @@ impl Dialect for RustDialect {
             .entries
             .chunks(table.cols)
             .map(|row| {
-                let row: Vec<String> = row.iter().map(Literal::to_string).collect();
+                let row: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
                 let row = braced(&row, "\n     ");
                 format!("    [{}]", row.trim_matches(['{', '}']))
             })
             .collect();
         format!(
-            "static {}: [[f64; {}]; {}] = [\n{},\n];",
+            "static {}: [[{}; {}]; {}] = [\n{},\n];",
             table.name,
+            self.real(),
             table.cols,
             table.rows,
             rows.join(",\n")
@@ -167,11 +187,11 @@ impl Dialect for RustDialect {
     }
 
     fn parameter(&self, parameter: &Parameter) -> String {
-        let (name, len) = (&parameter.name, parameter.len);
+        let (name, len, real) = (&parameter.name, parameter.len, self.real());
         match parameter.role {
-            Role::Input => format!("{name}: &[f64; {len}]"),
-            Role::Output | Role::InOut => format!("{name}: &mut [f64; {len}]"),
-            Role::Scalar => format!("{name}: f64"),
+            Role::Input => format!("{name}: &[{real}; {len}]"),
+            Role::Output | Role::InOut => format!("{name}: &mut [{real}; {len}]"),
+            Role::Scalar => format!("{name}: {real}"),
         }
     }
 

@@ -7,9 +7,11 @@ mod selftest;
 use askama::Template;
 
 use super::code::Function;
+use super::dialect::Dialect;
 use super::entries::{ModelEntries, PhaseEntries};
-use super::functions::{ModelFunctions, N_LANES};
+use super::functions::ModelFunctions;
 use super::kernel::KernelText;
+use super::precision::Precision;
 use super::printer::Printer;
 use super::target::{EmitError, EmittedFile};
 use super::usage::calls_kernel;
@@ -28,6 +30,12 @@ struct Cargo<'a> {
 struct Lib<'a> {
     banner: String,
     model: &'a str,
+    real: &'static str,
+    /// An unsigned integer as wide.
+    bits: &'static str,
+    /// From bit 1 to the sign.
+    to_sign: u32,
+    is_single: bool,
     latent_dim: usize,
     n_lanes: usize,
     has_lanes: bool,
@@ -56,9 +64,18 @@ struct PhaseText {
 ///
 /// # Errors
 /// [`EmitError::Template`] if a template fails.
-pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>, EmitError> {
+pub fn emit(
+    entries: &ModelEntries,
+    provenance: &str,
+    precision: Precision,
+) -> Result<Vec<EmittedFile>, EmitError> {
     let name = entries.identifier.as_str();
-    let dialect = RustDialect;
+    let dialect = RustDialect { precision };
+    let (bits, to_sign) = match precision {
+        Precision::Double => ("u64", 62),
+        Precision::Single => ("u32", 30),
+    };
+    let kernel = || KernelText::new(precision, &|literal| dialect.literal(literal));
     let functions = ModelFunctions::new(entries, &dialect, "");
     let printer = Printer::new(&dialect);
     let print = |function: &Function| printer.function(function);
@@ -66,11 +83,15 @@ pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>
     let lib = Lib {
         banner: format!("// {provenance}"),
         model: &entries.name,
+        real: dialect.real(),
+        bits,
+        to_sign,
+        is_single: precision == Precision::Single,
         latent_dim: entries.latent_dim,
-        n_lanes: N_LANES,
+        n_lanes: precision.lanes(),
         has_lanes: functions.lanes.iter().any(Option::is_some),
         state_dim: entries.state_dim,
-        kernel: uses_kernel.then(KernelText::new),
+        kernel: uses_kernel.then(kernel),
         tables: functions
             .tables
             .iter()
@@ -92,7 +113,7 @@ pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>
         banner: format!("# {provenance}"),
         name,
     };
-    let selftest = selftest::render(entries, &format!("// {provenance}"))?;
+    let selftest = selftest::render(entries, &dialect, &format!("// {provenance}"))?;
     Ok(vec![
         EmittedFile::new(format!("{name}/Cargo.toml"), tidy(&cargo.render()?)),
         EmittedFile::new(format!("{name}/src/lib.rs"), tidy(&lib.render()?)),
