@@ -6,6 +6,8 @@ mod drivers;
 mod functions;
 #[path = "differential/models.rs"]
 mod models;
+#[path = "differential/single.rs"]
+mod single;
 
 use drivers::{Workshop, c_compilers, contents};
 use functions::{Function, Random, functions as functions_of};

@@ -2,7 +2,7 @@
 
 use super::entries::{Entry, ModelEntries};
 use super::target::EmitError;
-use crate::ir::{Interpreter, Program, Range, Rounded, Statement};
+use crate::ir::{Program, Range, Statement, rounding_errors};
 
 /// Floating-point numbers of generated code.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -72,11 +72,11 @@ const MAGNITUDES: [f64; 2] = [1.0, 10.0];
 
 /// A sentence that bounds what single precision loses in a function, for its documentation.
 ///
-/// The bounds are those of [`Rounded`] over all inputs up to a magnitude.
+/// The bounds are those of [`rounding_errors`] over all inputs up to a magnitude.
 pub fn stated_bounds(entry: &Entry) -> String {
     let has_step = entry.parameters.iter().any(|p| p.name == "h");
     let of_magnitude = |magnitude: f64| -> String {
-        let outputs = worst_errors(entry, |name| match name {
+        let outputs = worst_errors(&entry.program, |name| match name {
             "h" => Range {
                 low: 0.0,
                 high: LONGEST_STEP_S,
@@ -101,45 +101,26 @@ pub fn stated_bounds(entry: &Entry) -> String {
     )
 }
 
-/// The largest bound of each output's elements over the given ranges of the inputs; outputs
+/// Largest error of single precision in each output of a program, over the given ranges of the inputs; outputs
 /// without elements are left out.
-pub fn worst_errors(entry: &Entry, range: impl Fn(&str) -> Range) -> Vec<(String, Option<f64>)> {
-    let ranges: Vec<Vec<Range>> = entry
-        .program
+pub fn worst_errors(
+    program: &Program,
+    range: impl Fn(&str) -> Range,
+) -> Vec<(String, Option<f64>)> {
+    let ranges: Vec<Vec<Range>> = program
         .inputs()
         .iter()
         .map(|slot| vec![range(&slot.name); slot.len])
         .collect();
-    element_errors(&entry.program, &ranges)
+    rounding_errors(program, &ranges)
         .into_iter()
-        .zip(entry.program.outputs())
+        .zip(program.outputs())
         .map(|(bounds, slot)| {
             let worst = bounds
                 .into_iter()
                 .try_fold(0.0, |worst: f64, bound| bound.map(|bound| worst.max(bound)));
             (slot.name.clone(), worst)
         })
-        .collect()
-}
-
-/// The bound of each element of each output, over ranges of each element of the inputs.
-pub fn element_errors(program: &Program, ranges: &[Vec<Range>]) -> Vec<Vec<Option<f64>>> {
-    let inputs: Vec<Vec<Rounded>> = ranges
-        .iter()
-        .map(|slot| slot.iter().map(|&range| Rounded::input(range)).collect())
-        .collect();
-    let zero = Rounded::input(Range::point(0.0));
-    let mut outputs: Vec<Vec<Rounded>> = program
-        .outputs()
-        .iter()
-        .map(|slot| vec![zero; slot.len])
-        .collect();
-    let read: Vec<&[Rounded]> = inputs.iter().map(Vec::as_slice).collect();
-    let mut written: Vec<&mut [Rounded]> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
-    Interpreter::<Rounded>::of(program).run(&read, &mut written);
-    outputs
-        .into_iter()
-        .map(|slot| slot.into_iter().map(Rounded::bound).collect())
         .collect()
 }
 

@@ -2,8 +2,8 @@
 
 use super::code::Role;
 use super::entries::{Entry, PhaseEntries};
-use super::precision::{Precision, element_errors};
-use crate::ir::{Interpreter, Range};
+use super::precision::Precision;
+use crate::ir::{Interpreter, Range, rounding_errors};
 
 /// Points at which each function is compared.
 pub const N_POINTS: usize = 6;
@@ -142,7 +142,7 @@ pub fn batch_tolerance(phase: &PhaseEntries, far_angle: f64) -> f64 {
 
 /// Largest accepted difference of each output in single precision.
 fn tolerances(entry: &Entry, inputs: &[Vec<Range>], outputs: &[Vec<f64>]) -> Vec<f64> {
-    let bounds = element_errors(&entry.program, inputs);
+    let bounds = rounding_errors(&entry.program, inputs);
     bounds
         .into_iter()
         .zip(outputs)

@@ -34,5 +34,5 @@ pub use program::{
     Binary, Group, Program, ResultEntry, Slopes, Slot, Statement, Table, TableId, Unary, ValueId,
 };
 pub use real::Real;
-pub use rounded::{Range, Rounded};
+pub use rounded::{Range, Rounded, rounding_errors};
 pub use validate::IrError;

@@ -13,7 +13,8 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::program::Unary;
+use super::interpret::Interpreter;
+use super::program::{Program, Unary};
 use super::real::Real;
 
 /// Largest relative error of one operation rounded to nearest in single precision.
@@ -404,9 +405,33 @@ impl Real for Rounded {
     }
 }
 
+/// The bound of each element of each output, over a range of each element of the inputs; `None` where
+/// there is none, see [`Rounded::bound`].
+///
+/// # Panics
+/// If the number or a length of the ranges differs from the program's input slots.
+pub fn rounding_errors(program: &Program, ranges: &[Vec<Range>]) -> Vec<Vec<Option<f64>>> {
+    let inputs: Vec<Vec<Rounded>> = ranges
+        .iter()
+        .map(|slot| slot.iter().map(|&range| Rounded::input(range)).collect())
+        .collect();
+    let mut outputs: Vec<Vec<Rounded>> = program
+        .outputs()
+        .iter()
+        .map(|slot| vec![Rounded::UNBOUNDED; slot.len])
+        .collect();
+    let read: Vec<&[Rounded]> = inputs.iter().map(Vec::as_slice).collect();
+    let mut written: Vec<&mut [Rounded]> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
+    Interpreter::<Rounded>::of(program).run(&read, &mut written);
+    outputs
+        .into_iter()
+        .map(|slot| slot.into_iter().map(Rounded::bound).collect())
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::{Binary, Interpreter, Program, ProgramBuilder};
+    use super::super::{Binary, ProgramBuilder};
     use super::*;
 
     /// y = (sin(3 x0) x1 - x0^2, tanh(x1) / (1 + x0^2), sqrt(x0^2 + x1^2)).
@@ -430,10 +455,8 @@ mod tests {
     }
 
     fn bounds(program: &Program, box_: Range) -> [Option<f64>; 3] {
-        let mut y = [Rounded::UNBOUNDED; 3];
-        let x = [Rounded::input(box_); 2];
-        Interpreter::<Rounded>::of(program).run(&[&x], &mut [&mut y]);
-        y.map(Rounded::bound)
+        let bounds = rounding_errors(program, &[vec![box_; 2]]).remove(0);
+        bounds.try_into().expect("three results")
     }
 
     #[test]
@@ -477,10 +500,8 @@ mod tests {
         builder.output("y", &[quotient, exponential, logarithm]);
         let program = builder.finish().expect("valid program");
         let at = |low: f64, high: f64| {
-            let mut y = [Rounded::UNBOUNDED; 3];
-            let x = [Rounded::input(Range { low, high })];
-            Interpreter::<Rounded>::of(&program).run(&[&x], &mut [&mut y]);
-            y.map(|y| y.bound().is_some())
+            let bounds = rounding_errors(&program, &[vec![Range { low, high }]]).remove(0);
+            [0, 1, 2].map(|k: usize| bounds[k].is_some())
         };
         assert_eq!(at(-1.0, 1.0), [false, true, false]);
         assert_eq!(at(0.5, 100.0), [true, false, true]);

@@ -1,11 +1,11 @@
 //! Compiles generated code of many models into one program and runs it on many points;
-//! numbers pass as the bits of `f64` through files.
+//! numbers pass as their bits through files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use romc::backend::{EmitOptions, Target, emit, write_files};
+use romc::backend::{EmitOptions, Precision, Target, emit, write_files};
 use romc::files::Overwrite;
 use romc::lower::LowerOptions;
 use romc::model::ReducedModel;
@@ -16,12 +16,22 @@ use super::functions::Function;
 pub struct Workshop {
     folder: tempfile::TempDir,
     models: Vec<String>,
+    precision: Precision,
 }
 
 impl Workshop {
     pub fn new(models: &[ReducedModel], lower: &LowerOptions) -> Self {
+        Self::in_precision(models, lower, Precision::Double)
+    }
+
+    pub fn in_precision(
+        models: &[ReducedModel],
+        lower: &LowerOptions,
+        precision: Precision,
+    ) -> Self {
         let options = EmitOptions {
             lower: *lower,
+            precision,
             ..EmitOptions::default()
         };
         let folder = tempfile::tempdir().expect("a temporary folder");
@@ -37,6 +47,7 @@ impl Workshop {
                 .iter()
                 .map(|model| model.identifier().to_string())
                 .collect(),
+            precision,
         }
     }
 
@@ -53,7 +64,12 @@ impl Workshop {
         points: &[Vec<f64>],
     ) -> Vec<Vec<f64>> {
         let driver = self.path().join("driver.c");
-        fs::write(&driver, c_driver(&self.models, functions)).expect("written");
+        let text = c_driver(&self.models, functions);
+        let text = match self.precision {
+            Precision::Double => text,
+            Precision::Single => text.replace("double", "float"),
+        };
+        fs::write(&driver, text).expect("written");
         let program = self.path().join("driver_c");
         let sources = self
             .models
@@ -90,7 +106,12 @@ impl Workshop {
                 body.join("\n")
             ));
         }
-        source.push_str(&rust_driver(functions));
+        source.push_str(&match self.precision {
+            Precision::Double => rust_driver(functions),
+            Precision::Single => rust_driver(functions)
+                .replace("f64", "f32")
+                .replace("chunks_exact(8)", "chunks_exact(4)"),
+        });
         let driver = self.path().join("driver.rs");
         fs::write(&driver, source).expect("written");
         let program = self.path().join("driver_rust");
@@ -186,14 +207,24 @@ impl Workshop {
         let bytes: Vec<u8> = points
             .iter()
             .flatten()
-            .flat_map(|x| x.to_ne_bytes())
+            .flat_map(|&x| match self.precision {
+                Precision::Double => x.to_ne_bytes().to_vec(),
+                Precision::Single => (x as f32).to_ne_bytes().to_vec(),
+            })
             .collect();
         fs::write(&inputs, bytes).expect("written");
         succeed(Command::new(program).arg(&inputs).arg(&outputs));
         let bytes = fs::read(outputs).expect("the driver wrote its results");
-        let mut numbers = bytes
-            .chunks_exact(8)
-            .map(|bytes| f64::from_ne_bytes(bytes.try_into().expect("eight bytes")));
+        let width = match self.precision {
+            Precision::Double => 8,
+            Precision::Single => 4,
+        };
+        let mut numbers = bytes.chunks_exact(width).map(|bytes| match self.precision {
+            Precision::Double => f64::from_ne_bytes(bytes.try_into().expect("eight bytes")),
+            Precision::Single => {
+                f64::from(f32::from_ne_bytes(bytes.try_into().expect("four bytes")))
+            }
+        });
         let results: Vec<Vec<f64>> = functions
             .iter()
             .map(|function| {
@@ -202,7 +233,7 @@ impl Workshop {
             })
             .collect();
         let found: usize = results.iter().map(Vec::len).sum();
-        assert_eq!(found * 8, bytes.len(), "the driver wrote every result");
+        assert_eq!(found * width, bytes.len(), "the driver wrote every result");
         results
     }
 }

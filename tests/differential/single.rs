@@ -1,0 +1,182 @@
+//! Generated code in single precision: the interpreter's very numbers, and within the stated bound.
+
+use romc::backend::{Precision, worst_errors};
+use romc::ir::{Interpreter, Range};
+use romc::lower::{Form, LowerOptions};
+use romc::model::ReducedModel;
+
+use super::drivers::{Workshop, c_compilers};
+use super::functions::{Function, Random, functions as functions_of};
+use super::{models, n_random_models};
+
+/// Magnitudes for which bounds are stated; point after point takes its turn.
+const MAGNITUDES: [f64; 2] = [1.0, 10.0];
+
+/// Points whose coordinates single precision represents, up to the magnitudes in turn.
+fn points(function: &Function, random: &mut Random) -> Vec<f64> {
+    let mut points = Vec::new();
+    for point in 0..function.n_points {
+        let magnitude = MAGNITUDES[point % 2];
+        for slot in function.program.inputs() {
+            for _ in 0..slot.len {
+                let x = match slot.name.as_str() {
+                    "h" => random.between(1e-4, 0.999e-2),
+                    _ => random.between(-magnitude, magnitude),
+                };
+                points.push(f64::from(x as f32));
+            }
+        }
+    }
+    points
+}
+
+/// What the interpreter makes of the points in single precision.
+fn interpret_single(function: &Function, points: &[f64]) -> Vec<f64> {
+    let mut interpreter = Interpreter::<f32>::of(&function.program);
+    let mut results = Vec::new();
+    for point in points.chunks(function.input_len()) {
+        let point: Vec<f32> = point.iter().map(|&x| x as f32).collect();
+        let mut rest = point.as_slice();
+        let mut inputs = Vec::new();
+        for slot in function.program.inputs() {
+            let (these, others) = rest.split_at(slot.len);
+            inputs.push(these);
+            rest = others;
+        }
+        let slots = function.program.outputs().iter();
+        let mut outputs: Vec<Vec<f32>> = slots.map(|slot| vec![f32::NAN; slot.len]).collect();
+        let mut written: Vec<&mut [f32]> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
+        interpreter.run(&inputs, &mut written);
+        results.extend(outputs.into_iter().flatten().map(f64::from));
+    }
+    results
+}
+
+/// Every result within the bound that the function states; tells the largest share of it that was used.
+fn assert_within_bound(function: &Function, points: &[f64], found: &[f64], by: &str) -> f64 {
+    let slots = function.program.outputs();
+    let bounds: [Vec<Option<f64>>; 2] = MAGNITUDES.map(|magnitude| {
+        let range = |name: &str| match name {
+            "h" => Range {
+                low: 0.0,
+                high: 0.01,
+            },
+            _ => Range::within(magnitude),
+        };
+        let bounds = worst_errors(&function.program, range);
+        let each = slots.iter().zip(bounds);
+        each.flat_map(|(slot, (_, bound))| vec![bound; slot.len])
+            .collect()
+    });
+    let exact = function.interpret(points);
+    let mut used = 0.0_f64;
+    let n = function.output_len();
+    for (k, (found, exact)) in found.iter().zip(&exact).enumerate() {
+        if let Some(bound) = bounds[(k / n) % 2][k % n] {
+            let error = (found - exact).abs();
+            assert!(
+                error <= bound,
+                "{by}: {}_{}: {found} is {error:e} from {exact}, bound {bound:e}",
+                function.model,
+                function.name
+            );
+            used = used.max(error / bound);
+        }
+    }
+    used
+}
+
+fn check(models: &[ReducedModel], form: Form, n_points: usize) {
+    let options = LowerOptions { form };
+    let functions: Vec<Function> = models
+        .iter()
+        .flat_map(|model| functions_of(model, n_points, &options))
+        .collect();
+    let workshop = Workshop::in_precision(models, &options, Precision::Single);
+    let mut random = Random(23);
+    let points: Vec<Vec<f64>> = functions
+        .iter()
+        .map(|function| points(function, &mut random))
+        .collect();
+    let compiler = &c_compilers()[0];
+    let strict = ["-O1", "-ffp-contract=off", "-Wdouble-promotion"];
+    let fused = ["-O2", "-march=native", "-ffp-contract=fast"];
+    let runs = [
+        ("C", workshop.run_c(compiler, &strict, &functions, &points)),
+        ("Rust", workshop.run_rust(&functions, &points)),
+        (
+            "C, fused",
+            workshop.run_c(compiler, &fused, &functions, &points),
+        ),
+    ];
+    for (by, found) in &runs {
+        for ((function, points), found) in functions.iter().zip(&points).zip(found) {
+            assert_within_bound(function, points, found, by);
+            if *by == "C, fused" {
+                continue;
+            }
+            let expected = interpret_single(function, points);
+            for (found, expected) in found.iter().zip(&expected) {
+                assert!(
+                    found.to_bits() == expected.to_bits() || (found.is_nan() && expected.is_nan()),
+                    "{by}: {}_{}: found {found:e}, interpreter {expected:e}",
+                    function.model,
+                    function.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn single_precision_of_shipped_models_equals_the_interpreter_and_stays_within_its_bound() {
+    check(&models::shipped(), Form::Automatic, 500);
+}
+
+#[test]
+fn single_precision_of_random_models_equals_the_interpreter_and_stays_within_its_bound() {
+    let random = (0..n_random_models() / 2).map(models::random);
+    let nonlinear = (0..2).map(models::random_nonlinear);
+    let models: Vec<ReducedModel> = random.chain(nonlinear).collect();
+    check(&models, Form::Automatic, 50);
+}
+
+#[test]
+fn single_precision_with_tables_equals_the_interpreter_and_stays_within_its_bound() {
+    let random = (1000..1000 + n_random_models() / 4).map(models::random);
+    let models: Vec<ReducedModel> = random.collect();
+    check(&models, Form::Tables, 50);
+}
+
+#[test]
+fn stated_bound_of_shipped_accelerations_is_within_two_orders_of_what_is_measured() {
+    for model in models::shipped() {
+        for function in functions_of(&model, 2000, &LowerOptions::default()) {
+            if !function.name.ends_with("_dynamics") {
+                continue;
+            }
+            let points = points(&function, &mut Random(29));
+            let found = interpret_single(&function, &points);
+            let used = assert_within_bound(&function, &points, &found, "interpreter");
+            assert!(
+                used > 0.01 || function.output_len() == 0,
+                "{}_{}: {used} of the bound",
+                function.model,
+                function.name
+            );
+        }
+    }
+}
+
+#[test]
+fn selftests_in_single_precision_pass() {
+    let models = models::shipped();
+    let options = LowerOptions::default();
+    let workshop = Workshop::in_precision(&models, &options, Precision::Single);
+    for model in &models {
+        workshop.run_c_selftest(&c_compilers()[0], model.identifier().as_str());
+    }
+    for model in models.iter().filter(|model| model.latent_dim() <= 2) {
+        workshop.run_rust_selftest(model.identifier().as_str());
+    }
+}
