@@ -206,7 +206,7 @@ impl Rounded {
     };
 
     /// A result that inherits an error and is then rounded to within `units`.
-    fn rounded(exact: Range, before: Range, inherited: f64, units: f64) -> Self {
+    fn result(exact: Range, before: Range, inherited: f64, units: f64) -> Self {
         let exact = exact.widened(OWN);
         let computed = before.widened(units * UNIT + OWN).flushed();
         let error = inherited + units * UNIT * before.magnitude() + TINY;
@@ -240,7 +240,7 @@ impl Rounded {
             self.exact.mapped(f64::sqrt),
             self.computed.mapped(f64::sqrt),
         );
-        Self::rounded(exact, computed, inherited, 1.0)
+        Self::result(exact, computed, inherited, 1.0)
     }
 
     fn sign(self) -> Self {
@@ -275,7 +275,7 @@ impl Rounded {
     /// An increasing function of the library.
     fn library(self, function: fn(f64) -> f64, inherited: f64) -> Self {
         let (exact, computed) = (self.exact.mapped(function), self.computed.mapped(function));
-        Self::rounded(exact, computed, inherited, LIBRARY_UNITS)
+        Self::result(exact, computed, inherited, LIBRARY_UNITS)
     }
 }
 
@@ -287,7 +287,7 @@ impl Add for Rounded {
             self.exact.sum(other.exact),
             self.computed.sum(other.computed),
         );
-        Self::rounded(exact, computed, self.error + other.error, 1.0)
+        Self::result(exact, computed, self.error + other.error, 1.0)
     }
 }
 
@@ -312,7 +312,7 @@ impl Mul for Rounded {
         );
         let inherited =
             self.error * other.computed.magnitude() + self.exact.magnitude() * other.error;
-        Self::rounded(exact, computed, inherited, 1.0)
+        Self::result(exact, computed, inherited, 1.0)
     }
 }
 
@@ -327,7 +327,7 @@ impl Div for Rounded {
         let (above, below) = (other.exact.reciprocal(), other.computed.reciprocal());
         let (exact, computed) = (self.exact.product(above), self.computed.product(below));
         let inherited = (self.error + exact.magnitude() * other.error) * below.magnitude();
-        Self::rounded(exact, computed, inherited, 1.0)
+        Self::result(exact, computed, inherited, 1.0)
     }
 }
 
@@ -361,7 +361,7 @@ impl Real for Rounded {
             return Self::UNBOUNDED;
         }
         let inherited = self.error * (self.exact.magnitude() + self.computed.magnitude());
-        Self::rounded(
+        Self::result(
             self.exact.squared(),
             self.computed.squared(),
             inherited,
@@ -399,7 +399,7 @@ impl Real for Rounded {
         }
         let of = |function: fn(Range) -> Range| {
             let (exact, computed) = (function(self.exact), function(self.computed));
-            Self::rounded(exact, computed, self.error, SIN_COS_UNITS)
+            Self::result(exact, computed, self.error, SIN_COS_UNITS)
         };
         (of(Range::sine), of(Range::cosine))
     }
