@@ -1,6 +1,6 @@
 //! What backends have in common: the files they make and how they fail.
 
-use super::typeset::UnknownSymbol;
+use super::typeset::{RobotTypesetError, UnknownSymbol};
 use crate::lower::LowerError;
 
 /// A file that a backend made, not yet on disk.
@@ -28,6 +28,9 @@ pub enum EmitError {
     /// A variable has no symbol in print.
     #[error(transparent)]
     Symbol(#[from] UnknownSymbol),
+    /// The model cannot be printed in robot coordinates.
+    #[error(transparent)]
+    Robot(#[from] RobotTypesetError),
     /// The model cannot be lowered.
     #[error(transparent)]
     Lower(#[from] LowerError),

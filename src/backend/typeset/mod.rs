@@ -19,7 +19,7 @@ pub mod words;
 pub use decimal::{Decimal, Rounding};
 pub use equations::{CoefficientRow, CoefficientTable, Equation, EquationSystem, Typeset};
 pub use expression::{Leading, UnknownSymbol, expression, with_coefficient};
-pub use robot::RobotTypeset;
+pub use robot::{RobotTypeset, RobotTypesetError};
 pub use rounder::{Place, RoundingReport};
 pub use symbols::{Quantity, RenameError, SymbolTable, Variable};
 pub use tree::{FunctionName, GREEK, Glyph, Math, Signed, Symbol};

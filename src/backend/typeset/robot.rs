@@ -29,17 +29,36 @@ pub struct RobotTypeset {
     pub rounding: RoundingReport,
 }
 
+/// Why a model cannot be printed in robot coordinates.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RobotTypesetError {
+    /// A variable has no symbol in print.
+    #[error(transparent)]
+    Symbol(#[from] UnknownSymbol),
+    /// A coefficient is too large once folded with weights and scale factors.
+    #[error("robot coordinates, {output}: the coefficient of {term:?} is {value} in SI units")]
+    NotFinite {
+        /// Left side of the equation.
+        output: String,
+        /// The term.
+        term: String,
+        /// What the coefficient became.
+        value: f64,
+    },
+}
+
 impl RobotTypeset {
     /// Lays out `model` in robot coordinates; `None` for a model without encoder, decoder,
     /// scaling or names of its state.
     ///
     /// # Errors
-    /// [`UnknownSymbol`] if a candidate term uses a variable that the latent model has not.
+    /// [`RobotTypesetError`] if a candidate term uses a variable that the latent model has not,
+    /// or a coefficient is too large for a float in SI units.
     pub fn new(
         model: &ReducedModel,
         symbols: &SymbolTable,
         rounding: Rounding,
-    ) -> Result<Option<Self>, UnknownSymbol> {
+    ) -> Result<Option<Self>, RobotTypesetError> {
         let (Some(state), Ok(map), Ok(decoder), Ok(factors)) = (
             model.state(),
             model.encoder(),
@@ -56,13 +75,14 @@ impl RobotTypeset {
             .iter()
             .map(|term| expression(library.pool(), term.expr(), symbols))
             .collect::<Result<Vec<_>, _>>()?;
-        let (encoder, negligible_weights) = encoder(map, &factors, symbols, &coordinates);
+        let (encoder, negligible_weights) = encoder(map, &factors, symbols, &coordinates)?;
         let mut rounder = Rounder::new(rounding);
         let mut systems = Vec::new();
         for phase in model.phases() {
             let xi = &phase.xi;
             let mut equations = Vec::with_capacity(coordinates.len());
             for (row, symbol) in coordinates.iter().enumerate() {
+                let output = format!("dd({})", state.names[row]);
                 let texts = library.terms().iter().map(CandidateTerm::text);
                 let entries = terms
                     .iter()
@@ -70,14 +90,15 @@ impl RobotTypeset {
                     .enumerate()
                     .map(|(term, (math, text))| {
                         let sum = decoder.row(row).transpose().dot(&xi.row(term).transpose());
-                        (sum / factors[row], text, math)
-                    });
+                        Ok((finite(sum / factors[row], &output, text)?, text, math))
+                    })
+                    .collect::<Result<Vec<_>, RobotTypesetError>>()?;
                 let left = Symbol {
                     dots: 2,
                     ..symbol.clone()
                 };
-                let output = format!("dd({})", state.names[row]);
-                equations.push(rounder.equation(left, (&phase.name, &output), entries));
+                let place = (phase.name.as_str(), output.as_str());
+                equations.push(rounder.equation(left, place, entries.into_iter()));
             }
             systems.push(EquationSystem {
                 phase: phase.name.clone(),
@@ -99,7 +120,7 @@ fn encoder(
     factors: &DVector<f64>,
     symbols: &SymbolTable,
     coordinates: &[Symbol],
-) -> (Vec<Equation>, usize) {
+) -> Result<(Vec<Equation>, usize), RobotTypesetError> {
     let one = Signed::plus(Math::Number(Decimal::integer(1)));
     let terms: Vec<Signed> = coordinates
         .iter()
@@ -114,6 +135,13 @@ fn encoder(
             .row(row)
             .transpose()
             .component_mul(factors);
+        for (col, &weight) in weights.iter().enumerate() {
+            finite(
+                weight,
+                &format!("z{}", row + 1),
+                &coordinates[col].to_string(),
+            )?;
+        }
         let smallest = NEGLIGIBLE * weights.amax();
         let is_printed = |weight: f64| weight.abs() >= smallest && weight != 0.0;
         left_out += weights
@@ -132,7 +160,19 @@ fn encoder(
         });
         equations.push(rounder.equation(left, ("encoder", ""), bias.chain(entries)));
     }
-    (equations, left_out)
+    Ok((equations, left_out))
+}
+
+/// `value`, unless folding it with weights and scale factors left the range of floats.
+fn finite(value: f64, output: &str, term: &str) -> Result<f64, RobotTypesetError> {
+    if value.is_finite() {
+        return Ok(value);
+    }
+    Err(RobotTypesetError::NotFinite {
+        output: output.to_owned(),
+        term: term.to_owned(),
+        value,
+    })
 }
 
 /// `fr.hx` as q with the subscript fr,hx; numbers where two names would look the same.
@@ -166,6 +206,37 @@ fn all_differ(symbols: &[Symbol]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn robot_equations_with_an_overflowing_coefficient_are_refused() {
+        let text = r#"{ "schema": "romc-model/1", "name": "huge", "latent_dim": 1,
+            "state": { "names": ["a", "b"], "units": ["m", "m"] }, "scaling": { "state": 0.5, "input": 1.0 },
+            "encoder": { "weights": [[1.0, 0.0]], "bias": [0.0] },
+            "decoder": { "weights": [[1.0], [0.0]], "bias": [0.0, 0.0] }, "library": ["z1"],
+            "phases": [ { "name": "contact", "feet": "any", "xi": [[1e308]] } ] }"#;
+        let found = |text: &str| {
+            let model = crate::artifact::read_from_bytes("huge.json", text.as_bytes())
+                .expect("all numbers are finite");
+            RobotTypeset::new(&model, &SymbolTable::default(), Rounding::Exact)
+        };
+        assert_eq!(
+            found(text),
+            Err(RobotTypesetError::NotFinite {
+                output: "dd(a)".to_owned(),
+                term: "z1".to_owned(),
+                value: f64::INFINITY
+            })
+        );
+        let large_weight = text
+            .replace("1e308", "1.0")
+            .replace("[[1.0, 0.0]]", "[[1e308, 0.0]]");
+        let large_weight = large_weight.replace("\"state\": 0.5", "\"state\": 2.5");
+        let message = found(&large_weight).expect_err("too large").to_string();
+        assert_eq!(
+            message,
+            "robot coordinates, z1: the coefficient of \"q_a\" is inf in SI units"
+        );
+    }
 
     #[test]
     fn coordinate_symbols_fall_back_to_numbers_when_names_look_alike() {

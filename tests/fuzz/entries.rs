@@ -1,0 +1,181 @@
+//! What every fuzz target does with its bytes; `tests/corpus.rs` does the same with every file of the corpus.
+//!
+//! Nothing here may panic, whatever the bytes are: a panic is a finding.
+#![allow(dead_code, reason = "each target is a program of its own and uses one of these")]
+
+use romc::artifact;
+use romc::artifact::import::{Format, ImportOptions, LibraryChoice, LibraryOrder, import_from_bytes, parse_standard};
+use romc::backend::{EmitOptions, Target, emit};
+use romc::model::{ReducedModel, Scaling};
+use romc::recording::check::{CheckOptions, check, without};
+use romc::recording::preprocess::{PreprocessOptions, prepare};
+use romc::recording::write::{Notation, WriteOptions, write_to};
+use romc::recording::{self, Recording, Segment};
+use romc::robot::Robot;
+use romc::symbolic::ExprPool;
+
+/// A model that reads is written and reads back equal; small ones are compiled to every target.
+pub fn model_file(bytes: &[u8]) {
+    match artifact::read_from_bytes("fuzz.json", bytes) {
+        Ok(model) => {
+            written_and_read_back(&model);
+            if model.latent_dim() <= 4 && model.library().len() <= 24 && bytes.len() < 4096 {
+                compiled(&model);
+            }
+        }
+        Err(error) => assert!(artifact::describe(&error).starts_with("fuzz.json")),
+    }
+}
+
+fn written_and_read_back(model: &ReducedModel) {
+    let text = artifact::to_text(model);
+    let again = artifact::read_from_bytes("again.json", text.as_bytes());
+    let again = again.unwrap_or_else(|error| panic!("{}\n{text}", artifact::describe(&error)));
+    assert_eq!(*model, again);
+    assert_eq!(artifact::to_text(&again), text);
+}
+
+/// Emission may refuse a model, and is the same twice.
+fn compiled(model: &ReducedModel) {
+    let options = EmitOptions::default();
+    let first = emit(model, &Target::ALL, &options);
+    let second = emit(model, &Target::ALL, &options);
+    match (first, second) {
+        (Ok(first), Ok(second)) => assert_eq!(first, second),
+        (Err(first), Err(second)) => assert_eq!(first.to_string(), second.to_string()),
+        (first, second) => panic!("{:?}\n{:?}", first.err(), second.err()),
+    }
+}
+
+/// An expression that parses prints to a text that parses back to itself; simpler forms and
+/// derivatives exist and print too.
+pub fn expression(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
+    let mut pool = ExprPool::new();
+    let Ok(expr) = pool.parse(text, &|_| true) else {
+        return;
+    };
+    let printed = reads_back(&mut pool, expr, text);
+    if printed.len() > 400 || pool.node_count(expr) > 60 {
+        return;
+    }
+    let simpler = pool.simplify(expr);
+    reads_back(&mut pool, simpler, text);
+    let symbols = pool.symbols_of(expr);
+    for symbol in symbols.into_iter().take(2) {
+        let slope = pool.derivative(expr, symbol);
+        reads_back(&mut pool, slope, text);
+    }
+}
+
+/// The text of an expression, after reading it.
+fn reads_back(pool: &mut ExprPool, expr: romc::symbolic::ExprId, text: &str) -> String {
+    let printed = pool.display(expr).to_string();
+    // Derivatives and simpler forms may be longer and deeper than what may be typed.
+    let limits = romc::symbolic::ParseLimits {
+        length: usize::MAX,
+        depth: usize::MAX,
+        exponent: u32::MAX,
+    };
+    match pool.parse_within(&printed, &|_| true, limits) {
+        Ok(again) => assert_eq!(again, expr, "{text:?} prints as {printed:?}, which reads as {}", pool.display(again)),
+        Err(error) => panic!("{text:?} prints as {printed:?}: {error}"),
+    }
+    printed
+}
+
+/// A recording that reads is finite and ordered, is checked and cut, is written and reads back equal.
+pub fn recording(bytes: &[u8]) {
+    let Ok(found) = recording::read_from_bytes("fuzz.csv", bytes) else {
+        return;
+    };
+    for segment in &found.segments {
+        is_sound(segment);
+    }
+    for notation in [Notation::Semicolon, Notation::Comma] {
+        same_when_written(&found, notation);
+    }
+    let go1 = Robot::by_name("go1").expect("go1 is registered");
+    let findings = check(&found, go1, &CheckOptions::default());
+    for finding in &findings {
+        assert!(!finding.to_string().is_empty());
+    }
+    if let Ok((rest, dropped)) = without(&found, &findings) {
+        assert_eq!(rest.sample_count() + dropped, found.sample_count());
+    }
+    for segment in &found.segments {
+        if let Ok(input) = segment.input(go1) {
+            assert_eq!(input.shape(), (18, segment.len()));
+        }
+    }
+    if let Ok(phases) = prepare(&found, &PreprocessOptions::default()) {
+        assert!(phases.iter().all(|phase| phase.samples.len() % 100 == 0));
+    }
+}
+
+fn same_when_written(found: &Recording, notation: Notation) {
+    let mut text = Vec::new();
+    let options = WriteOptions {
+        notation,
+        accelerations: true,
+    };
+    write_to(&mut text, found, &options).expect("memory takes every byte");
+    let again = recording::read_from_bytes("again.csv", &text);
+    let again = again.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(again.segments.len(), found.segments.len());
+    for (again, found) in again.segments.iter().zip(&found.segments) {
+        assert_eq!(again.time_s, found.time_s);
+        assert_eq!((&again.x, &again.dx), (&found.x, &found.dx));
+        assert_eq!((&again.ddx, &again.torque_nm), (&found.ddx, &found.torque_nm));
+        assert_eq!(again.feet, found.feet);
+    }
+}
+
+fn is_sound(segment: &Segment) {
+    assert!(segment.len() >= 2);
+    assert!(segment.time_s.windows(2).all(|pair| pair[0] < pair[1]));
+    for matrix in [&segment.x, &segment.dx, &segment.ddx, &segment.torque_nm] {
+        assert_eq!(matrix.ncols(), segment.len());
+        assert!(matrix.iter().all(|value| value.is_finite()));
+    }
+}
+
+/// Any bytes as a gzip file.
+pub fn recording_gz(bytes: &[u8]) {
+    recording(bytes);
+    if !bytes.starts_with(&[0x1f, 0x8b]) {
+        recording(&[&[0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3], bytes].concat());
+    }
+}
+
+/// Tensors of NumPy.
+pub fn import_npz(bytes: &[u8]) {
+    imported(Format::Npz, bytes);
+}
+
+/// Tensors of safetensors.
+pub fn import_safetensors(bytes: &[u8]) {
+    imported(Format::Safetensors, bytes);
+}
+
+/// Equations as text.
+pub fn import_equations(bytes: &[u8]) {
+    imported(Format::Equations, bytes);
+}
+
+/// A model that is imported is written and reads back equal.
+fn imported(format: Format, bytes: &[u8]) {
+    let library = parse_standard("degree=1,inputs").expect("a shorthand");
+    let options = ImportOptions {
+        name: "fuzz".to_owned(),
+        library: (format != Format::Equations).then_some(LibraryChoice::Standard(library, LibraryOrder::Author)),
+        scaling: Some(Scaling::uniform(0.1)),
+        ..ImportOptions::default()
+    };
+    match import_from_bytes("fuzz", format, bytes, &options) {
+        Ok(imported) => written_and_read_back(&imported.model),
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
