@@ -153,8 +153,9 @@ impl Printer<'_> {
         };
         let exponent = match number.as_rational() {
             Some((1, 1)) => return self.stack.push(self.factor_piece(base)),
-            // `sqrt(0)` is zero, its negative powers are not.
-            Some((halves, 2)) if base != ExprId::ZERO => {
+            // `sqrt(36)` would read as 6, though the power itself is beyond every float;
+            // `sqrt(0)` as zero, though its negative powers are not.
+            Some((halves, 2)) if !self.has_exact_root(base) => {
                 let root = [Piece::Text("sqrt("), Piece::Expr(base), Piece::Text(")")];
                 let mut pieces = Vec::from(root);
                 if halves != 1 {
@@ -169,6 +170,12 @@ impl Printer<'_> {
         let mut pieces = vec![Piece::Operand(base), Piece::Text("^")];
         pieces.extend(exponent);
         self.push_all(pieces);
+    }
+
+    /// Whether the square root of `expr` would be read as a number.
+    fn has_exact_root(&self, expr: ExprId) -> bool {
+        let number = self.pool.as_number(expr);
+        number.is_some_and(|number| number.checked_root(2).is_some())
     }
 
     /// A factor with exponent one: only sums need parentheses between other factors.
@@ -241,6 +248,8 @@ mod tests {
         "(-8)^(1/3)",
         "(2/3)^x",
         "(-2)^x",
+        "36^(661/2)",
+        "36^(-661/2)*x",
         "0^-1",
         "0^-2*x",
         "0^(-5/2)",

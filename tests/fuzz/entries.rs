@@ -1,10 +1,15 @@
 //! What every fuzz target does with its bytes; `tests/corpus.rs` does the same with every file of the corpus.
 //!
 //! Nothing here may panic, whatever the bytes are: a panic is a finding.
-#![allow(dead_code, reason = "each target is a program of its own and uses one of these")]
+#![allow(
+    dead_code,
+    reason = "each target is a program of its own and uses one of these"
+)]
 
 use romc::artifact;
-use romc::artifact::import::{Format, ImportOptions, LibraryChoice, LibraryOrder, import_from_bytes, parse_standard};
+use romc::artifact::import::{
+    Format, ImportOptions, LibraryChoice, LibraryOrder, import_from_bytes, parse_standard,
+};
 use romc::backend::{EmitOptions, Target, emit};
 use romc::model::{ReducedModel, Scaling};
 use romc::recording::check::{CheckOptions, check, without};
@@ -80,7 +85,12 @@ fn reads_back(pool: &mut ExprPool, expr: romc::symbolic::ExprId, text: &str) -> 
         exponent: u32::MAX,
     };
     match pool.parse_within(&printed, &|_| true, limits) {
-        Ok(again) => assert_eq!(again, expr, "{text:?} prints as {printed:?}, which reads as {}", pool.display(again)),
+        Ok(again) => assert_eq!(
+            again,
+            expr,
+            "{text:?} prints as {printed:?}, which reads as {}",
+            pool.display(again)
+        ),
         Err(error) => panic!("{text:?} prints as {printed:?}: {error}"),
     }
     printed
@@ -128,7 +138,10 @@ fn same_when_written(found: &Recording, notation: Notation) {
     for (again, found) in again.segments.iter().zip(&found.segments) {
         assert_eq!(again.time_s, found.time_s);
         assert_eq!((&again.x, &again.dx), (&found.x, &found.dx));
-        assert_eq!((&again.ddx, &again.torque_nm), (&found.ddx, &found.torque_nm));
+        assert_eq!(
+            (&again.ddx, &again.torque_nm),
+            (&found.ddx, &found.torque_nm)
+        );
         assert_eq!(again.feet, found.feet);
     }
 }
@@ -170,7 +183,8 @@ fn imported(format: Format, bytes: &[u8]) {
     let library = parse_standard("degree=1,inputs").expect("a shorthand");
     let options = ImportOptions {
         name: "fuzz".to_owned(),
-        library: (format != Format::Equations).then_some(LibraryChoice::Standard(library, LibraryOrder::Author)),
+        library: (format != Format::Equations)
+            .then_some(LibraryChoice::Standard(library, LibraryOrder::Author)),
         scaling: Some(Scaling::uniform(0.1)),
         ..ImportOptions::default()
     };
