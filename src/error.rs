@@ -13,6 +13,7 @@ use crate::mpc::MpcError;
 use crate::recording::RecordingError;
 use crate::robot::RobotError;
 use crate::sim::SimError;
+use crate::simplify::SimplifyError;
 use crate::study::StudyError;
 use crate::train::TrainError;
 
@@ -42,6 +43,8 @@ pub enum Error {
     Lower(#[from] LowerError),
     #[error(transparent)]
     Sim(#[from] SimError),
+    #[error(transparent)]
+    Simplify(#[from] SimplifyError),
     #[error(transparent)]
     Study(#[from] StudyError),
     #[error(transparent)]

@@ -14,6 +14,7 @@ pub mod recording;
 pub mod report;
 pub mod robot;
 pub mod sim;
+pub mod simplify;
 pub mod study;
 pub mod symbolic;
 pub mod train;

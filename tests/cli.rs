@@ -734,3 +734,114 @@ fn hardware_jump_trains_simulates_and_gives_torques_inside_the_limits() {
         assert!(run["torque_rms_nm"].as_f64().expect("a number") > 0.0);
     }
 }
+
+#[test]
+fn compile_within_zero_tolerance_emits_the_same_bytes() {
+    let folder = folder();
+    let (plain, zero) = (path(&folder, "plain"), path(&folder, "zero"));
+    let emit = ["compile", MODEL, "--emit", "latex,c,rust,markdown,mathml"];
+    done(&[&emit[..], &["--out-dir", &plain]].concat());
+    let tolerance = ["--tolerance", "0", "--domain", JUMP];
+    done(&[&emit[..], &["--out-dir", &zero], &tolerance[..]].concat());
+    let relative = |root: &str| -> Vec<(PathBuf, Vec<u8>)> {
+        let certificate = Path::new("go1_d4-simplification.md");
+        (contents(Path::new(root)).into_iter())
+            .map(|(file, bytes)| (file.strip_prefix(root).expect("below").to_owned(), bytes))
+            .filter(|(file, _)| file != certificate && file != Path::new(".romc-emitted"))
+            .collect()
+    };
+    assert_eq!(relative(&plain), relative(&zero));
+    let certificate = fs::read_to_string(Path::new(&zero).join("go1_d4-simplification.md"));
+    let certificate = certificate.expect("the certificate is written");
+    assert!(certificate.contains("- changes: 0\n"), "{certificate}");
+    // default printing rounds, and the certificate bounds what that costs
+    assert!(
+        certificate.contains("## What printing adds"),
+        "{certificate}"
+    );
+}
+
+#[test]
+fn compile_within_a_tolerance_tells_each_change_and_saves_the_simplified_model() {
+    let folder = folder();
+    let (out, saved) = (path(&folder, "out"), path(&folder, "short.json"));
+    let value = json(&[
+        "compile",
+        "models/go1-d6.json",
+        "--emit",
+        "latex,c",
+        "--out-dir",
+        &out,
+        "--tolerance",
+        "20%",
+        "--domain",
+        JUMP,
+        "--save-model",
+        &saved,
+    ]);
+    let simplification = &value["simplification"];
+    let (mut dropped, mut rounded) = (0, 0);
+    for phase in simplification["phases"].as_array().expect("phases") {
+        for equation in phase["equations"].as_array().expect("equations") {
+            let number = |value: &Value| value.as_f64().expect("a number");
+            let bound = &equation["bound"];
+            let magnitude = number(&bound[0]).abs().max(number(&bound[1]).abs());
+            assert!(magnitude <= number(&equation["allowed"]));
+            assert!(number(&equation["measured"]["max"]) <= magnitude * (1.0 + 1e-9) + 1e-12);
+            for change in equation["changes"].as_array().expect("changes") {
+                dropped += usize::from(change["kind"] != "rounded");
+                rounded += usize::from(change["kind"] == "rounded");
+            }
+        }
+    }
+    assert!(dropped > 0 && rounded > 20, "{dropped} {rounded}");
+    assert!(simplification["rollouts"]["rms_after"]["body.z"]["restarted"].is_number());
+    let page =
+        fs::read_to_string(Path::new(&out).join("go1_d6-simplification.md")).expect("written");
+    assert!(
+        page.contains("| contact | ddz1 |") && page.contains("rounded to"),
+        "{page}"
+    );
+    // the saved model is one like any other, and knows where it comes from
+    let model: Value =
+        serde_json::from_str(&fs::read_to_string(&saved).expect("written")).expect("JSON");
+    let entry = &model["provenance"]["simplification"];
+    assert_eq!(
+        (entry["tolerance"].as_str(), entry["domain"][0].as_str()),
+        (Some("20%"), Some(JUMP))
+    );
+    let active = simplification["terms"]["after"].as_u64();
+    let simulated = json(&["simulate", &saved, JUMP]);
+    assert_eq!(simulated["rollouts"]["active_terms"].as_u64(), active);
+    assert_eq!(
+        simulated["rollouts"]["full"]["coordinates"]["body.z"]["rms"],
+        simplification["rollouts"]["rms_after"]["body.z"]["full"]
+    );
+}
+
+#[test]
+fn sines_of_the_paper_become_linear_over_given_ranges() {
+    let folder = folder();
+    let (out, paper) = (path(&folder, "out"), "models/paper-2d.json");
+    let ranges = "examples/domains/paper-2d.toml";
+    let compile = ["compile", paper, "--emit", "latex", "--out-dir", &out];
+    done(&[&compile[..], &["--tolerance", "0.01", "--domain", ranges]].concat());
+    let equations = fs::read_to_string(Path::new(&out).join("paper_2d.tex")).expect("written");
+    assert!(!equations.contains("\\sin"), "{equations}");
+    let comment = "% Simplified within 0.01 scaled units per s^2\n";
+    assert!(equations.contains(comment), "{equations}");
+    let wrong = [
+        (
+            ["--tolerance", "1%", "--domain", ranges],
+            "scaled units per s^2",
+        ),
+        (["--tolerance", "0.01", "--domain", JUMP], "no encoder"),
+    ];
+    for (arguments, told) in wrong {
+        let error = failed(&[&compile[..], &arguments[..]].concat());
+        assert!(error.contains(told), "{error}");
+    }
+    let output = romc(&[&compile[..], &["--tolerance", "1%"]].concat());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("--domain <RECORDING>"));
+}

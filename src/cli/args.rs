@@ -10,6 +10,7 @@ use crate::artifact::import::{Format, ImportError, Mapping, PhaseRule, parse_sta
 use crate::backend::Target;
 use crate::model::{Activation, StandardLibrary};
 use crate::robot::STATE_DIM;
+use crate::simplify::Tolerance;
 use crate::study::Shard;
 
 /// The reduced-order model compiler: from recorded jumps to equations, code and torques.
@@ -472,7 +473,7 @@ pub struct ImportArguments {
 /// `romc compile`
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example:\n  romc compile models/paper-2d.json --emit latex,c,rust --out-dir out/paper-2d"
+    after_help = "Examples:\n  romc compile models/paper-2d.json --emit latex,c,rust --out-dir out/paper-2d\n  romc compile models/go1-d4.json --emit latex,c --out-dir out/short --tolerance 5% \\\n      --domain examples/recordings/go1/train_*.csv.gz --save-model out/go1-d4-short.json"
 )]
 pub struct CompileArguments {
     /// Model file
@@ -494,6 +495,8 @@ pub struct CompileArguments {
     pub code: CodeArguments,
     #[command(flatten)]
     pub equations: EquationArguments,
+    #[command(flatten)]
+    pub simplification: SimplifyArguments,
     /// Write into a folder that holds files romc did not make
     #[arg(long)]
     pub force: bool,
@@ -539,6 +542,26 @@ pub struct EquationArguments {
     /// Write numbers in LaTeX with siunitx's \\num
     #[arg(long)]
     pub siunitx: bool,
+}
+
+/// How far equations may be simplified.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Simplification")]
+pub struct SimplifyArguments {
+    /// Drop and round terms as long as no ddz is off by more than this anywhere in the domain: 1%
+    /// (of its root mean square over the recordings) or 0.05 (scaled units per s^2); nothing
+    /// changes at 0
+    #[arg(long, value_name = "ERROR", requires = "domain")]
+    pub tolerance: Option<Tolerance>,
+    /// Recordings whose smallest box is the domain, a phase; or one .toml file of ranges
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    pub domain: Vec<PathBuf>,
+    /// How far the domain reaches beyond the recordings, as a share of each variable's range
+    #[arg(long, value_name = "SHARE", default_value_t = crate::simplify::MARGIN, value_parser = share)]
+    pub margin: f64,
+    /// Also write the simplified model to this file
+    #[arg(long, value_name = "MODEL.json", requires = "domain")]
+    pub save_model: Option<PathBuf>,
 }
 
 /// `romc simulate`
@@ -642,6 +665,9 @@ pub struct ReportArguments {
     /// Time between restarts from the recorded state, in seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = positive_seconds)]
     pub restart_every: f64,
+    /// List what simplification within this error changes: 1% or 0.05, as in `romc compile`
+    #[arg(long, value_name = "ERROR", default_value = "1%")]
+    pub tolerance: Tolerance,
     /// Replace an existing page, or write into a folder that holds files romc did not make
     #[arg(long)]
     pub force: bool,
@@ -682,6 +708,13 @@ fn positive_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds.is_finite() && seconds > 0.0 => Ok(seconds),
         _ => Err("expected a positive number of seconds".to_owned()),
+    }
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if share.is_finite() && share >= 0.0 => Ok(share),
+        _ => Err("expected a number of at least 0, such as 0.1".to_owned()),
     }
 }
 

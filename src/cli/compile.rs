@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::{CodeArguments, CompileArguments, EquationArguments, PrecisionChoice};
-use super::output::Table;
+use super::output::{Table, check_output};
+use super::simplification;
 use crate::backend::latex::{LatexOptions, NumberStyle};
 use crate::backend::markdown::MarkdownOptions;
 use crate::backend::mathml::MathmlOptions;
@@ -22,14 +23,28 @@ use crate::{Error, artifact};
 /// # Errors
 /// Whatever reading, lowering or writing refuses.
 pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
-    let model = artifact::read(&arguments.model)?;
     let overwrite = Overwrite::when_forced(arguments.force);
-    let files = emit(
-        &model,
+    let save_model = arguments.simplification.save_model.as_deref();
+    check_output(save_model, overwrite)?;
+    let read = artifact::read(&arguments.model)?;
+    let simplified = simplification::run(&read, &arguments.simplification)?;
+    let model = simplified.as_ref().map_or(&read, |outcome| &outcome.model);
+    let unless_given = (simplified.as_ref()).map_or(Rounding::default(), |s| s.rounding());
+    let mut files = emit(
+        model,
         &arguments.emit,
         &arguments.code,
         &arguments.equations,
+        unless_given,
     )?;
+    let told = match &simplified {
+        None => None,
+        Some(outcome) => Some(outcome.told(rounding(&arguments.equations, unless_given))?),
+    };
+    if let Some(outcome) = &simplified {
+        outcome.comment(&mut files);
+    }
+    files.extend(told.iter().map(|(file, _, _)| file.clone()));
     let written = write(&arguments.out_dir, &files, overwrite)?;
     let mut table = Table::new(["file", "bytes"]);
     for (path, bytes) in &written {
@@ -39,8 +54,15 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         "model `{}`: {} latent coordinates, {}\n\n{table}",
         model.name(),
         model.latent_dim(),
-        phases_in_words(&model)
+        phases_in_words(model)
     );
+    if let Some((_, summary, _)) = &told {
+        text = format!("{summary}{text}");
+    }
+    if let Some(path) = save_model {
+        artifact::write_with(path, model, overwrite)?;
+        text += &simplification::saved_words(path);
+    }
     if arguments.emit.contains(&Target::C) {
         let name = model.identifier().as_str();
         let folder = arguments.out_dir.display();
@@ -55,14 +77,26 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
             "command": "compile",
             "model": arguments.model.display().to_string(),
             "name": model.name(),
-            "digest": artifact::digest(&model).to_string(),
+            "digest": artifact::digest(model).to_string(),
             "targets": arguments.emit.iter().map(|target| target.name()).collect::<Vec<_>>(),
+            "simplification": told.map(|(_, _, value)| value),
+            "saved_model": save_model.map(|path| path.display().to_string()),
             "files": written.iter().map(|(path, bytes)| file_json(path, *bytes)).collect::<Vec<_>>(),
         }),
     })
 }
 
-/// The files of the targets, in memory, with the model's digest in their headers.
+/// How coefficients are printed.
+fn rounding(equations: &EquationArguments, unless_given: Rounding) -> Rounding {
+    match (equations.digits, equations.significant) {
+        (Some(places), _) => Rounding::Decimals(places),
+        (None, Some(digits)) => Rounding::Significant(digits),
+        (None, None) => unless_given,
+    }
+}
+
+/// The files of the targets, in memory, with the model's digest in their headers; `unless_given` is
+/// how coefficients are printed where the arguments do not tell.
 ///
 /// # Errors
 /// [`Error::Emit`] if the model cannot be lowered or typeset, [`Error::Rename`] for a new name that
@@ -72,14 +106,11 @@ pub fn emit(
     targets: &[Target],
     code: &CodeArguments,
     equations: &EquationArguments,
+    unless_given: Rounding,
 ) -> Result<Vec<EmittedFile>, Error> {
     let digest = Some(artifact::digest(model).short());
     let symbols = SymbolTable::parse(&equations.rename, model.latent_dim())?;
-    let rounding = match (equations.digits, equations.significant) {
-        (Some(places), _) => Rounding::Decimals(places),
-        (None, Some(digits)) => Rounding::Significant(digits),
-        (None, None) => Rounding::default(),
-    };
+    let rounding = rounding(equations, unless_given);
     let latex = LatexOptions::default();
     let markdown = MarkdownOptions::default();
     let mathml = MathmlOptions::default();

@@ -13,12 +13,14 @@ use super::args::{CodeArguments, DemoArguments, EquationArguments};
 use super::mpc::NamedRun;
 use super::output::{Table, significant, spinner};
 use super::{compile, mpc as mpc_command, report, simulate};
+use crate::backend::typeset::Rounding;
 use crate::backend::{EmittedFile, Target};
 use crate::evaluate::Assessment;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::mpc::{Lift, MpcSettings, ReferenceInput};
 use crate::recording::Recording;
+use crate::simplify::Tolerance;
 use crate::{Error, artifact, recording};
 
 /// The shipped model that the demo works with.
@@ -43,6 +45,9 @@ const JUMPS: [(&str, &[u8]); 3] = [
 /// Time between restarts of the short rollouts, as in the paper's second test.
 const RESTART_S: f64 = 0.1;
 
+/// Within which the report lists what simplification changes.
+const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
+
 /// Runs the whole path and tells what it made and how well it does.
 ///
 /// # Errors
@@ -63,6 +68,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
         &targets,
         &CodeArguments::default(),
         &EquationArguments::default(),
+        Rounding::default(),
     )?;
     progress.set_message("rolling the model out");
     let evaluation = Assessment::over(&model, &jumps, RESTART_S)?;
@@ -76,6 +82,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
         &evaluation,
         [&control.transpose, &control.consistent],
         None,
+        REPORT_TOLERANCE,
         &["romc demo".to_owned()],
     )?;
     files.push(EmittedFile::new("report.html", report.page));

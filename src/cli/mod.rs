@@ -15,6 +15,7 @@ mod manual;
 mod mpc;
 mod output;
 mod report;
+mod simplification;
 mod simulate;
 mod study;
 mod train;

@@ -9,6 +9,7 @@ use super::Answer;
 use super::args::ReportArguments;
 use super::mpc::{NamedRun, run_all, run_table};
 use super::output::{Table, check_output, read_recordings, significant, spinner, write_file};
+use super::simplification;
 use super::simulate::{baseline_table, coordinate_table, dynamics_table, phase_table};
 use crate::backend::{EmittedFile, write_files};
 use crate::evaluate::{Assessment, LAMBDA};
@@ -18,6 +19,7 @@ use crate::mpc::{Lift, MpcSettings, ReferenceInput};
 use crate::recording::Recording;
 use crate::report::figures::{csv, pdf, standalone_svg};
 use crate::report::{Content, PageOptions, PageTable, all_figures, page};
+use crate::simplify::Tolerance;
 use crate::study::{Store, Summary};
 use crate::{Error, artifact};
 
@@ -97,10 +99,14 @@ fn make(
     let (plain, consistent) = (along(Lift::Transpose)?, along(Lift::Consistent)?);
     progress.set_message("drawing");
     let commands = commands(arguments);
-    let made = page_of(model, &assessment, [&plain, &consistent], study, &commands);
+    let tolerance = arguments.tolerance;
+    let runs = [&plain[..], &consistent];
+    let made = page_of(model, &assessment, runs, study, tolerance, &commands);
     progress.finish_and_clear();
     made
 }
+
+const LADDER_CAPTION: &str = "What is left within each tolerance; errors as shares of the root mean square of their ddz, the largest of all equations";
 
 /// Draws what was assessed, and the controller's runs with the plain and with the consistent lift.
 ///
@@ -112,6 +118,7 @@ pub fn page_of(
     assessment: &Assessment<'_>,
     [plain, consistent]: [&[NamedRun]; 2],
     study: Option<&Summary>,
+    tolerance: Tolerance,
     commands: &[String],
 ) -> Result<Made, Error> {
     let content = Content {
@@ -121,8 +128,20 @@ pub fn page_of(
         study,
     };
     let figures = all_figures(&content)?;
+    let ladder = simplification::ladder(model, assessment, tolerance)?;
     let options = PageOptions {
         commands: commands.to_vec(),
+        simplification: vec![
+            page_table(LADDER_CAPTION, &ladder.tolerances),
+            page_table(
+                &format!("Errors of each ddz within {tolerance}, scaled units per s²"),
+                &ladder.equations,
+            ),
+        ],
+        changes: vec![page_table(
+            &format!("Every change within {tolerance}, with its bound"),
+            &ladder.changes,
+        )],
         ..options(model, assessment, plain, consistent)
     };
     let page = page(&content, &figures, &options)?;
@@ -196,7 +215,7 @@ fn options(
             page_table("Plain lift, u = W_eᵀ u_lat", &run_table(plain)),
             page_table("Consistent lift", &run_table(consistent)),
         ],
-        commands: Vec::new(),
+        ..PageOptions::default()
     }
 }
 
@@ -228,6 +247,10 @@ fn commands(arguments: &ReportArguments) -> Vec<String> {
         format!("romc mpc {model} {recordings} --lift transpose"),
         format!("romc mpc {model} {recordings} --lift consistent"),
         format!("romc compile {model} --emit latex --out-dir out"),
+        format!(
+            "romc compile {model} --emit latex,c --tolerance {} --domain {recordings} --out-dir out",
+            arguments.tolerance
+        ),
     ]
 }
 

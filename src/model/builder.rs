@@ -97,6 +97,12 @@ impl ModelBuilder {
         self
     }
 
+    /// Replaces the library; the phases' Xi must then have a row for each of its terms.
+    pub fn library(mut self, library: Library) -> Self {
+        self.library = library;
+        self
+    }
+
     /// Appends a phase; rules are tried in the order of appending.
     pub fn phase(mut self, phase: Phase) -> Self {
         self.phases.push(phase);

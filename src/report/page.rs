@@ -37,6 +37,10 @@ pub struct PageOptions {
     pub dynamics: Vec<PageTable>,
     /// The controller's runs.
     pub control: Vec<PageTable>,
+    /// What simplification within several tolerances does.
+    pub simplification: Vec<PageTable>,
+    /// Long lists of changes, shown when asked for.
+    pub changes: Vec<PageTable>,
     /// Sentences below the tables of baselines.
     pub baseline_notes: Vec<String>,
     /// Commands that reproduce the report, in order.
@@ -93,6 +97,18 @@ pub fn page(
             &options.control,
         ),
     ];
+    if !options.simplification.is_empty() {
+        sections.push(Section {
+            folded: options.changes.iter().map(table_view).collect(),
+            ..section(
+                "simplification",
+                "How far the equations can be simplified",
+                &SIMPLIFICATION_WORDS,
+                &[],
+                &options.simplification,
+            )
+        });
+    }
     if !figures.study.is_empty() {
         sections.push(section(
             "study",
@@ -138,6 +154,11 @@ const DYNAMICS_WORDS: &str = "Eigenvalues belong to each phase's linearisation a
 const BASELINE_WORDS: &str = "The actuated spring-loaded inverted pendulum under the same forces, with the published constants and with the constants that fit the accelerations of these very recordings best.";
 const CONTROL_WORDS: &str = "At each control step the controller sees the recorded state and plans along the recording. Its commands are not fed back to a robot: this tells what it would have commanded where the robot really was.";
 
+const SIMPLIFICATION_WORDS: [&str; 2] = [
+    "Terms are dropped, coefficients shortened and nearly linear functions made linear, as long as no ddz of a phase can be off by more than the tolerance anywhere in its domain: the smallest box around the recorded latent states and inputs of the phase, a tenth of each range wider on both sides.",
+    "The certified error is proven by interval arithmetic for every point of that box. The measured errors are those at the recorded samples. Nothing is proven outside the box, so rollouts stand beside.",
+];
+
 const STUDY_WORDS: &str = "One model for every latent dimension and seed, judged on recordings that were not trained on. With more coordinates the decoder errs less and the equations grow.";
 
 fn phases(content: &Content<'_>, typeset: &Typeset) -> Vec<PhaseView> {
@@ -179,6 +200,7 @@ fn section(
         title,
         paragraphs: paragraphs.iter().map(|p| HtmlText(p).to_string()).collect(),
         tables: tables.iter().map(table_view).collect(),
+        folded: Vec::new(),
         figures: figures.iter().map(figure_view).collect(),
     }
 }
@@ -248,6 +270,7 @@ struct Section {
     title: &'static str,
     paragraphs: Vec<String>,
     tables: Vec<PageTable>,
+    folded: Vec<PageTable>,
     figures: Vec<FigureView>,
 }
 

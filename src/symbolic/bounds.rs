@@ -15,16 +15,28 @@ impl ExprPool {
     /// `f(c) + sum D_i (X_i - c_i)` around the centre is used. `sin(x) - x` on `[-0.1, 0.1]` is
     /// bounded by 1.7e-4 this way, instead of by 0.2.
     pub fn bound(&mut self, expr: ExprId, domain: &[(SymbolId, Interval)]) -> Interval {
+        let slopes: Vec<ExprId> = domain
+            .iter()
+            .map(|(symbol, _)| self.derivative(expr, *symbol))
+            .collect();
+        self.bound_by_slopes(expr, &slopes, domain)
+    }
+
+    /// As [`bound`](ExprPool::bound) with the derivatives of `expr` by the symbols of `domain`, for
+    /// many boxes of the same expression.
+    pub fn bound_by_slopes(
+        &self,
+        expr: ExprId,
+        slopes: &[ExprId],
+        domain: &[(SymbolId, Interval)],
+    ) -> Interval {
         let natural = self.bound_naturally(expr, domain);
         if !self.is_lipschitz_on(expr, domain) {
             return natural;
         }
-        let slopes: Vec<Interval> = domain
+        let slopes: Vec<Interval> = slopes
             .iter()
-            .map(|(symbol, _)| {
-                let slope = self.derivative(expr, *symbol);
-                self.bound_naturally(slope, domain)
-            })
+            .map(|slope| self.bound_naturally(*slope, domain))
             .collect();
         let lowest = self.bound_from_side(expr, domain, &slopes, Side::Low);
         let highest = self.bound_from_side(expr, domain, &slopes, Side::High);

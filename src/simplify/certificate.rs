@@ -1,0 +1,178 @@
+//! What was changed, and how far it can make `ddz` differ.
+
+use super::measure::Measured;
+use super::tolerance::Tolerance;
+use crate::symbolic::Interval;
+
+/// What became of a term.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChangeKind {
+    /// It is gone.
+    Dropped,
+    /// A constant took its place.
+    Constant,
+    /// A straight line took its place: multiples of variables, perhaps with a constant.
+    Linear,
+    /// A parabola took its place.
+    Quadratic,
+    /// Its coefficient has fewer digits.
+    Rounded {
+        /// Significant digits that are left.
+        digits: usize,
+    },
+}
+
+/// Another coefficient that a change altered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effect {
+    /// The term in the library's syntax.
+    pub term: String,
+    /// Its coefficient before the change.
+    pub before: f64,
+    /// And after it.
+    pub after: f64,
+}
+
+/// One change of one equation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// What was done.
+    pub kind: ChangeKind,
+    /// The term in the library's syntax.
+    pub term: String,
+    /// Its coefficient before this change.
+    pub before: f64,
+    /// And after it; zero unless the change is a rounding.
+    pub after: f64,
+    /// Coefficients that took over.
+    pub effects: Vec<Effect>,
+    /// Contains `ddz` before this change minus `ddz` after it at every point of the domain.
+    pub bound: Interval,
+    /// The same at the recorded samples.
+    pub measured: Option<Measured>,
+}
+
+/// One equation of one phase; all errors in scaled units per second squared.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EquationCertificate {
+    /// Index of the latent coordinate.
+    pub output: usize,
+    /// Root mean square of the model's `ddz` over the recorded samples.
+    pub rms: Option<f64>,
+    /// The largest error that the tolerance allows.
+    pub allowed: f64,
+    /// Contains `ddz` of the model minus `ddz` of the simplified model at every point of the domain;
+    /// found from the two models, not from the list of changes.
+    pub bound: Interval,
+    /// The sum of the changes' bounds, which contains the same difference.
+    pub sum_of_bounds: Interval,
+    /// The difference at the recorded samples.
+    pub measured: Option<Measured>,
+    /// Active terms of the model.
+    pub terms_before: usize,
+    /// Active terms of the simplified model.
+    pub terms_after: usize,
+    /// Significant decimal digits that the model's coefficients need, added up.
+    pub digits_before: usize,
+    /// The same of the simplified model.
+    pub digits_after: usize,
+    /// What was done, in order.
+    pub changes: Vec<Change>,
+}
+
+/// One phase.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhaseCertificate {
+    /// The phase's name.
+    pub name: String,
+    /// The box: each variable's name and range. `None` if there is no sample of the phase, so that
+    /// its equations were kept.
+    pub domain: Option<Vec<(String, Interval)>>,
+    /// Recorded samples in the box, at which errors were measured.
+    pub samples: usize,
+    /// Recorded samples of the phase outside the box, about which nothing is stated.
+    pub samples_outside: usize,
+    /// Operations of the straight-line code of `ddz`, before and after; a sine with its cosine
+    /// counts as two.
+    pub operations: (usize, usize),
+    /// One entry a latent coordinate.
+    pub equations: Vec<EquationCertificate>,
+}
+
+/// How far a simplified model can differ from the model it was made from, and why.
+///
+/// For every phase with a domain, every point `(z, dz, u_lat)` of it at which the model is defined,
+/// and every latent coordinate `i`, in real numbers: `ddz_i - ddz_i,simplified` lies in
+/// [`EquationCertificate::bound`]. The rounding of the floating-point evaluation, about 1e-16 of the
+/// largest summand, comes on top for both models.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Certificate {
+    /// What was asked for.
+    pub tolerance: Tolerance,
+    /// One entry a phase.
+    pub phases: Vec<PhaseCertificate>,
+}
+
+impl Certificate {
+    /// All equations with the names of their phases.
+    pub fn equations(&self) -> impl Iterator<Item = (&str, &EquationCertificate)> {
+        (self.phases.iter())
+            .flat_map(|phase| phase.equations.iter().map(|e| (phase.name.as_str(), e)))
+    }
+
+    /// Number of changes.
+    pub fn n_changes(&self) -> usize {
+        self.equations()
+            .map(|(_, equation)| equation.changes.len())
+            .sum()
+    }
+
+    /// Active terms before and after, all phases together.
+    pub fn terms(&self) -> (usize, usize) {
+        self.equations()
+            .fold((0, 0), |(before, after), (_, equation)| {
+                (before + equation.terms_before, after + equation.terms_after)
+            })
+    }
+
+    /// Significant decimal digits of all coefficients before and after, added up.
+    pub fn digits(&self) -> (usize, usize) {
+        self.equations()
+            .fold((0, 0), |(before, after), (_, equation)| {
+                (
+                    before + equation.digits_before,
+                    after + equation.digits_after,
+                )
+            })
+    }
+
+    /// Operations of the straight-line code of `ddz` before and after, all phases together.
+    pub fn operations(&self) -> (usize, usize) {
+        let phases = self.phases.iter().map(|phase| phase.operations);
+        phases.fold((0, 0), |(a, b), (before, after)| (a + before, b + after))
+    }
+
+    /// The largest bound as a share of the root mean square of its `ddz`.
+    pub fn largest_bound_share(&self) -> Option<f64> {
+        self.largest_share(|equation| Some(equation.bound.magnitude()))
+    }
+
+    /// The largest error at a recorded sample as a share of the root mean square of its `ddz`.
+    pub fn largest_measured_share(&self) -> Option<f64> {
+        self.largest_share(|equation| equation.measured.map(|measured| measured.max))
+    }
+
+    /// The largest root mean square error as a share of the root mean square of its `ddz`.
+    pub fn largest_rms_share(&self) -> Option<f64> {
+        self.largest_share(|equation| equation.measured.map(|measured| measured.rms))
+    }
+
+    fn largest_share(&self, error: impl Fn(&EquationCertificate) -> Option<f64>) -> Option<f64> {
+        self.equations()
+            .filter_map(|(_, equation)| {
+                let rms = equation.rms.filter(|&rms| rms > 0.0)?;
+                Some(error(equation)? / rms)
+            })
+            .reduce(f64::max)
+    }
+}

@@ -1,0 +1,221 @@
+//! Where the error is bounded: a box of latent states and inputs for each phase.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::error::SimplifyError;
+use crate::model::{LatentVariable, ReducedModel};
+use crate::sim::LatentSegment;
+use crate::symbolic::Interval;
+
+/// How far a domain reaches beyond the samples unless told otherwise, as a share of each variable's
+/// range.
+pub const MARGIN: f64 = 0.1;
+
+/// Recorded samples of one phase; matrices are `latent_dim x n`, a column a sample, scaled units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhaseSamples {
+    /// Latent positions.
+    pub z: DMatrix<f64>,
+    /// Latent velocities.
+    pub dz: DMatrix<f64>,
+    /// Latent inputs.
+    pub u_lat: DMatrix<f64>,
+}
+
+/// Recorded samples, sorted by the model's phases.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Samples {
+    /// One entry a phase of the model.
+    pub phases: Vec<PhaseSamples>,
+}
+
+impl Samples {
+    /// Sorts the samples of encoded recordings by phase.
+    pub fn of(model: &ReducedModel, segments: &[&LatentSegment]) -> Self {
+        let phases = (0..model.phases().len()).map(|phase| {
+            let gather = |of: fn(&LatentSegment) -> &DMatrix<f64>| {
+                let columns: Vec<DVector<f64>> = (segments.iter())
+                    .flat_map(|segment| {
+                        (0..segment.len())
+                            .filter(move |&k| segment.phase[k] == phase)
+                            .map(move |k| of(segment).column(k).into_owned())
+                    })
+                    .collect();
+                let n = columns.len();
+                DMatrix::from_fn(model.latent_dim(), n, |row, k| columns[k][row])
+            };
+            PhaseSamples {
+                z: gather(|segment| &segment.z),
+                dz: gather(|segment| &segment.dz),
+                u_lat: gather(|segment| &segment.u_lat),
+            }
+        });
+        Self {
+            phases: phases.collect(),
+        }
+    }
+}
+
+impl PhaseSamples {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.z.ncols()
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// One sample as `z`, `dz`, `u_lat` in a row.
+    fn point(&self, sample: usize) -> impl Iterator<Item = f64> + '_ {
+        let blocks = [&self.z, &self.dz, &self.u_lat];
+        (blocks.into_iter())
+            .flat_map(move |block| (0..block.nrows()).map(move |r| block[(r, sample)]))
+    }
+}
+
+/// A box a phase, over `z`, then `dz`, then `u_lat` (scaled units). A phase without one keeps its
+/// equations.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Domain {
+    boxes: Vec<Option<Vec<Interval>>>,
+}
+
+impl Domain {
+    /// The domain with these boxes, one a phase of the model.
+    ///
+    /// # Errors
+    /// [`SimplifyError::PhaseCount`], [`SimplifyError::BoxDimension`], [`SimplifyError::Range`].
+    pub fn new(
+        model: &ReducedModel,
+        boxes: Vec<Option<Vec<Interval>>>,
+    ) -> Result<Self, SimplifyError> {
+        if boxes.len() != model.phases().len() {
+            return Err(SimplifyError::PhaseCount {
+                found: boxes.len(),
+                expected: model.phases().len(),
+            });
+        }
+        let expected = 3 * model.latent_dim();
+        for (ranges, phase) in boxes.iter().zip(model.phases()) {
+            let Some(ranges) = ranges else { continue };
+            if ranges.len() != expected {
+                return Err(SimplifyError::BoxDimension {
+                    phase: phase.name.clone(),
+                    found: ranges.len(),
+                    expected,
+                });
+            }
+            let variables = LatentVariable::all(model.latent_dim());
+            for (range, variable) in ranges.iter().zip(variables) {
+                if range.is_empty() || !range.magnitude().is_finite() {
+                    return Err(SimplifyError::Range {
+                        phase: phase.name.clone(),
+                        variable: variable.to_string(),
+                        lo: range.lo(),
+                        hi: range.hi(),
+                    });
+                }
+            }
+        }
+        Ok(Self { boxes })
+    }
+
+    /// The smallest boxes that hold all samples, each side moved out by `margin` times the width.
+    ///
+    /// # Errors
+    /// As [`Domain::new`], for samples of another model.
+    pub fn around(
+        model: &ReducedModel,
+        samples: &Samples,
+        margin: f64,
+    ) -> Result<Self, SimplifyError> {
+        let boxes = samples.phases.iter().map(|samples| {
+            (0..samples.len())
+                .map(|k| samples.point(k).map(Interval::point).collect::<Vec<_>>())
+                .reduce(|all, point| all.into_iter().zip(point).map(|(a, b)| a.hull(b)).collect())
+                .map(|ranges| ranges.into_iter().map(|r| widened(r, margin)).collect())
+        });
+        Self::new(model, boxes.collect())
+    }
+
+    /// Reads boxes from TOML: a table a phase, with a range a variable, such as `z1 = [-0.2, 0.4]`.
+    ///
+    /// # Errors
+    /// [`SimplifyError::DomainFile`] for a phase or variable that the model does not have or that
+    /// has no range, and as [`Domain::new`].
+    pub fn from_toml(model: &ReducedModel, path: &Path, text: &str) -> Result<Self, SimplifyError> {
+        let refused = |message: String| SimplifyError::DomainFile {
+            path: path.to_owned(),
+            message,
+        };
+        let mut tables: BTreeMap<String, BTreeMap<String, [f64; 2]>> =
+            toml::from_str(text).map_err(|error| refused(error.to_string()))?;
+        let mut boxes = Vec::new();
+        for phase in model.phases() {
+            let Some(mut table) = tables.remove(&phase.name) else {
+                boxes.push(None);
+                continue;
+            };
+            let mut ranges = Vec::new();
+            for variable in LatentVariable::all(model.latent_dim()) {
+                let [lo, hi] = table.remove(&variable.to_string()).ok_or_else(|| {
+                    refused(format!(
+                        "[{}] has no range of `{variable}`, expected {variable} = [LOW, HIGH]",
+                        phase.name
+                    ))
+                })?;
+                ranges.push(Interval::new(lo, hi));
+            }
+            if let Some(unknown) = table.keys().next() {
+                return Err(refused(format!(
+                    "[{}] has a range of `{unknown}`, which is no variable of the model",
+                    phase.name
+                )));
+            }
+            boxes.push(Some(ranges));
+        }
+        if let Some(unknown) = tables.keys().next() {
+            return Err(refused(format!("[{unknown}] is no phase of the model")));
+        }
+        Self::new(model, boxes)
+    }
+
+    /// The box of a phase: `3 latent_dim` ranges.
+    ///
+    /// # Panics
+    /// If there is no such phase.
+    pub fn phase(&self, phase: usize) -> Option<&[Interval]> {
+        self.boxes[phase].as_deref()
+    }
+
+    /// Whether a point lies in a box; `false` for a phase without one.
+    ///
+    /// # Panics
+    /// If there is no such phase.
+    pub fn contains(&self, phase: usize, point: impl Iterator<Item = f64>) -> bool {
+        let Some(ranges) = self.phase(phase) else {
+            return false;
+        };
+        ranges
+            .iter()
+            .zip(point)
+            .all(|(range, value)| range.contains(value))
+    }
+
+    /// Which samples of a phase lie in its box.
+    pub(super) fn inside(&self, phase: usize, samples: &PhaseSamples) -> Vec<usize> {
+        (0..samples.len())
+            .filter(|&k| self.contains(phase, samples.point(k)))
+            .collect()
+    }
+}
+
+fn widened(range: Interval, margin: f64) -> Interval {
+    let by = margin * range.width();
+    Interval::new(range.lo() - by, range.hi() + by)
+}

@@ -1,0 +1,228 @@
+//! Which changes are made to one equation.
+//!
+//! Each change is made to the equation as the changes before it left it, and its error is enclosed
+//! over the box. The errors add, as intervals, to what all changes together may cost.
+
+use super::certificate::ChangeKind;
+use super::ranges::Ranges;
+use super::rewrite::{Rewrite, rewrites};
+use super::workspace::{Workspace, has_function};
+use crate::symbolic::Interval;
+
+/// Share of the tolerance that removing terms may use; the rest is for shorter coefficients.
+const REMOVAL_SHARE: f64 = 0.75;
+/// A coefficient of this many significant digits reads back as itself.
+const MAX_DIGITS: usize = 17;
+
+/// One change, by rows of the extended library.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Step {
+    pub kind: ChangeKind,
+    pub row: usize,
+    pub before: f64,
+    pub after: f64,
+    /// Other coefficients that it changed: row, before, after.
+    pub effects: Vec<(usize, f64, f64)>,
+    /// All values of the equation before minus the equation after.
+    pub bound: Interval,
+}
+
+/// Terms of one phase, and what may replace them over its box.
+#[derive(Debug)]
+pub(super) struct Terms<'a> {
+    workspace: &'a Workspace,
+    pub ranges: Ranges,
+    known: Vec<Option<Vec<Rewrite>>>,
+}
+
+impl<'a> Terms<'a> {
+    pub fn new(workspace: &'a Workspace, ranges: Ranges) -> Self {
+        Self {
+            workspace,
+            ranges,
+            known: vec![None; workspace.len()],
+        }
+    }
+
+    fn rewrites(&mut self, row: usize) -> &[Rewrite] {
+        let (workspace, ranges) = (self.workspace, &mut self.ranges);
+        self.known[row].get_or_insert_with(|| rewrites(workspace, ranges, row))
+    }
+}
+
+/// An equation on its way.
+#[derive(Clone, Debug)]
+pub(super) struct Equation {
+    /// Coefficients now, by row.
+    pub xi: Vec<f64>,
+    /// The changes so far, in order.
+    pub steps: Vec<Step>,
+    /// Encloses the original equation minus the present one.
+    pub spent: Interval,
+}
+
+impl Equation {
+    /// Simplifies an equation so that the sum of its changes' errors stays within `allowed`.
+    pub fn simplified(terms: &mut Terms<'_>, xi: Vec<f64>, allowed: f64) -> Self {
+        let mut equation = Self {
+            xi,
+            steps: Vec::new(),
+            spent: Interval::point(0.0),
+        };
+        equation.remove_terms(terms, REMOVAL_SHARE * allowed);
+        equation.fold_functions(terms, REMOVAL_SHARE * allowed);
+        equation.round(terms, allowed);
+        equation
+    }
+
+    fn active(&self) -> Vec<usize> {
+        (0..self.xi.len())
+            .filter(|&row| self.xi[row] != 0.0)
+            .collect()
+    }
+
+    /// Removes terms, the cheapest first: without replacement, or into terms that are there anyway.
+    fn remove_terms(&mut self, terms: &mut Terms<'_>, allowed: f64) {
+        loop {
+            let mut best: Option<(f64, usize, usize)> = None;
+            for row in self.active() {
+                let size = self.xi[row].abs();
+                for (choice, rewrite) in terms.rewrites(row).iter().enumerate() {
+                    let mut parts = rewrite.parts.iter();
+                    let cost = size * rewrite.error.magnitude();
+                    let is_better = best.is_none_or(|(least, _, _)| cost < least);
+                    if is_better && parts.all(|&(part, _)| self.xi[part] != 0.0) {
+                        best = Some((cost, row, choice));
+                    }
+                }
+            }
+            let Some((_, row, choice)) = best else { return };
+            let rewrite = terms.rewrites(row)[choice].clone();
+            let step = self.step(terms, row, &rewrite);
+            if !self.fits(&step, allowed) {
+                return;
+            }
+            self.make(step);
+        }
+    }
+
+    /// Replaces terms that call functions by the simplest form that fits, the cheapest first.
+    fn fold_functions(&mut self, terms: &mut Terms<'_>, allowed: f64) {
+        loop {
+            let mut best: Option<Step> = None;
+            for row in self.active() {
+                let expr = terms.ranges.expr(row);
+                if !has_function(terms.ranges.pool(), expr) {
+                    continue;
+                }
+                let rewrites = terms.rewrites(row).to_vec();
+                let steps = rewrites
+                    .iter()
+                    .map(|rewrite| self.step(terms, row, rewrite));
+                let steps: Vec<Step> = steps.collect();
+                let Some(step) = steps.into_iter().find(|step| self.fits(step, allowed)) else {
+                    continue;
+                };
+                let cost = step.bound.magnitude();
+                if best
+                    .as_ref()
+                    .is_none_or(|best| cost < best.bound.magnitude())
+                {
+                    best = Some(step);
+                }
+            }
+            let Some(step) = best else { return };
+            self.make(step);
+        }
+    }
+
+    /// Rounds each coefficient to the fewest significant digits that its share of what is left
+    /// allows.
+    fn round(&mut self, terms: &mut Terms<'_>, allowed: f64) {
+        let active = self.active();
+        for (done, &row) in active.iter().enumerate() {
+            let range = terms.ranges.term(row);
+            let left = (allowed - self.spent.magnitude()).max(0.0);
+            let share = left / (active.len() - done) as f64;
+            if range.is_empty() || !range.magnitude().is_finite() {
+                continue;
+            }
+            let before = self.xi[row];
+            for digits in 1..MAX_DIGITS {
+                let after = rounded(before, digits);
+                if after == before {
+                    break;
+                }
+                let bound = (Interval::point(before) - Interval::point(after)) * range;
+                let step = Step {
+                    kind: ChangeKind::Rounded { digits },
+                    row,
+                    before,
+                    after,
+                    effects: Vec::new(),
+                    bound,
+                };
+                if bound.magnitude() <= share && self.fits(&step, allowed) {
+                    self.make(step);
+                    break;
+                }
+            }
+        }
+    }
+
+    /// The change that `rewrite` makes to the term in `row`.
+    fn step(&self, terms: &mut Terms<'_>, row: usize, rewrite: &Rewrite) -> Step {
+        let before = self.xi[row];
+        let mut bound = Interval::point(before) * rewrite.error;
+        let mut effects = Vec::new();
+        for &(part, factor) in &rewrite.parts {
+            let (old, new) = (self.xi[part], self.xi[part] + before * factor);
+            // what the sum of floats is off by
+            let exact = Interval::point(before) * Interval::point(factor);
+            let rounding = exact - (Interval::point(new) - Interval::point(old));
+            bound = bound + rounding * terms.ranges.term(part);
+            effects.push((part, old, new));
+        }
+        Step {
+            kind: rewrite.kind,
+            row,
+            before,
+            after: 0.0,
+            effects,
+            bound,
+        }
+    }
+
+    fn fits(&self, step: &Step, allowed: f64) -> bool {
+        let is_finite = step.effects.iter().all(|(_, _, after)| after.is_finite());
+        is_finite && (self.spent + step.bound).magnitude() <= allowed
+    }
+
+    fn make(&mut self, step: Step) {
+        self.xi[step.row] = step.after;
+        for &(row, _, after) in &step.effects {
+            self.xi[row] = after;
+        }
+        self.spent = self.spent + step.bound;
+        self.steps.push(step);
+    }
+}
+
+/// The float nearest to `value` in so many significant decimal digits.
+fn rounded(value: f64, digits: usize) -> f64 {
+    let text = format!("{value:.*e}", digits - 1);
+    text.parse().expect("a formatted float reads back")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_keeps_so_many_digits() {
+        assert_eq!(rounded(-0.123456, 2), -0.12);
+        assert_eq!(rounded(99.6, 1), 100.0);
+        assert_eq!(rounded(6.02214e23, 3), 6.02e23);
+        assert_eq!(rounded(0.1 + 0.2, 17), 0.1 + 0.2);
+    }
+}

@@ -1,0 +1,104 @@
+//! Why a model was not simplified.
+
+use std::path::PathBuf;
+
+use crate::lower::LowerError;
+use crate::model::{LibraryError, ModelError};
+
+/// What can go wrong in simplifying a model.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimplifyError {
+    /// Not one box a phase.
+    #[error("the domain has {found} boxes, expected one for each of {expected} phases")]
+    PhaseCount {
+        /// Boxes.
+        found: usize,
+        /// Phases of the model.
+        expected: usize,
+    },
+    /// A box of the wrong dimension.
+    #[error(
+        "the domain of phase `{phase}` has {found} ranges, expected {expected} (z, dz, u of each latent coordinate)"
+    )]
+    BoxDimension {
+        /// The phase's name.
+        phase: String,
+        /// Ranges.
+        found: usize,
+        /// `3 latent_dim`.
+        expected: usize,
+    },
+    /// A range that is empty or infinite.
+    #[error(
+        "the domain of `{variable}` in phase `{phase}` is {lo} to {hi}, expected finite numbers in order"
+    )]
+    Range {
+        /// The phase's name.
+        phase: String,
+        /// The variable's name.
+        variable: String,
+        /// Lower end.
+        lo: f64,
+        /// Upper end.
+        hi: f64,
+    },
+    /// A file of ranges that cannot be read as such.
+    #[error("{path}: {message}", path = path.display())]
+    DomainFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// Recordings for a model that cannot encode them.
+    #[error(
+        "model `{model}` has no encoder, so recordings give it no domain; give a .toml file with a table a phase, such as [contact], and a range for each of z1, dz1, u1, ..., such as z1 = [-0.2, 0.4]"
+    )]
+    NoEncoder {
+        /// The model's name.
+        model: String,
+    },
+    /// A share of the recorded accelerations without recordings.
+    #[error(
+        "a tolerance in percent is a share of the root mean square of each ddz over recordings, and the domain has none; give a number in scaled units per s^2"
+    )]
+    NoSamples,
+    /// A recorded sample has a larger error than the certified one: a defect of romc.
+    #[error(
+        "internal error: in phase `{phase}`, ddz{output} of the simplified model is off by {measured:e} at a recorded sample, beyond the bound {bound:e}", output = output + 1
+    )]
+    Contradiction {
+        /// The phase's name.
+        phase: String,
+        /// Index of the latent coordinate.
+        output: usize,
+        /// The error at a sample.
+        measured: f64,
+        /// The certified bound.
+        bound: f64,
+    },
+    /// The final evaluation does not confirm the tolerance: a defect of romc.
+    #[error(
+        "internal error: in phase `{phase}`, the bound {bound:e} of ddz{output} exceeds the tolerance {allowed:e}", output = output + 1
+    )]
+    Uncertified {
+        /// The phase's name.
+        phase: String,
+        /// Index of the latent coordinate.
+        output: usize,
+        /// The bound found.
+        bound: f64,
+        /// The bound allowed.
+        allowed: f64,
+    },
+    /// The simplified model is not a model.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A model that cannot be lowered to code.
+    #[error(transparent)]
+    Lower(#[from] LowerError),
+    /// The simplified model's terms are no library.
+    #[error(transparent)]
+    Library(#[from] LibraryError),
+}

@@ -1,0 +1,66 @@
+//! Simplification with a certificate: fewer terms and digits, and how far `ddz` can be off for it.
+//!
+//! A model, a [`Domain`] (a box of latent states and inputs a phase, from recordings or given) and a
+//! [`Tolerance`] enter; a simpler model leaves with a [`Certificate`] that lists every change with
+//! the interval in which its error lies over the whole box, and with its error at the recorded
+//! samples. `docs/simplification.md` has the mathematics. Read `run.rs` first, then `rewrite.rs` (what
+//! may take a term's place), `equation.rs` (which changes are made) and `ranges.rs` (the intervals).
+//!
+//! ```
+//! use nalgebra::DMatrix;
+//! use romc::model::{FeetRule, Library, Phase, ReducedModel};
+//! use romc::simplify::{Domain, Tolerance, simplify};
+//! use romc::symbolic::Interval;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // A pendulum that hardly moves: ddz1 = -9.81 sin(z1) - 0.00003 dz1 + 2.0004 u1.
+//! let terms = ["z1", "dz1", "sin(z1)", "u1"].map(str::to_owned);
+//! let model = ReducedModel::builder("pendulum", Library::from_terms(1, &terms)?)
+//!     .phase(Phase {
+//!         name: "contact".into(),
+//!         feet: FeetRule::Any,
+//!         xi: DMatrix::from_column_slice(4, 1, &[0.0, -0.00003, -9.81, 2.0004]),
+//!     })
+//!     .build()?;
+//! let small = Interval::new(-0.1, 0.1);
+//! let domain = Domain::new(&model, vec![Some(vec![small, small, small])])?;
+//! let simplified = simplify(&model, &domain, None, Tolerance::Absolute(1e-3))?;
+//! let left = simplified.model.active_terms(0, 0)?;
+//! let left: Vec<_> = left.iter().map(|(xi, term)| (*xi, term.text())).collect();
+//! assert_eq!(left, [(-9.8, "z1"), (2.0, "u1")]);
+//! let equation = &simplified.certificate.phases[0].equations[0];
+//! assert!(equation.bound.magnitude() <= 1e-3);
+//! # Ok(())
+//! # }
+//! ```
+
+mod certificate;
+mod domain;
+mod equation;
+mod error;
+mod json;
+mod markdown;
+mod measure;
+mod printing;
+mod ranges;
+mod rewrite;
+mod rollouts;
+mod run;
+mod tolerance;
+mod workspace;
+
+#[cfg(test)]
+mod tests;
+
+pub use certificate::{
+    Certificate, Change, ChangeKind, Effect, EquationCertificate, PhaseCertificate,
+};
+pub use domain::{Domain, MARGIN, PhaseSamples, Samples};
+pub use error::SimplifyError;
+pub use json::{certificate_json, rollouts_json};
+pub use markdown::{bound_words, change_words, interval_words, markdown};
+pub use measure::Measured;
+pub use printing::{PrintedEquation, printed};
+pub use rollouts::{RolloutBasis, RolloutEffect, RolloutErrors};
+pub use run::{Simplified, simplify};
+pub use tolerance::{Tolerance, ToleranceError};

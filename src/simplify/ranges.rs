@@ -1,0 +1,295 @@
+//! Ranges of terms and of their combinations over a box.
+
+use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
+
+/// Share of a coefficient's size by which constants of the algebra may be off, with room to spare:
+/// a merged or halved float is off by 2^-53.
+const CONSTANT_ROUNDING: f64 = 1.0 / (1u64 << 48) as f64;
+/// A range counts as sharp when its ends are this close to values of the function, as a share of
+/// its width.
+const SHARP: f64 = 1e-3;
+/// Most boxes that a range is cut into.
+const MAX_BOXES: usize = 64;
+/// Nodes visited for one range, about.
+const MAX_VISITS: usize = 50_000;
+
+/// Ranges over one box, terms counted by their rows.
+#[derive(Clone, Debug)]
+pub(super) struct Ranges {
+    pool: ExprPool,
+    domain: Vec<(SymbolId, Interval)>,
+    terms: Vec<ExprId>,
+    known: Vec<Option<Interval>>,
+}
+
+impl Ranges {
+    /// Over the box `domain`, for these terms of `pool`.
+    pub fn new(pool: ExprPool, domain: Vec<(SymbolId, Interval)>, terms: Vec<ExprId>) -> Self {
+        Self {
+            pool,
+            domain,
+            known: vec![None; terms.len()],
+            terms,
+        }
+    }
+
+    /// The pool with all terms.
+    pub fn pool(&mut self) -> &mut ExprPool {
+        &mut self.pool
+    }
+
+    /// A term of the pool.
+    pub fn expr(&self, row: usize) -> ExprId {
+        self.terms[row]
+    }
+
+    /// Centre and half width of each symbol's range that `expr` has, in floating point: where to
+    /// look, not what to prove.
+    pub fn sides(&self, expr: ExprId) -> Vec<(SymbolId, f64, f64)> {
+        let side = |(symbol, range): &(SymbolId, Interval)| {
+            (
+                *symbol,
+                0.5 * range.lo() + 0.5 * range.hi(),
+                0.5 * range.width(),
+            )
+        };
+        (self.restricted(expr).iter()).map(side).collect()
+    }
+
+    /// All values of a term.
+    pub fn term(&mut self, row: usize) -> Interval {
+        if let Some(range) = self.known[row] {
+            return range;
+        }
+        let range = self.range(self.terms[row]);
+        self.known[row] = Some(range);
+        range
+    }
+
+    /// All values of `sum delta_j theta_j`, for every choice of the `delta_j` in their intervals.
+    ///
+    /// Terms without common variables are independent: their ranges add. Those with common
+    /// variables are bounded together, with the middles of the intervals as coefficients.
+    pub fn combination(&mut self, parts: &[(usize, Interval)]) -> Interval {
+        let mut total = Interval::point(0.0);
+        for group in self.groups(parts) {
+            if let [(row, delta)] = group[..] {
+                total = total + delta * self.term(row);
+                continue;
+            }
+            let mut summands = Vec::new();
+            for &(row, delta) in &group {
+                let middle = 0.5 * delta.lo() + 0.5 * delta.hi();
+                let factor = self.pool.number(middle);
+                summands.push(self.pool.mul(factor, self.terms[row]));
+                let rest = delta - Interval::point(middle);
+                let slack = Interval::point(CONSTANT_ROUNDING) * (delta.hull(-delta));
+                total = total + (rest + slack) * self.term(row);
+            }
+            let sum = self.pool.sum(&summands);
+            total = total + self.range(sum);
+        }
+        total
+    }
+
+    /// Connected components: terms that share a variable, directly or through others.
+    fn groups(&self, parts: &[(usize, Interval)]) -> Vec<Vec<(usize, Interval)>> {
+        let mut groups: Vec<(Vec<SymbolId>, Vec<(usize, Interval)>)> = Vec::new();
+        for &(row, delta) in parts {
+            let mut symbols: Vec<SymbolId> =
+                self.pool.symbols_of(self.terms[row]).into_iter().collect();
+            let mut members = vec![(row, delta)];
+            let (joined, apart): (Vec<_>, Vec<_>) = (groups.into_iter())
+                .partition(|(other, _)| other.iter().any(|symbol| symbols.contains(symbol)));
+            for (other, others) in joined {
+                symbols.extend(other);
+                members.extend(others);
+            }
+            groups = apart;
+            groups.push((symbols, members));
+        }
+        groups.into_iter().map(|(_, members)| members).collect()
+    }
+
+    fn restricted(&self, expr: ExprId) -> Vec<(SymbolId, Interval)> {
+        let symbols = self.pool.symbols_of(expr);
+        let known = self.domain.iter().copied();
+        known
+            .filter(|(symbol, _)| symbols.contains(symbol))
+            .collect()
+    }
+
+    /// All values of an expression over the box: bounded over ever smaller parts of the box, the
+    /// parts that reach furthest first, until values of the function come close to the bounds.
+    pub fn range(&mut self, expr: ExprId) -> Interval {
+        let domain = self.restricted(expr);
+        if self.is_single_use(expr) {
+            return self.pool.bound_by_slopes(expr, &[], &domain);
+        }
+        let slopes = domain.iter().map(|(symbol, _)| *symbol);
+        let slopes: Vec<ExprId> = slopes.map(|s| self.pool.derivative(expr, s)).collect();
+        let whole = self.pool.bound_by_slopes(expr, &slopes, &domain);
+        if !whole.magnitude().is_finite() || whole.is_empty() {
+            return whole;
+        }
+        let visits: usize = slopes
+            .iter()
+            .chain([&expr])
+            .map(|&part| self.pool.node_count(part))
+            .sum();
+        let mut parts = vec![(domain.clone(), whole)];
+        let mut reached = Interval::EMPTY;
+        for _ in 1..MAX_BOXES.min(MAX_VISITS / visits.max(1)) {
+            let newest = parts.len().saturating_sub(2);
+            for (cell, _) in &parts[newest..] {
+                reached = reached.hull(self.values(expr, cell));
+            }
+            let gap = SHARP * reached.width();
+            let furthest = |key: fn(&Interval) -> f64| {
+                let score = |place: &usize| key(&parts[*place].1);
+                (0..parts.len()).max_by(|a, b| score(a).total_cmp(&score(b)))
+            };
+            let (top, bottom) = (furthest(|r| r.hi()), furthest(|r| -r.lo()));
+            let worst = match (top, bottom) {
+                (Some(top), _) if parts[top].1.hi() > reached.hi() + gap => top,
+                (_, Some(bottom)) if parts[bottom].1.lo() < reached.lo() - gap => bottom,
+                _ => break,
+            };
+            let (cell, range) = parts.swap_remove(worst);
+            for half in halves(&cell, &domain) {
+                let sharper = self
+                    .pool
+                    .bound_by_slopes(expr, &slopes, &half)
+                    .intersection(range);
+                parts.push((half, sharper));
+            }
+        }
+        let all = parts.iter().map(|(_, range)| *range);
+        all.fold(Interval::EMPTY, Interval::hull)
+            .intersection(whole)
+    }
+
+    /// Some values of `expr` in a box, in floating point: they only tell when to stop.
+    fn values(&self, expr: ExprId, cell: &[(SymbolId, Interval)]) -> Interval {
+        let ends: [fn(Interval) -> f64; 3] = [
+            |range| range.lo(),
+            |range| 0.5 * range.lo() + 0.5 * range.hi(),
+            |range| range.hi(),
+        ];
+        let at = |end: fn(Interval) -> f64| {
+            let value = self.pool.evaluate(expr, &|symbol| {
+                let range = cell.iter().find(|(known, _)| *known == symbol);
+                range.map_or(f64::NAN, |(_, range)| end(*range))
+            });
+            if value.is_finite() {
+                Interval::point(value)
+            } else {
+                Interval::EMPTY
+            }
+        };
+        ends.into_iter()
+            .map(at)
+            .fold(Interval::EMPTY, Interval::hull)
+    }
+
+    /// Whether every symbol occurs once, so that interval evaluation is sharp.
+    fn is_single_use(&self, expr: ExprId) -> bool {
+        let mut seen = std::collections::BTreeSet::new();
+        let mut open = vec![expr];
+        while let Some(part) = open.pop() {
+            if let Node::Symbol(symbol) = self.pool.node(part)
+                && !seen.insert(*symbol)
+            {
+                return false;
+            }
+            // shared parts are walked again, which is what counts occurrences; a repeated
+            // symbol ends the walk before that can grow
+            open.extend(self.pool.children(part));
+        }
+        true
+    }
+}
+
+/// A box cut in the middle of its widest side, measured by the sides of the whole domain.
+fn halves(
+    cell: &[(SymbolId, Interval)],
+    whole: &[(SymbolId, Interval)],
+) -> [Vec<(SymbolId, Interval)>; 2] {
+    let width = |place: &usize| {
+        let all = whole[*place].1.width();
+        if all > 0.0 {
+            cell[*place].1.width() / all
+        } else {
+            0.0
+        }
+    };
+    let widest = (0..cell.len()).max_by(|a, b| width(a).total_cmp(&width(b)));
+    let mut halves = [cell.to_vec(), cell.to_vec()];
+    if let Some(side) = widest {
+        let range = cell[side].1;
+        let middle = 0.5 * range.lo() + 0.5 * range.hi();
+        halves[0][side].1 = Interval::new(range.lo(), middle);
+        halves[1][side].1 = Interval::new(middle, range.hi());
+    }
+    halves
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ranges(terms: &[&str], lo: f64, hi: f64) -> Ranges {
+        let mut pool = ExprPool::new();
+        let exprs: Vec<ExprId> = (terms.iter())
+            .map(|text| pool.parse(text, &|_| true).expect("terms parse"))
+            .collect();
+        let symbols: std::collections::BTreeSet<SymbolId> = exprs
+            .iter()
+            .flat_map(|&expr| pool.symbols_of(expr))
+            .collect();
+        let domain = symbols.into_iter().map(|s| (s, Interval::new(lo, hi)));
+        let domain = domain.collect();
+        Ranges::new(pool, domain, exprs)
+    }
+
+    #[test]
+    fn sine_minus_its_argument_is_bounded_together() {
+        let mut ranges = ranges(&["sin(x)", "x", "y"], -0.5, 0.5);
+        let exact = 0.5 - 0.5f64.sin();
+        let one = Interval::point(1.0);
+        let error = ranges.combination(&[(0, one), (1, -one), (2, one)]);
+        assert!(error.magnitude() >= exact + 0.5, "{error}");
+        assert!(error.magnitude() < (exact + 0.5) * 1.001, "{error}");
+    }
+
+    #[test]
+    fn cosine_minus_its_parabola_is_nearly_sharp() {
+        let mut ranges = ranges(&["1", "cos(x)", "x^2"], -0.4, 0.3);
+        let parts = [(0, -1.0), (1, 1.0), (2, 0.5)].map(|(row, c)| (row, Interval::point(c)));
+        let error = ranges.combination(&parts);
+        let exact = 0.4f64.cos() - 1.0 + 0.5 * 0.16;
+        assert!(
+            error.hi() >= exact && error.hi() < exact * 1.1,
+            "{error} {exact}"
+        );
+        assert!(error.lo() <= 0.0 && error.lo() > -1e-4, "{error}");
+    }
+
+    #[test]
+    fn coefficients_anywhere_in_their_intervals_are_covered() {
+        let mut ranges = ranges(&["sin(x)", "x"], -1.0, 1.0);
+        let parts = [(0, Interval::new(0.9, 1.1)), (1, Interval::new(-1.0, -0.8))];
+        let range = ranges.combination(&parts);
+        let largest = 1.1 * 1f64.sin() - 0.8;
+        assert!(
+            range.contains(largest) && range.contains(-largest),
+            "{range}"
+        );
+    }
+
+    #[test]
+    fn range_of_a_product_off_the_centre_is_that_of_its_corners() {
+        let mut ranges = ranges(&["x*y"], 1.0, 2.0);
+        assert_eq!(ranges.term(0), Interval::new(1.0, 4.0));
+    }
+}

@@ -1,0 +1,331 @@
+//! From a model, a domain and a tolerance to a simplified model and its certificate.
+
+use nalgebra::DMatrix;
+use serde_json::{Value, json};
+
+use super::certificate::{Certificate, Change, Effect, EquationCertificate, PhaseCertificate};
+use super::domain::{Domain, Samples};
+use super::equation::{Equation, Step, Terms};
+use super::error::SimplifyError;
+use super::measure::{Measured, at_samples};
+use super::tolerance::Tolerance;
+use super::workspace::Workspace;
+use crate::artifact;
+use crate::ir::{Program, Statement};
+use crate::lower::{self, Form, LowerOptions};
+use crate::model::{LatentVariable, ReducedModel};
+use crate::symbolic::Interval;
+
+/// What the search may use is lowered to this share of itself until the final evaluation confirms
+/// the tolerance.
+const RETREAT: f64 = 0.8;
+const MAX_RETREATS: usize = 40;
+/// Relative error of evaluating a sample in floating point, with room to spare.
+const EVALUATION: f64 = 1e-9;
+
+/// A simplified model and what is known about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simplified {
+    /// The model; equal to the one it was made from if nothing was changed. Its provenance tells
+    /// the tolerance, the digest of the original and the bounds.
+    pub model: ReducedModel,
+    /// What was changed and how far that can make `ddz` differ.
+    pub certificate: Certificate,
+}
+
+/// Simplifies each equation of each phase as far as `tolerance` allows over `domain`.
+///
+/// `samples` are needed for a tolerance that is a share, and give the measured errors. A zero
+/// tolerance changes nothing.
+///
+/// # Errors
+/// [`SimplifyError::NoSamples`], [`SimplifyError::PhaseCount`] for samples of another model, and the
+/// internal errors [`SimplifyError::Uncertified`] and [`SimplifyError::Contradiction`] if the final
+/// evaluation refutes the result.
+pub fn simplify(
+    model: &ReducedModel,
+    domain: &Domain,
+    samples: Option<&Samples>,
+    tolerance: Tolerance,
+) -> Result<Simplified, SimplifyError> {
+    if samples.is_none() && !tolerance.is_zero() && matches!(tolerance, Tolerance::ShareOfRms(_)) {
+        return Err(SimplifyError::NoSamples);
+    }
+    let n_phases = model.phases().len();
+    if let Some(found) = samples.map(|s| s.phases.len()).filter(|&n| n != n_phases) {
+        return Err(SimplifyError::PhaseCount {
+            found,
+            expected: n_phases,
+        });
+    }
+    let workspace = Workspace::new(model)?;
+    let mut xi = Vec::new();
+    let mut phases = Vec::new();
+    for phase in 0..n_phases {
+        let problem = PhaseProblem::new(model, &workspace, domain, samples, phase)?;
+        let (of_phase, certificate) = problem.solve(tolerance)?;
+        xi.push(of_phase);
+        phases.push(certificate);
+    }
+    let mut certificate = Certificate { tolerance, phases };
+    let mut simplified = model.clone();
+    if certificate.n_changes() > 0 {
+        simplified = workspace.finish(model, &xi)?;
+        let mut provenance = model.provenance().clone();
+        provenance.insert(
+            "simplification".to_owned(),
+            provenance_of(model, &certificate),
+        );
+        simplified = simplified.into_builder().provenance(provenance).build()?;
+    }
+    for (phase, certificate) in certificate.phases.iter_mut().enumerate() {
+        certificate.operations = (operations(model, phase)?, operations(&simplified, phase)?);
+    }
+    Ok(Simplified {
+        model: simplified,
+        certificate,
+    })
+}
+
+/// What the simplified model file says about itself.
+fn provenance_of(model: &ReducedModel, certificate: &Certificate) -> Value {
+    let phase = |phase: &PhaseCertificate| {
+        let equations = phase.equations.iter();
+        let bounds: Vec<f64> = equations
+            .map(|equation| equation.bound.magnitude())
+            .collect();
+        (phase.name.clone(), json!(bounds))
+    };
+    let bounds: serde_json::Map<_, _> = certificate.phases.iter().map(phase).collect();
+    json!({
+        "romc_version": env!("CARGO_PKG_VERSION"),
+        "tolerance": certificate.tolerance.to_string(),
+        "simplified_from": artifact::digest(model).to_string(),
+        "ddz_bounds": bounds,
+    })
+}
+
+/// Significant decimal digits of the shortest texts that read back as the coefficients.
+fn digits(xi: &[f64]) -> usize {
+    let active = xi.iter().filter(|&&coefficient| coefficient != 0.0);
+    let of = |coefficient: &f64| {
+        let text = format!("{coefficient:e}");
+        let mantissa = text.split('e').next().unwrap_or_default();
+        mantissa.chars().filter(char::is_ascii_digit).count()
+    };
+    active.map(of).sum()
+}
+
+/// Operations of the straight-line code of `ddz`.
+fn operations(model: &ReducedModel, phase: usize) -> Result<usize, SimplifyError> {
+    let options = LowerOptions {
+        form: Form::StraightLine,
+    };
+    let program: Program = lower::dynamics(model, phase, &options)?;
+    let counted = program.statements().iter().enumerate();
+    Ok(counted
+        .map(|(index, statement)| match statement {
+            Statement::Constant(_) | Statement::Input { .. } | Statement::Constants { .. } => 0,
+            _ => program.values_of(index).len(),
+        })
+        .sum())
+}
+
+/// One phase with its box and samples.
+struct PhaseProblem<'a> {
+    name: &'a str,
+    workspace: &'a Workspace,
+    xi: DMatrix<f64>,
+    domain: Option<&'a [Interval]>,
+    /// A row a sample in the box, a column a term.
+    theta: DMatrix<f64>,
+    samples_outside: usize,
+}
+
+impl<'a> PhaseProblem<'a> {
+    fn new(
+        model: &'a ReducedModel,
+        workspace: &'a Workspace,
+        domain: &'a Domain,
+        samples: Option<&Samples>,
+        phase: usize,
+    ) -> Result<Self, SimplifyError> {
+        let samples = samples.map(|samples| &samples.phases[phase]);
+        let inside = samples.map_or(Vec::new(), |samples| domain.inside(phase, samples));
+        let theta = match samples {
+            None => DMatrix::zeros(0, workspace.len()),
+            Some(samples) => {
+                let of = |all: &DMatrix<f64>| all.select_columns(&inside);
+                let [z, dz, u_lat] = [&samples.z, &samples.dz, &samples.u_lat].map(of);
+                workspace.library().evaluate_points(&z, &dz, &u_lat)?
+            }
+        };
+        Ok(Self {
+            name: &model.phases()[phase].name,
+            workspace,
+            xi: workspace.xi(model, phase),
+            domain: domain.phase(phase),
+            samples_outside: samples.map_or(0, |samples| samples.len()) - theta.nrows(),
+            theta,
+        })
+    }
+
+    fn solve(
+        &self,
+        tolerance: Tolerance,
+    ) -> Result<(DMatrix<f64>, PhaseCertificate), SimplifyError> {
+        let mut xi = self.xi.clone();
+        let mut terms = (self.domain).map(|d| Terms::new(self.workspace, self.workspace.ranges(d)));
+        let mut equations = Vec::new();
+        for output in 0..xi.ncols() {
+            let rms = self.rms(output);
+            let allowed = match tolerance {
+                Tolerance::Absolute(value) => value,
+                Tolerance::ShareOfRms(share) => share * rms.unwrap_or(0.0),
+            };
+            let kept = || Equation {
+                xi: self.coefficients(output),
+                steps: Vec::new(),
+                spent: Interval::point(0.0),
+            };
+            let (equation, bound) = match &mut terms {
+                Some(terms) if allowed > 0.0 => self.search(terms, output, allowed)?,
+                Some(_) | None => (kept(), Interval::point(0.0)),
+            };
+            xi.set_column(output, &nalgebra::DVector::from_column_slice(&equation.xi));
+            equations.push(self.certified(output, &equation, bound, allowed, rms)?);
+        }
+        let certificate = PhaseCertificate {
+            name: self.name.to_owned(),
+            domain: self.domain.map(|ranges| {
+                let variables = LatentVariable::all(self.workspace.library().latent_dim());
+                let names = variables.map(|variable| variable.to_string());
+                names.zip(ranges.iter().copied()).collect()
+            }),
+            samples: self.theta.nrows(),
+            samples_outside: self.samples_outside,
+            operations: (0, 0),
+            equations,
+        };
+        Ok((xi, certificate))
+    }
+
+    fn coefficients(&self, output: usize) -> Vec<f64> {
+        self.xi.column(output).iter().copied().collect()
+    }
+
+    /// Simplifies an equation, and encloses its difference from the original anew. Should that
+    /// exceed what is allowed, although the changes' own bounds do not, the search gets less.
+    fn search(
+        &self,
+        terms: &mut Terms<'_>,
+        output: usize,
+        allowed: f64,
+    ) -> Result<(Equation, Interval), SimplifyError> {
+        let mut budget = allowed;
+        let mut largest = 0.0;
+        for _ in 0..MAX_RETREATS {
+            let equation = Equation::simplified(terms, self.coefficients(output), budget);
+            let bound = terms
+                .ranges
+                .combination(&self.difference(output, &equation.xi));
+            largest = bound.magnitude();
+            if largest <= allowed {
+                return Ok((equation, bound));
+            }
+            budget *= RETREAT;
+        }
+        Err(SimplifyError::Uncertified {
+            phase: self.name.to_owned(),
+            output,
+            bound: largest,
+            allowed,
+        })
+    }
+
+    /// The original coefficients minus these, where they differ.
+    fn difference(&self, output: usize, xi: &[f64]) -> Vec<(usize, Interval)> {
+        (xi.iter().enumerate())
+            .filter(|&(row, &after)| self.xi[(row, output)] != after)
+            .map(|(row, &after)| {
+                let before = self.xi[(row, output)];
+                (row, Interval::point(before) - Interval::point(after))
+            })
+            .collect()
+    }
+
+    fn rms(&self, output: usize) -> Option<f64> {
+        let active: Vec<(usize, f64)> = (self.coefficients(output).into_iter().enumerate())
+            .filter(|&(_, coefficient)| coefficient != 0.0)
+            .collect();
+        Measured::of(at_samples(&self.theta, &active)).map(|measured| measured.rms)
+    }
+
+    fn certified(
+        &self,
+        output: usize,
+        equation: &Equation,
+        bound: Interval,
+        allowed: f64,
+        rms: Option<f64>,
+    ) -> Result<EquationCertificate, SimplifyError> {
+        let parts: Vec<(usize, f64)> = (equation.xi.iter().enumerate())
+            .map(|(row, &after)| (row, self.xi[(row, output)] - after))
+            .filter(|&(_, delta)| delta != 0.0)
+            .collect();
+        let measured = Measured::of(at_samples(&self.theta, &parts));
+        if let Some(measured) = measured {
+            let size = self.theta.amax() * parts.iter().map(|(_, d)| d.abs()).sum::<f64>();
+            let slack = EVALUATION * bound.magnitude() + f64::EPSILON * size * parts.len() as f64;
+            if measured.max > bound.magnitude() + slack {
+                return Err(SimplifyError::Contradiction {
+                    phase: self.name.to_owned(),
+                    output,
+                    measured: measured.max,
+                    bound: bound.magnitude(),
+                });
+            }
+        }
+        let active = |xi: &[f64]| xi.iter().filter(|&&coefficient| coefficient != 0.0).count();
+        Ok(EquationCertificate {
+            output,
+            rms,
+            allowed,
+            bound,
+            sum_of_bounds: equation.spent,
+            measured,
+            terms_before: active(&self.coefficients(output)),
+            terms_after: active(&equation.xi),
+            digits_before: digits(&self.coefficients(output)),
+            digits_after: digits(&equation.xi),
+            changes: equation
+                .steps
+                .iter()
+                .map(|step| self.change(step))
+                .collect(),
+        })
+    }
+
+    fn change(&self, step: &Step) -> Change {
+        let own = (step.row, step.before - step.after);
+        let others = step
+            .effects
+            .iter()
+            .map(|&(row, before, after)| (row, before - after));
+        let parts: Vec<(usize, f64)> = std::iter::once(own).chain(others).collect();
+        let effect = |&(row, before, after): &(usize, f64, f64)| Effect {
+            term: self.workspace.text(row).to_owned(),
+            before,
+            after,
+        };
+        Change {
+            kind: step.kind,
+            term: self.workspace.text(step.row).to_owned(),
+            before: step.before,
+            after: step.after,
+            effects: step.effects.iter().map(effect).collect(),
+            bound: step.bound,
+            measured: Measured::of(at_samples(&self.theta, &parts)),
+        }
+    }
+}

@@ -1,0 +1,389 @@
+//! Random models and boxes: no point of a box may be off by more than its certificate says.
+
+use nalgebra::{DMatrix, DVector};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+use super::*;
+use crate::model::{FeetRule, LatentVariable, Library, Phase, ReducedModel};
+use crate::symbolic::Interval;
+
+const CASES: u64 = 150;
+const POINTS: usize = 200;
+
+/// Terms of every kind, over two latent coordinates; the last is not defined everywhere.
+const TERMS: [&str; 20] = [
+    "1",
+    "z1",
+    "z2",
+    "dz1",
+    "dz2",
+    "u1",
+    "u2",
+    "sin(z1)",
+    "cos(dz2)",
+    "sin(z1 + 0.5*dz1)",
+    "z1*dz2",
+    "z2^2",
+    "tanh(u1)",
+    "exp(z2)",
+    "z1*sin(z2)",
+    "1/(3 + z1)",
+    "u1*u2",
+    "cos(z1/3)",
+    "2*z1",
+    "log(2.5 + dz1)",
+];
+
+struct Random(ChaCha8Rng);
+
+impl Random {
+    fn new(seed: u64) -> Self {
+        Self(ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    /// Uniform from `lo` to `hi`.
+    fn between(&mut self, lo: f64, hi: f64) -> f64 {
+        let unit = (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
+        lo + (hi - lo) * unit
+    }
+
+    fn chance(&mut self, share: f64) -> bool {
+        self.between(0.0, 1.0) < share
+    }
+
+    /// A coefficient of any size from 1e-4 to 10, or zero.
+    fn coefficient(&mut self) -> f64 {
+        if self.chance(0.4) {
+            return 0.0;
+        }
+        let size = 10f64.powf(self.between(-4.0, 1.0));
+        if self.chance(0.5) { size } else { -size }
+    }
+
+    fn model(&mut self) -> ReducedModel {
+        let mut texts: Vec<String> = TERMS.map(str::to_owned).to_vec();
+        texts.retain(|_| self.chance(0.6));
+        texts.push("3*dz1".to_owned());
+        let library = Library::from_terms(2, &texts).expect("terms parse");
+        let mut phase = |name: &str, feet| Phase {
+            name: name.to_owned(),
+            feet,
+            xi: DMatrix::from_fn(texts.len(), 2, |_, _| self.coefficient()),
+        };
+        let (contact, flight) = (
+            phase("contact", FeetRule::Any),
+            phase("flight", FeetRule::None),
+        );
+        let builder = ReducedModel::builder("random", library);
+        builder
+            .phase(contact)
+            .phase(flight)
+            .build()
+            .expect("a model")
+    }
+
+    fn domain(&mut self, model: &ReducedModel) -> Domain {
+        let boxes = (0..2).map(|_| {
+            let ranges = (0..6).map(|_| {
+                let centre = self.between(-0.6, 0.6);
+                let half = 10f64.powf(self.between(-2.5, 0.0));
+                Interval::new(centre - half, centre + half)
+            });
+            Some(ranges.collect())
+        });
+        let boxes = boxes.collect();
+        Domain::new(model, boxes).expect("finite boxes")
+    }
+
+    /// A point of a box, often on its boundary.
+    fn point(&mut self, ranges: &[Interval]) -> [DVector<f64>; 3] {
+        let values: Vec<f64> = (ranges.iter())
+            .map(|range| match self.between(0.0, 3.0) as usize {
+                0 => range.lo(),
+                1 => range.hi(),
+                _ => self.between(range.lo(), range.hi()),
+            })
+            .collect();
+        [0, 2, 4].map(|first| DVector::from_column_slice(&values[first..first + 2]))
+    }
+}
+
+#[test]
+fn no_point_of_a_random_box_is_off_by_more_than_certified() {
+    let mut kinds = [0usize; 5];
+    let mut tightest: f64 = 0.0;
+    for seed in 0..CASES {
+        let mut random = Random::new(seed);
+        let model = random.model();
+        let domain = random.domain(&model);
+        let tolerance = 10f64.powf(random.between(-3.0, 0.5));
+        let made =
+            simplify(&model, &domain, None, Tolerance::Absolute(tolerance)).expect("certified");
+        for (phase, certificate) in made.certificate.phases.iter().enumerate() {
+            let ranges = domain
+                .phase(phase)
+                .expect("both phases have a box")
+                .to_vec();
+            for _ in 0..POINTS {
+                let [z, dz, u] = random.point(&ranges);
+                let before = model.ddz(phase, &z, &dz, &u).expect("dimensions fit");
+                let after = made.model.ddz(phase, &z, &dz, &u).expect("dimensions fit");
+                for equation in &certificate.equations {
+                    let (full, simple) = (before[equation.output], after[equation.output]);
+                    if full.is_nan() {
+                        continue;
+                    }
+                    let error = full - simple;
+                    // some thirty summands of size at most 100 were rounded
+                    let slack = 1e-12;
+                    let enclosures = [equation.bound, equation.sum_of_bounds];
+                    for bound in enclosures {
+                        assert!(
+                            bound.lo() - slack <= error && error <= bound.hi() + slack,
+                            "seed {seed}, phase {phase}: {error:e} not in {bound}"
+                        );
+                    }
+                    if equation.bound.magnitude() > 1e-6 {
+                        tightest = tightest.max(error.abs() / equation.bound.magnitude());
+                    }
+                }
+            }
+            for equation in &certificate.equations {
+                assert!(equation.bound.magnitude() <= tolerance, "seed {seed}");
+                for change in &equation.changes {
+                    kinds[match change.kind {
+                        ChangeKind::Dropped => 0,
+                        ChangeKind::Constant => 1,
+                        ChangeKind::Linear => 2,
+                        ChangeKind::Quadratic => 3,
+                        ChangeKind::Rounded { .. } => 4,
+                    }] += 1;
+                }
+            }
+        }
+    }
+    assert!(
+        kinds.iter().all(|&count| count > 10),
+        "changes of each kind: {kinds:?}"
+    );
+    assert!(tightest > 0.9, "no bound was nearly reached: {tightest}");
+}
+
+#[test]
+fn changes_of_the_certificate_replayed_give_the_simplified_coefficients() {
+    for seed in 0..CASES {
+        let mut random = Random::new(seed);
+        let model = random.model();
+        let domain = random.domain(&model);
+        let tolerance = Tolerance::Absolute(10f64.powf(random.between(-3.0, 0.0)));
+        let made = simplify(&model, &domain, None, tolerance).expect("certified");
+        for (phase, certificate) in made.certificate.phases.iter().enumerate() {
+            for equation in &certificate.equations {
+                let coefficients =
+                    |model: &ReducedModel| -> std::collections::BTreeMap<String, f64> {
+                        let active = model
+                            .active_terms(phase, equation.output)
+                            .expect("in range");
+                        active
+                            .into_iter()
+                            .map(|(xi, term)| (term.text().to_owned(), xi))
+                            .collect()
+                    };
+                let mut replayed = coefficients(&model);
+                for change in &equation.changes {
+                    let effects = change.effects.iter().map(|e| (&e.term, e.before, e.after));
+                    for (term, before, after) in
+                        effects.chain([(&change.term, change.before, change.after)])
+                    {
+                        let now = replayed.insert(term.clone(), after).unwrap_or(0.0);
+                        assert_eq!(now, before, "seed {seed}: {term}");
+                    }
+                }
+                replayed.retain(|_, xi| *xi != 0.0);
+                assert_eq!(replayed, coefficients(&made.model), "seed {seed}");
+                assert_eq!(equation.terms_after, replayed.len());
+            }
+        }
+    }
+}
+
+#[test]
+fn simplification_is_deterministic_and_zero_tolerance_changes_nothing() {
+    for seed in 0..20 {
+        let mut random = Random::new(seed);
+        let model = random.model();
+        let domain = random.domain(&model);
+        let run = |tolerance| simplify(&model, &domain, None, tolerance).expect("certified");
+        let tolerance = Tolerance::Absolute(0.05);
+        assert_eq!(run(tolerance), run(tolerance));
+        for zero in [Tolerance::Absolute(0.0), Tolerance::ShareOfRms(0.0)] {
+            let kept = run(zero);
+            assert_eq!(kept.model, model);
+            assert_eq!(kept.certificate.n_changes(), 0);
+        }
+    }
+}
+
+/// One equation `ddz1 = sum xi_j theta_j` in a single phase.
+fn single(terms: &[(&str, f64)]) -> ReducedModel {
+    let texts: Vec<String> = terms.iter().map(|(text, _)| (*text).to_owned()).collect();
+    let coefficients: Vec<f64> = terms.iter().map(|(_, xi)| *xi).collect();
+    let library = Library::from_terms(1, &texts).expect("terms parse");
+    let phase = Phase {
+        name: "contact".to_owned(),
+        feet: FeetRule::Any,
+        xi: DMatrix::from_column_slice(terms.len(), 1, &coefficients),
+    };
+    ReducedModel::builder("single", library)
+        .phase(phase)
+        .build()
+        .expect("a model")
+}
+
+fn simplified(terms: &[(&str, f64)], ranges: [(f64, f64); 3], tolerance: f64) -> Simplified {
+    let model = single(terms);
+    let ranges = ranges.map(|(lo, hi)| Interval::new(lo, hi)).to_vec();
+    let domain = Domain::new(&model, vec![Some(ranges)]).expect("a box");
+    simplify(&model, &domain, None, Tolerance::Absolute(tolerance)).expect("certified")
+}
+
+fn left(made: &Simplified) -> Vec<(String, f64)> {
+    let active = made.model.active_terms(0, 0).expect("in range");
+    active
+        .into_iter()
+        .map(|(xi, term)| (term.text().to_owned(), xi))
+        .collect()
+}
+
+const UNIT: (f64, f64) = (-1.0, 1.0);
+
+#[test]
+fn near_linear_sine_becomes_its_argument_in_a_library_that_gains_the_term() {
+    let made = simplified(
+        &[("sin(z1)", -10.0), ("u1", 1.0)],
+        [(-0.1, 0.1), UNIT, UNIT],
+        0.01,
+    );
+    let terms = left(&made);
+    assert_eq!(terms[1].0, "z1", "{terms:?}");
+    assert_eq!(terms.len(), 2);
+    assert!((terms[1].1 + 10.0).abs() < 0.1, "{terms:?}");
+    let change = &made.certificate.phases[0].equations[0].changes[0];
+    assert_eq!(
+        (change.kind, change.term.as_str()),
+        (ChangeKind::Linear, "sin(z1)")
+    );
+}
+
+#[test]
+fn term_off_centre_leaves_its_middle_in_the_constant() {
+    let made = simplified(&[("1", 5.0), ("z1", 1.0)], [(2.9, 3.1), UNIT, UNIT], 0.15);
+    let terms = left(&made);
+    assert_eq!(terms, [("1".to_owned(), 8.0)]);
+    let bound = made.certificate.phases[0].equations[0].bound;
+    assert!(
+        bound.magnitude() >= 0.1 - 1e-15 && bound.magnitude() < 0.1001,
+        "{bound}"
+    );
+}
+
+#[test]
+fn term_without_finite_values_on_the_domain_is_never_touched() {
+    let terms = [
+        ("1/z1", 1e-9),
+        ("log(z1)", 0.1234567),
+        ("log(-2 - z1^2)", 0.1),
+        ("u1", 0.001),
+    ];
+    let made = simplified(&terms, [UNIT, UNIT, UNIT], 1.0);
+    let kept = left(&made);
+    let names: Vec<&str> = kept.iter().map(|(text, _)| text.as_str()).collect();
+    assert_eq!(names, ["1/z1", "log(z1)", "log(-2 - z1^2)"]);
+    assert_eq!(kept[1].1, 0.1234567);
+}
+
+#[test]
+fn bound_of_dropped_independent_terms_is_reached_at_a_corner() {
+    let terms = [("z1", 0.3), ("dz1", -0.2), ("u1", 7.0)];
+    let made = simplified(&terms, [(-1.0, 2.0), (-3.0, 1.0), UNIT], 2.0);
+    let equation = &made.certificate.phases[0].equations[0];
+    assert_eq!(left(&made).len(), 1);
+    // 0.3 * 2 + 0.2 * 3
+    assert!(
+        (equation.bound.hi() - 1.2).abs() < 1e-12,
+        "{}",
+        equation.bound
+    );
+    assert!(
+        (equation.bound.lo() + 0.5).abs() < 1e-12,
+        "{}",
+        equation.bound
+    );
+}
+
+#[test]
+fn domain_around_samples_has_their_extremes_and_margin() {
+    let model = single(&[("z1", 1.0)]);
+    let row = |values: [f64; 3]| DMatrix::from_row_slice(1, 3, &values);
+    let samples = Samples {
+        phases: vec![PhaseSamples {
+            z: row([1.0, 3.0, 2.0]),
+            dz: row([0.0, 0.0, 0.0]),
+            u_lat: row([-1.0, 1.0, 0.0]),
+        }],
+    };
+    let domain = Domain::around(&model, &samples, 0.1).expect("a box");
+    let ranges = domain.phase(0).expect("samples");
+    assert_eq!((ranges[0].lo(), ranges[0].hi()), (0.8, 3.2));
+    assert_eq!((ranges[1].lo(), ranges[1].hi()), (0.0, 0.0));
+    let made =
+        simplify(&model, &domain, Some(&samples), Tolerance::ShareOfRms(0.01)).expect("certified");
+    let equation = &made.certificate.phases[0].equations[0];
+    assert_eq!(equation.rms, Some((14.0f64 / 3.0).sqrt()));
+    let wrong = Domain::around(&model, &Samples { phases: Vec::new() }, 0.1);
+    assert!(matches!(
+        wrong,
+        Err(SimplifyError::PhaseCount {
+            found: 0,
+            expected: 1
+        })
+    ));
+    let refused = simplify(&model, &domain, None, Tolerance::ShareOfRms(0.01));
+    assert!(matches!(refused, Err(SimplifyError::NoSamples)));
+}
+
+#[test]
+fn domain_file_needs_every_variable_and_no_other() {
+    let model = single(&[("z1", 1.0)]);
+    let read = |text: &str| Domain::from_toml(&model, std::path::Path::new("box.toml"), text);
+    let whole = "[contact]\nz1 = [-1.0, 1.0]\ndz1 = [0, 2]\nu1 = [-3.5, 4]\n";
+    let domain = read(whole).expect("complete");
+    let names: Vec<String> = LatentVariable::all(1).map(|v| v.to_string()).collect();
+    assert_eq!(names, ["z1", "dz1", "u1"]);
+    assert_eq!(domain.phase(0).expect("given")[2], Interval::new(-3.5, 4.0));
+    for (text, told) in [
+        ("[contact]\nz1 = [0, 1]\n", "no range of `dz1`"),
+        (&format!("{whole}z2 = [0, 1]\n"), "range of `z2`"),
+        (&format!("{whole}[flight]\n"), "[flight] is no phase"),
+        (
+            &whole.replace("[0, 2]", "[2, 0]"),
+            "`dz1` in phase `contact`",
+        ),
+        (&whole.replace("[0, 2]", "[0, inf]"), "finite"),
+    ] {
+        let error = read(text).expect_err(text).to_string();
+        assert!(error.contains(told), "{error}");
+    }
+}
+
+#[test]
+fn printing_error_is_bounded_by_what_was_cut_off() {
+    let model = single(&[("z1", 0.126), ("u1", 1.0)]);
+    let ranges = vec![Some(vec![Interval::new(-2.0, 1.0); 3])];
+    let domain = Domain::new(&model, ranges).expect("a box");
+    let rounding = crate::backend::typeset::Rounding::Decimals(2);
+    let printed = printed(&model, &domain, None, rounding).expect("evaluates");
+    let bound = printed[0].bound.expect("has a box");
+    assert!((bound.magnitude() - 0.008).abs() < 1e-12, "{bound}");
+}

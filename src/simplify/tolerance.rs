@@ -1,0 +1,89 @@
+//! How large the error of a simplified `ddz` may be.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// The largest |ddz of the model - ddz of the simplified model| at any point of the domain, each
+/// latent coordinate for itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tolerance {
+    /// A share of the root mean square of that `ddz` over the recorded samples of the phase: 0.01
+    /// for `1%`.
+    ShareOfRms(f64),
+    /// In scaled units per second squared.
+    Absolute(f64),
+}
+
+/// Why a tolerance was refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "found `{found}`, expected a share such as 1% (of the root mean square of each ddz over the recordings) or a number such as 0.05 (scaled units per s^2)"
+)]
+pub struct ToleranceError {
+    /// The text.
+    pub found: String,
+}
+
+impl Tolerance {
+    /// Whether nothing may change.
+    pub fn is_zero(self) -> bool {
+        match self {
+            Tolerance::ShareOfRms(value) | Tolerance::Absolute(value) => value == 0.0,
+        }
+    }
+}
+
+impl FromStr for Tolerance {
+    type Err = ToleranceError;
+
+    fn from_str(text: &str) -> Result<Self, ToleranceError> {
+        let refused = || ToleranceError {
+            found: text.to_owned(),
+        };
+        let number = |text: &str| match text.trim().parse::<f64>() {
+            Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
+            _ => Err(refused()),
+        };
+        match text.trim().strip_suffix('%') {
+            Some(percent) => Ok(Tolerance::ShareOfRms(number(percent)? / 100.0)),
+            None => Ok(Tolerance::Absolute(number(text)?)),
+        }
+    }
+}
+
+impl fmt::Display for Tolerance {
+    /// As it is typed.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            // two roundings, of the division and of this product, may leave 0.30000000000000004
+            Tolerance::ShareOfRms(share) => {
+                let percent: f64 = format!("{:.12e}", share * 100.0)
+                    .parse()
+                    .expect("a formatted float reads back");
+                write!(f, "{percent}%")
+            }
+            Tolerance::Absolute(value) => write!(f, "{value}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tolerance_reads_shares_and_numbers_and_prints_them_alike() {
+        for (text, expected) in [
+            ("1%", Tolerance::ShareOfRms(0.01)),
+            ("0.3%", Tolerance::ShareOfRms(0.003)),
+            ("0.05", Tolerance::Absolute(0.05)),
+            ("0", Tolerance::Absolute(0.0)),
+        ] {
+            assert_eq!(text.parse(), Ok(expected));
+            assert_eq!(expected.to_string(), text);
+        }
+        for text in ["", "%", "-1%", "nan", "inf", "1 percent"] {
+            assert!(text.parse::<Tolerance>().is_err(), "{text}");
+        }
+    }
+}
