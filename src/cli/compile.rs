@@ -46,8 +46,33 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     }
     files.extend(told.iter().map(|(file, _, _)| file.clone()));
     let written = write(&arguments.out_dir, &files, overwrite)?;
+    if let Some(path) = save_model {
+        artifact::write_with(path, model, overwrite)?;
+    }
+    let (summary, certificate) = told.map_or((String::new(), Value::Null), |(_, s, c)| (s, c));
+    Ok(Answer {
+        text: summary + &text(arguments, model, &written),
+        json: json!({
+            "command": "compile",
+            "model": arguments.model.display().to_string(),
+            "name": model.name(),
+            "digest": artifact::digest(model).to_string(),
+            "targets": arguments.emit.iter().map(|target| target.name()).collect::<Vec<_>>(),
+            "simplification": certificate,
+            "saved_model": save_model.map(|path| path.display().to_string()),
+            "files": written.iter().map(|(path, bytes)| file_json(path, *bytes)).collect::<Vec<_>>(),
+        }),
+    })
+}
+
+/// What was written, in words.
+fn text(
+    arguments: &CompileArguments,
+    model: &ReducedModel,
+    written: &[(PathBuf, usize)],
+) -> String {
     let mut table = Table::new(["file", "bytes"]);
-    for (path, bytes) in &written {
+    for (path, bytes) in written {
         table.row([path.display().to_string(), bytes.to_string()]);
     }
     let mut text = format!(
@@ -56,12 +81,8 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         model.latent_dim(),
         phases_in_words(model)
     );
-    if let Some((_, summary, _)) = &told {
-        text = format!("{summary}{text}");
-    }
-    if let Some(path) = save_model {
-        artifact::write_with(path, model, overwrite)?;
-        text += &simplification::saved_words(path);
+    if let Some(path) = &arguments.simplification.save_model {
+        let _ = writeln!(text, "simplified model: {}", path.display());
     }
     if arguments.emit.contains(&Target::C) {
         let name = model.identifier().as_str();
@@ -71,19 +92,7 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
             "\ncheck the C code on this machine:\n  cc -O2 -o {folder}/selftest {folder}/{name}.c {folder}/{name}_selftest.c -lm && {folder}/selftest"
         );
     }
-    Ok(Answer {
-        text,
-        json: json!({
-            "command": "compile",
-            "model": arguments.model.display().to_string(),
-            "name": model.name(),
-            "digest": artifact::digest(model).to_string(),
-            "targets": arguments.emit.iter().map(|target| target.name()).collect::<Vec<_>>(),
-            "simplification": told.map(|(_, _, value)| value),
-            "saved_model": save_model.map(|path| path.display().to_string()),
-            "files": written.iter().map(|(path, bytes)| file_json(path, *bytes)).collect::<Vec<_>>(),
-        }),
-    })
+    text
 }
 
 /// How coefficients are printed.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
@@ -423,9 +423,4 @@ fn change_table(certificate: &Certificate) -> Table {
         }
     }
     table
-}
-
-/// A line on the file that the simplified model was saved in.
-pub fn saved_words(path: &Path) -> String {
-    format!("simplified model: {}\n", path.display())
 }

@@ -13,6 +13,9 @@ const MAX_BOXES: usize = 64;
 /// Nodes visited for one range, about.
 const MAX_VISITS: usize = 50_000;
 
+/// A term's row and the interval in which its factor lies.
+type Part = (usize, Interval);
+
 /// Ranges over one box, terms counted by their rows.
 #[derive(Clone, Debug)]
 pub(super) struct Ranges {
@@ -70,7 +73,7 @@ impl Ranges {
     ///
     /// Terms without common variables are independent: their ranges add. Those with common
     /// variables are bounded together, with the middles of the intervals as coefficients.
-    pub fn combination(&mut self, parts: &[(usize, Interval)]) -> Interval {
+    pub fn combination(&mut self, parts: &[Part]) -> Interval {
         let mut total = Interval::point(0.0);
         for group in self.groups(parts) {
             if let [(row, delta)] = group[..] {
@@ -93,8 +96,8 @@ impl Ranges {
     }
 
     /// Connected components: terms that share a variable, directly or through others.
-    fn groups(&self, parts: &[(usize, Interval)]) -> Vec<Vec<(usize, Interval)>> {
-        let mut groups: Vec<(Vec<SymbolId>, Vec<(usize, Interval)>)> = Vec::new();
+    fn groups(&self, parts: &[Part]) -> Vec<Vec<Part>> {
+        let mut groups: Vec<(Vec<SymbolId>, Vec<Part>)> = Vec::new();
         for &(row, delta) in parts {
             let mut symbols: Vec<SymbolId> =
                 self.pool.symbols_of(self.terms[row]).into_iter().collect();
