@@ -186,7 +186,7 @@ pub fn least_squares_decoder(
 /// The affine map of least square error from samples `z` to samples `x`, both in columns.
 ///
 /// # Errors
-/// [`ModelError::NotFinite`] if a weight is not finite.
+/// [`ModelError::NonFinite`] if a weight is not finite.
 pub fn fit_affine(x: &DMatrix<f64>, z: &DMatrix<f64>) -> Result<AffineMap, ModelError> {
     let (x_mean, z_mean) = (x.column_mean(), z.column_mean());
     let (x_centred, z_centred) = (centred(x, &x_mean), centred(z, &z_mean));
