@@ -2,6 +2,8 @@
 
 #[path = "mpc/control.rs"]
 mod control;
+#[path = "mpc/curved.rs"]
+mod curved;
 #[path = "mpc/failures.rs"]
 mod failures;
 #[path = "mpc/lifts.rs"]

@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use nalgebra::DVector;
 use serde_json::{Value, json};
 
 use super::Answer;
@@ -11,9 +10,9 @@ use super::args::{LiftChoice, MpcArguments, ReferenceInput};
 use super::output::{Table, check_output, progress_bar, read_recordings, significant, write_file};
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
-use crate::mpc::{self, Controller, Lift, MpcError, MpcSettings, Run, StepRow};
+use crate::mpc::{self, Controller, Lift, MpcSettings, Run, StepRow};
 use crate::recording::Recording;
-use crate::robot::{JOINT_DIM, Robot, STATE_DIM};
+use crate::robot::{JOINT_DIM, Robot};
 use crate::{Error, artifact};
 
 /// Runs the controller along each recording.
@@ -45,26 +44,6 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     Ok(answer(arguments, &runs))
 }
 
-/// The model with its maps linearised at the mean recorded state: the controller's rows and maps
-/// are the same at all stages.
-fn linearised(model: &ReducedModel, recordings: &[Recording]) -> Result<ReducedModel, Error> {
-    let segments = || recordings.iter().flat_map(|recording| &recording.segments);
-    let samples: usize = segments().map(|segment| segment.x.ncols()).sum();
-    let mut mean = DVector::zeros(STATE_DIM);
-    for segment in segments() {
-        for column in segment.x.column_iter() {
-            mean += column / samples as f64;
-        }
-    }
-    eprintln!(
-        "note: model `{}` has a nonlinear encoder or decoder; the controller takes both linearised \
-         at the mean recorded state",
-        model.name()
-    );
-    let linear = model.linearised_at(&mean);
-    Ok(linear.map_err(MpcError::from)?)
-}
-
 /// A recording and what the controller did along it.
 pub type NamedRun = (PathBuf, Run);
 
@@ -78,10 +57,7 @@ pub fn run_all(
     settings: MpcSettings,
     reference_input: mpc::ReferenceInput,
 ) -> Result<Vec<NamedRun>, Error> {
-    let mut controller = match model.is_linear() {
-        true => Controller::new(model, settings)?,
-        false => Controller::new(&linearised(model, recordings)?, settings)?,
-    };
+    let mut controller = Controller::new(model, settings)?;
     let mut runs = Vec::with_capacity(recordings.len());
     for recording in recordings {
         let bar = progress_bar(format!("controlling along {}", recording.path.display()));

@@ -124,7 +124,8 @@ pub fn lift_comparison(
             if !is_plausible(controller.plant().robot(), &recorded) {
                 continue;
             }
-            controller.plant().project(u, &mut u_lat);
+            controller.stand_at(segment.x.column(sample).as_slice());
+            controller.local_plant().project(u, &mut u_lat);
             let Some(footing) = footing(controller, segment, sample) else {
                 continue;
             };
@@ -297,7 +298,7 @@ fn lifted_input(
     segment: &Segment,
     sample: usize,
 ) -> [f64; STATE_DIM] {
-    let mut input = controller.plant().lift(&command.u_lat);
+    let mut input = controller.local_plant().lift(&command.u_lat);
     match controller.settings().lift {
         Lift::Transpose => {}
         Lift::Consistent => {
@@ -341,7 +342,7 @@ fn friction_violated(
         }
         Lift::Transpose => {
             let coefficient = settings.body_friction?;
-            let lifted = plant.lift(&command.u_lat);
+            let lifted = controller.local_plant().lift(&command.u_lat);
             let rotation = upright(footing.attitude_rad);
             let force =
                 rotation.map(|row| (0..3).map(|k| row[k] * lifted[JOINT_DIM + k]).sum::<f64>());

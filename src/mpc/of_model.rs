@@ -2,10 +2,14 @@
 //!
 //! The one place where the controller meets [`ReducedModel`]; what it makes is data.
 
+use std::sync::Arc;
+
 use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 
 use super::error::MpcError;
-use super::online::{Controller, LatentDynamics, MpcSettings, Plant, PlantParts, PlantPhase};
+use super::online::{
+    Controller, CurvedMaps, LatentDynamics, MpcSettings, Plant, PlantParts, PlantPhase,
+};
 use crate::model::ReducedModel;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 use crate::sim::CompiledModel;
@@ -45,11 +49,19 @@ impl Controller {
 impl Plant {
     /// Reads off a model what the controller needs.
     ///
+    /// Of a nonlinear model the matrices are those at the state that the decoder gives for `z = 0`,
+    /// and the statistics of the inputs are projected there, until a reference comes.
+    ///
     /// # Errors
     /// [`MpcError::Model`] if the model has no encoder, decoder, scaling, robot or input
     /// statistics, [`MpcError::StateDim`] if it is not over the robot's 18 coordinates, and
     /// [`MpcError::Statistics`] if a covariance cannot be factorised.
     pub fn new(model: &ReducedModel) -> Result<Self, MpcError> {
+        if !model.is_linear() {
+            let stand = model.decode(&DVector::zeros(model.latent_dim()))?;
+            let base = Self::new(&model.linearised_at(&stand)?)?;
+            return Ok(base.with_curved(Arc::new(ModelMaps(model.clone()))));
+        }
         let robot = model.robot()?;
         let (encoder, decoder) = (model.encoder()?, model.decoder()?);
         if encoder.input_dim() != STATE_DIM {
@@ -85,6 +97,52 @@ impl Plant {
             phases,
             phase_of_feet: std::array::from_fn(|bits| model.phase_for(pattern(bits))),
         })?)
+    }
+}
+
+/// The nonlinear maps of a model over the robot's coordinates with full maps: checked when the
+/// plant was made.
+#[derive(Debug)]
+struct ModelMaps(ReducedModel);
+
+const CHECKED: &str = "invariant: the plant was made of this model";
+
+impl CurvedMaps for ModelMaps {
+    fn encode(&self, x: &[f64], z: &mut [f64]) {
+        let encoded = self.0.encode(&DVector::from_column_slice(x));
+        z.copy_from_slice(encoded.expect(CHECKED).as_slice());
+    }
+
+    fn decode(&self, z: &[f64]) -> [f64; STATE_DIM] {
+        let decoded = self.0.decode(&DVector::from_column_slice(z));
+        let decoded = decoded.expect(CHECKED);
+        std::array::from_fn(|i| decoded[i])
+    }
+
+    fn encoder_jacobian(&self, x: &[f64]) -> DMatrix<f64> {
+        let jacobian = self.0.encoder_jacobian(&DVector::from_column_slice(x));
+        jacobian.expect(CHECKED)
+    }
+
+    fn decoder_jacobian(&self, z: &[f64]) -> DMatrix<f64> {
+        let jacobian = self.0.decoder_jacobian(&DVector::from_column_slice(z));
+        jacobian.expect(CHECKED)
+    }
+
+    fn lift(&self, x: &[f64]) -> DMatrix<f64> {
+        let lift = self.0.lift_matrix_at(&DVector::from_column_slice(x));
+        lift.expect(CHECKED)
+    }
+
+    fn projection(&self, x: &[f64]) -> Option<DMatrix<f64>> {
+        let projection = self.0.projection_matrix_at(&DVector::from_column_slice(x));
+        projection.ok()
+    }
+
+    fn phases(&self, x: &[f64]) -> Option<Vec<PlantPhase>> {
+        let model = self.0.linearised_at(&DVector::from_column_slice(x)).ok()?;
+        let phases = (0..model.phases().len()).map(|phase| phase_of(&model, phase));
+        phases.collect::<Result<_, _>>().ok()
     }
 }
 

@@ -12,7 +12,7 @@ use super::horizon::{Contact, Horizon, Scene};
 use super::lift::{ConsistentLift, Footing, LiftFailure};
 use super::plan::Plan;
 use super::plant::Plant;
-use super::problem::{ROW_MARGIN, StageRows};
+use super::problem::{ROW_MARGIN, StageRows, row_selection};
 use super::qp::{Outcome, QpSolver};
 use super::reference::{Reference, ReferenceSamples};
 use super::settings::{Lift, MissingInput, MpcSettings, RowSelection};
@@ -35,6 +35,8 @@ const SMALL_FORCE_N: f64 = 1.0;
 #[derive(Debug)]
 pub struct Controller {
     pub(super) plant: Plant,
+    /// The plant with its maps at the last state that was believed, if they depend on the state.
+    local: Option<Plant>,
     dynamics: Box<dyn LatentDynamics>,
     pub(super) settings: MpcSettings,
     /// Rows for any reference; the transcription has those that matter near the present one.
@@ -87,11 +89,7 @@ impl Controller {
         Ok(Self {
             dynamics,
             solver: QpSolver::new(program, settings.qp)?,
-            roots: plant
-                .phases()
-                .iter()
-                .map(|phase| phase.latent_root.clone())
-                .collect(),
+            roots: roots(&plant),
             plan: Plan::new(d, settings.horizon, settings.step_s),
             posture: vec![0.0; 2 * d],
             memory: Memory::new(d),
@@ -100,6 +98,7 @@ impl Controller {
             transcription,
             horizon,
             consistent,
+            local: None,
             plant,
             settings,
         })
@@ -108,6 +107,28 @@ impl Controller {
     /// The model's numbers.
     pub fn plant(&self) -> &Plant {
         &self.plant
+    }
+
+    /// The same with the maps at the last measured state, where they depend on the state: what
+    /// inputs are projected and lifted by.
+    pub fn local_plant(&self) -> &Plant {
+        self.local.as_ref().unwrap_or(&self.plant)
+    }
+
+    /// Takes the maps at a state (18, SI units), as each measurement does, if they depend on it; where
+    /// the encoder's Jacobian has not full row rank the maps stay those of the state before.
+    pub fn stand_at(&mut self, x: &[f64]) {
+        if !self.plant.is_curved() {
+            return;
+        }
+        let mut z = vec![0.0; self.plant.latent_dim()];
+        self.plant.encode(x, &mut z);
+        if let Some(local) = self.plant.tangent_at(x, &z) {
+            if let Some(lift) = &mut self.consistent {
+                lift.take_projection(&local);
+            }
+            self.local = Some(local);
+        }
     }
 
     /// The settings.
@@ -143,6 +164,10 @@ impl Controller {
     /// As [`Reference::new`] and [`QpSolver::new`]; the old reference stays.
     pub fn set_reference(&mut self, samples: ReferenceSamples<'_>) -> Result<(), ControlError> {
         let mut reference = Reference::new(&self.plant, samples)?;
+        if self.plant.is_curved() {
+            self.plant.take_statistics_at(&mean_state(samples.x));
+            self.roots = roots(&self.plant);
+        }
         if !reference.has_input() && self.settings.missing_input == MissingInput::Estimate {
             reference.estimate_input(&self.plant, self.dynamics.as_mut());
         }
@@ -164,7 +189,7 @@ impl Controller {
             input: self.settings.input_weight,
             joint_penalty: self.settings.joint_penalty,
         };
-        let rows = match self.settings.rows {
+        let rows = match row_selection(&self.plant, &self.settings) {
             RowSelection::All => self.rows.clone(),
             RowSelection::Needed => self.rows.clone().near(&reference),
         };
@@ -189,7 +214,7 @@ impl Controller {
         match &mut self.consistent {
             Some(lift) => lift.lift(&self.plant, u_lat, footing),
             None => {
-                let input = self.plant.lift(u_lat);
+                let input = self.local_plant().lift(u_lat);
                 Ok(std::array::from_fn(|joint| input[joint]))
             }
         }
@@ -261,7 +286,8 @@ impl Controller {
         };
         let (z, dz) = self.memory.measured.split_at_mut(self.plant.latent_dim());
         self.plant.encode(measurement.x, z);
-        self.plant.encode_velocity(measurement.dx, dz);
+        self.plant
+            .encode_velocity_at(measurement.x, measurement.dx, dz);
         let surprise = self.plan.surprise(
             measurement.time_s,
             &self.memory.measured,
@@ -276,6 +302,7 @@ impl Controller {
             }
         }
         self.memory.disbelieved = 0;
+        self.stand_at(measurement.x);
         Ok(())
     }
 
@@ -289,6 +316,7 @@ impl Controller {
             settings: &self.settings,
             reference,
             plan: &self.plan,
+            rows: self.transcription.rows(),
         };
         let (time_s, feet) = (measurement.time_s, measurement.feet);
         let contact = self
@@ -376,8 +404,8 @@ impl Controller {
         command.u_lat.copy_from_slice(input);
         command.phase = Some(self.plan.phase());
         command.joint_position_rad = self.plant.clamp_joints(self.plant.decode_joints(z));
-        command.joint_velocity_rad_s = self.plant.decode_joint_velocities(dz);
-        let lifted = self.plant.lift(input);
+        command.joint_velocity_rad_s = self.plant.decode_joint_velocities_at(z, dz);
+        let lifted = self.local_plant().lift(input);
         let torque = match (&mut self.consistent, &self.memory.footing) {
             (None, _) => std::array::from_fn(|joint| lifted[joint]),
             (Some(lift), Some(footing)) => match lift.lift(&self.plant, input, footing) {
@@ -411,4 +439,16 @@ impl Controller {
         let force = SVector::<f64, 6>::from_fn(|axis, _| lifted[JOINT_DIM + axis]);
         (force.norm() > SMALL_FORCE_N).then(|| (force - produced).norm() / force.norm())
     }
+}
+
+/// Scales of the inputs by phase.
+fn roots(plant: &Plant) -> Vec<DMatrix<f64>> {
+    let phases = plant.phases().iter();
+    phases.map(|phase| phase.latent_root.clone()).collect()
+}
+
+/// Mean of states, 18 values a sample.
+fn mean_state(x: &[f64]) -> [f64; STATE_DIM] {
+    let count = (x.len() / STATE_DIM).max(1) as f64;
+    std::array::from_fn(|i| x.iter().skip(i).step_by(STATE_DIM).sum::<f64>() / count)
 }

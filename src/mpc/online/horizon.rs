@@ -4,7 +4,7 @@ use super::dynamics::LatentDynamics;
 use super::linearise::{Lineariser, StageModel};
 use super::plan::Plan;
 use super::plant::Plant;
-use super::problem::BodyFriction;
+use super::problem::{BodyFriction, StageRows};
 use super::reference::Reference;
 use super::settings::{Drift, Linearisation, MpcSettings};
 use super::transcribe::Stage;
@@ -48,6 +48,8 @@ pub struct Scene<'a> {
     pub reference: &'a Reference,
     /// The last good plan.
     pub plan: &'a Plan,
+    /// The rows of every stage, as far as the maps are the same at all of them.
+    pub rows: &'a StageRows,
 }
 
 /// Times closer than this are the same control instant, s.
@@ -183,7 +185,13 @@ impl Horizon {
                 .input
                 .copy_from_slice(plant.phases()[stage.phase].latent_mean.as_slice());
         }
-        if let Some(friction) = &self.friction {
+        stage.rows = reference.robot_state_at(start_s).and_then(|x| {
+            let z = &self.ends[index][..plant.latent_dim()];
+            let local = plant.tangent_at(&x, z)?;
+            scene.rows.with_maps_of(&local, settings)
+        });
+        let local = stage.rows.as_ref().and_then(|rows| rows.friction.as_ref());
+        if let Some(friction) = local.or(self.friction.as_ref()) {
             let middle_s = start_s + 0.5 * settings.step_s;
             if plant.phases()[stage.phase].is_grounded {
                 friction.turned(reference.attitude_at(middle_s), &mut stage.force);

@@ -101,6 +101,15 @@ impl ConsistentLift {
         })
     }
 
+    /// Takes the projection of another plant: that at the measured state, where it depends on it.
+    pub fn take_projection(&mut self, plant: &Plant) {
+        let projection = plant.projection_matrix();
+        for (latent, row) in projection.row_iter().enumerate() {
+            self.by_torque[latent] = std::array::from_fn(|joint| row[joint]);
+            self.by_wrench[latent] = std::array::from_fn(|axis| row[JOINT_DIM + axis]);
+        }
+    }
+
     /// Torques, N m, for a latent input on a footing.
     ///
     /// # Errors

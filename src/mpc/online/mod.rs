@@ -7,6 +7,7 @@
 
 mod command;
 mod controller;
+mod curved;
 mod dynamics;
 mod error;
 pub mod estimate;
@@ -26,6 +27,7 @@ mod transcribe;
 
 pub use command::{Command, Source, Status};
 pub use controller::{Controller, Measurement};
+pub use curved::CurvedMaps;
 pub use dynamics::LatentDynamics;
 pub use error::ControlError;
 pub use lift::{ConsistentLift, Footing, LiftFailure};

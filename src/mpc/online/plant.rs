@@ -3,8 +3,11 @@
 //! Everything the controller needs besides the latent dynamics: the affine maps with their scale
 //! factors multiplied in, limits, and for each phase the distribution of the training inputs.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
+use super::curved::CurvedMaps;
 use super::error::ControlError;
 use crate::robot::{ContactFlags, JOINT_DIM, Robot, STATE_DIM};
 
@@ -13,6 +16,8 @@ use crate::robot::{ContactFlags, JOINT_DIM, Robot, STATE_DIM};
 pub struct Plant {
     latent_dim: usize,
     parts: PlantParts,
+    /// The maps of which the matrices are those at one state, if they are not the same at all.
+    curved: Option<Arc<dyn CurvedMaps>>,
 }
 
 /// The numbers of a [`Plant`], with scale factors multiplied in: SI units on the robot's side.
@@ -66,7 +71,55 @@ impl Plant {
         Ok(Self {
             latent_dim: parts.encoder.nrows(),
             parts,
+            curved: None,
         })
+    }
+
+    /// The plant with maps that depend on the state; its matrices are then those at one state.
+    pub fn with_curved(self, maps: Arc<dyn CurvedMaps>) -> Self {
+        Self {
+            curved: Some(maps),
+            ..self
+        }
+    }
+
+    /// Whether the maps depend on the state.
+    pub fn is_curved(&self) -> bool {
+        self.curved.is_some()
+    }
+
+    /// The plant of affine maps that touch the encoder at `x` (18, SI units) and the decoder at
+    /// `z`; none for a plant whose maps are affine anyway, and where the encoder's Jacobian has not
+    /// full row rank.
+    pub fn tangent_at(&self, x: &[f64], z: &[f64]) -> Option<Self> {
+        let maps = self.curved.as_ref()?;
+        let (encoder, decoder) = (maps.encoder_jacobian(x), maps.decoder_jacobian(z));
+        let mut value = vec![0.0; self.latent_dim];
+        maps.encode(x, &mut value);
+        let encoder_bias = DVector::from_vec(value) - &encoder * DVector::from_column_slice(x);
+        let decoded = DVector::from_column_slice(&maps.decode(z));
+        let decoder_bias = decoded - &decoder * DVector::from_column_slice(z);
+        Some(Self {
+            latent_dim: self.latent_dim,
+            parts: PlantParts {
+                encoder,
+                encoder_bias,
+                decoder,
+                decoder_bias,
+                lift: maps.lift(x),
+                projection: maps.projection(x)?,
+                ..self.parts.clone()
+            },
+            curved: None,
+        })
+    }
+
+    /// Takes the statistics of the training inputs as they are projected at `x`, if the maps depend
+    /// on the state and have full rank there.
+    pub(super) fn take_statistics_at(&mut self, x: &[f64]) {
+        if let Some(phases) = self.curved.as_ref().and_then(|maps| maps.phases(x)) {
+            self.parts.phases = phases;
+        }
     }
 
     /// The robot.
@@ -94,8 +147,11 @@ impl Plant {
         self.parts.phase_of_feet[bits]
     }
 
-    /// `z = W_e s_x x + b_e`; `x` in SI units (18), `z` is overwritten.
+    /// `z = W_e s_x x + b_e`, or the nonlinear encoder's; `x` in SI units (18), `z` is overwritten.
     pub fn encode(&self, x: &[f64], z: &mut [f64]) {
+        if let Some(maps) = &self.curved {
+            return maps.encode(x, z);
+        }
         z.copy_from_slice(self.parts.encoder_bias.as_slice());
         add_product(&self.parts.encoder, x, z);
     }
@@ -106,8 +162,23 @@ impl Plant {
         add_product(&self.parts.encoder, dx, dz);
     }
 
+    /// The same with the Jacobian at `x` if the encoder is nonlinear.
+    pub fn encode_velocity_at(&self, x: &[f64], dx: &[f64], dz: &mut [f64]) {
+        match &self.curved {
+            None => self.encode_velocity(dx, dz),
+            Some(maps) => {
+                dz.fill(0.0);
+                add_product(&maps.encoder_jacobian(x), dx, dz);
+            }
+        }
+    }
+
     /// Joint positions, rad, that the decoder gives for `z`.
     pub fn decode_joints(&self, z: &[f64]) -> [f64; JOINT_DIM] {
+        if let Some(maps) = &self.curved {
+            let x = maps.decode(z);
+            return std::array::from_fn(|joint| x[joint]);
+        }
         std::array::from_fn(|joint| {
             self.parts.decoder_bias[joint] + row_product(&self.parts.decoder, joint, z)
         })
@@ -116,6 +187,25 @@ impl Plant {
     /// Joint velocities, rad/s, that the decoder gives for `dz`.
     pub fn decode_joint_velocities(&self, dz: &[f64]) -> [f64; JOINT_DIM] {
         std::array::from_fn(|joint| row_product(&self.parts.decoder, joint, dz))
+    }
+
+    /// The same with the Jacobian at `z` if the decoder is nonlinear.
+    pub fn decode_joint_velocities_at(&self, z: &[f64], dz: &[f64]) -> [f64; JOINT_DIM] {
+        match &self.curved {
+            None => self.decode_joint_velocities(dz),
+            Some(maps) => {
+                let jacobian = maps.decoder_jacobian(z);
+                std::array::from_fn(|joint| row_product(&jacobian, joint, dz))
+            }
+        }
+    }
+
+    /// `u_lat = pinv(J_Eᵀ) s_u u` with the Jacobian at `x` if the encoder is nonlinear and has full
+    /// row rank there; else as [`Plant::project`].
+    pub fn project_at(&self, x: &[f64], u: &[f64], u_lat: &mut [f64]) {
+        u_lat.fill(0.0);
+        let local = self.curved.as_ref().and_then(|maps| maps.projection(x));
+        add_product(local.as_ref().unwrap_or(&self.parts.projection), u, u_lat);
     }
 
     /// `u_lat = pinv(W_eᵀ) s_u u`; `u` in SI units (18), `u_lat` is overwritten.

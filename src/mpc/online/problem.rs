@@ -130,11 +130,15 @@ impl StageRows {
     /// deviations of the training inputs can reach. A plan may pass a limit that was left out, by
     /// 2 % or by asking for an input unlike any in training; the command is clamped and does not.
     pub fn new(plant: &Plant, settings: &MpcSettings) -> Self {
-        let select = |rows: Vec<Row>| match settings.rows {
+        Self::selected(plant, settings, row_selection(plant, settings))
+    }
+
+    fn selected(plant: &Plant, settings: &MpcSettings, selection: RowSelection) -> Self {
+        let select = |rows: Vec<Row>| match selection {
             RowSelection::All => rows,
             RowSelection::Needed => needed_rows(rows, ROW_MARGIN),
         };
-        let torque = match (settings.lift, settings.rows) {
+        let torque = match (settings.lift, selection) {
             (Lift::Consistent, _) => Vec::new(),
             (Lift::Transpose, RowSelection::All) => torque_rows(plant),
             (Lift::Transpose, RowSelection::Needed) => {
@@ -158,7 +162,23 @@ impl StageRows {
     }
 }
 
+/// Rows of maps that depend on the state are all kept: which of them matter depends on it too.
+pub(super) fn row_selection(plant: &Plant, settings: &MpcSettings) -> RowSelection {
+    match plant.is_curved() {
+        true => RowSelection::All,
+        false => settings.rows,
+    }
+}
+
 impl StageRows {
+    /// The same rows with the maps of `plant`, those at a stage's reference; none if a row vanishes
+    /// there, so that the rows are not the same.
+    pub fn with_maps_of(&self, plant: &Plant, settings: &MpcSettings) -> Option<Self> {
+        let rows = Self::selected(plant, settings, RowSelection::All);
+        let shape = |rows: &Self| (rows.torque.len(), rows.rate.len(), rows.joint.len());
+        (shape(&rows) == shape(self)).then_some(rows)
+    }
+
     /// The same without the joint rows that no state within `STATE_REACH` standard deviations of
     /// some state of the reference reaches, the deviations being the reference's own.
     ///

@@ -3,7 +3,7 @@
 use super::dynamics::LatentDynamics;
 use super::error::ControlError;
 use super::estimate::{Motion, estimate_input};
-use super::plant::{Plant, add_product};
+use super::plant::Plant;
 use crate::robot::{ContactFlags, FOOT_DIM, STATE_DIM};
 
 /// A trajectory in SI units as its user has it: samples one after the other.
@@ -38,6 +38,8 @@ pub struct Reference {
     feet: Vec<ContactFlags>,
     /// Roll and pitch a sample.
     attitude: Vec<[f64; 2]>,
+    /// Robot states, 18 a sample, for maps that depend on them; else empty.
+    x: Vec<f64>,
     deviation: Vec<f64>,
 }
 
@@ -60,7 +62,7 @@ impl Reference {
         for (sample, encoded) in state.chunks_exact_mut(2 * d).enumerate() {
             let (z, dz) = encoded.split_at_mut(d);
             plant.encode(row(samples.x, sample), z);
-            plant.encode_velocity(row(samples.dx, sample), dz);
+            plant.encode_velocity_at(row(samples.x, sample), row(samples.dx, sample), dz);
         }
         let mut reference = Self {
             latent_dim: d,
@@ -75,9 +77,13 @@ impl Reference {
                 .chunks_exact(STATE_DIM)
                 .map(|x| [x[15], x[16]])
                 .collect(),
+            x: match plant.is_curved() {
+                true => samples.x.to_vec(),
+                false => Vec::new(),
+            },
         };
         if let Some(u) = samples.u {
-            reference.take_input(&project_all(plant, u));
+            reference.take_input(&project_all(plant, samples.x, u));
         }
         Ok(reference)
     }
@@ -149,6 +155,18 @@ impl Reference {
         }
     }
 
+    /// The robot's state at a time, between samples on the line from one to the next; none if it
+    /// was not kept because the maps are the same at every state.
+    pub fn robot_state_at(&self, time_s: f64) -> Option<[f64; STATE_DIM]> {
+        let (before, share) = self.locate(time_s);
+        let earlier = self.x.chunks_exact(STATE_DIM).nth(before)?;
+        let later = self.x.chunks_exact(STATE_DIM).nth(before + 1);
+        let later = later.unwrap_or(earlier);
+        Some(std::array::from_fn(|i| {
+            earlier[i] + share * (later[i] - earlier[i])
+        }))
+    }
+
     /// Writes the mean latent input over `[time_s, time_s + duration_s]` into `out`; false if the
     /// trajectory has no input.
     pub fn mean_input(&self, time_s: f64, duration_s: f64, out: &mut [f64]) -> bool {
@@ -218,11 +236,12 @@ fn row(values: &[f64], sample: usize) -> &[f64] {
     &values[sample * STATE_DIM..(sample + 1) * STATE_DIM]
 }
 
-fn project_all(plant: &Plant, u: &[f64]) -> Vec<f64> {
+fn project_all(plant: &Plant, x: &[f64], u: &[f64]) -> Vec<f64> {
     let d = plant.latent_dim();
     let mut latent = vec![0.0; u.len() / STATE_DIM * d];
-    for (u, latent) in u.chunks_exact(STATE_DIM).zip(latent.chunks_exact_mut(d)) {
-        add_product(plant.projection_matrix(), u, latent);
+    let samples = x.chunks_exact(STATE_DIM).zip(u.chunks_exact(STATE_DIM));
+    for ((x, u), latent) in samples.zip(latent.chunks_exact_mut(d)) {
+        plant.project_at(x, u, latent);
     }
     latent
 }

@@ -32,6 +32,8 @@ pub struct Stage {
     pub phase: usize,
     /// Friction cone rows `(μ F_z, F_x, F_y) / weight`, `3 × latent_dim` row-major; zero in flight.
     pub force: Vec<f64>,
+    /// Rows of this stage, as many as the program has, where they are not the same at all stages.
+    pub rows: Option<StageRows>,
 }
 
 impl Stage {
@@ -44,6 +46,7 @@ impl Stage {
             input: vec![0.0; latent_dim],
             phase: 0,
             force: vec![0.0; 3 * latent_dim],
+            rows: None,
         }
     }
 }
@@ -405,13 +408,14 @@ impl Transcription {
         let d = self.latent_dim;
         let stage = &step.stages[index];
         let root = &step.roots[stage.phase];
-        for (number, row) in self.rows.torque.iter().enumerate() {
+        let rows = stage.rows.as_ref().unwrap_or(&self.rows);
+        for (number, row) in rows.torque.iter().enumerate() {
             let positions = &self.positions[index].torque[number * d..][..d];
             let at_reference = scaled_row(&row.row, root, &stage.input, &mut self.work);
             scatter(&self.work, positions, program.a.values_mut());
             program.b[self.torque_row(index) + number] = row.bound - at_reference;
         }
-        for (number, row) in self.rows.rate.iter().enumerate() {
+        for (number, row) in rows.rate.iter().enumerate() {
             let positions = &self.positions[index].rate[number * d..][..d];
             let at_reference = scaled_row(&row.row, root, &stage.input, &mut self.work);
             scatter(&self.work, positions, program.a.values_mut());
@@ -419,8 +423,9 @@ impl Transcription {
                 dot(&row.row, step.last_input)
             } else {
                 let earlier = &step.stages[index - 1];
+                let rows = earlier.rows.as_ref().unwrap_or(&self.rows);
                 let before = scaled_row(
-                    &row.row,
+                    &rows.rate[number].row,
                     &step.roots[earlier.phase],
                     &earlier.input,
                     &mut self.work,
@@ -455,7 +460,8 @@ impl Transcription {
             Some(next) => &next.state[..d],
             None => step.last_position,
         };
-        for (number, Row { row, bound, .. }) in self.rows.joint.iter().enumerate() {
+        let rows = step.stages[index].rows.as_ref().unwrap_or(&self.rows);
+        for (number, Row { row, bound, .. }) in rows.joint.iter().enumerate() {
             let positions = &self.positions[index].joint[number * d..][..d];
             for (col, &position) in positions.iter().enumerate() {
                 program.a.values_mut()[position] = row[col] * step.deviation[col];
