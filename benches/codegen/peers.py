@@ -95,7 +95,7 @@ def symforce_code(name, model, rust):
     ddz = [sf.S(a) for a in accelerations(model, symbols, sf.sin, sf.cos)]
     jacobian = [a.diff(symbols[v]) for a in ddz for v in names(d)]
     jacobian = [entry for entry in jacobian if entry != 0]
-    text = "" if rust else HEAD
+    text = "" if rust else "#include <cmath>\nusing Scalar = double;\n"
     config = RustConfig() if rust else codegen.CppConfig()
     for suffix, expressions in (("", ddz), ("_jac", ddz + jacobian)):
         inputs = Values(**symbols)
@@ -104,7 +104,7 @@ def symforce_code(name, model, rust):
         printed = codegen_util.print_code(inputs=inputs, outputs=outputs, sparse_mat_data={}, config=config)
         temporaries = [(str(t[0]), t[1]) for t in printed.intermediate_terms]
         values = [code for term in printed.dense_terms for _, code in term[2]]
-        clean = lambda code: code.replace("Scalar(", "(double)(").replace("std::", "")
+        clean = lambda code: code.replace("Scalar(", "(double)(")
         if rust:
             jac = ", jac: *mut f64" if suffix else ""
             text += f"#[no_mangle]\npub unsafe extern \"C\" fn {name}{suffix}(z: *const f64, dz: *const f64, u: *const f64, ddz: *mut f64{jac}) {{\n"
@@ -117,8 +117,9 @@ def symforce_code(name, model, rust):
             text += "}\n"
         else:
             temporaries = [(symbol, clean(code)) for symbol, code in temporaries]
+            text += 'extern "C" '
             text += c_function(name + suffix, d, temporaries, [(t, clean(c)) for t, c in zip(targets, values)])
-    return {f"{name}.rs" if rust else f"{name}.c": text}
+    return {f"{name}.rs" if rust else f"{name}.cpp": text}
 
 
 def casadi_code(name, model):

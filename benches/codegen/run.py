@@ -164,9 +164,15 @@ def time_code(folder, model, flags):
     edition = ["rustc", "--edition", "2021", *rust]
     call([*edition, "--cfg", 'feature="std"', "--crate-type", "rlib", "--crate-name", "ours", crate, "-o", folder / "libours.rlib"])
     call([*edition, "--crate-type", "staticlib", "--extern", f"ours={folder / 'libours.rlib'}", folder / "shim.rs", "-o", folder / "libshim.a"])
-    sources = [folder / f"{peer}_model.c" for peer in PEERS if peer != "symforce_rust"]
-    sources += [folder / "romc" / "ours.c", folder / "driver.c"]
-    call(["gcc", *flags.split(), "-w", f"-I{folder}", f"-I{folder / 'romc'}", *sources, folder / "libshim.a", "-lm", "-lpthread", "-ldl", "-o", folder / "driver"])
+    sources = [folder / f"{peer}_model.c" for peer in PEERS if not peer.startswith("symforce")]
+    sources += [folder / "symforce_model.cpp", folder / "romc" / "ours.c", folder / "driver.c"]
+    objects = []
+    for source in sources:
+        objects.append(folder / f"{source.stem}.o")
+        compiler = "g++" if source.suffix == ".cpp" else "gcc"
+        call([compiler, *flags.split(), "-w", f"-I{folder / 'romc'}", "-c", source, "-o", objects[-1]])
+    libraries = ["-lm", "-lpthread", "-ldl"]
+    call(["gcc", *objects, folder / "libshim.a", *libraries, "-o", folder / "driver"])
     output = call([folder / "driver"], stdout=subprocess.PIPE, text=True).stdout
     times = {}
     for line in output.splitlines():
