@@ -181,30 +181,44 @@ def time_code(folder, model, flags):
     return times
 
 
+def table(title, names, rows):
+    """A Markdown table with one column a model."""
+    lines = [f"### {title}", "", "| | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
+    lines += [f"| {name} | " + " | ".join(cells) + " |" for name, cells in rows]
+    return "\n".join(lines) + "\n"
+
+
+def ratios(times, key):
+    """Best peer over romc: `ddz` alone and with Jacobian."""
+    return [min(times[peer][k] for peer in PEERS) / times[key][k] for k in (0, 1)]
+
+
 def report(results):
-    """The tables of all models."""
-    for flags in FLAGS:
-        print(f"\n### Time per evaluation in ns, `ddz` / `ddz` with Jacobian, gcc {flags}\n")
-        names = list(results)
-        print("| | " + " | ".join(names) + " |\n|" + "---|" * (len(names) + 1))
-        for row in [*PEERS, "romc", "romc_rust"]:
-            cells = [results[name]["time"][flags][row] for name in names]
-            print(f"| {row} | " + " | ".join(f"{a:.1f} / {b:.1f}" for a, b in cells) + " |")
-        for row in ("romc_batch", "romc_rust_batch"):
-            cells = [results[name]["time"][flags][row][0] for name in names]
-            print(f"| {row} (per point) | " + " | ".join(f"{a:.1f}" for a in cells) + " |")
-        cells = []
-        for name in names:
-            times = results[name]["time"][flags]
-            best = [min(times[peer][k] for peer in PEERS) for k in (0, 1)]
-            cells.append(" / ".join(f"{best[k] / times['romc'][k]:.1f}" for k in (0, 1)))
-        print("| best peer : romc | " + " | ".join(cells) + " |")
-    print("\n### From coefficients to code: CPU ms / peak RSS MB of the whole process\n")
+    """The tables of all models, as Markdown."""
     names = list(results)
-    print("| | " + " | ".join(names) + " |\n|" + "---|" * (len(names) + 1))
-    for row in [*PEERS, "romc"]:
-        cells = [results[name]["cost"][row] for name in names]
-        print(f"| {row} | " + " | ".join(f"{ms:.0f} / {mb:.0f}" for ms, mb in cells) + " |")
+    pair = lambda values: " / ".join(f"{value:.1f}" for value in values)
+    parts = []
+    for flags in FLAGS:
+        times = {name: results[name]["time"][flags] for name in names}
+        rows = [(row, [pair(times[name][row]) for name in names]) for row in [*PEERS, "romc", "romc_rust"]]
+        for row in ("romc_batch", "romc_rust_batch"):
+            rows.append((f"{row} (`ddz`, per point)", [f"{times[name][row][0]:.1f}" for name in names]))
+        for key in ("romc", "romc_rust"):
+            rows.append((f"**best peer : {key}**", [f"**{pair(ratios(times[name], key))}**" for name in names]))
+        rows.append(("single point : batch, C", [f"{times[n]['romc'][0] / times[n]['romc_batch'][0]:.1f}" for n in names]))
+        parts.append(table(f"Nanoseconds of `ddz` / `ddz` with Jacobian, gcc {flags}", names, rows))
+    cost = lambda row: [" / ".join(f"{v:.0f}" for v in results[name]["cost"][row]) for name in names]
+    title = "From coefficients to code: CPU ms / peak MB of the whole process"
+    parts.append(table(title, names, [(row, cost(row)) for row in [*PEERS, "romc"]]))
+    return "\n".join(parts)
+
+
+def machine():
+    """What the figures were measured on."""
+    processor = next(line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("model name"))
+    versions = [call(command, stdout=subprocess.PIPE, text=True).stdout.splitlines()[0] for command in (["gcc", "--version"], ["rustc", "--version"])]
+    packages = sorted({package for packages in REQUIREMENTS.values() for package in packages})
+    return "; ".join([processor.split(":")[1].strip(), *versions, *packages])
 
 
 def main():
@@ -213,6 +227,7 @@ def main():
     parser.add_argument("--only", help="names of models, separated by commas")
     parser.add_argument("--work", default=ROOT / "target" / "codegen-bench", type=Path)
     parser.add_argument("--romc", default=ROOT / "target" / "release" / "romc", type=Path)
+    parser.add_argument("--output", type=Path, help="page whose part between the marks becomes the tables")
     arguments = parser.parse_args()
     chosen = models.read(arguments.models)
     if arguments.only:
@@ -224,7 +239,18 @@ def main():
         timed = {flags: time_code(folder, model, flags) for flags in FLAGS}
         results[name] = {"cost": cost, "time": timed}
         print(f"{name}: {time.monotonic() - started:.0f} s", file=sys.stderr)
-    report(results)
+    tables = f"Measured on {machine()}.\n\n{report(results)}"
+    print(tables)
+    if arguments.output:
+        replace_tables(arguments.output, tables)
+
+
+def replace_tables(page, tables):
+    """Puts the tables between the marks of a page."""
+    begin, end = "<!-- tables of run.py -->\n", "<!-- end of tables -->\n"
+    before, rest = page.read_text().split(begin)
+    after = rest.split(end)[1]
+    page.write_text(before + begin + tables + end + after)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ use super::cost::LowerOptions;
 use super::dense::{self, DenseJacobian};
 use super::error::LowerError;
 use super::expression::ExpressionLowering;
+use super::nested::{Demand, Nested, Shared};
 use crate::ir::{Program, ProgramBuilder, ValueId};
 use crate::model::{LatentVariable, ReducedModel};
 use crate::symbolic::{ExprId, ExprPool, SymbolId};
@@ -44,14 +45,20 @@ pub fn dynamics(
     options: &LowerOptions,
 ) -> Result<Program, LowerError> {
     let equations = accelerations(model, phase)?;
-    let mut lowering = start(model, model.library().pool(), "dynamics");
-    lowering.prepare(&expressions(&equations));
-    let ddz = if options.uses_tables(&equations) {
-        dense::accelerations(&mut lowering, &equations)
+    let mut pool = model.library().pool().clone();
+    let (mut builder, ddz) = if options.uses_tables(&equations) {
+        let mut lowering = start(model, &pool, "dynamics");
+        lowering.prepare(&expressions(&equations));
+        let ddz = dense::accelerations(&mut lowering, &equations);
+        (lowering.builder, ddz)
     } else {
-        values(&mut lowering, &equations)
+        let demand = Demand::new(&mut pool, &equations);
+        let nest = |equation| demand.nest(&mut pool, equation);
+        let sums: Vec<Nested> = equations.iter().map(nest).collect();
+        let mut lowering = start(model, &pool, "dynamics");
+        let ddz = values(&mut lowering, &sums);
+        (lowering.builder, ddz)
     };
-    let mut builder = lowering.builder;
     builder.output("ddz", &ddz);
     Ok(builder.finish()?)
 }
@@ -85,23 +92,47 @@ pub fn dynamics_jacobian(
             }
         }
     }
-    let (builder, ddz, jacobian) = if options.uses_tables(&equations) {
+    let (mut builder, ddz, jacobian) = if options.uses_tables(&equations) {
         dense_jacobian(model, &mut pool, &equations, &pattern)
     } else {
+        let sums = nested_jacobian(model, &mut pool, &equations, entries, &pattern);
         let mut lowering = start(model, &pool, "dynamics_jacobian");
-        let mut roots = expressions(&equations);
-        roots.extend(expressions(&entries));
-        lowering.prepare(&roots);
-        let ddz = values(&mut lowering, &equations);
-        let jacobian = values(&mut lowering, &entries);
+        let mut ddz = values(&mut lowering, &sums);
+        let jacobian = ddz.split_off(equations.len());
         (lowering.builder, ddz, jacobian)
     };
-    let mut builder = builder;
     builder.output("ddz", &ddz);
     if !jacobian.is_empty() {
         builder.output("jacobian", &jacobian);
     }
     Ok((builder.finish()?, pattern))
+}
+
+/// Accelerations, then the entries of the pattern, in nested form: what a variable was taken
+/// out of in an acceleration is a part of its derivative by that variable.
+fn nested_jacobian(
+    model: &ReducedModel,
+    pool: &mut ExprPool,
+    equations: &[Combination],
+    entries: Vec<Combination>,
+    pattern: &JacobianPattern,
+) -> Vec<Nested> {
+    let demand = Demand::new(pool, equations.iter().chain(&entries));
+    let nest = |equation| demand.nest(pool, equation);
+    let mut sums: Vec<Nested> = equations.iter().map(nest).collect();
+    let variables: Vec<LatentVariable> = LatentVariable::all(model.latent_dim()).collect();
+    for ((&row, &col), mut entry) in pattern.rows.iter().zip(&pattern.cols).zip(entries) {
+        let variable = pool.symbol_expr(symbol(model, variables[col]));
+        let shared = sums[row].part_of(variable, &entry).map(|group| {
+            let known = &sums[row].groups[group].single.items;
+            entry.items.retain(|item| !known.contains(item));
+            Shared { sum: row, group }
+        });
+        let mut sum = demand.nest(pool, &entry);
+        sum.shared = shared;
+        sums.push(sum);
+    }
+    sums
 }
 
 /// Accelerations and the entries of the pattern by tables.
@@ -189,9 +220,17 @@ fn expressions(combinations: &[Combination]) -> Vec<ExprId> {
     items.map(|&(_, expr)| expr).collect()
 }
 
-fn values(lowering: &mut ExpressionLowering, combinations: &[Combination]) -> Vec<ValueId> {
-    combinations
-        .iter()
-        .map(|combination| lowering.combination(combination))
-        .collect()
+/// The values of nested sums; each may share a part of one before it.
+fn values(lowering: &mut ExpressionLowering, sums: &[Nested]) -> Vec<ValueId> {
+    let roots: Vec<ExprId> = sums.iter().flat_map(Nested::expressions).collect();
+    lowering.prepare(&roots);
+    let mut singles: Vec<Vec<ValueId>> = Vec::new();
+    let mut values = Vec::new();
+    for sum in sums {
+        let shared = sum.shared.map(|part| singles[part.sum][part.group]);
+        let (value, parts) = lowering.nested(sum, shared);
+        values.push(value);
+        singles.push(parts);
+    }
+    values
 }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::combination::Combination;
+use super::nested::Nested;
 use super::sums::{Term, linear_combination, scaled};
 use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
 use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
@@ -110,16 +111,52 @@ impl<'a> ExpressionLowering<'a> {
 
     /// The value of a linear combination.
     pub fn combination(&mut self, combination: &Combination) -> ValueId {
-        let terms: Vec<Term> = combination
-            .items
-            .iter()
-            .map(|&(coefficient, expr)| Term {
-                coefficient,
-                value: self.value(expr),
-                late: self.late.contains(&expr),
-            })
-            .collect();
+        let terms = self.terms(combination);
         linear_combination(&mut self.builder, combination.constant, &terms)
+    }
+
+    fn terms(&mut self, combination: &Combination) -> Vec<Term> {
+        let term = |&(coefficient, expr): &(f64, ExprId)| Term {
+            coefficient,
+            value: self.value(expr),
+            late: self.late.contains(&expr),
+        };
+        combination.items.iter().map(term).collect()
+    }
+
+    /// The value of a nested sum and of the `single` part of each of its groups; `shared` is
+    /// the part that is known already.
+    pub fn nested(&mut self, nested: &Nested, shared: Option<ValueId>) -> (ValueId, Vec<ValueId>) {
+        let mut terms = self.terms(&nested.flat);
+        terms.extend(shared.map(|value| Term {
+            coefficient: 1.0,
+            value,
+            late: false,
+        }));
+        let mut singles = Vec::new();
+        for group in &nested.groups {
+            let single = self.combination(&group.single);
+            let inner = match (group.single.is_zero(), group.repeated.is_zero()) {
+                (_, true) => single,
+                (true, false) => self.combination(&group.repeated),
+                (false, false) => {
+                    let repeated = self.combination(&group.repeated);
+                    self.builder.binary(Binary::Add, single, repeated)
+                }
+            };
+            let factor = self.value(group.factor);
+            let parts = [&group.single, &group.repeated];
+            let items = parts.into_iter().flat_map(|sum| &sum.items);
+            let mut exprs = items.map(|(_, expr)| expr).chain([&group.factor]);
+            terms.push(Term {
+                coefficient: 1.0,
+                value: self.builder.binary(Binary::Mul, factor, inner),
+                late: exprs.any(|expr| self.late.contains(expr)),
+            });
+            singles.push(single);
+        }
+        let sum = linear_combination(&mut self.builder, nested.flat.constant, &terms);
+        (sum, singles)
     }
 
     /// Factors with negative exponents form one divisor; the others multiply in

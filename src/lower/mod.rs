@@ -13,6 +13,7 @@ mod dynamics;
 mod error;
 mod expression;
 mod maps;
+mod nested;
 mod network;
 mod solve;
 mod step;

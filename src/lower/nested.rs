@@ -1,0 +1,318 @@
+//! Sums of products in nested form: `a x y + b x z^2` becomes `x (a y + b z^2)`.
+//!
+//! A product that only one sum uses costs a multiplication of its own beside the one with its
+//! coefficient. Taking a common factor out of several such products saves theirs and costs one
+//! for the group (Horner's rule for several variables). A product that many sums use is
+//! computed once for all of them and stays. What is left after a factor has been taken out
+//! is often needed again: it is the derivative of the sum by that factor.
+
+use std::collections::{BTreeMap, HashMap};
+
+use super::combination::Combination;
+use crate::symbolic::{ExprId, ExprPool, Node, Number};
+
+/// `flat + shared + sum_g factor_g (single_g + repeated_g)`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Nested {
+    /// What stays a sum of coefficients times expressions.
+    pub flat: Combination,
+    /// A part that another sum has computed: its `single` of one group.
+    pub shared: Option<Shared>,
+    /// Common factors, in the order in which they were taken out.
+    pub groups: Vec<Group>,
+}
+
+/// Which group of which sum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Shared {
+    pub sum: usize,
+    pub group: usize,
+}
+
+/// A factor taken out of a part of a sum.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Group {
+    /// The factor.
+    pub factor: ExprId,
+    /// What it multiplies and does not contain it: the derivative of these terms by the factor.
+    pub single: Combination,
+    /// What it multiplies and contains it again.
+    pub repeated: Combination,
+}
+
+impl Nested {
+    /// The group whose terms, divided by their `factor`, all occur in `derivative`.
+    pub fn part_of(&self, factor: ExprId, derivative: &Combination) -> Option<usize> {
+        let occurs = |item: &(f64, ExprId)| derivative.items.contains(item);
+        let is_part = |group: &Group| {
+            let items = &group.single.items;
+            group.factor == factor && items.len() > 1 && items.iter().all(occurs)
+        };
+        self.groups.iter().position(is_part)
+    }
+
+    /// All expressions that are multiplied by a coefficient or taken out.
+    pub fn expressions(&self) -> impl Iterator<Item = ExprId> + '_ {
+        let sums = self.groups.iter().flat_map(|g| [&g.single, &g.repeated]);
+        let factors = self.groups.iter().map(|group| group.factor);
+        let items = sums.chain([&self.flat]).flat_map(|sum| &sum.items);
+        items.map(|&(_, expr)| expr).chain(factors)
+    }
+}
+
+/// How often each product is wanted, by all sums of a program.
+pub(super) struct Demand {
+    uses: HashMap<ExprId, usize>,
+}
+
+/// A term of a sum and what can be taken out of it.
+struct Item {
+    coefficient: f64,
+    expr: ExprId,
+    quotients: Vec<Quotient>,
+}
+
+/// A product of a sum, divided by one of its factors.
+#[derive(Clone, Copy)]
+struct Quotient {
+    factor: ExprId,
+    rest: ExprId,
+    /// Whether the rest contains the factor again.
+    repeats: bool,
+}
+
+impl Demand {
+    /// Counts the products of all sums, and those that remain when a factor is taken out.
+    pub fn new<'a>(pool: &mut ExprPool, sums: impl IntoIterator<Item = &'a Combination>) -> Self {
+        let mut uses: HashMap<ExprId, usize> = HashMap::new();
+        for sum in sums {
+            for &(_, expr) in &sum.items {
+                *uses.entry(expr).or_default() += 1;
+                for quotient in quotients(pool, expr) {
+                    *uses.entry(quotient.rest).or_default() += 1;
+                }
+            }
+        }
+        Self { uses }
+    }
+
+    /// Share of one multiplication that a sum pays for a product whose own parts are known.
+    fn share(&self, pool: &ExprPool, expr: ExprId) -> f64 {
+        if n_factors(pool, expr) < 2 {
+            return 0.0;
+        }
+        let uses = self.uses.get(&expr).copied().unwrap_or(0);
+        1.0 / uses.max(1) as f64
+    }
+
+    /// Multiplications that are saved when a product becomes one of its quotients.
+    fn saving(&self, pool: &ExprPool, item: &Item, quotient: &Quotient) -> f64 {
+        let shares = item.quotients.iter().map(|q| self.share(pool, q.rest));
+        let parts = shares.fold(f64::INFINITY, f64::min);
+        (1.0 + parts) * self.share(pool, item.expr) - self.share(pool, quotient.rest)
+    }
+
+    /// Takes factors out of a sum wherever that saves multiplications.
+    pub fn nest(&self, pool: &mut ExprPool, sum: &Combination) -> Nested {
+        let item = |&(coefficient, expr): &(f64, ExprId)| Item {
+            coefficient,
+            expr,
+            quotients: quotients(pool, expr),
+        };
+        let mut items: Vec<Item> = sum.items.iter().map(item).collect();
+        let mut groups = Vec::new();
+        while let Some(factor) = self.best_factor(pool, &items) {
+            let mut group = Group {
+                factor,
+                single: Combination::default(),
+                repeated: Combination::default(),
+            };
+            items.retain(|item| {
+                let own = item.quotients.iter().find(|q| q.factor == factor);
+                let Some(quotient) = own.filter(|q| self.saving(pool, item, q) > 0.0) else {
+                    return true;
+                };
+                let part = if quotient.repeats {
+                    &mut group.repeated
+                } else {
+                    &mut group.single
+                };
+                part.items.push((item.coefficient, quotient.rest));
+                false
+            });
+            groups.push(group);
+        }
+        let rest = items.into_iter().map(|item| (item.coefficient, item.expr));
+        Nested {
+            flat: Combination {
+                constant: sum.constant,
+                items: rest.collect(),
+            },
+            shared: None,
+            groups,
+        }
+    }
+
+    /// The factor whose group saves most, if it saves more than it costs.
+    fn best_factor(&self, pool: &ExprPool, items: &[Item]) -> Option<ExprId> {
+        let mut savings: BTreeMap<ExprId, f64> = BTreeMap::new();
+        for item in items {
+            for quotient in &item.quotients {
+                let saving = self.saving(pool, item, quotient);
+                *savings.entry(quotient.factor).or_default() += saving.max(0.0);
+            }
+        }
+        let worth = savings.into_iter().filter(|&(_, saving)| saving > 1.0);
+        worth
+            .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
+            .map(|(factor, _)| factor)
+    }
+}
+
+/// Base and exponent of a factor that can be taken out, once or as often as its exponent says.
+fn base_of(pool: &ExprPool, factor: ExprId) -> Option<(ExprId, i64)> {
+    match pool.node(factor) {
+        Node::Power(base, exponent) => {
+            let exponent = pool.as_number(*exponent)?.as_integer()?;
+            (exponent > 0).then_some((*base, exponent))
+        }
+        _ => Some((factor, 1)),
+    }
+}
+
+/// Number of factors, powers counted by their exponents.
+fn n_factors(pool: &ExprPool, expr: ExprId) -> usize {
+    let count = |&factor: &ExprId| match base_of(pool, factor) {
+        Some((_, exponent)) => usize::try_from(exponent).unwrap_or(usize::MAX),
+        None => 1,
+    };
+    pool.factors_of(expr)
+        .iter()
+        .map(count)
+        .fold(0, usize::saturating_add)
+}
+
+/// What remains of a product without one of its factors, for each distinct factor; nothing if
+/// it is no product of factors with positive integer exponents.
+fn quotients(pool: &mut ExprPool, expr: ExprId) -> Vec<Quotient> {
+    let factors = pool.factors_of(expr).to_vec();
+    let bases: Option<Vec<(ExprId, i64)>> = factors.iter().map(|&f| base_of(pool, f)).collect();
+    let Some(bases) = bases.filter(|_| n_factors(pool, expr) > 1) else {
+        return Vec::new();
+    };
+    let mut quotients = Vec::new();
+    for (k, &(factor, exponent)) in bases.iter().enumerate() {
+        let mut rest = factors.clone();
+        let lower = pool.integer(exponent - 1);
+        rest[k] = pool.pow(factor, lower);
+        let rest = pool.product(&rest);
+        // Coefficients stand in the sums only.
+        if pool.terms_of(rest) == [(Number::ONE, rest)] {
+            quotients.push(Quotient {
+                factor,
+                rest,
+                repeats: exponent > 1,
+            });
+        }
+    }
+    quotients
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::expression::ExpressionLowering;
+    use super::*;
+    use crate::ir::{Binary, Interpreter, ProgramBuilder, Statement};
+
+    const VARIABLES: [&str; 4] = ["w", "x", "y", "z"];
+
+    /// Products of three variables, each in one sum only, and two that both sums have.
+    fn sums(pool: &mut ExprPool) -> [Combination; 2] {
+        let texts = [
+            "0.5 + 2*w*x*y - 3*w*w*y + 1.5*w*z*z - 0.25*x*y*z + 4*w + 7*y*z",
+            "1.25*w*x*z - 2.5*w*w*w + 0.125*w*y*y - 6*y*z + w",
+        ];
+        texts.map(|text| {
+            let expr = pool.parse(text, &|_| true).expect("valid expression");
+            let terms = pool.terms_of(expr);
+            let summands = terms
+                .into_iter()
+                .map(|(number, expr)| (number.to_f64(), expr));
+            Combination::collect(pool, summands)
+        })
+    }
+
+    /// Values of the sums at a point, and how many products that takes.
+    fn evaluated(pool: &ExprPool, sums: &[Nested], point: &[f64; 4]) -> (Vec<f64>, usize) {
+        let mut builder = ProgramBuilder::new("sums");
+        let inputs = builder.input("x", VARIABLES.len());
+        let symbols = VARIABLES.map(|name| pool.find_symbol(name).expect("occurs"));
+        let variables = symbols.into_iter().zip(inputs).collect();
+        let mut lowering = ExpressionLowering::new(pool, builder, variables);
+        let values: Vec<_> = sums
+            .iter()
+            .map(|sum| lowering.nested(sum, None).0)
+            .collect();
+        let mut builder = lowering.builder;
+        builder.output("y", &values);
+        let program = builder.finish().expect("valid program");
+        let is_product = |s: &&Statement| matches!(s, Statement::Binary(Binary::Mul, ..));
+        let products = program.statements().iter().filter(is_product).count();
+        let mut found = vec![0.0; sums.len()];
+        Interpreter::new(&program).run(&[point], &mut [&mut found]);
+        (found, products)
+    }
+
+    #[test]
+    fn nested_sums_have_the_same_values_with_fewer_products() {
+        let mut pool = ExprPool::new();
+        let sums = sums(&mut pool);
+        let demand = Demand::new(&mut pool, &sums);
+        let nested = sums.each_ref().map(|sum| demand.nest(&mut pool, sum));
+        let flat = sums.map(|flat| Nested {
+            flat,
+            shared: None,
+            groups: Vec::new(),
+        });
+        for point in [[0.5, -1.25, 2.0, 0.75], [-3.0, 0.1, 0.7, -0.3]] {
+            let (expected, n_flat) = evaluated(&pool, &flat, &point);
+            let (found, n_nested) = evaluated(&pool, &nested, &point);
+            assert!(n_nested + 4 <= n_flat, "{n_nested} against {n_flat}");
+            for (a, b) in found.iter().zip(&expected) {
+                assert!((a - b).abs() <= 1e-13 * b.abs().max(1.0), "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn single_part_of_a_group_is_found_in_the_derivative_by_its_factor() {
+        let mut pool = ExprPool::new();
+        let [sum, _] = sums(&mut pool);
+        let demand = Demand::new(&mut pool, [&sum]);
+        let nested = demand.nest(&mut pool, &sum);
+        let symbol = pool.find_symbol("w").expect("occurs");
+        let factor = pool.symbol_expr(symbol);
+        let derivative = sum.derivative(&mut pool, symbol);
+        let group = nested
+            .part_of(factor, &derivative)
+            .expect("w was taken out");
+        let other = pool.find_symbol("z").expect("occurs");
+        let wrong = sum.derivative(&mut pool, other);
+        assert_eq!(nested.groups[group].factor, factor);
+        assert_eq!(nested.part_of(factor, &wrong), None);
+    }
+
+    #[test]
+    fn product_that_many_sums_share_stays_flat() {
+        let mut pool = ExprPool::new();
+        let expr = pool.parse("2*x*y", &|_| true).expect("valid expression");
+        let terms = pool.terms_of(expr);
+        let summands = terms.iter().map(|(number, expr)| (number.to_f64(), *expr));
+        let sum = Combination::collect(&pool, summands);
+        let sums = vec![sum; 5];
+        let demand = Demand::new(&mut pool, &sums);
+        for sum in &sums {
+            assert!(demand.nest(&mut pool, sum).groups.is_empty());
+        }
+    }
+}
