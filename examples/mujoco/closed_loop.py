@@ -11,24 +11,26 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from PIL import Image
 
+import romc_controller
 from assessment import assess, longest_flight, repetition_faults
 from film_strip import render
 from followers import Jump, LatentMpc, Replay, TorquesOnly, WithoutFeedback
 from perturbations import NOMINAL, PERTURBATIONS, Motors, perturbed_simulation
 from recording_format import read_recording, states_of
 from robot_model import RobotModel
-from romc_controller import RomcController
 from simulation import CONTROL_STEP_S
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 RECORDINGS = ROOT / "examples/recordings/go1"
-LIBRARY = ROOT / "target/release/examples/libromc_mujoco.so"
+ROMC = ROOT / "target/release/romc"
 ROBOT = "go1"
 EXAMPLE = """example:
-  cargo build --release --example romc_mujoco
+  cargo build --release
   MUJOCO_GL=egl python closed_loop.py --out-dir ../../out/closed_loop
-drives the shipped model go1-d6; add --model for others. Writes closed_loop.csv (a row a run),
-closed_loop.json, table.txt and a film strip per test jump, recorded above and driven below."""
+drives the shipped model go1-d6 with its generated controller; --models takes others, --folds 3
+trains three models, each without another third of the training jumps, --seeds 3 with the joint
+method and seeds 1 to 3. Writes closed_loop.csv (a row a run), closed_loop.json, table.txt and a
+film strip per test jump, recorded above and driven below."""
 QUICK = ("payload +2 kg", "torque x0.9")
 FRAMES = 8
 LEAST_SHARE = 0.9
@@ -69,9 +71,12 @@ class Outcome:
 def main():
     arguments = parse_arguments()
     arguments.out_dir.mkdir(parents=True, exist_ok=True)
-    if not arguments.library.is_file():
-        raise SystemExit(f"no {arguments.library}: cargo build --release --example romc_mujoco")
-    models = [(path.resolve(), arguments.library.resolve()) for path in arguments.model]
+    if not arguments.romc.is_file():
+        raise SystemExit(f"no {arguments.romc}: cargo build --release")
+    models = []
+    for path in [*arguments.models, *trained(arguments)]:
+        folder = arguments.out_dir / "controllers" / path.stem
+        models.append((path.stem, romc_controller.build(path, folder, arguments.romc)))
     jumps = [read_jump(path) for path in sorted(RECORDINGS.glob("test_*.csv.gz"))]
     perturbations = [NOMINAL]
     perturbations += [p for p in PERTURBATIONS if not arguments.quick or p.name in QUICK]
@@ -102,16 +107,45 @@ def parse_arguments():
         description=__doc__, epilog=EXAMPLE, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--model", type=pathlib.Path, action="append", help="model file (default: go1-d6)"
+        "--models", type=pathlib.Path, nargs="+", default=[], help="model files (default: go1-d6)"
     )
-    parser.add_argument("--library", type=pathlib.Path, default=LIBRARY, help="built from library.rs")
+    parser.add_argument("--seeds", type=int, default=0, help="train so many joint models as well")
+    parser.add_argument(
+        "--folds", type=int, default=0, help="train so many models, each without some of the jumps"
+    )
+    parser.add_argument("--romc", type=pathlib.Path, default=ROMC, help="the compiler")
     parser.add_argument("--out-dir", type=pathlib.Path, default=ROOT / "out/closed_loop")
     parser.add_argument("--quick", action="store_true", help="two perturbations instead of all")
     parser.add_argument("--no-pictures", action="store_true", help="no film strips")
     parser.add_argument("--jobs", type=int, help="runs at a time (default: one a core)")
     arguments = parser.parse_args()
-    arguments.model = arguments.model or [ROOT / "models/go1-d6.json"]
+    arguments.out_dir, arguments.romc = arguments.out_dir.resolve(), arguments.romc.resolve()
+    arguments.models = [path.resolve() for path in arguments.models]
+    if not (arguments.models or arguments.seeds or arguments.folds):
+        arguments.models = [ROOT / "models/go1-d6.json"]
     return arguments
+
+
+def trained(arguments):
+    """Model files trained for this comparison: joint seeds, closed form on parts of the jumps."""
+    jumps = sorted(RECORDINGS.glob("train_*.csv.gz"))
+    validation = sorted(RECORDINGS.glob("validation_*.csv.gz"))
+    plans = [
+        (f"joint-seed-{seed}", jumps, ["--method", "joint", "--seed", seed, "--seeds", 1])
+        for seed in range(1, arguments.seeds + 1)
+    ] + [
+        (
+            f"fold-{fold + 1}",
+            [jump for row, jump in enumerate(jumps) if row % arguments.folds != fold],
+            ["--method", "closed-form"],
+        )
+        for fold in range(arguments.folds)
+    ]
+    for name, recordings, options in plans:
+        path = arguments.out_dir / f"{name}.json"
+        print(f"training {name} on {len(recordings)} jumps", file=sys.stderr)
+        romc_controller.train(recordings, validation, path, arguments.romc, options)
+        yield path
 
 
 def read_jump(path):
@@ -124,7 +158,7 @@ def read_jump(path):
 def run(task):
     """One closed-loop run; returns its Outcome and the states (rows, 18).
 
-    A task is who drives, (model file, library) or None, the perturbation and the jump.
+    A task is who drives, (name, generated crate) of the model or None, the perturbation, the jump.
     """
     follower_name, model, perturbation, jump = task
     robot = RobotModel(ROBOT)
@@ -140,7 +174,7 @@ def run(task):
     faults = repetition_faults(reference, repeated, log.other_contact.any())
     statuses = getattr(follower, "statuses", {})
     outcome = Outcome(
-        model=model[0].stem if model else "",
+        model=model[0] if model else "",
         follower=follower_name,
         perturbation=perturbation.name,
         jump=jump.name,
@@ -164,8 +198,7 @@ def make_controller(follower_name, model, jump, robot):
     """The generated controller with its reference set; none for followers without a model."""
     if not FOLLOWERS[follower_name]:
         return None
-    path, library = model
-    controller = RomcController(library, path)
+    controller = romc_controller.load(model[1]).Controller()
     u = None if follower_name == WITHOUT_INPUT else jump.inputs(robot)
     controller.set_reference(jump.time_s, jump.x, jump.dx, u, jump.feet)
     return controller

@@ -8,7 +8,7 @@ use super::markdown::MarkdownOptions;
 use super::mathml::MathmlOptions;
 use super::precision::Precision;
 use super::target::{EmitError, EmittedFile};
-use super::{c, latex, markdown, mathml, rust};
+use super::{c, controller, latex, markdown, mathml, rust};
 use crate::lower::LowerOptions;
 use crate::model::ReducedModel;
 
@@ -25,16 +25,19 @@ pub enum Target {
     Markdown,
     /// Equations for web pages.
     Mathml,
+    /// The controller as a crate with a C interface.
+    Controller,
 }
 
 impl Target {
     /// All targets, in the order in which they are listed.
-    pub const ALL: [Target; 5] = [
+    pub const ALL: [Target; 6] = [
         Target::Latex,
         Target::C,
         Target::Rust,
         Target::Markdown,
         Target::Mathml,
+        Target::Controller,
     ];
 
     /// The name on the command line.
@@ -45,13 +48,14 @@ impl Target {
             Self::Rust => "rust",
             Self::Markdown => "markdown",
             Self::Mathml => "mathml",
+            Self::Controller => "controller",
         }
     }
 
     fn is_code(self) -> bool {
         match self {
             Self::C | Self::Rust => true,
-            Self::Latex | Self::Markdown | Self::Mathml => false,
+            Self::Latex | Self::Markdown | Self::Mathml | Self::Controller => false,
         }
     }
 }
@@ -92,7 +96,8 @@ pub struct EmitOptions {
 /// # Errors
 /// [`EmitError::Lower`] if a phase cannot be lowered, [`EmitError::Symbol`] if a variable
 /// has no symbol in print, [`EmitError::BeyondSingle`] for a constant that single precision
-/// cannot hold.
+/// cannot hold, [`EmitError::Control`] and [`EmitError::Nonlinear`] for models that cannot be
+/// controlled.
 pub fn emit(
     model: &ReducedModel,
     targets: &[Target],
@@ -107,6 +112,7 @@ pub fn emit(
             (Target::C, Some(entries)) => c::emit(entries, &provenance, options.precision)?,
             (Target::Rust, Some(entries)) => rust::emit(entries, &provenance, options.precision)?,
             (Target::C | Target::Rust, None) => Vec::new(),
+            (Target::Controller, _) => controller::emit(model, &options.lower, &provenance)?,
             (Target::Latex, _) => latex::emit(model, &options.latex)?,
             (Target::Markdown, _) => markdown::emit(model, &options.markdown)?,
             (Target::Mathml, _) => mathml::emit(model, &options.mathml)?,

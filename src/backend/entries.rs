@@ -356,7 +356,7 @@ fn shapes(program: &Program) -> String {
     )
 }
 
-/// " x[0] fr.hx (rad), ..." if the model names its coordinates.
+/// " `x[0]` fr.hx (rad), ..." if the model names its coordinates.
 fn elements(array: &str, signals: Option<&Signals>) -> String {
     let Some(signals) = signals else {
         return String::new();

@@ -1,12 +1,13 @@
-//! From programs and equations to text: C, Rust, LaTeX, Markdown, MathML.
+//! From programs and equations to text: C, Rust, LaTeX, Markdown, MathML, and the controller.
 //!
-//! A model enters [`emit`]; files in memory leave, which [`write_files`] puts into a folder.
+//! A model enters [`emit()`]; files in memory leave, which [`write_files`] puts into a folder.
 //! `entries` lists what is generated, `translate` turns programs into the statements of
 //! `code`, `printer` prints them with what a `dialect` spells, templates place them.
 //! Backends decide nothing mathematical. Read `emit` first.
 
 mod c;
 mod code;
+mod controller;
 mod dialect;
 mod emit;
 mod entries;

@@ -2,6 +2,7 @@
 
 use super::typeset::{RobotTypesetError, UnknownSymbol};
 use crate::lower::LowerError;
+use crate::mpc::MpcError;
 
 /// A file that a backend made, not yet on disk.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,6 +50,18 @@ pub enum EmitError {
         function: String,
         /// The constant.
         value: f64,
+    },
+    /// The model lacks what a controller needs.
+    #[error("the controller cannot be generated")]
+    Control(#[from] MpcError),
+    /// Encoder or decoder of a model for control are not affine.
+    #[error(
+        "model `{model}`: generated controllers take affine encoders and decoders, this one has \
+         layers with an activation"
+    )]
+    Nonlinear {
+        /// Name of the model.
+        model: String,
     },
     /// A template failed to render.
     #[error("a template failed")]

@@ -39,6 +39,24 @@ pub enum Status {
 }
 
 impl Status {
+    /// Every status.
+    pub const ALL: [Status; 14] = [
+        Status::Solved,
+        Status::Softened,
+        Status::ContactEarly,
+        Status::ContactLate,
+        Status::ContactUnknown,
+        Status::Inaccurate,
+        Status::Infeasible,
+        Status::IterationCap,
+        Status::NumericalFailure,
+        Status::MeasurementJump,
+        Status::LiftFailed,
+        Status::NotFinite,
+        Status::WrongDimension,
+        Status::NoReference,
+    ];
+
     /// Whether the command comes from this step's own plan.
     pub fn has_plan(self) -> bool {
         match self {

@@ -11,7 +11,7 @@ use crate::robot::STATE_DIM;
 ///
 /// The matrices of a [`Plant`](super::Plant) are then those at one state, and
 /// [`Plant::tangent_at`](super::Plant::tangent_at) gives the plant of another.
-pub trait CurvedMaps: Debug {
+pub trait CurvedMaps: Debug + Send + Sync {
     /// Writes `z = E(s_x x)`.
     fn encode(&self, x: &[f64], z: &mut [f64]);
 

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 /// The latent accelerations of every phase with their derivatives.
 ///
 /// The interpreter's programs and the generated code of a controller both are.
-pub trait LatentDynamics: Debug {
+pub trait LatentDynamics: Debug + Send {
     /// Writes `ddz = Xiᵀ Θ(z, dz, u_lat)` of a phase and its dense Jacobian by `(z, dz, u_lat)`,
     /// `latent_dim × 3 latent_dim`.
     ///

@@ -13,6 +13,7 @@ mod error;
 pub mod estimate;
 mod fallback;
 mod horizon;
+pub mod interface;
 pub(super) mod lift;
 pub mod linearise;
 mod plan;

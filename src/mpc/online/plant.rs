@@ -122,6 +122,11 @@ impl Plant {
         }
     }
 
+    /// The numbers.
+    pub fn parts(&self) -> &PlantParts {
+        &self.parts
+    }
+
     /// The robot.
     pub fn robot(&self) -> &'static Robot {
         self.parts.robot

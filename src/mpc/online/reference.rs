@@ -45,6 +45,10 @@ pub struct Reference {
 
 /// Smallest standard deviation against the largest of the same kind.
 const DEVIATION_FLOOR: f64 = 1e-2;
+/// Share of a joint's half range within which a trajectory stands still.
+const STILL_SHARE: f64 = 0.02;
+/// Time in which one that stands still might cover that, s.
+const STILL_TIME_S: f64 = 0.1;
 
 impl Reference {
     /// Encodes a trajectory.
@@ -66,7 +70,7 @@ impl Reference {
         }
         let mut reference = Self {
             latent_dim: d,
-            deviation: deviations(&state, d),
+            deviation: deviations(&state, &still_deviations(plant)),
             state,
             input_integral: None,
             input_ends: [vec![0.0; d], vec![0.0; d]],
@@ -122,7 +126,8 @@ impl Reference {
     }
 
     /// Standard deviation of each of `(z, dz)` over the trajectory, never below a hundredth of
-    /// the largest position's or velocity's.
+    /// the largest position's or velocity's; for one that stands still, the scale of a small
+    /// motion of the joints.
     pub fn deviation(&self) -> &[f64] {
         &self.deviation
     }
@@ -258,8 +263,32 @@ fn integrate(time_s: &[f64], values: &[f64], width: usize) -> Vec<f64> {
     integral
 }
 
-fn deviations(state: &[f64], latent_dim: usize) -> Vec<f64> {
-    let width = 2 * latent_dim;
+/// Scale of `(z, dz)` for a trajectory that stands still: the change of each latent alone that
+/// moves some joint by `STILL_SHARE` of half its range, and that change within `STILL_TIME_S`.
+fn still_deviations(plant: &Plant) -> Vec<f64> {
+    let d = plant.latent_dim();
+    let limits = plant.robot().joint_limit_rad();
+    let positions = (0..d).map(|latent| {
+        let shares = limits.iter().enumerate().map(|(joint, (lower, upper))| {
+            plant.decoder_matrix()[(joint, latent)].abs() / (0.5 * (upper - lower))
+        });
+        let largest = shares.fold(0.0, f64::max);
+        if largest > 0.0 {
+            STILL_SHARE / largest
+        } else {
+            1.0
+        }
+    });
+    let mut scale: Vec<f64> = positions.collect();
+    scale.extend_from_within(..);
+    scale[d..]
+        .iter_mut()
+        .for_each(|value| *value /= STILL_TIME_S);
+    scale
+}
+
+fn deviations(state: &[f64], still: &[f64]) -> Vec<f64> {
+    let width = still.len();
     let count = (state.len() / width) as f64;
     let mut deviation: Vec<f64> = (0..width)
         .map(|column| {
@@ -268,7 +297,11 @@ fn deviations(state: &[f64], latent_dim: usize) -> Vec<f64> {
             (values().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
         })
         .collect();
-    for half in deviation.chunks_exact_mut(latent_dim) {
+    let half = width / 2;
+    if (0..half).all(|latent| deviation[latent] < still[latent]) {
+        return still.to_vec();
+    }
+    for half in deviation.chunks_exact_mut(half) {
         let largest = half.iter().copied().fold(0.0, f64::max);
         let floor = if largest > 0.0 {
             DEVIATION_FLOOR * largest

@@ -1,0 +1,335 @@
+//! The generated controller: built, linked into C, C++ and Python, and held against the library.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use romc::backend::{EmitError, EmitOptions, EmittedFile, Target, emit};
+use romc::model::ReducedModel;
+use romc::mpc::{Controller, Lift, Measurement, MpcSettings, ReferenceSamples};
+use romc::recording::Segment;
+
+/// Warnings that generated headers and examples must not raise.
+const STRICT: [&str; 6] = [
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wshadow",
+    "-pedantic",
+    "-Werror",
+];
+/// What a Rust static library needs from the system.
+const SYSTEM: [&str; 4] = ["-lm", "-lpthread", "-ldl", "-lrt"];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn shipped(name: &str) -> ReducedModel {
+    romc::artifact::read(&root().join(format!("models/{name}.json"))).expect("a shipped model")
+}
+
+fn emitted(model: &ReducedModel) -> Vec<EmittedFile> {
+    emit(model, &[Target::Controller], &EmitOptions::default()).expect("a complete model")
+}
+
+/// Runs a command and returns its output, which must be a success.
+fn succeed(command: &mut Command) -> Output {
+    let output = command
+        .output()
+        .unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    assert!(
+        output.status.success(),
+        "{command:?}\n{}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    output
+}
+
+/// A generated crate that was built; all share one folder of compiled dependencies.
+struct Built {
+    name: String,
+    folder: PathBuf,
+    target: PathBuf,
+}
+
+impl Built {
+    fn new(model: &ReducedModel) -> Self {
+        let name = model.identifier().to_string();
+        let scratch = Path::new(env!("CARGO_TARGET_TMPDIR"));
+        let built = Self {
+            folder: scratch.join(format!("{name}-controller")),
+            target: scratch.join("controller-target"),
+            name,
+        };
+        for file in emitted(model) {
+            let path = scratch.join(&file.path);
+            // What has not changed is not compiled again.
+            if fs::read_to_string(&path).ok().as_ref() != Some(&file.contents) {
+                fs::create_dir_all(path.parent().expect("inside the folder")).expect("a folder");
+                fs::write(&path, &file.contents).expect("written");
+            }
+        }
+        let output = succeed(
+            Command::new(env!("CARGO"))
+                .args(["build", "--release"])
+                .current_dir(&built.folder)
+                .env("CARGO_TARGET_DIR", &built.target),
+        );
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(!told.contains("warning"), "{told}");
+        built
+    }
+
+    fn library(&self, ending: &str) -> PathBuf {
+        let file = format!("release/lib{}_controller.{ending}", self.name);
+        self.target.join(file)
+    }
+
+    /// Compiles a program against the header and links the static library.
+    fn program(&self, compiler: &str, flags: &[&str], source: &Path) -> PathBuf {
+        let stem = source.file_name().expect("a file").to_string_lossy();
+        let program = self.target.join(format!("{}_{stem}_{compiler}", self.name));
+        succeed(
+            Command::new(compiler)
+                .args(flags)
+                .args(STRICT)
+                .arg("-I")
+                .arg(self.folder.join("include"))
+                .arg(format!("-DNAME={}", self.name))
+                .arg(format!("-DUPPER={}", self.name.to_ascii_uppercase()))
+                .arg(format!("-DHEADER=\"{}_controller.h\"", self.name))
+                .arg(source)
+                .arg(self.library("a"))
+                .args(SYSTEM)
+                .arg("-o")
+                .arg(&program),
+        );
+        program
+    }
+}
+
+/// One run: settings, reference, and the samples at which the controller acts.
+struct Case {
+    lift: Lift,
+    has_input: bool,
+}
+
+/// A segment's samples as a controller takes them, and every fifth of them as a measurement.
+fn samples<'a>(segment: &'a Segment, input: Option<&'a [f64]>) -> ReferenceSamples<'a> {
+    ReferenceSamples {
+        time_s: &segment.time_s,
+        x: segment.x.as_slice(),
+        dx: segment.dx.as_slice(),
+        u: input,
+        feet: &segment.feet,
+    }
+}
+
+fn measurements(segment: &Segment) -> impl Iterator<Item = Measurement<'_>> {
+    (0..segment.len()).step_by(5).map(|sample| Measurement {
+        time_s: segment.time_s[sample],
+        x: &segment.x.as_slice()[18 * sample..][..18],
+        dx: &segment.dx.as_slice()[18 * sample..][..18],
+        feet: segment.feet[sample],
+    })
+}
+
+fn push(bytes: &mut Vec<u8>, values: &[f64]) {
+    bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+}
+
+/// The case as the driver reads it.
+fn encoded(case: &Case, segment: &Segment, input: &[f64]) -> Vec<u8> {
+    let lift = match case.lift {
+        Lift::Transpose => 0,
+        Lift::Consistent => 1,
+    };
+    let n_steps = measurements(segment).count();
+    let head = [lift, usize::from(case.has_input), segment.len(), n_steps];
+    let mut bytes: Vec<u8> = head
+        .iter()
+        .flat_map(|value| (*value as i64).to_le_bytes())
+        .collect();
+    push(&mut bytes, &segment.time_s);
+    push(&mut bytes, segment.x.as_slice());
+    push(&mut bytes, segment.dx.as_slice());
+    if case.has_input {
+        push(&mut bytes, input);
+    }
+    bytes.extend(segment.feet.iter().flatten().map(|down| u8::from(*down)));
+    for measurement in measurements(segment) {
+        push(&mut bytes, &[measurement.time_s]);
+        push(&mut bytes, measurement.x);
+        push(&mut bytes, measurement.dx);
+        bytes.extend(measurement.feet.map(u8::from));
+    }
+    bytes
+}
+
+/// What the library commands, as the driver writes it.
+fn commanded(model: &ReducedModel, case: &Case, segment: &Segment, input: &[f64]) -> Vec<u8> {
+    let settings = MpcSettings {
+        lift: case.lift,
+        ..MpcSettings::default()
+    };
+    let mut controller = Controller::new(model, settings).expect("a complete model");
+    let input = case.has_input.then_some(input);
+    controller
+        .set_reference(samples(segment, input))
+        .expect("a sound recording");
+    let mut bytes = Vec::new();
+    for measurement in measurements(segment) {
+        let command = controller.step(measurement);
+        let status = i64::from(command.status.code());
+        for code in [status, status, i64::from(command.iterations)] {
+            bytes.extend(code.to_le_bytes());
+        }
+        push(&mut bytes, &command.torque_nm);
+        push(&mut bytes, &command.joint_position_rad);
+        push(&mut bytes, &command.joint_velocity_rad_s);
+        push(&mut bytes, &command.u_lat);
+    }
+    bytes
+}
+
+/// Drives the linked controller over whole recordings, both lifts, with and without their inputs.
+fn drive_and_compare(model: &ReducedModel, built: &Built) {
+    let driver = built.program(
+        "cc",
+        &["-std=c99"],
+        &root().join("tests/controller/drive.c"),
+    );
+    let mut cases = Vec::new();
+    let mut expected = Vec::new();
+    for recording in ["test_01", "test_03"] {
+        let path = root().join(format!("examples/recordings/go1/{recording}.csv.gz"));
+        let recording = romc::recording::read(&path).expect("a sound recording");
+        let segment = &recording.segments[0];
+        let robot = model.robot().expect("a robot");
+        let input = segment.input(robot).expect("inputs").as_slice().to_vec();
+        for lift in [Lift::Transpose, Lift::Consistent] {
+            for has_input in [true, false] {
+                let case = Case { lift, has_input };
+                cases.extend(encoded(&case, segment, &input));
+                expected.extend(commanded(model, &case, segment, &input));
+            }
+        }
+    }
+    let files =
+        ["cases", "commands"].map(|what| built.target.join(format!("{}.{what}", built.name)));
+    fs::write(&files[0], cases).expect("written");
+    succeed(Command::new(driver).args(&files));
+    let found = fs::read(&files[1]).expect("the driver wrote");
+    assert_eq!(found.len(), expected.len());
+    let step_len = 8 * (3 + 36 + model.latent_dim());
+    assert!(expected.len() / step_len > 1000, "few steps");
+    for (step, (found, expected)) in found
+        .chunks(step_len)
+        .zip(expected.chunks(step_len))
+        .enumerate()
+    {
+        assert_eq!(found, expected, "{}: command {step} differs", model.name());
+    }
+}
+
+#[test]
+fn emission_is_the_same_twice_and_names_its_origin_in_every_source() {
+    let model = shipped("go1-d4");
+    let files = emitted(&model);
+    assert_eq!(files, emitted(&model));
+    for file in &files {
+        let is_licence = file.path.contains("LICENSE");
+        let first = file.contents.lines().next().unwrap_or_default();
+        assert!(
+            is_licence || (first.contains("romc") && first.contains("go1-d4")),
+            "{}: {first}",
+            file.path
+        );
+    }
+    let manifest = (files.iter())
+        .find(|file| file.path == "go1_d4-controller/Cargo.toml")
+        .expect("a manifest");
+    let lock = fs::read_to_string(root().join("Cargo.lock")).expect("romc's own");
+    for name in ["clarabel", "nalgebra"] {
+        let (_, rest) = lock
+            .split_once(&format!("name = \"{name}\"\nversion = \""))
+            .expect("locked");
+        let version = rest.split('"').next().expect("a version");
+        assert!(
+            manifest
+                .contents
+                .contains(&format!("{name} = {{ version = \"={version}\""))
+        );
+    }
+}
+
+#[test]
+fn model_without_a_robot_or_with_activations_is_refused_with_the_reason() {
+    let paper = shipped("paper-2d");
+    let refused = emit(&paper, &[Target::Controller], &EmitOptions::default());
+    assert!(matches!(refused, Err(EmitError::Control(_))), "{refused:?}");
+
+    let path = root().join("models/go1-d4.json");
+    let text = fs::read_to_string(path).expect("a shipped model");
+    let mut manifest: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let mut layer = manifest["encoder"].take();
+    layer["activation"] = "tanh".into();
+    manifest["encoder"] = serde_json::json!({ "layers": [layer] });
+    let folder = tempfile::tempdir().expect("a folder");
+    let bent = folder.path().join("bent.json");
+    fs::write(&bent, manifest.to_string()).expect("written");
+    let bent = romc::artifact::read(&bent).expect("a nonlinear model");
+    let refused = emit(&bent, &[Target::Controller], &EmitOptions::default());
+    assert!(
+        matches!(&refused, Err(EmitError::Nonlinear { model }) if model == "go1-d4"),
+        "{refused:?}"
+    );
+}
+
+#[test]
+fn generated_controllers_command_the_librarys_bits_and_survive_abuse() {
+    for name in ["go1-d4", "go1-d6"] {
+        let model = shipped(name);
+        let built = Built::new(&model);
+        drive_and_compare(&model, &built);
+        let abuse = root().join("tests/controller/abuse.c");
+        succeed(&mut Command::new(built.program(
+            "cc",
+            &["-std=c99"],
+            &abuse,
+        )));
+        let examples = built.folder.join("examples");
+        for (compiler, standard, source) in [
+            ("cc", "-std=c99", "example.c"),
+            ("c++", "-std=c++11", "example.cpp"),
+        ] {
+            let program = built.program(compiler, &[standard], &examples.join(source));
+            let output = succeed(&mut Command::new(program));
+            assert!(String::from_utf8_lossy(&output.stdout).contains("N m"));
+        }
+        run_python(&built);
+    }
+}
+
+/// The Python example on the shared library; told and skipped without a Python, unless required.
+fn run_python(built: &Built) {
+    let script = format!(
+        "import {0}_controller as c; c.Controller.__init__.__defaults__ = (None, {1:?}); import example; example.main()",
+        built.name,
+        built.library("so")
+    );
+    let required = std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1");
+    if Command::new("python3").arg("--version").output().is_err() {
+        assert!(!required, "python3 is missing and ROMC_REQUIRE_TOOLS=1");
+        eprintln!("skipped: the Python example, python3 is missing");
+        return;
+    }
+    let output = succeed(
+        Command::new("python3")
+            .args(["-B", "-c", &script])
+            .current_dir(built.folder.join("python")),
+    );
+    assert!(String::from_utf8_lossy(&output.stdout).contains("N m"));
+}
