@@ -802,6 +802,8 @@ fn compile_within_a_tolerance_tells_each_change_and_saves_the_simplified_model()
         page.contains("| contact | ddz1 |") && page.contains("rounded to"),
         "{page}"
     );
+    let header = fs::read_to_string(Path::new(&out).join("go1_d6.h")).expect("written");
+    assert!(header.contains("/* Simplified within 20% of"), "{header}");
     // the saved model is one like any other, and knows where it comes from
     let model: Value =
         serde_json::from_str(&fs::read_to_string(&saved).expect("written")).expect("JSON");
@@ -841,7 +843,17 @@ fn sines_of_the_paper_become_linear_over_given_ranges() {
         let error = failed(&[&compile[..], &arguments[..]].concat());
         assert!(error.contains(told), "{error}");
     }
-    let output = romc(&[&compile[..], &["--tolerance", "1%"]].concat());
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output.stderr).contains("--domain <RECORDING>"));
+    for (arguments, told) in [
+        (&["--tolerance", "1%"][..], "--domain <RECORDING>"),
+        (&["--tolerance", "-0.1", "--domain", ranges], "found `-0.1`"),
+        (&["--tolerance", "nan", "--domain", ranges], "found `nan`"),
+        (&["--margin", "-1", "--domain", ranges], "of at least 0"),
+        (&["--significant", "0"], "from 1 to 40"),
+        (&["--digits", "41"], "from 0 to 40"),
+    ] {
+        let output = romc(&[&compile[..], arguments].concat());
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        let error = text(&output.stderr);
+        assert!(error.contains(told), "{error}");
+    }
 }

@@ -8,9 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::artifact::import::{Format, ImportError, Mapping, PhaseRule, parse_standard};
 use crate::backend::Target;
+use crate::backend::typeset::MOST_DIGITS;
 use crate::model::{Activation, StandardLibrary};
 use crate::robot::STATE_DIM;
-use crate::simplify::Tolerance;
+use crate::simplify::{MARGIN, Tolerance};
 use crate::study::Shard;
 
 /// The reduced-order model compiler: from recorded jumps to equations, code and torques.
@@ -76,7 +77,7 @@ impl Command {
 #[derive(Debug, Clone, Args)]
 pub struct OutputArguments {
     /// Print one JSON object to stdout and nothing else there
-    #[arg(long)]
+    #[arg(long, help_heading = None)]
     pub json: bool,
 }
 
@@ -498,7 +499,7 @@ pub struct CompileArguments {
     #[command(flatten)]
     pub simplification: SimplifyArguments,
     /// Write into a folder that holds files romc did not make
-    #[arg(long)]
+    #[arg(long, help_heading = None)]
     pub force: bool,
     #[command(flatten)]
     pub output_format: OutputArguments,
@@ -528,10 +529,10 @@ pub struct CodeArguments {
 #[command(next_help_heading = "Printed equations")]
 pub struct EquationArguments {
     /// Decimal places of coefficients; as many as each needs, at least two, unless given
-    #[arg(long, value_name = "N", conflicts_with = "significant")]
+    #[arg(long, value_name = "N", value_parser = decimal_places, conflicts_with = "significant")]
     pub digits: Option<usize>,
     /// Significant digits of coefficients
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = printed_digits)]
     pub significant: Option<usize>,
     /// Another name for a variable, such as z1=x or u2=F_z; may be repeated
     #[arg(long, value_name = "VARIABLE=NAME")]
@@ -551,13 +552,25 @@ pub struct SimplifyArguments {
     /// Drop and round terms as long as no ddz is off by more than this anywhere in the domain: 1%
     /// (of its root mean square over the recordings) or 0.05 (scaled units per s^2); nothing
     /// changes at 0
-    #[arg(long, value_name = "ERROR", requires = "domain")]
+    #[arg(
+        long,
+        value_name = "ERROR",
+        requires = "domain",
+        allow_negative_numbers = true
+    )]
     pub tolerance: Option<Tolerance>,
     /// Recordings whose smallest box is the domain, a phase; or one .toml file of ranges
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     pub domain: Vec<PathBuf>,
     /// How far the domain reaches beyond the recordings, as a share of each variable's range
-    #[arg(long, value_name = "SHARE", default_value_t = crate::simplify::MARGIN, value_parser = share)]
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value_t = MARGIN,
+        value_parser = share,
+        requires = "domain",
+        allow_negative_numbers = true
+    )]
     pub margin: f64,
     /// Also write the simplified model to this file
     #[arg(long, value_name = "MODEL.json", requires = "domain")]
@@ -666,7 +679,12 @@ pub struct ReportArguments {
     #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = positive_seconds)]
     pub restart_every: f64,
     /// List what simplification within this error changes: 1% or 0.05, as in `romc compile`
-    #[arg(long, value_name = "ERROR", default_value = "1%")]
+    #[arg(
+        long,
+        value_name = "ERROR",
+        default_value = "1%",
+        allow_negative_numbers = true
+    )]
     pub tolerance: Tolerance,
     /// Replace an existing page, or write into a folder that holds files romc did not make
     #[arg(long)]
@@ -708,6 +726,20 @@ fn positive_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds.is_finite() && seconds > 0.0 => Ok(seconds),
         _ => Err("expected a positive number of seconds".to_owned()),
+    }
+}
+
+fn decimal_places(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(places) if places <= MOST_DIGITS => Ok(places),
+        _ => Err(format!("expected a whole number from 0 to {MOST_DIGITS}")),
+    }
+}
+
+fn printed_digits(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(digits) if (1..=MOST_DIGITS).contains(&digits) => Ok(digits),
+        _ => Err(format!("expected a whole number from 1 to {MOST_DIGITS}")),
     }
 }
 

@@ -106,7 +106,7 @@ fn make(
     made
 }
 
-const LADDER_CAPTION: &str = "What is left within each tolerance; errors as shares of the root mean square of their ddz, the largest of all equations";
+const LADDER_CAPTION: &str = "What is left within each tolerance: active terms, digits of all coefficients, operations; errors as shares of the root mean square of their ddz, the largest of all equations; errors of rollouts over whole jumps and restarted";
 
 /// Draws what was assessed, and the controller's runs with the plain and with the consistent lift.
 ///

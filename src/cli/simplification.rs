@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
@@ -200,18 +200,29 @@ impl Outcome {
         Ok((EmittedFile::new(name, page), self.summary(), value))
     }
 
-    /// Tells in a comment of each LaTeX file what the equations were simplified from.
+    /// Tells in a comment of each file of equations or code what they were simplified from.
     pub fn comment(&self, files: &mut [EmittedFile]) {
         if self.certificate.n_changes() == 0 {
             return;
         }
-        let comment = format!(
-            "% Simplified within {}\n% from the model with digest {}; {}-simplification.md bounds each change.\n",
-            tolerance_words(self.certificate.tolerance),
-            artifact::digest(&self.original).short(),
-            self.model.identifier()
-        );
-        for file in files.iter_mut().filter(|file| file.path.ends_with(".tex")) {
+        let lines = [
+            format!(
+                "Simplified within {}",
+                tolerance_words(self.certificate.tolerance)
+            ),
+            format!(
+                "from the model with digest {}; {}-simplification.md bounds each change.",
+                artifact::digest(&self.original).short(),
+                self.model.identifier()
+            ),
+        ];
+        for file in files {
+            let Some([before, after]) = comment_marks(Path::new(&file.path)) else {
+                continue;
+            };
+            let comment: String = (lines.iter())
+                .map(|line| format!("{before}{line}{after}\n"))
+                .collect();
             let after_first_line = file.contents.find('\n').map_or(0, |end| end + 1);
             file.contents.insert_str(after_first_line, &comment);
         }
@@ -230,6 +241,17 @@ impl Outcome {
             let _ = write!(text, "\n{}", rollout_table(effect));
         }
         text + "\n"
+    }
+}
+
+/// What stands around a comment in a file of this kind; nothing where the model's equations are not.
+fn comment_marks(path: &Path) -> Option<[&'static str; 2]> {
+    match path.extension()?.to_str()? {
+        "tex" => Some(["% ", ""]),
+        "c" | "h" => Some(["/* ", " */"]),
+        "rs" => Some(["// ", ""]),
+        "md" | "html" => Some(["<!-- ", " -->"]),
+        _ => None,
     }
 }
 
@@ -327,18 +349,18 @@ pub fn ladder(
         latent,
         restart_every_s: assessment.restart_every_s,
     };
-    let every = format!("restarted every {} s: body.x", assessment.restart_every_s);
+    let every = format!("every {} s: body.x, m", assessment.restart_every_s);
     let mut table = Table::new([
         "tolerance",
-        "active terms",
-        "digits of coefficients",
+        "terms",
+        "digits",
         "operations",
         "certified error",
         "measured max",
         "measured rms",
-        "whole jump: body.x, m",
+        "body.x, m",
         "body.z, m",
-        &format!("{every}, m"),
+        &every,
         "body.z, m",
     ]);
     let names = ["body.x", "body.z"];

@@ -169,6 +169,13 @@ impl Domain {
                         phase.name
                     ))
                 })?;
+                // told as typed: an interval has no ends that are not numbers
+                if !(lo.is_finite() && hi.is_finite() && lo <= hi) {
+                    return Err(refused(format!(
+                        "[{}] {variable} = [{lo}, {hi}], expected finite numbers in order",
+                        phase.name
+                    )));
+                }
                 ranges.push(Interval::new(lo, hi));
             }
             if let Some(unknown) = table.keys().next() {
@@ -180,7 +187,16 @@ impl Domain {
             boxes.push(Some(ranges));
         }
         if let Some(unknown) = tables.keys().next() {
-            return Err(refused(format!("[{unknown}] is no phase of the model")));
+            return Err(refused(format!(
+                "[{unknown}] is no phase of the model, expected {}",
+                in_brackets(model)
+            )));
+        }
+        if boxes.iter().all(Option::is_none) {
+            return Err(refused(format!(
+                "no phase has ranges, expected {}",
+                in_brackets(model)
+            )));
         }
         Self::new(model, boxes)
     }
@@ -213,6 +229,13 @@ impl Domain {
             .filter(|&k| self.contains(phase, samples.point(k)))
             .collect()
     }
+}
+
+/// The tables that a file of ranges may have.
+fn in_brackets(model: &ReducedModel) -> String {
+    let phases = model.phases().iter();
+    let names: Vec<String> = phases.map(|phase| format!("[{}]", phase.name)).collect();
+    names.join(" or ")
 }
 
 fn widened(range: Interval, margin: f64) -> Interval {

@@ -136,38 +136,63 @@ impl Equation {
         }
     }
 
-    /// Rounds each coefficient to the fewest significant digits that its share of what is left
-    /// allows.
+    /// Rounds coefficients: what costs least goes first, one digit after another, as long as all
+    /// together fit.
     fn round(&mut self, terms: &mut Terms<'_>, allowed: f64) {
-        let active = self.active();
-        for (done, &row) in active.iter().enumerate() {
+        let mut chosen: Vec<Option<Step>> = vec![None; self.xi.len()];
+        // sums of floats tell what to try; what is made is checked with intervals
+        let (mut lo, mut hi) = (self.spent.lo(), self.spent.hi());
+        for step in self.roundings(terms) {
+            let place = &mut chosen[step.row];
+            let former = (place.as_ref()).map_or((0.0, 0.0), |s| (s.bound.lo(), s.bound.hi()));
+            let new_lo = lo - former.0 + step.bound.lo();
+            let new_hi = hi - former.1 + step.bound.hi();
+            if new_hi.max(-new_lo) <= allowed {
+                (lo, hi) = (new_lo, new_hi);
+                *place = Some(step);
+            }
+        }
+        for step in chosen.into_iter().flatten() {
+            if self.fits(&step, allowed) {
+                self.make(step);
+            }
+        }
+    }
+
+    /// Every rounding of every coefficient, the smallest error first.
+    fn roundings(&self, terms: &mut Terms<'_>) -> Vec<Step> {
+        let mut steps = Vec::new();
+        for row in self.active() {
             let range = terms.ranges.term(row);
-            let left = (allowed - self.spent.magnitude()).max(0.0);
-            let share = left / (active.len() - done) as f64;
             if range.is_empty() || !range.magnitude().is_finite() {
                 continue;
             }
             let before = self.xi[row];
-            for digits in 1..MAX_DIGITS {
+            let mut last = before;
+            for digits in (1..MAX_DIGITS).rev() {
                 let after = rounded(before, digits);
-                if after == before {
-                    break;
+                if after == last {
+                    // fewer digits write the same number
+                    if let Some(Step { kind, row: of, .. }) = steps.last_mut()
+                        && *of == row
+                    {
+                        *kind = ChangeKind::Rounded { digits };
+                    }
+                    continue;
                 }
-                let bound = (Interval::point(before) - Interval::point(after)) * range;
-                let step = Step {
+                last = after;
+                steps.push(Step {
                     kind: ChangeKind::Rounded { digits },
                     row,
                     before,
                     after,
                     effects: Vec::new(),
-                    bound,
-                };
-                if bound.magnitude() <= share && self.fits(&step, allowed) {
-                    self.make(step);
-                    break;
-                }
+                    bound: (Interval::point(before) - Interval::point(after)) * range,
+                });
             }
         }
+        steps.sort_by(|a, b| a.bound.magnitude().total_cmp(&b.bound.magnitude()));
+        steps
     }
 
     /// The change that `rewrite` makes to the term in `row`.

@@ -73,7 +73,8 @@ model minus `ddz` of the simplified model lies in the interval under *bound*, in
 computed with outward rounding, from the two models' coefficients and not from the list of changes; *sum of changes*
 adds the bounds of the list and contains the same difference. *Measured* is the difference at the recorded samples in
 the domain: it can never be larger. Nothing is stated about points outside the domain. All errors are in scaled units
-per second squared; a code's own rounding, about 1e-16 of its largest summand, comes on top of both models alike.
+per second squared. The rounding of emitted code comes on top of both models alike: about 1e-16 of its largest summand
+in double precision; in single precision each function states its bound.
 ";
 
 fn summary(certificate: &Certificate) -> String {

@@ -304,6 +304,22 @@ fn term_without_finite_values_on_the_domain_is_never_touched() {
 }
 
 #[test]
+fn rounding_spends_the_tolerance_where_it_saves_most_digits() {
+    let terms = [("z1", 3.14159), ("dz1", 2.71828), ("u1", 1.41421)];
+    let made = simplified(&terms, [UNIT, (-0.1, 0.1), UNIT], 0.06);
+    let equation = &made.certificate.phases[0].equations[0];
+    // 0.0142 for 1.4, 0.0282 for 3 and 0.0016 for 3.14 leave nothing for 3.1, which costs 0.0416
+    let names = left(&made);
+    let names: Vec<_> = names
+        .iter()
+        .map(|(text, xi)| (text.as_str(), *xi))
+        .collect();
+    assert_eq!(names, [("z1", 3.14), ("dz1", 3.0), ("u1", 1.4)]);
+    assert_eq!(equation.digits_after, 6);
+    assert!(equation.bound.magnitude() <= 0.06);
+}
+
+#[test]
 fn bound_of_dropped_independent_terms_is_reached_at_a_corner() {
     let terms = [("z1", 0.3), ("dz1", -0.2), ("u1", 7.0)];
     let made = simplified(&terms, [(-1.0, 2.0), (-3.0, 1.0), UNIT], 2.0);
@@ -349,6 +365,9 @@ fn domain_around_samples_has_their_extremes_and_margin() {
             expected: 1
         })
     ));
+    let infinite = Interval::new(0.0, f64::INFINITY);
+    let wrong = Domain::new(&model, vec![Some(vec![infinite; 3])]);
+    assert!(matches!(wrong, Err(SimplifyError::Range { .. })));
     let refused = simplify(&model, &domain, None, Tolerance::ShareOfRms(0.01));
     assert!(matches!(refused, Err(SimplifyError::NoSamples)));
 }
@@ -366,11 +385,10 @@ fn domain_file_needs_every_variable_and_no_other() {
         ("[contact]\nz1 = [0, 1]\n", "no range of `dz1`"),
         (&format!("{whole}z2 = [0, 1]\n"), "range of `z2`"),
         (&format!("{whole}[flight]\n"), "[flight] is no phase"),
-        (
-            &whole.replace("[0, 2]", "[2, 0]"),
-            "`dz1` in phase `contact`",
-        ),
-        (&whole.replace("[0, 2]", "[0, inf]"), "finite"),
+        (&whole.replace("[0, 2]", "[2, 0]"), "[contact] dz1 = [2, 0]"),
+        (&whole.replace("[0, 2]", "[0, inf]"), "[0, inf]"),
+        (&whole.replace("[0, 2]", "[nan, 1]"), "[NaN, 1]"),
+        ("", "expected [contact]"),
     ] {
         let error = read(text).expect_err(text).to_string();
         assert!(error.contains(told), "{error}");

@@ -51,7 +51,7 @@ pub struct Decimal {
 }
 
 /// Most digits that are ever printed of a fixed number of them.
-const MOST_DIGITS: usize = 40;
+pub const MOST_DIGITS: usize = 40;
 /// Places after the point beyond which [`Rounding::Adaptive`] turns to powers of ten.
 const MOST_DECIMALS: usize = 6;
 /// Values from here on are printed with a power of ten.

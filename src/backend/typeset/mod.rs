@@ -16,7 +16,7 @@ pub mod tree;
 mod width;
 pub mod words;
 
-pub use decimal::{Decimal, Rounding};
+pub use decimal::{Decimal, MOST_DIGITS, Rounding};
 pub use equations::{CoefficientRow, CoefficientTable, Equation, EquationSystem, Typeset};
 pub use expression::{Leading, UnknownSymbol, expression, with_coefficient};
 pub use robot::{RobotTypeset, RobotTypesetError};
