@@ -1,5 +1,7 @@
 //! Ranges of terms and of their combinations over a box.
 
+use std::collections::BTreeMap;
+
 use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
 
 /// Share of a coefficient's size by which constants of the algebra may be off, with room to spare:
@@ -72,10 +74,18 @@ impl Ranges {
     /// All values of `sum delta_j theta_j`, for every choice of the `delta_j` in their intervals.
     ///
     /// Terms without common variables are independent: their ranges add. Those with common
-    /// variables are bounded together, with the middles of the intervals as coefficients.
+    /// variables are bounded together, with the middles of the intervals as coefficients. Where
+    /// those are many, it is sharper to bound together only what has the very same variables;
+    /// both are done.
     pub fn combination(&mut self, parts: &[Part]) -> Interval {
+        let connected = self.sum_of_groups(self.connected(parts));
+        let alike = self.sum_of_groups(self.alike(parts));
+        connected.intersection(alike)
+    }
+
+    fn sum_of_groups(&mut self, groups: Vec<Vec<Part>>) -> Interval {
         let mut total = Interval::point(0.0);
-        for group in self.groups(parts) {
+        for group in groups {
             if let [(row, delta)] = group[..] {
                 total = total + delta * self.term(row);
                 continue;
@@ -95,8 +105,18 @@ impl Ranges {
         total
     }
 
+    /// Terms with the same variables.
+    fn alike(&self, parts: &[Part]) -> Vec<Vec<Part>> {
+        let mut groups: BTreeMap<Vec<SymbolId>, Vec<Part>> = BTreeMap::new();
+        for &(row, delta) in parts {
+            let symbols = self.pool.symbols_of(self.terms[row]).into_iter().collect();
+            groups.entry(symbols).or_default().push((row, delta));
+        }
+        groups.into_values().collect()
+    }
+
     /// Connected components: terms that share a variable, directly or through others.
-    fn groups(&self, parts: &[Part]) -> Vec<Vec<Part>> {
+    fn connected(&self, parts: &[Part]) -> Vec<Vec<Part>> {
         let mut groups: Vec<(Vec<SymbolId>, Vec<Part>)> = Vec::new();
         for &(row, delta) in parts {
             let mut symbols: Vec<SymbolId> =
@@ -288,6 +308,44 @@ mod tests {
             range.contains(largest) && range.contains(-largest),
             "{range}"
         );
+    }
+
+    #[test]
+    fn many_terms_that_share_variables_are_bounded_no_worse_than_one_by_one() {
+        let texts = ["x", "sin(x)", "x*y", "y*cos(x)", "x^2*y", "y^2", "cos(x*y)"];
+        let mut ranges = ranges(&texts, -1.0, 2.0);
+        let parts = [0.3, -0.3, 0.2, -0.7, 0.1, 0.4, -0.9];
+        let parts: Vec<Part> = (parts.iter().enumerate())
+            .map(|(row, delta)| (row, Interval::point(*delta)))
+            .collect();
+        let one_by_one = (parts.iter())
+            .map(|&(row, delta)| delta * ranges.term(row))
+            .fold(Interval::point(0.0), |sum, range| sum + range);
+        let together = ranges.combination(&parts);
+        assert!(one_by_one.lo() < together.lo() && together.hi() < one_by_one.hi());
+        for (x, y) in [
+            (-1.0, -1.0),
+            (2.0, 2.0),
+            (-1.0, 2.0),
+            (2.0, -1.0),
+            (0.7, 1.3),
+        ] {
+            let values = [
+                x,
+                f64::sin(x),
+                x * y,
+                y * x.cos(),
+                x * x * y,
+                y * y,
+                (x * y).cos(),
+            ];
+            let sum: f64 = parts
+                .iter()
+                .zip(values)
+                .map(|(part, v)| part.1.lo() * v)
+                .sum();
+            assert!(together.contains(sum), "{together} {sum}");
+        }
     }
 
     #[test]
