@@ -1,13 +1,54 @@
 //! What targets spell differently.
 
-use super::code::{Argument, ConstTable, Function, MathFunction, Parameter};
+use super::code::{Argument, ConstTable, Function, Index, Infix, MathFunction, Parameter};
 use super::literal::Literal;
+use super::printer::subscript;
 
 /// Spelling of a target language. The printer owns precedence and parentheses, the
 /// dialect everything that differs between languages.
 pub trait Dialect {
     /// Words that no variable may be called.
     fn reserved(&self) -> &'static [&'static str];
+
+    /// What ends a statement.
+    fn terminator(&self) -> &'static str {
+        ";"
+    }
+
+    /// What follows the head of a loop, and what closes its body.
+    fn loop_ends(&self) -> (&'static str, Option<&'static str>) {
+        (" {", Some("}"))
+    }
+
+    /// What ends a line that goes on in the next.
+    fn continuation(&self) -> &'static str {
+        ""
+    }
+
+    /// Whether there is `+=`.
+    fn adds_in_place(&self) -> bool {
+        true
+    }
+
+    /// An operator between numbers, with the spaces around it.
+    fn operator(&self, op: Infix) -> &'static str {
+        match op {
+            Infix::Add => " + ",
+            Infix::Sub => " - ",
+            Infix::Mul => "*",
+            Infix::Div => "/",
+        }
+    }
+
+    /// An element of an array.
+    fn element(&self, array: &str, index: &Index) -> String {
+        format!("{array}[{}]", subscript(index))
+    }
+
+    /// An entry of a table.
+    fn entry(&self, table: &str, row: &Index, col: &Index) -> String {
+        format!("{table}[{}][{}]", subscript(row), subscript(col))
+    }
 
     /// A number in the target's precision.
     fn literal(&self, literal: Literal) -> String;
@@ -24,7 +65,7 @@ pub trait Dialect {
     /// Declaration of an array that is assigned later.
     fn declare(&self, name: &str, len: usize) -> String;
 
-    /// Head of a loop whose body follows in braces.
+    /// Head of a loop.
     fn for_loop(&self, variable: &str, count: usize) -> String;
 
     /// Beginning of the names of constant tables.

@@ -7,9 +7,12 @@ use super::latex::LatexOptions;
 use super::markdown::MarkdownOptions;
 use super::mathml::MathmlOptions;
 use super::precision::Precision;
+use super::script::{matlab, python};
+use super::sines::SineCosine;
 use super::target::{EmitError, EmittedFile};
+use super::units::Units;
 use super::{c, controller, latex, markdown, mathml, rust};
-use crate::lower::LowerOptions;
+use crate::lower::{LowerError, LowerOptions};
 use crate::model::ReducedModel;
 
 /// What can be generated.
@@ -25,18 +28,27 @@ pub enum Target {
     Markdown,
     /// Equations for web pages.
     Mathml,
+    /// A Python module on NumPy.
+    Python,
+    /// A Python module of CasADi functions.
+    Casadi,
+    /// A function file for MATLAB and Octave.
+    Matlab,
     /// The controller as a crate with a C interface.
     Controller,
 }
 
 impl Target {
     /// All targets, in the order in which they are listed.
-    pub const ALL: [Target; 6] = [
+    pub const ALL: [Target; 9] = [
         Target::Latex,
         Target::C,
         Target::Rust,
         Target::Markdown,
         Target::Mathml,
+        Target::Python,
+        Target::Casadi,
+        Target::Matlab,
         Target::Controller,
     ];
 
@@ -48,14 +60,10 @@ impl Target {
             Self::Rust => "rust",
             Self::Markdown => "markdown",
             Self::Mathml => "mathml",
+            Self::Python => "python",
+            Self::Casadi => "casadi",
+            Self::Matlab => "matlab",
             Self::Controller => "controller",
-        }
-    }
-
-    fn is_code(self) -> bool {
-        match self {
-            Self::C | Self::Rust => true,
-            Self::Latex | Self::Markdown | Self::Mathml | Self::Controller => false,
         }
     }
 }
@@ -83,8 +91,12 @@ pub struct EmitOptions {
     pub markdown: MarkdownOptions,
     /// How equations are set in MathML.
     pub mathml: MathmlOptions,
-    /// Floating-point numbers of generated code.
+    /// Floating-point numbers of C and Rust.
     pub precision: Precision,
+    /// What computes sines and cosines in C and Rust.
+    pub sines: SineCosine,
+    /// Units of robot coordinates in generated code.
+    pub units: Units,
     /// Digest of the model file, for the first line of generated code.
     pub digest: Option<String>,
 }
@@ -103,33 +115,68 @@ pub fn emit(
     targets: &[Target],
     options: &EmitOptions,
 ) -> Result<Vec<EmittedFile>, EmitError> {
-    let code = targets.iter().any(|target| target.is_code());
-    let entries = code.then(|| code_entries(model, options)).transpose()?;
     let provenance = provenance(model, options.digest.as_deref());
+    let (precision, sines) = (options.precision, options.sines);
+    let mut entries = EntriesOnDemand {
+        model,
+        options,
+        compiled: None,
+        scripts: None,
+    };
     let mut files = Vec::new();
     for target in targets {
-        let emitted = match (target, &entries) {
-            (Target::C, Some(entries)) => c::emit(entries, &provenance, options.precision)?,
-            (Target::Rust, Some(entries)) => rust::emit(entries, &provenance, options.precision)?,
-            (Target::C | Target::Rust, None) => Vec::new(),
-            (Target::Controller, _) => controller::emit(model, &options.lower, &provenance)?,
-            (Target::Latex, _) => latex::emit(model, &options.latex)?,
-            (Target::Markdown, _) => markdown::emit(model, &options.markdown)?,
-            (Target::Mathml, _) => mathml::emit(model, &options.mathml)?,
-        };
-        files.extend(emitted);
+        files.extend(match target {
+            Target::C => c::emit(entries.compiled()?, &provenance, precision, sines)?,
+            Target::Rust => rust::emit(entries.compiled()?, &provenance, precision, sines)?,
+            Target::Python => python::emit(entries.scripts()?, &provenance)?,
+            Target::Casadi => python::emit_casadi(entries.scripts()?, &provenance)?,
+            Target::Matlab => matlab::emit(entries.scripts()?, &provenance)?,
+            Target::Latex => latex::emit(model, &options.latex)?,
+            Target::Markdown => markdown::emit(model, &options.markdown)?,
+            Target::Mathml => mathml::emit(model, &options.mathml)?,
+            Target::Controller => controller::emit(model, &options.lower, &provenance)?,
+        });
     }
     Ok(files)
 }
 
-/// What is generated as code, with the error of single precision in the documentation.
-fn code_entries(model: &ReducedModel, options: &EmitOptions) -> Result<ModelEntries, EmitError> {
-    let mut entries = ModelEntries::new(model, &options.lower)?;
-    options.precision.check(&entries)?;
-    if options.precision == Precision::Single {
-        entries.state_bounds();
+/// What code is generated from, made when the first target asks.
+struct EntriesOnDemand<'a> {
+    model: &'a ReducedModel,
+    options: &'a EmitOptions,
+    compiled: Option<ModelEntries>,
+    scripts: Option<ModelEntries>,
+}
+
+impl EntriesOnDemand<'_> {
+    /// For C and Rust, with the error of single precision in the documentation.
+    fn compiled(&mut self) -> Result<&ModelEntries, EmitError> {
+        let entries = match self.compiled.take() {
+            Some(entries) => entries,
+            None => {
+                let mut entries = self.in_double()?;
+                self.options.precision.check(&entries)?;
+                if self.options.precision == Precision::Single {
+                    entries.state_bounds();
+                }
+                entries
+            }
+        };
+        Ok(self.compiled.insert(entries))
     }
-    Ok(entries)
+
+    /// For languages that compute in double precision alone.
+    fn scripts(&mut self) -> Result<&ModelEntries, EmitError> {
+        let entries = match self.scripts.take() {
+            Some(entries) => entries,
+            None => self.in_double()?,
+        };
+        Ok(self.scripts.insert(entries))
+    }
+
+    fn in_double(&self) -> Result<ModelEntries, LowerError> {
+        ModelEntries::new(self.model, &self.options.lower, self.options.units)
+    }
 }
 
 /// The first line of generated code, without comment signs.

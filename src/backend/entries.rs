@@ -2,6 +2,7 @@
 
 use super::code::Role;
 use super::precision::{Precision, stated_bounds};
+use super::units::Units;
 use crate::ir::{Program, Slot, Statement, Unary};
 use crate::lower::{self, JacobianPattern, LowerError, LowerOptions};
 use crate::model::{ModelError, ReducedModel, Signals, StateMap};
@@ -55,6 +56,8 @@ pub struct ModelEntries {
     pub identifier: String,
     /// Name of the model.
     pub name: String,
+    /// Units of robot coordinates at the interface.
+    pub units: Units,
     /// Number of latent coordinates.
     pub latent_dim: usize,
     /// Number of robot coordinates, if the model speaks of any.
@@ -88,16 +91,22 @@ impl ModelEntries {
     ///
     /// # Errors
     /// [`LowerError`] if a phase cannot be lowered.
-    pub fn new(model: &ReducedModel, options: &LowerOptions) -> Result<Self, LowerError> {
+    pub fn new(
+        model: &ReducedModel,
+        options: &LowerOptions,
+        units: Units,
+    ) -> Result<Self, LowerError> {
+        let model = &units.of_model(model)?;
         let phases = (0..model.phases().len())
             .map(|phase| phase_entries(model, phase, options))
             .collect::<Result<_, _>>()?;
         Ok(Self {
             identifier: model.identifier().to_string(),
             name: model.name().to_owned(),
+            units,
             latent_dim: model.latent_dim(),
             state_dim: model.state_dim(),
-            maps: map_entries(model)?,
+            maps: map_entries(model, units)?,
             phases,
         })
     }
@@ -123,9 +132,14 @@ impl ModelEntries {
     }
 }
 
-fn map_entries(model: &ReducedModel) -> Result<Vec<Entry>, LowerError> {
-    let (state, input) = (model.state(), model.input());
-    let n = "robot coordinates in SI units";
+fn map_entries(model: &ReducedModel, units: Units) -> Result<Vec<Entry>, LowerError> {
+    let (state, input) = match units {
+        Units::Si => (model.state(), model.input()),
+        // Their units are those of SI values.
+        Units::Scaled => (None, None),
+    };
+    let unit = units.of_robot();
+    let n = format!("robot coordinates in {unit}");
     let is_curved = |map: Result<&StateMap, ModelError>| map.is_ok_and(|m| m.as_affine().is_none());
     let equations = MapEquations {
         curved_encoder: is_curved(model.encoder_map()),
@@ -163,7 +177,7 @@ fn map_entries(model: &ReducedModel) -> Result<Vec<Entry>, LowerError> {
             lower::project_input(model),
             equations.project_input(),
             format!(
-                "{at_x}u: generalised inputs in SI units. u_lat: latent inputs (scaled).{}",
+                "{at_x}u: generalised inputs in {unit}. u_lat: latent inputs (scaled).{}",
                 elements("u", input)
             ),
         ),
@@ -171,16 +185,20 @@ fn map_entries(model: &ReducedModel) -> Result<Vec<Entry>, LowerError> {
             lower::lift_input(model),
             equations.lift_input(),
             format!(
-                "{at_x}u_lat: latent inputs (scaled). u: generalised inputs in SI units.{}",
+                "{at_x}u_lat: latent inputs (scaled). u: generalised inputs in {unit}.{}",
                 elements("u", input)
             ),
         ),
     ];
     let mut entries = Vec::new();
-    for (program, title, units) in candidates {
+    for (program, title, text) in candidates {
         match program {
             Ok(program) => {
-                let docs = vec![title.to_owned(), units, shapes(&program)];
+                let title = match units {
+                    Units::Si => title.to_owned(),
+                    Units::Scaled => without_factors(title),
+                };
+                let docs = vec![title, text, shapes(&program)];
                 entries.push(entry(program.name().to_owned(), program, docs));
             }
             Err(LowerError::Model(ModelError::Missing { .. })) => {}
@@ -188,6 +206,20 @@ fn map_entries(model: &ReducedModel) -> Result<Vec<Entry>, LowerError> {
         }
     }
     Ok(entries)
+}
+
+/// An equation of the maps between scaled values.
+fn without_factors(title: &str) -> String {
+    [
+        ("(s_x x)", "x"),
+        ("(s_x dx)", "dx"),
+        ("(s_u u)", "u"),
+        ("s_x x", "x"),
+        (" / s_x", ""),
+        (" / s_u", ""),
+    ]
+    .into_iter()
+    .fold(title.to_owned(), |text, (from, to)| text.replace(from, to))
 }
 
 /// The equations of the maps in words of the documentation, for linear and nonlinear models.
@@ -341,7 +373,7 @@ fn entry(name: String, program: Program, docs: Vec<String>) -> Entry {
     }
 }
 
-/// "Lengths: z 2, dz 2, u_lat 2, ddz 2. The arrays must not overlap."
+/// "Lengths: z 2, dz 2, u_lat 2, ddz 2."
 fn shapes(program: &Program) -> String {
     let mut names: Vec<String> = Vec::new();
     for slot in program.inputs().iter().chain(program.outputs()) {
@@ -350,10 +382,7 @@ fn shapes(program: &Program) -> String {
             names.push(text);
         }
     }
-    format!(
-        "Lengths: {}. The arrays must not overlap.",
-        names.join(", ")
-    )
+    format!("Lengths: {}.", names.join(", "))
 }
 
 /// " `x[0]` fr.hx (rad), ..." if the model names its coordinates.

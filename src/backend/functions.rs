@@ -6,6 +6,7 @@ use super::entries::{Entry, ModelEntries};
 use super::ident::{Ident, Namer};
 use super::tables::Tables;
 use super::translate::{Names, translate, translate_lanes};
+use super::usage::calls_kernel;
 use crate::ir::Slot;
 
 /// The functions of a model in one target, with the tables that they share.
@@ -52,6 +53,15 @@ impl ModelFunctions {
             phases,
             lanes,
             tables,
+        }
+    }
+
+    /// Leaves batches with sines to single calls, for kernels that no compiler vectorises.
+    pub fn sines_point_by_point(&mut self) {
+        for lanes in &mut self.lanes {
+            if lanes.as_deref().is_some_and(calls_kernel) {
+                *lanes = None;
+            }
         }
     }
 

@@ -1,4 +1,4 @@
-//! From programs and equations to text: C, Rust, LaTeX, Markdown, MathML, and the controller.
+//! From programs and equations to text: C, Rust, Python, MATLAB, LaTeX, Markdown, MathML, and the controller.
 //!
 //! A model enters [`emit()`]; files in memory leave, which [`write_files`] puts into a folder.
 //! `entries` lists what is generated, `translate` turns programs into the statements of
@@ -22,11 +22,14 @@ pub mod mathml;
 mod precision;
 mod printer;
 mod rust;
+mod script;
+mod sines;
 mod tables;
 mod target;
 mod translate;
 mod translate_arrays;
 pub mod typeset;
+mod units;
 mod usage;
 mod vectors;
 mod wrap;
@@ -34,4 +37,6 @@ mod wrap;
 pub use emit::{EmitOptions, Target, emit};
 pub use folder::{FolderError, write_files};
 pub use precision::{Precision, worst_errors};
+pub use sines::SineCosine;
 pub use target::{EmitError, EmittedFile};
+pub use units::Units;

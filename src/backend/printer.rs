@@ -70,9 +70,12 @@ impl<'a> Printer<'a> {
             match statement {
                 Stmt::For(variable, count, body) => {
                     let head = self.dialect.for_loop(&variable.to_string(), *count);
-                    self.line(&format!("{head} {{"), depth, text);
+                    let (open, close) = self.dialect.loop_ends();
+                    self.line(&format!("{head}{open}"), depth, text);
                     self.in_loop().block(body, depth + 1, text);
-                    self.line("}", depth, text);
+                    if let Some(close) = close {
+                        self.line(close, depth, text);
+                    }
                 }
                 Stmt::Let(name, value) => {
                     let value = self.expression(value);
@@ -100,7 +103,11 @@ impl<'a> Printer<'a> {
                         let sum = Expr::infix(Infix::Add, target.clone(), value.clone());
                         self.assign(target, " = ", &sum, depth, text);
                     }
-                    (Some(_) | None, value) => self.assign(target, " += ", value, depth, text),
+                    (_, value) if !self.dialect.adds_in_place() => {
+                        let sum = Expr::infix(Infix::Add, target.clone(), value.clone());
+                        self.assign(target, " = ", &sum, depth, text);
+                    }
+                    (_, value) => self.assign(target, " += ", value, depth, text),
                 },
                 Stmt::SinCos {
                     arguments,
@@ -135,7 +142,8 @@ impl<'a> Printer<'a> {
     }
 
     fn assign(&self, target: &Expr, op: &str, value: &Expr, depth: usize, text: &mut String) {
-        let line = format!("{}{op}{};", self.expression(target), self.expression(value));
+        let (target, value) = (self.expression(target), self.expression(value));
+        let line = format!("{target}{op}{value}{}", self.dialect.terminator());
         self.line(&line, depth, text);
     }
 
@@ -158,6 +166,7 @@ impl<'a> Printer<'a> {
                 return;
             };
             text.push_str(&rest[..cut]);
+            text.push_str(self.dialect.continuation());
             text.push('\n');
             rest = &rest[cut + 1..];
             indent = 4 * depth + 4;
@@ -169,10 +178,8 @@ impl<'a> Printer<'a> {
         match expr {
             Expr::Literal(literal) => self.dialect.literal(*literal),
             Expr::Name(name) => name.to_string(),
-            Expr::Element(array, index) => format!("{array}[{}]", subscript(index)),
-            Expr::Entry(table, row, col) => {
-                format!("{table}[{}][{}]", subscript(row), subscript(col))
-            }
+            Expr::Element(array, index) => self.dialect.element(&array.to_string(), index),
+            Expr::Entry(table, row, col) => self.dialect.entry(&table.to_string(), row, col),
             Expr::Negate(a) => format!("-{}", self.operand(a, Precedence::Atom)),
             Expr::Infix(Infix::Add | Infix::Sub, a, b)
                 if self.multiply_add.is_some() && (is_product(a) || is_product(b)) =>
@@ -192,12 +199,7 @@ impl<'a> Printer<'a> {
                     right
                 };
                 let left = self.operand(a, own);
-                let operator = match op {
-                    Infix::Add => " + ",
-                    Infix::Sub => " - ",
-                    Infix::Mul => "*",
-                    Infix::Div => "/",
-                };
+                let operator = self.dialect.operator(*op);
                 format!("{left}{operator}{}", self.operand(b, right))
             }
             Expr::Apply(function, a) => self.dialect.apply(*function, &self.expression(a)),

@@ -515,6 +515,35 @@ pub enum PrecisionChoice {
     F32,
 }
 
+/// Units of robot coordinates at the interface of generated code.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum UnitsChoice {
+    /// rad, m, N m, N
+    #[default]
+    Si,
+    /// Scaled as the model was learned: the model file's factors times SI values
+    Scaled,
+}
+
+/// What computes sines and cosines in generated code.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum SinCosChoice {
+    /// A kernel inside the file that compilers vectorise, the same bits everywhere
+    #[default]
+    Inline,
+    /// The platform's mathematics library
+    Library,
+}
+
+/// How the equations of a phase stand on a page of LaTeX.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FormChoice {
+    /// A number for each equation; breaks across pages
+    Align,
+    /// One number, a brace around the phase's equations
+    Cases,
+}
+
 /// How code is generated.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Generated code")]
@@ -522,6 +551,12 @@ pub struct CodeArguments {
     /// Floating-point numbers of C and Rust
     #[arg(long, value_enum, default_value = "f64")]
     pub precision: PrecisionChoice,
+    /// Units of robot coordinates and inputs that functions take and give
+    #[arg(long, value_enum, default_value = "si")]
+    pub units: UnitsChoice,
+    /// What computes sines and cosines in C and Rust
+    #[arg(long, value_enum, default_value = "inline")]
+    pub sincos: SinCosChoice,
 }
 
 /// How equations are printed.
@@ -540,6 +575,9 @@ pub struct EquationArguments {
     /// Longest line in em: 32 suits one column, 22 a column of a two-column paper
     #[arg(long, value_name = "EM", value_parser = positive_width)]
     pub width: Option<f64>,
+    /// Arrangement in LaTeX; cases for what fits on a page, align for longer phases, unless given
+    #[arg(long, value_enum)]
+    pub form: Option<FormChoice>,
     /// Write numbers in LaTeX with siunitx's \\num
     #[arg(long)]
     pub siunitx: bool,

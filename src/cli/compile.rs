@@ -6,14 +6,17 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::args::{CodeArguments, CompileArguments, EquationArguments, PrecisionChoice};
+use super::args::{
+    CodeArguments, CompileArguments, EquationArguments, FormChoice, PrecisionChoice, SinCosChoice,
+    UnitsChoice,
+};
 use super::output::{Table, check_output};
 use super::simplification;
-use crate::backend::latex::{LatexOptions, NumberStyle};
+use crate::backend::latex::{Form, LatexOptions, NumberStyle};
 use crate::backend::markdown::MarkdownOptions;
 use crate::backend::mathml::MathmlOptions;
 use crate::backend::typeset::{Rounding, SymbolTable};
-use crate::backend::{self, EmitOptions, EmittedFile, Precision, Target};
+use crate::backend::{self, EmitOptions, EmittedFile, Precision, SineCosine, Target, Units};
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::{Error, artifact};
@@ -128,11 +131,24 @@ pub fn emit(
             PrecisionChoice::F64 => Precision::Double,
             PrecisionChoice::F32 => Precision::Single,
         },
+        units: match code.units {
+            UnitsChoice::Si => Units::Si,
+            UnitsChoice::Scaled => Units::Scaled,
+        },
+        sines: match code.sincos {
+            SinCosChoice::Inline => SineCosine::Inline,
+            SinCosChoice::Library => SineCosine::Library,
+        },
         latex: LatexOptions {
             rounding,
             numbers: match equations.siunitx {
                 true => NumberStyle::Siunitx,
                 false => NumberStyle::Plain,
+            },
+            form: match equations.form {
+                None => Form::Automatic,
+                Some(FormChoice::Align) => Form::Align,
+                Some(FormChoice::Cases) => Form::Cases,
             },
             width_em: equations.width.unwrap_or(latex.width_em),
             symbols: symbols.clone(),

@@ -12,6 +12,7 @@ use super::functions::ModelFunctions;
 use super::kernel::KernelText;
 use super::precision::Precision;
 use super::printer::Printer;
+use super::sines::SineCosine;
 use super::target::{EmitError, EmittedFile};
 use super::usage::{calls_function, calls_kernel};
 use super::wrap::braced;
@@ -24,6 +25,7 @@ struct Header<'a> {
     model: &'a str,
     upper: String,
     is_single: bool,
+    units: &'static str,
     latent_dim: usize,
     state_dim: Option<usize>,
     maps: Vec<String>,
@@ -60,6 +62,7 @@ struct Kernel<'a> {
     /// From bit 1 to the sign.
     to_sign: u32,
     is_single: bool,
+    is_library: bool,
     k: KernelText,
 }
 
@@ -97,13 +100,17 @@ pub fn emit(
     entries: &ModelEntries,
     provenance: &str,
     precision: Precision,
+    sines: SineCosine,
 ) -> Result<Vec<EmittedFile>, EmitError> {
     let name = entries.identifier.as_str();
     let dialect = CDialect {
         name: name.to_owned(),
         precision,
     };
-    let functions = ModelFunctions::new(entries, &dialect, &format!("{name}_"));
+    let mut functions = ModelFunctions::new(entries, &dialect, &format!("{name}_"));
+    if sines == SineCosine::Library {
+        functions.sines_point_by_point();
+    }
     let printer = Printer::new(&dialect);
     let print = |function: &Function| printer.function(function);
     let phases: Vec<PhaseText> = entries
@@ -122,6 +129,7 @@ pub fn emit(
         model: &entries.name,
         upper: name.to_ascii_uppercase(),
         is_single: precision == Precision::Single,
+        units: entries.units.of_robot(),
         latent_dim: entries.latent_dim,
         state_dim: entries.state_dim,
         maps: functions
@@ -139,7 +147,7 @@ pub fn emit(
         f: dialect.suffix(),
         latent_dim: entries.latent_dim,
         n_lanes: precision.lanes(),
-        kernel: uses_kernel.then(|| kernel(&dialect)).transpose()?,
+        kernel: uses_kernel.then(|| kernel(&dialect, sines)).transpose()?,
         sign: functions
             .all()
             .any(|function| calls_function(&function.body, MathFunction::Sign)),
@@ -206,7 +214,7 @@ fn batch_prototype(dialect: &CDialect, phase: &str) -> String {
     let docs = [
         format!("{name}_{phase}_dynamics at `count` points."),
         "Points are contiguous per variable: element k of point p is z[k * count + p], and alike \
-         for dz, u_lat and ddz. The arrays must not overlap."
+         for dz, u_lat and ddz."
             .to_owned(),
     ];
     format!(
@@ -216,7 +224,7 @@ fn batch_prototype(dialect: &CDialect, phase: &str) -> String {
     )
 }
 
-fn kernel(dialect: &CDialect) -> Result<String, EmitError> {
+fn kernel(dialect: &CDialect, sines: SineCosine) -> Result<String, EmitError> {
     let name = dialect.name.as_str();
     let (bits, to_sign) = match dialect.precision {
         Precision::Double => ("uint64_t", 62),
@@ -230,6 +238,7 @@ fn kernel(dialect: &CDialect) -> Result<String, EmitError> {
         bits,
         to_sign,
         is_single: dialect.precision == Precision::Single,
+        is_library: sines == SineCosine::Library,
         k: KernelText::new(dialect.precision, &|literal| dialect.literal(literal)),
     };
     Ok(kernel.render()?)

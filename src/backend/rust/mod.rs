@@ -13,6 +13,7 @@ use super::functions::ModelFunctions;
 use super::kernel::KernelText;
 use super::precision::Precision;
 use super::printer::Printer;
+use super::sines::SineCosine;
 use super::target::{EmitError, EmittedFile};
 use super::usage::calls_kernel;
 use super::wrap::{comment_lines, tidy};
@@ -36,6 +37,8 @@ struct Lib<'a> {
     /// From bit 1 to the sign.
     to_sign: u32,
     is_single: bool,
+    is_library: bool,
+    units: &'static str,
     latent_dim: usize,
     n_lanes: usize,
     has_lanes: bool,
@@ -68,6 +71,7 @@ pub fn emit(
     entries: &ModelEntries,
     provenance: &str,
     precision: Precision,
+    sines: SineCosine,
 ) -> Result<Vec<EmittedFile>, EmitError> {
     let name = entries.identifier.as_str();
     let dialect = RustDialect { precision };
@@ -76,7 +80,10 @@ pub fn emit(
         Precision::Single => ("u32", 30),
     };
     let kernel = || KernelText::new(precision, &|literal| dialect.literal(literal));
-    let functions = ModelFunctions::new(entries, &dialect, "");
+    let mut functions = ModelFunctions::new(entries, &dialect, "");
+    if sines == SineCosine::Library {
+        functions.sines_point_by_point();
+    }
     let printer = Printer::new(&dialect);
     let print = |function: &Function| printer.function(function);
     let uses_kernel = functions.all().any(|function| calls_kernel(&function.body));
@@ -87,6 +94,8 @@ pub fn emit(
         bits,
         to_sign,
         is_single: precision == Precision::Single,
+        is_library: sines == SineCosine::Library,
+        units: entries.units.of_robot(),
         latent_dim: entries.latent_dim,
         n_lanes: precision.lanes(),
         has_lanes: functions.lanes.iter().any(Option::is_some),
