@@ -257,6 +257,29 @@ fn compile_prints_equations_with_the_names_and_digits_asked_for() {
 }
 
 #[test]
+fn compile_arranges_equations_as_asked() {
+    let folder = folder();
+    let arranged = |form: &str| {
+        let out = path(&folder, form);
+        done(&[
+            "compile",
+            "models/paper-2d.json",
+            "--emit",
+            "latex",
+            "--form",
+            form,
+            "--out-dir",
+            &out,
+        ]);
+        fs::read_to_string(folder.path().join(form).join("paper_2d.tex")).expect("equations")
+    };
+    let (align, cases) = (arranged("align"), arranged("cases"));
+    assert!(align.contains("\\begin{align}") && !align.contains("\\left\\{"));
+    assert!(!cases.contains("\\begin{align}"));
+    assert_ne!(align, cases);
+}
+
+#[test]
 fn compile_into_a_folder_with_a_foreign_file_is_refused_and_leaves_it() {
     let folder = folder();
     let out = path(&folder, "");

@@ -127,33 +127,19 @@ pub fn emit(
     let markdown = MarkdownOptions::default();
     let mathml = MathmlOptions::default();
     let options = EmitOptions {
-        precision: match code.precision {
-            PrecisionChoice::F64 => Precision::Double,
-            PrecisionChoice::F32 => Precision::Single,
-        },
-        units: match code.units {
-            UnitsChoice::Si => Units::Si,
-            UnitsChoice::Scaled => Units::Scaled,
-        },
-        sines: match code.sincos {
-            SinCosChoice::Inline => SineCosine::Inline,
-            SinCosChoice::Library => SineCosine::Library,
-        },
+        precision: code.precision.into(),
+        units: code.units.into(),
+        sines: code.sincos.into(),
         latex: LatexOptions {
             rounding,
             numbers: match equations.siunitx {
                 true => NumberStyle::Siunitx,
                 false => NumberStyle::Plain,
             },
-            form: match equations.form {
-                None => Form::Automatic,
-                Some(FormChoice::Align) => Form::Align,
-                Some(FormChoice::Cases) => Form::Cases,
-            },
+            form: equations.form.map_or(Form::Automatic, Form::from),
             width_em: equations.width.unwrap_or(latex.width_em),
             symbols: symbols.clone(),
             digest: digest.clone(),
-            ..latex
         },
         markdown: MarkdownOptions {
             rounding,
@@ -201,4 +187,40 @@ fn phases_in_words(model: &ReducedModel) -> String {
 
 fn file_json(path: &Path, bytes: usize) -> Value {
     json!({ "path": path.display().to_string(), "bytes": bytes })
+}
+
+impl From<PrecisionChoice> for Precision {
+    fn from(choice: PrecisionChoice) -> Self {
+        match choice {
+            PrecisionChoice::F64 => Self::Double,
+            PrecisionChoice::F32 => Self::Single,
+        }
+    }
+}
+
+impl From<UnitsChoice> for Units {
+    fn from(choice: UnitsChoice) -> Self {
+        match choice {
+            UnitsChoice::Si => Self::Si,
+            UnitsChoice::Scaled => Self::Scaled,
+        }
+    }
+}
+
+impl From<SinCosChoice> for SineCosine {
+    fn from(choice: SinCosChoice) -> Self {
+        match choice {
+            SinCosChoice::Inline => Self::Inline,
+            SinCosChoice::Library => Self::Library,
+        }
+    }
+}
+
+impl From<FormChoice> for Form {
+    fn from(choice: FormChoice) -> Self {
+        match choice {
+            FormChoice::Align => Self::Align,
+            FormChoice::Cases => Self::Cases,
+        }
+    }
 }

@@ -13,7 +13,9 @@ use askama::Template;
 use super::entries::ModelEntries;
 use super::precision::Precision;
 use super::rust;
+use super::sines::SineCosine;
 use super::target::{EmitError, EmittedFile};
+use super::units::Units;
 use super::wrap::tidy;
 use crate::lower::LowerOptions;
 use crate::model::ReducedModel;
@@ -132,7 +134,7 @@ pub fn emit(
         });
     }
     let plant = Plant::new(model)?;
-    let entries = &ModelEntries::new(model, options)?;
+    let entries = &ModelEntries::new(model, options, Units::Si)?;
     let name = entries.identifier.as_str();
     let folder = format!("{name}-controller");
     let mut files = Vec::new();
@@ -147,7 +149,7 @@ pub fn emit(
     for (path, text) in project(entries, &plant, provenance)? {
         add(&path, text);
     }
-    for file in rust::emit(entries, provenance, Precision::Double)? {
+    for file in rust::emit(entries, provenance, Precision::Double, SineCosine::Inline)? {
         let path = file.path.replacen(name, "model", 1);
         add(&path, file.contents);
     }

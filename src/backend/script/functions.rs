@@ -89,12 +89,16 @@ pub fn list<T>(elements: &[T], print: impl Fn(&T) -> String) -> String {
     elements.iter().map(print).collect::<Vec<_>>().join(", ")
 }
 
+/// Prints a function, with the phase it belongs to, if it belongs to one.
+pub type PrintFunction<'a, F> =
+    dyn Fn(&FunctionText, Option<&PhaseEntries>) -> Result<F, EmitError> + 'a;
+
 /// A language's way to print functions and numbers.
 pub struct Script<'a, F> {
     /// Prints statements.
     pub printer: Printer<'a>,
-    /// Prints a function; the phase it belongs to, if it belongs to one.
-    pub print: &'a dyn Fn(&FunctionText, Option<&PhaseEntries>) -> Result<F, EmitError>,
+    /// Prints a function.
+    pub print: &'a PrintFunction<'a, F>,
     /// Prints rows or columns of nonzeros, counted from 0.
     pub numbers: fn(&[usize]) -> String,
 }
