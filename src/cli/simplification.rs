@@ -17,7 +17,7 @@ use crate::sim::LatentSegment;
 use crate::simplify::{
     Certificate, Domain, MARGIN, PrintedEquation, RolloutBasis, RolloutEffect, Samples, Simplified,
     SimplifyError, Tolerance, bound_words, certificate_json, change_words, interval_words,
-    markdown, printed, rollouts_json, simplify,
+    lost_words, markdown, printed, rollouts_json, simplify,
 };
 use crate::{Error, artifact};
 
@@ -237,6 +237,9 @@ impl Outcome {
             tolerance_words(self.certificate.tolerance),
             equation_table(&self.certificate)
         );
+        for sentence in lost_words(&self.certificate) {
+            let _ = writeln!(text, "\n{sentence}.");
+        }
         if let Some(effect) = &self.rollouts {
             let _ = write!(text, "\n{}", rollout_table(effect));
         }

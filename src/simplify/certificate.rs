@@ -2,6 +2,7 @@
 
 use super::measure::Measured;
 use super::tolerance::Tolerance;
+use crate::model::LatentVariable;
 use crate::symbolic::Interval;
 
 /// What became of a term.
@@ -95,6 +96,9 @@ pub struct PhaseCertificate {
     /// Operations of the straight-line code of `ddz`, before and after; a sine with its cosine
     /// counts as two.
     pub operations: (usize, usize),
+    /// Variables that some `ddz` of the phase depended on, and none does any more: inputs among them
+    /// can no longer be used for control.
+    pub lost: Vec<LatentVariable>,
     /// One entry a latent coordinate.
     pub equations: Vec<EquationCertificate>,
 }

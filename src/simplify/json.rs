@@ -59,6 +59,7 @@ fn phase_json(phase: &PhaseCertificate) -> Value {
         "samples": phase.samples,
         "samples_outside_domain": phase.samples_outside,
         "operations": { "before": phase.operations.0, "after": phase.operations.1 },
+        "no_longer_depends_on": phase.lost.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "equations": phase.equations.iter().map(equation_json).collect::<Vec<_>>(),
     })
 }

@@ -30,6 +30,23 @@ pub fn change_words(change: &Change) -> String {
     }
 }
 
+/// What phases no longer depend on, a sentence each without its stop.
+pub fn lost_words(certificate: &Certificate) -> Vec<String> {
+    let phases = certificate
+        .phases
+        .iter()
+        .filter(|phase| !phase.lost.is_empty());
+    let sentence = |phase: &PhaseCertificate| {
+        let names: Vec<String> = phase.lost.iter().map(ToString::to_string).collect();
+        format!(
+            "Phase {} no longer depends on {}",
+            phase.name,
+            names.join(", ")
+        )
+    };
+    phases.map(sentence).collect()
+}
+
 /// The certificate of a model and its simplification as a page: totals, changes, effect on rollouts,
 /// what printing rounds, domain.
 pub fn markdown(
@@ -50,6 +67,9 @@ pub fn markdown(
     page += STATEMENT;
     page += "\n## Each equation\n\n";
     page += &equations(certificate);
+    for text in lost_words(certificate) {
+        let _ = writeln!(page, "\n{}.", code(&text));
+    }
     page += "\n## Each change\n\n";
     page += &changes(certificate);
     if let Some(effect) = rollouts {

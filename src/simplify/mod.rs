@@ -35,6 +35,7 @@
 //! ```
 
 mod certificate;
+mod count;
 mod domain;
 mod equation;
 mod error;
@@ -58,7 +59,7 @@ pub use certificate::{
 pub use domain::{Domain, MARGIN, PhaseSamples, Samples};
 pub use error::SimplifyError;
 pub use json::{certificate_json, rollouts_json};
-pub use markdown::{bound_words, change_words, interval_words, markdown};
+pub use markdown::{bound_words, change_words, interval_words, lost_words, markdown};
 pub use measure::Measured;
 pub use printing::{PrintedEquation, printed};
 pub use rollouts::{RolloutBasis, RolloutEffect, RolloutErrors};

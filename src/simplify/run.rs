@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use serde_json::{Value, json};
 
 use super::certificate::{Certificate, Change, Effect, EquationCertificate, PhaseCertificate};
+use super::count::{digits, operations, variables};
 use super::domain::{Domain, Samples};
 use super::equation::{Equation, Step, Terms};
 use super::error::SimplifyError;
@@ -11,8 +12,6 @@ use super::measure::{Measured, at_samples};
 use super::tolerance::Tolerance;
 use super::workspace::Workspace;
 use crate::artifact;
-use crate::ir::{Program, Statement};
-use crate::lower::{self, Form, LowerOptions};
 use crate::model::{LatentVariable, ReducedModel};
 use crate::symbolic::Interval;
 
@@ -80,6 +79,8 @@ pub fn simplify(
     }
     for (phase, certificate) in certificate.phases.iter_mut().enumerate() {
         certificate.operations = (operations(model, phase)?, operations(&simplified, phase)?);
+        let (before, after) = (variables(model, phase), variables(&simplified, phase));
+        certificate.lost = before.into_iter().filter(|v| !after.contains(v)).collect();
     }
     Ok(Simplified {
         model: simplified,
@@ -103,32 +104,6 @@ fn provenance_of(model: &ReducedModel, certificate: &Certificate) -> Value {
         "simplified_from": artifact::digest(model).to_string(),
         "ddz_bounds": bounds,
     })
-}
-
-/// Significant decimal digits of the shortest texts that read back as the coefficients.
-fn digits(xi: &[f64]) -> usize {
-    let active = xi.iter().filter(|&&coefficient| coefficient != 0.0);
-    let of = |coefficient: &f64| {
-        let text = format!("{coefficient:e}");
-        let mantissa = text.split('e').next().unwrap_or_default();
-        mantissa.chars().filter(char::is_ascii_digit).count()
-    };
-    active.map(of).sum()
-}
-
-/// Operations of the straight-line code of `ddz`.
-fn operations(model: &ReducedModel, phase: usize) -> Result<usize, SimplifyError> {
-    let options = LowerOptions {
-        form: Form::StraightLine,
-    };
-    let program: Program = lower::dynamics(model, phase, &options)?;
-    let counted = program.statements().iter().enumerate();
-    Ok(counted
-        .map(|(index, statement)| match statement {
-            Statement::Constant(_) | Statement::Input { .. } | Statement::Constants { .. } => 0,
-            _ => program.values_of(index).len(),
-        })
-        .sum())
 }
 
 /// One phase with its box and samples.
@@ -205,6 +180,7 @@ impl<'a> PhaseProblem<'a> {
             samples: self.theta.nrows(),
             samples_outside: self.samples_outside,
             operations: (0, 0),
+            lost: Vec::new(),
             equations,
         };
         Ok((xi, certificate))

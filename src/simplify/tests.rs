@@ -325,6 +325,12 @@ fn bound_of_dropped_independent_terms_is_reached_at_a_corner() {
     let made = simplified(&terms, [(-1.0, 2.0), (-3.0, 1.0), UNIT], 2.0);
     let equation = &made.certificate.phases[0].equations[0];
     assert_eq!(left(&made).len(), 1);
+    let lost = [LatentVariable::Z(0), LatentVariable::Dz(0)];
+    assert_eq!(made.certificate.phases[0].lost, lost);
+    assert_eq!(
+        lost_words(&made.certificate),
+        ["Phase contact no longer depends on z1, dz1"]
+    );
     // 0.3 * 2 + 0.2 * 3
     assert!(
         (equation.bound.hi() - 1.2).abs() < 1e-12,
