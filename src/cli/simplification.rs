@@ -250,9 +250,10 @@ impl Outcome {
 /// What stands around a comment in a file of this kind; nothing where the model's equations are not.
 fn comment_marks(path: &Path) -> Option<[&'static str; 2]> {
     match path.extension()?.to_str()? {
-        "tex" => Some(["% ", ""]),
+        "tex" | "m" => Some(["% ", ""]),
         "c" | "h" => Some(["/* ", " */"]),
         "rs" => Some(["// ", ""]),
+        "py" => Some(["# ", ""]),
         "md" | "html" => Some(["<!-- ", " -->"]),
         _ => None,
     }
