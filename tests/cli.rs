@@ -762,7 +762,8 @@ fn hardware_jump_trains_simulates_and_gives_torques_inside_the_limits() {
 fn compile_within_zero_tolerance_emits_the_same_bytes() {
     let folder = folder();
     let (plain, zero) = (path(&folder, "plain"), path(&folder, "zero"));
-    let emit = ["compile", MODEL, "--emit", "latex,c,rust,markdown,mathml"];
+    let targets = "latex,c,rust,markdown,mathml,python,casadi,matlab,controller";
+    let emit = ["compile", MODEL, "--emit", targets];
     done(&[&emit[..], &["--out-dir", &plain]].concat());
     let tolerance = ["--tolerance", "0", "--domain", JUMP];
     done(&[&emit[..], &["--out-dir", &zero], &tolerance[..]].concat());
