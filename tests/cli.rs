@@ -405,6 +405,136 @@ fn train_takes_settings_from_a_file_and_flags_override_it() {
 }
 
 #[test]
+fn train_divides_jumps_by_shares_and_tells_figures_of_the_test_jumps() {
+    let folder = folder();
+    let model = path(&folder, "split.json");
+    let jumps: Vec<String> = (1..=5)
+        .map(|number| format!("examples/recordings/go1/train_{number:02}.csv.gz"))
+        .collect();
+    let mut arguments = vec!["train"];
+    arguments.extend(jumps.iter().map(String::as_str));
+    arguments.extend(["--latent-dim", "2", "--output", &model, "--split", "3,1,1"]);
+    let value = json(&arguments);
+    let mut files = Vec::new();
+    for (set, expected) in [("training", 3), ("validation", 1), ("test", 1)] {
+        let places = value["split"][set].as_array().expect("a list");
+        assert_eq!(places.len(), expected, "{set}");
+        files.extend(places.iter().map(|place| place["file"].to_string()));
+    }
+    files.sort();
+    files.dedup();
+    assert_eq!(files.len(), 5, "every jump is in one set");
+    let error = |set: &Value| set["decoder_mse"].as_f64().expect("a number");
+    let (tested, trained) = (error(&value["test"]), error(&value["report"]["training"]));
+    assert!(
+        tested > 0.0 && tested < 1e-3 && tested != trained,
+        "{tested}"
+    );
+    let written = text(&fs::read(&model).expect("a model"));
+    assert!(written.contains("--split 3,1,1"), "{written}");
+
+    arguments.extend(["--validation", &jumps[0]]);
+    assert_eq!(romc(&arguments).status.code(), Some(2));
+}
+
+#[test]
+fn train_tells_implausible_samples_and_leaves_them_out_only_when_asked() {
+    let folder = folder();
+    let (model, spoilt) = (path(&folder, "m.json"), path(&folder, "spoilt.csv"));
+    let mut recording = romc::recording::read("examples/recordings/go1/train_01.csv.gz".as_ref())
+        .expect("a shipped recording");
+    let last = recording.segments[0].len() - 10;
+    recording.segments[0].torque_nm[(4, last)] = 900.0;
+    recording.path = PathBuf::from(&spoilt);
+    romc::recording::write(Path::new(&spoilt), &recording).expect("writable");
+    let with = |more: &[&str]| {
+        let mut arguments = vec!["train", &spoilt, "examples/recordings/go1/train_02.csv.gz"];
+        arguments.extend(["--latent-dim", "2", "--output", &model, "--force", "--json"]);
+        arguments.extend(more);
+        let output = romc(&arguments);
+        let stderr = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{stderr}");
+        let value: Value = serde_json::from_str(&text(&output.stdout)).expect("one JSON value");
+        (value, stderr)
+    };
+    let (kept, stderr) = with(&[]);
+    assert!(
+        stderr.contains("spoilt.csv: 1 implausible") && stderr.contains("fl.hy Torque"),
+        "{stderr}"
+    );
+    assert!(stderr.contains("--leave-out-implausible"), "{stderr}");
+    let finding = &kept["recordings"]["implausible"][0];
+    assert_eq!(finding["first_row"], last + 2);
+    assert_eq!(finding["value"], 900.0);
+    assert_eq!(kept["recordings"]["left_out"], 0);
+
+    let (clean, stderr) = with(&["--leave-out-implausible"]);
+    // The sample, and the nine after it, which are too few to learn from.
+    assert_eq!(clean["recordings"]["left_out"], 10);
+    assert!(stderr.contains("10 samples are left out"), "{stderr}");
+    let torque_r2 = |value: &Value| value["report"]["training"]["torque_r2"].as_f64();
+    assert!(torque_r2(&clean) > torque_r2(&kept), "{clean}");
+    let written = text(&fs::read(&model).expect("a model"));
+    assert!(written.contains("--leave-out-implausible"), "{written}");
+}
+
+#[test]
+fn train_switches_of_the_defaults_do_what_they_say() {
+    let folder = folder();
+    let (config, model) = (path(&folder, "train.toml"), path(&folder, "m.json"));
+    let with = |settings: &str, more: &[&str]| {
+        fs::write(&config, settings).expect("writable");
+        let mut arguments = vec!["train", "examples/recordings/go1/train_01.csv.gz"];
+        arguments.extend(["--latent-dim", "2", "--config", &config]);
+        arguments.extend(["--output", &model, "--force"]);
+        arguments.extend(more);
+        let output = romc(&arguments);
+        (output.status.code(), text(&output.stderr))
+    };
+    let written = || -> Value {
+        serde_json::from_slice(&fs::read(&model).expect("a model")).expect("one JSON value")
+    };
+    let encoded = || {
+        let model = written();
+        let names = model["provenance"]["report"]["encoded"].clone();
+        names.as_array().expect("a list").len()
+    };
+    assert_eq!(with("", &[]).0, Some(0));
+    assert!(encoded() < 18, "coordinates that hardly move are masked");
+    let settings = "smooth = \"11,2\"\nmask-std = 0\nforce-scaling = 0.01\n";
+    let (code, stderr) = with(settings, &["--no-rotation", "--smooth-rows", "all"]);
+    assert_eq!(code, Some(0), "{stderr}");
+    assert_eq!(encoded(), 18);
+    let model = written();
+    assert_eq!(model["scaling"]["input"][12], 0.01);
+    assert_eq!(model["scaling"]["input"][0], 0.1);
+    assert_eq!(model["provenance"]["encoder_options"]["rotate"], false);
+    let command = model["provenance"]["command"].to_string();
+    for part in [
+        "--smooth 11,2",
+        "--smooth-rows all",
+        "--mask-std 0",
+        "--no-rotation",
+    ] {
+        assert!(command.contains(part), "{part}: {command}");
+    }
+
+    for (settings, more, code, named) in [
+        ("", &["--smooth", "10,2"][..], 2, "odd window"),
+        ("", &["--smooth-rows", "all"], 2, "--smooth"),
+        ("", &["--force-scaling", "0"], 2, "force-scaling"),
+        ("smooth = \"11\"\n", &[], 1, "11,2"),
+        ("moving-average = 0\n", &[], 1, "moving-average"),
+        ("", &["--split", "1"], 2, "14,3,3"),
+        ("", &["--split", "1,1"], 1, "cannot be divided"),
+    ] {
+        let (found, stderr) = with(settings, more);
+        assert_eq!(found, Some(code), "{settings} {more:?}: {stderr}");
+        assert!(stderr.contains(named), "{stderr}");
+    }
+}
+
+#[test]
 fn trained_networks_go_through_every_command() {
     let folder = folder();
     let (config, model) = (path(&folder, "train.toml"), path(&folder, "curved.json"));

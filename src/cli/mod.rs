@@ -11,6 +11,7 @@ mod import;
 mod inspect;
 mod inspect_model;
 mod inspect_recording;
+mod intake;
 mod manual;
 mod mpc;
 mod output;

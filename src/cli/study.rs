@@ -6,6 +6,7 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::{StudyArguments, TrainMethod, TrainSettings};
+use super::intake::Intake;
 use super::output::{Table, read_recordings, significant, spinner, write_file};
 use super::train_settings;
 use crate::Error;
@@ -60,8 +61,10 @@ fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
 fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let settings = settings(arguments)?;
     let robot = Robot::by_name(settings.robot.as_deref().unwrap_or("go1"))?;
-    let training = read_recordings(&arguments.recordings)?;
-    let validation = read_recordings(&arguments.validation)?;
+    let mut intake = Intake::new(&settings, robot)?;
+    let training = intake.take(&read_recordings(&arguments.recordings)?)?;
+    let validation = intake.take(&read_recordings(&arguments.validation)?)?;
+    intake.tell();
     let plan = plan(arguments, &settings, &training, &validation);
     let store = Store::create(&arguments.out_dir, plan)?;
     let bar = spinner("training");

@@ -8,10 +8,10 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::{TrainArguments, TrainMethod, TrainSettings};
-use super::output::{Table, check_output, read_recordings, significant, spinner};
+use super::intake::{Intake, RecordedSets};
+use super::output::{Table, check_output, significant, spinner};
 use super::train_settings;
 use crate::files::Overwrite;
-use crate::recording::Recording;
 use crate::robot::Robot;
 use crate::train::{Origin, Progress, Recordings, SetMetrics, TrainReport, Trained, Watch};
 use crate::{Error, artifact, train};
@@ -29,15 +29,19 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         .expect("checked by clap, or with the file");
     let method = train_settings::method(&settings);
     let robot = Robot::by_name(settings.robot.as_deref().unwrap_or("go1"))?;
-    let training = read_recordings(&arguments.recordings)?;
-    let validation = read_recordings(&arguments.validation)?;
+    let options = train_settings::options(&settings, latent_dim, model_name(arguments));
+    let recorded = RecordedSets::read(arguments, options.seed)?;
+    let mut intake = Intake::new(&settings, robot)?;
+    let training = intake.take(&recorded.training)?;
+    let validation = intake.take(&recorded.validation)?;
+    let test = intake.take(&recorded.test)?;
+    intake.tell();
     let sets = Recordings {
         training: &training,
         validation: &validation,
     };
-    let all: Vec<Recording> = training.iter().chain(&validation).cloned().collect();
-    let origin = Origin::new(command_line(arguments, &settings, method), &all);
-    let options = train_settings::options(&settings, latent_dim, model_name(arguments));
+    let files = arguments.recordings.iter().chain(&arguments.validation);
+    let origin = Origin::of_files(command_line(arguments, &settings, method), files);
 
     let bar = spinner("training");
     let mut listener = |news: Progress| match news {
@@ -52,7 +56,24 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let trained = learn(sets, robot, &options, &origin, &mut watch)?;
     bar.finish_and_clear();
     artifact::write_with(&arguments.output, &trained.model, overwrite)?;
-    Ok(answer(arguments, &trained))
+    let mut answer = match test.is_empty() {
+        true => answer(arguments, &trained, None),
+        false => {
+            let tested = train::assess(&trained.model, &test)?;
+            answer(arguments, &trained, Some(&tested))
+        }
+    };
+    answer.json["recordings"] = intake.json();
+    if arguments.split.is_some() {
+        answer.json["split"] = recorded.json();
+        let sizes = [&training, &validation, &test].map(|set| set.len());
+        let [training, validation, test] = sizes;
+        let _ = writeln!(
+            answer.text,
+            "\nof the jumps {training} were for training, {validation} for validation, {test} for test"
+        );
+    }
+    Ok(answer)
 }
 
 /// Becomes true at the first Ctrl-C, so that a training ends with the best so far; the second one ends the process.
@@ -91,6 +112,9 @@ fn command_line(
     if !arguments.validation.is_empty() {
         let _ = write!(line, " --validation {}", paths(&arguments.validation));
     }
+    if let Some(split) = arguments.split {
+        let _ = write!(line, " --split {split}");
+    }
     let settings = TrainSettings {
         method: Some(method),
         ..settings.clone()
@@ -100,22 +124,25 @@ fn command_line(
     line
 }
 
-fn answer(arguments: &TrainArguments, trained: &Trained) -> Answer {
+fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetrics>) -> Answer {
     let report = &trained.report;
-    let mut table = Table::new(["figure", "unit", "training", "validation"]);
-    let validation = report.validation.as_ref();
+    let mut sets = vec![
+        ("training", Some(&report.training)),
+        ("validation", report.validation.as_ref()),
+    ];
+    if tested.is_some() {
+        sets.push(("test", tested));
+    }
+    let names = sets.iter().map(|(name, _)| *name);
+    let mut table = Table::new(["figure", "unit"].into_iter().chain(names));
     let mut row = |name: &str, unit: &str, value: &dyn Fn(&SetMetrics) -> Option<f64>| {
-        let cell = |set: Option<&SetMetrics>, absent: &str| {
+        let cell = |set: Option<&SetMetrics>| {
             set.map_or(String::new(), |set| {
-                value(set).map_or(absent.to_owned(), significant)
+                value(set).map_or("diverged".to_owned(), significant)
             })
         };
-        table.row([
-            name.to_owned(),
-            unit.to_owned(),
-            cell(Some(&report.training), "diverged"),
-            cell(validation, "diverged"),
-        ]);
+        let label = [name.to_owned(), unit.to_owned()].into_iter();
+        table.row(label.chain(sets.iter().map(|(_, set)| cell(*set))));
     };
     row("decoder mean square", "scaled", &|set| {
         Some(set.decoder_mse)
@@ -150,6 +177,7 @@ fn answer(arguments: &TrainArguments, trained: &Trained) -> Answer {
             "name": trained.model.name(),
             "latent_dim": trained.model.latent_dim(),
             "report": report,
+            "test": tested,
         }),
     }
 }

@@ -7,12 +7,15 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::args::{
-    BpttIntegrator, HiddenActivation, PhaseSet, TrainArguments, TrainMethod, TrainSettings,
+    AccelerationSource, BpttIntegrator, FilteredRows, HiddenActivation, PhaseSet, TrainArguments,
+    TrainMethod, TrainSettings,
 };
 use crate::Error;
 use crate::model::{Activation, StandardLibrary};
-use crate::recording::PhaseRule;
-use crate::train::{Integrator, LibraryChoice, MapOptions, TrainError, TrainOptions};
+use crate::recording::preprocess::SmoothedRows;
+use crate::recording::smoothing::SavitzkyGolay;
+use crate::recording::{Accelerations, ConditionOptions, ImplausibleSamples, PhaseRule};
+use crate::train::{Integrator, LibraryChoice, MIN_SAMPLES, MapOptions, TrainError, TrainOptions};
 
 /// The options that the settings describe.
 pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String) -> TrainOptions {
@@ -40,11 +43,50 @@ pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String)
     set(&mut options.encoder.lift_weight, settings.lift_weight);
     set(&mut options.encoder.body_weight, settings.body_weight);
     set(&mut options.regression.slack, settings.slack);
+    set(&mut options.regression.smoothing, settings.moving_average);
+    set(&mut options.encoder.least_std, settings.mask_std);
+    set(
+        &mut options.encoder.least_input_share,
+        settings.mask_input_share,
+    );
+    options.encoder.rotate &= !settings.no_rotation;
+    set(&mut options.scaling.state, settings.state_scaling);
+    set(&mut options.scaling.torque, settings.torque_scaling);
+    set(&mut options.scaling.force, settings.force_scaling);
+    set(&mut options.scaling.moment, settings.moment_scaling);
     options.library = library(settings, options.library);
     if settings.phases == Some(PhaseSet::ContactRearFlight) {
         options.phases = PhaseRule::three_phase().with_min_samples(options.phases.min_samples);
     }
     options
+}
+
+/// What happens to recordings before they are learned from.
+///
+/// # Errors
+/// [`TrainError::Recording`] for a filter that does not exist.
+pub(super) fn conditioning(settings: &TrainSettings) -> Result<ConditionOptions, TrainError> {
+    let rows = match settings.smooth_rows {
+        Some(FilteredRows::All) => SmoothedRows::All,
+        Some(FilteredRows::Accelerations) | None => SmoothedRows::Accelerations,
+    };
+    let filter = settings
+        .smooth
+        .map(|shape| SavitzkyGolay::new(shape.window, shape.order))
+        .transpose()?;
+    Ok(ConditionOptions {
+        implausible: match settings.leave_out_implausible {
+            true => ImplausibleSamples::LeaveOut,
+            false => ImplausibleSamples::Keep,
+        },
+        least_samples: MIN_SAMPLES,
+        accelerations: match settings.accelerations {
+            Some(AccelerationSource::Differences) => Accelerations::Differences,
+            Some(AccelerationSource::Recorded) | None => Accelerations::Recorded,
+        },
+        smoothing: filter.map(|filter| (filter, rows)),
+        ..ConditionOptions::default()
+    })
 }
 
 /// The layers of encoder and decoder; the decoder mirrors the encoder unless it is described itself.
@@ -134,11 +176,11 @@ pub(super) fn as_flags(settings: &TrainSettings) -> String {
 pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Error> {
     let given = &arguments.settings;
     let Some(path) = &arguments.config else {
-        check_activation(given)?;
+        check_pairs(given)?;
         return Ok(given.clone());
     };
     let settings = overlay(given, read(path)?);
-    check_activation(&settings)?;
+    check_pairs(&settings)?;
     if settings.latent_dim.is_none() {
         return Err(refused(
             path,
@@ -148,16 +190,30 @@ pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Err
     Ok(settings)
 }
 
-/// An activation is of hidden layers only.
-fn check_activation(settings: &TrainSettings) -> Result<(), Error> {
-    match settings.activation {
-        Some(activation) if maps(settings).is_linear() => Err(Error::Train(TrainError::Option {
-            option: "activation",
-            found: format!("{activation:?} without hidden layers"),
-            expected: "`--encoder-layers` or `--decoder-layers` beside it",
-        })),
-        Some(_) | None => Ok(()),
+/// An activation is of hidden layers only, rows to filter of a filter.
+fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
+    let refused = |option, found, expected| {
+        Err(Error::Train(TrainError::Option {
+            option,
+            found,
+            expected,
+        }))
+    };
+    if let (Some(activation), true) = (settings.activation, maps(settings).is_linear()) {
+        return refused(
+            "activation",
+            format!("{activation:?} without hidden layers"),
+            "`--encoder-layers` or `--decoder-layers` beside it",
+        );
     }
+    if let (Some(rows), None) = (settings.smooth_rows, settings.smooth) {
+        return refused(
+            "smooth-rows",
+            format!("{rows:?} without a filter"),
+            "`--smooth` beside it",
+        );
+    }
+    Ok(())
 }
 
 /// The settings of a file.
@@ -191,6 +247,7 @@ fn check(settings: &TrainSettings) -> Result<(), String> {
         ("epochs", settings.epochs),
         ("bptt-window", settings.bptt_window),
         ("bptt-stride", settings.bptt_stride),
+        ("moving-average", settings.moving_average),
     ];
     if let Some((name, _)) = counts.iter().find(|(_, count)| *count == Some(0)) {
         return Err(format!("`{name}` is 0, expected at least 1"));
@@ -239,5 +296,17 @@ fn overlay(above: &TrainSettings, below: TrainSettings) -> TrainSettings {
         trigonometric: above.trigonometric || below.trigonometric,
         terms: above.terms.or(below.terms),
         phases: above.phases.or(below.phases),
+        leave_out_implausible: above.leave_out_implausible || below.leave_out_implausible,
+        accelerations: above.accelerations.or(below.accelerations),
+        smooth: above.smooth.or(below.smooth),
+        smooth_rows: above.smooth_rows.or(below.smooth_rows),
+        moving_average: above.moving_average.or(below.moving_average),
+        mask_std: above.mask_std.or(below.mask_std),
+        mask_input_share: above.mask_input_share.or(below.mask_input_share),
+        no_rotation: above.no_rotation || below.no_rotation,
+        state_scaling: above.state_scaling.or(below.state_scaling),
+        torque_scaling: above.torque_scaling.or(below.torque_scaling),
+        force_scaling: above.force_scaling.or(below.force_scaling),
+        moment_scaling: above.moment_scaling.or(below.moment_scaling),
     }
 }

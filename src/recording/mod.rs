@@ -3,7 +3,7 @@
 //! Enters: CSV files of one or several jumps, plain or gzip. Leaves: segments
 //! of consecutive samples in SI units, samples as columns; the spans of each
 //! contact phase; a report of what is implausible. Read [`segment`] for the
-//! data first, then [`columns`] and [`csv`] for the format, [`check`],
+//! data first, then [`columns`] and [`csv`] for the format, [`check`], [`condition()`],
 //! [`phases`] and [`preprocess`] for what is done with it, and [`mod@write`].
 //!
 //! ```
@@ -33,6 +33,7 @@
 
 pub mod check;
 pub mod columns;
+pub mod condition;
 pub mod csv;
 pub mod phases;
 pub mod preprocess;
@@ -47,6 +48,7 @@ mod table;
 
 pub use self::csv::{read, read_from_bytes};
 pub use self::write::{WriteOptions, write, write_with};
+pub use condition::{Accelerations, ConditionOptions, Conditioned, ImplausibleSamples, condition};
 pub use error::RecordingError;
 pub use phases::{PhaseRule, PhaseSpan, Stance};
 pub use segment::{Recording, Segment};

@@ -1,5 +1,7 @@
 //! From trained numbers to a model that carries where it comes from.
 
+use std::path::Path;
+
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
@@ -45,9 +47,17 @@ pub struct SourceFile {
 impl Origin {
     /// The origin of a training on these recordings; files that can no longer be read have an empty digest.
     pub fn new(command: impl Into<String>, recordings: &[Recording]) -> Self {
-        let files = recordings.iter().map(|recording| SourceFile {
-            path: recording.path.display().to_string(),
-            digest: std::fs::read(&recording.path)
+        Self::of_files(command, recordings.iter().map(|recording| &recording.path))
+    }
+
+    /// The same, by the paths of the files.
+    pub fn of_files(
+        command: impl Into<String>,
+        files: impl IntoIterator<Item = impl AsRef<Path>>,
+    ) -> Self {
+        let files = files.into_iter().map(|path| SourceFile {
+            path: path.as_ref().display().to_string(),
+            digest: std::fs::read(path.as_ref())
                 .map(|bytes| sha256(&bytes))
                 .unwrap_or_default(),
         });

@@ -12,7 +12,7 @@ use crate::recording::{PhaseRule, Recording, Segment};
 use crate::robot::{JOINT_DIM, Robot, STATE_DIM};
 
 /// Fewest samples of a segment, and of a phase over all segments.
-const MIN_SAMPLES: usize = 50;
+pub const MIN_SAMPLES: usize = 50;
 
 /// Factors from SI to scaled units, one a coordinate.
 #[derive(Clone, Debug, PartialEq)]

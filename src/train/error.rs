@@ -17,6 +17,14 @@ pub enum TrainError {
         /// `training` or `validation`.
         set: &'static str,
     },
+    /// There are fewer jumps than sets to divide them into.
+    #[error("{found} jumps cannot be divided into {expected} sets")]
+    Split {
+        /// Jumps in the recordings.
+        found: usize,
+        /// Sets with a share.
+        expected: usize,
+    },
     /// A recording is too short to learn from.
     #[error(
         "{path}: {found} samples in a segment starting at row {row}, expected at least {expected}"

@@ -30,10 +30,11 @@ mod prune;
 mod random;
 mod report;
 mod smooth;
+mod split;
 
 pub use assemble::{Origin, SourceFile};
 pub use closed_form::{Recordings, closed_form};
-pub use dataset::ScaleOptions;
+pub use dataset::{MIN_SAMPLES, ScaleOptions};
 pub use error::TrainError;
 pub use joint::{Integrator, Unroll, joint};
 pub use metrics::{SetMetrics, assess};
@@ -43,3 +44,4 @@ pub use options::{
 };
 pub use progress::{Progress, Watch};
 pub use report::{PhaseTerms, SeedReport, TrainReport, Trained};
+pub use split::{Split, SplitJumps};

@@ -280,9 +280,10 @@ impl TrainOptions {
             force,
             moment,
         } = self.scaling;
-        for factor in [state, torque, force, moment] {
-            above_zero("scaling", factor)?;
-        }
+        above_zero("state-scaling", state)?;
+        above_zero("torque-scaling", torque)?;
+        above_zero("force-scaling", force)?;
+        above_zero("moment-scaling", moment)?;
         let RegressionOptions {
             windows,
             ridges,

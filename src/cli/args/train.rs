@@ -1,0 +1,347 @@
+//! What can be typed after `romc train` and `romc study`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, ValueEnum};
+use serde::{Deserialize, Serialize};
+
+use super::{OutputArguments, at_least_one};
+use crate::recording::smoothing::SavitzkyGolay;
+use crate::robot::STATE_DIM;
+use crate::study::Shard;
+use crate::train::Split;
+
+/// How a model is learned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TrainMethod {
+    /// Encoder, decoder and coefficients each from a least-squares problem; seconds
+    ClosedForm,
+    /// Encoder, decoder and coefficients together by Adam, as published; minutes
+    Joint,
+}
+
+/// What the hidden layers of a nonlinear encoder or decoder apply to each unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HiddenActivation {
+    /// a, below zero exp(a) - 1
+    Elu,
+    /// Hyperbolic tangent
+    Tanh,
+    /// 1 / (1 + exp(-a))
+    Sigmoid,
+}
+
+/// Widths of hidden layers in their order: `32,16`, or `linear` for none; a list of numbers in a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Widths(pub Vec<usize>);
+
+impl FromStr for Widths {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "linear" {
+            return Ok(Self(Vec::new()));
+        }
+        let widths = text.split(',').map(|width| at_least_one(width.trim()));
+        let widths: Result<Vec<usize>, String> = widths.collect();
+        widths
+            .map(Self)
+            .map_err(|_| format!("found `{text}`, expected widths such as 32,16, or `linear`"))
+    }
+}
+
+/// How the window of predictions is integrated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BpttIntegrator {
+    /// Explicit Euler
+    Euler,
+    /// Midpoint rule
+    Rk2,
+    /// Classical Runge-Kutta
+    Rk4,
+}
+
+/// Where accelerations come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AccelerationSource {
+    /// The recording's own columns, differences where it has none
+    Recorded,
+    /// Differences of the recorded velocities
+    Differences,
+}
+
+/// What a filter is applied to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FilteredRows {
+    /// Accelerations only
+    Accelerations,
+    /// State, velocities, accelerations and torques
+    All,
+}
+
+/// Window and order of a filter: `11,2`, also in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub struct FilterShape {
+    /// Samples of the window, odd.
+    pub window: usize,
+    /// Degree of the polynomial.
+    pub order: usize,
+}
+
+impl FromStr for FilterShape {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let refused =
+            || format!("found `{text}`, expected an odd window and an order such as 11,2");
+        let (window, order) = text.split_once(',').ok_or_else(refused)?;
+        let number = |text: &str| text.trim().parse::<usize>().map_err(|_| refused());
+        let (window, order) = (number(window)?, number(order)?);
+        match SavitzkyGolay::new(window, order) {
+            Ok(_) => Ok(Self { window, order }),
+            Err(error) => Err(error.to_string()),
+        }
+    }
+}
+
+impl TryFrom<String> for FilterShape {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl From<FilterShape> for String {
+    fn from(shape: FilterShape) -> String {
+        format!("{},{}", shape.window, shape.order)
+    }
+}
+
+/// Phases that a model tells apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PhaseSet {
+    /// Any foot down, no foot down
+    ContactFlight,
+    /// A front foot down, only rear feet down, no foot down
+    ContactRearFlight,
+}
+
+/// `romc train`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc train examples/recordings/go1/train_*.csv.gz \\\n      --validation examples/recordings/go1/validation_*.csv.gz \\\n      --latent-dim 4 --method closed-form --output my-model.json"
+)]
+pub struct TrainArguments {
+    /// Recordings to learn from
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    /// Recordings that choose between candidate models
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    pub validation: Vec<PathBuf>,
+    /// Recordings that nothing sees before the end; the model's figures on them are told
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    pub test: Vec<PathBuf>,
+    /// Divide the jumps by these shares for training, validation and test, such as 14,3,3
+    #[arg(long, value_name = "SHARES", conflicts_with_all = ["validation", "test"])]
+    pub split: Option<Split>,
+    /// The model file to write
+    #[arg(long, value_name = "MODEL.json")]
+    pub output: PathBuf,
+    /// Settings by their names below, as `latent-dim = 4`; flags given here override them
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
+    #[command(flatten)]
+    pub settings: TrainSettings,
+    /// Name of the model; the output file's stem unless given
+    #[arg(long)]
+    pub name: Option<String>,
+    /// Replace an existing output file
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// Settings of `romc train`; what is not given keeps the default of the method.
+#[derive(Debug, Default, Clone, PartialEq, Args, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct TrainSettings {
+    /// Number of latent coordinates d
+    #[arg(long, value_name = "D", value_parser = at_least_one, required_unless_present = "config")]
+    pub latent_dim: Option<usize>,
+    /// How to learn (closed-form unless given)
+    #[arg(long, value_enum)]
+    pub method: Option<TrainMethod>,
+    /// Robot that made the recordings (go1 unless given)
+    #[arg(long)]
+    pub robot: Option<String>,
+    /// Train exactly as published: one scale, no mask, no lift loss, Xi from ones (joint method)
+    #[arg(long)]
+    pub paper: bool,
+    /// Seed of all random choices
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Seeds to try, counting up from the seed; the best is kept (1 unless given, joint method 3)
+    #[arg(long, value_parser = at_least_one)]
+    pub seeds: Option<usize>,
+    /// Epochs of a step, refinement not counted (joint method)
+    #[arg(long, value_parser = at_least_one)]
+    pub epochs: Option<usize>,
+    /// Widths of the encoder's hidden layers, such as 32,16; a linear layer to z follows (joint method)
+    #[arg(long, value_name = "WIDTHS")]
+    pub encoder_layers: Option<Widths>,
+    /// Widths of the decoder's hidden layers, or `linear` (those of the encoder backwards unless given)
+    #[arg(long, value_name = "WIDTHS")]
+    pub decoder_layers: Option<Widths>,
+    /// Activation of the hidden layers (elu unless given)
+    #[arg(long, value_enum)]
+    pub activation: Option<HiddenActivation>,
+    /// Weight of the input energy that the latent input cannot carry
+    #[arg(long, value_name = "WEIGHT")]
+    pub lift_weight: Option<f64>,
+    /// Weight of body x, y, z in the reconstruction error
+    #[arg(long, value_name = "WEIGHT")]
+    pub body_weight: Option<f64>,
+    /// Weight of the loss over a window of predictions, 0 for none (joint method)
+    #[arg(long, value_name = "WEIGHT")]
+    pub bptt_weight: Option<f64>,
+    /// Steps of that window (5 unless given)
+    #[arg(long, value_name = "STEPS", value_parser = at_least_one)]
+    pub bptt_window: Option<usize>,
+    /// Samples a step of that window (5 unless given: 10 ms at 500 Hz)
+    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
+    pub bptt_stride: Option<usize>,
+    /// Weight of a prediction against the one a step earlier (0.9 unless given)
+    #[arg(long, value_name = "FACTOR")]
+    pub bptt_decay: Option<f64>,
+    /// How predictions are integrated (rk2 unless given)
+    #[arg(long, value_enum)]
+    pub bptt_integrator: Option<BpttIntegrator>,
+    /// Validation error to give up for fewer terms, as a share of the least
+    #[arg(long, value_name = "SHARE")]
+    pub slack: Option<f64>,
+    /// Highest degree of the polynomial candidate terms
+    #[arg(long, value_name = "P")]
+    pub degree: Option<u32>,
+    /// Add sines and cosines of z and dz to the candidate terms
+    #[arg(long)]
+    pub trigonometric: bool,
+    /// Candidate terms of your own, separated by semicolons: "1; z1; dz1; u1; z1*dz2"
+    #[arg(long, value_name = "TERMS", conflicts_with_all = ["degree", "trigonometric"])]
+    pub terms: Option<String>,
+    /// Phases to tell apart
+    #[arg(long, value_enum)]
+    pub phases: Option<PhaseSet>,
+    /// Leave out samples that a robot cannot have done (`romc inspect` lists them)
+    #[arg(long)]
+    pub leave_out_implausible: bool,
+    /// Where accelerations come from (recorded unless given)
+    #[arg(long, value_enum)]
+    pub accelerations: Option<AccelerationSource>,
+    /// Savitzky-Golay filter over each jump: samples of the window and degree, such as 11,2
+    #[arg(long, value_name = "WINDOW,ORDER")]
+    pub smooth: Option<FilterShape>,
+    /// What that filter is applied to (accelerations unless given)
+    #[arg(long, value_enum)]
+    pub smooth_rows: Option<FilteredRows>,
+    /// Window of the mean over accelerations within each phase (11 unless given, 1 with --paper)
+    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
+    pub moving_average: Option<usize>,
+    /// Coordinates with a smaller standard deviation (rad or m) are masked unless actuated; 0 for no mask
+    #[arg(long, value_name = "STD")]
+    pub mask_std: Option<f64>,
+    /// Coordinates with a larger share of the input's energy count as actuated
+    #[arg(long, value_name = "SHARE")]
+    pub mask_input_share: Option<f64>,
+    /// Leave the latent basis as it comes, without varimax
+    #[arg(long)]
+    pub no_rotation: bool,
+    /// Scaled units of the state in one rad or m (0.1 unless given)
+    #[arg(long, value_name = "FACTOR")]
+    pub state_scaling: Option<f64>,
+    /// Scaled units of joint torques in one N m (0.1 unless given)
+    #[arg(long, value_name = "FACTOR")]
+    pub torque_scaling: Option<f64>,
+    /// Scaled units of forces on the body in one N (0.005 unless given, 0.1 with --paper)
+    #[arg(long, value_name = "FACTOR")]
+    pub force_scaling: Option<f64>,
+    /// Scaled units of moments on the body in one N m (0.05 unless given, 0.1 with --paper)
+    #[arg(long, value_name = "FACTOR")]
+    pub moment_scaling: Option<f64>,
+}
+
+/// `romc study`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc study examples/recordings/go1/train_*.csv.gz \\\n      --validation examples/recordings/go1/validation_*.csv.gz --latent-dims 1..18 --seeds 5\n\nA stopped study goes on when the same command is given again. On a cluster, `--shard 3/8` computes a part,\n`romc study --merge part1 part2 --out-dir whole` joins parts."
+)]
+pub struct StudyArguments {
+    /// Recordings to learn from
+    #[arg(value_name = "RECORDING", required_unless_present = "merge")]
+    pub recordings: Vec<PathBuf>,
+    /// Recordings that choose between candidate models and give the figures
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    pub validation: Vec<PathBuf>,
+    /// Latent dimensions: `4`, `1..18` (both ends counted) or `2,4,6`
+    #[arg(long, value_name = "DIMS", default_value = "1..18", value_parser = dimensions)]
+    pub latent_dims: Dimensions,
+    /// Seeds a dimension
+    #[arg(long, default_value_t = 5, value_parser = at_least_one)]
+    pub seeds: usize,
+    /// How to learn (closed-form unless given)
+    #[arg(long, value_enum)]
+    pub method: Option<TrainMethod>,
+    /// Train as published (joint method)
+    #[arg(long)]
+    pub paper: bool,
+    /// Settings of `romc train`, except `latent-dim`, `seed` and `seeds`
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
+    /// Weight of the complexity in the combined loss 2 E_dec + 2 lambda log |Xi|
+    #[arg(long, default_value_t = crate::evaluate::LAMBDA)]
+    pub lambda: f64,
+    /// Compute only this part of the study, such as 3/8
+    #[arg(long, value_name = "PART", value_parser = Shard::parse, conflicts_with = "merge")]
+    pub shard: Option<Shard>,
+    /// Join the finished parts in these folders instead of training
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["recordings", "validation", "config"])]
+    pub merge: Vec<PathBuf>,
+    /// Folder of the study
+    #[arg(long, value_name = "DIR", default_value = "out/study")]
+    pub out_dir: PathBuf,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// Latent dimensions of a study, ascending.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Dimensions(pub Vec<usize>);
+
+fn dimensions(text: &str) -> Result<Dimensions, String> {
+    let expected =
+        || format!("found `{text}`, expected 4, 1..18 or 2,4,6, each from 1 to {STATE_DIM}");
+    let number = |text: &str| match text.trim().parse::<usize>() {
+        Ok(d) if (1..=STATE_DIM).contains(&d) => Ok(d),
+        _ => Err(expected()),
+    };
+    let mut found = match text.split_once("..") {
+        Some((first, last)) => (number(first)?..=number(last)?).collect(),
+        None => text.split(',').map(number).collect::<Result<Vec<_>, _>>()?,
+    };
+    found.sort_unstable();
+    found.dedup();
+    if found.is_empty() {
+        return Err(expected());
+    }
+    Ok(Dimensions(found))
+}

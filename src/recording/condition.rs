@@ -1,0 +1,222 @@
+//! What happens to recordings before anything learns from them: implausible samples are found and,
+//! when asked, left out; accelerations are recomputed and rows smoothed, when asked.
+
+use super::check::{CheckOptions, Finding, check, without};
+use super::error::RecordingError;
+use super::preprocess::{SmoothedRows, differences, smoothed};
+use super::segment::Recording;
+use super::smoothing::SavitzkyGolay;
+use crate::robot::Robot;
+
+/// What becomes of samples that a robot cannot have done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ImplausibleSamples {
+    /// They stay.
+    #[default]
+    Keep,
+    /// They go, and the segment is divided there.
+    LeaveOut,
+}
+
+/// Where accelerations come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Accelerations {
+    /// From the file; by differences where it has none.
+    #[default]
+    Recorded,
+    /// From the velocities by differences (equation 21).
+    Differences,
+}
+
+/// The steps of [`condition`]; by default the recording stays as it is.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ConditionOptions {
+    /// What counts as implausible.
+    pub check: CheckOptions,
+    /// What becomes of it.
+    pub implausible: ImplausibleSamples,
+    /// Shortest piece between samples left out that is kept; shorter ones go too.
+    pub least_samples: usize,
+    /// Where accelerations come from.
+    pub accelerations: Accelerations,
+    /// Filter over whole segments.
+    pub smoothing: Option<(SavitzkyGolay, SmoothedRows)>,
+}
+
+/// A recording made ready, and what was found in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conditioned {
+    /// The recording to go on with.
+    pub recording: Recording,
+    /// What is implausible in the one that came in; segments and samples are counted there.
+    pub findings: Vec<Finding>,
+    /// Samples left out: the implausible ones, and pieces between them that are too short.
+    pub left_out: usize,
+}
+
+/// Checks a recording and applies the steps in the order of [`ConditionOptions`].
+///
+/// # Errors
+/// [`RecordingError::TooShort`] if nothing long enough remains, or a segment is shorter than the filter.
+pub fn condition(
+    recording: &Recording,
+    robot: &Robot,
+    options: &ConditionOptions,
+) -> Result<Conditioned, RecordingError> {
+    let findings = check(recording, robot, &options.check);
+    let mut kept = match options.implausible {
+        ImplausibleSamples::LeaveOut if !findings.is_empty() => {
+            long_enough(without(recording, &findings)?.0, options.least_samples)?
+        }
+        ImplausibleSamples::LeaveOut | ImplausibleSamples::Keep => recording.clone(),
+    };
+    let left_out = recording.sample_count() - kept.sample_count();
+    for segment in &mut kept.segments {
+        match options.accelerations {
+            Accelerations::Recorded => {}
+            Accelerations::Differences => {
+                segment.ddx = differences(&segment.time_s, &segment.dx);
+            }
+        }
+        if let Some((filter, rows)) = &options.smoothing {
+            *segment = smoothed(segment, filter, *rows)?;
+        }
+    }
+    Ok(Conditioned {
+        recording: kept,
+        findings,
+        left_out,
+    })
+}
+
+/// The recording without segments under `least` samples.
+fn long_enough(mut recording: Recording, least: usize) -> Result<Recording, RecordingError> {
+    let longest = recording.segments.iter().max_by_key(|part| part.len());
+    let (row, found) = longest.map_or((1, 0), |part| (part.first_row, part.len()));
+    recording.segments.retain(|segment| segment.len() >= least);
+    if recording.segments.is_empty() {
+        return Err(RecordingError::TooShort {
+            path: recording.path,
+            row,
+            found,
+            expected: least,
+        });
+    }
+    Ok(recording)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::recording::Segment;
+
+    /// A robot that stands still, with noise on the accelerations, and one torque that no motor gives.
+    fn recording() -> Recording {
+        let n = 200;
+        let mut torque_nm = DMatrix::from_element(12, n, 1.0);
+        torque_nm[(4, 60)] = 900.0;
+        torque_nm[(4, 70)] = 900.0;
+        let path = PathBuf::from("stand.csv");
+        let standing = |i: usize, _| match i {
+            0..12 => [0.0, 0.7, -1.4][i % 3],
+            14 => 0.3,
+            _ => 0.0,
+        };
+        Recording {
+            path: path.clone(),
+            segments: vec![Segment {
+                path,
+                first_row: 2,
+                row_stride: 1.0,
+                time_s: (0..n).map(|i| 0.002 * i as f64).collect(),
+                x: DMatrix::from_fn(18, n, standing),
+                dx: DMatrix::zeros(18, n),
+                ddx: DMatrix::from_fn(18, n, |_, j| if j % 2 == 0 { 0.5 } else { -0.5 }),
+                torque_nm,
+                feet: vec![[true; 4]; n],
+                body_wrench: None,
+            }],
+            ignored_columns: Vec::new(),
+        }
+    }
+
+    fn go1() -> &'static Robot {
+        Robot::by_name("go1").expect("a known robot")
+    }
+
+    #[test]
+    fn condition_by_default_reports_with_place_and_changes_nothing() {
+        let recording = recording();
+        let out = condition(&recording, go1(), &ConditionOptions::default()).expect("sound");
+        assert_eq!(out.recording, recording);
+        assert_eq!(out.left_out, 0);
+        let places: Vec<_> = out
+            .findings
+            .iter()
+            .map(|f| (f.first_row, f.value))
+            .collect();
+        assert_eq!(places, [(62, 900.0), (72, 900.0)]);
+        assert!(
+            out.findings[0].column.contains("fl.hy"),
+            "{:?}",
+            out.findings[0].column
+        );
+    }
+
+    #[test]
+    fn condition_leaves_out_implausible_samples_and_pieces_too_short_to_learn_from() {
+        let options = ConditionOptions {
+            implausible: ImplausibleSamples::LeaveOut,
+            least_samples: 50,
+            ..ConditionOptions::default()
+        };
+        let out = condition(&recording(), go1(), &options).expect("sound");
+        let pieces: Vec<_> = (out.recording.segments.iter())
+            .map(|piece| (piece.first_row, piece.len()))
+            .collect();
+        assert_eq!(pieces, [(2, 60), (73, 129)]);
+        assert_eq!(out.left_out, 11);
+
+        let options = ConditionOptions {
+            least_samples: 150,
+            ..options
+        };
+        let error = condition(&recording(), go1(), &options).expect_err("nothing remains");
+        assert!(matches!(
+            error,
+            RecordingError::TooShort {
+                row: 73,
+                found: 129,
+                expected: 150,
+                ..
+            }
+        ));
+    }
+
+    #[test]
+    fn condition_smooths_accelerations_or_takes_them_from_velocities() {
+        let filter = SavitzkyGolay::new(11, 2).expect("a filter");
+        let smooth = ConditionOptions {
+            smoothing: Some((filter, SmoothedRows::Accelerations)),
+            ..ConditionOptions::default()
+        };
+        let before = recording();
+        let out = condition(&before, go1(), &smooth).expect("sound").recording;
+        let ddx = |recording: &Recording| recording.segments[0].ddx.clone();
+        assert!(ddx(&out).norm() < 0.3 * ddx(&before).norm());
+        assert_eq!(out.segments[0].torque_nm, before.segments[0].torque_nm);
+
+        let differences = ConditionOptions {
+            accelerations: Accelerations::Differences,
+            ..ConditionOptions::default()
+        };
+        let out = condition(&before, go1(), &differences)
+            .expect("sound")
+            .recording;
+        assert_eq!(ddx(&out).amax(), 0.0);
+    }
+}

@@ -1,0 +1,226 @@
+//! Jumps divided into sets for training, validation and test.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::error::TrainError;
+use super::random::Random;
+use crate::recording::Recording;
+
+/// Shares of the jumps for training, validation and test, such as 14, 3 and 3: any unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Split {
+    shares: [usize; 3],
+}
+
+/// The sets of a [`Split`], each with one recording a jump in the order they came.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SplitJumps {
+    /// What the model is fitted to.
+    pub training: Vec<Recording>,
+    /// What chooses between candidates.
+    pub validation: Vec<Recording>,
+    /// What nothing sees before the end.
+    pub test: Vec<Recording>,
+}
+
+impl FromStr for Split {
+    type Err = String;
+
+    /// Two or three whole numbers separated by commas; the first is not 0.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let refused = || {
+            format!(
+                "found `{text}`, expected shares for training, validation and test such as 14,3,3"
+            )
+        };
+        let numbers = text.split(',').map(|number| number.trim().parse::<usize>());
+        let numbers: Vec<usize> = numbers.collect::<Result<_, _>>().map_err(|_| refused())?;
+        let shares = match numbers[..] {
+            [training, validation] => [training, validation, 0],
+            [training, validation, test] => [training, validation, test],
+            _ => return Err(refused()),
+        };
+        if shares[0] == 0 || shares.iter().any(|share| *share > 1_000_000) {
+            return Err(refused());
+        }
+        Ok(Self { shares })
+    }
+}
+
+impl fmt::Display for Split {
+    /// As it is read.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [training, validation, test] = self.shares;
+        write!(f, "{training},{validation},{test}")
+    }
+}
+
+impl Split {
+    /// Draws the sets: a jump (a segment of a recording) goes into one of them as a whole, by a random order that
+    /// depends on nothing but `seed` and the number of jumps.
+    ///
+    /// # Errors
+    /// [`TrainError::Split`] if there are fewer jumps than sets.
+    pub fn of(&self, recordings: &[Recording], seed: u64) -> Result<SplitJumps, TrainError> {
+        let jumps: Vec<Recording> = recordings.iter().flat_map(single_jumps).collect();
+        let counts = self.counts(jumps.len())?;
+        let order = shuffled(jumps.len(), seed);
+        let mut set = vec![0; jumps.len()];
+        for (place, jump) in order.into_iter().enumerate() {
+            set[jump] = match place {
+                place if place < counts[0] => 0,
+                place if place < counts[0] + counts[1] => 1,
+                _ => 2,
+            };
+        }
+        let [mut training, mut validation, mut test] = [const { Vec::new() }; 3];
+        for (jump, set) in jumps.into_iter().zip(set) {
+            [&mut training, &mut validation, &mut test][set].push(jump);
+        }
+        Ok(SplitJumps {
+            training,
+            validation,
+            test,
+        })
+    }
+
+    /// Jumps a set: in proportion, the largest remainders rounded up, at least one where the share is not 0.
+    fn counts(&self, jumps: usize) -> Result<[usize; 3], TrainError> {
+        let wanted = self.shares.iter().filter(|share| **share > 0).count();
+        if jumps < wanted {
+            return Err(TrainError::Split {
+                found: jumps,
+                expected: wanted,
+            });
+        }
+        let total: usize = self.shares.iter().sum();
+        let mut counts = self.shares.map(|share| match share {
+            0 => 0,
+            share => (share * jumps / total).max(1),
+        });
+        let owed = |counts: &[usize; 3], set: usize| {
+            (self.shares[set] * jumps) as i64 - (counts[set] * total) as i64
+        };
+        while counts.iter().sum::<usize>() != jumps {
+            let given: usize = counts.iter().sum();
+            let sets = (0..3).filter(|set| self.shares[*set] > 0);
+            // `max_by_key` takes the last of equals: reversed, training comes first.
+            if given < jumps {
+                let next = sets.rev().max_by_key(|set| owed(&counts, *set));
+                counts[next.expect("invariant: a share is not 0")] += 1;
+            } else {
+                let next = sets
+                    .filter(|set| counts[*set] > 1)
+                    .min_by_key(|set| owed(&counts, *set));
+                counts[next.expect("invariant: more jumps than sets")] -= 1;
+            }
+        }
+        Ok(counts)
+    }
+}
+
+/// A recording for each of its segments.
+fn single_jumps(recording: &Recording) -> impl Iterator<Item = Recording> + '_ {
+    recording.segments.iter().map(|segment| Recording {
+        path: recording.path.clone(),
+        segments: vec![segment.clone()],
+        ignored_columns: recording.ignored_columns.clone(),
+    })
+}
+
+/// The numbers below `count` in a random order (Fisher and Yates).
+fn shuffled(count: usize, seed: u64) -> Vec<usize> {
+    let mut random = Random::new(seed);
+    let mut order: Vec<usize> = (0..count).collect();
+    for last in (1..count).rev() {
+        order.swap(last, random.below(last + 1));
+    }
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::recording::Segment;
+
+    fn recording(name: &str, jumps: usize) -> Recording {
+        let path = PathBuf::from(name);
+        let segment = |jump: usize| Segment {
+            path: path.clone(),
+            first_row: 2 + 2 * jump,
+            row_stride: 1.0,
+            time_s: vec![0.0, 0.002],
+            x: DMatrix::zeros(18, 2),
+            dx: DMatrix::zeros(18, 2),
+            ddx: DMatrix::zeros(18, 2),
+            torque_nm: DMatrix::zeros(12, 2),
+            feet: vec![[true; 4]; 2],
+            body_wrench: None,
+        };
+        Recording {
+            path: path.clone(),
+            segments: (0..jumps).map(segment).collect(),
+            ignored_columns: Vec::new(),
+        }
+    }
+
+    fn split(text: &str) -> Split {
+        text.parse().expect("shares")
+    }
+
+    fn places(set: &[Recording]) -> Vec<(PathBuf, usize)> {
+        let place = |jump: &Recording| (jump.path.clone(), jump.segments[0].first_row);
+        set.iter().map(place).collect()
+    }
+
+    #[test]
+    fn split_takes_every_jump_into_one_set_and_depends_on_the_seed_alone() {
+        let recordings = [recording("a.csv", 13), recording("b.csv", 7)];
+        let sets = split("14,3,3").of(&recordings, 5).expect("enough jumps");
+        let found = [&sets.training, &sets.validation, &sets.test].map(|set| places(set));
+        assert_eq!(found.each_ref().map(Vec::len), [14, 3, 3]);
+        assert!(found.iter().all(|set| set.is_sorted()));
+        let mut all = found.concat();
+        all.sort();
+        all.dedup();
+        assert_eq!(all.len(), 20);
+        assert_eq!(sets, split("14,3,3").of(&recordings, 5).expect("enough"));
+        assert_ne!(sets, split("14,3,3").of(&recordings, 6).expect("enough"));
+    }
+
+    #[test]
+    fn split_gives_each_set_its_share_and_none_without_one() {
+        for (shares, jumps, expected) in [
+            ("14,3,3", 20, [14, 3, 3]),
+            ("70,15,15", 20, [14, 3, 3]),
+            ("70,15,15", 3, [1, 1, 1]),
+            ("1,1,1", 5, [2, 2, 1]),
+            ("98,1,1", 10, [8, 1, 1]),
+            ("4,1", 10, [8, 2, 0]),
+            ("1,0,1", 4, [2, 0, 2]),
+        ] {
+            let counts = split(shares).counts(jumps).expect("enough jumps");
+            assert_eq!(counts, expected, "{shares} of {jumps}");
+        }
+        assert!(matches!(
+            split("14,3,3").counts(2),
+            Err(TrainError::Split {
+                found: 2,
+                expected: 3
+            })
+        ));
+    }
+
+    #[test]
+    fn shares_that_are_not_two_or_three_numbers_are_refused() {
+        for text in ["14", "0,3,3", "14,3,3,3", "14,-3", "a,b", ""] {
+            let message = text.parse::<Split>().expect_err("refused");
+            assert!(message.contains("14,3,3"), "{text}: {message}");
+        }
+    }
+}
