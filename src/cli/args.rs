@@ -38,7 +38,7 @@ pub enum Command {
     /// Tell what a recording or a model holds, and what is implausible in it
     Inspect(InspectArguments),
     /// Learn a model from recordings
-    Train(TrainArguments),
+    Train(Box<TrainArguments>),
     /// Train every latent dimension with several seeds: accuracy against complexity
     Study(StudyArguments),
     /// Take over a model trained elsewhere: safetensors, npz, PySINDy, equations as text

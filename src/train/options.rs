@@ -274,16 +274,7 @@ impl TrainOptions {
             let (Pruning::Threshold(value) | Pruning::Elimination(value)) = pruning;
             at_least_zero("threshold", *value)?;
         }
-        let ScaleOptions {
-            state,
-            torque,
-            force,
-            moment,
-        } = self.scaling;
-        above_zero("state-scaling", state)?;
-        above_zero("torque-scaling", torque)?;
-        above_zero("force-scaling", force)?;
-        above_zero("moment-scaling", moment)?;
+        self.scaling.check()?;
         let RegressionOptions {
             windows,
             ridges,
@@ -303,6 +294,15 @@ impl TrainOptions {
             });
         }
         Ok(())
+    }
+}
+
+impl ScaleOptions {
+    fn check(&self) -> Result<(), TrainError> {
+        above_zero("state-scaling", self.state)?;
+        above_zero("torque-scaling", self.torque)?;
+        above_zero("force-scaling", self.force)?;
+        above_zero("moment-scaling", self.moment)
     }
 }
 
