@@ -1,5 +1,9 @@
 //! Generated C and Rust against the interpreter, and the interpreter against the model.
 
+#[path = "differential/agreement.rs"]
+mod agreement;
+#[path = "differential/driver_text.rs"]
+mod driver_text;
 #[path = "differential/drivers.rs"]
 mod drivers;
 #[path = "differential/functions.rs"]
@@ -8,8 +12,15 @@ mod functions;
 mod models;
 #[path = "differential/single.rs"]
 mod single;
+#[path = "differential/terms.rs"]
+mod terms;
 
-use drivers::{Workshop, c_compilers, contents};
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use agreement::{Rule, Tally, compare};
+use drivers::{Build, Workshop, cc, contents};
 use functions::{Function, Random, functions as functions_of};
 use nalgebra::DVector;
 use romc::ir::Interpreter;
@@ -17,13 +28,15 @@ use romc::lower::{self, Form, LowerOptions, dynamics_jacobian};
 use romc::model::{LatentVariable, ReducedModel};
 use romc::sim::CompiledModel;
 
-const N_POINTS: usize = 10_000;
+/// Random models of tests that compile nothing or little.
+const SOME_MODELS: u64 = 24;
 
-/// Random models compared in one run; more on request.
-fn n_random_models() -> u64 {
+/// Random models of the comparison with generated code, and how many of them every build compiles.
+fn n_random_models() -> (u64, u64) {
     let asked = std::env::var("ROMC_RANDOM_MODELS").ok();
-    asked.map_or(24, |count| {
-        count.parse().expect("ROMC_RANDOM_MODELS is a number")
+    asked.map_or((200, SOME_MODELS), |count| {
+        let count = count.parse().expect("ROMC_RANDOM_MODELS is a number");
+        (count, count)
     })
 }
 
@@ -31,6 +44,8 @@ fn n_random_models() -> u64 {
 struct Case {
     models: Vec<ReducedModel>,
     functions: Vec<Function>,
+    /// The model of each function.
+    model_of: Vec<usize>,
     points: Vec<Vec<f64>>,
     expected: Vec<Vec<f64>>,
     options: LowerOptions,
@@ -39,107 +54,178 @@ struct Case {
 impl Case {
     fn new(models: Vec<ReducedModel>, n_points: usize, form: Form) -> Self {
         let options = LowerOptions { form };
-        let functions: Vec<Function> = models
-            .iter()
-            .flat_map(|model| functions_of(model, n_points, &options))
-            .collect();
+        let (mut functions, mut model_of) = (Vec::new(), Vec::new());
+        for (index, model) in models.iter().enumerate() {
+            functions.extend(functions_of(model, n_points, &options));
+            model_of.resize(functions.len(), index);
+        }
         let mut random = Random(7);
-        let points: Vec<Vec<f64>> = functions.iter().map(|f| f.points(&mut random)).collect();
-        let expected = functions
-            .iter()
-            .zip(&points)
-            .map(|(f, p)| f.interpret(p))
-            .collect();
-        Self {
+        let points = functions.iter().map(|f| f.points(&mut random)).collect();
+        let mut case = Self {
             models,
             functions,
+            model_of,
             points,
-            expected,
+            expected: Vec::new(),
             options,
-        }
+        };
+        case.interpret();
+        case
+    }
+
+    fn interpret(&mut self) {
+        let pairs = self.functions.iter().zip(&self.points);
+        self.expected = pairs.map(|(f, points)| f.interpret(points)).collect();
     }
 
     fn workshop(&self) -> Workshop {
         Workshop::new(&self.models, &self.options)
     }
 
-    fn assert_same_bits(&self, found: &[Vec<f64>], by: &str) {
-        for ((function, found), expected) in self.functions.iter().zip(found).zip(&self.expected) {
-            for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
-                let same =
-                    found.to_bits() == expected.to_bits() || (found.is_nan() && expected.is_nan());
-                assert!(
-                    same,
-                    "{by}: {}_{}, result {k}: found {found:e}, interpreter {expected:e}",
-                    function.model, function.name
-                );
+    /// Runs the functions as `build` compiles them and compares every result.
+    fn check(&self, workshop: &Workshop, build: &Build) -> Tally {
+        let found = workshop.run(build, &self.functions, &self.points);
+        let mut tally = Tally::default();
+        for (k, found) in found.iter().enumerate() {
+            tally.add(compare(
+                &self.models[self.model_of[k]],
+                &self.functions[k],
+                (&self.points[k], &self.expected[k], found),
+                (build.rule, build.name),
+            ));
+        }
+        tally
+    }
+}
+
+/// Every build of every case, compilers side by side; prints what was compared.
+fn check_all(what: &str, cases: &[Case], builds: impl Fn(usize) -> Vec<Build>) {
+    let workshops: Vec<Workshop> = cases.iter().map(Case::workshop).collect();
+    let mut jobs: Vec<(usize, Build)> = Vec::new();
+    for case in 0..cases.len() {
+        jobs.extend(builds(case).into_iter().map(|build| (case, build)));
+    }
+    let tallies: Mutex<BTreeMap<&str, (usize, Rule, Tally)>> = Mutex::default();
+    let next = AtomicUsize::new(0);
+    let work = || {
+        while let Some((case, build)) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let tally = cases[*case].check(&workshops[*case], build);
+            let mut tallies = tallies.lock().expect("no comparison failed");
+            let empty = || (0, build.rule, Tally::default());
+            let sum = tallies.entry(build.name).or_insert_with(empty);
+            sum.0 += cases[*case].models.len();
+            sum.2.add(tally);
+        }
+    };
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(work);
+        }
+    });
+    for (name, (models, rule, tally)) in tallies.into_inner().expect("no comparison failed") {
+        print!(
+            "{what}: {name}: {models} models, {} functions ({} with transcendental functions), {} \
+             results, {} of equal bits",
+            tally.functions, tally.transcendental, tally.results, tally.equal_bits
+        );
+        match rule {
+            Rule::SameBits => println!(),
+            Rule::TwoUlpsATerm => {
+                println!("; worst {:.2} ulp a term, {}", tally.worst.0, tally.worst.1);
             }
         }
     }
+}
 
-    /// Contracted operations round less often, so results differ, by a little.
-    fn assert_close(&self, found: &[Vec<f64>], by: &str) {
-        for ((function, found), expected) in self.functions.iter().zip(found).zip(&self.expected) {
-            let len = function.output_len();
-            for (found, expected) in found.chunks(len).zip(expected.chunks(len)) {
-                let scale = expected.iter().fold(1.0_f64, |scale, x| scale.max(x.abs()));
-                for (found, expected) in found.iter().zip(expected) {
-                    assert!(
-                        (found - expected).abs() <= 1e-11 * scale
-                            || (found.is_nan() && expected.is_nan()),
-                        "{by}: {}_{}: found {found:e}, interpreter {expected:e}",
-                        function.model,
-                        function.name
-                    );
-                }
-            }
+#[test]
+fn generated_code_of_shipped_models_equals_the_interpreter() {
+    let cases = [Case::new(models::shipped(), 10_000, Form::Automatic)];
+    check_all("shipped", &cases, |_| Build::all());
+}
+
+#[test]
+fn generated_code_of_random_models_equals_the_interpreter() {
+    let (count, by_all) = n_random_models();
+    let seeds: Vec<u64> = (0..count).collect();
+    let cases: Vec<Case> = seeds
+        .chunks(SOME_MODELS as usize)
+        .map(|seeds| {
+            let models = seeds.iter().map(|seed| models::random(*seed)).collect();
+            Case::new(models, 50, Form::Automatic)
+        })
+        .collect();
+    check_all("random", &cases, |case| {
+        if (case as u64) * SOME_MODELS < by_all {
+            Build::all()
+        } else {
+            vec![Build::c(), Build::rust()]
         }
+    });
+}
+
+#[test]
+fn random_models_have_all_shapes() {
+    let models: Vec<ReducedModel> = (0..200).map(models::random).collect();
+    let some = |what: &str, is: &dyn Fn(&ReducedModel) -> bool| {
+        let count = models.iter().filter(|model| is(model)).count();
+        assert!(count >= 5, "{what}: {count} models");
+    };
+    for d in 1..=8 {
+        some("dimension", &|model| model.latent_dim() == d);
     }
-}
-
-fn check_c_and_rust(case: &Case) {
-    let workshop = case.workshop();
-    for compiler in c_compilers() {
-        let flags = ["-O1", "-ffp-contract=off"];
-        let found = workshop.run_c(&compiler, &flags, &case.functions, &case.points);
-        case.assert_same_bits(&found, &format!("{compiler} -ffp-contract=off"));
+    for count in 1..=3 {
+        some("phases", &|model| model.phases().len() == count);
     }
-    let found = workshop.run_rust(&case.functions, &case.points);
-    case.assert_same_bits(&found, "rustc");
-    let flags = ["-O3", "-march=native", "-ffp-contract=fast"];
-    let compiler = &c_compilers()[0];
-    let found = workshop.run_c(compiler, &flags, &case.functions, &case.points);
-    case.assert_close(&found, &format!("{compiler} -O3 -march=native"));
+    let has = |model: &ReducedModel, part: &str| {
+        let terms = model.library().terms();
+        terms.iter().any(|term| term.text().contains(part))
+    };
+    for part in [
+        "sin(", "tanh(", "exp(", "log(", "sqrt(", "abs(", "^1.5", "^3",
+    ] {
+        some(part, &|model| has(model, part));
+    }
+    some("no inputs", &|model| !has(model, "u"));
+    some("no maps", &|model| model.encoder_map().is_err());
+    let is_affine = |model: &ReducedModel| model.encoder_map().map(|m| m.as_affine().is_some());
+    some("affine maps", &|model| is_affine(model) == Ok(true));
+    some("curved encoder", &|model| is_affine(model) == Ok(false));
+    some("an equation without terms", &|model| {
+        let mut columns = model
+            .phases()
+            .iter()
+            .flat_map(|phase| phase.xi.column_iter());
+        columns.any(|column| column.iter().all(|xi| *xi == 0.0))
+    });
+    let density = |model: &ReducedModel| {
+        let xi = &model.phases()[0].xi;
+        model.phases()[0].active_count() as f64 / xi.len() as f64
+    };
+    some("dense Xi", &|model| density(model) > 0.8);
+    some("sparse Xi", &|model| density(model) < 0.2);
 }
 
 #[test]
-fn generated_code_of_shipped_models_equals_the_interpreter_bit_for_bit() {
-    check_c_and_rust(&Case::new(models::shipped(), N_POINTS, Form::Automatic));
-}
-
-#[test]
-fn generated_code_of_random_models_equals_the_interpreter_bit_for_bit() {
-    let models = (0..n_random_models()).map(models::random).collect();
-    check_c_and_rust(&Case::new(models, 50, Form::Automatic));
-}
-
-#[test]
-fn generated_code_with_tables_equals_the_interpreter_bit_for_bit() {
-    let random_models = (1000..1000 + n_random_models()).map(models::random);
+fn generated_code_with_tables_equals_the_interpreter() {
+    let random_models = (1000..1000 + SOME_MODELS).map(models::random);
     let models = models::shipped().into_iter().chain(random_models).collect();
-    check_c_and_rust(&Case::new(models, 100, Form::Tables));
+    let cases = [Case::new(models, 100, Form::Tables)];
+    check_all("tables", &cases, |_| {
+        vec![Build::c(), Build::rust(), Build::c_fast()]
+    });
 }
 
 #[test]
-fn generated_maps_of_nonlinear_models_equal_the_interpreter_bit_for_bit() {
+fn generated_maps_of_nonlinear_models_equal_the_interpreter() {
     let models = (0..5).map(models::random_nonlinear).collect();
-    let case = Case::new(models, 50, Form::Automatic);
-    check_c_and_rust(&case);
-    let workshop = case.workshop();
-    for model in &case.models {
-        workshop.run_c_selftest(&c_compilers()[0], model.identifier().as_str());
+    let cases = [Case::new(models, 50, Form::Automatic)];
+    check_all("nonlinear", &cases, |_| Build::all());
+    let workshop = cases[0].workshop();
+    for model in &cases[0].models {
+        workshop.run_c_selftest(&cc(), model.identifier().as_str());
     }
-    workshop.run_rust_selftest(case.models[0].identifier().as_str());
+    workshop.run_rust_selftest(cases[0].models[0].identifier().as_str());
 }
 
 #[test]
@@ -198,7 +284,7 @@ fn lowered_maps_of_nonlinear_models_equal_the_models_own_evaluation() {
 fn tables_and_straight_lines_agree() {
     for model in models::shipped()
         .into_iter()
-        .chain((0..n_random_models()).map(models::random))
+        .chain((0..SOME_MODELS).map(models::random))
     {
         let [lines, tables] = [Form::StraightLine, Form::Tables]
             .map(|form| functions_of(&model, 50, &LowerOptions { form }));
@@ -228,18 +314,8 @@ fn generated_code_beyond_the_reduction_limit_equals_the_interpreter() {
             }
         }
     }
-    case.expected = case
-        .functions
-        .iter()
-        .zip(&case.points)
-        .map(|(function, points)| function.interpret(points))
-        .collect();
-    let workshop = case.workshop();
-    let flags = ["-O3", "-ffp-contract=off"];
-    let found = workshop.run_c(&c_compilers()[0], &flags, &case.functions, &case.points);
-    case.assert_same_bits(&found, "C");
-    let found = workshop.run_rust(&case.functions, &case.points);
-    case.assert_same_bits(&found, "Rust");
+    case.interpret();
+    check_all("beyond", &[case], |_| vec![Build::c(), Build::rust()]);
 }
 
 #[test]
@@ -247,7 +323,7 @@ fn selftests_of_generated_code_pass() {
     let models = models::shipped();
     let workshop = Workshop::new(&models, &LowerOptions::default());
     for model in &models {
-        workshop.run_c_selftest(&c_compilers()[0], model.identifier().as_str());
+        workshop.run_c_selftest(&cc(), model.identifier().as_str());
     }
     for model in models.iter().filter(|model| model.latent_dim() <= 2) {
         workshop.run_rust_selftest(model.identifier().as_str());
@@ -273,7 +349,7 @@ fn random_point(random: &mut Random, d: usize) -> [DVector<f64>; 3] {
 
 #[test]
 fn compiled_accelerations_equal_the_models_own_evaluation() {
-    let random_models = (0..n_random_models()).map(models::random);
+    let random_models = (0..SOME_MODELS).map(models::random);
     for model in models::shipped().into_iter().chain(random_models) {
         let mut compiled = CompiledModel::new(&model).expect("lowers");
         let d = model.latent_dim();
@@ -308,7 +384,7 @@ fn compiled_accelerations_equal_the_models_own_evaluation() {
 
 #[test]
 fn compiled_jacobians_equal_symbolic_derivatives_and_finite_differences() {
-    let random_models = (0..n_random_models()).map(models::random);
+    let random_models = (0..SOME_MODELS).map(models::random);
     for model in models::shipped().into_iter().chain(random_models) {
         for phase in 0..model.phases().len() {
             check_jacobian(&model, phase);

@@ -10,6 +10,8 @@ use romc::files::Overwrite;
 use romc::lower::LowerOptions;
 use romc::model::ReducedModel;
 
+use super::agreement::Rule;
+use super::driver_text::{c_driver, rust_driver};
 use super::functions::Function;
 
 /// A folder with the generated code of some models.
@@ -55,30 +57,37 @@ impl Workshop {
         self.folder.path()
     }
 
-    /// Runs the functions as C compiled by `compiler` with `flags`.
-    pub fn run_c(
+    /// Runs the functions as `build` compiles them. Builds of one folder may run side by side.
+    pub fn run(&self, build: &Build, functions: &[Function], points: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let program = match &build.compiler {
+            Compiler::C { command, flags } => self.compile_c(build, command, flags, functions),
+            Compiler::Rust { library } => self.compile_rust(build, *library, functions),
+        };
+        self.run_program(&program, functions, points)
+    }
+
+    fn compile_c(
         &self,
+        build: &Build,
         compiler: &str,
         flags: &[&str],
         functions: &[Function],
-        points: &[Vec<f64>],
-    ) -> Vec<Vec<f64>> {
-        let driver = self.path().join("driver.c");
+    ) -> PathBuf {
+        let program = self.path().join(build.file_name());
+        let driver = program.with_extension("c");
         let text = c_driver(&self.models, functions);
         let text = match self.precision {
             Precision::Double => text,
             Precision::Single => text.replace("double", "float"),
         };
         fs::write(&driver, text).expect("written");
-        let program = self.path().join("driver_c");
         let sources = self
             .models
             .iter()
             .map(|model| self.path().join(model).join(format!("{model}.c")));
         succeed(
             Command::new(compiler)
-                .args(["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow"])
-                .args(["-pedantic", "-Werror"])
+                .args(C_WARNINGS)
                 .args(flags)
                 .arg("-I")
                 .arg(self.path())
@@ -88,11 +97,11 @@ impl Workshop {
                 .arg(&program)
                 .arg("-lm"),
         );
-        self.run(&program, functions, points)
+        program
     }
 
-    /// Runs the functions as Rust; each crate becomes a module of one program.
-    pub fn run_rust(&self, functions: &[Function], points: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    /// Each crate becomes a module of one program.
+    fn compile_rust(&self, build: &Build, library: MathLibrary, functions: &[Function]) -> PathBuf {
         let mut source = String::from(
             "#![allow(non_snake_case, clippy::all, unused_imports)]\n#![deny(warnings)]\n",
         );
@@ -112,31 +121,33 @@ impl Workshop {
                 .replace("f64", "f32")
                 .replace("chunks_exact(8)", "chunks_exact(4)"),
         });
-        let driver = self.path().join("driver.rs");
+        let program = self.path().join(build.file_name());
+        let driver = program.with_extension("rs");
         fs::write(&driver, source).expect("written");
-        let program = self.path().join("driver_rust");
         let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_owned());
-        succeed(
-            Command::new(rustc)
-                .args([
-                    "--edition",
-                    "2021",
-                    "-C",
-                    "opt-level=1",
-                    "--cfg",
-                    "feature=\"std\"",
-                ])
-                .args([
-                    "--check-cfg",
-                    "cfg(feature, values(\"std\", \"libm\"))",
-                    "--check-cfg",
-                    "cfg(test)",
-                ])
-                .arg(driver)
-                .arg("-o")
-                .arg(&program),
-        );
-        self.run(&program, functions, points)
+        let mut command = Command::new(rustc);
+        command.args([
+            "--edition",
+            "2021",
+            "-C",
+            "opt-level=1",
+            "-C",
+            "debug-assertions=on",
+        ]);
+        command.args([
+            "--check-cfg",
+            "cfg(feature, values(\"std\", \"libm\"))",
+            "--check-cfg",
+            "cfg(test)",
+        ]);
+        match library {
+            MathLibrary::Std => command.args(["--cfg", "feature=\"std\""]),
+            MathLibrary::Libm => command
+                .args(["--cfg", "feature=\"libm\"", "--extern"])
+                .arg(format!("libm={}", libm().display())),
+        };
+        succeed(command.arg(driver).arg("-o").arg(&program));
+        program
     }
 
     /// Compiles and runs the C self-test of a model, which also compares batches.
@@ -145,15 +156,8 @@ impl Workshop {
         let program = folder.join("selftest");
         succeed(
             Command::new(compiler)
-                .args([
-                    "-std=c99",
-                    "-O2",
-                    "-Wall",
-                    "-Wextra",
-                    "-Wconversion",
-                    "-Wshadow",
-                ])
-                .args(["-pedantic", "-Werror"])
+                .args(C_WARNINGS)
+                .arg("-O2")
                 .args([
                     folder.join(format!("{model}.c")),
                     folder.join(format!("{model}_selftest.c")),
@@ -202,8 +206,14 @@ impl Workshop {
         succeed(&mut Command::new(program));
     }
 
-    fn run(&self, program: &Path, functions: &[Function], points: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let (inputs, outputs) = (self.path().join("inputs"), self.path().join("outputs"));
+    fn run_program(
+        &self,
+        program: &Path,
+        functions: &[Function],
+        points: &[Vec<f64>],
+    ) -> Vec<Vec<f64>> {
+        let inputs = program.with_extension("inputs");
+        let outputs = program.with_extension("outputs");
         let bytes: Vec<u8> = points
             .iter()
             .flatten()
@@ -238,13 +248,159 @@ impl Workshop {
     }
 }
 
-/// The C compilers to try: `CC` or `cc`, and clang where it is installed.
-pub fn c_compilers() -> Vec<String> {
-    let mut compilers = vec![std::env::var("CC").unwrap_or_else(|_| "cc".to_owned())];
-    if Command::new("clang").arg("--version").output().is_ok() {
-        compilers.push("clang".to_owned());
+const C_WARNINGS: [&str; 7] = [
+    "-std=c99",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wshadow",
+    "-pedantic",
+    "-Werror",
+];
+
+/// A way to compile generated code, and how its results are judged.
+#[derive(Clone, Debug)]
+pub struct Build {
+    pub name: &'static str,
+    pub compiler: Compiler,
+    pub rule: Rule,
+}
+
+#[derive(Clone, Debug)]
+pub enum Compiler {
+    C {
+        command: String,
+        flags: Vec<&'static str>,
+    },
+    Rust {
+        library: MathLibrary,
+    },
+}
+
+/// Where a generated crate finds elementary functions.
+#[derive(Clone, Copy, Debug)]
+pub enum MathLibrary {
+    /// The standard library.
+    Std,
+    /// The crate of that name, for targets without the standard library.
+    Libm,
+}
+
+impl Build {
+    /// The C compiler of the machine, `CC` or `cc`, without contraction.
+    pub fn c() -> Self {
+        Self::c_of(
+            "C, -O1 -ffp-contract=off",
+            cc(),
+            &["-O1", "-ffp-contract=off"],
+        )
     }
-    compilers
+
+    pub fn c_fast() -> Self {
+        let flags = ["-O3", "-march=native", "-ffp-contract=fast"];
+        Self {
+            rule: Rule::TwoUlpsATerm,
+            ..Self::c_of("C, -O3 -march=native, contracted", cc(), &flags)
+        }
+    }
+
+    pub fn rust() -> Self {
+        Self {
+            name: "Rust",
+            compiler: Compiler::Rust {
+                library: MathLibrary::Std,
+            },
+            rule: Rule::SameBits,
+        }
+    }
+
+    pub fn rust_libm() -> Self {
+        Self {
+            name: "Rust with libm",
+            compiler: Compiler::Rust {
+                library: MathLibrary::Libm,
+            },
+            rule: Rule::TwoUlpsATerm,
+        }
+    }
+
+    /// Clang without and with contraction, where it is installed.
+    pub fn clang() -> Vec<Self> {
+        if !is_installed("clang") {
+            return Vec::new();
+        }
+        let clang = || "clang".to_owned();
+        let fast = ["-O2", "-march=native", "-ffp-contract=fast"];
+        vec![
+            Self::c_of(
+                "clang, -O1 -ffp-contract=off",
+                clang(),
+                &["-O1", "-ffp-contract=off"],
+            ),
+            Self {
+                rule: Rule::TwoUlpsATerm,
+                ..Self::c_of("clang, -O2 -march=native, contracted", clang(), &fast)
+            },
+        ]
+    }
+
+    pub fn all() -> Vec<Self> {
+        let mut all = vec![Self::c(), Self::rust(), Self::c_fast(), Self::rust_libm()];
+        all.extend(Self::clang());
+        all
+    }
+
+    /// The C compiler of the machine with flags.
+    pub fn c_with(name: &'static str, flags: &[&'static str]) -> Self {
+        Self::c_of(name, cc(), flags)
+    }
+
+    fn c_of(name: &'static str, command: String, flags: &[&'static str]) -> Self {
+        let flags = flags.to_vec();
+        Self {
+            name,
+            compiler: Compiler::C { command, flags },
+            rule: Rule::SameBits,
+        }
+    }
+
+    fn file_name(&self) -> String {
+        self.name
+            .chars()
+            .filter(char::is_ascii_alphanumeric)
+            .collect()
+    }
+}
+
+/// The C compiler of the machine.
+pub fn cc() -> String {
+    std::env::var("CC").unwrap_or_else(|_| "cc".to_owned())
+}
+
+/// Whether a tool answers; fails the test if it does not and tools are required.
+fn is_installed(tool: &str) -> bool {
+    let found = Command::new(tool).arg("--version").output().is_ok();
+    if !found {
+        let is_required = std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1");
+        assert!(!is_required, "`{tool}` is required and missing");
+        println!("skipped: `{tool}` is missing");
+    }
+    found
+}
+
+/// The crate `libm` as cargo compiled it for this test.
+fn libm() -> PathBuf {
+    let test = std::env::current_exe().expect("a test is a program");
+    let folder = test.parent().expect("it is in a folder");
+    let is_libm = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("liblibm-") && name.ends_with(".rlib")
+    };
+    let mut found = fs::read_dir(folder)
+        .expect("a folder")
+        .map(|entry| entry.expect("an entry").path())
+        .filter(is_libm);
+    found.next().expect("`libm` is a dependency of the tests")
 }
 
 fn succeed(command: &mut Command) {
@@ -256,154 +412,6 @@ fn succeed(command: &mut Command) {
         .take(4000)
         .collect();
     assert!(output.status.success(), "{command:?}:\n{messages}");
-}
-
-/// Where each slot begins in a function's flat record of inputs or outputs.
-fn offsets(slots: &[romc::ir::Slot]) -> Vec<(&str, usize, usize)> {
-    let mut offset = 0;
-    slots
-        .iter()
-        .map(|slot| {
-            let at = offset;
-            offset += slot.len;
-            (slot.name.as_str(), at, slot.len)
-        })
-        .collect()
-}
-
-fn c_driver(models: &[String], functions: &[Function]) -> String {
-    let mut text = String::from("#include <stdio.h>\n#include <stdlib.h>\n#include <string.h>\n");
-    for model in models {
-        text.push_str(&format!("#include \"{model}/{model}.h\"\n"));
-    }
-    let mut calls = String::new();
-    for (k, function) in functions.iter().enumerate() {
-        let (model, name) = (&function.model, &function.name);
-        let mut body = String::new();
-        let mut arguments = Vec::new();
-        let outputs = offsets(function.program.outputs());
-        for (slot, at, len) in offsets(function.program.inputs()) {
-            let in_place = outputs.iter().find(|(name, ..)| *name == slot);
-            if let Some((_, to, _)) = in_place {
-                body.push_str(&format!(
-                    "memcpy(out + {to}, in + {at}, {len} * sizeof *in);\n"
-                ));
-                arguments.push(format!("out + {to}"));
-            } else if slot == "h" {
-                arguments.push(format!("in[{at}]"));
-            } else {
-                arguments.push(format!("in + {at}"));
-            }
-        }
-        if !function.is_step() {
-            arguments.extend(outputs.iter().map(|(_, at, _)| format!("out + {at}")));
-        }
-        if name.ends_with("_jacobian") && outputs.len() == 1 {
-            arguments.push("out".to_owned());
-        }
-        let arguments = arguments.join(", ");
-        text.push_str(&format!(
-            "static void run{k}(const double *in, double *out) {{\n{body}{model}_{name}({arguments});\n}}\n"
-        ));
-        let (n, from, to) = (
-            function.n_points,
-            function.input_len(),
-            function.output_len(),
-        );
-        calls.push_str(&format!(
-            "for (size_t p = 0; p < {n}; ++p, in += {from}, out += {to}) run{k}(in, out);\n"
-        ));
-    }
-    let total = |len: fn(&Function) -> usize| -> usize {
-        functions.iter().map(|f| f.n_points * len(f)).sum()
-    };
-    let (from, to) = (total(Function::input_len), total(Function::output_len));
-    text.push_str(&format!(
-        "int main(int argc, char **argv) {{
-double *inputs = malloc({from} * sizeof *inputs), *outputs = malloc({to} * sizeof *outputs);
-if (argc != 3 || !inputs || !outputs) return 2;
-const double *in = inputs;
-double *out = outputs;
-FILE *file = fopen(argv[1], \"rb\");
-if (!file || fread(inputs, sizeof *inputs, {from}, file) != {from}) return 3;
-fclose(file);
-{calls}file = fopen(argv[2], \"wb\");
-if (!file || fwrite(outputs, sizeof *outputs, {to}, file) != {to}) return 4;
-return fclose(file) == 0 ? 0 : 5;
-}}\n"
-    ));
-    text
-}
-
-fn rust_driver(functions: &[Function]) -> String {
-    let mut text = String::from(
-        "fn array<const N: usize>(values: &[f64]) -> &[f64; N] { values.try_into().unwrap() }
-fn array_mut<const N: usize>(values: &mut [f64]) -> &mut [f64; N] { values.try_into().unwrap() }
-fn main() {
-    let arguments: Vec<String> = std::env::args().collect();
-    let bytes = std::fs::read(&arguments[1]).unwrap();
-    let mut numbers = bytes.chunks_exact(8).map(|b| f64::from_ne_bytes(b.try_into().unwrap()));
-    let mut results: Vec<f64> = Vec::new();
-",
-    );
-    for (k, function) in functions.iter().enumerate() {
-        let (n, from, to) = (
-            function.n_points,
-            function.input_len(),
-            function.output_len(),
-        );
-        text.push_str(&format!(
-            "    let mut input = [0.0; {from}];\n    let mut output = [0.0; {to}];\n    \
-             for _ in 0..{n} {{\n        for x in &mut input {{ *x = numbers.next().unwrap(); }}\n        \
-             run{k}(&input, &mut output);\n        results.extend(output);\n    }}\n"
-        ));
-    }
-    text.push_str(
-        "    let bytes: Vec<u8> = results.iter().flat_map(|x| x.to_ne_bytes()).collect();
-    std::fs::write(&arguments[2], bytes).unwrap();\n}\n",
-    );
-    for (k, function) in functions.iter().enumerate() {
-        let mut body = String::new();
-        let mut arguments = Vec::new();
-        let outputs = offsets(function.program.outputs());
-        let mut rest = "out".to_owned();
-        for (j, (name, at, len)) in outputs.iter().enumerate() {
-            body.push_str(&format!(
-                "    let (o{j}, rest{j}) = {rest}.split_at_mut({len});\n    let _ = {at};\n"
-            ));
-            rest = format!("rest{j}");
-            for (input, from, _) in offsets(function.program.inputs()) {
-                if input == *name {
-                    body.push_str(&format!(
-                        "    o{j}.copy_from_slice(&input[{from}..{}]);\n",
-                        from + len
-                    ));
-                }
-            }
-        }
-        body.push_str(&format!("    let _ = {rest};\n"));
-        for (name, at, len) in offsets(function.program.inputs()) {
-            let in_place = outputs.iter().position(|(output, ..)| *output == name);
-            arguments.push(match in_place {
-                Some(j) => format!("array_mut(o{j})"),
-                None if name == "h" => format!("input[{at}]"),
-                None => format!("array(&input[{at}..{}])", at + len),
-            });
-        }
-        if !function.is_step() {
-            arguments.extend((0..outputs.len()).map(|j| format!("array_mut(o{j})")));
-        }
-        if function.name.ends_with("_jacobian") && outputs.len() == 1 {
-            arguments.push("&mut []".to_owned());
-        }
-        text.push_str(&format!(
-            "fn run{k}(input: &[f64], out: &mut [f64]) {{\n{body}    {}::{}({});\n}}\n",
-            function.model,
-            function.name,
-            arguments.join(", ")
-        ));
-    }
-    text
 }
 
 /// Names of a folder's files with their contents, for comparing two emissions.

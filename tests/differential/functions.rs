@@ -1,21 +1,48 @@
 //! The generated functions of a model, as the interpreter knows them.
 
-use romc::ir::{Interpreter, Program};
-use romc::lower::{self, LowerOptions};
-use romc::model::ReducedModel;
+use romc::ir::{Interpreter, Program, Statement, Unary};
+use romc::lower::{self, JacobianPattern, LowerOptions};
+use romc::model::{ModelError, ReducedModel, StateMap};
 
 /// A generated function: its name after the model's, and the program it must equal.
 pub struct Function {
     pub model: String,
     pub name: String,
     pub program: Program,
+    pub kind: Kind,
     /// Points at which it is compared.
     pub n_points: usize,
 }
 
+/// What a function computes; phases by their place in the model.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kind {
+    /// A map whose outputs are sums of weights times inputs.
+    Affine,
+    /// A map through curved layers.
+    Curved,
+    Dynamics(usize),
+    Jacobian(usize, JacobianPattern),
+    Step(usize),
+    /// As [`Kind::Dynamics`], all points in one call.
+    Batch(usize),
+}
+
+/// Points of a batch: blocks of eight and a rest.
+const BATCH_POINTS: usize = 21;
+
 impl Function {
     pub fn is_step(&self) -> bool {
-        self.program.inputs().iter().any(|slot| slot.name == "h")
+        matches!(self.kind, Kind::Step(_))
+    }
+
+    pub fn is_batch(&self) -> bool {
+        matches!(self.kind, Kind::Batch(_))
+    }
+
+    /// Whether it has functions that a mathematics library rounds, or the kernel of sines.
+    pub fn is_transcendental(&self) -> bool {
+        is_transcendental(&self.program)
     }
 
     /// Numbers that enter, all slots one after the other.
@@ -70,40 +97,77 @@ impl Function {
     }
 }
 
+fn is_transcendental(program: &Program) -> bool {
+    let own = program
+        .statements()
+        .iter()
+        .any(|statement| match statement {
+            Statement::SinCos { .. } => true,
+            Statement::Unary(op, _) => {
+                matches!(op, Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log)
+            }
+            _ => false,
+        });
+    own || program.callees().iter().any(is_transcendental)
+}
+
 /// All functions that are generated for a model.
 pub fn functions(model: &ReducedModel, n_points: usize, options: &LowerOptions) -> Vec<Function> {
     let name = model.identifier().as_str();
-    let function = |name_of: String, program: Program, n_points: usize| Function {
+    let function = |name_of: String, program: Program, kind: Kind, n_points: usize| Function {
         model: name.to_owned(),
         name: name_of,
         program,
+        kind,
         n_points,
     };
     let mut list = Vec::new();
+    let kind_of = |map: Result<&StateMap, ModelError>| match map {
+        Ok(map) if map.as_affine().is_none() => Kind::Curved,
+        Ok(_) | Err(_) => Kind::Affine,
+    };
+    let (encoder, decoder) = (kind_of(model.encoder_map()), kind_of(model.decoder_map()));
     let maps = [
-        lower::encode(model),
-        lower::encode_velocity(model),
-        lower::decode(model),
-        lower::decode_velocity(model),
-        lower::project_input(model),
-        lower::lift_input(model),
+        (lower::encode(model), &encoder),
+        (lower::encode_velocity(model), &encoder),
+        (lower::decode(model), &decoder),
+        (lower::decode_velocity(model), &decoder),
+        (lower::project_input(model), &encoder),
+        (lower::lift_input(model), &encoder),
     ];
-    for program in maps.into_iter().flatten() {
-        list.push(function(program.name().to_owned(), program, 100));
+    for (program, kind) in maps {
+        if let Ok(program) = program {
+            let name = program.name().to_owned();
+            list.push(function(name, program, kind.clone(), n_points.min(100)));
+        }
     }
     for phase in 0..model.phases().len() {
         let phase_name = model.phase_identifier(phase);
+        let named = |what: &str| format!("{phase_name}_{what}");
         let program = lower::dynamics(model, phase, options).expect("lowers");
+        let batch = (named("dynamics_batch"), program.clone());
         list.push(function(
-            format!("{phase_name}_dynamics"),
+            named("dynamics"),
             program,
+            Kind::Dynamics(phase),
             n_points,
         ));
-        let (program, _) = lower::dynamics_jacobian(model, phase, options).expect("lowers");
-        let name_of = format!("{phase_name}_dynamics_jacobian");
-        list.push(function(name_of, program, n_points));
+        list.push(function(batch.0, batch.1, Kind::Batch(phase), BATCH_POINTS));
+        let (program, pattern) = lower::dynamics_jacobian(model, phase, options).expect("lowers");
+        let kind = Kind::Jacobian(phase, pattern);
+        list.push(function(
+            named("dynamics_jacobian"),
+            program,
+            kind,
+            n_points,
+        ));
         let program = lower::rk4_step(model, phase, options).expect("lowers");
-        list.push(function(format!("{phase_name}_step"), program, 200));
+        list.push(function(
+            named("step"),
+            program,
+            Kind::Step(phase),
+            n_points.min(200),
+        ));
     }
     list
 }

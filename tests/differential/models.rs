@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use romc::artifact;
 use romc::model::{
     Activation, AffineMap, FeetRule, Layer, Library, Phase, ReducedModel, ScaleFactors, Scaling,
-    StateMap,
+    StandardLibrary, StateMap,
 };
 
 use super::functions::Random;
@@ -34,50 +34,91 @@ pub fn shipped() -> Vec<ReducedModel> {
         .collect()
 }
 
-/// A random model: dimension, library, sparsity and phases all vary with the seed.
-/// Polynomial models have no function that a mathematics library rounds.
+/// A random model. With the seed vary: one to eight coordinates, the library (standard of degree
+/// 0 to 3 with and without sines, or terms of the syntax), inputs or none, one to three phases,
+/// density of Xi, equations and phases without a term, no maps, affine ones, curved ones.
+/// Models of even seeds have no function that a mathematics library rounds, and no sines.
 pub fn random(seed: u64) -> ReducedModel {
     let mut random = Random(seed.wrapping_mul(0x1234_5677) + 1);
-    let d = 1 + random.below(6);
-    let polynomial = seed.is_multiple_of(3);
+    let d = 1 + random.below(8);
+    let polynomial = seed.is_multiple_of(2);
+    let inputs = random.below(4) > 0;
+    let library = if random.below(3) == 0 {
+        random_standard(&mut random, d, polynomial, inputs)
+    } else {
+        random_terms(&mut random, d, polynomial, inputs)
+    };
+    let mut density = [0.05, 0.15, 0.5, 1.0][random.below(4)];
+    // Compilers take their time for thousands of terms, and learn nothing more from them.
+    density = f64::min(density, 160.0 / (library.len() * d) as f64);
+    let rear = FeetRule::Patterns(vec![
+        [false, false, true, true],
+        [false, false, false, true],
+    ]);
+    let all = [
+        ("rear stance", rear),
+        ("contact", FeetRule::Any),
+        ("flight", FeetRule::None),
+    ];
+    let (first, count) = [(1, 1), (1, 2), (0, 3)][random.below(3)];
+    let mut phases = Vec::new();
+    for (name, feet) in all.into_iter().skip(first).take(count) {
+        let silent = (random.below(4) == 0).then(|| random.below(d));
+        let empty = random.below(12) == 0;
+        let xi = DMatrix::from_fn(library.len(), d, |_, column| {
+            let value = random.between(-2.0, 2.0);
+            let is_active = random.unit() < density && !empty && silent != Some(column);
+            if is_active { value } else { 0.0 }
+        });
+        let name = name.to_owned();
+        phases.push(Phase { name, feet, xi });
+    }
+    let mut builder = ReducedModel::builder(format!("random{seed}"), library).phases(phases);
+    let n = d + random.below(8);
+    let shape = random.below(8);
+    if shape < 3 {
+        let mut map = |rows, cols, bias| {
+            let weights = DMatrix::from_fn(rows, cols, |_, _| random.between(-1.0, 1.0));
+            let map = AffineMap::new("map", weights, DVector::from_element(rows, bias));
+            StateMap::from(map.expect("shapes fit"))
+        };
+        let encoder = map(d, n, 0.25);
+        let decoder = map(n, d, -0.5);
+        let encoder = if shape == 0 && !polynomial {
+            random_map(&mut random, seed as usize, n, d)
+        } else {
+            encoder
+        };
+        builder = builder.encoder(encoder).decoder(decoder).scaling(Scaling {
+            state: ScaleFactors::PerCoordinate(DVector::from_fn(n, |i, _| 0.1 + 0.05 * i as f64)),
+            input: ScaleFactors::Uniform(0.3),
+        });
+    }
+    builder.build().expect("a valid model")
+}
+
+/// The highest degree from 3 down whose library is not too long.
+fn random_standard(random: &mut Random, d: usize, polynomial: bool, inputs: bool) -> Library {
+    let mut standard = StandardLibrary {
+        degree: random.below(4) as u32,
+        trigonometric: !polynomial,
+        inputs,
+    };
+    while standard.term_count(d).is_none_or(|count| count > 170) {
+        standard.degree -= 1;
+    }
+    Library::standard(d, standard).expect("a short library")
+}
+
+fn random_terms(random: &mut Random, d: usize, polynomial: bool, inputs: bool) -> Library {
     let mut terms: Vec<String> = Vec::new();
     for _ in 0..2 + random.below(30) {
-        let term = random_term(&mut random, d, polynomial);
+        let term = random_term(random, d, polynomial, inputs);
         if Library::from_terms(d, &[terms.clone(), vec![term.clone()]].concat()).is_ok() {
             terms.push(term);
         }
     }
-    let library = Library::from_terms(d, &terms).expect("terms were tried one by one");
-    let density = [0.15, 0.5, 1.0][random.below(3)];
-    let name = format!("random{seed}");
-    let mut builder = ReducedModel::builder(name, library);
-    let rules = [("contact", FeetRule::Any), ("flight", FeetRule::None)];
-    for (name, feet) in rules.into_iter().take(1 + random.below(2)) {
-        let xi = DMatrix::from_fn(terms.len(), d, |_, _| {
-            let value = random.between(-2.0, 2.0);
-            if random.unit() < density { value } else { 0.0 }
-        });
-        builder = builder.phase(Phase {
-            name: name.to_owned(),
-            feet,
-            xi,
-        });
-    }
-    if random.below(4) == 0 {
-        let n = d + random.below(8);
-        let mut matrix =
-            |rows, cols| DMatrix::from_fn(rows, cols, |_, _| random.between(-1.0, 1.0));
-        let encoder = AffineMap::new("encoder", matrix(d, n), DVector::from_element(d, 0.25));
-        let decoder = AffineMap::new("decoder", matrix(n, d), DVector::from_element(n, -0.5));
-        builder = builder
-            .encoder(encoder.expect("shapes fit"))
-            .decoder(decoder.expect("shapes fit"))
-            .scaling(Scaling {
-                state: ScaleFactors::Uniform(0.1),
-                input: ScaleFactors::Uniform(0.3),
-            });
-    }
-    builder.build().expect("a valid model")
+    Library::from_terms(d, &terms).expect("terms were tried one by one")
 }
 
 /// A model with random layers: depth, widths and activations vary with the seed.
@@ -136,10 +177,10 @@ fn random_map(random: &mut Random, shape: usize, from: usize, to: usize) -> Stat
     StateMap::new("map", layers).expect("layers fit")
 }
 
-fn random_term(random: &mut Random, d: usize, polynomial: bool) -> String {
-    let kinds = if polynomial { 4 } else { 12 };
+fn random_term(random: &mut Random, d: usize, polynomial: bool, inputs: bool) -> String {
+    let kinds = if polynomial { 6 } else { 14 };
     let mut v = || {
-        let kind = ["z", "dz", "u"][random.below(3)];
+        let kind = ["z", "dz", "u"][random.below(if inputs { 3 } else { 2 })];
         format!("{kind}{}", 1 + random.below(d))
     };
     let (a, b, c) = (v(), v(), v());
@@ -148,13 +189,15 @@ fn random_term(random: &mut Random, d: usize, polynomial: bool) -> String {
         1 => a,
         2 => format!("{a}*{b}^2"),
         3 => format!("({a} - 0.5*{b})*{c}^3"),
-        4 => format!("sin({a})"),
-        5 => format!("cos({a})"),
-        6 => format!("{a}*sin({b} + 2*{c})"),
-        7 => format!("tanh({a})/(1 + {b}^2)"),
-        8 => format!("exp(-{a}^2)*cos({b})"),
-        9 => format!("sqrt(1 + {a}^2 + {b}^2)"),
-        10 => format!("abs({a})*{b}"),
+        4 => format!("sqrt(1 + {a}^2 + {b}^2)"),
+        5 => format!("abs({a})*{b}/(2 + {c}^2)"),
+        6 => format!("sin({a})"),
+        7 => format!("cos({a})"),
+        8 => format!("{a}*sin({b} + 2*{c})"),
+        9 => format!("tanh({a})/(1 + {b}^2)"),
+        10 => format!("exp(-{a}^2)*cos({b})"),
+        11 => format!("sin({a})^2*cos({b} - {c})"),
+        12 => format!("(1 + {a}^2)^1.5*exp(0.5*{b})"),
         _ => format!("log(2 + {a}^2) + tan(0.3*{b})"),
     }
 }

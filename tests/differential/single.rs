@@ -5,9 +5,9 @@ use romc::ir::{Interpreter, Range};
 use romc::lower::{Form, LowerOptions};
 use romc::model::ReducedModel;
 
-use super::drivers::{Workshop, c_compilers};
+use super::drivers::{Build, Workshop, cc};
 use super::functions::{Function, Random, functions as functions_of};
-use super::{models, n_random_models};
+use super::{SOME_MODELS, models};
 
 /// Magnitudes for which bounds are stated; point after point takes its turn.
 const MAGNITUDES: [f64; 2] = [1.0, 10.0];
@@ -98,17 +98,14 @@ fn check(models: &[ReducedModel], form: Form, n_points: usize) {
         .iter()
         .map(|function| points(function, &mut random))
         .collect();
-    let compiler = &c_compilers()[0];
     let strict = ["-O1", "-ffp-contract=off", "-Wdouble-promotion"];
     let fused = ["-O2", "-march=native", "-ffp-contract=fast"];
-    let runs = [
-        ("C", workshop.run_c(compiler, &strict, &functions, &points)),
-        ("Rust", workshop.run_rust(&functions, &points)),
-        (
-            "C, fused",
-            workshop.run_c(compiler, &fused, &functions, &points),
-        ),
+    let builds = [
+        Build::c_with("C", &strict),
+        Build::rust(),
+        Build::c_with("C, fused", &fused),
     ];
+    let runs = builds.map(|build| (build.name, workshop.run(&build, &functions, &points)));
     for (by, found) in &runs {
         for ((function, points), found) in functions.iter().zip(&points).zip(found) {
             assert_within_bound(function, points, found, by);
@@ -135,7 +132,7 @@ fn single_precision_of_shipped_models_equals_the_interpreter_and_stays_within_it
 
 #[test]
 fn single_precision_of_random_models_equals_the_interpreter_and_stays_within_its_bound() {
-    let random = (0..n_random_models() / 2).map(models::random);
+    let random = (0..SOME_MODELS / 2).map(models::random);
     let nonlinear = (0..2).map(models::random_nonlinear);
     let models: Vec<ReducedModel> = random.chain(nonlinear).collect();
     check(&models, Form::Automatic, 50);
@@ -143,7 +140,7 @@ fn single_precision_of_random_models_equals_the_interpreter_and_stays_within_its
 
 #[test]
 fn single_precision_with_tables_equals_the_interpreter_and_stays_within_its_bound() {
-    let random = (1000..1000 + n_random_models() / 4).map(models::random);
+    let random = (1000..1000 + SOME_MODELS / 4).map(models::random);
     let models: Vec<ReducedModel> = random.collect();
     check(&models, Form::Tables, 50);
 }
@@ -174,7 +171,7 @@ fn selftests_in_single_precision_pass() {
     let options = LowerOptions::default();
     let workshop = Workshop::in_precision(&models, &options, Precision::Single);
     for model in &models {
-        workshop.run_c_selftest(&c_compilers()[0], model.identifier().as_str());
+        workshop.run_c_selftest(&cc(), model.identifier().as_str());
     }
     for model in models.iter().filter(|model| model.latent_dim() <= 2) {
         workshop.run_rust_selftest(model.identifier().as_str());

@@ -1,0 +1,103 @@
+//! When a result of generated code counts as the interpreter's.
+//!
+//! - [`Rule::SameBits`]: every operation is rounded as the program says, so every result has the
+//!   interpreter's bits. It holds for C without contraction and for Rust: always without
+//!   transcendental functions; with them because both call one mathematics library.
+//! - [`Rule::TwoUlpsATerm`]: fused operations or another mathematics library; a result differs by
+//!   at most 2 ulp of each term of its sum (`terms.rs`). Outputs of curved layers and of the solve
+//!   behind their inputs' projection are no such sums: 1e-11 of the largest output.
+
+use romc::model::ReducedModel;
+
+use super::functions::Function;
+use super::terms::Terms;
+
+/// Largest difference, in ulps of each term of an output.
+pub const ULPS_A_TERM: f64 = 2.0;
+/// Largest difference of maps through curved layers, relative to the largest output.
+const CURVED: f64 = 1e-11;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rule {
+    SameBits,
+    TwoUlpsATerm,
+}
+
+/// What was compared, and the largest difference met.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    pub functions: usize,
+    pub transcendental: usize,
+    pub results: usize,
+    pub equal_bits: usize,
+    /// In ulps a term, with where it was.
+    pub worst: (f64, String),
+}
+
+impl Tally {
+    pub fn add(&mut self, other: Tally) {
+        self.functions += other.functions;
+        self.transcendental += other.transcendental;
+        self.results += other.results;
+        self.equal_bits += other.equal_bits;
+        if other.worst.0 > self.worst.0 {
+            self.worst = other.worst;
+        }
+    }
+}
+
+/// Compares one function's results at its points; fails the test where `rule` is broken.
+pub fn compare(
+    model: &ReducedModel,
+    function: &Function,
+    (points, expected, found): (&[f64], &[f64], &[f64]),
+    (rule, by): (Rule, &str),
+) -> Tally {
+    let name = format!("{}_{}", function.model, function.name);
+    let mut tally = Tally {
+        functions: 1,
+        transcendental: usize::from(function.is_transcendental()),
+        ..Tally::default()
+    };
+    let terms = match rule {
+        Rule::SameBits => None,
+        Rule::TwoUlpsATerm => Terms::new(model, function),
+    };
+    let len = function.output_len();
+    assert_eq!(found.len(), expected.len(), "{by}: {name}");
+    let inputs = points.chunks(function.input_len());
+    let results = expected.chunks(len).zip(found.chunks(len));
+    for (point, (expected, found)) in inputs.zip(results) {
+        let same = |k: &usize| {
+            let (e, f) = (expected[*k], found[*k]);
+            e.to_bits() == f.to_bits() || (e.is_nan() && f.is_nan())
+        };
+        let other: Vec<usize> = (0..len).filter(|k| !same(k)).collect();
+        tally.results += len;
+        tally.equal_bits += len - other.len();
+        if other.is_empty() {
+            continue;
+        }
+        let units = terms.as_ref().map(|terms| terms.ulps(point));
+        let largest = expected.iter().fold(1.0_f64, |scale, x| scale.max(x.abs()));
+        for k in other {
+            let (e, f) = (expected[k], found[k]);
+            let difference = (f - e).abs();
+            let place = format!("{by}: {name}, output {k}: found {f:e}, interpreter {e:e}");
+            match (&units, rule) {
+                (_, Rule::SameBits) => panic!("{place}"),
+                (None, Rule::TwoUlpsATerm) => {
+                    assert!(difference <= CURVED * largest, "{place}");
+                }
+                (Some(units), Rule::TwoUlpsATerm) => {
+                    let ulps = difference / units[k];
+                    if ulps > ULPS_A_TERM { println!("{place}: {ulps:.2} ulp a term"); }
+                    if ulps > tally.worst.0 {
+                        tally.worst = (ulps, name.clone());
+                    }
+                }
+            }
+        }
+    }
+    tally
+}

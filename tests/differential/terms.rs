@@ -1,0 +1,206 @@
+//! How large the terms of a function's outputs are at a point: what two correct evaluations that
+//! round differently may differ by.
+//!
+//! An output is a sum of terms: coefficient times candidate term for `ddz`, coefficient times the
+//! candidate term's derivative for the Jacobian, weight times coordinate and bias for affine maps,
+//! and for a step `z`, `h dz` and the terms of each stage's `ddz` times what the stage weighs. A
+//! candidate term that is itself a sum counts as its summands. The unit of a difference is one ulp
+//! of each term, added up.
+
+use nalgebra::DVector;
+use romc::lower::JacobianPattern;
+use romc::model::{LatentVariable, ReducedModel};
+use romc::symbolic::{ExprId, ExprPool, Function as Elementary, Node, SymbolId};
+
+use super::functions::{Function, Kind};
+
+/// The distance from `|x|` to the next float.
+pub fn ulp(x: f64) -> f64 {
+    x.abs().next_up() - x.abs()
+}
+
+/// The terms of one function's outputs.
+pub enum Terms<'m> {
+    Latent(Sums),
+    Step(&'m ReducedModel, usize, Sums),
+    Affine {
+        constant: Vec<f64>,
+        /// One a coordinate of the input.
+        columns: Vec<Vec<f64>>,
+    },
+}
+
+impl<'m> Terms<'m> {
+    /// `None` for maps through curved layers, whose outputs are no sums of terms.
+    pub fn new(model: &'m ReducedModel, function: &Function) -> Option<Self> {
+        Some(match &function.kind {
+            Kind::Curved => return None,
+            Kind::Dynamics(phase) | Kind::Batch(phase) => {
+                Terms::Latent(Sums::new(model, *phase, None))
+            }
+            Kind::Jacobian(phase, pattern) => {
+                Terms::Latent(Sums::new(model, *phase, Some(pattern)))
+            }
+            Kind::Step(phase) => Terms::Step(model, *phase, Sums::new(model, *phase, None)),
+            Kind::Affine => {
+                let n = function.input_len();
+                let constant = function.interpret(&vec![0.0; n]);
+                let column = |col: usize| {
+                    let mut unit = vec![0.0; n];
+                    unit[col] = 1.0;
+                    let at_unit = function.interpret(&unit);
+                    at_unit.iter().zip(&constant).map(|(a, b)| a - b).collect()
+                };
+                let columns = (0..n).map(column).collect();
+                Terms::Affine { constant, columns }
+            }
+        })
+    }
+
+    /// One ulp of each term, added up, for each output at `point`.
+    pub fn ulps(&self, point: &[f64]) -> Vec<f64> {
+        match self {
+            Terms::Latent(sums) => sums.ulps(point),
+            Terms::Step(model, phase, sums) => step_ulps(model, *phase, sums, point),
+            Terms::Affine { constant, columns } => (constant.iter().enumerate())
+                .map(|(row, bias)| {
+                    let terms = columns.iter().zip(point).map(|(column, x)| column[row] * x);
+                    ulp(*bias) + terms.map(ulp).sum::<f64>()
+                })
+                .collect(),
+        }
+    }
+}
+
+/// The terms of a classical Runge-Kutta step from `(z, dz)` with `u_lat` held; `h` is last.
+fn step_ulps(model: &ReducedModel, phase: usize, sums: &Sums, point: &[f64]) -> Vec<f64> {
+    let d = model.latent_dim();
+    let part = |k: usize| DVector::from_column_slice(&point[k * d..(k + 1) * d]);
+    let (z, dz, u, h) = (part(0), part(1), part(2), point[3 * d]);
+    let mut of_z: Vec<f64> = (0..d).map(|k| ulp(z[k]) + ulp(h * dz[k])).collect();
+    let mut of_dz: Vec<f64> = (0..d).map(|k| ulp(dz[k])).collect();
+    let (mut stage_z, mut stage_dz) = (z.clone(), dz.clone());
+    let stages = [
+        (1.0, 1.0, 0.5 * h),
+        (2.0, 1.0, 0.5 * h),
+        (2.0, 1.0, h),
+        (1.0, 0.0, h),
+    ];
+    for (weight, weight_z, next) in stages {
+        let at: Vec<f64> = [stage_z.as_slice(), stage_dz.as_slice(), u.as_slice()].concat();
+        for (k, size) in sums.ulps(&at).into_iter().enumerate() {
+            of_dz[k] += h / 6.0 * weight * size;
+            of_z[k] += h * h / 6.0 * weight_z * size;
+        }
+        let ddz = model.ddz(phase, &stage_z, &stage_dz, &u);
+        let ddz = ddz.expect("dimensions fit");
+        stage_z = &z + next * &stage_dz;
+        stage_dz = &dz + next * ddz;
+    }
+    of_z.extend(of_dz);
+    of_z
+}
+
+/// Sums of coefficients times expressions over `(z, dz, u_lat)`.
+pub struct Sums {
+    pool: ExprPool,
+    /// All parts of all terms, operands first.
+    order: Vec<ExprId>,
+    symbols: Vec<SymbolId>,
+    outputs: Vec<Vec<(f64, ExprId)>>,
+}
+
+impl Sums {
+    fn new(model: &ReducedModel, phase: usize, pattern: Option<&JacobianPattern>) -> Self {
+        let library = model.library();
+        let mut pool = library.pool().clone();
+        let symbols: Vec<SymbolId> = LatentVariable::all(model.latent_dim())
+            .map(|variable| library.symbol(variable).expect("a variable"))
+            .collect();
+        let of_row = |row: usize| -> Vec<(f64, ExprId)> {
+            let active = model.phases()[phase].active_terms(row);
+            active
+                .map(|(id, xi)| (xi, library.term(id).expr()))
+                .collect()
+        };
+        let mut outputs: Vec<Vec<(f64, ExprId)>> = (0..model.latent_dim()).map(of_row).collect();
+        for (&row, &col) in pattern.iter().flat_map(|p| p.rows.iter().zip(&p.cols)) {
+            let slopes = of_row(row).into_iter();
+            outputs.push(
+                slopes
+                    .map(|(xi, expr)| (xi, pool.derivative(expr, symbols[col])))
+                    .collect(),
+            );
+        }
+        let roots: Vec<ExprId> = outputs.iter().flatten().map(|(_, expr)| *expr).collect();
+        Self {
+            order: pool.reachable(&roots),
+            pool,
+            symbols,
+            outputs,
+        }
+    }
+
+    fn ulps(&self, point: &[f64]) -> Vec<f64> {
+        let mut found: Vec<Sizes> = Vec::with_capacity(self.order.len());
+        for &expr in &self.order {
+            let next = self.sized(expr, &found, point);
+            found.push(next);
+        }
+        let size = |expr: &ExprId| found[self.place(*expr)].size;
+        let sum =
+            |terms: &Vec<(f64, ExprId)>| terms.iter().map(|(xi, expr)| ulp(xi * size(expr))).sum();
+        self.outputs.iter().map(sum).collect()
+    }
+
+    fn place(&self, expr: ExprId) -> usize {
+        self.order.binary_search(&expr).expect("a part of a term")
+    }
+
+    fn sized(&self, expr: ExprId, found: &[Sizes], point: &[f64]) -> Sizes {
+        let of = |child: &ExprId| found[self.place(*child)];
+        match self.pool.node(expr) {
+            Node::Number(number) => Sizes::exact(number.to_f64()),
+            Node::Symbol(symbol) => {
+                let at = self.symbols.iter().position(|known| known == symbol);
+                Sizes::exact(point[at.expect("a latent variable")])
+            }
+            Node::Sum(terms) => Sizes {
+                value: terms.iter().map(|term| of(term).value).sum(),
+                size: terms.iter().map(|term| of(term).size).sum(),
+            },
+            Node::Product(factors) => Sizes {
+                value: factors.iter().map(|factor| of(factor).value).product(),
+                size: factors.iter().map(|factor| of(factor).size).product(),
+            },
+            Node::Power(base, exponent) => {
+                let (base, exponent) = (of(base), of(exponent).value);
+                let value = base.value.powf(exponent);
+                let size = match exponent > 0.0 {
+                    true => base.size.powf(exponent),
+                    false => value.abs(),
+                };
+                Sizes { value, size }
+            }
+            Node::Apply(Elementary::Abs, argument) => Sizes {
+                value: of(argument).value.abs(),
+                ..of(argument)
+            },
+            Node::Apply(function, argument) => Sizes::exact(function.evaluate(of(argument).value)),
+        }
+    }
+}
+
+/// A value, and the sum of the magnitudes of what was added up to it.
+#[derive(Clone, Copy)]
+struct Sizes {
+    value: f64,
+    size: f64,
+}
+
+impl Sizes {
+    fn exact(value: f64) -> Self {
+        let size = value.abs();
+        Self { value, size }
+    }
+}
