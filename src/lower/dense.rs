@@ -66,6 +66,29 @@ fn matrix_vector(lowering: &mut ExpressionLowering, sums: &[Combination]) -> Vec
     lowering.builder.accumulate(table, sections)
 }
 
+/// [`matrix_vector`] whose table has no columns for combinations that are zero.
+fn matrix_vector_without_zeros(
+    lowering: &mut ExpressionLowering,
+    sums: &[Combination],
+) -> Vec<ValueId> {
+    let rest = sums.iter().filter(|sum| !sum.is_zero());
+    let rest: Vec<Combination> = rest.cloned().collect();
+    if rest.len() == sums.len() {
+        return matrix_vector(lowering, sums);
+    }
+    let zero = lowering.builder.constant(0.0);
+    let mut values = match rest.is_empty() {
+        true => Vec::new(),
+        false => matrix_vector(lowering, &rest),
+    }
+    .into_iter();
+    let value = |sum: &Combination| match sum.is_zero() {
+        true => zero,
+        false => values.next().expect("one value a sum"),
+    };
+    sums.iter().map(value).collect()
+}
+
 /// Divides sorted weights into runs that loops read in place; what is scattered goes to the
 /// end, as one section.
 fn sections(
@@ -200,7 +223,11 @@ impl DenseJacobian {
         let mut ddz = matrix_vector(lowering, &self.rest);
         let has_rest_slopes = self.rest_slopes.iter().any(|slope| !slope.is_zero());
         let is_base_needed = has_rest_slopes || !self.has_angles && !self.curved.is_empty();
-        let mut slopes = is_base_needed.then(|| matrix_vector(lowering, &self.rest_slopes));
+        let mut slopes = is_base_needed.then(|| match self.has_angles {
+            // The separable loops add to an entry for every row and variable.
+            true => matrix_vector(lowering, &self.rest_slopes),
+            false => matrix_vector_without_zeros(lowering, &self.rest_slopes),
+        });
         if self.has_angles {
             let groups = self.groups(lowering, equations);
             let (sums, all) = lowering.builder.separable(ddz, slopes, groups);

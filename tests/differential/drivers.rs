@@ -299,7 +299,7 @@ impl Build {
     pub fn c_fast() -> Self {
         let flags = ["-O3", "-march=native", "-ffp-contract=fast"];
         Self {
-            rule: Rule::TwoUlpsATerm,
+            rule: Rule::UlpsATerm,
             ..Self::c_of("C, -O3 -march=native, contracted", cc(), &flags)
         }
     }
@@ -320,33 +320,41 @@ impl Build {
             compiler: Compiler::Rust {
                 library: MathLibrary::Libm,
             },
-            rule: Rule::TwoUlpsATerm,
+            rule: Rule::UlpsATerm,
         }
     }
 
-    /// Clang without and with contraction, where it is installed.
-    pub fn clang() -> Vec<Self> {
-        if !is_installed("clang") {
-            return Vec::new();
-        }
-        let clang = || "clang".to_owned();
-        let fast = ["-O2", "-march=native", "-ffp-contract=fast"];
-        vec![
-            Self::c_of(
-                "clang, -O1 -ffp-contract=off",
-                clang(),
-                &["-O1", "-ffp-contract=off"],
-            ),
-            Self {
-                rule: Rule::TwoUlpsATerm,
-                ..Self::c_of("clang, -O2 -march=native, contracted", clang(), &fast)
-            },
-        ]
+    /// Clang without contraction, where it is installed.
+    fn clang() -> Option<Self> {
+        let flags = ["-O1", "-ffp-contract=off"];
+        is_installed("clang")
+            .then(|| Self::c_of("clang, -O1 -ffp-contract=off", "clang".to_owned(), &flags))
+    }
+
+    /// Clang with contraction, where it is installed.
+    fn clang_fast() -> Option<Self> {
+        let flags = ["-O2", "-march=native", "-ffp-contract=fast"];
+        is_installed("clang").then(|| Self {
+            rule: Rule::UlpsATerm,
+            ..Self::c_of(
+                "clang, -O2 -march=native, contracted",
+                "clang".to_owned(),
+                &flags,
+            )
+        })
+    }
+
+    /// The builds that must have the interpreter's bits.
+    pub fn exact() -> Vec<Self> {
+        let mut exact = vec![Self::rust(), Self::c()];
+        exact.extend(Self::clang());
+        exact
     }
 
     pub fn all() -> Vec<Self> {
-        let mut all = vec![Self::c(), Self::rust(), Self::c_fast(), Self::rust_libm()];
-        all.extend(Self::clang());
+        let mut all = Self::exact();
+        all.extend([Self::c_fast(), Self::rust_libm()]);
+        all.extend(Self::clang_fast());
         all
     }
 

@@ -4,8 +4,10 @@
 //! An output is a sum of terms: coefficient times candidate term for `ddz`, coefficient times the
 //! candidate term's derivative for the Jacobian, weight times coordinate and bias for affine maps,
 //! and for a step `z`, `h dz` and the terms of each stage's `ddz` times what the stage weighs. A
-//! candidate term that is itself a sum counts as its summands. The unit of a difference is one ulp
-//! of each term, added up.
+//! candidate term that is itself a sum counts as its summands.
+//!
+//! A term may differ by four ulp, for its coefficient and for adding it, and by one more for each
+//! operation inside its candidate term: `xi1*z1` by four, `xi2*z1*z2` by five ulp.
 
 use nalgebra::DVector;
 use romc::lower::JacobianPattern;
@@ -14,8 +16,11 @@ use romc::symbolic::{ExprId, ExprPool, Function as Elementary, Node, SymbolId};
 
 use super::functions::{Function, Kind};
 
+/// Ulp that every term may differ by.
+const TERM: f64 = 4.0;
+
 /// The distance from `|x|` to the next float.
-pub fn ulp(x: f64) -> f64 {
+fn ulp(x: f64) -> f64 {
     x.abs().next_up() - x.abs()
 }
 
@@ -57,15 +62,15 @@ impl<'m> Terms<'m> {
         })
     }
 
-    /// One ulp of each term, added up, for each output at `point`.
-    pub fn ulps(&self, point: &[f64]) -> Vec<f64> {
+    /// What each output may differ by at `point`.
+    pub fn allowance(&self, point: &[f64]) -> Vec<f64> {
         match self {
-            Terms::Latent(sums) => sums.ulps(point),
-            Terms::Step(model, phase, sums) => step_ulps(model, *phase, sums, point),
+            Terms::Latent(sums) => sums.allowance(point),
+            Terms::Step(model, phase, sums) => step_allowance(model, *phase, sums, point),
             Terms::Affine { constant, columns } => (constant.iter().enumerate())
                 .map(|(row, bias)| {
                     let terms = columns.iter().zip(point).map(|(column, x)| column[row] * x);
-                    ulp(*bias) + terms.map(ulp).sum::<f64>()
+                    TERM * (ulp(*bias) + terms.map(ulp).sum::<f64>())
                 })
                 .collect(),
         }
@@ -73,12 +78,14 @@ impl<'m> Terms<'m> {
 }
 
 /// The terms of a classical Runge-Kutta step from `(z, dz)` with `u_lat` held; `h` is last.
-fn step_ulps(model: &ReducedModel, phase: usize, sums: &Sums, point: &[f64]) -> Vec<f64> {
+fn step_allowance(model: &ReducedModel, phase: usize, sums: &Sums, point: &[f64]) -> Vec<f64> {
     let d = model.latent_dim();
     let part = |k: usize| DVector::from_column_slice(&point[k * d..(k + 1) * d]);
     let (z, dz, u, h) = (part(0), part(1), part(2), point[3 * d]);
-    let mut of_z: Vec<f64> = (0..d).map(|k| ulp(z[k]) + ulp(h * dz[k])).collect();
-    let mut of_dz: Vec<f64> = (0..d).map(|k| ulp(dz[k])).collect();
+    let mut of_z: Vec<f64> = (0..d)
+        .map(|k| TERM * (ulp(z[k]) + ulp(h * dz[k])))
+        .collect();
+    let mut of_dz: Vec<f64> = (0..d).map(|k| TERM * ulp(dz[k])).collect();
     let (mut stage_z, mut stage_dz) = (z.clone(), dz.clone());
     let stages = [
         (1.0, 1.0, 0.5 * h),
@@ -88,7 +95,7 @@ fn step_ulps(model: &ReducedModel, phase: usize, sums: &Sums, point: &[f64]) -> 
     ];
     for (weight, weight_z, next) in stages {
         let at: Vec<f64> = [stage_z.as_slice(), stage_dz.as_slice(), u.as_slice()].concat();
-        for (k, size) in sums.ulps(&at).into_iter().enumerate() {
+        for (k, size) in sums.allowance(&at).into_iter().enumerate() {
             of_dz[k] += h / 6.0 * weight * size;
             of_z[k] += h * h / 6.0 * weight_z * size;
         }
@@ -141,16 +148,18 @@ impl Sums {
         }
     }
 
-    fn ulps(&self, point: &[f64]) -> Vec<f64> {
+    fn allowance(&self, point: &[f64]) -> Vec<f64> {
         let mut found: Vec<Sizes> = Vec::with_capacity(self.order.len());
         for &expr in &self.order {
             let next = self.sized(expr, &found, point);
             found.push(next);
         }
-        let size = |expr: &ExprId| found[self.place(*expr)].size;
-        let sum =
-            |terms: &Vec<(f64, ExprId)>| terms.iter().map(|(xi, expr)| ulp(xi * size(expr))).sum();
-        self.outputs.iter().map(sum).collect()
+        let term = |(xi, expr): &(f64, ExprId)| {
+            let of = found[self.place(*expr)];
+            (TERM + of.operations) * ulp(xi * of.size)
+        };
+        let outputs = self.outputs.iter();
+        outputs.map(|terms| terms.iter().map(term).sum()).collect()
     }
 
     fn place(&self, expr: ExprId) -> usize {
@@ -168,25 +177,38 @@ impl Sums {
             Node::Sum(terms) => Sizes {
                 value: terms.iter().map(|term| of(term).value).sum(),
                 size: terms.iter().map(|term| of(term).size).sum(),
+                operations: terms.iter().map(|term| of(term).operations + 1.0).sum(),
             },
             Node::Product(factors) => Sizes {
                 value: factors.iter().map(|factor| of(factor).value).product(),
                 size: factors.iter().map(|factor| of(factor).size).product(),
+                operations: factors.iter().map(|f| of(f).operations + 1.0).sum::<f64>() - 1.0,
             },
             Node::Power(base, exponent) => {
                 let (base, exponent) = (of(base), of(exponent).value);
+                let operations = exponent.abs() * base.operations + exponent.abs().max(1.0);
                 let value = base.value.powf(exponent);
                 let size = match exponent > 0.0 {
                     true => base.size.powf(exponent),
                     false => value.abs(),
                 };
-                Sizes { value, size }
+                Sizes {
+                    value,
+                    size,
+                    operations,
+                }
             }
             Node::Apply(Elementary::Abs, argument) => Sizes {
                 value: of(argument).value.abs(),
                 ..of(argument)
             },
-            Node::Apply(function, argument) => Sizes::exact(function.evaluate(of(argument).value)),
+            Node::Apply(function, argument) => {
+                let argument = of(argument);
+                Sizes {
+                    operations: argument.operations + 1.0,
+                    ..Sizes::exact(function.evaluate(argument.value))
+                }
+            }
         }
     }
 }
@@ -196,11 +218,16 @@ impl Sums {
 struct Sizes {
     value: f64,
     size: f64,
+    /// Operations that round.
+    operations: f64,
 }
 
 impl Sizes {
     fn exact(value: f64) -> Self {
-        let size = value.abs();
-        Self { value, size }
+        Self {
+            value,
+            size: value.abs(),
+            operations: 0.0,
+        }
     }
 }
