@@ -47,7 +47,9 @@ fn cases(folder: &Path, target: Target, ending: &str) -> Vec<Value> {
         let own = folder.join(name);
         write_files(&own, &files, Overwrite::Refuse).expect("written");
         let file = own.join(format!("{name}{ending}"));
-        for function in functions_of(&model, N_POINTS, &options.lower) {
+        let functions = functions_of(&model, N_POINTS, &options.lower);
+        // Arrays of points are the caller's loop in these languages.
+        for function in functions.into_iter().filter(|f| !f.is_batch()) {
             cases.push(case(&file, function));
         }
     }

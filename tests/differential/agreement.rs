@@ -8,6 +8,7 @@
 //!   (`terms.rs`). Outputs of curved layers and of the solve behind their inputs' projection are
 //!   no such sums: 1e-11 of the largest output.
 
+use romc::ir::{Program, Statement, Unary};
 use romc::model::ReducedModel;
 
 use super::functions::Function;
@@ -55,7 +56,7 @@ pub fn compare(
     let name = format!("{}_{}", function.model, function.name);
     let mut tally = Tally {
         functions: 1,
-        transcendental: usize::from(function.is_transcendental()),
+        transcendental: usize::from(is_transcendental(&function.program)),
         ..Tally::default()
     };
     let terms = match rule {
@@ -99,4 +100,19 @@ pub fn compare(
         }
     }
     tally
+}
+
+/// Whether a program has functions that a mathematics library rounds, or the kernel of sines.
+fn is_transcendental(program: &Program) -> bool {
+    let own = program
+        .statements()
+        .iter()
+        .any(|statement| match statement {
+            Statement::SinCos { .. } => true,
+            Statement::Unary(op, _) => {
+                matches!(op, Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log)
+            }
+            _ => false,
+        });
+    own || program.callees().iter().any(is_transcendental)
 }

@@ -1,6 +1,6 @@
 //! The generated functions of a model, as the interpreter knows them.
 
-use romc::ir::{Interpreter, Program, Statement, Unary};
+use romc::ir::{Interpreter, Program};
 use romc::lower::{self, JacobianPattern, LowerOptions};
 use romc::model::{ModelError, ReducedModel, StateMap};
 
@@ -38,11 +38,6 @@ impl Function {
 
     pub fn is_batch(&self) -> bool {
         matches!(self.kind, Kind::Batch(_))
-    }
-
-    /// Whether it has functions that a mathematics library rounds, or the kernel of sines.
-    pub fn is_transcendental(&self) -> bool {
-        is_transcendental(&self.program)
     }
 
     /// Numbers that enter, all slots one after the other.
@@ -95,20 +90,6 @@ impl Function {
         }
         results
     }
-}
-
-fn is_transcendental(program: &Program) -> bool {
-    let own = program
-        .statements()
-        .iter()
-        .any(|statement| match statement {
-            Statement::SinCos { .. } => true,
-            Statement::Unary(op, _) => {
-                matches!(op, Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log)
-            }
-            _ => false,
-        });
-    own || program.callees().iter().any(is_transcendental)
 }
 
 /// All functions that are generated for a model.
