@@ -178,6 +178,41 @@ fn report_is_one_page_without_requests_and_its_figures_are_files() {
 }
 
 #[test]
+fn mpc_draws_each_recording_and_replaces_no_foreign_file_unless_forced() {
+    let folder = folder();
+    let figures = path(&folder, "figures");
+    let arguments = ["mpc", MODEL, JUMP, "--figures", &figures];
+    let value = json(&arguments);
+    let names = [
+        "torques_1",
+        "latent_inputs_1",
+        "latent_tracking_1",
+        "solve_times_1",
+    ];
+    assert_eq!(value["figures"].as_array().map(Vec::len), Some(12));
+    for name in names {
+        for kind in ["svg", "pdf", "csv"] {
+            let file = Path::new(&figures).join(format!("{name}.{kind}"));
+            assert!(file.is_file(), "{}", file.display());
+        }
+    }
+    let steps = value["runs"][0]["steps"].as_u64().expect("steps");
+    let torques = std::fs::read_to_string(Path::new(&figures).join("torques_1.csv"));
+    let torques = torques.expect("a table");
+    let commanded = torques.lines().filter(|line| line.contains("commanded"));
+    assert_eq!(commanded.count() as u64, 12 * steps);
+
+    let foreign = Path::new(&figures).join("torques_1.svg");
+    std::fs::write(&foreign, "mine").expect("written");
+    assert_eq!(romc(&arguments).status.code(), Some(1));
+    assert_eq!(
+        std::fs::read_to_string(&foreign).expect("still there"),
+        "mine"
+    );
+    done(&["mpc", MODEL, JUMP, "--figures", &figures, "--force"]);
+}
+
+#[test]
 fn manual_has_a_page_for_every_command_and_completions_know_them() {
     let folder = folder();
     let out = path(&folder, "man");

@@ -87,8 +87,12 @@ def main():
         for perturbation in perturbations
         for jump in jumps
     ]
+    outcomes = []
     with concurrent.futures.ProcessPoolExecutor(arguments.jobs) as pool:
-        outcomes = [outcome for outcome, _ in pool.map(run, tasks)]
+        for outcome, _ in pool.map(run, tasks):
+            outcomes.append(outcome)
+            print(f"\r{len(outcomes)} of {len(tasks)} runs", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
     text = table(outcomes, perturbations)
     print(text)
     write_outcomes(arguments.out_dir, outcomes, text)

@@ -475,6 +475,9 @@ pub struct MpcArguments {
     /// Write one row per control step to this CSV file
     #[arg(long, value_name = "FILE.csv")]
     pub output: Option<PathBuf>,
+    /// Folder for figures of torques, latent inputs, latent tracking and solve times: SVG, PDF, CSV
+    #[arg(long, value_name = "DIR")]
+    pub figures: Option<PathBuf>,
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,

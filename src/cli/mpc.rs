@@ -8,10 +8,13 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::{LiftChoice, MpcArguments, ReferenceInput};
 use super::output::{Table, check_output, progress_bar, read_recordings, significant, write_file};
+use super::report::figure_files;
+use crate::backend::{EmittedFile, write_files};
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::mpc::{self, Controller, Lift, MpcSettings, Run, StepRow};
 use crate::recording::Recording;
+use crate::report::control_figures;
 use crate::robot::{JOINT_DIM, Robot};
 use crate::{Error, artifact};
 
@@ -41,7 +44,17 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     if let Some(path) = &arguments.output {
         write_file(path, command_table(&model, &runs).as_bytes(), overwrite)?;
     }
-    Ok(answer(arguments, &runs))
+    let mut answer = answer(arguments, &runs);
+    if let Some(folder) = &arguments.figures {
+        let figures = control_figures(&model, &settings, &runs);
+        let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
+        let written = write_files(folder, &files, overwrite)?;
+        let count = figures.len();
+        let _ = writeln!(answer.text, "{count} figures: {}", folder.display());
+        let paths = written.iter().map(|path| path.display().to_string());
+        answer.json["figures"] = paths.collect::<Vec<_>>().into();
+    }
+    Ok(answer)
 }
 
 /// A recording and what the controller did along it.

@@ -17,7 +17,7 @@ use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::mpc::{Lift, MpcSettings, ReferenceInput};
 use crate::recording::Recording;
-use crate::report::figures::{csv, pdf, standalone_svg};
+use crate::report::figures::{Figure, csv, pdf, standalone_svg};
 use crate::report::{Content, PageOptions, PageTable, all_figures, page};
 use crate::simplify::Tolerance;
 use crate::study::{Store, Summary};
@@ -145,21 +145,21 @@ pub fn page_of(
         ..options(model, assessment, plain, consistent)
     };
     let page = page(&content, &figures, &options)?;
-    let mut files = Vec::new();
-    for figure in figures.iter() {
-        let id = &figure.id;
-        files.push(EmittedFile::new(
-            format!("{id}.svg"),
-            standalone_svg(figure),
-        ));
-        files.push(EmittedFile::new(format!("{id}.pdf"), pdf(figure)));
-        files.push(EmittedFile::new(format!("{id}.csv"), csv(figure)));
-    }
     Ok(Made {
         page,
-        files,
+        files: figures.iter().flat_map(figure_files).collect(),
         n_figures: figures.iter().count(),
     })
+}
+
+/// A figure as SVG, PDF and CSV.
+pub fn figure_files(figure: &Figure) -> [EmittedFile; 3] {
+    let id = &figure.id;
+    [
+        EmittedFile::new(format!("{id}.svg"), standalone_svg(figure)),
+        EmittedFile::new(format!("{id}.pdf"), pdf(figure)),
+        EmittedFile::new(format!("{id}.csv"), csv(figure)),
+    ]
 }
 
 fn options(

@@ -53,6 +53,8 @@ pub struct StepRow {
     pub z_reference: Vec<f64>,
     /// Measurement in latent coordinates.
     pub z: Vec<f64>,
+    /// Latent position that the step's own plan expects at the end of its horizon.
+    pub z_planned: Option<Vec<f64>>,
 }
 
 /// All steps along a recording, and what they come to.
@@ -211,6 +213,8 @@ fn one_step(
         z_reference: reference[..d].to_vec(),
         u_lat: command.u_lat,
         z,
+        z_planned: (command.status.has_plan())
+            .then(|| controller.plan().end(controller.settings().horizon - 1)[..d].to_vec()),
     }
 }
 

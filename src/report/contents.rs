@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use nalgebra::DVector;
 
 use super::complexity::study_figures;
+use super::control::{Place, latent_inputs, torques};
 use super::figures::{Figure, HeatMap, LinePlot, Panel, Role, Series};
 use crate::evaluate::{Assessment, SegmentRun};
 use crate::model::{ModelError, ReducedModel};
-use crate::mpc::Run;
-use crate::robot::{JOINT_DIM, Robot};
+use crate::mpc::{Lift, Run};
+use crate::robot::JOINT_DIM;
 use crate::sim::Rollout;
 use crate::study::Summary;
 
@@ -84,19 +85,15 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
             suffix: (index + 1).to_string(),
             words: stem(path),
         };
-        figures.control.push(torques(run, &place));
-        figures.control.push(latent_tracking(model, run, &place));
+        figures
+            .control
+            .push(torques(model, Lift::Consistent, run, &place));
+        figures.control.push(latent_inputs(model, run, &place));
     }
     if let Some(summary) = content.study {
         figures.study = study_figures(summary);
     }
     Ok(figures)
-}
-
-/// Which jump a figure shows.
-struct Place {
-    suffix: String,
-    words: String,
 }
 
 impl Place {
@@ -112,7 +109,8 @@ impl Place {
     }
 }
 
-fn stem(path: &std::path::Path) -> String {
+/// Name of a recording without folder and endings.
+pub(super) fn stem(path: &std::path::Path) -> String {
     let name = path.file_name().map(|name| name.to_string_lossy());
     name.map_or(String::new(), |name| {
         name.trim_end_matches(".gz")
@@ -340,70 +338,4 @@ fn baselines(
         ],
         legend,
     })
-}
-
-/// Commanded torques beside the recorded ones.
-fn torques(run: &Run, place: &Place) -> Figure {
-    let panel = |joint: usize| {
-        let line = |role, value: &dyn Fn(usize) -> f64| Series {
-            role,
-            points: (0..run.rows.len())
-                .map(|k| (run.rows[k].time_s, Some(value(k))))
-                .collect(),
-        };
-        Panel::Lines(LinePlot {
-            title: format!("{}, N m", Robot::state_names()[joint]),
-            series: vec![
-                line(Role::Recorded, &|k| run.rows[k].recorded_torque_nm[joint]),
-                line(Role::Full, &|k| run.rows[k].torque_nm[joint]),
-            ],
-            shaded: Vec::new(),
-        })
-    };
-    Figure {
-        id: format!("torques_{}", place.suffix),
-        caption: format!(
-            "Joint torques along {}: recorded, and commanded by the latent controller (consistent lift).",
-            place.words
-        ),
-        x_label: "time, s".to_owned(),
-        panel_size: PANEL,
-        columns: 3,
-        panels: (0..JOINT_DIM).map(panel).collect(),
-        legend: vec![
-            (Role::Recorded, "recorded".to_owned()),
-            (Role::Full, "commanded".to_owned()),
-        ],
-    }
-}
-
-/// The controller's latent inputs.
-fn latent_tracking(model: &ReducedModel, run: &Run, place: &Place) -> Figure {
-    let panel = |latent: usize| {
-        let line = |role, value: &dyn Fn(usize) -> Option<f64>| Series {
-            role,
-            points: (0..run.rows.len())
-                .map(|k| (run.rows[k].time_s, value(k)))
-                .collect(),
-        };
-        Panel::Lines(LinePlot {
-            title: format!("u{}", latent + 1),
-            series: vec![line(Role::Full, &|k| {
-                run.rows[k].u_lat.get(latent).copied()
-            })],
-            shaded: Vec::new(),
-        })
-    };
-    Figure {
-        id: format!("latent_inputs_{}", place.suffix),
-        caption: format!(
-            "Latent inputs that the controller chose along {} (scaled units).",
-            place.words
-        ),
-        x_label: "time, s".to_owned(),
-        panel_size: PANEL,
-        columns: 3,
-        panels: (0..model.latent_dim()).map(panel).collect(),
-        legend: vec![(Role::Full, "commanded".to_owned())],
-    }
 }

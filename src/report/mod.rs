@@ -6,9 +6,11 @@
 
 mod complexity;
 mod contents;
+mod control;
 pub mod figures;
 mod page;
 
 pub use complexity::study_figures;
 pub use contents::{AllFigures, Content, all_figures};
+pub use control::control_figures;
 pub use page::{PageOptions, PageTable, page};

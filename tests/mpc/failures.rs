@@ -243,6 +243,40 @@ fn single_outlier_costs_one_step() {
 }
 
 #[test]
+fn plan_that_fails_the_optimality_conditions_is_inaccurate_and_not_used() {
+    let settings = MpcSettings {
+        qp: QpSettings {
+            accepted_residual: 1e-30,
+            ..QpSettings::default()
+        },
+        ..MpcSettings::default()
+    };
+    let refused = Bench::new(settings).nominal(0);
+    assert_eq!(
+        (refused.status, refused.source),
+        (Status::Inaccurate, Source::Hold)
+    );
+}
+
+#[test]
+fn reference_on_which_the_equations_overflow_is_a_numerical_failure_until_a_sane_one_comes() {
+    let mut bench = Bench::new(MpcSettings::default());
+    let mut huge = trajectory(&model(Equations::Nonlinear));
+    huge.dx.iter_mut().for_each(|value| *value *= 1e160);
+    let set = bench.controller.set_reference(huge.samples());
+    set.expect("finite");
+    let refused = bench.nominal(0);
+    assert_eq!(
+        (refused.status, refused.source),
+        (Status::NumericalFailure, Source::Hold)
+    );
+    let sane = trajectory(&model(Equations::Nonlinear));
+    let set = bench.controller.set_reference(sane.samples());
+    set.expect("sound");
+    assert_eq!(bench.nominal(5).status, Status::Solved);
+}
+
+#[test]
 fn contradicting_constraints_are_infeasible_and_solved_again_when_they_agree() {
     // Touchdown before schedule: the inputs of the flight, where friction is free, are outside the
     // cone of the contact, and the rate is too small to bring them into it.

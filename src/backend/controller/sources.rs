@@ -16,7 +16,7 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 27] = sources![
+const SOURCES: [(&str, &str); 31] = sources![
     "mpc/online/command.rs",
     "mpc/online/controller.rs",
     "mpc/online/curved.rs",
@@ -25,7 +25,11 @@ const SOURCES: [(&str, &str); 27] = sources![
     "mpc/online/estimate.rs",
     "mpc/online/fallback.rs",
     "mpc/online/horizon.rs",
-    "mpc/online/interface.rs",
+    "mpc/online/interface/codes.rs",
+    "mpc/online/interface/handle.rs",
+    "mpc/online/interface/mod.rs",
+    "mpc/online/interface/settings.rs",
+    "mpc/online/interface/values.rs",
     "mpc/online/lift.rs",
     "mpc/online/linearise.rs",
     "mpc/online/mod.rs",
@@ -66,17 +70,18 @@ mod tests {
     #[test]
     fn sources_are_all_files_of_their_folders() {
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-        for folder in ["mpc/online", "robot"] {
+        for folder in ["mpc/online", "mpc/online/interface", "robot"] {
             let mut found: Vec<String> = std::fs::read_dir(root.join(folder))
                 .expect("a folder of sources")
                 .map(|entry| entry.expect("an entry").file_name())
                 .map(|name| format!("{folder}/{}", name.to_string_lossy()))
+                .filter(|path| path.ends_with(".rs"))
                 .collect();
             found.sort();
             let listed: Vec<&str> = SOURCES
                 .iter()
                 .map(|(path, _)| *path)
-                .filter(|path| path.starts_with(folder))
+                .filter(|path| path.rsplit_once('/').map(|(parent, _)| parent) == Some(folder))
                 .collect();
             assert_eq!(listed, found);
         }

@@ -142,20 +142,24 @@ fn draw_lines(plot: &LinePlot, size: (f64, f64), x_label: &str) -> Vec<Mark> {
     marks
 }
 
-/// Values that the range of y follows: a prediction that runs away does not flatten the record.
+/// Values that the range of y follows: a prediction that runs away does not flatten the record,
+/// a limit is always in sight.
 fn visible(plot: &LinePlot) -> impl Iterator<Item = f64> {
     let recorded = plot
         .series
         .iter()
         .find(|series| series.role == Role::Recorded);
     let bounds = recorded.map(|series| padded(series.points.iter().filter_map(|p| p.1)));
-    let values = plot.series.iter().flat_map(|series| &series.points);
-    values.filter_map(move |point| {
-        let value = point.1?;
-        Some(bounds.map_or(value, |(low, high)| {
+    let follows = move |role: Role, value: f64| match (role, bounds) {
+        (Role::Limit, _) | (_, None) => value,
+        (_, Some((low, high))) => {
             let reach = high - low;
             value.clamp(low - reach, high + reach)
-        }))
+        }
+    };
+    plot.series.iter().flat_map(move |series| {
+        let values = series.points.iter().filter_map(|point| point.1);
+        values.map(move |value| follows(series.role, value))
     })
 }
 
@@ -261,6 +265,7 @@ mod tests {
             series: vec![
                 line(Role::Recorded, [0.2, 0.3, 0.25]),
                 line(Role::Full, [0.2, 0.21, -1e9]),
+                line(Role::Limit, [3.0; 3]),
             ],
             shaded: vec![(1.0, 9.0)],
         };
@@ -270,8 +275,8 @@ mod tests {
             Mark::Rectangle(..) | Mark::Rule(..) | Mark::Text(..) => None,
         });
         let points: Vec<_> = lines.flatten().collect();
-        // three recorded, two before the prediction leaves
-        assert_eq!(points.len(), 5);
+        // three recorded, two before the prediction leaves, three of the limit
+        assert_eq!(points.len(), 8);
         let inside = |p: &&(f64, f64)| (0.0..=240.0).contains(&p.0) && (0.0..=150.0).contains(&p.1);
         assert!(points.iter().all(inside));
     }

@@ -13,16 +13,19 @@ pub enum Role {
     Baseline,
     /// A second template model.
     SecondBaseline,
+    /// A bound that the others keep, always within the frame.
+    Limit,
 }
 
 impl Role {
     /// Every role.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Recorded,
         Self::Full,
         Self::Restarted,
         Self::Baseline,
         Self::SecondBaseline,
+        Self::Limit,
     ];
 
     /// Class of its lines in SVG.
@@ -33,6 +36,7 @@ impl Role {
             Self::Restarted => "restarted",
             Self::Baseline => "baseline",
             Self::SecondBaseline => "baseline2",
+            Self::Limit => "limit",
         }
     }
 
@@ -43,7 +47,7 @@ impl Role {
             Self::Full => [194, 87, 12],
             Self::Restarted => [35, 122, 62],
             Self::Baseline => [123, 63, 160],
-            Self::SecondBaseline => [110, 110, 110],
+            Self::SecondBaseline | Self::Limit => [110, 110, 110],
         }
     }
 
@@ -54,7 +58,7 @@ impl Role {
             Self::Full => &[6.0, 2.5],
             Self::Restarted => &[2.0, 1.6],
             Self::Baseline => &[8.0, 2.0, 2.0, 2.0],
-            Self::SecondBaseline => &[1.0, 2.0],
+            Self::SecondBaseline | Self::Limit => &[1.0, 2.0],
         }
     }
 }

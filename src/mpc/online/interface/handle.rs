@@ -1,172 +1,16 @@
-//! The controller behind a C interface: numbers in, numbers and codes out, never a panic.
-//!
-//! A generated controller wraps these functions under its model's name; pointers are turned into
-//! slices there, everything else happens here. A pointer that cannot be used arrives as `None`.
+//! A controller that C holds by its address.
 
-use std::cell::RefCell;
-use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::command::{Command, Status};
-use super::controller::{Controller, Measurement};
-use super::error::ControlError;
-use super::reference::ReferenceSamples;
-use super::settings::{Lift, Linearisation, MpcSettings};
-use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Robot};
-
-/// A pointer is null or not aligned.
-pub const BAD_POINTER: i32 = -4;
-/// The time of a reference does not increase.
-pub const TIME_ORDER: i32 = -5;
-/// No phase of the model has the feet of a reference's sample in contact.
-pub const UNKNOWN_FEET: i32 = -6;
-/// A setting is out of its range.
-pub const BAD_SETTING: i32 = -7;
-/// The conic solver refused the problem.
-pub const SOLVER_REFUSED: i32 = -8;
-/// The controller broke down inside; it works again after a new reference.
-pub const INTERNAL: i32 = -9;
-
-/// Settings as C has them; zero friction of the body and zero rate leave both free.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Stages of the horizon.
-    pub horizon: i32,
-    /// Cap on interior-point iterations.
-    pub max_iterations: i32,
-    /// 0 transpose, 1 consistent.
-    pub lift: i32,
-    /// 0 about the reference, 1 about the last plan.
-    pub linearisation: i32,
-    /// Duration of a stage, s.
-    pub step_s: f64,
-    /// Weight of the input deviation.
-    pub input_weight: f64,
-    /// Weight of velocities against positions.
-    pub velocity_weight: f64,
-    /// Factor on the state weights of the last stage.
-    pub terminal_weight: f64,
-    /// Price of leaving the joint limits.
-    pub joint_penalty: f64,
-    /// Friction coefficient of the lifted body force, or 0.
-    pub body_friction: f64,
-    /// Friction coefficient of each foot in the consistent lift.
-    pub foot_friction: f64,
-    /// Weight of the consistent lift's prior.
-    pub lift_prior_weight: f64,
-    /// Largest change of a lifted torque, N m/s, or 0.
-    pub torque_rate_nm_s: f64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        let settings = MpcSettings::default();
-        Self {
-            horizon: settings.horizon as i32,
-            max_iterations: settings.qp.max_iterations as i32,
-            lift: match settings.lift {
-                Lift::Transpose => 0,
-                Lift::Consistent => 1,
-            },
-            linearisation: match settings.linearisation {
-                Linearisation::Reference => 0,
-                Linearisation::LastPlan => 1,
-            },
-            step_s: settings.step_s,
-            input_weight: settings.input_weight,
-            velocity_weight: settings.velocity_weight,
-            terminal_weight: settings.terminal_weight,
-            joint_penalty: settings.joint_penalty,
-            body_friction: settings.body_friction.unwrap_or(0.0),
-            foot_friction: settings.foot_friction,
-            lift_prior_weight: settings.lift_prior_weight,
-            torque_rate_nm_s: settings.torque_rate_nm_s.unwrap_or(0.0),
-        }
-    }
-}
-
-impl Settings {
-    /// The same for the controller.
-    ///
-    /// # Errors
-    /// [`ControlError::Setting`] for a choice or a count that does not exist; other ranges are
-    /// checked when the controller is built.
-    pub fn to_mpc(&self) -> Result<MpcSettings, ControlError> {
-        let refuse = |name, found: i32, expected| ControlError::Setting {
-            name,
-            found: f64::from(found),
-            expected,
-        };
-        let mut settings = MpcSettings {
-            horizon: usize::try_from(self.horizon)
-                .map_err(|_| refuse("horizon", self.horizon, "1 to 500 stages"))?,
-            step_s: self.step_s,
-            lift: match self.lift {
-                0 => Lift::Transpose,
-                1 => Lift::Consistent,
-                found => return Err(refuse("lift", found, "0 (transpose) or 1 (consistent)")),
-            },
-            linearisation: match self.linearisation {
-                0 => Linearisation::Reference,
-                1 => Linearisation::LastPlan,
-                found => {
-                    let expected = "0 (the reference) or 1 (the last plan)";
-                    return Err(refuse("linearisation", found, expected));
-                }
-            },
-            input_weight: self.input_weight,
-            velocity_weight: self.velocity_weight,
-            terminal_weight: self.terminal_weight,
-            joint_penalty: self.joint_penalty,
-            body_friction: (self.body_friction != 0.0).then_some(self.body_friction),
-            foot_friction: self.foot_friction,
-            lift_prior_weight: self.lift_prior_weight,
-            torque_rate_nm_s: (self.torque_rate_nm_s != 0.0).then_some(self.torque_rate_nm_s),
-            ..MpcSettings::default()
-        };
-        settings.qp.max_iterations = u32::try_from(self.max_iterations)
-            .map_err(|_| refuse("max_iterations", self.max_iterations, "a positive number"))?;
-        Ok(settings)
-    }
-}
-
-/// What a robot's low-level interface takes, as C has it; `D` latent coordinates.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RawCommand<const D: usize> {
-    /// Feed-forward torques, N m.
-    pub torque: [f64; JOINT_DIM],
-    /// Desired joint positions, rad.
-    pub joint_position: [f64; JOINT_DIM],
-    /// Desired joint velocities, rad/s.
-    pub joint_velocity: [f64; JOINT_DIM],
-    /// Latent input behind the torques.
-    pub u_lat: [f64; D],
-    /// How the step ended.
-    pub status: i32,
-    /// Interior-point iterations.
-    pub iterations: i32,
-    /// Wall time of the step, µs.
-    pub solve_us: f64,
-}
-
-impl<const D: usize> RawCommand<D> {
-    /// No torque, at the middle of the joints' ranges: what is commanded when nothing is known.
-    pub fn at_rest(robot: &Robot, status: i32) -> Self {
-        Self {
-            torque: [0.0; JOINT_DIM],
-            joint_position: robot
-                .joint_limit_rad()
-                .map(|(lower, upper)| 0.5 * (lower + upper)),
-            joint_velocity: [0.0; JOINT_DIM],
-            u_lat: [0.0; D],
-            status,
-            iterations: 0,
-            solve_us: 0.0,
-        }
-    }
-}
+use super::super::command::{Command, Status};
+use super::super::controller::{Controller, Measurement};
+use super::super::error::ControlError;
+use super::super::reference::ReferenceSamples;
+use super::super::settings::MpcSettings;
+use super::codes::{BAD_POINTER, INTERNAL, guarded, tell};
+use super::settings::Settings;
+use super::values::{RawCommand, RawMeasurement, RawReference};
+use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM};
 
 /// A controller with the memory that its interface needs; `D` latent coordinates.
 #[derive(Debug)]
@@ -176,34 +20,6 @@ pub struct Handle<const D: usize> {
     last: RawCommand<D>,
     /// A panic was caught: what the controller holds may contradict itself.
     is_broken: bool,
-}
-
-/// A trajectory as it comes through the interface; see [`ReferenceSamples`].
-#[derive(Debug, Clone, Copy)]
-pub struct RawReference<'a> {
-    /// Time of each sample, s.
-    pub time_s: Option<&'a [f64]>,
-    /// States, 18 values a sample.
-    pub x: Option<&'a [f64]>,
-    /// Velocities, 18 values a sample.
-    pub dx: Option<&'a [f64]>,
-    /// Inputs, 18 values a sample, unless there are none; the inner `None` is a bad pointer.
-    pub u: Option<Option<&'a [f64]>>,
-    /// Feet in contact, 4 values a sample, zero in the air.
-    pub feet: Option<&'a [u8]>,
-}
-
-/// A measurement as it comes through the interface.
-#[derive(Debug, Clone, Copy)]
-pub struct RawMeasurement<'a> {
-    /// Time, s.
-    pub time_s: f64,
-    /// State, 18 values.
-    pub x: Option<&'a [f64]>,
-    /// Velocity, 18 values.
-    pub dx: Option<&'a [f64]>,
-    /// Feet in contact, 4 values, zero in the air.
-    pub feet: Option<&'a [u8]>,
 }
 
 impl<const D: usize> Handle<D> {
@@ -340,136 +156,15 @@ fn contact(flags: &[u8]) -> ContactFlags {
     std::array::from_fn(|foot| flags.get(foot).is_some_and(|&flag| flag != 0))
 }
 
-/// Runs `action`; its error or panic becomes a code, and a message for [`last_error`].
-fn guarded<T>(action: impl FnOnce() -> Result<T, ControlError>) -> Result<T, i32> {
-    match catch_unwind(AssertUnwindSafe(action)) {
-        Ok(Ok(value)) => Ok(value),
-        Ok(Err(error)) => {
-            tell(&error.to_string());
-            Err(code_of(&error))
-        }
-        Err(_) => {
-            tell("the controller broke down inside");
-            Err(INTERNAL)
-        }
-    }
-}
-
-fn code_of(error: &ControlError) -> i32 {
-    match error {
-        ControlError::Shape { .. } => INTERNAL,
-        ControlError::Setting { .. } => BAD_SETTING,
-        ControlError::ReferenceLen { .. } | ControlError::ReferenceShape { .. } => {
-            Status::WrongDimension.code()
-        }
-        ControlError::ReferenceValue { .. } => Status::NotFinite.code(),
-        ControlError::ReferenceTime { .. } => TIME_ORDER,
-        ControlError::ReferencePhase { .. } => UNKNOWN_FEET,
-        ControlError::Solver { .. } => SOLVER_REFUSED,
-    }
-}
-
-thread_local! {
-    static LAST_ERROR: RefCell<CString> = RefCell::new(CString::default());
-}
-
-/// Leaves a message for [`last_error`].
-pub fn tell(message: &str) {
-    let text = CString::new(message.replace('\0', " ")).unwrap_or_default();
-    LAST_ERROR.with_borrow_mut(|last| *last = text);
-}
-
-/// Why the last call on this thread that made a controller or set a reference was refused; valid
-/// until the next such call on this thread.
-pub fn last_error() -> *const c_char {
-    LAST_ERROR.with_borrow(|last| last.as_ptr())
-}
-
-/// A status or return code in words.
-pub fn status_text(code: i32) -> &'static CStr {
-    match TEXTS.iter().find(|(known, _)| *known == code) {
-        Some((_, text)) => text,
-        None => c"unknown status",
-    }
-}
-
-/// Every code that the interface returns, with its meaning.
-pub const TEXTS: [(i32, &CStr); 20] = [
-    (
-        0,
-        c"solved: a plan whose optimality conditions were checked",
-    ),
-    (
-        1,
-        c"softened: a checked plan that leaves the joint limits somewhere",
-    ),
-    (
-        2,
-        c"contact early: a checked plan, the feet are in the reference's next phase",
-    ),
-    (
-        3,
-        c"contact late: a checked plan, the feet are in the reference's last phase",
-    ),
-    (
-        4,
-        c"contact unknown: a checked plan in the reference's phase, not the feet's",
-    ),
-    (
-        10,
-        c"inaccurate: the solver's point fails the optimality conditions; fallback",
-    ),
-    (
-        11,
-        c"infeasible: the constraints contradict each other; fallback",
-    ),
-    (
-        12,
-        c"iteration cap: the solver reached its deadline; fallback",
-    ),
-    (13, c"numerical failure: the solver broke down; fallback"),
-    (
-        14,
-        c"measurement jump: a measurement far from the prediction; fallback",
-    ),
-    (
-        15,
-        c"lift failed: no torques for the latent input; fallback",
-    ),
-    (
-        -1,
-        c"not finite: a number is infinite or not a number; fallback",
-    ),
-    (
-        -2,
-        c"wrong dimension: the wrong number of values or too few samples; fallback",
-    ),
-    (-3, c"no reference: none has been set; fallback"),
-    (BAD_POINTER, c"bad pointer: null or not aligned; fallback"),
-    (
-        TIME_ORDER,
-        c"time order: the reference's time does not increase",
-    ),
-    (
-        UNKNOWN_FEET,
-        c"unknown feet: no phase of the model has these feet in contact",
-    ),
-    (BAD_SETTING, c"bad setting: a setting is out of its range"),
-    (
-        SOLVER_REFUSED,
-        c"solver refused: the conic solver does not take the problem",
-    ),
-    (
-        INTERNAL,
-        c"internal: the controller broke down; set a reference to use it again",
-    ),
-];
-
 #[cfg(test)]
 mod tests {
+    use std::ffi::CStr;
+
+    use nalgebra::DMatrix;
+
+    use super::super::codes::{TIME_ORDER, last_error};
     use super::*;
     use crate::mpc::online::LatentDynamics;
-    use nalgebra::DMatrix;
 
     /// Equations that panic.
     #[derive(Debug)]
@@ -546,26 +241,6 @@ mod tests {
         // SAFETY: the text lives until the next refusal on this thread.
         let text = unsafe { CStr::from_ptr(last_error()) };
         text.to_string_lossy().into_owned()
-    }
-
-    #[test]
-    fn every_status_has_a_text_that_begins_with_its_word() {
-        let mut codes: Vec<i32> = TEXTS.iter().map(|(code, _)| *code).collect();
-        codes.sort_unstable();
-        codes.dedup();
-        assert_eq!(codes.len(), TEXTS.len());
-        for status in Status::ALL {
-            let text = status_text(status.code()).to_string_lossy();
-            let word = status.word().replace('_', " ");
-            assert!(text.starts_with(&format!("{word}:")), "{text}");
-        }
-        assert_eq!(status_text(77), c"unknown status");
-    }
-
-    #[test]
-    fn default_settings_are_those_of_the_library() {
-        let settings = Settings::default().to_mpc().expect("sound");
-        assert_eq!(settings, MpcSettings::default());
     }
 
     #[test]

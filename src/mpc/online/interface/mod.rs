@@ -1,0 +1,18 @@
+//! The controller behind a C interface: numbers in, numbers and codes out, never a panic.
+//!
+//! A generated controller wraps these functions under its model's name; pointers are turned into
+//! slices there, everything else happens here. A pointer that cannot be used arrives as `None`.
+//! Read `handle` first: it takes `values` and answers with `codes`.
+
+mod codes;
+mod handle;
+mod settings;
+mod values;
+
+pub use codes::{
+    BAD_POINTER, BAD_SETTING, INTERNAL, SOLVER_REFUSED, TEXTS, TIME_ORDER, UNKNOWN_FEET,
+    last_error, status_text, tell,
+};
+pub use handle::Handle;
+pub use settings::Settings;
+pub use values::{RawCommand, RawMeasurement, RawReference};

@@ -1,0 +1,119 @@
+//! The controller's settings as C has them.
+
+use super::super::error::ControlError;
+use super::super::settings::{Lift, Linearisation, MpcSettings};
+
+/// Settings as C has them; zero friction of the body and zero rate leave both free.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Stages of the horizon.
+    pub horizon: i32,
+    /// Cap on interior-point iterations.
+    pub max_iterations: i32,
+    /// 0 transpose, 1 consistent.
+    pub lift: i32,
+    /// 0 about the reference, 1 about the last plan.
+    pub linearisation: i32,
+    /// Duration of a stage, s.
+    pub step_s: f64,
+    /// Weight of the input deviation.
+    pub input_weight: f64,
+    /// Weight of velocities against positions.
+    pub velocity_weight: f64,
+    /// Factor on the state weights of the last stage.
+    pub terminal_weight: f64,
+    /// Price of leaving the joint limits.
+    pub joint_penalty: f64,
+    /// Friction coefficient of the lifted body force, or 0.
+    pub body_friction: f64,
+    /// Friction coefficient of each foot in the consistent lift.
+    pub foot_friction: f64,
+    /// Weight of the consistent lift's prior.
+    pub lift_prior_weight: f64,
+    /// Largest change of a lifted torque, N m/s, or 0.
+    pub torque_rate_nm_s: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        let settings = MpcSettings::default();
+        Self {
+            horizon: settings.horizon as i32,
+            max_iterations: settings.qp.max_iterations as i32,
+            lift: match settings.lift {
+                Lift::Transpose => 0,
+                Lift::Consistent => 1,
+            },
+            linearisation: match settings.linearisation {
+                Linearisation::Reference => 0,
+                Linearisation::LastPlan => 1,
+            },
+            step_s: settings.step_s,
+            input_weight: settings.input_weight,
+            velocity_weight: settings.velocity_weight,
+            terminal_weight: settings.terminal_weight,
+            joint_penalty: settings.joint_penalty,
+            body_friction: settings.body_friction.unwrap_or(0.0),
+            foot_friction: settings.foot_friction,
+            lift_prior_weight: settings.lift_prior_weight,
+            torque_rate_nm_s: settings.torque_rate_nm_s.unwrap_or(0.0),
+        }
+    }
+}
+
+impl Settings {
+    /// The same for the controller.
+    ///
+    /// # Errors
+    /// [`ControlError::Setting`] for a choice or a count that does not exist; other ranges are
+    /// checked when the controller is built.
+    pub fn to_mpc(&self) -> Result<MpcSettings, ControlError> {
+        let refuse = |name, found: i32, expected| ControlError::Setting {
+            name,
+            found: f64::from(found),
+            expected,
+        };
+        let mut settings = MpcSettings {
+            horizon: usize::try_from(self.horizon)
+                .map_err(|_| refuse("horizon", self.horizon, "1 to 500 stages"))?,
+            step_s: self.step_s,
+            lift: match self.lift {
+                0 => Lift::Transpose,
+                1 => Lift::Consistent,
+                found => return Err(refuse("lift", found, "0 (transpose) or 1 (consistent)")),
+            },
+            linearisation: match self.linearisation {
+                0 => Linearisation::Reference,
+                1 => Linearisation::LastPlan,
+                found => {
+                    let expected = "0 (the reference) or 1 (the last plan)";
+                    return Err(refuse("linearisation", found, expected));
+                }
+            },
+            input_weight: self.input_weight,
+            velocity_weight: self.velocity_weight,
+            terminal_weight: self.terminal_weight,
+            joint_penalty: self.joint_penalty,
+            body_friction: (self.body_friction != 0.0).then_some(self.body_friction),
+            foot_friction: self.foot_friction,
+            lift_prior_weight: self.lift_prior_weight,
+            torque_rate_nm_s: (self.torque_rate_nm_s != 0.0).then_some(self.torque_rate_nm_s),
+            ..MpcSettings::default()
+        };
+        settings.qp.max_iterations = u32::try_from(self.max_iterations)
+            .map_err(|_| refuse("max_iterations", self.max_iterations, "a positive number"))?;
+        Ok(settings)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn default_settings_are_those_of_the_library() {
+        let settings = Settings::default().to_mpc().expect("sound");
+        assert_eq!(settings, MpcSettings::default());
+    }
+}
