@@ -202,14 +202,15 @@ fn mpc_draws_each_recording_and_replaces_no_foreign_file_unless_forced() {
     let commanded = torques.lines().filter(|line| line.contains("commanded"));
     assert_eq!(commanded.count() as u64, 12 * steps);
 
-    let foreign = Path::new(&figures).join("torques_1.svg");
+    let other = path(&folder, "other");
+    let foreign = Path::new(&other).join("torques_1.svg");
+    std::fs::create_dir(&other).expect("a folder");
     std::fs::write(&foreign, "mine").expect("written");
+    let arguments = ["mpc", MODEL, JUMP, "--figures", &other];
     assert_eq!(romc(&arguments).status.code(), Some(1));
-    assert_eq!(
-        std::fs::read_to_string(&foreign).expect("still there"),
-        "mine"
-    );
-    done(&["mpc", MODEL, JUMP, "--figures", &figures, "--force"]);
+    let kept = std::fs::read_to_string(&foreign).expect("still there");
+    assert_eq!(kept, "mine");
+    done(&["mpc", MODEL, JUMP, "--figures", &other, "--force"]);
 }
 
 #[test]

@@ -63,7 +63,9 @@ impl Built {
             target: scratch.join("controller-target"),
             name,
         };
-        for file in emitted(model) {
+        let files = emitted(model);
+        built.remove_all_but(&files);
+        for file in files {
             let path = scratch.join(&file.path);
             // What has not changed is not compiled again.
             if fs::read_to_string(&path).ok().as_ref() != Some(&file.contents) {
@@ -80,6 +82,23 @@ impl Built {
         let told = String::from_utf8_lossy(&output.stderr);
         assert!(!told.contains("warning"), "{told}");
         built
+    }
+
+    /// Removes what an earlier version emitted and this one does not.
+    fn remove_all_but(&self, files: &[EmittedFile]) {
+        let scratch = Path::new(env!("CARGO_TARGET_TMPDIR"));
+        let kept: Vec<PathBuf> = files.iter().map(|file| scratch.join(&file.path)).collect();
+        let mut folders = vec![self.folder.clone()];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).into_iter().flatten() {
+                let path = entry.expect("an entry").path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if !kept.contains(&path) {
+                    fs::remove_file(path).expect("removed");
+                }
+            }
+        }
     }
 
     fn library(&self, ending: &str) -> PathBuf {

@@ -259,10 +259,10 @@ fn plan_that_fails_the_optimality_conditions_is_inaccurate_and_not_used() {
 }
 
 #[test]
-fn reference_on_which_the_equations_overflow_is_a_numerical_failure_until_a_sane_one_comes() {
+fn reference_whose_deviations_overflow_is_a_numerical_failure_until_a_sane_one_comes() {
     let mut bench = Bench::new(MpcSettings::default());
     let mut huge = trajectory(&model(Equations::Nonlinear));
-    huge.dx.iter_mut().for_each(|value| *value *= 1e160);
+    huge.x.iter_mut().for_each(|value| *value *= 1e200);
     let set = bench.controller.set_reference(huge.samples());
     set.expect("finite");
     let refused = bench.nominal(0);
