@@ -24,7 +24,7 @@ pub struct Handle<const D: usize> {
 
 impl<const D: usize> Handle<D> {
     /// Builds a controller with `build`, from settings or the defaults; a message is left for
-    /// [`last_error`] if there is none to be made.
+    /// [`last_error`](super::last_error) if there is none to be made.
     pub fn create(
         settings: Option<&Settings>,
         build: impl FnOnce(MpcSettings) -> Result<Controller, ControlError>,
@@ -43,7 +43,7 @@ impl<const D: usize> Handle<D> {
         made.ok()
     }
 
-    /// Takes a trajectory to follow; 0, or a code with a message for [`last_error`]. A refused
+    /// Takes a trajectory to follow; 0, or a code with a message for [`last_error`](super::last_error). A refused
     /// trajectory leaves the old one.
     pub fn set_reference(&mut self, raw: &RawReference<'_>) -> i32 {
         let is_missing = |name: &str| {

@@ -39,7 +39,7 @@ impl<const D: usize> RawCommand<D> {
     }
 }
 
-/// A trajectory as it comes through the interface; see [`ReferenceSamples`].
+/// A trajectory as it comes through the interface; see [`ReferenceSamples`](super::super::ReferenceSamples).
 #[derive(Debug, Clone, Copy)]
 pub struct RawReference<'a> {
     /// Time of each sample, s.
