@@ -138,10 +138,14 @@ pub fn page_of(
                 &ladder.equations,
             ),
         ],
-        changes: vec![page_table(
-            &format!("Every change within {tolerance}, with its bound"),
-            &ladder.changes,
-        )],
+        changes: Some(&ladder.changes)
+            .filter(|changes| !changes.rows().is_empty())
+            .map(|changes| {
+                let caption = format!("Every change within {tolerance}, with its bound");
+                page_table(&caption, changes)
+            })
+            .into_iter()
+            .collect(),
         ..options(model, assessment, plain, consistent)
     };
     let page = page(&content, &figures, &options)?;

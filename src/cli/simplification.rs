@@ -111,7 +111,8 @@ pub struct Outcome {
     rollouts: Option<RolloutEffect>,
     basis: Basis,
     domain_files: Vec<String>,
-    margin: f64,
+    /// `None` if the ranges were given.
+    margin: Option<f64>,
 }
 
 /// Simplifies a model as typed; nothing if no domain was given.
@@ -132,6 +133,7 @@ pub fn run(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Option
     progress.set_message("rolling out");
     let rollouts = basis.rollouts(model, &simplified)?;
     progress.finish_and_clear();
+    let margin = basis.samples.as_ref().map(|_| arguments.margin);
     let mut outcome = Outcome {
         model: simplified,
         original: model.clone(),
@@ -143,7 +145,7 @@ pub fn run(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Option
             .iter()
             .map(|path| path.display().to_string())
             .collect(),
-        margin: arguments.margin,
+        margin,
     };
     outcome.record_domain()?;
     Ok(Some(outcome))

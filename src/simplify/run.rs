@@ -98,12 +98,17 @@ fn provenance_of(model: &ReducedModel, certificate: &Certificate) -> Value {
         (phase.name.clone(), json!(bounds))
     };
     let bounds: serde_json::Map<_, _> = certificate.phases.iter().map(phase).collect();
-    json!({
+    let mut entry = json!({
         "romc_version": env!("CARGO_PKG_VERSION"),
         "tolerance": certificate.tolerance.to_string(),
         "simplified_from": artifact::digest(model).to_string(),
         "ddz_bounds": bounds,
-    })
+    });
+    // the bounds are those to the model before, not to one that was simplified into it
+    if let Some(earlier) = model.provenance().get("simplification") {
+        entry["earlier"] = earlier.clone();
+    }
+    entry
 }
 
 /// One phase with its box and samples.

@@ -277,6 +277,21 @@ fn near_linear_sine_becomes_its_argument_in_a_library_that_gains_the_term() {
 }
 
 #[test]
+fn model_simplified_twice_keeps_the_first_bounds_in_its_provenance() {
+    let once = simplified(&[("z1", 1.234), ("u1", 2.0)], [UNIT; 3], 0.01).model;
+    let domain = Domain::new(&once, vec![Some(vec![Interval::new(-1.0, 1.0); 3])]);
+    let domain = domain.expect("a box");
+    let twice = simplify(&once, &domain, None, Tolerance::Absolute(0.1)).expect("certified");
+    assert_eq!(left(&twice)[0], ("z1".to_owned(), 1.2));
+    let first = &once.provenance()["simplification"];
+    assert_eq!(first["earlier"], serde_json::Value::Null);
+    assert_eq!(
+        &twice.model.provenance()["simplification"]["earlier"],
+        first
+    );
+}
+
+#[test]
 fn term_off_centre_leaves_its_middle_in_the_constant() {
     let made = simplified(&[("1", 5.0), ("z1", 1.0)], [(2.9, 3.1), UNIT, UNIT], 0.15);
     let terms = left(&made);
