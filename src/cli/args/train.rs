@@ -6,7 +6,8 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
-use super::{OutputArguments, at_least_one};
+use super::command::OutputArguments;
+use super::number::at_least_one;
 use crate::recording::smoothing::SavitzkyGolay;
 use crate::robot::STATE_DIM;
 use crate::study::Shard;

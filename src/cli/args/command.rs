@@ -1,0 +1,78 @@
+//! The program, its commands, and what each command offers.
+
+use clap::{Args, Parser, Subcommand};
+
+use super::compile::CompileArguments;
+use super::import::ImportArguments;
+use super::manual::{CompletionsArguments, ManualArguments};
+use super::run::{
+    DemoArguments, InspectArguments, MpcArguments, ReportArguments, SimulateArguments,
+};
+use super::train::{StudyArguments, TrainArguments};
+
+/// The reduced-order model compiler: from recorded jumps to equations, code and torques.
+#[derive(Debug, Parser)]
+#[command(
+    name = "romc",
+    version,
+    propagate_version = true,
+    after_help = "Start with `romc demo`. `romc <command> --help` explains a command with an example."
+)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// One of romc's commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// The main job on the shipped model and recordings: equations, code, rollouts, controller
+    Demo(DemoArguments),
+    /// Tell what a recording or a model holds, and what is implausible in it
+    Inspect(InspectArguments),
+    /// Learn a model from recordings
+    Train(Box<TrainArguments>),
+    /// Train every latent dimension with several seeds: accuracy against complexity
+    Study(StudyArguments),
+    /// Take over a model trained elsewhere: safetensors, npz, PySINDy, equations as text
+    Import(ImportArguments),
+    /// Compile a model to LaTeX, C and Rust
+    Compile(CompileArguments),
+    /// Roll a model out over recordings and measure how far it drifts
+    Simulate(SimulateArguments),
+    /// Run the latent-space controller along a recording
+    Mpc(MpcArguments),
+    /// Put equations, errors, baselines and the controller's torques on one HTML page
+    Report(ReportArguments),
+    /// Write man pages, one a command
+    Manual(ManualArguments),
+    /// Print completions for a shell
+    Completions(CompletionsArguments),
+}
+
+impl Command {
+    /// Whether `--json` was given.
+    pub fn wants_json(&self) -> bool {
+        match self {
+            Self::Demo(arguments) => arguments.output_format.json,
+            Self::Inspect(arguments) => arguments.output_format.json,
+            Self::Train(arguments) => arguments.output_format.json,
+            Self::Study(arguments) => arguments.output_format.json,
+            Self::Import(arguments) => arguments.output_format.json,
+            Self::Compile(arguments) => arguments.output_format.json,
+            Self::Simulate(arguments) => arguments.output_format.json,
+            Self::Mpc(arguments) => arguments.output_format.json,
+            Self::Report(arguments) => arguments.output_format.json,
+            Self::Manual(arguments) => arguments.output_format.json,
+            Self::Completions(arguments) => arguments.output_format.json,
+        }
+    }
+}
+
+/// Output every command offers.
+#[derive(Debug, Clone, Args)]
+pub struct OutputArguments {
+    /// Print one JSON object to stdout and nothing else there
+    #[arg(long, help_heading = None)]
+    pub json: bool,
+}

@@ -1,0 +1,186 @@
+//! `romc compile`: equations and code, and how far they may be simplified.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::command::OutputArguments;
+use crate::backend::Target;
+use crate::backend::typeset::MOST_DIGITS;
+use crate::simplify::{MARGIN, Tolerance};
+
+/// `romc compile`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  romc compile models/paper-2d.json --emit latex,c,rust --out-dir out/paper-2d\n  romc compile models/go1-d4.json --emit latex,c --out-dir out/short --tolerance 5% \\\n      --domain examples/recordings/go1/train_*.csv.gz --save-model out/go1-d4-short.json"
+)]
+pub struct CompileArguments {
+    /// Model file
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// What to write, separated by commas
+    #[arg(
+        long,
+        value_name = "TARGET",
+        value_delimiter = ',',
+        default_value = "latex,c,rust",
+        value_parser = target
+    )]
+    pub emit: Vec<Target>,
+    /// Folder for the emitted files
+    #[arg(long, value_name = "DIR")]
+    pub out_dir: PathBuf,
+    #[command(flatten)]
+    pub code: CodeArguments,
+    #[command(flatten)]
+    pub equations: EquationArguments,
+    #[command(flatten)]
+    pub simplification: SimplifyArguments,
+    /// Write into a folder that holds files romc did not make
+    #[arg(long, help_heading = None)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// Floating-point numbers of generated code.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum PrecisionChoice {
+    /// 64 bits: `double` and `f64`
+    #[default]
+    F64,
+    /// 32 bits: `float` and `f32`; each function states the bound of its rounding errors
+    F32,
+}
+
+/// Units of robot coordinates at the interface of generated code.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum UnitsChoice {
+    /// rad, m, N m, N
+    #[default]
+    Si,
+    /// Scaled as the model was learned: the model file's factors times SI values
+    Scaled,
+}
+
+/// What computes sines and cosines in generated code.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum SinCosChoice {
+    /// A kernel inside the file that compilers vectorise, the same bits everywhere
+    #[default]
+    Inline,
+    /// The platform's mathematics library
+    Library,
+}
+
+/// How the equations of a phase stand on a page of LaTeX.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FormChoice {
+    /// A number for each equation; breaks across pages
+    Align,
+    /// One number, a brace around the phase's equations
+    Cases,
+}
+
+/// How code is generated.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Generated code")]
+pub struct CodeArguments {
+    /// Floating-point numbers of C and Rust
+    #[arg(long, value_enum, default_value = "f64")]
+    pub precision: PrecisionChoice,
+    /// Units of robot coordinates and inputs that functions take and give
+    #[arg(long, value_enum, default_value = "si")]
+    pub units: UnitsChoice,
+    /// What computes sines and cosines in C and Rust
+    #[arg(long, value_enum, default_value = "inline")]
+    pub sincos: SinCosChoice,
+}
+
+/// How equations are printed.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Printed equations")]
+pub struct EquationArguments {
+    /// Decimal places of coefficients; as many as each needs, at least two, unless given
+    #[arg(long, value_name = "N", value_parser = decimal_places, conflicts_with = "significant")]
+    pub digits: Option<usize>,
+    /// Significant digits of coefficients
+    #[arg(long, value_name = "N", value_parser = printed_digits)]
+    pub significant: Option<usize>,
+    /// Another name for a variable, such as z1=x or u2=F_z; may be repeated
+    #[arg(long, value_name = "VARIABLE=NAME")]
+    pub rename: Vec<String>,
+    /// Longest line in em: 32 suits one column, 22 a column of a two-column paper
+    #[arg(long, value_name = "EM", value_parser = positive_width)]
+    pub width: Option<f64>,
+    /// Arrangement in LaTeX; cases for what fits on a page, align for longer phases, unless given
+    #[arg(long, value_enum)]
+    pub form: Option<FormChoice>,
+    /// Write numbers in LaTeX with siunitx's \\num
+    #[arg(long)]
+    pub siunitx: bool,
+}
+
+/// How far equations may be simplified.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Simplification")]
+pub struct SimplifyArguments {
+    /// Drop and round terms as long as no ddz is off by more than this anywhere in the domain: 1%
+    /// (of its root mean square over the recordings) or 0.05 (scaled units per s^2); nothing
+    /// changes at 0
+    #[arg(
+        long,
+        value_name = "ERROR",
+        requires = "domain",
+        allow_negative_numbers = true
+    )]
+    pub tolerance: Option<Tolerance>,
+    /// Recordings whose smallest box is the domain, a phase; or one .toml file of ranges
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    pub domain: Vec<PathBuf>,
+    /// How far the domain reaches beyond the recordings, as a share of each variable's range
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value_t = MARGIN,
+        value_parser = share,
+        requires = "domain",
+        allow_negative_numbers = true
+    )]
+    pub margin: f64,
+    /// Also write the simplified model to this file
+    #[arg(long, value_name = "MODEL.json", requires = "domain")]
+    pub save_model: Option<PathBuf>,
+}
+
+fn decimal_places(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(places) if places <= MOST_DIGITS => Ok(places),
+        _ => Err(format!("expected a whole number from 0 to {MOST_DIGITS}")),
+    }
+}
+
+fn printed_digits(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(digits) if (1..=MOST_DIGITS).contains(&digits) => Ok(digits),
+        _ => Err(format!("expected a whole number from 1 to {MOST_DIGITS}")),
+    }
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if share.is_finite() && share >= 0.0 => Ok(share),
+        _ => Err("expected a number of at least 0, such as 0.1".to_owned()),
+    }
+}
+
+fn positive_width(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(width) if width.is_finite() && width > 0.0 => Ok(width),
+        _ => Err("expected a positive width in em".to_owned()),
+    }
+}
+
+fn target(text: &str) -> Result<Target, String> {
+    text.parse::<Target>().map_err(|error| error.to_string())
+}

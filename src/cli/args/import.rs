@@ -1,0 +1,157 @@
+//! `romc import`: models trained elsewhere.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::command::OutputArguments;
+use super::number::{at_least_one, positive_seconds};
+use crate::artifact::import::{Format, ImportError, Mapping, PhaseRule, parse_standard};
+use crate::model::{Activation, StandardLibrary};
+
+/// Kinds of files that can be imported.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum StoredFormat {
+    /// Tensors in a safetensors file, such as a PyTorch state dict
+    Safetensors,
+    /// NumPy arrays
+    Npz,
+    /// Equations as text: `[contact]`, then `ddz1 = 0.36 - 0.16*dz1 + u1` and so on
+    Equations,
+}
+
+impl From<StoredFormat> for Format {
+    fn from(stored: StoredFormat) -> Format {
+        match stored {
+            StoredFormat::Safetensors => Format::Safetensors,
+            StoredFormat::Npz => Format::Npz,
+            StoredFormat::Equations => Format::Equations,
+        }
+    }
+}
+
+/// How a file stores weights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum StoredWeights {
+    /// For `z = x W` (TensorFlow, Keras)
+    Row,
+    /// For `z = W x` (torch.nn.Linear)
+    Column,
+}
+
+/// How a file stores coefficients.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum StoredXi {
+    /// A row a candidate term
+    TermsByLatent,
+    /// A row a latent coordinate (PySINDy)
+    LatentByTerms,
+}
+
+/// In which order a file has the sines and cosines of the shorthand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TermOrder {
+    /// sin z, sin dz, cos z, cos dz: the published arrays
+    Author,
+    /// sin z, cos z, sin dz, cos dz: appendix B of the paper
+    Paper,
+}
+
+/// The candidate terms of an imported model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LibraryArgument {
+    /// `degree=1,trigonometric,inputs`
+    Shorthand(StandardLibrary),
+    /// A file with the list of terms
+    File(PathBuf),
+}
+
+fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
+    if text.starts_with("degree=") {
+        parse_standard(text).map(LibraryArgument::Shorthand)
+    } else {
+        Ok(LibraryArgument::File(PathBuf::from(text)))
+    }
+}
+
+/// `romc import`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Tensors are found by usual names (encoder.weight, encoder.0.bias, W_e, xi_contact, ...); --map\n\
+                  names the others. Parts: encoder.weight, encoder.bias, decoder.weight, decoder.bias,\n\
+                  xi.PHASE, mask.PHASE, input_mean.PHASE, input_covariance.PHASE, scaling.state,\n\
+                  scaling.input. What was taken for what, and turned how, is printed.\n\n\
+                  Examples:\n  \
+                  romc import net.safetensors --library degree=1,trigonometric,inputs --scaling 0.1 \\\n      \
+                  --map xi.contact=Xi_c --map xi.flight=Xi_f --robot go1 --output my-model.json\n  \
+                  romc import equations.txt --phase contact=any --phase flight=none --output hopper.json"
+)]
+pub struct ImportArguments {
+    /// What to import: .safetensors, .npz, or equations as .txt
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// The model file to write
+    #[arg(long, value_name = "MODEL.json")]
+    pub output: PathBuf,
+    /// Kind of file, if its ending does not tell
+    #[arg(long, value_enum)]
+    pub format: Option<StoredFormat>,
+    /// Take a tensor for a part of the model; can be repeated
+    #[arg(long, value_name = "PART=TENSOR")]
+    pub map: Vec<Mapping>,
+    /// How weights are stored, if their shape does not tell
+    #[arg(long, value_enum)]
+    pub weights: Option<StoredWeights>,
+    /// What is between the layers of an encoder or decoder that has several: elu, tanh, sigmoid
+    #[arg(long, value_name = "NAME")]
+    pub activation: Option<Activation>,
+    /// How coefficients are stored, if their shape does not tell
+    #[arg(long, value_enum)]
+    pub xi_layout: Option<StoredXi>,
+    /// Candidate terms: `degree=N[,trigonometric][,inputs]`, or a file with the list of terms
+    #[arg(long, value_name = "LIBRARY", value_parser = library_argument)]
+    pub library: Option<LibraryArgument>,
+    /// Order of the sines and cosines of degree=N,trigonometric
+    #[arg(long, value_enum, default_value = "author")]
+    pub library_order: TermOrder,
+    /// Number of latent coordinates d, if shapes do not tell
+    #[arg(long, value_name = "D", value_parser = at_least_one)]
+    pub latent_dim: Option<usize>,
+    /// When a phase holds: any, none, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be
+    /// repeated, the first match wins; contact=any and flight=none are known
+    #[arg(long, value_name = "NAME=FEET")]
+    pub phase: Vec<PhaseRule>,
+    /// Scaled value = factor times SI value: one number or one per coordinate, separated by commas
+    #[arg(long, value_name = "FACTOR", value_delimiter = ',')]
+    pub scaling: Vec<f64>,
+    /// Factors of the inputs, where they differ from --scaling
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        value_delimiter = ',',
+        requires = "scaling"
+    )]
+    pub input_scaling: Vec<f64>,
+    /// Robot whose 18 coordinates the encoder takes
+    #[arg(long)]
+    pub robot: Option<String>,
+    /// Sampling period of the training recordings
+    #[arg(long, value_name = "SECONDS", value_parser = positive_seconds)]
+    pub sample_time: Option<f64>,
+    /// Name of the model; the output file's stem unless given
+    #[arg(long)]
+    pub name: Option<String>,
+    /// Free text about the model
+    #[arg(
+        long,
+        value_name = "TEXT",
+        default_value = "",
+        hide_default_value = true
+    )]
+    pub description: String,
+    /// Replace an existing output file
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}

@@ -1,0 +1,158 @@
+//! `romc demo`, `inspect`, `simulate`, `mpc`, `report`: models held against recordings.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::command::OutputArguments;
+use super::number::{at_least_one, positive_seconds};
+use crate::simplify::Tolerance;
+
+/// `romc demo`
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  romc demo --out-dir out/demo")]
+pub struct DemoArguments {
+    /// Folder for what the demo makes
+    #[arg(long, value_name = "DIR", default_value = "out/demo")]
+    pub out_dir: PathBuf,
+    /// Write into a folder that holds files romc did not make
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// `romc inspect`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc inspect models/go1-d4.json examples/recordings/go1/test_01.csv.gz"
+)]
+pub struct InspectArguments {
+    /// Models (`.json`) and recordings (`.csv`, `.csv.gz`)
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Robot whose limits the recordings are held against
+    #[arg(long, default_value = "go1")]
+    pub robot: String,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// `romc simulate`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc simulate models/go1-d4.json examples/recordings/go1/test_*.csv.gz"
+)]
+pub struct SimulateArguments {
+    /// Model file
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Recordings to follow
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    /// Time between restarts from the recorded state, in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = positive_seconds)]
+    pub restart_every: f64,
+    /// Write the trajectories of all rollouts to this CSV file
+    #[arg(long, value_name = "FILE.csv")]
+    pub output: Option<PathBuf>,
+    /// Replace an existing output file
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// Where the controller's input reference comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ReferenceInput {
+    /// The recorded torques and forces, projected into the latent space
+    Recorded,
+    /// None: the controller finds the input itself
+    None,
+}
+
+/// How a latent input becomes joint torques.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LiftChoice {
+    /// `u = W_e^T u_lat`, the paper's
+    Transpose,
+    /// Torques whose own ground reaction forces reproduce the latent input
+    Consistent,
+}
+
+/// `romc mpc`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc mpc models/go1-d4.json examples/recordings/go1/test_01.csv.gz --output mpc.csv"
+)]
+pub struct MpcArguments {
+    /// Model file
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Recordings to follow
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    /// Number of stages
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one)]
+    pub horizon: usize,
+    /// Length of a stage in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.01, value_parser = positive_seconds)]
+    pub step: f64,
+    /// How latent inputs become joint torques
+    #[arg(long, value_enum, default_value = "transpose")]
+    pub lift: LiftChoice,
+    /// Where the input reference comes from
+    #[arg(long, value_enum, default_value = "recorded")]
+    pub reference_input: ReferenceInput,
+    /// Write one row per control step to this CSV file
+    #[arg(long, value_name = "FILE.csv")]
+    pub output: Option<PathBuf>,
+    /// Folder for figures of torques, latent inputs, latent tracking and solve times: SVG, PDF, CSV
+    #[arg(long, value_name = "DIR")]
+    pub figures: Option<PathBuf>,
+    /// Replace an existing output file
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
+
+/// `romc report`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  romc report models/go1-d4.json examples/recordings/go1/test_*.csv.gz --output report.html"
+)]
+pub struct ReportArguments {
+    /// Model file
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Recordings that the model is held against
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    /// The page to write
+    #[arg(long, value_name = "FILE.html")]
+    pub output: PathBuf,
+    /// Folder of a finished `romc study`, to show figures 10 and 11
+    #[arg(long, value_name = "DIR")]
+    pub study: Option<PathBuf>,
+    /// Also write each figure as SVG, PDF and CSV into this folder
+    #[arg(long, value_name = "DIR")]
+    pub figures: Option<PathBuf>,
+    /// Time between restarts from the recorded state, in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = positive_seconds)]
+    pub restart_every: f64,
+    /// List what simplification within this error changes: 1% or 0.05, as in `romc compile`
+    #[arg(
+        long,
+        value_name = "ERROR",
+        default_value = "1%",
+        allow_negative_numbers = true
+    )]
+    pub tolerance: Tolerance,
+    /// Replace an existing page, or write into a folder that holds files romc did not make
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub output_format: OutputArguments,
+}
