@@ -1,21 +1,22 @@
 //! `romc import`: a model trained elsewhere in, a model file out.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use nalgebra::DVector;
 use serde_json::json;
 
 use super::Answer;
 use super::args::{ImportArguments, LibraryArgument, StoredWeights, StoredXi, TermOrder};
-use super::output::{Table, check_output};
+use super::output::{Table, check_output, read_recordings};
 use crate::artifact::import::{
     Chosen, ImportError, ImportOptions, ImportReport, LibraryChoice, LibraryOrder, WeightVectors,
     XiLayout, import, read_terms,
 };
 use crate::files::Overwrite;
-use crate::model::{ScaleFactors, Scaling};
+use crate::model::{ReducedModel, ScaleFactors, Scaling};
 use crate::robot::Robot;
+use crate::sim::input_statistics;
 use crate::{Error, artifact};
 
 /// Imports a model and writes it.
@@ -26,24 +27,65 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(Some(&arguments.output), overwrite)?;
     let imported = import(&arguments.file, &options(arguments)?)?;
-    artifact::write_with(&arguments.output, &imported.model, overwrite)?;
+    let model = with_inputs(imported.model, &arguments.inputs_from)?;
+    artifact::write_with(&arguments.output, &model, overwrite)?;
     let mut text = describe(&imported.report);
     let _ = writeln!(
         text,
         "{}: model `{}`",
         arguments.output.display(),
-        imported.model.name()
+        model.name()
     );
+    if let Some(lacking) = lacking(&model) {
+        let _ = writeln!(text, "\n{lacking}");
+    }
     Ok(Answer {
         text,
         json: json!({
             "command": "import",
             "model": arguments.output.display().to_string(),
-            "name": imported.model.name(),
-            "digest": artifact::digest(&imported.model).to_string(),
+            "name": model.name(),
+            "digest": artifact::digest(&model).to_string(),
             "report": imported.report,
         }),
     })
+}
+
+/// The model with the input statistics of recordings, in the phases that they have samples of.
+fn with_inputs(model: ReducedModel, recordings: &[PathBuf]) -> Result<ReducedModel, Error> {
+    if recordings.is_empty() {
+        return Ok(model);
+    }
+    let recordings = read_recordings(recordings)?;
+    let segments: Vec<_> = recordings.iter().flat_map(|r| &r.segments).collect();
+    let statistics = input_statistics(&model, &segments)?;
+    let names: Vec<String> = model.phases().iter().map(|p| p.name.clone()).collect();
+    let mut builder = model.into_builder();
+    for (name, statistics) in names.into_iter().zip(statistics) {
+        if let Some(statistics) = statistics {
+            builder = builder.input_statistics(name, statistics);
+        }
+    }
+    Ok(builder.build()?)
+}
+
+/// What a model cannot be used for, and what would help.
+fn lacking(model: &ReducedModel) -> Option<&'static str> {
+    if model.encoder_map().is_err() || model.decoder_map().is_err() {
+        return Some(
+            "Equations only: `romc compile` takes this model; everything else needs an encoder and a decoder.",
+        );
+    }
+    if model.robot().is_err() {
+        return Some(
+            "No robot: `romc compile` takes this model; `--robot go1` lets `simulate`, `report` and `mpc` do so too.",
+        );
+    }
+    let n_phases = model.phases().len();
+    (0..n_phases).any(|phase| model.input_statistics(phase).is_err()).then_some(
+        "No input statistics in some phase: the controller (`mpc`, `compile --emit controller`) cannot weigh inputs; \
+         `--inputs-from jumps/*.csv` takes them from recordings.",
+    )
 }
 
 fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {

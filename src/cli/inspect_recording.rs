@@ -45,6 +45,10 @@ pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
         let _ = writeln!(text, "  |{}|", time_bar(segment));
         segments.push(segment_json(segment, &spans, &rule));
     }
+    if !recording.ignored_columns.is_empty() {
+        let names = recording.ignored_columns.join("`, `");
+        let _ = writeln!(text, "  columns not read: `{names}`");
+    }
     text.push_str("  # a front foot is down, = only rear feet are, blank: flight\n\n");
     let ranges = ranges(recording);
     let _ = writeln!(text, "{}", range_table(&ranges));

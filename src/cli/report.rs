@@ -10,7 +10,7 @@ use super::args::ReportArguments;
 use super::mpc::{NamedRun, run_all, run_table};
 use super::output::{Table, check_output, read_recordings, significant, spinner, write_file};
 use super::simplification;
-use super::simulate::{baseline_table, coordinate_table, dynamics_table, phase_table};
+use super::simulate::{baseline_table, coordinate_table, dynamics_table, phase_table, remarks};
 use crate::backend::{EmittedFile, write_files};
 use crate::evaluate::{Assessment, LAMBDA};
 use crate::files::Overwrite;
@@ -96,7 +96,10 @@ fn make(
         };
         run_all(model, recordings, settings, ReferenceInput::Recorded)
     };
-    let (plain, consistent) = (along(Lift::Transpose)?, along(Lift::Consistent)?);
+    let (plain, consistent) = match without_statistics(model) {
+        None => (along(Lift::Transpose)?, along(Lift::Consistent)?),
+        Some(_) => (Vec::new(), Vec::new()),
+    };
     progress.set_message("drawing");
     let commands = commands(arguments);
     let tolerance = arguments.tolerance;
@@ -104,6 +107,13 @@ fn make(
     let made = page_of(model, &assessment, runs, study, tolerance, &commands);
     progress.finish_and_clear();
     made
+}
+
+/// The first phase whose inputs the controller cannot weigh.
+fn without_statistics(model: &ReducedModel) -> Option<&str> {
+    let phases = model.phases().iter().enumerate();
+    let mut without = phases.filter(|&(index, _)| model.input_statistics(index).is_err());
+    without.next().map(|(_, phase)| phase.name.as_str())
 }
 
 const LADDER_CAPTION: &str = "What is left within each tolerance: active terms, digits of all coefficients, operations; errors as shares of the root mean square of their ddz, the largest of all equations; errors of rollouts over whole jumps and restarted";
@@ -215,10 +225,22 @@ fn options(
             "Each phase of the model",
             &dynamics_table(model, assessment),
         )],
-        control: vec![
-            page_table("Plain lift, u = W_eᵀ u_lat", &run_table(plain)),
-            page_table("Consistent lift", &run_table(consistent)),
-        ],
+        remarks: remarks(model, assessment),
+        control: match plain.is_empty() {
+            true => Vec::new(),
+            false => vec![
+                page_table("Plain lift, u = W_eᵀ u_lat", &run_table(plain)),
+                page_table("Consistent lift", &run_table(consistent)),
+            ],
+        },
+        control_notes: (without_statistics(model).into_iter())
+            .map(|phase| {
+                format!(
+                    "The controller did not run: the model has no input statistics of phase {phase}, \
+                     which weigh its inputs. romc import --inputs-from takes them from recordings."
+                )
+            })
+            .collect(),
         ..PageOptions::default()
     }
 }

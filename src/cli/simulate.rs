@@ -96,7 +96,27 @@ pub fn figures_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String
         cell(lift.torque_r2_flight()),
         cell(lift.inconsistency())
     );
+    for remark in remarks(model, assessment) {
+        let _ = writeln!(text, "\nnote: {remark}");
+    }
     text
+}
+
+/// What says that the recordings are unlike those that the model was learned from.
+pub fn remarks(model: &ReducedModel, assessment: &Assessment<'_>) -> Vec<String> {
+    let accelerations = assessment.pointwise.acceleration.iter().map(FitSums::fit);
+    let worse_than_mean = |fit: &Option<Fit>| fit.and_then(|fit| fit.r2).is_some_and(|r2| r2 < 0.0);
+    (model.phases().iter().zip(accelerations))
+        .filter(|(_, fit)| worse_than_mean(fit))
+        .map(|(phase, _)| {
+            format!(
+                "in {} the latent accelerations are further off than their mean would be (R^2 below 0): \
+                 these recordings are unlike those of the training. Another robot, other signs or \
+                 frames, or motions that it never saw? Do not rely on predictions or torques there",
+                phase.name
+            )
+        })
+        .collect()
 }
 
 fn cell(value: Option<f64>) -> String {
@@ -247,6 +267,7 @@ pub fn figures_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Value 
             "inconsistency": assessment.lift.inconsistency(),
         },
         "baselines": assessment.baselines.iter().map(baseline_json).collect::<Vec<_>>(),
+        "remarks": remarks(model, assessment),
     })
 }
 

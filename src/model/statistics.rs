@@ -27,6 +27,25 @@ pub struct LatentInputStatistics {
 }
 
 impl InputStatistics {
+    /// Mean and covariance of samples, `input_dim x n`, SI; all zero without a sample.
+    pub fn of_samples(u: &DMatrix<f64>) -> Self {
+        if u.ncols() == 0 {
+            let n = u.nrows();
+            return Self {
+                mean: DVector::zeros(n),
+                covariance: DMatrix::zeros(n, n),
+            };
+        }
+        let mean: DVector<f64> = u.column_mean();
+        let mut deviations = u.clone();
+        for mut column in deviations.column_iter_mut() {
+            column -= &mean;
+        }
+        let covariance = &deviations * deviations.transpose() / u.ncols() as f64;
+        let covariance = (&covariance + covariance.transpose()) * 0.5;
+        Self { mean, covariance }
+    }
+
     /// Complains unless mean and covariance are those of some distribution over `dim` inputs.
     pub(super) fn check(&self, phase: &str, dim: usize) -> Result<(), ModelError> {
         let mean = format!("input_statistics.{phase}.mean");

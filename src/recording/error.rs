@@ -112,6 +112,18 @@ pub enum RecordingError {
         /// What a number looks like in this file.
         expected: &'static str,
     },
+    /// Samples are too far apart to show a jump.
+    #[error("{}: row {row}, column `Time`: found a sample every {found} s on average, expected at most {expected} s; is `Time` in milliseconds?", path.display())]
+    Sampling {
+        /// The file.
+        path: PathBuf,
+        /// First row of the segment.
+        row: usize,
+        /// Mean distance between samples, in s.
+        found: f64,
+        /// Largest distance accepted, in s.
+        expected: f64,
+    },
     /// A cell is NaN, infinite, or too large for a double.
     #[error("{}: row {row}, column `{column}`: found `{found}`, expected a finite number", path.display())]
     NotFinite {

@@ -19,6 +19,8 @@ pub(super) const MAX_ROWS: usize = 1_000_000;
 /// A step this many times the one before it starts a new segment, as a jump
 /// back does: samples were left out between the two.
 const GAP_STEPS: f64 = 20.0;
+/// Largest mean distance between samples: a jump lasts less than a second.
+const LARGEST_STEP_S: f64 = 0.1;
 
 /// One row, sorted by meaning.
 #[derive(Default)]
@@ -232,6 +234,15 @@ impl<'a> Table<'a> {
                 row: open.first_row,
                 found: n,
                 expected: 2,
+            });
+        }
+        let step_s = (open.time_s[n - 1] - open.time_s[0]) / (n - 1) as f64;
+        if step_s > LARGEST_STEP_S {
+            return Err(RecordingError::Sampling {
+                path: self.path.to_owned(),
+                row: open.first_row,
+                found: step_s,
+                expected: LARGEST_STEP_S,
             });
         }
         let dx = DMatrix::from_column_slice(STATE_DIM, n, &open.dx);

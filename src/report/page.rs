@@ -29,6 +29,8 @@ pub struct PageTable {
 pub struct PageOptions {
     /// The most telling figures: a name and a value.
     pub headline: Vec<(String, String)>,
+    /// Warnings below the figures of the headline.
+    pub remarks: Vec<String>,
     /// Errors of every coordinate.
     pub coordinates: Vec<PageTable>,
     /// The model beside the template models.
@@ -37,6 +39,8 @@ pub struct PageOptions {
     pub dynamics: Vec<PageTable>,
     /// The controller's runs.
     pub control: Vec<PageTable>,
+    /// Sentences below the tables of the controller.
+    pub control_notes: Vec<String>,
     /// What simplification within several tolerances does.
     pub simplification: Vec<PageTable>,
     /// Long lists of changes, shown when asked for.
@@ -89,12 +93,15 @@ pub fn page(
             ),
             &options.baseline_notes,
         ),
-        section(
-            "control",
-            "The controller along the recordings",
-            &[CONTROL_WORDS],
-            &figures.control,
-            &options.control,
+        with_notes(
+            section(
+                "control",
+                "The controller along the recordings",
+                &[CONTROL_WORDS],
+                &figures.control,
+                &options.control,
+            ),
+            &options.control_notes,
         ),
     ];
     if !options.simplification.is_empty() {
@@ -126,6 +133,9 @@ pub fn page(
         digest: artifact::digest(model).to_string(),
         headline: (options.headline.iter())
             .map(|(name, value)| (HtmlText(name).to_string(), HtmlText(value).to_string()))
+            .collect(),
+        remarks: (options.remarks.iter())
+            .map(|remark| HtmlText(remark).to_string())
             .collect(),
         phases: phases(content, &typeset),
         rounding: HtmlText(&words::rounding(Rounding::default(), &typeset.rounding)).to_string(),
@@ -247,6 +257,7 @@ struct Page {
     version: &'static str,
     digest: String,
     headline: Vec<(String, String)>,
+    remarks: Vec<String>,
     phases: Vec<PhaseView>,
     rounding: String,
     sections: Vec<Section>,

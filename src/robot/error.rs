@@ -19,7 +19,8 @@ pub enum RobotError {
     /// of hip abduction) that torques do not determine a foot force.
     #[error(
         "{robot}: leg {leg} is singular at hx {:.4}, hy {:.4}, kn {:.4} rad: \
-         normalised determinant {determinant:.2e}, expected at least {bound:.0e}",
+         normalised determinant {determinant:.2e}, expected at least {bound:.0e}; \
+         are the joint angles in rad?",
         joints_rad[0], joints_rad[1], joints_rad[2]
     )]
     SingularLeg {

@@ -86,7 +86,8 @@ impl LatentSegment {
     }
 }
 
-fn phases(model: &ReducedModel, segment: &Segment) -> Result<Vec<usize>, SimError> {
+/// The phase that the feet of each sample select.
+pub(super) fn phases(model: &ReducedModel, segment: &Segment) -> Result<Vec<usize>, SimError> {
     segment
         .feet
         .iter()

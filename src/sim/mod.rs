@@ -6,12 +6,14 @@
 
 mod compiled;
 mod error;
+mod inputs;
 mod integrate;
 mod latent;
 mod rollout;
 
 pub use compiled::CompiledModel;
 pub use error::SimError;
+pub use inputs::input_statistics;
 pub use integrate::{Integration, IntegrationMethod, IntegrationOptions, integrate};
 pub use latent::LatentSegment;
 pub use rollout::{Restart, Rollout, Window, restart_windows, rollout};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
@@ -137,11 +137,7 @@ fn input_statistics(dataset: &Dataset, phase: usize) -> InputStatistics {
     for (mut row, factor) in u.row_iter_mut().zip(dataset.scaling.input.iter()) {
         row /= *factor;
     }
-    let mean: DVector<f64> = u.column_mean();
-    u.column_iter_mut().for_each(|mut column| column -= &mean);
-    let covariance = &u * u.transpose() / u.ncols().max(1) as f64;
-    let covariance = (&covariance + covariance.transpose()) * 0.5;
-    InputStatistics { mean, covariance }
+    InputStatistics::of_samples(&u)
 }
 
 fn median_step_s(dataset: &Dataset) -> f64 {

@@ -5,6 +5,10 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use romc::artifact;
+use romc::recording;
+use zip::CompressionMethod;
+
+use crate::store::{list, model, npz, plain};
 
 const EQUATIONS: &str = "[contact]\nddz1 = 0.5 - 2*z1 + u1\n[flight]\nddz1 = -1\n";
 
@@ -32,7 +36,8 @@ fn command_writes_a_model_and_tells_what_it_read() {
         said.contains("note: phase flight holds for feet `none`"),
         "{said}"
     );
-    assert!(said.ends_with("hopper.json: model `hopper`\n"), "{said}");
+    assert!(said.contains("hopper.json: model `hopper`\n"), "{said}");
+    assert!(said.contains("needs an encoder"), "{said}");
     let model = artifact::read(&folder.path().join("hopper.json")).expect("a model file");
     assert_eq!(model.phases()[0].xi.as_slice(), [0.5, -2.0, 1.0]);
 
@@ -85,4 +90,106 @@ fn command_with_wrong_usage_ends_with_two() {
             "{wrong:?}"
         );
     }
+}
+
+/// Writes the arrays of go1-d4 without what weighs inputs, and the options that import them.
+fn go1_arrays(folder: &Path) -> Vec<String> {
+    let model = model("models/go1-d4.json");
+    let (encoder, decoder) = (model.encoder(), model.decoder());
+    let (encoder, decoder) = (encoder.expect("linear"), decoder.expect("linear"));
+    let mut tensors = vec![
+        plain("encoder.weight", encoder.weights()),
+        list("encoder.bias", encoder.bias().as_slice()),
+        plain("decoder.weight", decoder.weights()),
+        list("decoder.bias", decoder.bias().as_slice()),
+    ];
+    for phase in model.phases() {
+        tensors.push(plain(&format!("xi_{}", phase.name), &phase.xi));
+    }
+    let bytes = npz(&tensors, CompressionMethod::Stored);
+    fs::write(folder.join("net.npz"), bytes).expect("writable");
+    let scaling = model.scaling().expect("scaling");
+    let factors = |factors: &romc::model::ScaleFactors| {
+        let factors: Vec<String> = factors.expand(18).iter().map(f64::to_string).collect();
+        factors.join(",")
+    };
+    [
+        "import",
+        "net.npz",
+        "--library",
+        "degree=1,inputs",
+        "--robot",
+        "go1",
+        "--scaling",
+        &factors(&scaling.state),
+        "--input-scaling",
+        &factors(&scaling.input),
+        "--output",
+        "net.json",
+    ]
+    .map(str::to_owned)
+    .to_vec()
+}
+
+#[test]
+fn command_takes_input_statistics_from_recordings() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let jump =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/recordings/go1/validation_01.csv.gz");
+    let mut arguments = go1_arrays(folder.path());
+    arguments.extend(["--inputs-from".to_owned(), jump.display().to_string()]);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let done = romc(folder.path(), &arguments);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    assert!(!text(&done.stdout).contains("No input statistics"));
+
+    let imported = artifact::read(&folder.path().join("net.json")).expect("a model file");
+    let segment = &recording::read(&jump).expect("checked in").segments[0];
+    let flight = (0..imported.phases().len())
+        .find(|&phase| imported.phases()[phase].name == "flight")
+        .expect("go1 flies");
+    // In flight there is no force, and the mean torque of a joint is that of the file.
+    let statistics = imported.input_statistics(flight).expect("given");
+    let airborne = (0..segment.len()).filter(|&k| segment.feet[k] == [false; 4]);
+    let torques: Vec<f64> = airborne.map(|k| segment.torque_nm[(4, k)]).collect();
+    let mean = torques.iter().sum::<f64>() / torques.len() as f64;
+    let variance = torques.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / torques.len() as f64;
+    assert!((statistics.mean[4] - mean).abs() < 1e-12 * (1.0 + mean.abs()));
+    assert!((statistics.covariance[(4, 4)] - variance).abs() < 1e-12 * (1.0 + variance));
+    assert!(
+        statistics
+            .mean
+            .rows(12, 6)
+            .iter()
+            .all(|force| *force == 0.0)
+    );
+}
+
+#[test]
+fn report_of_a_model_without_input_statistics_leaves_the_controller_out() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let arguments = go1_arrays(folder.path());
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let done = romc(folder.path(), &arguments);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    assert!(text(&done.stdout).contains("--inputs-from"));
+
+    let jump = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/recordings/go1/test_01.csv.gz");
+    let jump = jump.display().to_string();
+    let report = romc(
+        folder.path(),
+        &["report", "net.json", &jump, "--output", "page.html"],
+    );
+    assert!(report.status.success(), "{}", text(&report.stderr));
+    let page = fs::read_to_string(folder.path().join("page.html")).expect("a page");
+    assert!(page.contains("The controller did not run"));
+    assert!(page.contains("Beside the pendulum"));
+
+    let controlled = romc(folder.path(), &["mpc", "net.json", &jump]);
+    assert_eq!(controlled.status.code(), Some(1));
+    let said = text(&controlled.stderr);
+    assert!(
+        said.contains("input_statistics") && said.contains("--inputs-from"),
+        "{said}"
+    );
 }

@@ -92,6 +92,20 @@ fn single_sample_is_too_short() {
 }
 
 #[test]
+fn time_in_milliseconds_is_told() {
+    let mut sheet = Sheet::landing();
+    for row in 1..sheet.rows.len() {
+        sheet.set(row + 1, "Time", &(2 * row).to_string());
+    }
+    let error = fault(&sheet);
+    assert!(
+        matches!(error, RecordingError::Sampling { row: 2, found, .. } if found == 2.0),
+        "{error:?}"
+    );
+    assert!(message(&error).ends_with("is `Time` in milliseconds?"));
+}
+
+#[test]
 fn truncated_row_names_the_first_column_without_a_cell() {
     let mut sheet = Sheet::landing();
     sheet.rows[24].truncate(60);

@@ -36,7 +36,7 @@ pub enum Command {
     Study(StudyArguments),
     /// Take over a model trained elsewhere: safetensors, npz, PySINDy, equations as text
     Import(ImportArguments),
-    /// Compile a model to LaTeX, C and Rust
+    /// Compile a model to equations, code (C, Rust, Python, MATLAB) or a controller
     Compile(CompileArguments),
     /// Roll a model out over recordings and measure how far it drifts
     Simulate(SimulateArguments),

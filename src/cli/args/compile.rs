@@ -18,7 +18,8 @@ pub struct CompileArguments {
     /// Model file
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// What to write, separated by commas
+    /// What to write, separated by commas: latex, markdown, mathml; c, rust, python, casadi, matlab;
+    /// controller
     #[arg(
         long,
         value_name = "TARGET",

@@ -80,7 +80,8 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
     after_help = "Tensors are found by usual names (encoder.weight, encoder.0.bias, W_e, xi_contact, ...); --map\n\
                   names the others. Parts: encoder.weight, encoder.bias, decoder.weight, decoder.bias,\n\
                   xi.PHASE, mask.PHASE, input_mean.PHASE, input_covariance.PHASE, scaling.state,\n\
-                  scaling.input. What was taken for what, and turned how, is printed.\n\n\
+                  scaling.input. Statistics are of u in SI units: 18 numbers and 18 x 18. What was taken\n\
+                  for what, and turned how, is printed.\n\n\
                   Examples:\n  \
                   romc import net.safetensors --library degree=1,trigonometric,inputs --scaling 0.1 \\\n      \
                   --map xi.contact=Xi_c --map xi.flight=Xi_f --robot go1 --output my-model.json\n  \
@@ -138,6 +139,10 @@ pub struct ImportArguments {
     /// Sampling period of the training recordings
     #[arg(long, value_name = "SECONDS", value_parser = positive_seconds)]
     pub sample_time: Option<f64>,
+    /// Recordings whose inputs say what is usual in each phase: mean and covariance weigh the
+    /// controller's inputs. Needs --robot
+    #[arg(long, value_name = "RECORDING", num_args = 1.., requires = "robot")]
+    pub inputs_from: Vec<PathBuf>,
     /// Name of the model; the output file's stem unless given
     #[arg(long)]
     pub name: Option<String>,

@@ -1,0 +1,32 @@
+//! What the recorded inputs look like in each phase of a model.
+
+use nalgebra::DMatrix;
+
+use super::error::SimError;
+use super::latent::phases;
+use crate::model::{InputStatistics, ReducedModel};
+use crate::recording::Segment;
+
+/// Mean and covariance of the recorded inputs `u = [tau; F]` (SI) in each phase of a model; phases
+/// without a sample have none.
+///
+/// # Errors
+/// [`SimError::Model`] for a model without robot, [`SimError::Recording`] if the body wrench cannot
+/// be computed, [`SimError::NoPhase`] with the row whose feet no phase covers.
+pub fn input_statistics(
+    model: &ReducedModel,
+    segments: &[&Segment],
+) -> Result<Vec<Option<InputStatistics>>, SimError> {
+    let robot = model.robot()?;
+    let mut of_phases = vec![Vec::new(); model.phases().len()];
+    for segment in segments {
+        let input = segment.input(robot)?;
+        for (sample, phase) in phases(model, segment)?.into_iter().enumerate() {
+            of_phases[phase].push(input.column(sample).into_owned());
+        }
+    }
+    let statistics = of_phases.iter().map(|samples| {
+        (!samples.is_empty()).then(|| InputStatistics::of_samples(&DMatrix::from_columns(samples)))
+    });
+    Ok(statistics.collect())
+}
