@@ -102,12 +102,13 @@ pub fn figures_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String
     text
 }
 
-/// What says that the recordings are unlike those that the model was learned from.
+/// What says that the recordings are unlike those that the model was learned from. Flight says
+/// nothing: accelerations hardly vary there, and any model is as far off as their mean.
 pub fn remarks(model: &ReducedModel, assessment: &Assessment<'_>) -> Vec<String> {
     let accelerations = assessment.pointwise.acceleration.iter().map(FitSums::fit);
     let worse_than_mean = |fit: &Option<Fit>| fit.and_then(|fit| fit.r2).is_some_and(|r2| r2 < 0.0);
     (model.phases().iter().zip(accelerations))
-        .filter(|(_, fit)| worse_than_mean(fit))
+        .filter(|(phase, fit)| !phase.feet.matches([false; 4]) && worse_than_mean(fit))
         .map(|(phase, _)| {
             format!(
                 "in {} the latent accelerations are further off than their mean would be (R^2 below 0): \
