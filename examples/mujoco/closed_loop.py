@@ -77,11 +77,12 @@ def main():
     for path in [*arguments.models, *trained(arguments)]:
         folder = arguments.out_dir / "controllers" / path.stem
         models.append((path.stem, romc_controller.build(path, folder, arguments.romc)))
-    jumps = [read_jump(path) for path in sorted(RECORDINGS.glob("test_*.csv.gz"))]
+    jumps = [read_jump(path) for path in sorted(RECORDINGS.glob(f"{arguments.jumps}_*.csv.gz"))]
     perturbations = [NOMINAL]
     perturbations += [p for p in PERTURBATIONS if not arguments.quick or p.name in QUICK]
+    settings = dict(arguments.setting)
     tasks = [
-        (follower, model, perturbation, jump)
+        (follower, model, settings, perturbation, jump)
         for follower, has_model in FOLLOWERS.items()
         for model in (models if has_model else [None])
         for perturbation in perturbations
@@ -98,7 +99,7 @@ def main():
     write_outcomes(arguments.out_dir, outcomes, text)
     if not arguments.no_pictures:
         for jump in jumps:
-            _, states = run((WITH_INPUT, models[0], NOMINAL, jump))
+            _, states = run((WITH_INPUT, models[0], settings, NOMINAL, jump))
             write_strip(arguments.out_dir / f"{jump.name}.png", jump, states)
     missed = missed_aims(outcomes, len(models))
     for aim in missed:
@@ -119,6 +120,17 @@ def parse_arguments():
     )
     parser.add_argument("--romc", type=pathlib.Path, default=ROMC, help="the compiler")
     parser.add_argument("--out-dir", type=pathlib.Path, default=ROOT / "out/closed_loop")
+    parser.add_argument(
+        "--jumps", choices=["test", "validation", "train"], default="test", help="which recordings"
+    )
+    parser.add_argument(
+        "--setting",
+        type=named_number,
+        action="append",
+        default=[],
+        metavar="NAME=NUMBER",
+        help="a setting of the controller, such as velocity_weight=0.02",
+    )
     parser.add_argument("--quick", action="store_true", help="two perturbations instead of all")
     parser.add_argument("--no-pictures", action="store_true", help="no film strips")
     parser.add_argument("--jobs", type=int, help="runs at a time (default: one a core)")
@@ -128,6 +140,12 @@ def parse_arguments():
     if not (arguments.models or arguments.seeds or arguments.folds):
         arguments.models = [ROOT / "models/go1-d6.json"]
     return arguments
+
+
+def named_number(text):
+    """("name", number) of NAME=NUMBER."""
+    name, _, number = text.partition("=")
+    return name, float(number)
 
 
 def trained(arguments):
@@ -162,13 +180,14 @@ def read_jump(path):
 def run(task):
     """One closed-loop run; returns its Outcome and the states (rows, 18).
 
-    A task is who drives, (name, generated crate) of the model or None, the perturbation, the jump.
+    A task is who drives, (name, generated crate) of the model or None, settings that are not the
+    controller's own, the perturbation, the jump.
     """
-    follower_name, model, perturbation, jump = task
+    follower_name, model, settings, perturbation, jump = task
     robot = RobotModel(ROBOT)
     takeoff_s = jump.time_s[longest_flight(jump.feet)[0]]
     simulation = perturbed_simulation(ROBOT, perturbation, jump.x[0], jump.dx[0], takeoff_s)
-    controller = make_controller(follower_name, model, jump, robot)
+    controller = make_controller(follower_name, model, settings, jump, robot)
     follower = make_follower(follower_name, controller, jump)
     motors = Motors(follower, perturbation, robot.torque_limit_nm)
     log = simulation.run(motors, jump.time_s[-1])
@@ -198,11 +217,16 @@ def run(task):
     return outcome, log.x
 
 
-def make_controller(follower_name, model, jump, robot):
+def make_controller(follower_name, model, settings, jump, robot):
     """The generated controller with its reference set; none for followers without a model."""
     if not FOLLOWERS[follower_name]:
         return None
-    controller = romc_controller.load(model[1]).Controller()
+    module = romc_controller.load(model[1])
+    chosen = module.Library().default_settings()
+    for name, number in settings.items():
+        kind = type(getattr(chosen, name))
+        setattr(chosen, name, kind(number))
+    controller = module.Controller(chosen)
     u = None if follower_name == WITHOUT_INPUT else jump.inputs(robot)
     controller.set_reference(jump.time_s, jump.x, jump.dx, u, jump.feet)
     return controller

@@ -81,6 +81,9 @@ fn on_a_reference_that_the_model_follows_the_reference_input_is_commanded() {
     }
 }
 
+/// Weight of velocities with which errors of position are made good fast.
+const STIFF: f64 = 0.02;
+
 /// Runs the model itself under the controller from an offset; returns the distance from the
 /// reference, in latent units, at every step.
 fn closed_loop(model: &ReducedModel, settings: MpcSettings, with_input: bool) -> Vec<f64> {
@@ -129,10 +132,12 @@ fn feedback_brings_the_model_back_to_the_reference_faster_than_its_own_damping()
     let model = model(Equations::Nonlinear);
     let strong = MpcSettings {
         input_weight: 1e-3,
+        velocity_weight: STIFF,
         ..MpcSettings::default()
     };
     let weak = MpcSettings {
         input_weight: 1e6,
+        velocity_weight: STIFF,
         ..MpcSettings::default()
     };
     let sum = |settings| {
@@ -154,6 +159,7 @@ fn without_a_recorded_input_the_reference_is_still_tracked() {
         for missing_input in [MissingInput::Estimate, MissingInput::Mean] {
             let settings = MpcSettings {
                 input_weight: 1e-3,
+                velocity_weight: STIFF,
                 linearisation,
                 missing_input,
                 ..MpcSettings::default()
@@ -309,6 +315,7 @@ fn saturated_torques_reach_their_limit_and_never_pass_it() {
     let reference = trajectory(&model);
     let settings = MpcSettings {
         input_weight: 1e-9,
+        velocity_weight: STIFF,
         ..MpcSettings::default()
     };
     let mut controller = controller(&model, settings, reference.samples());

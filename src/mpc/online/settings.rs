@@ -97,7 +97,8 @@ pub struct MpcSettings {
     /// a weight of one follows errors of the model into a fall, a weight of hundreds is the reference
     /// input without feedback.
     pub input_weight: f64,
-    /// Weight of velocities against positions, `w_v`.
+    /// Weight of velocities against positions, `w_v`. In closed loop small weights let a jump that is
+    /// under-powered, by a payload or weak motors, end short; see `docs/control.md`.
     pub velocity_weight: f64,
     /// Factor on the state weights of the last stage.
     pub terminal_weight: f64,
@@ -132,7 +133,7 @@ impl Default for MpcSettings {
             step_s: 0.01,
             lift: Lift::Transpose,
             input_weight: 20.0,
-            velocity_weight: 0.02,
+            velocity_weight: 0.1,
             terminal_weight: 1.0,
             linearisation: Linearisation::Reference,
             drift: Drift::Automatic,
