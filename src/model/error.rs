@@ -269,7 +269,7 @@ pub enum ModelError {
         needs: &'static str,
     },
     /// The model was asked for something it does not carry.
-    #[error("model {model} has no `{part}`: {purpose} needs it")]
+    #[error("model {model} has no `{part}`, needed for {purpose}")]
     Missing {
         /// Name of the model.
         model: String,
@@ -279,7 +279,7 @@ pub enum ModelError {
         purpose: &'static str,
     },
     /// Something needs a linear encoder or decoder, and the model's has activations.
-    #[error("model {model}: found a nonlinear {part}, expected a linear one ({purpose} needs it)")]
+    #[error("model {model}: found a nonlinear {part}, expected a linear one, needed for {purpose}")]
     Nonlinear {
         /// Name of the model.
         model: String,

@@ -197,7 +197,7 @@ impl ReducedModel {
         self.require(
             &self.statistics[phase],
             "input_statistics",
-            "weighing inputs in control (`romc import --inputs-from` takes it from recordings)",
+            "weighing inputs in control; `romc import --inputs-from` takes it from recordings",
         )
     }
 

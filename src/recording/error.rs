@@ -137,7 +137,7 @@ pub enum RecordingError {
         found: String,
     },
     /// A contact flag is neither 0 nor 1.
-    #[error("{}: row {row}, column `{column}`: found {found}, expected contact 0 or 1", path.display())]
+    #[error("{}: row {row}, column `{column}`: found {found}, expected contact 0 or 1 (a force? compare it with a threshold first)", path.display())]
     Contact {
         /// The file.
         path: PathBuf,

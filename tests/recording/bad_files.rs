@@ -309,7 +309,9 @@ fn contact_flag_that_is_neither_0_nor_1_is_told() {
         assert!(matches!(error, RecordingError::Contact { row: 7, .. }));
         assert_eq!(
             message(&error),
-            format!("row 7, column `fl Foot`: found {value}, expected contact 0 or 1")
+            format!(
+                "row 7, column `fl Foot`: found {value}, expected contact 0 or 1 (a force? compare it with a threshold first)"
+            )
         );
     }
 }
