@@ -2,6 +2,8 @@
 
 #[path = "differential/agreement.rs"]
 mod agreement;
+#[path = "differential/checkers.rs"]
+mod checkers;
 #[path = "differential/driver_text.rs"]
 mod driver_text;
 #[path = "differential/drivers.rs"]
@@ -20,7 +22,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use agreement::{Rule, Tally, compare};
-use drivers::{Build, Workshop, cc, contents};
+use drivers::{Build, Workshop, contents};
 use functions::{Function, Random, functions as functions_of};
 use nalgebra::DVector;
 use romc::ir::Interpreter;
@@ -226,7 +228,7 @@ fn generated_maps_of_nonlinear_models_equal_the_interpreter() {
     check_all("nonlinear", &cases, |_| Build::all());
     let workshop = cases[0].workshop();
     for model in &cases[0].models {
-        workshop.run_c_selftest(&cc(), model.identifier().as_str());
+        workshop.run_c_selftest(&Build::c_plain(), model.identifier().as_str());
     }
     workshop.run_rust_selftest(cases[0].models[0].identifier().as_str());
 }
@@ -326,7 +328,7 @@ fn selftests_of_generated_code_pass() {
     let models = models::shipped();
     let workshop = Workshop::new(&models, &LowerOptions::default());
     for model in &models {
-        workshop.run_c_selftest(&cc(), model.identifier().as_str());
+        workshop.run_c_selftest(&Build::c_plain(), model.identifier().as_str());
     }
     for model in models.iter().filter(|model| model.latent_dim() <= 2) {
         workshop.run_rust_selftest(model.identifier().as_str());

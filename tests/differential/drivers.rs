@@ -63,7 +63,7 @@ impl Workshop {
             Compiler::C { command, flags } => self.compile_c(build, command, flags, functions),
             Compiler::Rust { library } => self.compile_rust(build, *library, functions),
         };
-        self.run_program(&program, functions, points)
+        self.run_program(&program, build, functions, points)
     }
 
     fn compile_c(
@@ -150,14 +150,17 @@ impl Workshop {
         program
     }
 
-    /// Compiles and runs the C self-test of a model, which also compares batches.
-    pub fn run_c_selftest(&self, compiler: &str, model: &str) {
+    /// Compiles the C self-test of a model, which also compares batches, and runs it.
+    pub fn run_c_selftest(&self, build: &Build, model: &str) {
+        let Compiler::C { command, flags } = &build.compiler else {
+            panic!("{} is no build of C", build.name);
+        };
         let folder = self.path().join(model);
-        let program = folder.join("selftest");
+        let program = folder.join(format!("selftest{}", build.file_name()));
         succeed(
-            Command::new(compiler)
+            Command::new(command)
                 .args(C_WARNINGS)
-                .arg("-O2")
+                .args(flags)
                 .args([
                     folder.join(format!("{model}.c")),
                     folder.join(format!("{model}_selftest.c")),
@@ -166,7 +169,7 @@ impl Workshop {
                 .arg(&program)
                 .arg("-lm"),
         );
-        succeed(&mut Command::new(program));
+        succeed(&mut build.command(&program));
     }
 
     /// Compiles and runs the tests of a model's crate, without a package registry.
@@ -209,6 +212,7 @@ impl Workshop {
     fn run_program(
         &self,
         program: &Path,
+        build: &Build,
         functions: &[Function],
         points: &[Vec<f64>],
     ) -> Vec<Vec<f64>> {
@@ -223,7 +227,7 @@ impl Workshop {
             })
             .collect();
         fs::write(&inputs, bytes).expect("written");
-        succeed(Command::new(program).arg(&inputs).arg(&outputs));
+        succeed(build.command(program).arg(&inputs).arg(&outputs));
         let bytes = fs::read(outputs).expect("the driver wrote its results");
         let width = match self.precision {
             Precision::Double => 8,
@@ -264,6 +268,8 @@ pub struct Build {
     pub name: &'static str,
     pub compiler: Compiler,
     pub rule: Rule,
+    /// The command that its programs run under, as valgrind; none if empty.
+    pub under: &'static [&'static str],
 }
 
 #[derive(Clone, Debug)]
@@ -311,6 +317,7 @@ impl Build {
                 library: MathLibrary::Std,
             },
             rule: Rule::SameBits,
+            under: &[],
         }
     }
 
@@ -321,6 +328,7 @@ impl Build {
                 library: MathLibrary::Libm,
             },
             rule: Rule::UlpsATerm,
+            under: &[],
         }
     }
 
@@ -358,6 +366,59 @@ impl Build {
         all
     }
 
+    /// As a user compiles it.
+    pub fn c_plain() -> Self {
+        Self::c_with("C, -O2", &["-O2"])
+    }
+
+    /// With sanitizers of addresses and of undefined behaviour, where they are installed; the
+    /// first finding ends the program.
+    pub fn sanitized() -> Option<Self> {
+        let flags = [
+            "-O1",
+            "-g",
+            "-ffp-contract=off",
+            "-fsanitize=address,undefined",
+            "-fno-sanitize-recover=all",
+        ];
+        let build = Self::c_with("C, sanitized", &flags);
+        build.links().then_some(build)
+    }
+
+    /// Under valgrind, where it is installed.
+    pub fn valgrind() -> Option<Self> {
+        is_installed("valgrind").then(|| Self {
+            under: &["valgrind", "-q", "--error-exitcode=9", "--leak-check=full"],
+            ..Self::c_with("C, valgrind", &["-O1", "-g", "-ffp-contract=off"])
+        })
+    }
+
+    /// Whether the compiler is there and finds what its flags need.
+    fn links(&self) -> bool {
+        let Compiler::C { command, flags } = &self.compiler else {
+            return true;
+        };
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let source = folder.path().join("probe.c");
+        fs::write(&source, "int main(void) { return 0; }\n").expect("written");
+        let mut probe = Command::new(command);
+        probe.args(flags).arg(&source).arg("-o");
+        probe.arg(folder.path().join("probe"));
+        is_there(self.name, &mut probe)
+    }
+
+    /// The command that runs a program of this build.
+    fn command(&self, program: &Path) -> Command {
+        match self.under {
+            [] => Command::new(program),
+            [tool, arguments @ ..] => {
+                let mut command = Command::new(tool);
+                command.args(arguments).arg(program);
+                command
+            }
+        }
+    }
+
     /// The C compiler of the machine with flags.
     pub fn c_with(name: &'static str, flags: &[&'static str]) -> Self {
         Self::c_of(name, cc(), flags)
@@ -369,6 +430,7 @@ impl Build {
             name,
             compiler: Compiler::C { command, flags },
             rule: Rule::SameBits,
+            under: &[],
         }
     }
 
@@ -385,12 +447,17 @@ pub fn cc() -> String {
     std::env::var("CC").unwrap_or_else(|_| "cc".to_owned())
 }
 
-/// Whether a tool answers; fails the test if it does not and tools are required.
-fn is_installed(tool: &str) -> bool {
-    let found = Command::new(tool).arg("--version").output().is_ok();
+/// Whether a tool answers.
+pub fn is_installed(tool: &str) -> bool {
+    is_there(tool, Command::new(tool).arg("--version"))
+}
+
+/// Whether a probe succeeds; if it does not, fails the test where tools are required.
+fn is_there(tool: &str, probe: &mut Command) -> bool {
+    let found = probe.output().is_ok_and(|output| output.status.success());
     if !found {
         let is_required = std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1");
-        assert!(!is_required, "`{tool}` is required and missing");
+        assert!(!is_required, "`{tool}` is required and missing: {probe:?}");
         println!("skipped: `{tool}` is missing");
     }
     found
@@ -404,14 +471,18 @@ fn libm() -> PathBuf {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         name.starts_with("liblibm-") && name.ends_with(".rlib")
     };
-    let mut found = fs::read_dir(folder)
+    let found = fs::read_dir(folder)
         .expect("a folder")
         .map(|entry| entry.expect("an entry").path())
         .filter(is_libm);
-    found.next().expect("`libm` is a dependency of the tests")
+    // The newest, should older ones of another compiler be left in the folder.
+    let modified = |path: &PathBuf| fs::metadata(path).and_then(|of| of.modified()).ok();
+    found
+        .max_by_key(modified)
+        .expect("`libm` is a dependency of the tests")
 }
 
-fn succeed(command: &mut Command) {
+pub fn succeed(command: &mut Command) {
     let output = command
         .output()
         .unwrap_or_else(|error| panic!("{command:?} does not start: {error}"));

@@ -5,7 +5,7 @@ use romc::ir::{Interpreter, Range};
 use romc::lower::{Form, LowerOptions};
 use romc::model::ReducedModel;
 
-use super::drivers::{Build, Workshop, cc};
+use super::drivers::{Build, Workshop};
 use super::functions::{Function, Random, functions as functions_of};
 use super::{SOME_MODELS, models};
 
@@ -171,7 +171,7 @@ fn selftests_in_single_precision_pass() {
     let options = LowerOptions::default();
     let workshop = Workshop::in_precision(&models, &options, Precision::Single);
     for model in &models {
-        workshop.run_c_selftest(&cc(), model.identifier().as_str());
+        workshop.run_c_selftest(&Build::c_plain(), model.identifier().as_str());
     }
     for model in models.iter().filter(|model| model.latent_dim() <= 2) {
         workshop.run_rust_selftest(model.identifier().as_str());

@@ -1,0 +1,158 @@
+//! Generated code under sanitizers and valgrind, and before static checkers.
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use romc::backend::Precision;
+use romc::lower::{Form, LowerOptions};
+use romc::model::ReducedModel;
+
+use super::drivers::{Build, Workshop, contents, is_installed, succeed};
+use super::{Case, SOME_MODELS, check_all, models, n_random_models};
+
+/// Builds with sanitizers and under valgrind, as far as this machine has them.
+fn memory_checkers() -> Vec<Build> {
+    Build::sanitized()
+        .into_iter()
+        .chain(Build::valgrind())
+        .collect()
+}
+
+#[test]
+fn sanitizers_and_valgrind_are_silent_on_generated_functions() {
+    let (_, count) = n_random_models();
+    let random: Vec<ReducedModel> = (0..count / 3).map(models::random).collect();
+    let mut cases = vec![
+        Case::new(models::shipped(), 20, Form::Automatic),
+        Case::new(
+            (1000..1000 + SOME_MODELS / 4).map(models::random).collect(),
+            20,
+            Form::Tables,
+        ),
+        Case::new(
+            (0..2).map(models::random_nonlinear).collect(),
+            20,
+            Form::Automatic,
+        ),
+    ];
+    for some in random.chunks(SOME_MODELS as usize) {
+        cases.push(Case::new(some.to_vec(), 20, Form::Automatic));
+    }
+    check_all("memory", &cases, |_| memory_checkers());
+}
+
+#[test]
+fn sanitizers_and_valgrind_are_silent_on_selftests() {
+    let models = models::shipped();
+    let options = LowerOptions::default();
+    let double = Workshop::new(&models, &options);
+    let single = Workshop::in_precision(&models, &options, Precision::Single);
+    let mut runs: Vec<(&Workshop, Build)> = Vec::new();
+    runs.extend(memory_checkers().into_iter().map(|build| (&double, build)));
+    runs.extend(Build::sanitized().map(|build| (&single, build)));
+    for (workshop, build) in runs {
+        for model in &models {
+            workshop.run_c_selftest(&build, model.identifier().as_str());
+        }
+    }
+}
+
+/// Folders with generated code of every kind: both precisions, lines and tables, layers.
+fn emitted() -> Vec<Workshop> {
+    let mut random: Vec<ReducedModel> = (0..SOME_MODELS / 4).map(models::random).collect();
+    random.extend((0..2).map(models::random_nonlinear));
+    let tables = LowerOptions { form: Form::Tables };
+    let automatic = LowerOptions::default();
+    vec![
+        Workshop::new(&models::shipped(), &automatic),
+        Workshop::in_precision(&models::shipped(), &automatic, Precision::Single),
+        Workshop::new(&random, &tables),
+    ]
+}
+
+/// Emitted files whose name ends so.
+fn files(workshops: &[Workshop], ending: &str) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for workshop in workshops {
+        let all = contents(workshop.path()).into_iter();
+        let paths = all.map(|(path, _)| workshop.path().join(path));
+        files.extend(paths.filter(|path| path.to_string_lossy().ends_with(ending)));
+    }
+    assert!(files.len() >= 30, "{ending}: {} files", files.len());
+    files
+}
+
+#[test]
+fn clang_tidy_finds_nothing_bugprone_in_generated_c() {
+    if !is_installed("clang-tidy") {
+        return;
+    }
+    // Functions take the vectors z, dz and u_lat one after the other: nobody can help that
+    // these are swappable.
+    let checks = "-*,bugprone-*,clang-analyzer-*,-bugprone-easily-swappable-parameters";
+    let workshops = emitted();
+    succeed(
+        Command::new("clang-tidy")
+            .args(["--quiet", "--warnings-as-errors=*"])
+            .arg(format!("--checks={checks}"))
+            .args(files(&workshops, ".c"))
+            .args(["--", "-std=c99"]),
+    );
+}
+
+#[test]
+fn cppcheck_finds_nothing_in_generated_c() {
+    if !is_installed("cppcheck") {
+        return;
+    }
+    let workshops = emitted();
+    succeed(
+        Command::new("cppcheck")
+            .args(["--std=c99", "--quiet", "--error-exitcode=1"])
+            .arg("--enable=warning,style,performance,portability")
+            // log(1 + x) is the model's own term, with the interpreter's rounding.
+            .arg("--suppress=unpreciseMathCall")
+            .args(files(&workshops, ".c")),
+    );
+}
+
+#[test]
+fn clippy_finds_nothing_in_generated_rust() {
+    if !is_installed("clippy-driver") {
+        return;
+    }
+    let workshops = emitted();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for file in files(&workshops, "src/lib.rs") {
+        succeed(
+            Command::new("clippy-driver")
+                .args(["--edition", "2021", "--crate-type", "lib"])
+                .args(["--crate-name", "generated", "--emit", "metadata"])
+                .args(["--check-cfg", "cfg(feature, values(\"std\", \"libm\"))"])
+                .args(["--check-cfg", "cfg(test)", "--cfg", "feature=\"std\""])
+                .args(["-D", "warnings", "-D", "clippy::all"])
+                .args(["-D", "clippy::pedantic"])
+                .args(SPELLING)
+                .arg(&file)
+                .arg("-o")
+                .arg(folder.path().join("generated.rmeta")),
+        );
+    }
+}
+
+/// Lints of the pedantic group about names, digits and length: names and lengths are the
+/// model's, digits are the shortest that read back, inlining was measured.
+const SPELLING: [&str; 12] = [
+    "-A",
+    "clippy::doc_markdown",
+    "-A",
+    "clippy::inline_always",
+    "-A",
+    "clippy::many_single_char_names",
+    "-A",
+    "clippy::similar_names",
+    "-A",
+    "clippy::too_many_lines",
+    "-A",
+    "clippy::unreadable_literal",
+];
