@@ -515,6 +515,39 @@ fn train_tells_implausible_samples_and_leaves_them_out_only_when_asked() {
 }
 
 #[test]
+fn train_with_squares_finds_a_model_though_full_libraries_diverge() {
+    let folder = folder();
+    let model = path(&folder, "squares.json");
+    let jumps = |set: &str, count: usize| -> Vec<String> {
+        (1..=count)
+            .map(|number| format!("examples/recordings/go1/{set}_{number:02}.csv.gz"))
+            .collect()
+    };
+    let (training, validation) = (jumps("train", 14), jumps("validation", 3));
+    let figures = |degree: &str| {
+        let mut arguments = vec!["train"];
+        arguments.extend(training.iter().map(String::as_str));
+        arguments.push("--validation");
+        arguments.extend(validation.iter().map(String::as_str));
+        arguments.extend(["--latent-dim", "4", "--output", &model, "--force"]);
+        arguments.extend(["--degree", degree]);
+        json(&arguments)["report"].clone()
+    };
+    let (affine, squares) = (figures("1"), figures("2"));
+    let written: Value = serde_json::from_slice(&fs::read(&model).expect("a model")).expect("JSON");
+    assert_eq!(written["library"]["degree"], 2);
+    let error = |report: &Value| {
+        report["validation"]["prediction_x_m"]
+            .as_f64()
+            .expect("finite")
+    };
+    assert!(error(&squares) < 0.9 * error(&affine), "{squares}");
+    for set in ["training", "validation"] {
+        assert!(squares[set]["rollout_x_m"].as_f64().is_some(), "{squares}");
+    }
+}
+
+#[test]
 fn train_switches_of_the_defaults_do_what_they_say() {
     let folder = folder();
     let (config, model) = (path(&folder, "train.toml"), path(&folder, "m.json"));

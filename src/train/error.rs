@@ -76,7 +76,7 @@ pub enum TrainError {
     },
     /// Every candidate model left the range of finite numbers on the validation recordings.
     #[error(
-        "all {candidates} candidate models diverge on the validation recordings: try a larger ridge or more data"
+        "all {candidates} candidate models diverge on the validation recordings: try another number of latent coordinates or more recordings"
     )]
     NoStableModel {
         /// Candidates tried.

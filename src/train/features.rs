@@ -73,6 +73,30 @@ impl Features {
         self.latent_dim
     }
 
+    /// For every term whether it is affine in `z`, `dz` and `u_lat`: dynamics of such terms do not run away within the
+    /// time of a jump.
+    pub fn affine_terms(&self) -> Vec<bool> {
+        // 0 constant, 1 affine, 2 anything else
+        let mut degree: Vec<u32> = Vec::with_capacity(self.steps.len());
+        for step in &self.steps {
+            let of = |at: &usize| degree[*at];
+            let bent = |inside: u32| if inside == 0 { 0 } else { 2 };
+            degree.push(match step {
+                Step::Number(_) => 0,
+                Step::Variable(_) => 1,
+                Step::Sum(parts) => parts.iter().map(of).max().unwrap_or(0),
+                Step::Product(parts) => parts.iter().map(of).sum::<u32>().min(2),
+                Step::Integer(base, 1) => of(base),
+                Step::Integer(inner, _)
+                | Step::Sine(inner)
+                | Step::Cosine(inner)
+                | Step::Apply(_, inner) => bent(of(inner)),
+                Step::Power(base, exponent) => bent(of(base).max(of(exponent))),
+            });
+        }
+        self.terms.iter().map(|&step| degree[step] < 2).collect()
+    }
+
     /// `Theta` (`n x library_dim`) from `variables` (`n x 3 latent_dim`, columns z, dz, u_lat).
     pub fn evaluate(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) -> DMatrix<f64> {
         self.forward(variables, values);
@@ -453,6 +477,23 @@ mod tests {
             "(2 + z1)^z2",
         ];
         Library::from_terms(2, &terms.map(String::from)).expect("terms parse")
+    }
+
+    #[test]
+    fn affine_terms_are_those_of_degree_one_at_most() {
+        let terms = [
+            "2",
+            "z1",
+            "3*dz2 - z1 + 1",
+            "u1/4",
+            "z1*u1",
+            "z1^2",
+            "sin(z1)",
+            "exp(dz1)",
+        ];
+        let library = Library::from_terms(2, &terms.map(String::from)).expect("terms parse");
+        let affine = Features::new(&library).affine_terms();
+        assert_eq!(affine, [true, true, true, true, false, false, false, false]);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Pruning by rollouts: terms that a prediction does not miss are dropped.
+//! Refining by rollouts: terms that a prediction does not miss are dropped, terms that it gains by are added.
 
 use nalgebra::DMatrix;
 
@@ -8,8 +8,15 @@ use super::rollout::Candidate;
 use super::select::Judge;
 use super::sparse::Regression;
 
+/// Share of the score that a term must bring to be added.
+const LEAST_GAIN: f64 = 0.005;
+/// Terms tried in a round of adding.
+const ATTEMPTS: usize = 60;
+/// Rounds of adding.
+const ROUNDS: usize = 3;
+
 /// Coefficients of all phases with the regressions that can fit them again.
-pub(super) struct Pruned<'a> {
+pub(super) struct Refined<'a> {
     /// One a phase.
     pub regressions: &'a [Regression],
     /// Ridge of every fit.
@@ -20,7 +27,7 @@ pub(super) struct Pruned<'a> {
     pub score: f64,
 }
 
-impl Pruned<'_> {
+impl Refined<'_> {
     /// Drops terms, the least useful to the regression first, fitting the rest of their equation again, as long as
     /// the score stays within `limit`. One attempt a term.
     pub fn sweep(
@@ -53,6 +60,51 @@ impl Pruned<'_> {
             }
             watch.done(attempt + 1, format!("score {:.4}", self.score));
         }
+    }
+
+    /// Adds terms, those that explain most of the accelerations first, fitting their equation again, wherever the score
+    /// falls by [`LEAST_GAIN`] or more. Goes round [`ROUNDS`] times, as terms explain less once others are there.
+    pub fn grow(&mut self, features: &Features, judge: &Judge<'_>, watch: &mut Watch<'_>) {
+        watch.stage("adding terms that predictions gain by", ROUNDS * ATTEMPTS);
+        for round in 0..ROUNDS {
+            let before = self.score;
+            let mut order = self.terms_by_gain();
+            order.sort_by(|a, b| b.0.total_cmp(&a.0));
+            for (attempt, (_, phase, row, column)) in order.into_iter().take(ATTEMPTS).enumerate() {
+                if watch.cancelled() {
+                    return;
+                }
+                let mut xi = self.xi.clone();
+                let mut support = xi[phase].map(|value| value != 0.0);
+                support[(row, column)] = true;
+                let fitted = self.regressions[phase].fit_column(column, &support, self.ridge);
+                xi[phase].set_column(column, &fitted);
+                let score = judge.score(Candidate { features, xi: &xi });
+                if score <= (1.0 - LEAST_GAIN) * self.score {
+                    self.xi = xi;
+                    self.score = score;
+                }
+                let done = round * ATTEMPTS + attempt + 1;
+                watch.done(done, format!("score {:.4}", self.score));
+            }
+            if self.score == before {
+                return;
+            }
+        }
+    }
+
+    /// Terms that are not active as (share of the energy that is explained with it, phase, row, column).
+    fn terms_by_gain(&self) -> Vec<(f64, usize, usize, usize)> {
+        let mut terms = Vec::new();
+        for (phase, regression) in self.regressions.iter().enumerate() {
+            let support = self.xi[phase].map(|value| value != 0.0);
+            for column in 0..support.ncols() {
+                for (row, gain) in regression.gains(column, &support, self.ridge) {
+                    terms.push((gain, phase, row, column));
+                }
+            }
+        }
+        terms
     }
 
     /// Active terms as (share of the energy that is lost without it, phase, row, column).

@@ -9,7 +9,7 @@ use super::features::Features;
 use super::latent::Latent;
 use super::options::RegressionOptions;
 use super::progress::Watch;
-use super::prune::Pruned;
+use super::prune::Refined;
 use super::rollout::{Candidate, Window, predict, restarted, whole};
 use super::sparse::{Pruning, Regression, active_terms};
 use super::weak::windowed_samples;
@@ -134,7 +134,7 @@ pub fn select(
         .enumerate()
     {
         let Fitted { xi, choice, window } = start;
-        let mut pruned = Pruned {
+        let mut pruned = Refined {
             regressions: &regressions[window],
             ridge: choice.ridge,
             xi,
@@ -175,6 +175,8 @@ struct Fitted {
     window: usize, // index into the windows of the options
 }
 
+/// Every combination of the options; where the library has terms that are not affine, also those without them, and the
+/// best of these grown by such terms: rollouts of full libraries diverge more often than not.
 fn try_all(
     regressions: &[Vec<Regression>],
     features: &Features,
@@ -182,36 +184,92 @@ fn try_all(
     options: &RegressionOptions,
     watch: &mut Watch<'_>,
 ) -> Vec<Fitted> {
-    let mut tried = Vec::new();
-    watch.stage(
-        "fitting the dynamics",
-        regressions.len() * options.ridges.len() * options.prunings.len(),
-    );
-    for (window, phases) in regressions.iter().enumerate() {
-        for &ridge in &options.ridges {
-            for &pruning in &options.prunings {
+    let affine = features.affine_terms();
+    let attempt = Attempt {
+        regressions,
+        features,
+        judge,
+        options,
+    };
+    let mut tried = attempt.fit_all(&vec![true; affine.len()], watch);
+    if affine.contains(&false) && !watch.cancelled() {
+        let tame = attempt.fit_all(&affine, watch);
+        let grown = attempt.grown(&tame, watch);
+        tried.extend(tame);
+        tried.extend(grown);
+    }
+    tried
+}
+
+/// What candidates are fitted from and judged by.
+struct Attempt<'a> {
+    regressions: &'a [Vec<Regression>],
+    features: &'a Features,
+    judge: &'a Judge<'a>,
+    options: &'a RegressionOptions,
+}
+
+impl Attempt<'_> {
+    /// Every combination of the options with the terms that are `allowed`.
+    fn fit_all(&self, allowed: &[bool], watch: &mut Watch<'_>) -> Vec<Fitted> {
+        let (options, features) = (self.options, self.features);
+        let mut tried = Vec::new();
+        watch.stage(
+            "fitting the dynamics",
+            self.regressions.len() * options.ridges.len() * options.prunings.len(),
+        );
+        for (window, phases) in self.regressions.iter().enumerate() {
+            for &ridge in &options.ridges {
                 if watch.cancelled() {
                     return tried;
                 }
-                let xi: Vec<_> = phases
+                let fits: Vec<Vec<DMatrix<f64>>> = phases
                     .iter()
-                    .map(|regression| regression.fit(ridge, pruning))
+                    .map(|regression| regression.fit_each(ridge, &options.prunings, allowed))
                     .collect();
-                let score = judge.score(Candidate { features, xi: &xi });
-                let active = xi.iter().map(active_terms).sum();
-                watch.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
-                let choice = Choice {
-                    window: options.windows[window],
-                    ridge,
-                    pruning,
-                    score,
-                    active,
-                };
-                tried.push(Fitted { xi, choice, window });
+                for (number, &pruning) in options.prunings.iter().enumerate() {
+                    let xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
+                    let score = self.judge.score(Candidate { features, xi: &xi });
+                    let active = xi.iter().map(active_terms).sum();
+                    watch.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
+                    let choice = Choice {
+                        window: options.windows[window],
+                        ridge,
+                        pruning,
+                        score,
+                        active,
+                    };
+                    tried.push(Fitted { xi, choice, window });
+                }
             }
         }
+        tried
     }
-    tried
+
+    /// The best of these with terms added that its predictions gain by; none if they all diverge.
+    fn grown(&self, tame: &[Fitted], watch: &mut Watch<'_>) -> Option<Fitted> {
+        let best = tame
+            .iter()
+            .filter(|fitted| fitted.choice.score.is_finite())
+            .min_by(|a, b| a.choice.score.total_cmp(&b.choice.score))?;
+        let mut refined = Refined {
+            regressions: &self.regressions[best.window],
+            ridge: best.choice.ridge,
+            xi: best.xi.clone(),
+            score: best.choice.score,
+        };
+        refined.grow(self.features, self.judge, watch);
+        let choice = Choice {
+            score: refined.score,
+            active: refined.xi.iter().map(active_terms).sum(),
+            ..best.choice.clone()
+        };
+        Some(Fitted {
+            xi: refined.xi,
+            choice,
+            window: best.window,
+        })
+    }
 }
 
 fn best_score(tried: &[Fitted]) -> Result<f64, TrainError> {

@@ -3,6 +3,11 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::{Deserialize, Serialize};
 
+/// Least ridge on the normalised columns: far above rounding.
+const LEAST_RIDGE: f64 = 1e-10;
+/// Supports up to this size are solved anew after every elimination, larger ones by an update.
+const RECOMPUTED: usize = 64;
+
 /// Normal equations of `ddz = theta Xi` for one phase, columns normalised to unit root mean square.
 ///
 /// Building it reads the samples once; every solve afterwards works on `library_dim x library_dim` matrices.
@@ -63,25 +68,47 @@ impl Regression {
     /// Contributions, not bare coefficients, decide (STLSQ of Brunton et al. 2016 otherwise), so that the units of a
     /// term do not matter.
     pub fn fit(&self, ridge: f64, pruning: Pruning) -> DMatrix<f64> {
-        let mut xi = DMatrix::zeros(self.library_dim(), self.latent_dim());
+        let all = vec![true; self.library_dim()];
+        self.fit_each(ridge, &[pruning], &all).remove(0)
+    }
+
+    /// The same for several prunings, of the terms that are `allowed`.
+    ///
+    /// Eliminations drop terms in one and the same order, which is walked once for all of them.
+    pub fn fit_each(
+        &self,
+        ridge: f64,
+        prunings: &[Pruning],
+        allowed: &[bool],
+    ) -> Vec<DMatrix<f64>> {
+        let zero = DMatrix::zeros(self.library_dim(), self.latent_dim());
+        let mut fits = vec![zero; prunings.len()];
         let informative: Vec<usize> = (0..self.library_dim())
-            .filter(|&i| self.theta_rms[i] > 0.0)
+            .filter(|&i| self.theta_rms[i] > 0.0 && allowed[i])
             .collect();
-        for column in 0..self.latent_dim() {
-            if self.target_rms[column] == 0.0 {
-                continue;
+        for column in (0..self.latent_dim()).filter(|&column| self.target_rms[column] > 0.0) {
+            let losses: Vec<f64> = (prunings.iter())
+                .filter_map(|pruning| match pruning {
+                    Pruning::Elimination(loss) => Some(*loss),
+                    Pruning::Threshold(_) => None,
+                })
+                .collect();
+            let mut eliminated = self.eliminate(column, informative.clone(), ridge, &losses);
+            eliminated.reverse();
+            for (pruning, xi) in prunings.iter().zip(&mut fits) {
+                let support = match pruning {
+                    Pruning::Threshold(least) => {
+                        self.threshold(column, informative.clone(), ridge, *least)
+                    }
+                    Pruning::Elimination(_) => eliminated
+                        .pop()
+                        .expect("invariant: a support for every loss"),
+                };
+                let solution = self.solve(column, &support, ridge);
+                self.store(xi, column, &support, &solution);
             }
-            let (support, solution) = match pruning {
-                Pruning::Threshold(least) => {
-                    self.threshold(column, informative.clone(), ridge, least)
-                }
-                Pruning::Elimination(loss) => {
-                    self.eliminate(column, informative.clone(), ridge, loss)
-                }
-            };
-            self.store(&mut xi, column, &support, &solution);
         }
-        xi
+        fits
     }
 
     fn threshold(
@@ -90,7 +117,7 @@ impl Regression {
         mut support: Vec<usize>,
         ridge: f64,
         least: f64,
-    ) -> (Vec<usize>, DVector<f64>) {
+    ) -> Vec<usize> {
         loop {
             let solution = self.solve(column, &support, ridge);
             let kept: Vec<usize> = support
@@ -100,32 +127,75 @@ impl Regression {
                 .map(|(&i, _)| i)
                 .collect();
             if kept.len() == support.len() {
-                return (support, solution);
+                return support;
             }
             support = kept;
         }
     }
 
+    /// The support that is left for each of the losses.
     fn eliminate(
         &self,
         column: usize,
-        mut support: Vec<usize>,
+        support: Vec<usize>,
         ridge: f64,
-        loss: f64,
-    ) -> (Vec<usize>, DVector<f64>) {
+        losses: &[f64],
+    ) -> Vec<Vec<usize>> {
+        let mut left = vec![None; losses.len()];
+        let energy = self.target_rms[column].powi(2).max(f64::MIN_POSITIVE);
+        let mut fit = self.support_fit(column, support, ridge);
         let mut lost = 0.0;
-        loop {
-            let solution = self.solve(column, &support, ridge);
-            let rises = self.rises(column, &support, &solution, ridge);
-            let weakest = (0..support.len()).min_by(|&a, &b| rises[a].total_cmp(&rises[b]));
-            match weakest {
-                Some(j) if lost + rises[j] <= loss => {
-                    lost += rises[j];
-                    support.remove(j);
+        while left.contains(&None) {
+            let weakest = (0..fit.support.len())
+                .map(|j| (j, fit.rise(j) / energy))
+                .min_by(|a, b| a.1.total_cmp(&b.1));
+            for (left, loss) in left.iter_mut().zip(losses) {
+                let stays = weakest.is_none_or(|(_, rise)| lost + rise > *loss);
+                if left.is_none() && stays {
+                    *left = Some(fit.support.clone());
                 }
-                Some(_) | None => return (support, solution),
+            }
+            let Some((j, rise)) = weakest else { break };
+            lost += rise;
+            match fit.support.len() > RECOMPUTED {
+                true => fit.remove(j),
+                false => {
+                    fit.support.remove(j);
+                    fit = self.support_fit(column, fit.support, ridge);
+                }
             }
         }
+        left.into_iter().flatten().collect()
+    }
+
+    fn support_fit(&self, column: usize, support: Vec<usize>, ridge: f64) -> SupportFit {
+        SupportFit {
+            solution: self.solve(column, &support, ridge),
+            inverse: self.ridged_gram(&support, ridge).inverse(),
+            support,
+        }
+    }
+
+    /// For every term that is not active in a column: its row, and the share of the acceleration's energy that is
+    /// explained with it and not without.
+    pub fn gains(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> Vec<(usize, f64)> {
+        let energy = self.target_rms[column].powi(2).max(f64::MIN_POSITIVE);
+        let (inside, outside): (Vec<usize>, Vec<usize>) =
+            (0..self.library_dim()).partition(|&i| support[(i, column)]);
+        let fit = self.support_fit(column, inside, ridge);
+        let outside = outside.into_iter().filter(|&i| self.theta_rms[i] > 0.0);
+        outside
+            .map(|i| {
+                let shared = DVector::from_iterator(
+                    fit.support.len(),
+                    fit.support.iter().map(|&j| self.gram[(i, j)]),
+                );
+                let missing = self.correlation[(i, column)] - shared.dot(&fit.solution);
+                let own = self.gram[(i, i)] + ridge.max(LEAST_RIDGE)
+                    - shared.dot(&(&fit.inverse * &shared));
+                (i, missing.powi(2) / own / energy)
+            })
+            .collect()
     }
 
     /// One column of Xi on a given support (`library_dim x latent_dim`, true where a term is active).
@@ -144,25 +214,10 @@ impl Regression {
         let rows: Vec<usize> = (0..self.library_dim())
             .filter(|&i| support[(i, column)])
             .collect();
-        let solution = self.solve(column, &rows, ridge);
-        let losses = self.rises(column, &rows, &solution, ridge);
-        rows.into_iter().zip(losses).collect()
-    }
-
-    /// Removing term `j` raises the ridge objective by `c_j^2 / (G^-1)_jj`, with `c` the solution and `G` the ridged
-    /// Gram matrix of the support; here as a share of the acceleration's energy.
-    fn rises(
-        &self,
-        column: usize,
-        support: &[usize],
-        solution: &DVector<f64>,
-        ridge: f64,
-    ) -> Vec<f64> {
         let energy = self.target_rms[column].powi(2).max(f64::MIN_POSITIVE);
-        let inverse = self.ridged_gram(support, ridge).inverse();
-        (0..support.len())
-            .map(|j| solution[j].powi(2) / inverse[(j, j)] / energy)
-            .collect()
+        let fit = self.support_fit(column, rows, ridge);
+        let losses = (0..fit.support.len()).map(|j| fit.rise(j) / energy);
+        fit.support.iter().copied().zip(losses).collect()
     }
 
     /// Ridge solution for the normalised columns in `support`.
@@ -178,7 +233,7 @@ impl Regression {
         let n = support.len();
         let gram = self.gram.select_rows(support).select_columns(support);
         // The normalised columns have unit diagonal, so this is far above rounding.
-        let ridge = ridge.max(1e-10);
+        let ridge = ridge.max(LEAST_RIDGE);
         (gram + DMatrix::identity(n, n) * ridge)
             .cholesky()
             .expect("a Gram matrix plus a ridge is positive definite")
@@ -196,6 +251,34 @@ impl Regression {
                 xi[(row, column)] = value / self.theta_rms[row];
             }
         }
+    }
+}
+
+/// The ridge solution of one column on a support.
+struct SupportFit {
+    support: Vec<usize>,
+    solution: DVector<f64>,
+    /// Of the ridged Gram matrix of the support.
+    inverse: DMatrix<f64>,
+}
+
+impl SupportFit {
+    /// What the ridge objective gains without term `j`: `c_j^2 / (G^-1)_jj`, with `c` the solution and `G` the ridged
+    /// Gram matrix.
+    fn rise(&self, j: usize) -> f64 {
+        self.solution[j].powi(2) / self.inverse[(j, j)]
+    }
+
+    /// The fit without term `j`: `c - P_j c_j / P_jj` and `P - P_j P_j^T / P_jj`, with `P` the inverse.
+    fn remove(&mut self, j: usize) {
+        let column = self.inverse.column(j) / self.inverse[(j, j)];
+        let (own, at) = (self.solution[j], self.inverse[(j, j)]);
+        self.solution.axpy(-own, &column, 1.0);
+        self.inverse.ger(-at, &column, &column, 1.0);
+        self.support.remove(j);
+        self.solution = std::mem::take(&mut self.solution).remove_row(j);
+        let inverse = std::mem::take(&mut self.inverse);
+        self.inverse = inverse.remove_row(j).remove_column(j);
     }
 }
 
@@ -217,6 +300,7 @@ fn column_rms(matrix: &DMatrix<f64>) -> DVector<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::train::random::Random;
 
     fn samples() -> (DMatrix<f64>, DMatrix<f64>) {
         let theta = DMatrix::from_fn(200, 4, |i, j| {
@@ -254,6 +338,58 @@ mod tests {
             active_terms(&Regression::new(&theta, &target).fit(1e-3, Pruning::Elimination(2.0))),
             0
         );
+    }
+
+    #[test]
+    fn eliminations_of_many_terms_at_once_are_those_one_by_one() {
+        let mut random = Random::new(5);
+        let theta = random.matrix(400, 90, 1.0);
+        let weights = DMatrix::from_fn(90, 1, |i, _| if i % 9 == 0 { 1.0 + i as f64 } else { 0.5 });
+        let target = &theta * weights + random.matrix(400, 1, 3.0);
+        let regression = Regression::new(&theta, &target);
+        let losses = [0.3, 1e-4, 0.02];
+        let all: Vec<usize> = (0..90).collect();
+        let found = regression.eliminate(0, all.clone(), 1e-3, &losses);
+        for (found, loss) in found.iter().zip(losses) {
+            let (mut support, mut lost) = (all.clone(), 0.0);
+            loop {
+                let fit = regression.support_fit(0, support.clone(), 1e-3);
+                let energy = regression.target_rms[0].powi(2);
+                let weakest = (0..support.len())
+                    .map(|j| (j, fit.rise(j) / energy))
+                    .min_by(|a, b| a.1.total_cmp(&b.1));
+                match weakest {
+                    Some((j, rise)) if lost + rise <= loss => {
+                        lost += rise;
+                        support.remove(j);
+                    }
+                    Some(_) | None => break,
+                }
+            }
+            assert_eq!(*found, support, "{loss}");
+        }
+        assert!(found[0].len() < found[2].len() && found[2].len() < found[1].len());
+    }
+
+    #[test]
+    fn gains_of_terms_are_what_a_fit_with_them_explains_more() {
+        let mut random = Random::new(6);
+        let (theta, target) = (random.matrix(100, 5, 1.0), random.matrix(100, 1, 1.0));
+        let regression = Regression::new(&theta, &target);
+        let mut support = DMatrix::from_column_slice(5, 1, &[true, false, true, false, false]);
+        let gains = regression.gains(0, &support, 1e-2);
+        assert_eq!(
+            gains.iter().map(|(row, _)| *row).collect::<Vec<_>>(),
+            [1, 3, 4]
+        );
+        // Taking a term out again loses what it gave.
+        support[(3, 0)] = true;
+        let losses = regression.losses(0, &support, 1e-2);
+        let (_, loss) = losses
+            .into_iter()
+            .find(|(row, _)| *row == 3)
+            .expect("active");
+        assert!((gains[1].1 - loss).abs() < 1e-12);
     }
 
     #[test]
