@@ -62,7 +62,7 @@ pub struct ModelEntries {
     pub latent_dim: usize,
     /// Number of robot coordinates, if the model speaks of any.
     pub state_dim: Option<usize>,
-    /// The maps that the model has the data for.
+    /// The generalised inputs and the maps, where the model has the data for them.
     pub maps: Vec<Entry>,
     /// Phases in the order of the model.
     pub phases: Vec<PhaseEntries>,
@@ -106,7 +106,13 @@ impl ModelEntries {
             units,
             latent_dim: model.latent_dim(),
             state_dim: model.state_dim(),
-            maps: map_entries(model, units)?,
+            maps: match units {
+                Units::Si => input_entry(model)?
+                    .into_iter()
+                    .chain(map_entries(model, units)?)
+                    .collect(),
+                Units::Scaled => map_entries(model, units)?,
+            },
             phases,
         })
     }
@@ -130,6 +136,32 @@ impl ModelEntries {
             .flat_map(|phase| [&phase.dynamics, &phase.jacobian, &phase.step]);
         self.maps.iter().chain(phases)
     }
+}
+
+/// What computes the input of the maps, if the model is over a known robot's coordinates.
+fn input_entry(model: &ReducedModel) -> Result<Option<Entry>, LowerError> {
+    let Some(program) = lower::generalised_input(model)? else {
+        return Ok(None);
+    };
+    let robot = model.robot()?.name();
+    let docs = vec![
+        format!(
+            "Generalised inputs of the {robot}: u = [tau; sum of F_k; sum of p_k x F_k] over the feet on \
+             the ground, F_k = -J_k^-T tau_k the force on the body (equations 4 to 7, 22, 23)."
+        ),
+        "x: robot coordinates in SI units, of which the joint angles count (0 to 11, rad). tau: joint \
+         torques (N m). feet: 1 on the ground, 0 in the air, order fr, fl, rr, rl. u: the torques \
+         (N m), force (N) and moment (N m) on the body."
+            .to_owned(),
+        "Axes are parallel to the body's: x forward, y left, z up. The arm p_k of a moment is the foot in \
+         its own hip frame, as in the data that models are learned from."
+            .to_owned(),
+        "A leg on the ground that is fully stretched, or whose foot is on its axis of abduction, gives \
+         infinities or no numbers, and huge forces near there: then keep the last u."
+            .to_owned(),
+        shapes(&program),
+    ];
+    Ok(Some(entry(program.name().to_owned(), program, docs)))
 }
 
 fn map_entries(model: &ReducedModel, units: Units) -> Result<Vec<Entry>, LowerError> {

@@ -4,6 +4,8 @@ use super::code::Role;
 use super::entries::{Entry, PhaseEntries};
 use super::precision::Precision;
 use crate::ir::{Interpreter, Range, rounding_errors};
+use crate::robot::JOINT_DIM;
+use crate::robot::joints::LEG_JOINT_DIM;
 
 /// Points at which each function is compared.
 pub const N_POINTS: usize = 6;
@@ -57,8 +59,8 @@ pub fn vectors(entry: &Entry, precision: Precision) -> Vec<ParameterVectors> {
             .iter()
             .map(|slot| match slot.name.as_str() {
                 "h" => vec![precision.nearest(0.002)],
-                _ => (0..slot.len)
-                    .map(|_| precision.nearest(random.next()))
+                name => (0..slot.len)
+                    .map(|k| precision.nearest(element(entry, name, k, random.next())))
                     .collect(),
             })
             .collect();
@@ -92,6 +94,20 @@ pub fn vectors(entry: &Entry, precision: Precision) -> Vec<ParameterVectors> {
         }
     }
     result
+}
+
+/// Element `k` of an input from a number between -1 and 1: that number, except that the function of the
+/// feet's forces gets knees that are bent and feet on the ground or in the air.
+fn element(entry: &Entry, slot: &str, k: usize, random: f64) -> f64 {
+    let has_feet = entry.parameters.iter().any(|p| p.name == "feet");
+    match (slot, k % LEG_JOINT_DIM) {
+        ("feet", _) => f64::from(u8::from(random > -0.4)),
+        ("x", joint) if has_feet && k < JOINT_DIM => {
+            let (middle, reach) = [(0.0, 0.4), (0.8, 0.4), (-1.6, 0.5)][joint];
+            middle + reach * random
+        }
+        _ => random,
+    }
 }
 
 /// Points of the batch that self-tests run.

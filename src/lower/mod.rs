@@ -1,8 +1,8 @@
 //! From a model to programs.
 //!
 //! A [`ReducedModel`](crate::model::ReducedModel) and a phase enter, a
-//! [`Program`](crate::ir::Program) leaves: the accelerations, their Jacobian, a Runge-Kutta step, or
-//! one of the maps between robot and latent coordinates. Every decision that changes
+//! [`Program`](crate::ir::Program) leaves: the accelerations, their Jacobian, a Runge-Kutta step,
+//! one of the maps between robot and latent coordinates, or the generalised inputs. Every decision that changes
 //! a rounding is made here: which subexpressions are shared, in which order sums are
 //! added, that a power is a chain of products. Read `dynamics` first, then `expression`.
 
@@ -18,9 +18,11 @@ mod network;
 mod solve;
 mod step;
 mod sums;
+mod wrench;
 
 pub use cost::{Form, LowerOptions};
 pub use dynamics::{JacobianPattern, dynamics, dynamics_jacobian};
 pub use error::LowerError;
 pub use maps::{decode, decode_velocity, encode, encode_velocity, lift_input, project_input};
 pub use step::rk4_step;
+pub use wrench::generalised_input;

@@ -21,6 +21,8 @@ pub enum Kind {
     Affine,
     /// A map through curved layers.
     Curved,
+    /// Generalised inputs from torques and contacts.
+    Wrench,
     Dynamics(usize),
     Jacobian(usize, JacobianPattern),
     Step(usize),
@@ -55,9 +57,14 @@ impl Function {
         let mut points = Vec::with_capacity(self.n_points * self.input_len());
         for _ in 0..self.n_points {
             for slot in self.program.inputs() {
-                for _ in 0..slot.len {
-                    points.push(match slot.name.as_str() {
-                        "h" => random.between(1e-4, 1e-2),
+                for k in 0..slot.len {
+                    points.push(match (slot.name.as_str(), k % 3) {
+                        ("h", _) => random.between(1e-4, 1e-2),
+                        ("feet", _) => random.below(2) as f64,
+                        // Knees far from where a leg is singular.
+                        ("x", 1) if self.kind == Kind::Wrench => random.between(0.0, 1.2),
+                        ("x", 2) if self.kind == Kind::Wrench => random.between(-2.2, -1.0),
+                        ("x", 0) if self.kind == Kind::Wrench => random.between(-0.8, 0.8),
                         _ => random.between(-2.0, 2.0),
                     });
                 }
@@ -121,6 +128,10 @@ pub fn functions(model: &ReducedModel, n_points: usize, options: &LowerOptions) 
             let name = program.name().to_owned();
             list.push(function(name, program, kind.clone(), n_points.min(100)));
         }
+    }
+    if let Some(program) = lower::generalised_input(model).expect("lowers") {
+        let name = program.name().to_owned();
+        list.push(function(name, program, Kind::Wrench, n_points.min(100)));
     }
     for phase in 0..model.phases().len() {
         let phase_name = model.phase_identifier(phase);

@@ -36,10 +36,10 @@ pub enum Terms<'m> {
 }
 
 impl<'m> Terms<'m> {
-    /// `None` for maps through curved layers, whose outputs are no sums of terms.
+    /// `None` for maps through curved layers and for feet's forces, which are no sums of terms.
     pub fn new(model: &'m ReducedModel, function: &Function) -> Option<Self> {
         Some(match &function.kind {
-            Kind::Curved => return None,
+            Kind::Curved | Kind::Wrench => return None,
             Kind::Dynamics(phase) | Kind::Batch(phase) => {
                 Terms::Latent(Sums::new(model, *phase, None))
             }
