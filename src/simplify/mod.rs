@@ -27,7 +27,7 @@
 //! let simplified = simplify(&model, &domain, None, Tolerance::Absolute(1e-3))?;
 //! let left = simplified.model.active_terms(0, 0)?;
 //! let left: Vec<_> = left.iter().map(|(xi, term)| (*xi, term.text())).collect();
-//! assert_eq!(left, [(-9.8, "z1"), (2.0, "u1")]);
+//! assert_eq!(left, [(-9.794, "z1"), (2.0, "u1")]);
 //! let equation = &simplified.certificate.phases[0].equations[0];
 //! assert!(equation.bound.magnitude() <= 1e-3);
 //! # Ok(())
