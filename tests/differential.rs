@@ -217,7 +217,8 @@ fn generated_code_with_tables_equals_the_interpreter() {
     let cases = [Case::new(models, 100, Form::Tables)];
     check_all("tables", &cases, |_| {
         let exact = Build::exact().into_iter();
-        exact.chain([Build::c_fast()]).collect()
+        let tables = [Build::c_scalar_lanes(), Build::c_fast()];
+        exact.chain(tables).collect()
     });
 }
 

@@ -2,6 +2,7 @@
 
 use super::ident::Ident;
 use super::literal::Literal;
+use super::row::Row;
 
 /// A subscript `offset + sum_i stride_i * name_i`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -36,6 +37,23 @@ impl Index {
     pub fn shifted(mut self, by: usize) -> Self {
         self.offset += by;
         self
+    }
+
+    /// With another subscript in place of a variable.
+    fn with(&self, variable: &Ident, at: &Self) -> Self {
+        let mut result = Self::fixed(self.offset);
+        for (stride, name) in &self.terms {
+            if name == variable {
+                result.offset += stride * at.offset;
+                let scaled = at.terms.iter().map(|(inner, name)| (stride * inner, name));
+                result
+                    .terms
+                    .extend(scaled.map(|(s, name)| (s, name.clone())));
+            } else {
+                result.terms.push((*stride, name.clone()));
+            }
+        }
+        result
     }
 }
 
@@ -88,12 +106,32 @@ pub enum Expr {
     Infix(Infix, Box<Expr>, Box<Expr>),
     /// `f(a)`
     Apply(MathFunction, Box<Expr>),
+    /// The sums of all lanes, within a loop of a variable over lanes.
+    Lanes(Ident, Ident),
+    /// The total of the sums of all lanes.
+    LaneTotal(Ident),
 }
 
 impl Expr {
     /// `a op b`
     pub fn infix(op: Infix, a: Expr, b: Expr) -> Self {
         Self::Infix(op, Box::new(a), Box::new(b))
+    }
+
+    /// With another subscript in place of a variable.
+    pub fn with(&self, variable: &Ident, at: &Index) -> Self {
+        match self {
+            Self::Literal(_) | Self::Name(_) | Self::Lanes(..) | Self::LaneTotal(_) => self.clone(),
+            Self::Element(array, index) => Self::Element(array.clone(), index.with(variable, at)),
+            Self::Entry(table, row, col) => Self::Entry(
+                table.clone(),
+                row.with(variable, at),
+                col.with(variable, at),
+            ),
+            Self::Negate(a) => Self::Negate(Box::new(a.with(variable, at))),
+            Self::Infix(op, a, b) => Self::infix(*op, a.with(variable, at), b.with(variable, at)),
+            Self::Apply(function, a) => Self::Apply(*function, Box::new(a.with(variable, at))),
+        }
     }
 }
 
@@ -166,6 +204,12 @@ pub enum Stmt {
     },
     /// A call of another generated function.
     Call(Ident, Vec<Argument>),
+    /// The columns of one row; languages with lanes run them side by side.
+    Row(Box<Row>),
+    /// Sums of the lanes, which are assigned later.
+    DeclareLanes(Ident),
+    /// A loop of the variable over the lanes, or all of them at once.
+    ForLanes(Ident, Vec<Stmt>),
 }
 
 /// What a parameter of a generated function is for.
@@ -203,6 +247,8 @@ pub struct ConstTable {
     pub cols: usize,
     /// Entries, row-major.
     pub entries: Vec<Literal>,
+    /// Whether rows are read in lanes.
+    pub is_in_lanes: bool,
 }
 
 /// A generated function.

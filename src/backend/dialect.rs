@@ -4,6 +4,27 @@ use super::code::{Argument, ConstTable, Function, Index, Infix, MathFunction, Pa
 use super::literal::Literal;
 use super::printer::subscript;
 
+/// Spelling of lanes: neighbours of an array that are computed side by side.
+pub trait LaneDialect {
+    /// Declaration of one sum a lane.
+    fn declare(&self, sums: &str) -> String;
+
+    /// Head of a loop over the lanes.
+    fn for_lanes(&self, variable: &str) -> String;
+
+    /// The element of each lane, to be read; `element` is the first lane's.
+    fn read(&self, element: &str) -> String;
+
+    /// The element of each lane, to be assigned.
+    fn write(&self, element: &str) -> String;
+
+    /// The sum of each lane.
+    fn sums(&self, sums: &str, variable: &str) -> String;
+
+    /// The total of all lanes.
+    fn total(&self, sums: &str) -> String;
+}
+
 /// Spelling of a target language. The printer owns precedence and parentheses, the
 /// dialect everything that differs between languages.
 pub trait Dialect {
@@ -48,6 +69,12 @@ pub trait Dialect {
     /// An entry of a table.
     fn entry(&self, table: &str, row: &Index, col: &Index) -> String {
         format!("{table}[{}][{}]", subscript(row), subscript(col))
+    }
+
+    /// How lanes run side by side, in a language in which they do; in others loops take column
+    /// after column.
+    fn lanes(&self) -> Option<&dyn LaneDialect> {
+        None
     }
 
     /// A number in the target's precision.

@@ -1,7 +1,7 @@
 //! The one place that owns precedence, parentheses, indentation and line width.
 
 use super::code::{Argument, ConstTable, Expr, Function, Index, Infix, Stmt};
-use super::dialect::Dialect;
+use super::dialect::{Dialect, LaneDialect};
 
 /// Longest line before an expression is broken, in characters.
 const WIDTH: usize = 100;
@@ -21,6 +21,8 @@ pub struct Printer<'a> {
     dialect: &'a dyn Dialect,
     /// Function that sums with a product are printed with.
     multiply_add: Option<&'static str>,
+    /// How elements are spelled within a loop over lanes.
+    lanes: Option<&'a dyn LaneDialect>,
 }
 
 impl<'a> Printer<'a> {
@@ -29,6 +31,7 @@ impl<'a> Printer<'a> {
         Self {
             dialect,
             multiply_add: None,
+            lanes: None,
         }
     }
 
@@ -133,6 +136,28 @@ impl<'a> Printer<'a> {
                         self.line(&line, depth, text);
                     }
                 }
+                Stmt::Row(row) => match self.dialect.lanes() {
+                    Some(_) => self.block(&row.in_lanes(), depth, text),
+                    None => self.block(&row.in_columns(), depth, text),
+                },
+                Stmt::DeclareLanes(sums) => {
+                    let declare = self.lane_dialect().declare(&sums.to_string());
+                    self.line(&declare, depth, text);
+                }
+                Stmt::ForLanes(variable, body) => {
+                    let lanes = self.lane_dialect();
+                    let head = lanes.for_lanes(&variable.to_string());
+                    let (open, close) = self.dialect.loop_ends();
+                    self.line(&format!("{head}{open}"), depth, text);
+                    let inside = Self {
+                        lanes: Some(lanes),
+                        ..*self
+                    };
+                    inside.block(body, depth + 1, text);
+                    if let Some(close) = close {
+                        self.line(close, depth, text);
+                    }
+                }
                 Stmt::Call(callee, arguments) => {
                     let call = self.dialect.call(Some(&callee.to_string()), arguments);
                     self.line(&call, depth, text);
@@ -141,8 +166,21 @@ impl<'a> Printer<'a> {
         }
     }
 
+    /// Lanes are only where [`Dialect::lanes`] has been asked.
+    fn lane_dialect(&self) -> &'a dyn LaneDialect {
+        self.dialect.lanes().expect("a dialect with lanes")
+    }
+
     fn assign(&self, target: &Expr, op: &str, value: &Expr, depth: usize, text: &mut String) {
-        let (target, value) = (self.expression(target), self.expression(value));
+        let value = self.expression(value);
+        let outside = Self {
+            lanes: None,
+            ..*self
+        };
+        let target = match (target, self.lanes) {
+            (Expr::Element(..), Some(lanes)) => lanes.write(&outside.expression(target)),
+            _ => self.expression(target),
+        };
         let line = format!("{target}{op}{value}{}", self.dialect.terminator());
         self.line(&line, depth, text);
     }
@@ -178,8 +216,16 @@ impl<'a> Printer<'a> {
         match expr {
             Expr::Literal(literal) => self.dialect.literal(*literal),
             Expr::Name(name) => name.to_string(),
-            Expr::Element(array, index) => self.dialect.element(&array.to_string(), index),
-            Expr::Entry(table, row, col) => self.dialect.entry(&table.to_string(), row, col),
+            Expr::Element(array, index) => {
+                self.read(self.dialect.element(&array.to_string(), index))
+            }
+            Expr::Entry(table, row, col) => {
+                self.read(self.dialect.entry(&table.to_string(), row, col))
+            }
+            Expr::Lanes(sums, variable) => self
+                .lane_dialect()
+                .sums(&sums.to_string(), &variable.to_string()),
+            Expr::LaneTotal(sums) => self.lane_dialect().total(&sums.to_string()),
             Expr::Negate(a) => format!("-{}", self.operand(a, Precedence::Atom)),
             Expr::Infix(Infix::Add | Infix::Sub, a, b)
                 if self.multiply_add.is_some() && (is_product(a) || is_product(b)) =>
@@ -203,6 +249,13 @@ impl<'a> Printer<'a> {
                 format!("{left}{operator}{}", self.operand(b, right))
             }
             Expr::Apply(function, a) => self.dialect.apply(*function, &self.expression(a)),
+        }
+    }
+
+    fn read(&self, element: String) -> String {
+        match self.lanes {
+            Some(lanes) => lanes.read(&element),
+            None => element,
         }
     }
 
@@ -252,6 +305,8 @@ fn precedence(expr: &Expr) -> Precedence {
         | Expr::Name(_)
         | Expr::Element(..)
         | Expr::Entry(..)
+        | Expr::Lanes(..)
+        | Expr::LaneTotal(_)
         | Expr::Apply(..) => Precedence::Atom,
         Expr::Negate(_) => Precedence::Sign,
         Expr::Infix(Infix::Add | Infix::Sub, ..) => Precedence::Sum,
@@ -273,6 +328,8 @@ fn starts_with_minus(expr: &Expr) -> bool {
         | Expr::Name(_)
         | Expr::Element(..)
         | Expr::Entry(..)
+        | Expr::Lanes(..)
+        | Expr::LaneTotal(_)
         | Expr::Apply(..) => false,
     }
 }

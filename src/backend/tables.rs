@@ -30,20 +30,33 @@ impl Tables {
 
     /// The name of a table, which is stored if it is new.
     pub fn name(&mut self, table: &Table) -> Ident {
-        if let Some((_, known)) = self.known.iter().find(|(known, _)| known == table) {
-            return known.name.clone();
+        self.stored(table).name.clone()
+    }
+
+    /// The name of a table whose rows are read in lanes.
+    pub fn name_in_lanes(&mut self, table: &Table) -> Ident {
+        let table = self.stored(table);
+        table.is_in_lanes = true;
+        table.name.clone()
+    }
+
+    fn stored(&mut self, table: &Table) -> &mut ConstTable {
+        if let Some(known) = self.known.iter().position(|(known, _)| known == table) {
+            return &mut self.known[known].1;
         }
         let name = self
             .namer
             .mint(&format!("{}_{}", self.base, self.known.len()));
         let literal = |&value| Literal::new(value).expect("tables of programs are finite");
         let printed = ConstTable {
-            name: name.clone(),
+            name,
             rows: table.rows(),
             cols: table.cols(),
             entries: table.entries().iter().map(literal).collect(),
+            is_in_lanes: false,
         };
         self.known.push((table.clone(), printed));
-        name
+        let last = self.known.len() - 1;
+        &mut self.known[last].1
     }
 }

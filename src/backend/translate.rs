@@ -1,21 +1,15 @@
-//! Programs to statements: names, what is nested into one expression, and where arrays live.
+//! Programs to statements: names, and what is nested into one expression.
 //!
 //! No mathematics happens here: the tree of operations of the program is kept as it is.
 
-use std::ops::Range;
-
-use super::code::{Expr, Index, Infix, MathFunction, Parameter, Role, Span, Stmt};
+use super::code::{Expr, Index, Infix, MathFunction, Parameter, Role, Stmt};
 use super::ident::{Ident, Namer};
 use super::literal::Literal;
 use super::tables::Tables;
-use crate::ir::{Binary, Program, ResultEntry, Statement, Unary, ValueId};
+use crate::ir::{Binary, Program, Statement, Unary, ValueId};
 
 /// Deepest nesting of operations in one expression.
 const DEEPEST: usize = 48;
-
-/// Arrays up to this length are copied element by element, not in loops: what reads a short
-/// array wholly would wait for the stores of several loops.
-const LONGEST_LIST: usize = 24;
 
 /// The statements of a program.
 pub struct Translation {
@@ -40,23 +34,18 @@ pub struct Names<'a> {
     pub tables: &'a mut Tables,
 }
 
-/// Where the rows of a matrix of values live: `array[offset + stride * row + col]`.
-pub(super) struct MatrixHome {
-    pub array: Ident,
-    pub offset: usize,
-    pub stride: usize,
-}
-
 pub(super) struct Translator<'a> {
     pub program: &'a Program,
     pub names: Names<'a>,
     pub n_uses: Vec<usize>,
     /// How a value is read: a name, an element, or an expression to be nested once, and
     /// how deeply operations are nested in it.
-    spelled: Vec<Option<(Expr, usize)>>,
+    pub spelled: Vec<Option<(Expr, usize)>>,
     pub body: Vec<Stmt>,
     /// Values that were copied to an array.
-    copies: Vec<(Vec<ValueId>, Ident)>,
+    pub copies: Vec<(Vec<ValueId>, Ident)>,
+    /// Arrays that end with zeros, and where these begin.
+    pub zeros: Vec<(Ident, usize)>,
     /// Loop variable of a block of lanes.
     pub lane: Option<Ident>,
 }
@@ -99,8 +88,14 @@ fn translate_as(program: &Program, names: Names, lane: Option<Ident>) -> Transla
         spelled: vec![None; program.n_values()],
         body: Vec::new(),
         copies: Vec::new(),
+        zeros: Vec::new(),
         lane,
     };
+    for (position, statement) in program.statements().iter().enumerate() {
+        if let Statement::Constant(value) = statement {
+            translator.constant(program.values_of(position).start, *value);
+        }
+    }
     for (position, statement) in program.statements().iter().enumerate() {
         if live[position] {
             translator.statement(position, statement);
@@ -131,10 +126,8 @@ impl Translator<'_> {
     fn statement(&mut self, position: usize, statement: &Statement) {
         let first = self.program.values_of(position).start;
         match statement {
-            Statement::Constant(value) => {
-                let literal = Literal::new(*value).expect("constants of programs are finite");
-                self.spelled[first] = Some((Expr::Literal(literal), 0));
-            }
+            // Spelled beforehand.
+            Statement::Constant(_) => {}
             Statement::Input { slot, index } => {
                 let parameter = &self.names.inputs[*slot];
                 let expr = match parameter.role {
@@ -167,9 +160,15 @@ impl Translator<'_> {
                 start,
                 base,
                 groups,
-            } => self.separable(first, start, base.as_deref(), groups),
+                cols,
+            } => self.separable(first, start, base.as_deref(), groups, *cols),
             Statement::Call { callee, arguments } => self.call(first, *callee, arguments),
         }
+    }
+
+    fn constant(&mut self, value: usize, constant: f64) {
+        let literal = Literal::new(constant).expect("constants of programs are finite");
+        self.spelled[value] = Some((Expr::Literal(literal), 0));
     }
 
     /// Element of a parameter: `array[index]`, or `array[index][lane]` in a block of lanes.
@@ -208,211 +207,10 @@ impl Translator<'_> {
         self.spelled[value] = Some((expr, 0));
     }
 
-    fn read(&self, value: ValueId) -> (Expr, usize) {
+    pub(super) fn read(&self, value: ValueId) -> (Expr, usize) {
         self.spelled[value.index()]
             .clone()
             .expect("values are defined before they are read")
-    }
-
-    /// The values as contiguous elements of one array: in place if they are, copied if not.
-    pub(super) fn span(&mut self, values: &[ValueId]) -> Span {
-        if let Some(span) = self.contiguous(values) {
-            return span;
-        }
-        self.copied(values)
-    }
-
-    /// The values copied to an array of their own, long runs of elements by loops.
-    fn copied(&mut self, values: &[ValueId]) -> Span {
-        let known = self.copies.iter().find(|(copied, _)| copied == values);
-        if let Some((_, array)) = known {
-            return local(array.clone(), values.len());
-        }
-        let array = self.names.locals.mint("a");
-        self.copies.push((values.to_vec(), array.clone()));
-        let runs = self.runs(values);
-        if values.len() < LONGEST_LIST {
-            let elements = values.iter().map(|&value| self.read(value).0).collect();
-            self.body.push(Stmt::LetArray(array.clone(), elements));
-            return local(array, values.len());
-        }
-        self.body.push(Stmt::Declare(array.clone(), values.len()));
-        for run in runs {
-            self.copy_run(&array, values, run);
-        }
-        local(array, values.len())
-    }
-
-    fn copy_run(&mut self, array: &Ident, values: &[ValueId], run: Range<usize>) {
-        let from = self.read(values[run.start]).0;
-        match from {
-            Expr::Element(source, at) if run.len() > 1 => {
-                let i = self.names.locals.mint("i");
-                let target = Index::variable(&i).shifted(run.start);
-                let source = Expr::Element(source, Index::variable(&i).shifted(at.offset));
-                let assign = Stmt::Assign(Expr::Element(array.clone(), target), source);
-                self.body.push(Stmt::For(i, run.len(), vec![assign]));
-            }
-            value => {
-                let target = Expr::Element(array.clone(), Index::fixed(run.start));
-                self.body.push(Stmt::Assign(target, value));
-            }
-        }
-    }
-
-    /// Divides values into runs of consecutive elements of one array.
-    fn runs(&self, values: &[ValueId]) -> Vec<Range<usize>> {
-        let mut runs: Vec<Range<usize>> = Vec::new();
-        for (k, &value) in values.iter().enumerate() {
-            let follows = k > 0
-                && match (self.element(values[k - 1]), self.element(value)) {
-                    (Some((before, at)), Some((array, next))) => before == array && at + 1 == next,
-                    _ => false,
-                };
-            match runs.last_mut() {
-                Some(run) if follows => run.end = k + 1,
-                _ => runs.push(k..k + 1),
-            }
-        }
-        runs
-    }
-
-    /// Array and position of a value that is an element.
-    fn element(&self, value: ValueId) -> Option<(&Ident, usize)> {
-        match self.spelled[value.index()].as_ref() {
-            Some((Expr::Element(array, index), _)) if index.terms.is_empty() => {
-                Some((array, index.offset))
-            }
-            _ => None,
-        }
-    }
-
-    /// As [`Self::span`], but the whole of an array.
-    pub(super) fn whole_span(&mut self, values: &[ValueId]) -> Span {
-        match self.contiguous(values).filter(Span::is_whole) {
-            Some(span) => span,
-            None => self.copied(values),
-        }
-    }
-
-    fn contiguous(&self, values: &[ValueId]) -> Option<Span> {
-        let (array, offset) = self.element(*values.first()?)?;
-        let array = array.clone();
-        if self.runs(values).len() != 1 {
-            return None;
-        }
-        let parameters = self.names.inputs.iter().chain(self.names.outputs);
-        let parameter = parameters.clone().find(|parameter| parameter.name == array);
-        let declared = self.body.iter().find_map(|statement| match statement {
-            Stmt::Declare(name, len) if *name == array => Some(*len),
-            _ => None,
-        });
-        Some(Span {
-            array,
-            offset,
-            len: values.len(),
-            of: declared.or(parameter.map(|parameter| parameter.len))?,
-            is_parameter: parameter.is_some(),
-        })
-    }
-
-    /// Reserves `len` elements for values, in an output where they belong if possible.
-    pub(super) fn home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
-        match self.output_home(first, len) {
-            Some(home) => self.settle(first, home),
-            None => self.local_home(first, len, wanted),
-        }
-    }
-
-    /// Reserves `len` elements of a new array for values.
-    pub(super) fn local_home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
-        let array = self.names.locals.mint(wanted);
-        self.body.push(Stmt::Declare(array.clone(), len));
-        self.settle(first, local(array, len))
-    }
-
-    /// Spells values as the elements of a span.
-    pub(super) fn settle(&mut self, first: usize, home: Span) -> Span {
-        for k in 0..home.len {
-            let index = Index::fixed(home.offset + k);
-            self.spelled[first + k] = Some((Expr::Element(home.array.clone(), index), 0));
-        }
-        home
-    }
-
-    /// The output array, if the values are just a run of its elements and nothing in it is
-    /// still to be read.
-    pub(super) fn output_home(&self, first: usize, len: usize) -> Option<Span> {
-        let results = self.program.results();
-        let at = results
-            .iter()
-            .position(|entry| entry.value.index() == first)?;
-        let run: &[ResultEntry] = results.get(at..at + len)?;
-        let slot = run[0].slot;
-        let fits = run
-            .iter()
-            .enumerate()
-            .all(|(k, entry)| entry.slot == slot && entry.value.index() == first + k);
-        let output = &self.names.outputs[slot];
-        (fits && output.role == Role::Output).then(|| Span {
-            array: output.name.clone(),
-            offset: run[0].index,
-            len,
-            of: output.len,
-            is_parameter: true,
-        })
-    }
-
-    /// Reserves `rows x cols` elements for values, row by row in an output where they belong
-    /// if possible.
-    pub(super) fn matrix_home(&mut self, first: usize, rows: usize, cols: usize) -> MatrixHome {
-        let home = self.output_matrix(first, rows, cols).unwrap_or_else(|| {
-            let array = self.names.locals.mint("m");
-            self.body.push(Stmt::Declare(array.clone(), rows * cols));
-            MatrixHome {
-                array,
-                offset: 0,
-                stride: cols,
-            }
-        });
-        for r in 0..rows {
-            for i in 0..cols {
-                let index = Index::fixed(home.offset + home.stride * r + i);
-                let element = Expr::Element(home.array.clone(), index);
-                self.spelled[first + r * cols + i] = Some((element, 0));
-            }
-        }
-        home
-    }
-
-    /// The output array in which each row is a run of elements, all equally far apart.
-    fn output_matrix(&self, first: usize, rows: usize, cols: usize) -> Option<MatrixHome> {
-        let results = self.program.results();
-        let find = |value: usize| {
-            results
-                .iter()
-                .position(|entry| entry.value.index() == value)
-        };
-        let at = find(first)?;
-        let stride = if rows > 1 {
-            find(first + cols)?.checked_sub(at)?
-        } else {
-            cols
-        };
-        let slot = results[at].slot;
-        let output = &self.names.outputs[slot];
-        let fits = (0..rows).all(|r| {
-            (0..cols).all(|i| {
-                results.get(at + r * stride + i).is_some_and(|entry| {
-                    entry.slot == slot && entry.value.index() == first + r * cols + i
-                })
-            })
-        });
-        (fits && output.role == Role::Output).then(|| MatrixHome {
-            array: output.name.clone(),
-            offset: results[at].index,
-            stride,
-        })
     }
 
     /// Input parameters without a live element, and outputs without elements.
@@ -453,17 +251,6 @@ impl Translator<'_> {
             assigned.push(Stmt::Assign(target, value));
         }
         self.body.extend(assigned);
-    }
-}
-
-/// All of a local array.
-fn local(array: Ident, len: usize) -> Span {
-    Span {
-        array,
-        offset: 0,
-        len,
-        of: len,
-        is_parameter: false,
     }
 }
 

@@ -3,8 +3,9 @@
 use super::code::{Argument, Expr, Index, Infix, Span, Stmt};
 use super::ident::Ident;
 use super::literal::Literal;
-use super::translate::{MatrixHome, Translator};
-use crate::ir::{Group, Slopes, TableId, ValueId};
+use super::row::{Row, Run};
+use super::translate::Translator;
+use crate::ir::{Group, LANES, Slopes, TableId, ValueId};
 
 /// A group of functions where its numbers live.
 struct GroupCode {
@@ -19,15 +20,6 @@ enum SlopeCode {
     Minus(Span),
 }
 
-impl MatrixHome {
-    fn element(&self, row: &Ident, col: &Ident) -> Expr {
-        let index = Index::fixed(self.offset)
-            .plus(self.stride, row)
-            .plus(1, col);
-        Expr::Element(self.array.clone(), index)
-    }
-}
-
 impl Translator<'_> {
     pub(super) fn sin_cos(&mut self, first: usize, arguments: &[ValueId]) {
         let n = arguments.len();
@@ -37,9 +29,9 @@ impl Translator<'_> {
             }
             return;
         }
-        let arguments = self.span(arguments);
-        let sines = self.local_home(first, n, "s");
-        let cosines = self.local_home(first + n, n, "c");
+        let arguments = self.span_with_rest(arguments);
+        let sines = self.padded_home(first, n, "s");
+        let cosines = self.padded_home(first + n, n, "c");
         self.body.push(Stmt::SinCos {
             arguments,
             sines,
@@ -68,6 +60,13 @@ impl Translator<'_> {
     pub(super) fn accumulate(&mut self, first: usize, table: TableId, sections: &[Vec<ValueId>]) {
         let cols = self.program.tables()[table.index()].cols();
         let name = self.table(table);
+        if sections.is_empty() {
+            for k in 0..cols {
+                let entry = Expr::Entry(name.clone(), Index::fixed(0), Index::fixed(k));
+                self.spell(first + k, entry);
+            }
+            return;
+        }
         let weights: Vec<Span> = sections.iter().map(|section| self.span(section)).collect();
         let home = self.home(first, cols, "y");
         let (i, k) = (self.names.locals.mint("i"), self.names.locals.mint("k"));
@@ -110,71 +109,74 @@ impl Translator<'_> {
         self.body.push(Stmt::For(r, rows, vec![inner]));
     }
 
-    /// One loop over the rows: the columns' sums and slopes, then the lanes.
+    /// One loop over the rows.
     pub(super) fn separable(
         &mut self,
         first: usize,
         start: &[ValueId],
         base: Option<&[ValueId]>,
         groups: &[Group],
+        cols: usize,
     ) {
-        let shape = &self.program.tables()[groups[0].table.index()];
-        let (rows, cols) = (shape.rows(), shape.cols());
-        let start = self.span(start);
+        let rows = start.len();
+        let r = self.names.locals.mint("r");
+        let start = self.at(start, &r);
         let base = base.map(|base| self.span(base));
         let groups: Vec<GroupCode> = groups.iter().map(|group| self.group(group)).collect();
         let sums = self.home(first, rows, "y");
         let slopes = self.matrix_home(first + rows, rows, cols);
-        let [r, i, q] = ["r", "i", "q"].map(|name| self.names.locals.mint(name));
+        let i = self.names.locals.mint("i");
+        let names = ["k", "l", "q", "p"].map(|name| self.names.locals.mint(name));
 
-        let (mut sum, mut slope): (Option<Expr>, Option<Expr>) = (None, None);
-        if let Some(base) = base {
-            let index = Index::fixed(base.offset).plus(cols, &r).plus(1, &i);
-            slope = Some(Expr::Element(base.array, index));
-        }
-        for group in groups {
-            let entry = || {
-                Expr::Entry(
-                    group.table.clone(),
-                    Index::variable(&r),
-                    Index::variable(&i),
-                )
-            };
-            let times = |span: &Span| {
-                let index = Index::variable(&i).shifted(span.offset);
-                Expr::infix(
-                    Infix::Mul,
-                    entry(),
-                    Expr::Element(span.array.clone(), index),
-                )
-            };
-            sum = Some(joined(sum, Infix::Add, times(&group.values)));
-            slope = Some(match &group.slopes {
-                SlopeCode::One => joined(slope, Infix::Add, entry()),
-                SlopeCode::Plus(span) => joined(slope, Infix::Add, times(span)),
-                SlopeCode::Minus(span) => joined(slope, Infix::Sub, times(span)),
+        let mut bounds: Vec<usize> = groups.iter().map(|group| group.values.len).collect();
+        bounds.sort_unstable();
+        bounds.dedup();
+        let mut runs = Vec::new();
+        let mut from = 0;
+        for to in bounds {
+            let here = groups.iter().filter(|group| group.values.len > from);
+            let (term, slope) = column(here, base.as_ref(), cols, &r, &i);
+            let blocks = from / LANES..to / LANES;
+            runs.push(Run {
+                blocks,
+                term,
+                slope,
             });
+            from = to;
         }
-        let zero = || Expr::Literal(Literal::ZERO);
-        let columns = vec![
-            Stmt::Assign(slopes.element(&r, &i), slope.unwrap_or_else(zero)),
-            Stmt::Assign(
-                Expr::Element(q.clone(), Index::variable(&i)),
-                sum.unwrap_or_else(zero),
-            ),
-        ];
-        let mut row = vec![Stmt::Declare(q.clone(), cols), Stmt::For(i, cols, columns)];
-        let at_row = |span: &Span| {
-            Expr::Element(span.array.clone(), Index::variable(&r).shifted(span.offset))
+        let row = Row {
+            slope: slopes.element(&r, &i),
+            column: i,
+            names,
+            runs,
+            n_slopes: cols,
+            start,
+            sum: Expr::Element(sums.array, Index::variable(&r).shifted(sums.offset)),
         };
-        let total = self.lane_sum(at_row(&start), &q, cols, &mut row);
-        row.push(Stmt::Assign(at_row(&sums), total));
-        self.body.push(Stmt::For(r, rows, row));
+        self.body
+            .push(Stmt::For(r, rows, vec![Stmt::Row(Box::new(row))]));
+    }
+
+    /// The value at a loop's variable: an entry of a table if the values are the entries of its
+    /// first row, an element of an array if not.
+    fn at(&mut self, values: &[ValueId], variable: &Ident) -> Expr {
+        if let Expr::Entry(table, row, _) = self.named(values[0]) {
+            let entry = |col| Expr::Entry(table.clone(), row.clone(), col);
+            let mut indexed = values.iter().enumerate();
+            if indexed.all(|(k, &value)| self.named(value) == entry(Index::fixed(k))) {
+                return entry(Index::variable(variable));
+            }
+        }
+        let span = self.span(values);
+        Expr::Element(span.array, Index::variable(variable).shifted(span.offset))
     }
 
     fn group(&mut self, group: &Group) -> GroupCode {
         GroupCode {
-            table: self.table(group.table),
+            table: self
+                .names
+                .tables
+                .name_in_lanes(&self.program.tables()[group.table.index()]),
             values: self.span(&group.values),
             slopes: match &group.slopes {
                 Slopes::One => SlopeCode::One,
@@ -182,27 +184,6 @@ impl Translator<'_> {
                 Slopes::Minus(values) => SlopeCode::Minus(self.span(values)),
             },
         }
-    }
-
-    /// `start` plus the columns `q`, in the association of the statement.
-    fn lane_sum(&mut self, start: Expr, q: &Ident, cols: usize, row: &mut Vec<Stmt>) -> Expr {
-        let element = |index: Index| Expr::Element(q.clone(), index);
-        let blocks = cols / 4;
-        let mut total = start;
-        if blocks > 0 {
-            let [p, l] = ["p", "l"].map(|name| self.names.locals.mint(name));
-            let lane = tree(0, blocks, &|k| element(Index::variable(&l).shifted(4 * k)));
-            let target = Expr::Element(p.clone(), Index::variable(&l));
-            row.push(Stmt::Declare(p.clone(), 4));
-            row.push(Stmt::For(l, 4, vec![Stmt::Assign(target, lane)]));
-            let lane = |l: usize| Expr::Element(p.clone(), Index::fixed(l));
-            let front = Expr::infix(Infix::Add, lane(0), lane(1));
-            let back = Expr::infix(Infix::Add, lane(2), lane(3));
-            total = Expr::infix(Infix::Add, total, Expr::infix(Infix::Add, front, back));
-        }
-        (4 * blocks..cols).fold(total, |total, k| {
-            Expr::infix(Infix::Add, total, element(Index::fixed(k)))
-        })
     }
 
     pub(super) fn call(&mut self, first: usize, callee: usize, arguments: &[ValueId]) {
@@ -229,6 +210,41 @@ impl Translator<'_> {
     }
 }
 
+/// Term and slope of column `i` of row `r`.
+fn column<'a>(
+    groups: impl Iterator<Item = &'a GroupCode>,
+    base: Option<&Span>,
+    cols: usize,
+    r: &Ident,
+    i: &Ident,
+) -> (Expr, Expr) {
+    let (mut term, mut slope): (Option<Expr>, Option<Expr>) = (None, None);
+    if let Some(base) = base {
+        let width = cols.next_multiple_of(LANES);
+        let index = Index::fixed(base.offset).plus(width, r).plus(1, i);
+        slope = Some(Expr::Element(base.array.clone(), index));
+    }
+    for group in groups {
+        let entry = || {
+            let (row, col) = (Index::variable(r), Index::variable(i));
+            Expr::Entry(group.table.clone(), row, col)
+        };
+        let times = |span: &Span| {
+            let index = Index::variable(i).shifted(span.offset);
+            let element = Expr::Element(span.array.clone(), index);
+            Expr::infix(Infix::Mul, entry(), element)
+        };
+        term = Some(joined(term, Infix::Add, times(&group.values)));
+        slope = Some(match &group.slopes {
+            SlopeCode::One => joined(slope, Infix::Add, entry()),
+            SlopeCode::Plus(span) => joined(slope, Infix::Add, times(span)),
+            SlopeCode::Minus(span) => joined(slope, Infix::Sub, times(span)),
+        });
+    }
+    let zero = || Expr::Literal(Literal::ZERO);
+    (term.unwrap_or_else(zero), slope.unwrap_or_else(zero))
+}
+
 /// `a op b`, or `b` alone (negated for a difference) if there is no `a`.
 fn joined(a: Option<Expr>, op: Infix, b: Expr) -> Expr {
     match (a, op) {
@@ -236,17 +252,4 @@ fn joined(a: Option<Expr>, op: Infix, b: Expr) -> Expr {
         (None, Infix::Sub) => Expr::Negate(Box::new(b)),
         (None, Infix::Add | Infix::Mul | Infix::Div) => b,
     }
-}
-
-/// The leaves from `low` to below `high` added in a balanced tree.
-fn tree(low: usize, high: usize, leaf: &dyn Fn(usize) -> Expr) -> Expr {
-    if high - low == 1 {
-        return leaf(low);
-    }
-    let middle = (low + high).div_ceil(2);
-    Expr::infix(
-        Infix::Add,
-        tree(low, middle, leaf),
-        tree(middle, high, leaf),
-    )
 }

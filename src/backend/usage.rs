@@ -1,6 +1,7 @@
 //! What statements need from outside.
 
 use super::code::{Expr, MathFunction, Stmt};
+use super::ident::Ident;
 
 /// Whether the statements call the sine-and-cosine kernel.
 pub fn calls_kernel(body: &[Stmt]) -> bool {
@@ -12,8 +13,24 @@ pub fn calls_kernel(body: &[Stmt]) -> bool {
         | Stmt::Declare(..)
         | Stmt::Assign(..)
         | Stmt::AddAssign(..)
-        | Stmt::Call(..) => false,
+        | Stmt::Call(..)
+        | Stmt::Row(_)
+        | Stmt::DeclareLanes(_)
+        | Stmt::ForLanes(..) => false,
     })
+}
+
+/// The arrays that are assigned in lanes.
+pub fn assigned_in_lanes(body: &[Stmt]) -> Vec<Ident> {
+    let assigned = |statement: &Stmt| match statement {
+        Stmt::Row(row) => match &row.slope {
+            Expr::Element(array, _) => vec![array.clone()],
+            _ => Vec::new(),
+        },
+        Stmt::For(_, _, body) => assigned_in_lanes(body),
+        _ => Vec::new(),
+    };
+    body.iter().flat_map(assigned).collect()
 }
 
 /// Whether the statements apply a function.
@@ -24,7 +41,13 @@ pub fn calls_function(body: &[Stmt], function: MathFunction) -> bool {
         Stmt::Assign(_, value) | Stmt::AddAssign(_, value) => applies(value, function),
         Stmt::SinCosLane { argument, .. } => applies(argument, function),
         Stmt::For(_, _, body) => calls_function(body, function),
-        Stmt::Declare(..) | Stmt::SinCos { .. } | Stmt::Call(..) => false,
+        Stmt::ForLanes(_, body) => calls_function(body, function),
+        // A row has sums of products only.
+        Stmt::Declare(..)
+        | Stmt::SinCos { .. }
+        | Stmt::Call(..)
+        | Stmt::Row(_)
+        | Stmt::DeclareLanes(_) => false,
     })
 }
 
@@ -33,6 +56,11 @@ fn applies(expr: &Expr, function: MathFunction) -> bool {
         Expr::Apply(applied, a) => *applied == function || applies(a, function),
         Expr::Negate(a) => applies(a, function),
         Expr::Infix(_, a, b) => applies(a, function) || applies(b, function),
-        Expr::Literal(_) | Expr::Name(_) | Expr::Element(..) | Expr::Entry(..) => false,
+        Expr::Literal(_)
+        | Expr::Name(_)
+        | Expr::Element(..)
+        | Expr::Entry(..)
+        | Expr::Lanes(..)
+        | Expr::LaneTotal(_) => false,
     }
 }

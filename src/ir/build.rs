@@ -118,23 +118,21 @@ impl ProgramBuilder {
 
     /// Sums of functions of one variable each, and their slopes, see
     /// [`Statement::Separable`].
-    ///
-    /// # Panics
-    /// If there is no group; a caller's defect.
     pub fn separable(
         &mut self,
         start: Vec<ValueId>,
         base: Option<Vec<ValueId>>,
         groups: Vec<Group>,
+        cols: usize,
     ) -> (Vec<ValueId>, Vec<ValueId>) {
-        let shape = &self.program.tables[groups[0].table.index()];
-        let (rows, n) = (shape.rows, shape.entries.len());
+        let rows = start.len();
         let statement = Statement::Separable {
             start,
             base,
             groups,
+            cols,
         };
-        let values = self.push_array(statement, rows + n);
+        let values = self.push_array(statement, rows + rows * cols);
         (values[..rows].to_vec(), values[rows..].to_vec())
     }
 

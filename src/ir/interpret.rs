@@ -1,7 +1,9 @@
 //! Runs programs: the reference for generated code, and what simulation and
 //! control run.
 
-use super::program::{Binary, Group, Program, Slopes, Slot, Statement, Table, Unary, ValueId};
+use super::program::{
+    Binary, Group, LANES, Program, Slopes, Slot, Statement, Table, Unary, ValueId,
+};
 use super::real::Real;
 
 /// Runs one program as often as asked; owns the memory of all its values, so that
@@ -63,7 +65,9 @@ struct SeparableStep<T> {
     start: Box<[usize]>,
     base: Option<Box<[usize]>>,
     groups: Box<[GroupStep]>,
-    /// One product sum a column, reused by every row.
+    /// Number of variables.
+    cols: usize,
+    /// One product sum a column, reused by every row; zero behind the last.
     columns: Vec<T>,
 }
 
@@ -127,9 +131,9 @@ impl<T: Real> Interpreter<T> {
                     start,
                     base,
                     groups,
+                    cols,
                 } => {
-                    let cols = program.tables()[groups[0].table.index()].cols();
-                    let step = SeparableStep::new(start, base.as_deref(), groups, cols);
+                    let step = SeparableStep::new(start, base.as_deref(), groups, *cols);
                     steps.push(Step::Separable(Box::new(step), first));
                 }
                 Statement::Call { callee, arguments } => {
@@ -304,17 +308,18 @@ impl<T: Real> SeparableStep<T> {
             start: positions(start),
             base: base.map(positions),
             groups: groups.iter().map(group).collect(),
-            columns: vec![T::constant(0.0); cols],
+            cols,
+            columns: vec![T::constant(0.0); cols.next_multiple_of(LANES)],
         }
     }
 
     fn run(&mut self, tables: &[Entries<T>], first: usize, values: &mut [T]) {
-        let (rows, cols) = (self.start.len(), self.columns.len());
+        let (rows, cols, width) = (self.start.len(), self.cols, self.columns.len());
         for r in 0..rows {
             for i in 0..cols {
                 let mut sum: Option<T> = None;
-                let mut slope = self.base.as_ref().map(|base| values[base[r * cols + i]]);
-                for group in &self.groups {
+                let mut slope = self.base.as_ref().map(|base| values[base[r * width + i]]);
+                for group in self.groups.iter().filter(|group| i < group.values.len()) {
                     let t = tables[group.table].row(r)[i];
                     let product = t * values[group.values[i]];
                     sum = Some(sum.map_or(product, |sum| sum + product));
@@ -337,22 +342,11 @@ impl<T: Real> SeparableStep<T> {
 
 /// `start` plus all columns, associated as [`Statement::Separable`] says.
 fn lane_sum<T: Real>(start: T, columns: &[T]) -> T {
-    let blocks = columns.len() / 4;
-    let mut sum = start;
-    if blocks > 0 {
-        let lane = |l: usize| tree_sum(columns, l, 0, blocks);
-        sum = sum + ((lane(0) + lane(1)) + (lane(2) + lane(3)));
-    }
-    columns[4 * blocks..].iter().fold(sum, |sum, &q| sum + q)
-}
-
-/// The columns `4 k + lane` for `k` from `low` to below `high`, in a balanced tree.
-fn tree_sum<T: Real>(columns: &[T], lane: usize, low: usize, high: usize) -> T {
-    if high - low == 1 {
-        return columns[4 * low + lane];
-    }
-    let middle = (low + high).div_ceil(2);
-    tree_sum(columns, lane, low, middle) + tree_sum(columns, lane, middle, high)
+    let p: [T; LANES] = std::array::from_fn(|l| {
+        let lane = columns[l..].iter().step_by(LANES).copied();
+        lane.reduce(|p, q| p + q).unwrap_or(T::constant(0.0))
+    });
+    start + (((p[0] + p[4]) + (p[2] + p[6])) + ((p[1] + p[5]) + (p[3] + p[7])))
 }
 
 #[cfg(test)]
@@ -416,20 +410,24 @@ mod tests {
         let x = builder.input("x", 5);
         let one = builder.constant(1.0);
         let (sines, cosines) = builder.sin_cos(&x);
-        let entries = |shift: f64| (0..10).map(|k| f64::from(k) - shift).collect();
-        let tables: [_; 3] =
-            [1.5, -2.0, 7.25].map(|shift| builder.table(Table::new(2, 5, entries(shift))));
+        let row = |row: u8, shift: f64| (0..5).map(move |k| f64::from(5 * row + k) - shift);
+        let tables: [_; 3] = [1.5, -2.0, 7.25].map(|shift| {
+            let rows = (0..2).flat_map(|r| row(r, shift).chain([0.0; 3]));
+            builder.table(Table::new(2, LANES, rows.collect()))
+        });
+        let zero = builder.constant(0.0);
+        let padded = |values: &[ValueId]| [values, &[zero; 3]].concat();
         let group = |table, values: &[ValueId], slopes| Group {
             table,
-            values: values.to_vec(),
+            values: padded(values),
             slopes,
         };
         let groups = vec![
             group(tables[0], &x, Slopes::One),
-            group(tables[1], &sines, Slopes::Plus(cosines.clone())),
-            group(tables[2], &cosines, Slopes::Minus(sines.clone())),
+            group(tables[1], &sines, Slopes::Plus(padded(&cosines))),
+            group(tables[2], &cosines, Slopes::Minus(padded(&sines))),
         ];
-        let (sums, slopes) = builder.separable(vec![one, one], None, groups);
+        let (sums, slopes) = builder.separable(vec![one, one], None, groups, 5);
         builder.output("y", &sums);
         builder.output("slopes", &slopes);
         let program = builder.finish().expect("valid program");

@@ -2,6 +2,10 @@
 
 use std::ops::Range;
 
+/// Neighbouring columns that [`Statement::Separable`] adds side by side: what the widest common
+/// registers hold.
+pub const LANES: usize = 8;
+
 /// A named, contiguous array of scalars that enters or leaves a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Slot {
@@ -134,9 +138,9 @@ impl Slopes {
 /// Functions of one variable each, one a column of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Group {
-    /// Coefficients, `rows x cols`.
+    /// Coefficients, a multiple of [`LANES`] columns.
     pub table: TableId,
-    /// Value of each function.
+    /// Value of each function; zero behind the last.
     pub values: Vec<ValueId>,
     /// Derivative of each function by its variable.
     pub slopes: Slopes,
@@ -183,22 +187,25 @@ pub enum Statement {
         table: TableId,
     },
     /// Sums of functions of one variable each, with their derivatives. With the groups
-    /// `g` of functions, one function a column `i`, and `rows x cols` tables `T_g`:
+    /// `g` of functions, one function a column `i`, and tables `T_g`:
     ///
     /// `y_r = start_r + sum_i q_ri`, `q_ri = sum_g T_g,ri value_g,i` (groups in order), and
-    /// `slope_ri = base_ri + sum_g T_g,ri slope_g,i` (base, then groups in order).
+    /// `slope_ri = base_ri + sum_g T_g,ri slope_g,i` (base, then groups in order). A group has no
+    /// part in the columns behind its table.
     ///
-    /// Association of the sum over columns: four lanes `p_l` add the columns `4 k + l` in a
-    /// balanced tree over `k`; then `y_r = start_r + ((p_0 + p_1) + (p_2 + p_3))`, and the columns
-    /// beyond a multiple of four are added one by one. Defines the `rows` sums, then the
-    /// `rows x cols` slopes, row-major.
+    /// Association of the sum over columns: eight lanes `p_l` add the columns `8 k + l` in order of
+    /// `k`; then `y_r = start_r + (((p_0 + p_4) + (p_2 + p_6)) + ((p_1 + p_5) + (p_3 + p_7)))`.
+    /// Defines the `rows` sums, then the `rows x cols` slopes, row-major.
     Separable {
         /// One value a row.
         start: Vec<ValueId>,
-        /// What the slopes begin with, `rows x cols` values; nothing if absent.
+        /// What the slopes begin with, row-major, `cols` rounded up to a multiple of [`LANES`]
+        /// values a row; nothing if absent.
         base: Option<Vec<ValueId>>,
-        /// At least one group; all tables have the same shape.
+        /// At least one group.
         groups: Vec<Group>,
+        /// Number of variables.
+        cols: usize,
     },
     /// Evaluation of another program; the arguments fill its input slots in order.
     /// Defines the values of its output slots in order.
@@ -223,6 +230,7 @@ impl Statement {
                 start,
                 base,
                 groups,
+                cols: _,
             } => {
                 let mut operands = start.clone();
                 operands.extend(base.iter().flatten());
@@ -232,6 +240,24 @@ impl Statement {
                 }
                 operands
             }
+        }
+    }
+
+    /// The values that a separable statement reads as arrays, one a group's functions and slopes.
+    pub fn arrays(&self) -> Vec<&[ValueId]> {
+        match self {
+            Self::Separable { groups, .. } => groups
+                .iter()
+                .flat_map(|group| [group.values.as_slice(), group.slopes.values()])
+                .collect(),
+            Self::Constant(_)
+            | Self::Input { .. }
+            | Self::Unary(..)
+            | Self::Binary(..)
+            | Self::SinCos { .. }
+            | Self::Accumulate { .. }
+            | Self::Constants { .. }
+            | Self::Call { .. } => Vec::new(),
         }
     }
 }
@@ -301,6 +327,15 @@ impl Program {
     /// Number of scalar values.
     pub fn n_values(&self) -> usize {
         self.first.last().map_or(0, |&count| count as usize)
+    }
+
+    /// How many of the values, from the last on, are the constant zero.
+    pub fn n_zeros_behind(&self, values: &[ValueId]) -> usize {
+        let is_zero = |value: &&ValueId| {
+            let (statement, _) = self.definition(**value);
+            matches!(self.statements[statement], Statement::Constant(constant) if constant == 0.0)
+        };
+        values.iter().rev().take_while(is_zero).count()
     }
 
     /// Which statements compute something that an output depends on.

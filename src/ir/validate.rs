@@ -1,6 +1,6 @@
 //! What every program promises, checked once when it is built.
 
-use super::program::{Program, Slopes, Statement, TableId, ValueId};
+use super::program::{LANES, Program, Slopes, Statement, TableId, ValueId};
 
 /// Why a program is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -182,21 +182,24 @@ fn check_shape(program: &Program, position: usize, statement: &Statement) -> Res
             start,
             base,
             groups,
+            cols,
         } => {
-            let shape = table(&groups[0].table);
-            count(start.len(), shape.rows)?;
+            let width = cols.next_multiple_of(LANES);
             if let Some(base) = base {
-                count(base.len(), shape.entries.len())?;
+                count(base.len(), start.len() * width)?;
             }
+            let widest = groups.iter().map(|group| table(&group.table).cols).max();
+            count(widest.unwrap_or(0), width)?;
             for group in groups {
-                finite(&table(&group.table).entries)?;
-                count(table(&group.table).rows, shape.rows)?;
-                count(table(&group.table).cols, shape.cols)?;
-                count(group.values.len(), shape.cols)?;
+                let table = table(&group.table);
+                finite(&table.entries)?;
+                count(table.rows, start.len())?;
+                count(table.cols, table.cols.next_multiple_of(LANES))?;
+                count(group.values.len(), table.cols)?;
                 match &group.slopes {
                     Slopes::One => {}
                     Slopes::Plus(slopes) | Slopes::Minus(slopes) => {
-                        count(slopes.len(), shape.cols)?;
+                        count(slopes.len(), table.cols)?;
                     }
                 }
             }

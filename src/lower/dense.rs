@@ -5,13 +5,13 @@
 //! column and go through [`Statement::Separable`](crate::ir::Statement), which shares
 //! each table between sum and slope; the derivatives of all other terms are another
 //! matrix-vector product over the flattened Jacobian; variables that occur only
-//! linearly have constant columns.
+//! linearly have constant columns, which the separable loops share as well where there are any.
 
 use std::collections::{BTreeSet, HashMap};
 
 use super::combination::Combination;
 use super::expression::ExpressionLowering;
-use crate::ir::{Group, Slopes, Table, TableId, ValueId};
+use crate::ir::{Group, LANES, Slopes, Table, ValueId};
 use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
 
 /// Fewest weights for which a loop of their own is worth it.
@@ -143,11 +143,14 @@ pub(super) struct DenseJacobian {
     curved: Vec<SymbolId>,
     /// Variables that occur only linearly.
     linear: Vec<SymbolId>,
+    /// All of these variables, in the order of the Jacobian.
+    used: Vec<SymbolId>,
     /// Whether sines or cosines of variables occur.
     has_angles: bool,
     /// What is not in a separable group, one combination a row.
     rest: Vec<Combination>,
-    /// Derivatives of the curved part of `rest`, rows x curved.
+    /// Derivatives of `rest`, row by row: with angles one a used variable and zeros up to a
+    /// multiple of [`LANES`], otherwise one a curved variable.
     rest_slopes: Vec<Combination>,
 }
 
@@ -176,9 +179,11 @@ impl DenseJacobian {
             .copied()
             .filter(|s| curved_set.contains(s))
             .collect();
-        // With angles, the linear terms of curved variables share the angles' loop.
+        let is_used = |symbol: &&SymbolId| curved.contains(symbol) || linear.contains(symbol);
+        let used: Vec<SymbolId> = columns.iter().filter(is_used).copied().collect();
+        // With angles, linear terms share the angles' loop.
         let in_group = |pool: &ExprPool, expr| match kind(pool, expr) {
-            Kind::Variable(symbol) => has_angles && curved_set.contains(&symbol),
+            Kind::Variable(symbol) => has_angles && used.contains(&symbol),
             Kind::Sine(_) | Kind::Cosine(_) => true,
             Kind::Other => false,
         };
@@ -194,15 +199,21 @@ impl DenseJacobian {
                     .collect(),
             })
             .collect();
+        let (sloped, width) = match has_angles {
+            true => (&used, used.len().next_multiple_of(LANES)),
+            false => (&curved, curved.len()),
+        };
         let mut rest_slopes = Vec::new();
-        for equation in &rest {
-            for &symbol in &curved {
+        for (row, equation) in rest.iter().enumerate() {
+            for &symbol in sloped {
                 rest_slopes.push(equation.derivative(pool, symbol));
             }
+            rest_slopes.resize((row + 1) * width, Combination::default());
         }
         Self {
             curved,
             linear,
+            used,
             has_angles,
             rest,
             rest_slopes,
@@ -220,31 +231,29 @@ impl DenseJacobian {
         lowering: &mut ExpressionLowering,
         equations: &[Combination],
     ) -> (Vec<ValueId>, HashMap<(usize, SymbolId), ValueId>) {
-        let mut ddz = matrix_vector(lowering, &self.rest);
+        let ddz = matrix_vector(lowering, &self.rest);
         let has_rest_slopes = self.rest_slopes.iter().any(|slope| !slope.is_zero());
-        let is_base_needed = has_rest_slopes || !self.has_angles && !self.curved.is_empty();
-        let mut slopes = is_base_needed.then(|| match self.has_angles {
-            // The separable loops add to an entry for every row and variable.
-            true => matrix_vector(lowering, &self.rest_slopes),
-            false => matrix_vector_without_zeros(lowering, &self.rest_slopes),
-        });
-        if self.has_angles {
-            let groups = self.groups(lowering, equations);
-            let (sums, all) = lowering.builder.separable(ddz, slopes, groups);
-            (ddz, slopes) = (sums, Some(all));
-        }
-        let constants = self.linear_slopes(lowering, equations);
         let mut entries = HashMap::new();
-        for row in 0..equations.len() {
-            let values = slopes.iter().flatten().skip(row * self.curved.len());
-            for (&symbol, &value) in self.curved.iter().zip(values) {
-                entries.insert((row, symbol), value);
+        let mut enter = |variables: &[SymbolId], values: &[ValueId]| {
+            for (row, values) in values.chunks(variables.len().max(1)).enumerate() {
+                let row = variables.iter().map(|&symbol| (row, symbol));
+                entries.extend(row.zip(values.iter().copied()));
             }
-            let values = constants.iter().skip(row * self.linear.len());
-            for (&symbol, &value) in self.linear.iter().zip(values) {
-                entries.insert((row, symbol), value);
-            }
+        };
+        if self.has_angles {
+            // The loops add to an entry for every row and variable.
+            let base = has_rest_slopes.then(|| matrix_vector(lowering, &self.rest_slopes));
+            let groups = self.groups(lowering, equations);
+            let builder = &mut lowering.builder;
+            let (ddz, slopes) = builder.separable(ddz, base, groups, self.used.len());
+            enter(&self.used, &slopes);
+            return (ddz, entries);
         }
+        if !self.curved.is_empty() {
+            let slopes = matrix_vector_without_zeros(lowering, &self.rest_slopes);
+            enter(&self.curved, &slopes);
+        }
+        enter(&self.linear, &self.linear_slopes(lowering, equations));
         (ddz, entries)
     }
 
@@ -254,60 +263,92 @@ impl DenseJacobian {
         equations: &[Combination],
         variables: &[SymbolId],
         of: impl Fn(Kind) -> Option<SymbolId>,
-    ) -> Table {
-        let mut entries = vec![0.0; equations.len() * variables.len()];
+    ) -> Vec<Vec<f64>> {
         let column: HashMap<SymbolId, usize> = variables
             .iter()
             .enumerate()
             .map(|(col, &symbol)| (symbol, col))
             .collect();
-        for (row, equation) in equations.iter().enumerate() {
+        let row = |equation: &Combination| {
+            let mut row = vec![0.0; variables.len()];
             for &(coefficient, expr) in &equation.items {
                 if let Some(col) = of(kind(pool, expr)).and_then(|symbol| column.get(&symbol)) {
-                    entries[row * variables.len() + col] = coefficient;
+                    row[*col] = coefficient;
                 }
             }
-        }
-        Table::new(equations.len(), variables.len(), entries)
+            row
+        };
+        equations.iter().map(row).collect()
     }
 
     fn groups(&self, lowering: &mut ExpressionLowering, equations: &[Combination]) -> Vec<Group> {
-        let table = |lowering: &mut ExpressionLowering, of: fn(Kind) -> Option<SymbolId>| {
-            let table = Self::coefficients(lowering.pool, equations, &self.curved, of);
-            let is_used = table.entries().iter().any(|&entry| entry != 0.0);
-            is_used.then(|| lowering.builder.table(table))
-        };
-        let variable = table(lowering, |kind| match kind {
-            Kind::Variable(symbol) => Some(symbol),
-            Kind::Sine(_) | Kind::Cosine(_) | Kind::Other => None,
-        });
-        let sine = table(lowering, |kind| match kind {
-            Kind::Sine(symbol) => Some(symbol),
-            Kind::Variable(_) | Kind::Cosine(_) | Kind::Other => None,
-        });
-        let cosine = table(lowering, |kind| match kind {
-            Kind::Cosine(symbol) => Some(symbol),
-            Kind::Variable(_) | Kind::Sine(_) | Kind::Other => None,
-        });
-        let arguments: Vec<ExprId> = self
-            .curved
+        let zero = lowering.builder.constant(0.0);
+        let variables: Vec<ExprId> = self
+            .used
             .iter()
             .map(|&symbol| lowering.pool.symbol_expr(symbol))
             .collect();
-        let variables: Vec<ValueId> = arguments
-            .iter()
-            .map(|&argument| lowering.value(argument))
-            .collect();
-        let (sines, cosines) = lowering.angles(&arguments);
-        let group = |table: Option<TableId>, values: &[ValueId], slopes: Slopes| {
-            table.map(|table| Group {
-                table,
-                values: values.to_vec(),
-                slopes,
+        let values: Vec<ValueId> = variables.iter().map(|&v| lowering.value(v)).collect();
+        let is_curved = |&(symbol, _): &(&SymbolId, &ExprId)| self.curved.contains(symbol);
+        let angles = self.used.iter().zip(&variables).filter(is_curved);
+        let angles: Vec<ExprId> = angles.map(|(_, &angle)| angle).collect();
+        let (sines, cosines) = lowering.angles(&angles);
+        let of_angles = |values: Vec<ValueId>| {
+            let mut values = values.into_iter();
+            let value = |symbol| match self.curved.contains(symbol) {
+                true => values.next().expect("one value an angle"),
+                false => zero,
+            };
+            self.used.iter().map(value).collect::<Vec<_>>()
+        };
+        let (sines, cosines) = (of_angles(sines), of_angles(cosines));
+        let width = self.used.len().next_multiple_of(LANES);
+        let mut is_first = true;
+        let mut group = |of: fn(Kind) -> Option<SymbolId>, values: &[ValueId], slopes: Slopes| {
+            let mut rows = Self::coefficients(lowering.pool, equations, &self.used, of);
+            let last = rows
+                .iter()
+                .filter_map(|row| row.iter().rposition(|&x| x != 0.0));
+            let last = last.max()?;
+            // One group has a part in every column.
+            let cols = match std::mem::take(&mut is_first) {
+                true => width,
+                false => (last + 1).next_multiple_of(LANES),
+            };
+            let padded = |values: &[ValueId]| {
+                let mut values = values.to_vec();
+                values.resize(cols, zero);
+                values
+            };
+            for row in &mut rows {
+                row.resize(cols, 0.0);
+            }
+            Some(Group {
+                table: lowering
+                    .builder
+                    .table(Table::new(rows.len(), cols, rows.concat())),
+                values: padded(values),
+                slopes: match slopes {
+                    Slopes::One => Slopes::One,
+                    Slopes::Plus(values) => Slopes::Plus(padded(&values)),
+                    Slopes::Minus(values) => Slopes::Minus(padded(&values)),
+                },
             })
         };
+        let variable = |kind| match kind {
+            Kind::Variable(symbol) => Some(symbol),
+            Kind::Sine(_) | Kind::Cosine(_) | Kind::Other => None,
+        };
+        let sine = |kind| match kind {
+            Kind::Sine(symbol) => Some(symbol),
+            Kind::Variable(_) | Kind::Cosine(_) | Kind::Other => None,
+        };
+        let cosine = |kind| match kind {
+            Kind::Cosine(symbol) => Some(symbol),
+            Kind::Variable(_) | Kind::Sine(_) | Kind::Other => None,
+        };
         [
-            group(variable, &variables, Slopes::One),
+            group(variable, &values, Slopes::One),
             group(sine, &sines, Slopes::Plus(cosines.clone())),
             group(cosine, &cosines, Slopes::Minus(sines.clone())),
         ]
@@ -325,10 +366,11 @@ impl DenseJacobian {
             return Vec::new();
         }
         let pool = lowering.pool;
-        let table = Self::coefficients(pool, equations, &self.linear, |kind| match kind {
+        let rows = Self::coefficients(pool, equations, &self.linear, |kind| match kind {
             Kind::Variable(symbol) => Some(symbol),
             Kind::Sine(_) | Kind::Cosine(_) | Kind::Other => None,
         });
+        let table = Table::new(rows.len(), self.linear.len(), rows.concat());
         let table = lowering.builder.table(table);
         lowering.builder.constants(table)
     }

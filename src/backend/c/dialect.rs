@@ -1,10 +1,12 @@
 //! How C99 spells statements.
 
 use crate::backend::code::{Argument, ConstTable, Function, MathFunction, Parameter, Role, Span};
-use crate::backend::dialect::Dialect;
+use crate::backend::dialect::{Dialect, LaneDialect};
 use crate::backend::literal::Literal;
 use crate::backend::precision::Precision;
+use crate::backend::usage::assigned_in_lanes;
 use crate::backend::wrap::{braced, comment_lines};
+use crate::ir::LANES;
 
 /// C99 with the names of one model.
 #[derive(Clone, Debug)]
@@ -214,6 +216,10 @@ impl Dialect for CDialect {
         ]
     }
 
+    fn lanes(&self) -> Option<&dyn LaneDialect> {
+        Some(self)
+    }
+
     fn table_base(&self, prefix: &str) -> String {
         format!("{prefix}table")
     }
@@ -227,8 +233,12 @@ impl Dialect for CDialect {
                 format!("    {}", braced(&row, "\n     "))
             })
             .collect();
+        let aligned = match table.is_in_lanes {
+            true => format!(" {}_ALIGNED", self.upper()),
+            false => String::new(),
+        };
         format!(
-            "static const {} {}[{}][{}] = {{\n{},\n}};",
+            "static const {}{aligned} {}[{}][{}] = {{\n{},\n}};",
             self.real(),
             table.name,
             table.rows,
@@ -247,11 +257,14 @@ impl Dialect for CDialect {
     }
 
     fn signature(&self, function: &Function) -> String {
-        let parameters: Vec<String> = function
-            .parameters
-            .iter()
-            .map(|p| self.parameter(p))
-            .collect();
+        // Without `restrict` on what lanes assign, gcc keeps in registers what it has read for them;
+        // with it, it reads tables once for each use.
+        let in_lanes = assigned_in_lanes(&function.body);
+        let spelled = |parameter: &Parameter| match in_lanes.contains(&parameter.name) {
+            true => self.parameter(parameter).replace("*restrict ", "*"),
+            false => self.parameter(parameter),
+        };
+        let parameters: Vec<String> = function.parameters.iter().map(spelled).collect();
         format!("void {}({})", function.name, parameters.join(", "))
     }
 
@@ -261,7 +274,39 @@ impl Dialect for CDialect {
     }
 }
 
+impl LaneDialect for CDialect {
+    fn declare(&self, sums: &str) -> String {
+        format!("{}_lanes {sums};", self.name)
+    }
+
+    fn for_lanes(&self, variable: &str) -> String {
+        let step = format!("{}_LANE_STEP", self.upper());
+        format!("for (size_t {variable} = 0; {variable} < {LANES}; {variable} += {step})")
+    }
+
+    fn read(&self, element: &str) -> String {
+        format!("{}_READ({element})", self.upper())
+    }
+
+    fn write(&self, element: &str) -> String {
+        format!("{}_WRITE({element})", self.upper())
+    }
+
+    fn sums(&self, sums: &str, variable: &str) -> String {
+        format!("{}_SUMS({sums}, {variable})", self.upper())
+    }
+
+    fn total(&self, sums: &str) -> String {
+        format!("{}_LANE_TOTAL({sums})", self.upper())
+    }
+}
+
 impl CDialect {
+    /// What macros begin with.
+    pub fn upper(&self) -> String {
+        self.name.to_ascii_uppercase()
+    }
+
     /// The type of numbers.
     pub fn real(&self) -> &'static str {
         match self.precision {

@@ -43,6 +43,7 @@ struct Source<'a> {
     latent_dim: usize,
     n_lanes: usize,
     kernel: Option<String>,
+    lanes: Option<String>,
     sign: bool,
     tables: Vec<String>,
     maps: Vec<String>,
@@ -64,6 +65,16 @@ struct Kernel<'a> {
     is_single: bool,
     is_library: bool,
     k: KernelText,
+}
+
+#[derive(Template)]
+#[template(path = "c/lanes.askama", config = "templates/askama.toml")]
+struct LaneText<'a> {
+    name: &'a str,
+    upper: String,
+    real: &'static str,
+    /// Bytes of a number.
+    size: usize,
 }
 
 #[derive(Template)]
@@ -140,6 +151,7 @@ pub fn emit(
         phases: phases.clone(),
     };
     let uses_kernel = functions.all().any(|function| calls_kernel(&function.body));
+    let uses_lanes = functions.tables.iter().any(|table| table.is_in_lanes);
     let source = Source {
         banner: banner.clone(),
         name,
@@ -148,6 +160,7 @@ pub fn emit(
         latent_dim: entries.latent_dim,
         n_lanes: precision.lanes(),
         kernel: uses_kernel.then(|| kernel(&dialect, sines)).transpose()?,
+        lanes: uses_lanes.then(|| lanes(&dialect)).transpose()?,
         sign: functions
             .all()
             .any(|function| calls_function(&function.body, MathFunction::Sign)),
@@ -242,6 +255,19 @@ fn kernel(dialect: &CDialect, sines: SineCosine) -> Result<String, EmitError> {
         k: KernelText::new(dialect.precision, &|literal| dialect.literal(literal)),
     };
     Ok(kernel.render()?)
+}
+
+fn lanes(dialect: &CDialect) -> Result<String, EmitError> {
+    let lanes = LaneText {
+        name: &dialect.name,
+        upper: dialect.upper(),
+        real: dialect.real(),
+        size: match dialect.precision {
+            Precision::Double => 8,
+            Precision::Single => 4,
+        },
+    };
+    Ok(lanes.render()?)
 }
 
 /// Ends with exactly one newline and has no blank lines in a row.

@@ -176,14 +176,14 @@ impl Dialect for RustDialect {
                 format!("    [{}]", row.trim_matches(['{', '}']))
             })
             .collect();
-        format!(
-            "static {}: [[{}; {}]; {}] = [\n{},\n];",
-            table.name,
-            self.real(),
-            table.cols,
-            table.rows,
-            rows.join(",\n")
-        )
+        let (name, real, cols, n) = (&table.name, self.real(), table.cols, table.rows);
+        let rows = rows.join(",\n");
+        match table.is_in_lanes {
+            true => {
+                format!("static {name}: &[[{real}; {cols}]; {n}] = &Aligned([\n{rows},\n]).0;")
+            }
+            false => format!("static {name}: [[{real}; {cols}]; {n}] = [\n{rows},\n];"),
+        }
     }
 
     fn parameter(&self, parameter: &Parameter) -> String {

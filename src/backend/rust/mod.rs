@@ -45,6 +45,8 @@ struct Lib<'a> {
     state_dim: Option<usize>,
     kernel: Option<KernelText>,
     tables: Vec<String>,
+    /// Whether rows of tables are read by wide registers.
+    has_aligned: bool,
     maps: Vec<String>,
     phases: Vec<PhaseText>,
 }
@@ -101,6 +103,7 @@ pub fn emit(
         has_lanes: functions.lanes.iter().any(Option::is_some),
         state_dim: entries.state_dim,
         kernel: uses_kernel.then(kernel),
+        has_aligned: functions.tables.iter().any(|table| table.is_in_lanes),
         tables: functions
             .tables
             .iter()

@@ -1,0 +1,128 @@
+//! One row of a matrix of functions: its sum and its slopes, column by column or in lanes.
+
+use std::ops::Range;
+
+use super::code::{Expr, Index, Infix, Stmt};
+use super::ident::Ident;
+use crate::ir::LANES;
+
+/// One row of [`Statement::Separable`](crate::ir::Statement); expressions are in terms of the variable
+/// `column`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// The variable for a column.
+    pub column: Ident,
+    /// Names for a block of columns, a lane, the terms of all columns and the sums of the lanes.
+    pub names: [Ident; 4],
+    /// Runs of blocks whose columns have terms alike, one after the other.
+    pub runs: Vec<Run>,
+    /// Where the slope of a column goes.
+    pub slope: Expr,
+    /// Number of columns with a slope.
+    pub n_slopes: usize,
+    /// What is added to the lanes' total.
+    pub start: Expr,
+    /// Where the sum goes.
+    pub sum: Expr,
+}
+
+/// Blocks of [`LANES`] columns whose terms are alike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// The blocks.
+    pub blocks: Range<usize>,
+    /// A column's term of the sum.
+    pub term: Expr,
+    /// A column's slope.
+    pub slope: Expr,
+}
+
+impl Row {
+    /// Statements that take block after block, all lanes of one side by side.
+    pub fn in_lanes(&self) -> Vec<Stmt> {
+        let [block, lane, _, sums] = &self.names;
+        let full = self.n_slopes / LANES;
+        let mut body = vec![Stmt::DeclareLanes(sums.clone())];
+        for run in &self.runs {
+            // The first block begins the sums, and the last may have fewer slopes than lanes.
+            let mut blocks = run.blocks.clone();
+            if blocks.start == 0 {
+                body.push(self.block(run, &Index::fixed(0), full > 0, true));
+                blocks.start = 1;
+            }
+            let inner = blocks.start..blocks.end.min(full).max(blocks.start);
+            if inner.len() == 1 {
+                body.push(self.block(run, &Index::fixed(LANES * inner.start), true, false));
+            } else if !inner.is_empty() {
+                let at = Index::fixed(LANES * inner.start).plus(LANES, block);
+                let inside = self.block(run, &at, true, false);
+                body.push(Stmt::For(block.clone(), inner.len(), vec![inside]));
+            }
+            if inner.end < blocks.end {
+                body.push(self.block(run, &Index::fixed(LANES * inner.end), false, false));
+            }
+            if run.blocks.contains(&full) && !self.n_slopes.is_multiple_of(LANES) {
+                let at = Index::variable(lane).shifted(LANES * full);
+                let slope = self.assign_slope(run, &at);
+                body.push(Stmt::For(lane.clone(), self.n_slopes % LANES, vec![slope]));
+            }
+        }
+        let total = Expr::LaneTotal(sums.clone());
+        let total = Expr::infix(Infix::Add, self.start.clone(), total);
+        body.push(Stmt::Assign(self.sum.clone(), total));
+        body
+    }
+
+    /// One block of columns from `first` on.
+    fn block(&self, run: &Run, first: &Index, has_slopes: bool, begins: bool) -> Stmt {
+        let [_, lane, _, sums] = &self.names;
+        let at = first.clone().plus(1, lane);
+        let term = run.term.with(&self.column, &at);
+        let target = Expr::Lanes(sums.clone(), lane.clone());
+        let add = match begins {
+            true => Stmt::Assign(target, term),
+            false => Stmt::AddAssign(target, term),
+        };
+        let slope = has_slopes.then(|| self.assign_slope(run, &at));
+        Stmt::ForLanes(lane.clone(), slope.into_iter().chain([add]).collect())
+    }
+
+    fn assign_slope(&self, run: &Run, at: &Index) -> Stmt {
+        let target = self.slope.with(&self.column, at);
+        Stmt::Assign(target, run.slope.with(&self.column, at))
+    }
+
+    /// Statements that take column after column, then add what the lanes would.
+    pub fn in_columns(&self) -> Vec<Stmt> {
+        let [_, lane, terms, sums] = &self.names;
+        let width = self.n_slopes.next_multiple_of(LANES);
+        // Arrays are declared as zeros, also behind the last column.
+        let mut body = vec![Stmt::Declare(terms.clone(), width)];
+        for run in &self.runs {
+            let (first, end) = (LANES * run.blocks.start, LANES * run.blocks.end);
+            let at = Index::variable(&self.column).shifted(first);
+            let term = Expr::Element(terms.clone(), at.clone());
+            let columns = vec![
+                self.assign_slope(run, &at),
+                Stmt::Assign(term, run.term.with(&self.column, &at)),
+            ];
+            let n = end.min(self.n_slopes) - first;
+            body.push(Stmt::For(self.column.clone(), n, columns));
+        }
+        let lane_sum = (0..width / LANES)
+            .map(|k| Expr::Element(terms.clone(), Index::variable(lane).shifted(LANES * k)))
+            .reduce(|sum, term| Expr::infix(Infix::Add, sum, term));
+        let p = |index: Index| Expr::Element(sums.clone(), index);
+        if let Some(lane_sum) = lane_sum {
+            let assign = Stmt::Assign(p(Index::variable(lane)), lane_sum);
+            body.push(Stmt::Declare(sums.clone(), LANES));
+            body.push(Stmt::For(lane.clone(), LANES, vec![assign]));
+        }
+        let pair = |a: Expr, b: Expr| Expr::infix(Infix::Add, a, b);
+        let half = |l: usize| pair(p(Index::fixed(l)), p(Index::fixed(l + LANES / 2)));
+        let total = pair(pair(half(0), half(2)), pair(half(1), half(3)));
+        let total = Expr::infix(Infix::Add, self.start.clone(), total);
+        body.push(Stmt::Assign(self.sum.clone(), total));
+        body
+    }
+}
