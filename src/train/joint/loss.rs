@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::batch::Batch;
 use super::multiply::{Columns, add_product, add_transposed, product_into};
 use super::parameters::Parameters;
+use super::schedule::pull_to_zero;
 use super::unroll::{Pulls, Unroll, Window};
 use crate::train::features::{FeatureValues, Features};
 
@@ -137,7 +138,11 @@ impl<'a> JointLoss<'a> {
         let projection = InputProjection::new(&parameters.encoder);
         let lift = self.lift(parameters, batch, &projection);
         let (ddz, ddx, bptt) = self.dynamics(parameters, batch, &projection);
-        let l1 = self.sparsity(parameters);
+        let l1 = {
+            let xi = &parameters.xi;
+            let pull = self.weights.l1 * (1.0 / xi.len() as f64);
+            pull_to_zero(xi, pull, &mut self.gradient.xi)
+        };
         Losses {
             decoder,
             ddz,
@@ -313,18 +318,6 @@ impl<'a> JointLoss<'a> {
         let pulled = Columns::some(&self.pulled, 2 * d, d);
         add_transposed(&mut input, 1.0, Columns::all(&batch.u), pulled);
         self.gradient.encoder += projection.pull_back(&parameters.encoder, &input);
-    }
-
-    /// (19).
-    fn sparsity(&mut self, parameters: &Parameters) -> f64 {
-        let share = 1.0 / parameters.xi.len() as f64;
-        if self.weights.l1 != 0.0 {
-            let pull = self.weights.l1 * share;
-            for (g, xi) in self.gradient.xi.iter_mut().zip(parameters.xi.iter()) {
-                *g += if *xi == 0.0 { 0.0 } else { pull * xi.signum() };
-            }
-        }
-        parameters.xi.iter().map(|xi| xi.abs()).sum::<f64>() * share
     }
 }
 

@@ -13,8 +13,9 @@ pub mod unroll;
 
 mod adam;
 mod run;
+mod schedule;
 
 pub use loss::{LossWeights, Losses};
 pub use run::joint;
-pub use stages::Schedule;
+pub use schedule::Schedule;
 pub use unroll::{Integrator, Unroll};

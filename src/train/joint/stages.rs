@@ -5,55 +5,13 @@
 //! iterates are those of the plain losses.
 
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
 
 use super::adam::Adam;
 use super::batch::Batch;
 use super::loss::{InputProjection, JointLoss, LossWeights, Losses};
 use super::parameters::Parameters;
+use super::schedule::{MaskedAdam, Schedule, pull_to_zero};
 use crate::train::features::{FeatureValues, Features};
-
-/// Epochs, thresholding and step length.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Schedule {
-    /// Epochs with the L1 term and thresholding.
-    pub epochs: usize,
-    /// Epochs of refinement: no L1 term, no thresholding, the mask stays.
-    pub refinement: usize,
-    /// Coefficients below this are masked for good.
-    pub threshold: f64,
-    /// Epochs between two thresholdings.
-    pub threshold_every: usize,
-    /// Step length of Adam.
-    pub learning_rate: f64,
-}
-
-impl Default for Schedule {
-    /// The author's schedule.
-    fn default() -> Self {
-        Self {
-            epochs: 501,
-            refinement: 101,
-            threshold: 0.01,
-            threshold_every: 100,
-            learning_rate: 1e-3,
-        }
-    }
-}
-
-impl Schedule {
-    /// Epochs of one step, refinement included.
-    pub fn total(&self) -> usize {
-        self.epochs + self.refinement
-    }
-
-    pub(super) fn thresholds_at(&self, epoch: usize) -> bool {
-        epoch > 0
-            && epoch < self.epochs
-            && self.threshold_every > 0
-            && epoch.is_multiple_of(self.threshold_every)
-    }
-}
 
 /// Told after every epoch: its number, the losses, the active terms. Answers whether to go on.
 pub type Listener<'a> = dyn FnMut(usize, &Losses, usize) -> bool + 'a;
@@ -70,40 +28,31 @@ pub fn train_together(
     schedule: &Schedule,
     listener: &mut Listener<'_>,
 ) -> Losses {
-    let mut optimisers = parameters
-        .blocks()
-        .map(|block| Adam::new(block.len(), schedule.learning_rate));
-    let mut support = parameters.xi.map(|_| true);
+    // The last block is Xi, which is masked.
+    let [maps @ .., _] = parameters.blocks();
+    let mut optimisers = maps.map(|block| Adam::new(block.len(), schedule.learning_rate));
+    let mut masked = MaskedAdam::new(&parameters.xi, schedule);
     mask_rows(&mut parameters.encoder, mask);
     let mut last = Losses::default();
     for epoch in 0..schedule.total() {
-        if schedule.thresholds_at(epoch) {
-            drop_small(&mut parameters.xi, &mut support, schedule.threshold);
-        }
-        let refining = epoch >= schedule.epochs;
-        loss.set_weights(LossWeights {
-            l1: if refining { 0.0 } else { weights.l1 },
-            ..weights
-        });
+        masked.start_epoch(epoch, schedule, &mut parameters.xi);
+        loss.set_weights(schedule.weights_at(epoch, weights));
         let mut mean = Losses::default();
         for batch in batches {
             mean = mean.plus(
                 &loss.evaluate(parameters, batch),
                 1.0 / batches.len() as f64,
             );
-            let gradient = loss.gradient().blocks();
-            for ((optimiser, block), g) in optimisers
-                .iter_mut()
-                .zip(parameters.blocks_mut())
-                .zip(gradient)
-            {
-                optimiser.step(block, g);
+            let gradient = loss.gradient();
+            let ([maps @ .., _], [pulls @ .., _]) = (parameters.blocks_mut(), gradient.blocks());
+            for ((optimiser, map), pull) in optimisers.iter_mut().zip(maps).zip(pulls) {
+                optimiser.step(map, pull);
             }
             mask_rows(&mut parameters.encoder, mask);
-            keep_support(&mut parameters.xi, &support);
+            masked.step(&mut parameters.xi, &gradient.xi);
         }
         last = mean;
-        if !listener(epoch + 1, &last, active(&support)) {
+        if !listener(epoch + 1, &last, masked.active()) {
             break;
         }
     }
@@ -178,30 +127,19 @@ pub fn train_xi(
         .map(|batch| XiMoments::new(parameters, batch, features))
         .collect();
     let decoder_gram = &parameters.decoder * parameters.decoder.transpose();
-    let (mut xi, mut support) = (
-        start,
-        DMatrix::from_element(features.library_dim(), features.latent_dim(), true),
-    );
-    let mut optimiser = Adam::new(xi.len(), schedule.learning_rate);
+    let mut xi = start;
+    let mut masked = MaskedAdam::new(&xi, schedule);
     let mut last = Losses::default();
     for epoch in 0..schedule.total() {
-        if schedule.thresholds_at(epoch) {
-            drop_small(&mut xi, &mut support, schedule.threshold);
-        }
-        let l1 = if epoch < schedule.epochs {
-            weights.l1
-        } else {
-            0.0
-        };
-        let weights = LossWeights { l1, ..weights };
+        masked.start_epoch(epoch, schedule, &mut xi);
+        let weights = schedule.weights_at(epoch, weights);
         last = Losses::default();
         for moment in &moments {
             let (losses, gradient) = moment.evaluate(&xi, &decoder_gram, weights);
             last = last.plus(&losses, 1.0 / moments.len() as f64);
-            optimiser.step(xi.as_mut_slice(), gradient.as_slice());
-            keep_support(&mut xi, &support);
+            masked.step(&mut xi, &gradient);
         }
-        if !listener(epoch + 1, &last, active(&support)) {
+        if !listener(epoch + 1, &last, masked.active()) {
             break;
         }
     }
@@ -218,25 +156,17 @@ pub fn train_xi_unrolled(
     listener: &mut Listener<'_>,
 ) -> DMatrix<f64> {
     let mut parameters = start.clone();
-    let mut support = parameters.xi.map(|_| true);
-    let mut optimiser = Adam::new(parameters.xi.len(), schedule.learning_rate);
+    let mut masked = MaskedAdam::new(&parameters.xi, schedule);
     for epoch in 0..schedule.total() {
-        if schedule.thresholds_at(epoch) {
-            drop_small(&mut parameters.xi, &mut support, schedule.threshold);
-        }
-        let refining = epoch >= schedule.epochs;
-        loss.set_weights(LossWeights {
-            l1: if refining { 0.0 } else { weights.l1 },
-            ..weights
-        });
+        masked.start_epoch(epoch, schedule, &mut parameters.xi);
+        loss.set_weights(schedule.weights_at(epoch, weights));
         let mut mean = Losses::default();
         for batch in batches {
             let share = 1.0 / batches.len() as f64;
             mean = mean.plus(&loss.evaluate(&parameters, batch), share);
-            optimiser.step(parameters.xi.as_mut_slice(), loss.gradient().xi.as_slice());
-            keep_support(&mut parameters.xi, &support);
+            masked.step(&mut parameters.xi, &loss.gradient().xi);
         }
-        if !listener(epoch + 1, &mean, active(&support)) {
+        if !listener(epoch + 1, &mean, masked.active()) {
             break;
         }
     }
@@ -279,22 +209,14 @@ impl XiMoments {
         let real_scale = 1.0 / (self.n * self.state_dim);
         let own = &self.gram * xi;
         let decoded = &own * decoder_gram;
-        let losses = Losses {
+        let mut losses = Losses {
             ddz: latent_scale * (xi.dot(&own) - 2.0 * xi.dot(&self.latent) + self.ddz_energy),
             ddx: real_scale * (xi.dot(&decoded) - 2.0 * xi.dot(&self.real) + self.ddx_energy),
-            l1: xi.iter().map(|value| value.abs()).sum::<f64>() / xi.len() as f64,
             ..Losses::default()
         };
         let mut gradient = (own - &self.latent) * (2.0 * weights.ddz * latent_scale);
         gradient += (decoded - &self.real) * (2.0 * weights.ddx * real_scale);
-        let pull = weights.l1 / xi.len() as f64;
-        for (g, value) in gradient.iter_mut().zip(xi.iter()) {
-            *g += if *value == 0.0 {
-                0.0
-            } else {
-                pull * value.signum()
-            };
-        }
+        losses.l1 = pull_to_zero(xi, weights.l1 / xi.len() as f64, &mut gradient);
         (losses, gradient)
     }
 }
@@ -333,24 +255,6 @@ fn mask_rows(encoder: &mut DMatrix<f64>, mask: &[bool]) {
     for (mut row, _) in encoder.row_iter_mut().zip(mask).filter(|(_, used)| !**used) {
         row.fill(0.0);
     }
-}
-
-pub(super) fn drop_small(xi: &mut DMatrix<f64>, support: &mut DMatrix<bool>, threshold: f64) {
-    for (value, kept) in xi.iter_mut().zip(support.iter_mut()) {
-        *kept &= value.abs() >= threshold;
-    }
-    keep_support(xi, support);
-}
-
-pub(super) fn keep_support(xi: &mut DMatrix<f64>, support: &DMatrix<bool>) {
-    xi.iter_mut()
-        .zip(support.iter())
-        .filter(|(_, kept)| !**kept)
-        .for_each(|(value, _)| *value = 0.0);
-}
-
-pub(super) fn active(support: &DMatrix<bool>) -> usize {
-    support.iter().filter(|kept| **kept).count()
 }
 
 #[cfg(test)]

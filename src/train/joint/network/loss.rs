@@ -12,6 +12,7 @@ use crate::train::features::{FeatureValues, Features};
 use crate::train::joint::batch::Batch;
 use crate::train::joint::loss::{LossWeights, Losses};
 use crate::train::joint::multiply::{Columns, add_product, add_transposed};
+use crate::train::joint::schedule::pull_to_zero;
 use crate::train::joint::unroll::{Pulls, Unroll, Window};
 use crate::train::random::Random;
 
@@ -224,7 +225,8 @@ impl<'a> NetworkLoss<'a> {
         pull.rows_mut(2 * n, n).copy_from(&-miss); // from here on with respect to ddz
         let (bptt, pulled) =
             self.pull_through_library(batch, &encoded, (xi, &theta), &onto_predicted);
-        let l1 = self.sparsity(xi, batch.phase);
+        let pull_xi = self.weights.l1 * (1.0 / xi.len() as f64);
+        let l1 = pull_to_zero(xi, pull_xi, &mut self.gradient.xi[batch.phase]);
         for (block, start) in [(0, 0), (n, d)] {
             let mut rows = pull.rows_mut(block, n);
             rows += pulled.columns(start, d);
@@ -332,18 +334,6 @@ impl<'a> NetworkLoss<'a> {
         let at_affine = network.pull_back_jacobian(tape, &encoded.jacobians, &onto_rows, gradient);
         network.backward(tape, pull * self.frame.latent, &at_affine, gradient);
         1.0 - encoded.projections.carried / total
-    }
-
-    /// (19) of the batch's phase.
-    fn sparsity(&mut self, xi: &DMatrix<f64>, phase: usize) -> f64 {
-        let share = 1.0 / xi.len() as f64;
-        if self.weights.l1 != 0.0 {
-            let pull = self.weights.l1 * share;
-            for (g, xi) in self.gradient.xi[phase].iter_mut().zip(xi.iter()) {
-                *g += if *xi == 0.0 { 0.0 } else { pull * xi.signum() };
-            }
-        }
-        xi.iter().map(|xi| xi.abs()).sum::<f64>() * share
     }
 }
 

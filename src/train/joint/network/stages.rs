@@ -12,7 +12,8 @@ use crate::train::joint::adam::Adam;
 use crate::train::joint::batch::Batch;
 use crate::train::joint::loss::{LossWeights, Losses};
 use crate::train::joint::multiply::{Columns, add_product, add_transposed};
-use crate::train::joint::stages::{Listener, Schedule, active, drop_small, keep_support};
+use crate::train::joint::schedule::{MaskedAdam, Schedule, pull_to_zero};
+use crate::train::joint::stages::Listener;
 
 /// Encoder, decoder and Xi together; every batch moves the Xi of its phase.
 ///
@@ -27,15 +28,15 @@ pub fn train_together(
 ) -> Losses {
     let mut encoder = MapOptimiser::new(&parameters.encoder, schedule);
     let mut decoder = MapOptimiser::new(&parameters.decoder, schedule);
-    let mut coefficients: Vec<Sparse> = (parameters.xi.iter())
-        .map(|xi| Sparse::new(xi, schedule))
+    let mut coefficients: Vec<MaskedAdam> = (parameters.xi.iter())
+        .map(|xi| MaskedAdam::new(xi, schedule))
         .collect();
     let mut last = Losses::default();
     for epoch in 0..schedule.total() {
-        for (sparse, xi) in coefficients.iter_mut().zip(&mut parameters.xi) {
-            sparse.start_epoch(epoch, schedule, xi);
+        for (masked, xi) in coefficients.iter_mut().zip(&mut parameters.xi) {
+            masked.start_epoch(epoch, schedule, xi);
         }
-        loss.set_weights(in_epoch(epoch, schedule, weights));
+        loss.set_weights(schedule.weights_at(epoch, weights));
         let mut mean = Losses::default();
         for batch in batches {
             let losses = loss.evaluate(parameters, batch);
@@ -47,7 +48,7 @@ pub fn train_together(
             coefficients[phase].step(&mut parameters.xi[phase], &gradient.xi[phase]);
         }
         last = mean;
-        let count = coefficients.iter().map(|sparse| active(&sparse.support));
+        let count = coefficients.iter().map(MaskedAdam::active);
         if !listener(epoch + 1, &last, count.sum()) {
             break;
         }
@@ -117,10 +118,10 @@ pub fn train_xi(
     } else {
         Vec::new()
     };
-    let mut sparse = Sparse::new(&parameters.xi[phase], schedule);
+    let mut masked = MaskedAdam::new(&parameters.xi[phase], schedule);
     for epoch in 0..schedule.total() {
-        sparse.start_epoch(epoch, schedule, &mut parameters.xi[phase]);
-        let weights = in_epoch(epoch, schedule, weights);
+        masked.start_epoch(epoch, schedule, &mut parameters.xi[phase]);
+        let weights = schedule.weights_at(epoch, weights);
         loss.set_weights(weights);
         let mut mean = Losses::default();
         for (index, batch) in batches.iter().enumerate() {
@@ -133,22 +134,12 @@ pub fn train_xi(
                 }
             };
             mean = mean.plus(&losses, share);
-            sparse.step(&mut parameters.xi[phase], &gradient);
+            masked.step(&mut parameters.xi[phase], &gradient);
         }
-        if !listener(epoch + 1, &mean, active(&sparse.support)) {
+        if !listener(epoch + 1, &mean, masked.active()) {
             break;
         }
     }
-}
-
-/// The weights in an epoch: refinement has no L1 term.
-fn in_epoch(epoch: usize, schedule: &Schedule, weights: LossWeights) -> LossWeights {
-    let l1 = if epoch < schedule.epochs {
-        weights.l1
-    } else {
-        0.0
-    };
-    LossWeights { l1, ..weights }
 }
 
 /// Adam on the blocks of a network.
@@ -169,32 +160,6 @@ impl MapOptimiser {
         for (optimiser, (block, gradient)) in self.0.iter_mut().zip(blocks) {
             optimiser.step(block, gradient);
         }
-    }
-}
-
-/// Adam on the coefficients of a phase, with the mask of sequential thresholding.
-struct Sparse {
-    optimiser: Adam,
-    support: DMatrix<bool>,
-}
-
-impl Sparse {
-    fn new(xi: &DMatrix<f64>, schedule: &Schedule) -> Self {
-        Self {
-            optimiser: Adam::new(xi.len(), schedule.learning_rate),
-            support: xi.map(|_| true),
-        }
-    }
-
-    fn start_epoch(&mut self, epoch: usize, schedule: &Schedule, xi: &mut DMatrix<f64>) {
-        if schedule.thresholds_at(epoch) {
-            drop_small(xi, &mut self.support, schedule.threshold);
-        }
-    }
-
-    fn step(&mut self, xi: &mut DMatrix<f64>, gradient: &DMatrix<f64>) {
-        self.optimiser.step(xi.as_mut_slice(), gradient.as_slice());
-        keep_support(xi, &self.support);
     }
 }
 
@@ -264,11 +229,10 @@ impl XiSamples {
         }
         let (latent_scale, real_scale) = (1.0 / (n * d) as f64, 1.0 / (n * self.state_dim) as f64);
         let miss = &predicted - &self.ddz;
-        let losses = Losses {
+        let mut losses = Losses {
             ddz: latent_scale * miss.norm_squared(),
             ddx: real_scale
                 * (predicted.dot(&own) - 2.0 * predicted.dot(&self.shared) + self.energy),
-            l1: xi.iter().map(|value| value.abs()).sum::<f64>() / xi.len() as f64,
             ..Losses::default()
         };
         let pull = miss * (2.0 * weights.ddz * latent_scale)
@@ -276,14 +240,7 @@ impl XiSamples {
         let mut gradient = DMatrix::zeros(xi.nrows(), d);
         let (theta, pull) = (Columns::all(&self.theta), Columns::all(&pull));
         add_transposed(&mut gradient, 1.0, theta, pull);
-        let l1 = weights.l1 / xi.len() as f64;
-        for (g, value) in gradient.iter_mut().zip(xi.iter()) {
-            *g += if *value == 0.0 {
-                0.0
-            } else {
-                l1 * value.signum()
-            };
-        }
+        losses.l1 = pull_to_zero(xi, weights.l1 / xi.len() as f64, &mut gradient);
         (losses, gradient)
     }
 }
