@@ -2,22 +2,19 @@
 
 use std::collections::HashMap;
 
-use nalgebra::DMatrix;
 use serde_json::{Map, Value};
 
 use super::error::{ModelError, check_finite, check_shape};
 use super::identifier::Identifier;
 use super::library::Library;
 use super::phase::{FeetRule, Phase, all_patterns};
+use super::projection::pinv_of_transpose;
 use super::rom::ReducedModel;
 use super::scaling::Scaling;
 use super::signals::Signals;
 use super::state_map::StateMap;
 use super::statistics::InputStatistics;
 use crate::robot::Robot;
-
-/// An encoder has full row rank if its smallest singular value is above this share of the largest.
-pub const RANK_TOLERANCE: f64 = 1e-10;
 
 const MAX_PHASES: usize = 16;
 const MAX_STATE_DIM: usize = 256;
@@ -179,7 +176,7 @@ impl ModelBuilder {
     ///
     /// # Errors
     /// The first of the [`ModelError`]s that applies: names, shapes, finite values, scale factors,
-    /// rank of the encoder (singular values, [`RANK_TOLERANCE`]), reachable phases, covariances.
+    /// rank of the encoder (singular values, [`super::RANK_TOLERANCE`]), reachable phases, covariances.
     pub fn build(self) -> Result<ReducedModel, ModelError> {
         let identifier = identifier_of("model name", &self.name)?;
         let phase_identifiers = self.check_phase_names()?;
@@ -436,71 +433,4 @@ fn check_widths(encoder: &StateMap, latent_dim: usize) -> Result<(), ModelError>
             expected: latent_dim,
         }),
     }
-}
-
-/// `pinv(J^T)` of a nonlinear encoder's Jacobian at a state.
-pub(super) fn pinv_of_jacobian(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
-    pinv_of_transpose(jacobian).map_err(|error| match error {
-        ModelError::RankDeficient {
-            smallest,
-            largest,
-            expected,
-            tolerance,
-        } => ModelError::SingularJacobian {
-            smallest,
-            largest,
-            expected,
-            tolerance,
-        },
-        other => other,
-    })
-}
-
-/// `pinv(W_e^T)`, `latent_dim x state_dim`, from the singular values of `W_e = U S V^T`:
-/// `pinv(W_e^T) = U S^-1 V^T`.
-fn pinv_of_transpose(weights: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
-    let expected = weights.nrows();
-    let deficient = |smallest, largest| ModelError::RankDeficient {
-        smallest,
-        largest,
-        expected,
-        tolerance: RANK_TOLERANCE,
-    };
-    let largest_entry = weights.amax();
-    if largest_entry == 0.0 {
-        return Err(deficient(0.0, 0.0));
-    }
-    // Divided by the largest entry first, so that no intermediate product overflows.
-    let normalised = weights / largest_entry;
-    let max_iterations = 1_000 * weights.ncols();
-    let svd = nalgebra::SVD::try_new(normalised, true, true, f64::EPSILON, max_iterations)
-        .filter(|svd| svd.singular_values.iter().all(|value| value.is_finite()))
-        .ok_or_else(|| ModelError::Decomposition {
-            tensor: "encoder.weights".to_owned(),
-        })?;
-    let smallest = svd.singular_values.min();
-    let largest = svd.singular_values.max();
-    if smallest <= RANK_TOLERANCE * largest {
-        return Err(deficient(smallest * largest_entry, largest * largest_entry));
-    }
-    let u = svd.u.expect("asked for the left singular vectors");
-    let v_t = svd.v_t.expect("asked for the right singular vectors");
-    let inverse = svd.singular_values.map(|value| 1.0 / value);
-    let projection = u * DMatrix::from_diagonal(&inverse) * v_t / largest_entry;
-    let projection = refined(projection, weights);
-    check_finite("pinv(encoder.weights^T)", &projection)?;
-    Ok(projection)
-}
-
-/// Removes what the iteration of the singular values left over, which can be 1e-10 even for well
-/// conditioned matrices: a Newton step on `P W_e^T = I` squares the residual.
-fn refined(projection: DMatrix<f64>, weights: &DMatrix<f64>) -> DMatrix<f64> {
-    const NEGLIGIBLE: f64 = 1e-13;
-    let dim = projection.nrows();
-    let residual = DMatrix::identity(dim, dim) - &projection * weights.transpose();
-    if residual.amax() <= NEGLIGIBLE {
-        return projection;
-    }
-    let step = &residual * &projection;
-    projection + step
 }

@@ -13,8 +13,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::affine::AffineMap;
-use super::builder::pinv_of_jacobian;
 use super::error::ModelError;
+use super::projection::pinv_of_jacobian;
 use super::rom::ReducedModel;
 use super::state_map::StateMap;
 use super::statistics::LatentInputStatistics;

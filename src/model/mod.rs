@@ -41,6 +41,7 @@ mod identifier;
 mod library;
 mod maps;
 mod phase;
+mod projection;
 mod rom;
 mod scaling;
 mod signals;
@@ -53,7 +54,7 @@ mod tests;
 
 pub use activation::Activation;
 pub use affine::AffineMap;
-pub use builder::{ModelBuilder, RANK_TOLERANCE};
+pub use builder::ModelBuilder;
 pub use error::{Dimensions, ModelError, SignalPart};
 pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN};
 pub use library::{
@@ -61,6 +62,7 @@ pub use library::{
     MAX_LIBRARY_DIM, MAX_TERM_LEN, TermId,
 };
 pub use phase::{FeetRule, Phase};
+pub use projection::RANK_TOLERANCE;
 pub use rom::{LatentEquations, ReducedModel};
 pub use scaling::{ScaleFactors, Scaling};
 pub use signals::Signals;

@@ -1,0 +1,75 @@
+//! Pseudo-inverses of encoders: `u_lat = pinv(W_e^T) u`.
+
+use nalgebra::DMatrix;
+
+use super::error::{ModelError, check_finite};
+
+/// An encoder has full row rank if its smallest singular value is above this share of the largest.
+pub const RANK_TOLERANCE: f64 = 1e-10;
+
+/// `pinv(J^T)` of a nonlinear encoder's Jacobian at a state.
+pub(super) fn pinv_of_jacobian(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
+    pinv_of_transpose(jacobian).map_err(|error| match error {
+        ModelError::RankDeficient {
+            smallest,
+            largest,
+            expected,
+            tolerance,
+        } => ModelError::SingularJacobian {
+            smallest,
+            largest,
+            expected,
+            tolerance,
+        },
+        other => other,
+    })
+}
+
+/// `pinv(W_e^T)`, `latent_dim x state_dim`, from the singular values of `W_e = U S V^T`:
+/// `pinv(W_e^T) = U S^-1 V^T`.
+pub(super) fn pinv_of_transpose(weights: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
+    let expected = weights.nrows();
+    let deficient = |smallest, largest| ModelError::RankDeficient {
+        smallest,
+        largest,
+        expected,
+        tolerance: RANK_TOLERANCE,
+    };
+    let largest_entry = weights.amax();
+    if largest_entry == 0.0 {
+        return Err(deficient(0.0, 0.0));
+    }
+    // Divided by the largest entry first, so that no intermediate product overflows.
+    let normalised = weights / largest_entry;
+    let max_iterations = 1_000 * weights.ncols();
+    let svd = nalgebra::SVD::try_new(normalised, true, true, f64::EPSILON, max_iterations)
+        .filter(|svd| svd.singular_values.iter().all(|value| value.is_finite()))
+        .ok_or_else(|| ModelError::Decomposition {
+            tensor: "encoder.weights".to_owned(),
+        })?;
+    let smallest = svd.singular_values.min();
+    let largest = svd.singular_values.max();
+    if smallest <= RANK_TOLERANCE * largest {
+        return Err(deficient(smallest * largest_entry, largest * largest_entry));
+    }
+    let u = svd.u.expect("asked for the left singular vectors");
+    let v_t = svd.v_t.expect("asked for the right singular vectors");
+    let inverse = svd.singular_values.map(|value| 1.0 / value);
+    let projection = u * DMatrix::from_diagonal(&inverse) * v_t / largest_entry;
+    let projection = refined(projection, weights);
+    check_finite("pinv(encoder.weights^T)", &projection)?;
+    Ok(projection)
+}
+
+/// Removes what the iteration of the singular values left over, which can be 1e-10 even for well
+/// conditioned matrices: a Newton step on `P W_e^T = I` squares the residual.
+fn refined(projection: DMatrix<f64>, weights: &DMatrix<f64>) -> DMatrix<f64> {
+    const NEGLIGIBLE: f64 = 1e-13;
+    let dim = projection.nrows();
+    let residual = DMatrix::identity(dim, dim) - &projection * weights.transpose();
+    if residual.amax() <= NEGLIGIBLE {
+        return projection;
+    }
+    let step = &residual * &projection;
+    projection + step
+}
