@@ -103,36 +103,64 @@ pub struct Script<'a, F> {
     pub numbers: fn(&[usize]) -> String,
 }
 
-impl<F> Script<'_, F> {
-    /// The maps of a model.
-    pub fn maps(&self, functions: &ModelFunctions) -> Result<Vec<F>, EmitError> {
-        let maps = functions.maps.iter();
-        maps.map(|map| (self.print)(&text(map, functions, &self.printer), None))
-            .collect()
-    }
+/// What the files of all languages say of a model; `F` is what they print of a function.
+pub struct ModelText<F> {
+    /// Name of the model.
+    pub name: String,
+    /// Name of the first phase's accelerations, for an example of a call.
+    pub example: String,
+    /// Units of robot coordinates.
+    pub units: &'static str,
+    /// Number of latent coordinates.
+    pub latent_dim: usize,
+    /// Number of robot coordinates.
+    pub state_dim: Option<usize>,
+    /// Constant tables.
+    pub tables: Vec<String>,
+    /// Maps between robot and latent coordinates.
+    pub maps: Vec<F>,
+    /// Phases.
+    pub phases: Vec<PhaseText<F>>,
+}
 
-    /// The phases of a model.
-    pub fn phases(
+impl<F> Script<'_, F> {
+    /// All of a model.
+    pub fn model(
         &self,
         entries: &ModelEntries,
         functions: &ModelFunctions,
-    ) -> Result<Vec<PhaseText<F>>, EmitError> {
-        let pairs = entries.phases.iter().zip(&functions.phases);
-        pairs
-            .map(|(phase, of_phase)| {
-                let texts = of_phase.iter().map(|function| {
-                    (self.print)(&text(function, functions, &self.printer), Some(phase))
-                });
-                Ok(PhaseText {
-                    identifier: phase.identifier.clone(),
-                    upper: phase.identifier.to_ascii_uppercase(),
-                    nnz: phase.pattern.len(),
-                    rows: (self.numbers)(&phase.pattern.rows),
-                    cols: (self.numbers)(&phase.pattern.cols),
-                    functions: texts.collect::<Result<_, EmitError>>()?,
-                })
+    ) -> Result<ModelText<F>, EmitError> {
+        let print = |function: &Function, phase: Option<&PhaseEntries>| {
+            (self.print)(&text(function, functions, &self.printer), phase)
+        };
+        let phase = |(phase, of_phase): (&PhaseEntries, &[Function; 3])| {
+            let texts = of_phase.iter().map(|function| print(function, Some(phase)));
+            Ok(PhaseText {
+                identifier: phase.identifier.clone(),
+                upper: phase.identifier.to_ascii_uppercase(),
+                nnz: phase.pattern.len(),
+                rows: (self.numbers)(&phase.pattern.rows),
+                cols: (self.numbers)(&phase.pattern.cols),
+                functions: texts.collect::<Result<_, EmitError>>()?,
             })
-            .collect()
+        };
+        let maps = functions.maps.iter().map(|map| print(map, None));
+        let phases = entries.phases.iter().zip(&functions.phases).map(phase);
+        let first = entries.phases.first();
+        Ok(ModelText {
+            name: entries.name.clone(),
+            example: first.map_or(String::new(), |phase| phase.dynamics.name.clone()),
+            units: entries.units.of_robot(),
+            latent_dim: entries.latent_dim,
+            state_dim: entries.state_dim,
+            tables: functions
+                .tables
+                .iter()
+                .map(|table| self.printer.table(table))
+                .collect(),
+            maps: maps.collect::<Result<_, EmitError>>()?,
+            phases: phases.collect::<Result<_, EmitError>>()?,
+        })
     }
 }
 

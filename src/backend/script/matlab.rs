@@ -2,7 +2,7 @@
 
 use askama::Template;
 
-use super::functions::{FunctionText, PhaseText, Script, list};
+use super::functions::{FunctionText, ModelText, Script, list};
 use crate::backend::code::{
     Argument, ConstTable, Function, Index, Infix, MathFunction, Parameter, Span,
 };
@@ -158,16 +158,13 @@ impl Dialect for MatlabDialect {
             }
         }
         let read = read.join(", ");
-        match (callee, written.as_slice()) {
-            (None, [sines, cosines]) => {
+        match callee {
+            Some(callee) => format!("[{}] = {callee}({read});", written.join(", ")),
+            None => {
+                let [sines, cosines] = written.as_slice() else {
+                    unreachable!("the kernel writes sines and cosines");
+                };
                 format!("{sines} = sin({read}); {cosines} = cos({read});")
-            }
-            (callee, written) => {
-                format!(
-                    "[{}] = {}({read});",
-                    written.join(", "),
-                    callee.unwrap_or_default()
-                )
             }
         }
     }
@@ -225,16 +222,9 @@ fn span_text(span: &Span) -> String {
 #[template(path = "script/matlab.askama", config = "templates/askama.toml")]
 struct MatlabFile<'a> {
     banner: String,
-    model: &'a str,
     file: &'a str,
-    example: String,
-    units: &'static str,
-    latent_dim: usize,
-    state_dim: Option<usize>,
-    tables: Vec<String>,
-    /// Names and definitions.
-    maps: Vec<(String, String)>,
-    phases: Vec<PhaseText<(String, String)>>,
+    /// Functions are names and definitions.
+    m: ModelText<(String, String)>,
 }
 
 #[derive(Template)]
@@ -268,22 +258,8 @@ pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>
     let stem = Namer::new(&RESERVED).mint(&entries.identifier).to_string();
     let file = MatlabFile {
         banner: format!("% {provenance}"),
-        model: &entries.name,
         file: &stem,
-        example: entries
-            .phases
-            .first()
-            .map_or(String::new(), |phase| phase.dynamics.name.clone()),
-        units: entries.units.of_robot(),
-        latent_dim: entries.latent_dim,
-        state_dim: entries.state_dim,
-        tables: functions
-            .tables
-            .iter()
-            .map(|table| script.printer.table(table))
-            .collect(),
-        maps: script.maps(&functions)?,
-        phases: script.phases(entries, &functions)?,
+        m: script.model(entries, &functions)?,
     };
     Ok(vec![EmittedFile::new(
         format!("{stem}.m"),

@@ -2,7 +2,7 @@
 
 use askama::Template;
 
-use super::functions::{FunctionText, PhaseText, Script, list};
+use super::functions::{FunctionText, ModelText, Script, list};
 use crate::backend::code::{Argument, ConstTable, Function, MathFunction, Parameter, Span};
 use crate::backend::dialect::Dialect;
 use crate::backend::entries::{ModelEntries, PhaseEntries};
@@ -155,15 +155,9 @@ fn slice(span: &Span) -> String {
 
 #[derive(Template)]
 #[template(path = "script/numpy.askama", config = "templates/askama.toml")]
-struct NumPyModule<'a> {
+struct NumPyModule {
     banner: String,
-    model: &'a str,
-    units: &'static str,
-    latent_dim: usize,
-    state_dim: Option<usize>,
-    tables: Vec<String>,
-    maps: Vec<String>,
-    phases: Vec<PhaseText<String>>,
+    m: ModelText<String>,
 }
 
 #[derive(Template)]
@@ -187,16 +181,9 @@ struct NumPyFunction<'a> {
 #[template(path = "script/casadi.askama", config = "templates/askama.toml")]
 struct CasadiModule<'a> {
     banner: String,
-    model: &'a str,
     module: &'a str,
-    example: String,
-    units: &'static str,
-    latent_dim: usize,
-    state_dim: Option<usize>,
-    tables: Vec<String>,
-    /// Expressions, and the function made of them.
-    maps: Vec<(String, String)>,
-    phases: Vec<PhaseText<(String, String)>>,
+    /// Functions are expressions, and the function made of them.
+    m: ModelText<(String, String)>,
 }
 
 #[derive(Template)]
@@ -230,17 +217,7 @@ pub fn emit(entries: &ModelEntries, provenance: &str) -> Result<Vec<EmittedFile>
     };
     let module = NumPyModule {
         banner: format!("# {provenance}"),
-        model: &entries.name,
-        units: entries.units.of_robot(),
-        latent_dim: entries.latent_dim,
-        state_dim: entries.state_dim,
-        tables: functions
-            .tables
-            .iter()
-            .map(|table| script.printer.table(table))
-            .collect(),
-        maps: script.maps(&functions)?,
-        phases: script.phases(entries, &functions)?,
+        m: script.model(entries, &functions)?,
     };
     let path = format!("{}.py", stem(entries));
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
@@ -268,22 +245,8 @@ pub fn emit_casadi(
     let module_name = format!("{}_casadi", stem(entries));
     let module = CasadiModule {
         banner: format!("# {provenance}"),
-        model: &entries.name,
         module: &module_name,
-        example: entries
-            .phases
-            .first()
-            .map_or(String::new(), |phase| phase.dynamics.name.clone()),
-        units: entries.units.of_robot(),
-        latent_dim: entries.latent_dim,
-        state_dim: entries.state_dim,
-        tables: functions
-            .tables
-            .iter()
-            .map(|table| script.printer.table(table))
-            .collect(),
-        maps: script.maps(&functions)?,
-        phases: script.phases(entries, &functions)?,
+        m: script.model(entries, &functions)?,
     };
     let path = format!("{module_name}.py");
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
