@@ -82,7 +82,8 @@ fn stage(folder: &Path, file: &EmittedFile) -> Result<(PathBuf, PathBuf), Folder
     let path = folder.join(&file.path);
     let parent = path.parent().unwrap_or(folder);
     fs::create_dir_all(parent).map_err(|error| io_error(parent, error))?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = path.file_name().expect("emitted files have names");
+    let name = name.to_string_lossy();
     let beside = parent.join(format!(".{name}.romc-part"));
     fs::write(&beside, &file.contents).map_err(|error| io_error(&beside, error))?;
     Ok((beside, path))

@@ -227,12 +227,10 @@ impl<'a> Printer<'a> {
                 .sums(&sums.to_string(), &variable.to_string()),
             Expr::LaneTotal(sums) => self.lane_dialect().total(&sums.to_string()),
             Expr::Negate(a) => format!("-{}", self.operand(a, Precedence::Atom)),
-            Expr::Infix(Infix::Add | Infix::Sub, a, b)
-                if self.multiply_add.is_some() && (is_product(a) || is_product(b)) =>
-            {
-                self.multiply_added(expr)
-            }
             Expr::Infix(op, a, b) => {
+                if let Some(fused) = self.multiply_added(*op, a, b) {
+                    return fused;
+                }
                 // Sums and products group to the left; a right operand of the same kind keeps
                 // its parentheses, because floating-point sums do not associate.
                 let (own, right) = match op {
@@ -259,33 +257,27 @@ impl<'a> Printer<'a> {
         }
     }
 
-    /// `a*b + c` and its like by the dialect's function; the same two roundings, unless the
-    /// target can fuse them.
-    fn multiply_added(&self, expr: &Expr) -> String {
-        let name = self.multiply_add.unwrap_or_default();
-        let (sign, product, rest) = match expr {
-            Expr::Infix(Infix::Add, c, product) if is_product(product) => ("", product, c),
-            Expr::Infix(Infix::Add, product, c) => ("", product, c),
-            Expr::Infix(Infix::Sub, c, product) if is_product(product) => ("-", product, c),
-            Expr::Infix(Infix::Sub, product, c) => {
-                let negated = self.operand(c, Precedence::Atom);
-                return self.call_multiply_add(name, "", product, &format!("-{negated}"));
+    /// `a*b + c` and its like by the dialect's function, if it has one; the same two roundings, unless
+    /// the target can fuse them.
+    fn multiply_added(&self, op: Infix, a: &Expr, b: &Expr) -> Option<String> {
+        let name = self.multiply_add?;
+        let (first, second, rest) = match (op, product(a), product(b)) {
+            (Infix::Add, _, Some((x, y))) => (self.expression(x), y, self.expression(a)),
+            (Infix::Add, Some((x, y)), None) => (self.expression(x), y, self.expression(b)),
+            (Infix::Sub, _, Some((x, y))) => {
+                let negated = format!("-{}", self.operand(x, Precedence::Atom));
+                (negated, y, self.expression(a))
             }
-            _ => return String::new(),
+            (Infix::Sub, Some((x, y)), None) => {
+                let negated = format!("-{}", self.operand(b, Precedence::Atom));
+                (self.expression(x), y, negated)
+            }
+            (Infix::Add | Infix::Sub, None, None) | (Infix::Mul | Infix::Div, ..) => return None,
         };
-        self.call_multiply_add(name, sign, product, &self.expression(rest))
-    }
-
-    fn call_multiply_add(&self, name: &str, sign: &str, product: &Expr, rest: &str) -> String {
-        let Expr::Infix(_, a, b) = product else {
-            return String::new();
-        };
-        let first = if sign.is_empty() {
-            self.expression(a)
-        } else {
-            format!("{sign}{}", self.operand(a, Precedence::Atom))
-        };
-        format!("{name}({first}, {}, {rest})", self.expression(b))
+        Some(format!(
+            "{name}({first}, {}, {rest})",
+            self.expression(second)
+        ))
     }
 
     fn operand(&self, expr: &Expr, at_least: Precedence) -> String {
@@ -314,8 +306,11 @@ fn precedence(expr: &Expr) -> Precedence {
     }
 }
 
-fn is_product(expr: &Expr) -> bool {
-    matches!(expr, Expr::Infix(Infix::Mul, ..))
+fn product(expr: &Expr) -> Option<(&Expr, &Expr)> {
+    match expr {
+        Expr::Infix(Infix::Mul, a, b) => Some((a, b)),
+        _ => None,
+    }
 }
 
 /// Whether the printed expression begins with a minus that would follow an operator.

@@ -44,11 +44,11 @@ pub(super) fn latent(
     check_options(options)?;
     let ordered = phases_in_order(file, sections, options)?;
     let given = given_library(file, latent_dim, options)?;
-    let pool = given.as_ref().map(|library| library.pool().clone());
+    let pool_of = |library: &Library| library.pool().clone();
     let mut separation = Separation {
         file,
         latent_dim,
-        pool: pool.unwrap_or_default(),
+        pool: given.as_ref().map_or_else(ExprPool::default, pool_of),
         given: given.as_ref().map(rows_of).unwrap_or_default(),
     };
     let mut separated = Vec::new();
