@@ -62,7 +62,7 @@ pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
             "segments": segments,
             "ranges": ranges.iter().map(Range::json).collect::<Vec<_>>(),
             "ignored_columns": recording.ignored_columns,
-            "implausible": findings.iter().map(finding_json).collect::<Vec<_>>(),
+            "implausible": findings.iter().map(in_segment).collect::<Vec<_>>(),
         }),
     })
 }
@@ -186,10 +186,16 @@ fn findings_text(findings: &[Finding]) -> String {
     text
 }
 
-fn finding_json(finding: &Finding) -> Value {
+fn in_segment(finding: &Finding) -> Value {
+    let mut value = finding_json(finding);
+    value["segment"] = json!(finding.segment);
+    value
+}
+
+/// A finding without the place of its recording.
+pub(super) fn finding_json(finding: &Finding) -> Value {
     json!({
         "what": finding.kind.description(),
-        "segment": finding.segment,
         "samples": finding.samples.len(),
         "first_row": finding.first_row,
         "worst_row": finding.worst_row,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::args::{TrainArguments, TrainSettings};
+use super::inspect_recording::finding_json;
 use super::output::read_recordings;
 use super::train_settings;
 use crate::Error;
@@ -131,16 +132,9 @@ impl Intake {
     /// Every finding with its place, and how many samples were left out.
     pub fn json(&self) -> Value {
         let findings = self.findings.iter().map(|(file, finding)| {
-            json!({
-                "file": file.display().to_string(),
-                "what": finding.kind.description(),
-                "samples": finding.samples.len(),
-                "first_row": finding.first_row,
-                "worst_row": finding.worst_row,
-                "column": finding.column,
-                "value": finding.value,
-                "bound": finding.bound,
-            })
+            let mut value = finding_json(finding);
+            value["file"] = json!(file.display().to_string());
+            value
         });
         json!({ "implausible": findings.collect::<Vec<_>>(), "left_out": self.left_out })
     }
