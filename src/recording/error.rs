@@ -85,7 +85,7 @@ pub enum RecordingError {
         second: usize,
     },
     /// A row has fewer cells than the header, or more.
-    #[error("{}: row {row}, column `{column}`: found {found} cells, expected {expected}", path.display())]
+    #[error("{}: row {row}, column `{column}`: found {found} cells, expected {expected}{hint}", path.display())]
     RowLength {
         /// The file.
         path: PathBuf,
@@ -97,6 +97,8 @@ pub enum RecordingError {
         found: usize,
         /// Columns of the header.
         expected: usize,
+        /// What may be the reason, or nothing.
+        hint: &'static str,
     },
     /// A cell is not a number.
     #[error("{}: row {row}, column `{column}`: found `{found}`, expected {expected}", path.display())]
@@ -259,8 +261,14 @@ fn listed(names: &[String], most: usize) -> String {
 /// The text, cut after 40 characters and without control characters.
 pub(super) fn shortened(text: &str) -> String {
     const MOST: usize = 40;
-    let visible = |c: char| if c.is_control() { '\u{fffd}' } else { c };
-    let mut out: String = text.chars().take(MOST).map(visible).collect();
+    let mut out = String::new();
+    for c in text.chars().take(MOST) {
+        match c {
+            '\t' => out.push_str("\\t"),
+            c if c.is_control() => out.push('\u{fffd}'),
+            c => out.push(c),
+        }
+    }
     if text.chars().nth(MOST).is_some() {
         out.push('…');
     }
@@ -281,6 +289,7 @@ mod tests {
     #[test]
     fn shortened_cuts_long_text_and_hides_control_characters() {
         assert_eq!(shortened("a\u{1b}b"), "a\u{fffd}b");
+        assert_eq!(shortened("Time\tfeet"), "Time\\tfeet");
         assert_eq!(shortened(&"é".repeat(50)).chars().count(), 41);
     }
 }

@@ -194,6 +194,12 @@ impl<'a> Table<'a> {
             column: column.unwrap_or_default(),
             found,
             expected: names.len(),
+            hint: match self.delimiter {
+                ',' if found > names.len() => {
+                    "; where numbers have decimal commas, cells are separated by `;`"
+                }
+                _ => "",
+            },
         }
     }
 

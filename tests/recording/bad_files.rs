@@ -334,6 +334,22 @@ fn other_delimiters_are_told() {
 }
 
 #[test]
+fn decimal_commas_between_commas_are_told() {
+    let mut sheet = Sheet::landing();
+    sheet.separator = ",";
+    let error = fault(&sheet);
+    assert!(matches!(error, RecordingError::RowLength { row: 2, .. }));
+    assert!(message(&error).ends_with("decimal commas, cells are separated by `;`"));
+}
+
+#[test]
+fn tabs_are_seen_in_the_error() {
+    let mut sheet = Sheet::landing();
+    sheet.separator = "\t";
+    assert!(message(&fault(&sheet)).contains("found `Time\\t"));
+}
+
+#[test]
 fn row_with_another_delimiter_than_the_header_is_told() {
     let text = Sheet::landing().text().replace(',', ".");
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
