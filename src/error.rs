@@ -66,6 +66,22 @@ pub enum Error {
     Write { path: PathBuf, source: io::Error },
 }
 
+impl Error {
+    /// Whether an option had a value that it cannot have, as opposed to a run that failed.
+    pub fn is_usage(&self) -> bool {
+        match self {
+            Self::Robot(error) => matches!(error, RobotError::UnknownRobot { .. }),
+            Self::Import(error) => matches!(**error, ImportError::Option { .. }),
+            Self::Train(error) => matches!(error, TrainError::Option { .. }),
+            Self::Simplify(error) => {
+                matches!(error, SimplifyError::NoSamples | SimplifyError::Margin)
+            }
+            Self::Rename(_) => true,
+            _ => false,
+        }
+    }
+}
+
 impl From<ImportError> for Error {
     fn from(error: ImportError) -> Self {
         Self::Import(Box::new(error))

@@ -38,8 +38,17 @@ fn json(arguments: &[&str]) -> Value {
 
 /// Runs, expects exit code 1 and nothing on stdout, returns stderr.
 fn failed(arguments: &[&str]) -> String {
+    ended_with(1, arguments)
+}
+
+/// As [`failed`], for options that cannot be: exit code 2.
+fn refused(arguments: &[&str]) -> String {
+    ended_with(2, arguments)
+}
+
+fn ended_with(code: i32, arguments: &[&str]) -> String {
     let output = romc(arguments);
-    assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}");
     assert_eq!(
         text(&output.stdout),
         "",
@@ -279,7 +288,7 @@ fn compile_prints_equations_with_the_names_and_digits_asked_for() {
     );
     assert!(compile(&["--siunitx"]).contains(r"\num{0.36}"));
 
-    let error = failed(&[
+    let error = refused(&[
         "compile",
         "models/paper-2d.json",
         "--emit",
@@ -682,8 +691,8 @@ fn study_in_parts_and_resumed_equals_the_whole() {
     let expected = contents(Path::new(&whole));
     assert_eq!(
         expected.len(),
-        4 + 3 + 6,
-        "four models, the plan, two tables, two figures in three forms"
+        4 + 4 + 6,
+        "four models, the plan, two tables, the list of files, two figures in three forms"
     );
 
     let part = run(&["--shard", "1/2"], &first);
@@ -861,7 +870,7 @@ fn inspect_tells_findings_of_a_recording_and_parts_of_a_model() {
 
 #[test]
 fn inspect_of_an_unknown_robot_lists_the_known_ones() {
-    let error = failed(&["inspect", JUMP, "--robot", "go9"]);
+    let error = refused(&["inspect", JUMP, "--robot", "go9"]);
     assert!(error.contains("go9") && error.contains("go1"), "{error}");
 }
 
@@ -1045,6 +1054,49 @@ fn compile_within_a_tolerance_tells_each_change_and_saves_the_simplified_model()
 }
 
 #[test]
+fn simplified_model_may_be_saved_among_the_emitted_files_and_again() {
+    let folder = folder();
+    let out = path(&folder, "out");
+    let saved = format!("{out}/short.json");
+    let ranges = "examples/domains/paper-2d.toml";
+    let compile = [
+        "compile",
+        "models/paper-2d.json",
+        "--emit",
+        "c,c",
+        "--out-dir",
+        &out,
+        "--domain",
+        ranges,
+        "--save-model",
+        &saved,
+        "--tolerance",
+    ];
+    let run = |tolerance: &'static str| [&compile[..], &[tolerance]].concat();
+    done(&run("0.01"));
+    let first = fs::read(&saved).expect("written");
+    done(&run("0.01"));
+    let header = Path::new(&out).join("paper_2d.h");
+    let emitted = fs::read(&header).expect("written");
+    let error = failed(&run("0.02"));
+    assert!(error.contains("short.json"), "{error}");
+    assert_eq!(fs::read(&saved).expect("kept"), first);
+    assert_eq!(fs::read(&header).expect("kept"), emitted);
+}
+
+#[test]
+fn study_leaves_files_of_others_alone() {
+    let folder = folder();
+    let (out, mine) = (path(&folder, "st"), path(&folder, "st/summary.csv"));
+    fs::create_dir(&out).expect("a folder");
+    fs::write(&mine, "mine").expect("written");
+    let error = failed(&["study", JUMP, "--latent-dims", "1", "--out-dir", &out]);
+    assert!(error.contains("summary.csv: not made by romc"), "{error}");
+    assert_eq!(fs::read_to_string(&mine).expect("kept"), "mine");
+    assert_eq!(contents(Path::new(&out)).len(), 1, "nothing was trained");
+}
+
+#[test]
 fn sines_of_the_paper_become_linear_over_given_ranges() {
     let folder = folder();
     let (out, paper) = (path(&folder, "out"), "models/paper-2d.json");
@@ -1055,22 +1107,21 @@ fn sines_of_the_paper_become_linear_over_given_ranges() {
     assert!(!equations.contains("\\sin"), "{equations}");
     let comment = "% Simplified within 0.01 scaled units per s^2\n";
     assert!(equations.contains(comment), "{equations}");
-    let wrong = [
-        (
-            ["--tolerance", "1%", "--domain", ranges],
-            "scaled units per s^2",
-        ),
-        (["--tolerance", "0.01", "--domain", JUMP], "no encoder"),
-    ];
-    for (arguments, told) in wrong {
-        let error = failed(&[&compile[..], &arguments[..]].concat());
-        assert!(error.contains(told), "{error}");
-    }
+    let error = failed(&[&compile[..], &["--tolerance", "0.01", "--domain", JUMP]].concat());
+    assert!(error.contains("no encoder"), "{error}");
     for (arguments, told) in [
         (&["--tolerance", "1%"][..], "--domain <RECORDING>"),
         (&["--tolerance", "-0.1", "--domain", ranges], "found `-0.1`"),
         (&["--tolerance", "nan", "--domain", ranges], "found `nan`"),
         (&["--margin", "-1", "--domain", ranges], "of at least 0"),
+        (
+            &["--margin", "0.5", "--domain", ranges],
+            "taken as they are",
+        ),
+        (
+            &["--tolerance", "1%", "--domain", ranges],
+            "scaled units per s^2",
+        ),
         (&["--significant", "0"], "from 1 to 40"),
         (&["--digits", "41"], "from 0 to 40"),
     ] {

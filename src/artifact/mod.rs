@@ -42,4 +42,4 @@ pub use digest::{Digest, digest};
 pub use error::{ArtifactError, describe};
 pub use manifest::SCHEMA;
 pub use read::{MAX_FILE_BYTES, read, read_from_bytes};
-pub use write::{to_text, write, write_with};
+pub use write::{check_place, to_text, write, write_with};

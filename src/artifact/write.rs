@@ -25,6 +25,28 @@ pub fn write(path: &Path, model: &ReducedModel) -> Result<(), ArtifactError> {
     write_with(path, model, Overwrite::Refuse)
 }
 
+/// Tells whether [`write_with`] would refuse.
+///
+/// # Errors
+/// [`ArtifactError::Exists`] if a different file is there and `overwrite` refuses.
+pub fn check_place(
+    path: &Path,
+    model: &ReducedModel,
+    overwrite: Overwrite,
+) -> Result<(), ArtifactError> {
+    check_text(path, &to_text(model), overwrite)
+}
+
+fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<(), ArtifactError> {
+    let same = || fs::read(path).is_ok_and(|bytes| bytes == text.as_bytes());
+    match overwrite.allows(path) || same() {
+        true => Ok(()),
+        false => Err(ArtifactError::Exists {
+            path: path.to_owned(),
+        }),
+    }
+}
+
 /// Writes a model file: into a new file beside `path`, which is then renamed.
 ///
 /// # Errors
@@ -36,16 +58,7 @@ pub fn write_with(
     overwrite: Overwrite,
 ) -> Result<(), ArtifactError> {
     let text = to_text(model);
-    if !overwrite.allows(path) {
-        let same = fs::read(path).is_ok_and(|bytes| bytes == text.as_bytes());
-        return if same {
-            Ok(())
-        } else {
-            Err(ArtifactError::Exists {
-                path: path.to_owned(),
-            })
-        };
-    }
+    check_text(path, &text, overwrite)?;
     write_whole(path, |out| out.write_all(text.as_bytes())).map_err(|source| ArtifactError::Io {
         path: path.to_owned(),
         action: "write",

@@ -101,7 +101,8 @@ pub struct EmitOptions {
     pub digest: Option<String>,
 }
 
-/// The files of the chosen targets, each with its path below the output folder.
+/// The files of the chosen targets, each with its path below the output folder; a target that is chosen
+/// twice gives them once.
 ///
 /// Equal models and options give equal bytes.
 ///
@@ -124,7 +125,10 @@ pub fn emit(
         scripts: None,
     };
     let mut files = Vec::new();
-    for target in targets {
+    for (position, target) in targets.iter().enumerate() {
+        if targets[..position].contains(target) {
+            continue;
+        }
         files.extend(match target {
             Target::C => c::emit(entries.compiled()?, &provenance, precision, sines)?,
             Target::Rust => rust::emit(entries.compiled()?, &provenance, precision, sines)?,

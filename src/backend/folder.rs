@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use super::target::EmittedFile;
-use crate::files::Overwrite;
+use crate::files::{Overwrite, beside, write_whole};
 
 /// Names the files of the folder that were emitted, one a line.
 const MANIFEST: &str = ".romc-emitted";
@@ -30,6 +30,26 @@ pub enum FolderError {
     },
 }
 
+/// Refuses a folder that holds files of these names that romc did not make.
+///
+/// # Errors
+/// [`FolderError::Foreign`], [`FolderError::Io`].
+pub fn check_folder<'a>(
+    folder: &Path,
+    names: impl IntoIterator<Item = &'a str>,
+    overwrite: Overwrite,
+) -> Result<(), FolderError> {
+    let own = emitted_names(folder)?;
+    for name in names {
+        let path = folder.join(name);
+        let is_own = own.contains(name) || overwrite == Overwrite::Replace;
+        if path.symlink_metadata().is_ok() && (path.is_dir() || !is_own) {
+            return Err(FolderError::Foreign { path });
+        }
+    }
+    Ok(())
+}
+
 /// Writes the files into `folder`, which is made if it does not exist. Every file is first
 /// written beside its place, then renamed; nothing is renamed before all are written.
 /// Files of earlier runs that are no longer emitted stay.
@@ -41,52 +61,58 @@ pub fn write_files(
     files: &[EmittedFile],
     overwrite: Overwrite,
 ) -> Result<Vec<PathBuf>, FolderError> {
-    let manifest = folder.join(MANIFEST);
-    let own: BTreeSet<String> = match fs::read_to_string(&manifest) {
-        Ok(text) => text.lines().map(str::to_owned).collect(),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => BTreeSet::new(),
-        Err(error) => return Err(io_error(&manifest, error)),
-    };
+    let names = || files.iter().map(|file| file.path.as_str());
+    check_folder(folder, names(), overwrite)?;
+    let mut staged = Staged::default();
     for file in files {
-        let path = folder.join(&file.path);
-        let is_own = own.contains(&file.path) || overwrite == Overwrite::Replace;
-        if path.symlink_metadata().is_ok() && (path.is_dir() || !is_own) {
-            return Err(FolderError::Foreign { path });
-        }
+        staged.add(folder, file)?;
     }
-    let mut names = own;
-    names.extend(files.iter().map(|file| file.path.clone()));
-    let list: String = names.iter().map(|name| format!("{name}\n")).collect();
-    // The list comes first: after an interruption each finished file is known as ours.
-    let list = EmittedFile::new(MANIFEST, list);
-
-    let mut staged = Vec::new();
-    let result = std::iter::once(&list)
-        .chain(files)
-        .try_for_each(|file| stage(folder, file).map(|paths| staged.push(paths)));
-    if let Err(error) = result {
-        for (beside, _) in &staged {
-            // The first error is the one to report; what stays behind is only rubbish.
-            let _ = fs::remove_file(beside);
-        }
-        return Err(error);
-    }
-    for (beside, path) in &staged {
+    // The list comes first: after an interruption each finished file is known as ours. It is read
+    // again, for another run may have written to the folder meanwhile.
+    let mut known = emitted_names(folder)?;
+    known.extend(names().map(str::to_owned));
+    let list: String = known.iter().map(|name| format!("{name}\n")).collect();
+    let manifest = folder.join(MANIFEST);
+    write_whole(&manifest, |out| out.write_all(list.as_bytes()))
+        .map_err(|error| io_error(&manifest, error))?;
+    for (beside, path) in &staged.0 {
         fs::rename(beside, path).map_err(|error| io_error(path, error))?;
     }
-    Ok(staged.into_iter().skip(1).map(|(_, path)| path).collect())
+    Ok(staged.0.iter().map(|(_, path)| path.clone()).collect())
 }
 
-/// Writes a file beside its place; returns where it is and where it belongs.
-fn stage(folder: &Path, file: &EmittedFile) -> Result<(PathBuf, PathBuf), FolderError> {
-    let path = folder.join(&file.path);
-    let parent = path.parent().unwrap_or(folder);
-    fs::create_dir_all(parent).map_err(|error| io_error(parent, error))?;
-    let name = path.file_name().expect("emitted files have names");
-    let name = name.to_string_lossy();
-    let beside = parent.join(format!(".{name}.romc-part"));
-    fs::write(&beside, &file.contents).map_err(|error| io_error(&beside, error))?;
-    Ok((beside, path))
+/// The files of a folder that romc made.
+fn emitted_names(folder: &Path) -> Result<BTreeSet<String>, FolderError> {
+    let manifest = folder.join(MANIFEST);
+    match fs::read_to_string(&manifest) {
+        Ok(text) => Ok(text.lines().map(str::to_owned).collect()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(BTreeSet::new()),
+        Err(error) => Err(io_error(&manifest, error)),
+    }
+}
+
+/// Files beside their places, with these places; what has not been renamed is removed in the end.
+#[derive(Default)]
+struct Staged(Vec<(PathBuf, PathBuf)>);
+
+impl Staged {
+    fn add(&mut self, folder: &Path, file: &EmittedFile) -> Result<(), FolderError> {
+        let path = folder.join(&file.path);
+        let parent = path.parent().unwrap_or(folder);
+        fs::create_dir_all(parent).map_err(|error| io_error(parent, error))?;
+        let beside = beside(&path).map_err(|error| io_error(&path, error))?;
+        self.0.push((beside.clone(), path));
+        fs::write(&beside, &file.contents).map_err(|error| io_error(&beside, error))
+    }
+}
+
+impl Drop for Staged {
+    fn drop(&mut self) {
+        for (beside, _) in &self.0 {
+            // After success there is nothing; after an error, that one is to be told.
+            let _ = fs::remove_file(beside);
+        }
+    }
 }
 
 fn io_error(path: &Path, source: io::Error) -> FolderError {
@@ -123,6 +149,36 @@ mod tests {
             .collect();
         names.sort();
         assert_eq!(names, [MANIFEST, "m", "m.c"]);
+    }
+
+    #[test]
+    fn a_place_that_cannot_be_taken_leaves_no_part() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut files = files("one");
+        files.push(EmittedFile::new(
+            "m.c/below",
+            "a file stands where a folder should",
+        ));
+        let found = write_files(folder.path(), &files, Overwrite::Refuse);
+        assert!(matches!(found, Err(FolderError::Io { .. })), "{found:?}");
+        let left = fs::read_dir(folder.path()).expect("a folder");
+        let names = left.map(|entry| entry.expect("an entry").file_name());
+        let parts = names.filter(|name| name.to_string_lossy().ends_with(".part"));
+        assert_eq!(parts.count(), 0);
+    }
+
+    #[test]
+    fn runs_into_one_folder_at_a_time_leave_all_files_and_one_list() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let write = |name: &str| {
+            let file = EmittedFile::new(name, "text");
+            write_files(folder.path(), &[file], Overwrite::Refuse).expect("written")
+        };
+        write("a.c");
+        write("b.c");
+        let own = emitted_names(folder.path()).expect("a list");
+        assert!(own.contains("a.c") && own.contains("b.c"));
+        write("a.c");
     }
 
     #[test]

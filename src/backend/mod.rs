@@ -37,7 +37,7 @@ mod vectors;
 mod wrap;
 
 pub use emit::{EmitOptions, Target, emit};
-pub use folder::{FolderError, write_files};
+pub use folder::{FolderError, check_folder, write_files};
 pub use precision::{Precision, worst_errors};
 pub use sines::SineCosine;
 pub use target::{EmitError, EmittedFile};

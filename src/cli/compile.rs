@@ -28,7 +28,10 @@ use crate::{Error, artifact};
 pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     let save_model = arguments.simplification.save_model.as_deref();
-    check_output(save_model, overwrite)?;
+    // What would be the same file again may stay; it is compared once there is a model.
+    if save_model.and_then(Path::parent) != Some(&arguments.out_dir) {
+        check_output(save_model, Overwrite::Replace)?;
+    }
     let read = artifact::read(&arguments.model)?;
     let simplified = simplification::run(&read, &arguments.simplification)?;
     let model = simplified.as_ref().map_or(&read, |outcome| &outcome.model);
@@ -48,6 +51,9 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         outcome.comment(&mut files);
     }
     files.extend(told.iter().map(|(file, _, _)| file.clone()));
+    if let Some(path) = save_model {
+        artifact::check_place(path, model, overwrite)?;
+    }
     let written = write(&arguments.out_dir, &files, overwrite)?;
     if let Some(path) = save_model {
         artifact::write_with(path, model, overwrite)?;

@@ -29,7 +29,6 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::Error;
-use crate::train::TrainError;
 use args::{Arguments, Command};
 
 /// What a command has to say: to people and to programs.
@@ -43,7 +42,7 @@ pub struct Answer {
 
 /// Parses the process's arguments, runs the command, prints its answer.
 ///
-/// Wrong usage gives exit code 2 (by clap, or for an option of a training that is out of range); a failed run gives 1.
+/// Wrong usage gives exit code 2 (by clap, or for an option whose value turns out to be none); a failed run gives 1.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let json = arguments.command.wants_json();
@@ -58,9 +57,9 @@ pub fn run() -> ExitCode {
         Ok(text) => print(&text),
         Err(error) => {
             tell(&error);
-            match error {
-                Error::Train(TrainError::Option { .. }) => ExitCode::from(2),
-                _ => ExitCode::FAILURE,
+            match error.is_usage() {
+                true => ExitCode::from(2),
+                false => ExitCode::FAILURE,
             }
         }
     }

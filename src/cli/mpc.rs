@@ -41,9 +41,6 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     };
     let recordings = read_recordings(&arguments.recordings)?;
     let runs = run_all(&model, &recordings, settings, reference_input)?;
-    if let Some(path) = &arguments.output {
-        write_file(path, command_table(&model, &runs).as_bytes(), overwrite)?;
-    }
     let mut answer = answer(arguments, &runs);
     if let Some(folder) = &arguments.figures {
         let figures = control_figures(&model, &settings, &runs);
@@ -53,6 +50,9 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
         let _ = writeln!(answer.text, "{count} figures: {}", folder.display());
         let paths = written.iter().map(|path| path.display().to_string());
         answer.json["figures"] = paths.collect::<Vec<_>>().into();
+    }
+    if let Some(path) = &arguments.output {
+        write_file(path, command_table(&model, &runs).as_bytes(), overwrite)?;
     }
     Ok(answer)
 }

@@ -37,6 +37,11 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         Some(folder) => Some(Summary::of(&Store::open(folder)?.cells()?, LAMBDA)),
     };
     let made = make(&model, &recordings, study.as_ref(), arguments)?;
+    // The figures come first: files that romc did not make are refused with nothing written.
+    let written = match &arguments.figures {
+        Some(folder) => write_files(folder, &made.files, overwrite)?,
+        None => Vec::new(),
+    };
     write_file(&arguments.output, made.page.as_bytes(), overwrite)?;
     let mut text = format!(
         "{}: {} kB, {} figures\n",
@@ -44,9 +49,7 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         made.page.len() / 1000,
         made.n_figures
     );
-    let mut written = Vec::new();
     if let Some(folder) = &arguments.figures {
-        written = write_files(folder, &made.files, overwrite)?;
         let _ = writeln!(
             text,
             "{}: {} files, each figure as .svg, .pdf and .csv",
@@ -101,7 +104,7 @@ fn make(
         Some(_) => (Vec::new(), Vec::new()),
     };
     progress.set_message("drawing");
-    let commands = commands(arguments);
+    let commands = commands(arguments, without_statistics(model).is_none());
     let tolerance = arguments.tolerance;
     let runs = [&plain[..], &consistent];
     let made = page_of(model, &assessment, runs, study, tolerance, &commands);
@@ -254,7 +257,7 @@ fn page_table(caption: &str, table: &Table) -> PageTable {
 }
 
 /// The commands whose output the page shows.
-fn commands(arguments: &ReportArguments) -> Vec<String> {
+fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
     let paths = |paths: &[PathBuf]| {
         let quoted = paths.iter().map(|path| quoted(path));
         quoted.collect::<Vec<_>>().join(" ")
@@ -264,20 +267,26 @@ fn commands(arguments: &ReportArguments) -> Vec<String> {
     let study = (arguments.study.as_ref()).map_or(String::new(), |folder| {
         format!(" --study {}", quoted(folder))
     });
-    vec![
+    let tolerance = arguments.tolerance;
+    let mut commands = vec![
         format!(
-            "romc report {model} {recordings} --restart-every {every}{study} --output {}",
+            "romc report {model} {recordings} --restart-every {every} --tolerance {tolerance}{study} --output {}",
             quoted(&arguments.output)
         ),
         format!("romc simulate {model} {recordings} --restart-every {every}"),
-        format!("romc mpc {model} {recordings} --lift transpose"),
-        format!("romc mpc {model} {recordings} --lift consistent"),
+    ];
+    if has_control {
+        for lift in ["transpose", "consistent"] {
+            commands.push(format!("romc mpc {model} {recordings} --lift {lift}"));
+        }
+    }
+    commands.extend([
         format!("romc compile {model} --emit latex --out-dir out"),
         format!(
-            "romc compile {model} --emit latex,c --tolerance {} --domain {recordings} --out-dir out",
-            arguments.tolerance
+            "romc compile {model} --emit latex,c --tolerance {tolerance} --domain {recordings} --out-dir out"
         ),
-    ]
+    ]);
+    commands
 }
 
 /// A path as a shell takes it.

@@ -37,15 +37,20 @@ impl Basis {
     ///
     /// # Errors
     /// [`Error::Simplify`] for files that give no domain, and whatever reading refuses.
-    pub fn read(model: &ReducedModel, files: &[PathBuf], margin: f64) -> Result<Self, Error> {
+    pub fn read(
+        model: &ReducedModel,
+        files: &[PathBuf],
+        margin: Option<f64>,
+    ) -> Result<Self, Error> {
         let is_table = |path: &&PathBuf| path.extension().is_some_and(|end| end == "toml");
         match files.iter().find(is_table) {
-            None => Self::of(model, read_recordings(files)?, margin),
+            None => Self::of(model, read_recordings(files)?, margin.unwrap_or(MARGIN)),
             Some(path) if files.len() > 1 => Err(SimplifyError::DomainFile {
                 path: path.clone(),
                 message: "one .toml file of ranges, or recordings, but not both".to_owned(),
             }
             .into()),
+            Some(_) if margin.is_some() => Err(SimplifyError::Margin.into()),
             Some(path) => {
                 let text = fs::read_to_string(path).map_err(|source| Error::Read {
                     path: path.clone(),
@@ -133,7 +138,7 @@ pub fn run(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Option
     progress.set_message("rolling out");
     let rollouts = basis.rollouts(model, &simplified)?;
     progress.finish_and_clear();
-    let margin = basis.samples.as_ref().map(|_| arguments.margin);
+    let margin = (basis.samples.as_ref()).map(|_| arguments.margin.unwrap_or(MARGIN));
     let mut outcome = Outcome {
         model: simplified,
         original: model.clone(),

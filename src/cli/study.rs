@@ -7,22 +7,29 @@ use serde_json::json;
 use super::Answer;
 use super::args::{StudyArguments, TrainMethod, TrainSettings};
 use super::intake::Intake;
-use super::output::{Table, read_recordings, significant, spinner, write_file};
+use super::output::{Table, read_recordings, significant, spinner};
+use super::report::figure_files;
 use super::train_settings;
 use crate::Error;
+use crate::backend::{EmittedFile, check_folder, write_files};
 use crate::files::Overwrite;
 use crate::recording::Recording;
-use crate::report::figures::{csv, pdf, standalone_svg};
 use crate::report::study_figures;
 use crate::robot::Robot;
 use crate::study::{self, Plan, Shard, Spread, Store, Summary, cells_csv};
 use crate::train::{Origin, Recordings};
 
+/// The tables of a study.
+const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
+
 /// Trains what is missing, or joins parts, and writes the tables of the study.
 ///
 /// # Errors
-/// Whatever reading refuses; [`Error::Study`] for folders of another study.
+/// Whatever reading refuses; [`Error::Study`] for folders of another study, [`Error::Folder`] for one with
+/// files of these names that romc did not make.
 pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
+    let overwrite = Overwrite::when_forced(arguments.force);
+    check_folder(&arguments.out_dir, TABLES, overwrite)?;
     let store = if arguments.merge.is_empty() {
         trained(arguments)?
     } else {
@@ -30,20 +37,13 @@ pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
     };
     let cells = store.cells()?;
     let summary = Summary::of(&cells, arguments.lambda);
-    let write = |name: &str, text: String| {
-        write_file(
-            &arguments.out_dir.join(name),
-            text.as_bytes(),
-            Overwrite::Replace,
-        )
-    };
-    write("cells.csv", cells_csv(&cells, arguments.lambda))?;
-    write("summary.csv", summary.csv())?;
-    for figure in &study_figures(&summary) {
-        write(&format!("{}.svg", figure.id), standalone_svg(figure))?;
-        write(&format!("{}.pdf", figure.id), pdf(figure))?;
-        write(&format!("{}.csv", figure.id), csv(figure))?;
-    }
+    let tables = [cells_csv(&cells, arguments.lambda), summary.csv()];
+    let tables = TABLES.iter().zip(tables);
+    let mut files: Vec<EmittedFile> = tables
+        .map(|(name, text)| EmittedFile::new(*name, text))
+        .collect();
+    files.extend(study_figures(&summary).iter().flat_map(figure_files));
+    write_files(&arguments.out_dir, &files, overwrite)?;
     Ok(answer(&arguments.out_dir, &store, &summary))
 }
 

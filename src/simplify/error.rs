@@ -64,6 +64,11 @@ pub enum SimplifyError {
         "a tolerance in percent is a share of the root mean square of each ddz over recordings, and the domain has none; give a number in scaled units per s^2"
     )]
     NoSamples,
+    /// A margin around ranges, which are taken as they are.
+    #[error(
+        "a margin widens the box around recordings; the ranges of a .toml file are taken as they are"
+    )]
+    Margin,
     /// A recorded sample has a larger error than the certified one: a defect of romc.
     #[error(
         "internal error: in phase `{phase}`, ddz{output} of the simplified model is off by {measured:e} at a recorded sample, beyond the bound {bound:e}", output = output + 1

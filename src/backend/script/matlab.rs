@@ -20,7 +20,7 @@ use crate::backend::wrap::tidy;
 struct MatlabDialect;
 
 /// Keywords of MATLAB and Octave, and the names that generated files use themselves.
-const RESERVED: [&str; 47] = [
+const RESERVED: [&str; 55] = [
     "arguments",
     "break",
     "case",
@@ -59,6 +59,14 @@ const RESERVED: [&str; 47] = [
     "rows_of",
     "model",
     "n",
+    "zeros",
+    "size",
+    "numel",
+    "repmat",
+    "cell",
+    "max",
+    "error",
+    "nargin",
     "sin",
     "cos",
     "tan",

@@ -37,6 +37,105 @@ const RESERVED: [&str; 49] = [
     "len", "float", "print", "_rows", "_sin_cos",
 ];
 
+/// Modules that a file of the same name would hide from NumPy, CasADi and the file itself.
+const MODULES: [&str; 95] = [
+    "numpy",
+    "abc",
+    "argparse",
+    "array",
+    "ast",
+    "atexit",
+    "base64",
+    "bisect",
+    "builtins",
+    "bz2",
+    "calendar",
+    "cmath",
+    "code",
+    "codecs",
+    "collections",
+    "concurrent",
+    "contextlib",
+    "contextvars",
+    "copy",
+    "copyreg",
+    "csv",
+    "ctypes",
+    "dataclasses",
+    "datetime",
+    "decimal",
+    "dis",
+    "email",
+    "encodings",
+    "enum",
+    "errno",
+    "fnmatch",
+    "fractions",
+    "functools",
+    "gc",
+    "genericpath",
+    "getpass",
+    "glob",
+    "gzip",
+    "hashlib",
+    "heapq",
+    "hmac",
+    "html",
+    "http",
+    "importlib",
+    "inspect",
+    "io",
+    "itertools",
+    "json",
+    "keyword",
+    "linecache",
+    "locale",
+    "logging",
+    "lzma",
+    "marshal",
+    "math",
+    "mmap",
+    "multiprocessing",
+    "numbers",
+    "opcode",
+    "operator",
+    "os",
+    "pathlib",
+    "pickle",
+    "pkgutil",
+    "platform",
+    "posixpath",
+    "pprint",
+    "queue",
+    "random",
+    "re",
+    "secrets",
+    "select",
+    "selectors",
+    "shutil",
+    "signal",
+    "site",
+    "socket",
+    "stat",
+    "statistics",
+    "string",
+    "struct",
+    "subprocess",
+    "sys",
+    "sysconfig",
+    "tempfile",
+    "textwrap",
+    "threading",
+    "time",
+    "token",
+    "tokenize",
+    "traceback",
+    "types",
+    "typing",
+    "unittest",
+    "urllib",
+];
+
 impl Dialect for PythonDialect {
     fn reserved(&self) -> &'static [&'static str] {
         &RESERVED
@@ -253,7 +352,11 @@ pub fn emit_casadi(
 }
 
 fn stem(entries: &ModelEntries) -> String {
-    Namer::new(&RESERVED).mint(&entries.identifier).to_string()
+    let mut namer = Namer::new(&RESERVED);
+    for module in MODULES {
+        namer.mint(module);
+    }
+    namer.mint(&entries.identifier).to_string()
 }
 
 fn numpy_function(function: &FunctionText) -> Result<String, EmitError> {

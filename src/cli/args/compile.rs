@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use super::command::OutputArguments;
 use crate::backend::Target;
 use crate::backend::typeset::MOST_DIGITS;
-use crate::simplify::{MARGIN, Tolerance};
+use crate::simplify::Tolerance;
 
 /// `romc compile`
 #[derive(Debug, Args)]
@@ -139,16 +139,16 @@ pub struct SimplifyArguments {
     /// Recordings whose smallest box is the domain, a phase; or one .toml file of ranges
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     pub domain: Vec<PathBuf>,
-    /// How far the domain reaches beyond the recordings, as a share of each variable's range
+    /// How far the domain reaches beyond the recordings, as a share of each variable's range (0.1
+    /// unless given)
     #[arg(
         long,
         value_name = "SHARE",
-        default_value_t = MARGIN,
         value_parser = share,
         requires = "domain",
         allow_negative_numbers = true
     )]
-    pub margin: f64,
+    pub margin: Option<f64>,
     /// Also write the simplified model to this file
     #[arg(long, value_name = "MODEL.json", requires = "domain")]
     pub save_model: Option<PathBuf>,

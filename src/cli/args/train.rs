@@ -320,6 +320,9 @@ pub struct StudyArguments {
     /// Folder of the study
     #[arg(long, value_name = "DIR", default_value = "out/study")]
     pub out_dir: PathBuf,
+    /// Replace tables and figures of these names that romc did not make
+    #[arg(long)]
+    pub force: bool,
     #[command(flatten)]
     pub output_format: OutputArguments,
 }
