@@ -1085,6 +1085,17 @@ fn simplified_model_may_be_saved_among_the_emitted_files_and_again() {
 }
 
 #[test]
+fn control_step_shorter_than_the_samples_is_refused() {
+    for step in ["1e-300", "0.001"] {
+        let error = failed(&["mpc", MODEL, JUMP, "--step", step]);
+        assert!(
+            error.contains("test_01.csv.gz") && error.contains("2.000 ms"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
 fn study_leaves_files_of_others_alone() {
     let folder = folder();
     let (out, mine) = (path(&folder, "st"), path(&folder, "st/summary.csv"));

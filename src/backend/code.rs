@@ -173,7 +173,7 @@ pub enum Stmt {
     Let(Ident, Expr),
     /// A named array that never changes.
     LetArray(Ident, Vec<Expr>),
-    /// An array whose elements are assigned later.
+    /// An array whose elements are assigned later; in languages without lanes they are zero before.
     Declare(Ident, usize),
     /// `target = value`
     Assign(Expr, Expr),

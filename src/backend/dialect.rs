@@ -89,7 +89,7 @@ pub trait Dialect {
     /// Definition of an array by its printed elements.
     fn let_array(&self, name: &str, elements: &[String]) -> String;
 
-    /// Declaration of an array that is assigned later.
+    /// Declaration of an array that is assigned later; without [`Self::lanes`] of zeros.
     fn declare(&self, name: &str, len: usize) -> String;
 
     /// Head of a loop.

@@ -8,7 +8,7 @@ use super::literal::Literal;
 use super::translate::Translator;
 use crate::ir::{ResultEntry, Statement, ValueId};
 
-/// Arrays up to this length are copied element by element, not in loops: what reads a short
+/// Arrays shorter than this are copied element by element, not in loops: what reads a short
 /// array wholly would wait for the stores of several loops.
 const LONGEST_LIST: usize = 24;
 
@@ -139,17 +139,19 @@ impl Translator<'_> {
         if n_zeros > 0 && !self.zeros.contains(&(array.clone(), offset + elements)) {
             return None;
         }
+        let end = offset + values.len();
         let parameters = self.names.inputs.iter().chain(self.names.outputs);
         let parameter = parameters.clone().find(|parameter| parameter.name == array);
         let declared = self.body.iter().find_map(|statement| match statement {
             Stmt::Declare(name, len) if *name == array => Some(*len),
             _ => None,
         });
-        Some(Span {
+        let of = declared.or(parameter.map(|parameter| parameter.len))?;
+        (end <= of).then(|| Span {
             array,
             offset,
             len: values.len(),
-            of: declared.or(parameter.map(|parameter| parameter.len))?,
+            of,
             is_parameter: parameter.is_some(),
         })
     }

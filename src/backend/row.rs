@@ -96,7 +96,7 @@ impl Row {
     pub fn in_columns(&self) -> Vec<Stmt> {
         let [_, lane, terms, sums] = &self.names;
         let width = self.n_slopes.next_multiple_of(LANES);
-        // Arrays are declared as zeros, also behind the last column.
+        // Without lanes arrays are declared as zeros, also behind the last column.
         let mut body = vec![Stmt::Declare(terms.clone(), width)];
         for run in &self.runs {
             let (first, end) = (LANES * run.blocks.start, LANES * run.blocks.end);
@@ -113,11 +113,10 @@ impl Row {
             .map(|k| Expr::Element(terms.clone(), Index::variable(lane).shifted(LANES * k)))
             .reduce(|sum, term| Expr::infix(Infix::Add, sum, term));
         let p = |index: Index| Expr::Element(sums.clone(), index);
-        if let Some(lane_sum) = lane_sum {
-            let assign = Stmt::Assign(p(Index::variable(lane)), lane_sum);
-            body.push(Stmt::Declare(sums.clone(), LANES));
-            body.push(Stmt::For(lane.clone(), LANES, vec![assign]));
-        }
+        let lane_sum = lane_sum.expect("a row has columns");
+        let assign = Stmt::Assign(p(Index::variable(lane)), lane_sum);
+        body.push(Stmt::Declare(sums.clone(), LANES));
+        body.push(Stmt::For(lane.clone(), LANES, vec![assign]));
         let pair = |a: Expr, b: Expr| Expr::infix(Infix::Add, a, b);
         let half = |l: usize| pair(p(Index::fixed(l)), p(Index::fixed(l + LANES / 2)));
         let total = pair(pair(half(0), half(2)), pair(half(1), half(3)));

@@ -126,7 +126,7 @@ impl Translator<'_> {
     fn statement(&mut self, position: usize, statement: &Statement) {
         let first = self.program.values_of(position).start;
         match statement {
-            // Spelled beforehand.
+            // Spelled beforehand: what is copied for several statements may end with zeros.
             Statement::Constant(_) => {}
             Statement::Input { slot, index } => {
                 let parameter = &self.names.inputs[*slot];

@@ -2,7 +2,6 @@
 
 use super::code::{Argument, Expr, Index, Infix, Span, Stmt};
 use super::ident::Ident;
-use super::literal::Literal;
 use super::row::{Row, Run};
 use super::translate::Translator;
 use crate::ir::{Group, LANES, Slopes, TableId, ValueId};
@@ -129,13 +128,16 @@ impl Translator<'_> {
         let names = ["k", "l", "q", "p"].map(|name| self.names.locals.mint(name));
 
         let mut bounds: Vec<usize> = groups.iter().map(|group| group.values.len).collect();
+        let width = base.as_ref().map_or(0, |base| base.len / rows);
+        bounds.extend(base.iter().map(|_| width));
         bounds.sort_unstable();
         bounds.dedup();
         let mut runs = Vec::new();
         let mut from = 0;
         for to in bounds {
             let here = groups.iter().filter(|group| group.values.len > from);
-            let (term, slope) = column(here, base.as_ref(), cols, &r, &i);
+            let base = base.as_ref().filter(|_| width > from);
+            let (term, slope) = column(here, base.map(|base| (base, width)), &r, &i);
             let blocks = from / LANES..to / LANES;
             runs.push(Run {
                 blocks,
@@ -210,17 +212,15 @@ impl Translator<'_> {
     }
 }
 
-/// Term and slope of column `i` of row `r`.
+/// Term and slope of column `i` of row `r`; the base comes with the length of its rows.
 fn column<'a>(
     groups: impl Iterator<Item = &'a GroupCode>,
-    base: Option<&Span>,
-    cols: usize,
+    base: Option<(&Span, usize)>,
     r: &Ident,
     i: &Ident,
 ) -> (Expr, Expr) {
     let (mut term, mut slope): (Option<Expr>, Option<Expr>) = (None, None);
-    if let Some(base) = base {
-        let width = cols.next_multiple_of(LANES);
+    if let Some((base, width)) = base {
         let index = Index::fixed(base.offset).plus(width, r).plus(1, i);
         slope = Some(Expr::Element(base.array.clone(), index));
     }
@@ -241,8 +241,8 @@ fn column<'a>(
             SlopeCode::Minus(span) => joined(slope, Infix::Sub, times(span)),
         });
     }
-    let zero = || Expr::Literal(Literal::ZERO);
-    (term.unwrap_or_else(zero), slope.unwrap_or_else(zero))
+    let invariant = "one group has a part in every column";
+    (term.expect(invariant), slope.expect(invariant))
 }
 
 /// `a op b`, or `b` alone (negated for a difference) if there is no `a`.

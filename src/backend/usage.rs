@@ -7,7 +7,7 @@ use super::ident::Ident;
 pub fn calls_kernel(body: &[Stmt]) -> bool {
     body.iter().any(|statement| match statement {
         Stmt::SinCos { .. } | Stmt::SinCosLane { .. } => true,
-        Stmt::For(_, _, body) => calls_kernel(body),
+        Stmt::For(_, _, body) | Stmt::ForLanes(_, body) => calls_kernel(body),
         Stmt::Let(..)
         | Stmt::LetArray(..)
         | Stmt::Declare(..)
@@ -15,8 +15,7 @@ pub fn calls_kernel(body: &[Stmt]) -> bool {
         | Stmt::AddAssign(..)
         | Stmt::Call(..)
         | Stmt::Row(_)
-        | Stmt::DeclareLanes(_)
-        | Stmt::ForLanes(..) => false,
+        | Stmt::DeclareLanes(_) => false,
     })
 }
 

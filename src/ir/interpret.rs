@@ -314,11 +314,13 @@ impl<T: Real> SeparableStep<T> {
     }
 
     fn run(&mut self, tables: &[Entries<T>], first: usize, values: &mut [T]) {
-        let (rows, cols, width) = (self.start.len(), self.cols, self.columns.len());
+        let (rows, cols) = (self.start.len(), self.cols);
+        let width = self.base.as_ref().map_or(0, |base| base.len() / rows);
         for r in 0..rows {
             for i in 0..cols {
                 let mut sum: Option<T> = None;
-                let mut slope = self.base.as_ref().map(|base| values[base[r * width + i]]);
+                let base = self.base.as_ref().filter(|_| i < width);
+                let mut slope = base.map(|base| values[base[r * width + i]]);
                 for group in self.groups.iter().filter(|group| i < group.values.len()) {
                     let t = tables[group.table].row(r)[i];
                     let product = t * values[group.values[i]];

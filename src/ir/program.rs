@@ -140,7 +140,7 @@ impl Slopes {
 pub struct Group {
     /// Coefficients, a multiple of [`LANES`] columns.
     pub table: TableId,
-    /// Value of each function; zero behind the last.
+    /// Value of each function; zero behind the last variable, as the coefficients are.
     pub values: Vec<ValueId>,
     /// Derivative of each function by its variable.
     pub slopes: Slopes,
@@ -199,8 +199,8 @@ pub enum Statement {
     Separable {
         /// One value a row.
         start: Vec<ValueId>,
-        /// What the slopes begin with, row-major, `cols` rounded up to a multiple of [`LANES`]
-        /// values a row; nothing if absent.
+        /// What the slopes of the first columns begin with, row-major, a multiple of [`LANES`] values a
+        /// row; nothing if absent.
         base: Option<Vec<ValueId>>,
         /// At least one group.
         groups: Vec<Group>,
@@ -333,7 +333,7 @@ impl Program {
     pub fn n_zeros_behind(&self, values: &[ValueId]) -> usize {
         let is_zero = |value: &&ValueId| {
             let (statement, _) = self.definition(**value);
-            matches!(self.statements[statement], Statement::Constant(constant) if constant == 0.0)
+            matches!(self.statements[statement], Statement::Constant(x) if x.to_bits() == 0)
         };
         values.iter().rev().take_while(is_zero).count()
     }

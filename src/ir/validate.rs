@@ -184,13 +184,16 @@ fn check_shape(program: &Program, position: usize, statement: &Statement) -> Res
             groups,
             cols,
         } => {
-            let width = cols.next_multiple_of(LANES);
+            let width = (*cols).max(1).next_multiple_of(LANES);
             if let Some(base) = base {
-                count(base.len(), start.len() * width)?;
+                let row = (base.len() / start.len().max(1)).next_multiple_of(LANES);
+                count(base.len(), start.len() * row.min(width))?;
             }
             let widest = groups.iter().map(|group| table(&group.table).cols).max();
             count(widest.unwrap_or(0), width)?;
             for group in groups {
+                let behind = group.values.len().saturating_sub(*cols);
+                count(program.n_zeros_behind(&group.values).min(behind), behind)?;
                 let table = table(&group.table);
                 finite(&table.entries)?;
                 count(table.rows, start.len())?;
@@ -218,7 +221,7 @@ fn check_shape(program: &Program, position: usize, statement: &Statement) -> Res
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Binary, ProgramBuilder, Table};
+    use super::super::{Binary, Group, ProgramBuilder, Table};
     use super::*;
 
     #[test]
@@ -269,6 +272,52 @@ mod tests {
             expected: 3,
         };
         assert_eq!(found, Err(expected));
+    }
+
+    /// One row over two variables; the value behind them is zero or not.
+    fn separable(is_padded: bool) -> Result<Program, IrError> {
+        let mut builder = ProgramBuilder::new("p");
+        let x = builder.input("x", 3);
+        let start = builder.constant(0.0);
+        let mut values = vec![start; LANES];
+        values[..2].copy_from_slice(&x[..2]);
+        if !is_padded {
+            values[2] = x[2];
+        }
+        let table = builder.table(Table::new(1, LANES, vec![1.0; LANES]));
+        let slopes = Slopes::One;
+        let group = Group {
+            table,
+            values,
+            slopes,
+        };
+        let (sums, slopes) = builder.separable(vec![start], None, vec![group], 2);
+        builder.output("y", &sums);
+        builder.output("slopes", &slopes);
+        builder.finish()
+    }
+
+    #[test]
+    fn separable_values_behind_the_variables_must_be_zero() {
+        assert!(separable(true).is_ok());
+        let found = separable(false);
+        assert!(
+            matches!(found, Err(IrError::OperandCount { .. })),
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn separable_without_groups_is_refused() {
+        let mut builder = ProgramBuilder::new("p");
+        let start = builder.input("x", 1);
+        let (sums, _) = builder.separable(start, None, Vec::new(), 0);
+        builder.output("y", &sums);
+        let found = builder.finish();
+        assert!(
+            matches!(found, Err(IrError::OperandCount { .. })),
+            "{found:?}"
+        );
     }
 
     #[test]

@@ -137,6 +137,40 @@ fn kind(pool: &ExprPool, expr: ExprId) -> Kind {
     }
 }
 
+/// Derivatives of each equation by each variable.
+fn slopes(
+    pool: &mut ExprPool,
+    equations: &[Combination],
+    variables: &[SymbolId],
+) -> Vec<Vec<Combination>> {
+    let mut row = |equation: &Combination| {
+        let by = |&symbol| equation.derivative(pool, symbol);
+        variables.iter().map(by).collect()
+    };
+    equations.iter().map(&mut row).collect()
+}
+
+/// [`slopes`] up to the last variable of which there are any, with zeros up to a multiple of
+/// [`LANES`].
+fn padded_slopes(
+    pool: &mut ExprPool,
+    equations: &[Combination],
+    variables: &[SymbolId],
+) -> Vec<Combination> {
+    let mut rows = slopes(pool, equations, variables);
+    let last = |row: &Vec<Combination>| row.iter().rposition(|slope| !slope.is_zero());
+    let used = rows
+        .iter()
+        .filter_map(last)
+        .max()
+        .map_or(0, |last| last + 1);
+    for row in &mut rows {
+        row.truncate(used);
+        row.resize(used.next_multiple_of(LANES), Combination::default());
+    }
+    rows.concat()
+}
+
 /// How the equations divide; `columns` are the variables in the order of the Jacobian.
 pub(super) struct DenseJacobian {
     /// Variables whose columns of the Jacobian vary.
@@ -149,8 +183,8 @@ pub(super) struct DenseJacobian {
     has_angles: bool,
     /// What is not in a separable group, one combination a row.
     rest: Vec<Combination>,
-    /// Derivatives of `rest`, row by row: with angles one a used variable and zeros up to a
-    /// multiple of [`LANES`], otherwise one a curved variable.
+    /// Derivatives of `rest`, row by row: with angles one a used variable up to the last of which there
+    /// are any, and zeros up to a multiple of [`LANES`]; otherwise one a curved variable.
     rest_slopes: Vec<Combination>,
 }
 
@@ -199,17 +233,10 @@ impl DenseJacobian {
                     .collect(),
             })
             .collect();
-        let (sloped, width) = match has_angles {
-            true => (&used, used.len().next_multiple_of(LANES)),
-            false => (&curved, curved.len()),
+        let rest_slopes = match has_angles {
+            true => padded_slopes(pool, &rest, &used),
+            false => slopes(pool, &rest, &curved).concat(),
         };
-        let mut rest_slopes = Vec::new();
-        for (row, equation) in rest.iter().enumerate() {
-            for &symbol in sloped {
-                rest_slopes.push(equation.derivative(pool, symbol));
-            }
-            rest_slopes.resize((row + 1) * width, Combination::default());
-        }
         Self {
             curved,
             linear,

@@ -57,6 +57,9 @@ pub struct StepRow {
     pub z_planned: Option<Vec<f64>>,
 }
 
+/// A step may be shorter than the time between samples by what rounds it.
+const STEP_SLACK: f64 = 0.99;
+
 /// All steps along a recording, and what they come to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
@@ -73,8 +76,8 @@ pub struct Run {
 /// `progress(done, total)` is called once a control step.
 ///
 /// # Errors
-/// Those of [`Controller::set_reference`], and [`MpcError::Recording`] if the recording's inputs
-/// cannot be computed.
+/// Those of [`Controller::set_reference`], [`MpcError::Step`] if the controller's step is shorter
+/// than the recording's, and [`MpcError::Recording`] if the recording's inputs cannot be computed.
 pub fn along_recording(
     controller: &mut Controller,
     recording: &Recording,
@@ -82,6 +85,16 @@ pub fn along_recording(
     mut progress: impl FnMut(usize, usize),
 ) -> Result<Run, MpcError> {
     let step_s = controller.settings().step_s;
+    for segment in recording.segments.iter().filter(|s| s.len() >= 2) {
+        let recorded_s = segment.mean_step_s();
+        if step_s < STEP_SLACK * recorded_s {
+            return Err(MpcError::Step {
+                path: recording.path.clone(),
+                found_s: step_s,
+                recorded_s,
+            });
+        }
+    }
     let schedules: Vec<Vec<usize>> = recording
         .segments
         .iter()
@@ -194,7 +207,9 @@ fn one_step(
     }
     let limits = controller.plant().robot().torque_limit_nm();
     tally.limit_violations += usize::from(exceeds(&command.torque_nm, limits, 1.0));
-    tally.tracking.extend(controller.planned_deviations());
+    if command.status.has_plan() {
+        tally.tracking.extend(controller.planned_deviations());
+    }
     let footing = footing(controller, segment, sample);
     if let Some(violated) = friction_violated(controller, &command, footing.as_ref()) {
         *tally.friction_violations.get_or_insert(0) += usize::from(violated);

@@ -1,5 +1,7 @@
 //! What can go wrong before a controller runs.
 
+use std::path::PathBuf;
+
 use thiserror::Error;
 
 use super::online::ControlError;
@@ -36,6 +38,16 @@ pub enum MpcError {
     Statistics {
         /// The phase.
         phase: String,
+    },
+    /// A controller that acts more often than there are samples.
+    #[error("{}: a sample every {:.3} ms; found a step of {:.3e} s, expected at least as long", path.display(), recorded_s * 1e3, found_s)]
+    Step {
+        /// The recording.
+        path: PathBuf,
+        /// Duration of a stage, s.
+        found_s: f64,
+        /// Time between samples, s.
+        recorded_s: f64,
     },
     /// A setting, a reference or the solver.
     #[error(transparent)]

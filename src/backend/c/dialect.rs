@@ -276,7 +276,7 @@ impl Dialect for CDialect {
 
 impl LaneDialect for CDialect {
     fn declare(&self, sums: &str) -> String {
-        format!("{}_lanes {sums};", self.name)
+        format!("{}_eight {sums};", self.name)
     }
 
     fn for_lanes(&self, variable: &str) -> String {

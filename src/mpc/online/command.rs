@@ -14,8 +14,8 @@ pub enum Status {
     ContactEarly,
     /// The same: the feet are still in the phase that the reference has left.
     ContactLate,
-    /// The same: the feet are in a phase that the model does not have or the reference never
-    /// enters; the reference's phase was used.
+    /// The same: the feet are in a phase that the model does not have, where the reference's was used,
+    /// or that the reference is not near, where it was used for the first stage.
     ContactUnknown,
     /// The solver's point fails the optimality conditions.
     Inaccurate,

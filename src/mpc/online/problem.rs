@@ -30,8 +30,8 @@
 //!   within their limits, so the rows of `T` are left out.
 //! - `ρ` is an exact penalty: above the sum of the multipliers of a stage's joint rows it changes
 //!   nothing where the limits can be kept. One `s_k` serves all joints of a stage. Joint limits are
-//!   the only rows that can contradict the measurement, `u = 0` satisfies all others, hence they
-//!   alone are soft, and from stage 1 on.
+//!   the rows that contradict the measurement, hence they alone are soft, and from stage 1 on: `u = 0`
+//!   satisfies all others but those of a limited torque rate.
 //!
 //! All is written in deviations divided by their scale, `x_k = x_r,k + σ x̂_k` and
 //! `u_k = u_r,k + C_p û_k` with `C_p C_pᵀ = S_p`, and each row divided by its limit: then the cost is

@@ -116,7 +116,8 @@ pub struct MpcSettings {
     pub foot_friction: f64,
     /// Weight of the consistent lift's prior against its reproduction of the latent input.
     pub lift_prior_weight: f64,
-    /// Largest change of a lifted torque, N m/s; none leaves it free.
+    /// Largest change of a plainly lifted torque, N m/s; none leaves it free. What the consistent lift
+    /// makes of the same latent input is not limited.
     pub torque_rate_nm_s: Option<f64>,
     /// Which rows of the constraints are kept.
     pub rows: RowSelection,

@@ -93,7 +93,7 @@ pub const TEXTS: [(i32, &CStr); 20] = [
     ),
     (
         4,
-        c"contact unknown: a checked plan in the reference's phase, not the feet's",
+        c"contact unknown: a checked plan, the feet are in no phase of the model or in one far from the reference",
     ),
     (
         10,
