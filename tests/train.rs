@@ -1,15 +1,17 @@
 //! Training on the checked-in jumps, and on input that cannot be trained on.
 
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use romc::artifact;
-use romc::model::Activation;
+use romc::model::{Activation, StandardLibrary};
 use romc::recording::{self, Recording};
 use romc::robot::Robot;
 use romc::sim::{CompiledModel, IntegrationOptions, LatentSegment, Restart, rollout};
 use romc::train::{
-    self, Origin, Progress, Recordings, TrainError, TrainOptions, Trained, Transfer, Watch,
+    self, LibraryChoice, Origin, Progress, Recordings, TrainError, TrainOptions, Trained, Transfer,
+    Watch,
 };
 
 fn jumps(set: &str, count: usize) -> Vec<Recording> {
@@ -185,6 +187,97 @@ fn cancelled_training_ends_without_a_model_when_none_is_complete() {
         &mut Watch::new(&mut listener, &cancel),
     );
     assert!(matches!(result, Err(TrainError::Cancelled)));
+}
+
+/// Trains on two jumps and cancels at the first news for which `ends` is true.
+fn cancelled_at(
+    method: Method,
+    options: &TrainOptions,
+    ends: impl Fn(&Progress) -> bool,
+) -> Result<Trained, TrainError> {
+    let cancel = AtomicBool::new(false);
+    let mut listener = |progress: Progress| {
+        if ends(&progress) {
+            cancel.store(true, Ordering::Relaxed);
+        }
+    };
+    let training = jumps("train", 2);
+    let recordings = Recordings {
+        training: &training,
+        validation: &[],
+    };
+    let mut watch = Watch::new(&mut listener, &cancel);
+    method(recordings, go1(), options, &Origin::default(), &mut watch)
+}
+
+type Method = fn(
+    Recordings<'_>,
+    &'static Robot,
+    &TrainOptions,
+    &Origin,
+    &mut Watch<'_>,
+) -> Result<Trained, TrainError>;
+
+fn tells(progress: &Progress, part: &str) -> bool {
+    matches!(progress, Progress::Done { text, .. } if text.contains(part))
+}
+
+#[test]
+fn joint_training_cancelled_during_descent_gives_a_model() {
+    let mut options = TrainOptions::new("m", 2);
+    options.joint.threads = 1;
+    options.n_seeds = 2;
+    let networks = few_epochs(Activation::Tanh);
+    for transfer in [Transfer::Chosen, Transfer::Published] {
+        for mut options in [options.clone(), networks.clone()] {
+            options.joint.transfer = transfer;
+            let ended = cancelled_at(train::joint, &options, |news| tells(news, "epoch 4:"));
+            let Trained { model, report } = ended.expect("the best so far");
+            assert_eq!(report.seeds.len(), 1, "{transfer:?}");
+            let training = jumps("train", 1);
+            train::assess(&model, &training).expect("the model fits the recordings");
+        }
+    }
+}
+
+#[test]
+fn joint_training_cancelled_during_descent_of_a_curved_library_gives_a_model() {
+    let mut options = TrainOptions::new("m", 2);
+    options.library = LibraryChoice::Standard(StandardLibrary {
+        degree: 3,
+        trigonometric: false,
+        inputs: true,
+    });
+    let ended = cancelled_at(train::joint, &options, |news| tells(news, "epoch 4:"));
+    let report = ended.expect("the best so far").report;
+    assert!(report.choice.is_some_and(|choice| choice.score.is_finite()));
+}
+
+#[test]
+fn joint_training_cancelled_before_its_start_ends_without_a_model() {
+    let ended = cancelled_at(train::joint, &TrainOptions::new("m", 2), |_| true);
+    assert!(matches!(ended, Err(TrainError::Cancelled)), "{ended:?}");
+}
+
+#[test]
+fn closed_form_cancelled_during_a_later_seed_keeps_the_seeds_begun() {
+    let mut options = TrainOptions::new("m", 2);
+    options.n_seeds = 4;
+    for (stage, begun) in [
+        ("searching the latent space", 2),
+        ("fitting the dynamics", 2),
+    ] {
+        let seen = Cell::new(0);
+        let ended = cancelled_at(train::closed_form, &options, |news| {
+            seen.set(
+                seen.get()
+                    + usize::from(matches!(news, Progress::Stage { name, .. } if *name == stage)),
+            );
+            seen.get() == begun
+        });
+        let report = ended.expect("the best so far").report;
+        assert_eq!(report.seeds.len(), begun, "{stage}");
+    }
 }
 
 fn joint(training: &[Recording], options: &TrainOptions, news: &mut Vec<String>) -> Trained {

@@ -28,10 +28,12 @@ pub struct Recordings<'a> {
 ///
 /// The encoder's rows span the space of least reconstruction error and lift loss ([`find_subspace`]), rotated by
 /// varimax; its bias puts the mean of the training states at `z = 0`. The decoder is the least-squares one over all
-/// phases. Xi is chosen a phase among many regressions by rollouts ([`select`](super::select)). Deterministic.
+/// phases. Xi is chosen a phase among many regressions by rollouts ([`select`](super::select)). A cancelled training
+/// finishes with the seeds begun by then. Deterministic.
 ///
 /// # Errors
-/// [`TrainError`]: options out of range, too few samples, too many latent coordinates, no stable model.
+/// [`TrainError`]: options out of range, too few samples, too many latent coordinates, no stable model, cancelled
+/// before the first seed.
 pub fn closed_form(
     recordings: Recordings<'_>,
     robot: &'static Robot,
@@ -55,6 +57,9 @@ pub fn closed_form(
     let features = Features::new(&library);
     let mut tried = Vec::new();
     for seed in options.seeds() {
+        if watch.cancelled() {
+            break;
+        }
         watch.stage("searching the latent space", 1);
         let search = SubspaceOptions {
             lift_weight: options.encoder.lift_weight,
@@ -75,6 +80,9 @@ pub fn closed_form(
             sets.seed_report(&features, &fitted, (seed, score), None),
             fitted,
         ));
+    }
+    if tried.is_empty() {
+        return Err(TrainError::Cancelled);
     }
     let fits: Vec<&Fitted> = tried.iter().map(|(_, fitted)| fitted).collect();
     let overlap = support_overlap(&library, &fits, &moments.state);

@@ -102,7 +102,7 @@ impl<'a> Judge<'a> {
 /// Fits all combinations of the options and takes, among those within the slack of the best, the sparsest.
 ///
 /// # Errors
-/// [`TrainError::NoStableModel`] if every candidate diverges, [`TrainError::Cancelled`] if cancelled before the first.
+/// [`TrainError::NoStableModel`] if every candidate diverges. If cancelled, the search ends as soon as one does not.
 pub fn select(
     dataset: &Dataset,
     latent: &[Latent],
@@ -191,9 +191,12 @@ fn try_all(
         judge,
         options,
     };
-    let mut tried = attempt.fit_all(&vec![true; affine.len()], watch);
-    if affine.contains(&false) && !watch.cancelled() {
-        let tame = attempt.fit_all(&affine, watch);
+    let curved = affine.contains(&false);
+    // The affine terms are still to come where full libraries diverge.
+    let enough = |tried: &[Fitted]| any_stable(tried) || (curved && !tried.is_empty());
+    let mut tried = attempt.fit_all(&vec![true; affine.len()], enough, watch);
+    if curved && !(watch.cancelled() && any_stable(&tried)) {
+        let tame = attempt.fit_all(&affine, any_stable, watch);
         let grown = attempt.grown(&tame, watch);
         tried.extend(tame);
         tried.extend(grown);
@@ -210,8 +213,14 @@ struct Attempt<'a> {
 }
 
 impl Attempt<'_> {
-    /// Every combination of the options with the terms that are `allowed`.
-    fn fit_all(&self, allowed: &[bool], watch: &mut Watch<'_>) -> Vec<Fitted> {
+    /// Every combination of the options with the terms that are `allowed`; if cancelled, those until there are
+    /// `enough`.
+    fn fit_all(
+        &self,
+        allowed: &[bool],
+        enough: impl Fn(&[Fitted]) -> bool,
+        watch: &mut Watch<'_>,
+    ) -> Vec<Fitted> {
         let (options, features) = (self.options, self.features);
         let mut tried = Vec::new();
         watch.stage(
@@ -220,7 +229,7 @@ impl Attempt<'_> {
         );
         for (window, phases) in self.regressions.iter().enumerate() {
             for &ridge in &options.ridges {
-                if watch.cancelled() {
+                if watch.cancelled() && enough(&tried) {
                     return tried;
                 }
                 let fits: Vec<Vec<DMatrix<f64>>> = phases
@@ -272,15 +281,21 @@ impl Attempt<'_> {
     }
 }
 
+/// Whether the rollouts of a candidate stay finite.
+fn any_stable(tried: &[Fitted]) -> bool {
+    tried.iter().any(|fitted| fitted.choice.score.is_finite())
+}
+
 fn best_score(tried: &[Fitted]) -> Result<f64, TrainError> {
     let best = tried
         .iter()
         .map(|fitted| fitted.choice.score)
         .fold(f64::INFINITY, f64::min);
-    match tried.len() {
-        0 => Err(TrainError::Cancelled),
-        candidates if best.is_infinite() => Err(TrainError::NoStableModel { candidates }),
-        _ => Ok(best),
+    match best.is_finite() {
+        true => Ok(best),
+        false => Err(TrainError::NoStableModel {
+            candidates: tried.len(),
+        }),
     }
 }
 

@@ -30,10 +30,11 @@ use crate::train::report::{SeedReport, Trained};
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
 ///
 /// Every seed is trained on its own, on as many threads as the options say; the one of least score is kept. A
-/// cancelled training finishes with what the seeds have by then. Deterministic for a seed, on any number of threads.
+/// cancelled training finishes with what the seeds begun have by then. Deterministic for a seed, on any number of
+/// threads.
 ///
 /// # Errors
-/// [`TrainError`]: options out of range, too few samples, no stable model.
+/// [`TrainError`]: options out of range, too few samples, no stable model, cancelled before the first seed.
 pub fn joint(
     recordings: Recordings<'_>,
     robot: &'static Robot,
@@ -62,6 +63,9 @@ pub fn joint(
         options,
     };
     let runs = task.run_seeds(watch);
+    if runs.is_empty() {
+        return Err(TrainError::Cancelled);
+    }
 
     let validation = batches(recordings.validation, robot, &batch_options)?;
     let judged = if validation.is_empty() {
@@ -77,9 +81,6 @@ pub fn joint(
     let overlap = support_overlap(&library, &fits, &sets.moments().state);
     finished.sort_by(|(a, _), (b, _)| a.score.total_cmp(&b.score));
     let (seeds, mut fitted): (Vec<SeedReport>, Vec<Fitted>) = finished.into_iter().unzip();
-    if fitted.is_empty() {
-        return Err(TrainError::Cancelled);
-    }
     let fitted = fitted.swap_remove(0);
     let mut report = sets.report(&features, &fitted, &active);
     (report.seeds, report.support_overlap) = (seeds, overlap);
@@ -130,7 +131,8 @@ struct LinearMaps {
 }
 
 impl Task<'_> {
-    /// Trains all seeds on the threads of the options, in rounds; results are in the order of the seeds.
+    /// Trains all seeds on the threads of the options, in rounds, none of which begins after a cancellation; results
+    /// are in the order of the seeds.
     fn run_seeds(&self, watch: &mut Watch<'_>) -> Vec<Run> {
         let JointOptions {
             threads,
@@ -145,6 +147,9 @@ impl Task<'_> {
         let cancel = watch.cancel_flag();
         let mut runs = Vec::new();
         for (round, group) in seeds.chunks(threads.max(1)).enumerate() {
+            if watch.cancelled() {
+                break;
+            }
             let done_before = round * threads.max(1) * schedule.total();
             let (sender, receiver) = channel();
             std::thread::scope(|scope| {
