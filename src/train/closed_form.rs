@@ -8,10 +8,10 @@ use super::finish::{
 };
 use super::latent::least_squares_decoder;
 use super::options::TrainOptions;
-use super::overlap::support_overlap;
 use super::progress::Watch;
 use super::report::{SeedReport, Trained};
-use super::subspace::{SubspaceOptions, find_subspace};
+use super::seeds::{Best, Seeds};
+use super::subspace::{Moments, SubspaceOptions, find_subspace};
 use crate::recording::Recording;
 use crate::robot::Robot;
 
@@ -29,7 +29,7 @@ pub struct Recordings<'a> {
 /// The encoder's rows span the space of least reconstruction error and lift loss ([`find_subspace`]), rotated by
 /// varimax; its bias puts the mean of the training states at `z = 0`. The decoder is the least-squares one over all
 /// phases. Xi is chosen a phase among many regressions by rollouts ([`select`](super::select)). A cancelled training
-/// finishes with the seeds begun by then. Deterministic.
+/// finishes with the seeds begun by then; seeds without a stable model are left out. Deterministic.
 ///
 /// # Errors
 /// [`TrainError`]: options out of range, too few samples, too many latent coordinates, no stable model, cancelled
@@ -55,43 +55,29 @@ pub fn closed_form(
     check_latent_dim(options, &active)?;
     let library = options.library()?;
     let features = Features::new(&library);
-    let mut tried = Vec::new();
+    let task = Task {
+        sets: &sets,
+        moments: &moments,
+        features: &features,
+        active: &active,
+        options,
+    };
+    let mut seeds = Seeds::default();
     for seed in options.seeds() {
         if watch.cancelled() {
             break;
         }
-        watch.stage("searching the latent space", 1);
-        let search = SubspaceOptions {
-            lift_weight: options.encoder.lift_weight,
-            coordinate_weights: options.encoder.coordinate_weights(),
-            iterations: 2000,
-            restarts: options.encoder.restarts,
-            seed,
-        };
-        let subspace = find_subspace(&moments, &active, options.latent_dim, &search)?;
-        let encoder = encoder_over(&sets.training, &subspace.basis, options)?.into();
-        let decoder = least_squares_decoder(&sets.training, &encoder)?.into();
-        let fitted = fit_dynamics(&sets, &features, (encoder, decoder), options, watch)?;
-        let score = fitted
-            .choice
-            .as_ref()
-            .map_or(f64::INFINITY, |(choice, _)| choice.score);
-        tried.push((
-            sets.seed_report(&features, &fitted, (seed, score), None),
-            fitted,
-        ));
+        let outcome = task.fit(seed, watch);
+        seeds.add(seed, outcome, watch)?;
     }
-    if tried.is_empty() {
-        return Err(TrainError::Cancelled);
-    }
-    let fits: Vec<&Fitted> = tried.iter().map(|(_, fitted)| fitted).collect();
-    let overlap = support_overlap(&library, &fits, &moments.state);
-    tried.sort_by(|(a, _), (b, _)| a.score.total_cmp(&b.score));
-    let (seeds, mut fits): (Vec<SeedReport>, Vec<Fitted>) = tried.into_iter().unzip();
-    let fitted = fits.swap_remove(0);
+    let Best {
+        fitted,
+        reports,
+        overlap,
+    } = seeds.best(&library, &moments.state)?;
     let mut report = sets.report(&features, &fitted, &active);
-    if seeds.len() > 1 {
-        (report.seeds, report.support_overlap) = (seeds, overlap);
+    if reports.len() > 1 {
+        (report.seeds, report.support_overlap) = (reports, overlap);
     }
     let parts = Parts {
         library,
@@ -109,4 +95,38 @@ pub fn closed_form(
         &report,
     )?;
     Ok(Trained { model, report })
+}
+
+/// What all seeds share.
+struct Task<'a> {
+    sets: &'a Sets,
+    moments: &'a Moments,
+    features: &'a Features,
+    active: &'a [usize],
+    options: &'a TrainOptions,
+}
+
+impl Task<'_> {
+    /// The numbers of one seed, and what it is compared by.
+    fn fit(&self, seed: u64, watch: &mut Watch<'_>) -> Result<(SeedReport, Fitted), TrainError> {
+        let (sets, options) = (self.sets, self.options);
+        watch.stage("searching the latent space", 1);
+        let search = SubspaceOptions {
+            lift_weight: options.encoder.lift_weight,
+            coordinate_weights: options.encoder.coordinate_weights(),
+            iterations: 2000,
+            restarts: options.encoder.restarts,
+            seed,
+        };
+        let subspace = find_subspace(self.moments, self.active, options.latent_dim, &search)?;
+        let encoder = encoder_over(&sets.training, &subspace.basis, options)?.into();
+        let decoder = least_squares_decoder(&sets.training, &encoder)?.into();
+        let fitted = fit_dynamics(sets, self.features, (encoder, decoder), options, watch)?;
+        let score = fitted
+            .choice
+            .as_ref()
+            .map_or(f64::INFINITY, |(choice, _)| choice.score);
+        let report = sets.seed_report(self.features, &fitted, (seed, score), None);
+        Ok((report, fitted))
+    }
 }

@@ -29,6 +29,7 @@ mod overlap;
 mod prune;
 mod random;
 mod report;
+mod seeds;
 mod smooth;
 mod split;
 

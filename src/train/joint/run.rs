@@ -22,14 +22,15 @@ use crate::train::finish::{
 };
 use crate::train::latent::least_squares_decoder;
 use crate::train::options::{JointOptions, TrainOptions, Transfer};
-use crate::train::overlap::support_overlap;
 use crate::train::progress::Watch;
 use crate::train::random::Random;
 use crate::train::report::{SeedReport, Trained};
+use crate::train::seeds::{Best, Seeds};
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
 ///
-/// Every seed is trained on its own, on as many threads as the options say; the one of least score is kept. A
+/// Every seed is trained on its own, on as many threads as the options say; the one of least score is kept, and a
+/// seed without a model (no stable dynamics, numbers that are not finite) is left out. A
 /// cancelled training finishes with what the seeds begun have by then. Deterministic for a seed, on any number of
 /// threads.
 ///
@@ -63,9 +64,6 @@ pub fn joint(
         options,
     };
     let runs = task.run_seeds(watch);
-    if runs.is_empty() {
-        return Err(TrainError::Cancelled);
-    }
 
     let validation = batches(recordings.validation, robot, &batch_options)?;
     let judged = if validation.is_empty() {
@@ -73,17 +71,19 @@ pub fn joint(
     } else {
         &validation
     };
-    let mut finished = Vec::new();
+    let mut seeds = Seeds::default();
     for run in runs {
-        finished.push(task.finish(run, judged, watch)?);
+        let seed = run.seed;
+        let outcome = task.finish(run, judged, watch);
+        seeds.add(seed, outcome, watch)?;
     }
-    let fits: Vec<&Fitted> = finished.iter().map(|(_, fitted)| fitted).collect();
-    let overlap = support_overlap(&library, &fits, &sets.moments().state);
-    finished.sort_by(|(a, _), (b, _)| a.score.total_cmp(&b.score));
-    let (seeds, mut fitted): (Vec<SeedReport>, Vec<Fitted>) = finished.into_iter().unzip();
-    let fitted = fitted.swap_remove(0);
+    let Best {
+        fitted,
+        reports,
+        overlap,
+    } = seeds.best(&library, &sets.moments().state)?;
     let mut report = sets.report(&features, &fitted, &active);
-    (report.seeds, report.support_overlap) = (seeds, overlap);
+    (report.seeds, report.support_overlap) = (reports, overlap);
     let parts = Parts {
         library,
         encoder: fitted.encoder,

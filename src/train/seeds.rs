@@ -1,0 +1,208 @@
+//! What the seeds of a training come to: a seed without a model ends nothing as long as another one has a model.
+
+use nalgebra::DMatrix;
+
+use super::error::TrainError;
+use super::finish::Fitted;
+use super::overlap::support_overlap;
+use super::progress::Watch;
+use super::report::SeedReport;
+use crate::model::{Library, ModelError};
+
+/// Outcomes of the seeds so far.
+#[derive(Default)]
+pub(super) struct Seeds {
+    finished: Vec<(SeedReport, Fitted)>,
+    /// Why the first seed without a model has none.
+    failure: Option<TrainError>,
+}
+
+/// The seed of least score, and the figures of all that have a model, best first.
+pub(super) struct Best {
+    pub fitted: Fitted,
+    pub reports: Vec<SeedReport>,
+    /// Overlap of the supports, see [`support_overlap`].
+    pub overlap: Option<f64>,
+}
+
+impl Seeds {
+    /// Keeps what a seed came to.
+    ///
+    /// # Errors
+    /// Those that other seeds would have as well.
+    pub fn add(
+        &mut self,
+        seed: u64,
+        outcome: Result<(SeedReport, Fitted), TrainError>,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), TrainError> {
+        match outcome.and_then(with_finite_coefficients) {
+            Ok(finished) => self.finished.push(finished),
+            Err(error) if is_of_one_seed(&error) => {
+                watch.stage("leaving out a seed without a model", 1);
+                watch.done(1, format!("seed {seed}: {error}"));
+                self.failure.get_or_insert(error);
+            }
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+
+    /// The best seed; `state_covariance` (18 x 18) is that of the training states in scaled units.
+    ///
+    /// # Errors
+    /// The first seed's if none has a model, [`TrainError::Cancelled`] if none was begun.
+    pub fn best(
+        mut self,
+        library: &Library,
+        state_covariance: &DMatrix<f64>,
+    ) -> Result<Best, TrainError> {
+        let fits: Vec<&Fitted> = self.finished.iter().map(|(_, fitted)| fitted).collect();
+        let overlap = support_overlap(library, &fits, state_covariance);
+        self.finished
+            .sort_by(|(a, _), (b, _)| a.score.total_cmp(&b.score));
+        let (reports, fits): (Vec<SeedReport>, Vec<Fitted>) = self.finished.into_iter().unzip();
+        match fits.into_iter().next() {
+            Some(fitted) => Ok(Best {
+                fitted,
+                reports,
+                overlap,
+            }),
+            None => Err(self.failure.unwrap_or(TrainError::Cancelled)),
+        }
+    }
+}
+
+/// Refuses coefficients that a descent has left infinite; a score that is not a number is the worst.
+fn with_finite_coefficients(
+    (mut report, fitted): (SeedReport, Fitted),
+) -> Result<(SeedReport, Fitted), TrainError> {
+    for xi in &fitted.xi {
+        for column in 0..xi.ncols() {
+            if let Some(row) = (0..xi.nrows()).find(|&row| !xi[(row, column)].is_finite()) {
+                return Err(TrainError::Model(ModelError::NonFinite {
+                    tensor: "xi".to_owned(),
+                    row,
+                    column,
+                    found: xi[(row, column)],
+                }));
+            }
+        }
+    }
+    if report.score.is_nan() {
+        report.score = f64::INFINITY;
+    }
+    Ok((report, fitted))
+}
+
+/// Whether another seed may do better.
+fn is_of_one_seed(error: &TrainError) -> bool {
+    match error {
+        TrainError::NoStableModel { .. } | TrainError::Model(_) => true,
+        TrainError::NoRecording { .. }
+        | TrainError::Split { .. }
+        | TrainError::TooFewSamples { .. }
+        | TrainError::PhaseSamples { .. }
+        | TrainError::LatentDim { .. }
+        | TrainError::Option { .. }
+        | TrainError::Cancelled
+        | TrainError::Recording(_)
+        | TrainError::Robot(_) => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+    use crate::model::{AffineMap, StandardLibrary};
+    use crate::train::metrics::SetMetrics;
+    use crate::train::progress::Progress;
+
+    fn outcome(score: f64, coefficient: f64) -> Result<(SeedReport, Fitted), TrainError> {
+        let map = |name: &'static str| {
+            AffineMap::new(name, DMatrix::identity(2, 2), nalgebra::DVector::zeros(2))
+        };
+        let report = SeedReport {
+            seed: 1,
+            score,
+            losses: None,
+            active: 1,
+            dominant: Vec::new(),
+            judged: SetMetrics {
+                decoder_mse: 0.0,
+                ddz_r2: Vec::new(),
+                torque_r2: 1.0,
+                prediction_x_m: 0.0,
+                prediction_z_m: 0.0,
+                rollout_x_m: None,
+                rollout_z_m: None,
+            },
+        };
+        let fitted = Fitted {
+            encoder: map("encoder")?.into(),
+            decoder: map("decoder")?.into(),
+            weights: DMatrix::identity(2, 2),
+            xi: vec![DMatrix::from_element(7, 2, coefficient)],
+            choice: None,
+        };
+        Ok((report, fitted))
+    }
+
+    fn best(outcomes: Vec<Result<(SeedReport, Fitted), TrainError>>) -> Result<Best, TrainError> {
+        let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
+        let mut watch = Watch::new(&mut listener, &cancel);
+        let mut seeds = Seeds::default();
+        for (seed, outcome) in outcomes.into_iter().enumerate() {
+            seeds.add(seed as u64, outcome, &mut watch)?;
+        }
+        let standard = StandardLibrary {
+            degree: 1,
+            trigonometric: false,
+            inputs: true,
+        };
+        let library = Library::standard(2, standard).expect("small library");
+        seeds.best(&library, &DMatrix::identity(2, 2))
+    }
+
+    fn unstable(candidates: usize) -> Result<(SeedReport, Fitted), TrainError> {
+        Err(TrainError::NoStableModel { candidates })
+    }
+
+    #[test]
+    fn seeds_some_without_a_model_give_the_best_of_the_others() {
+        let outcomes = vec![
+            outcome(3.0, 1.0),
+            unstable(9),
+            outcome(-1.0, f64::NAN),
+            outcome(-f64::NAN, 1.0),
+            outcome(2.0, 1.0),
+        ];
+        let best = best(outcomes).expect("three seeds have a model");
+        let scores: Vec<f64> = best.reports.iter().map(|report| report.score).collect();
+        assert_eq!(scores, [2.0, 3.0, f64::INFINITY]);
+    }
+
+    #[test]
+    fn seeds_all_without_a_model_give_the_first_error() {
+        let error = best(vec![unstable(9), outcome(1.0, f64::INFINITY)]).err();
+        assert!(
+            matches!(error, Some(TrainError::NoStableModel { candidates: 9 })),
+            "{error:?}"
+        );
+    }
+
+    #[test]
+    fn seeds_with_an_error_of_all_seeds_end_the_training() {
+        let dimension = TrainError::LatentDim {
+            requested: 9,
+            active: 3,
+        };
+        let error = best(vec![outcome(1.0, 1.0), Err(dimension)]).err();
+        assert!(
+            matches!(error, Some(TrainError::LatentDim { .. })),
+            "{error:?}"
+        );
+    }
+}
