@@ -173,6 +173,25 @@ fn training_with_a_negative_lift_weight_is_refused() {
 }
 
 #[test]
+fn training_with_predictions_over_more_than_a_batch_is_refused() {
+    let mut options = TrainOptions::new("m", 2);
+    options.joint.unroll.window = 20;
+    options.check().expect("without a weight it does not count");
+    options.joint.weights.bptt = 1.0;
+    for (window, stride) in [(20, 5), (usize::MAX, 5)] {
+        options.joint.unroll.window = window;
+        let error = options.check().expect_err("no batch has room");
+        let expected = format!("{window} x {stride} with batches of 100");
+        assert!(
+            matches!(&error, TrainError::Option { found, .. } if *found == expected),
+            "{error}"
+        );
+    }
+    options.joint.unroll.window = 19;
+    options.check().expect("a batch has room");
+}
+
+#[test]
 fn cancelled_training_ends_without_a_model_when_none_is_complete() {
     let (cancel, mut listener) = (AtomicBool::new(true), |_: Progress| ());
     let training = jumps("train", 1);

@@ -250,21 +250,7 @@ impl TrainOptions {
         at_least_zero("mask-std", least_std)?;
         at_least_zero("mask-input-share", least_input_share)?;
         self.joint.maps.check(self.latent_dim)?;
-        at_least_zero("bptt-weight", self.joint.weights.bptt)?;
-        let Unroll {
-            window,
-            stride,
-            decay,
-            ..
-        } = self.joint.unroll;
-        above_zero("bptt-window", window as f64)?;
-        above_zero("bptt-stride", stride as f64)?;
-        in_range(
-            "bptt-decay",
-            decay,
-            decay > 0.0 && decay <= 1.0,
-            "above 0 and at most 1",
-        )?;
+        self.joint.check_predictions()?;
         at_least_zero("slack", self.regression.slack)?;
         at_least_zero("rollout-weight", self.regression.rollout_weight)?;
         for ridge in &self.regression.ridges {
@@ -291,6 +277,36 @@ impl TrainOptions {
                     prunings.len()
                 ),
                 expected: "at least one each",
+            });
+        }
+        Ok(())
+    }
+}
+
+impl JointOptions {
+    /// Complains about a window of predictions out of range; one that no batch has room for would count for nothing.
+    fn check_predictions(&self) -> Result<(), TrainError> {
+        at_least_zero("bptt-weight", self.weights.bptt)?;
+        let Unroll {
+            window,
+            stride,
+            decay,
+            ..
+        } = self.unroll;
+        above_zero("bptt-window", window as f64)?;
+        above_zero("bptt-stride", stride as f64)?;
+        in_range(
+            "bptt-decay",
+            decay,
+            decay > 0.0 && decay <= 1.0,
+            "above 0 and at most 1",
+        )?;
+        let reach = window.checked_mul(stride);
+        if self.weights.bptt > 0.0 && reach.is_none_or(|reach| reach >= self.batch_rows) {
+            return Err(TrainError::Option {
+                option: "bptt-window times bptt-stride",
+                found: format!("{window} x {stride} with batches of {}", self.batch_rows),
+                expected: "fewer samples than a batch has",
             });
         }
         Ok(())
