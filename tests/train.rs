@@ -192,6 +192,39 @@ fn training_with_predictions_over_more_than_a_batch_is_refused() {
 }
 
 #[test]
+fn training_with_terms_that_are_not_finite_is_refused_with_their_place() {
+    for (refused, undefined) in [("exp(10000*dz1)", false), ("log(z1)", true)] {
+        let terms = ["1", "z1", "dz1", "u1", refused];
+        let mut options = TrainOptions::new("m", 1);
+        options.library = LibraryChoice::Terms(terms.map(str::to_owned).to_vec());
+        let mut networks = options.clone();
+        (networks.joint.schedule, networks.joint.maps) = {
+            let few = few_epochs(Activation::Tanh).joint;
+            (few.schedule, few.maps)
+        };
+        let methods: [(Method, &TrainOptions); 3] = [
+            (train::closed_form, &options),
+            (train::joint, &options),
+            (train::joint, &networks),
+        ];
+        for (method, options) in methods {
+            let error = cancelled_at(method, options, |_| false).expect_err("no finite value");
+            let place = error.to_string();
+            let TrainError::TermValue { term, found, .. } = error else {
+                panic!("{place}")
+            };
+            assert_eq!((term.as_str(), found.is_nan()), (refused, undefined));
+            let named = [
+                "train_01.csv.gz: term `",
+                "at sample ",
+                "in phase `contact`",
+            ];
+            assert!(named.iter().all(|part| place.contains(part)), "{place}");
+        }
+    }
+}
+
+#[test]
 fn cancelled_training_ends_without_a_model_when_none_is_complete() {
     let (cancel, mut listener) = (AtomicBool::new(true), |_: Progress| ());
     let training = jumps("train", 1);

@@ -82,6 +82,27 @@ pub enum TrainError {
         /// Candidates tried.
         candidates: usize,
     },
+    /// A candidate term has no usable value at a training sample.
+    #[error(
+        "{path}: term `{term}` is {found:e} at sample {sample} ({time_s} s) in phase `{phase}`, expected a finite number \
+         below {limit:e}: leave it out, or scale or shift what is inside"
+    )]
+    TermValue {
+        /// File.
+        path: PathBuf,
+        /// The term.
+        term: String,
+        /// Name of the phase.
+        phase: String,
+        /// Sample of the jump, from 0.
+        sample: usize,
+        /// Time of the sample in the recording.
+        time_s: f64,
+        /// Value of the term.
+        found: f64,
+        /// Magnitude above which squares overflow.
+        limit: f64,
+    },
     /// The training was cancelled before there was a model to keep.
     #[error("training was cancelled before the first complete model")]
     Cancelled,

@@ -17,7 +17,8 @@ use crate::symbolic::{ExprId, Function, Node, SymbolId};
 #[derive(Clone, Debug)]
 pub struct Features {
     steps: Vec<Step>,
-    terms: Vec<usize>, // step of every term
+    terms: Vec<usize>,  // step of every term
+    texts: Vec<String>, // every term as the model file writes it
     latent_dim: usize,
 }
 
@@ -56,9 +57,11 @@ impl Features {
             .iter()
             .map(|term| builder.step(term.expr()))
             .collect();
+        let texts = library.terms().iter().map(|term| term.text().to_owned());
         Self {
             steps: builder.steps,
             terms,
+            texts: texts.collect(),
             latent_dim,
         }
     }
@@ -66,6 +69,11 @@ impl Features {
     /// Number of terms.
     pub fn library_dim(&self) -> usize {
         self.terms.len()
+    }
+
+    /// A term as the model file writes it.
+    pub fn text(&self, term: usize) -> &str {
+        &self.texts[term]
     }
 
     /// Number of latent coordinates.

@@ -98,6 +98,18 @@ impl Latent {
         (variables, target)
     }
 
+    /// Jump and sample of a row of [`Self::regression_samples`], if there are so many.
+    pub fn place_of_row(dataset: &Dataset, phase: usize, row: usize) -> Option<(&Jump, usize)> {
+        let spans = dataset
+            .jumps
+            .iter()
+            .flat_map(|jump| jump.spans.iter().map(move |span| (jump, span)));
+        spans
+            .filter(|(_, (index, _))| *index == phase)
+            .flat_map(|(jump, (_, range))| range.clone().map(move |sample| (jump, sample)))
+            .nth(row)
+    }
+
     /// Writes `[z, dz, u_lat]` of some samples into the rows of `variables`.
     pub fn copy_variables(&self, range: Range<usize>, variables: &mut DMatrixViewMut<'_, f64>) {
         let d = self.z.nrows();

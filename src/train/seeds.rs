@@ -98,7 +98,9 @@ fn with_finite_coefficients(
 /// Whether another seed may do better.
 fn is_of_one_seed(error: &TrainError) -> bool {
     match error {
-        TrainError::NoStableModel { .. } | TrainError::Model(_) => true,
+        TrainError::NoStableModel { .. } | TrainError::TermValue { .. } | TrainError::Model(_) => {
+            true
+        }
         TrainError::NoRecording { .. }
         | TrainError::Split { .. }
         | TrainError::TooFewSamples { .. }

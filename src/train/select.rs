@@ -12,7 +12,7 @@ use super::progress::Watch;
 use super::prune::Refined;
 use super::rollout::{Candidate, Window, predict, restarted, whole};
 use super::sparse::{Pruning, Regression, active_terms};
-use super::weak::windowed_samples;
+use super::weak::{check_terms, windowed_samples};
 
 /// How a candidate was fitted, and how it did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -102,6 +102,7 @@ impl<'a> Judge<'a> {
 /// Fits all combinations of the options and takes, among those within the slack of the best, the sparsest.
 ///
 /// # Errors
+/// [`TrainError::TermValue`] for a term without a finite value at a sample,
 /// [`TrainError::NoStableModel`] if every candidate diverges. If cancelled, the search ends as soon as one does not.
 pub fn select(
     dataset: &Dataset,
@@ -111,19 +112,7 @@ pub fn select(
     options: &RegressionOptions,
     watch: &mut Watch<'_>,
 ) -> Result<Selected, TrainError> {
-    let regressions: Vec<Vec<Regression>> = options
-        .windows
-        .iter()
-        .map(|&window| {
-            (0..dataset.phases.patterns.len())
-                .map(|phase| {
-                    let (theta, target) =
-                        windowed_samples(dataset, latent, features, phase, window);
-                    Regression::new(&theta, &target)
-                })
-                .collect()
-        })
-        .collect();
+    let regressions = regressions(dataset, latent, features, &options.windows)?;
     let tried = try_all(&regressions, features, judge, options, watch);
     let candidates = tried.len();
     let best = best_score(&tried)?;
@@ -166,6 +155,26 @@ pub fn select(
         choice,
         candidates,
     })
+}
+
+/// For every window the regression of every phase.
+fn regressions(
+    dataset: &Dataset,
+    latent: &[Latent],
+    features: &Features,
+    windows: &[usize],
+) -> Result<Vec<Vec<Regression>>, TrainError> {
+    check_terms(dataset, latent, features)?;
+    let regression = |phase, window| {
+        let (theta, target) = windowed_samples(dataset, latent, features, phase, window);
+        Regression::new(&theta, &target)
+    };
+    let phases = 0..dataset.phases.patterns.len();
+    let of_window = |&window: &usize| {
+        let each = phases.clone().map(|phase| regression(phase, window));
+        each.collect()
+    };
+    Ok(windows.iter().map(of_window).collect())
 }
 
 /// A candidate that was fitted and judged.

@@ -3,11 +3,47 @@
 use nalgebra::DMatrix;
 
 use super::dataset::Dataset;
+use super::error::TrainError;
 use super::features::{FeatureValues, Features};
 use super::latent::Latent;
 
 /// Samples between the starts of two windows.
 const STRIDE: usize = 5;
+/// Largest magnitude of a term: sums of its squares stay finite.
+const LARGEST: f64 = 1e150;
+
+/// Complains about the first term without a finite value at a sample, or with one whose square overflows.
+///
+/// # Errors
+/// [`TrainError::TermValue`].
+pub fn check_terms(
+    dataset: &Dataset,
+    latent: &[Latent],
+    features: &Features,
+) -> Result<(), TrainError> {
+    for (phase, pattern) in dataset.phases.patterns.iter().enumerate() {
+        let (variables, _) = Latent::regression_samples(dataset, latent, phase);
+        let theta = features.evaluate(&variables, &mut FeatureValues::default());
+        for (term, column) in theta.column_iter().enumerate() {
+            let bad = |value: &f64| value.is_nan() || value.abs() > LARGEST;
+            let Some((row, found)) = column.iter().enumerate().find(|(_, value)| bad(value)) else {
+                continue;
+            };
+            let (jump, sample) = Latent::place_of_row(dataset, phase, row)
+                .expect("invariant: a row of the regression is a sample of the phase");
+            return Err(TrainError::TermValue {
+                path: jump.path.clone(),
+                term: features.text(term).to_owned(),
+                phase: pattern.name.clone(),
+                sample,
+                time_s: jump.time_s[sample],
+                found: *found,
+                limit: LARGEST,
+            });
+        }
+    }
+    Ok(())
+}
 
 /// Rows of `theta` and `target` of one phase, averaged over windows of `window` samples.
 ///

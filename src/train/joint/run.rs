@@ -10,7 +10,7 @@ use super::loss::{JointLoss, LossWeights, Losses};
 use super::network::run::{NetworkTask, TrainedNetworks};
 use super::parameters::Parameters;
 use super::stages::{train_decoder, train_together, train_xi, train_xi_unrolled};
-use crate::model::AffineMap;
+use crate::model::{AffineMap, ModelError};
 use crate::robot::{Robot, STATE_DIM};
 use crate::train::assemble::{Origin, Parts, assemble};
 use crate::train::closed_form::Recordings;
@@ -20,12 +20,13 @@ use crate::train::features::Features;
 use crate::train::finish::{
     Fitted, Sets, active_coordinates, check_latent_dim, encoder_over, fit_dynamics,
 };
-use crate::train::latent::least_squares_decoder;
+use crate::train::latent::{Latent, least_squares_decoder};
 use crate::train::options::{JointOptions, TrainOptions, Transfer};
 use crate::train::progress::Watch;
 use crate::train::random::Random;
 use crate::train::report::{SeedReport, Trained};
 use crate::train::seeds::{Best, Seeds};
+use crate::train::weak::check_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
 ///
@@ -75,6 +76,7 @@ pub fn joint(
     for run in runs {
         let seed = run.seed;
         let outcome = task.finish(run, judged, watch);
+        let outcome = outcome.map_err(|error| task.explained(error, seed));
         seeds.add(seed, outcome, watch)?;
     }
     let Best {
@@ -348,6 +350,27 @@ impl Task<'_> {
             .sets
             .seed_report(self.features, &fitted, seed, Some(run.losses));
         Ok((report, fitted))
+    }
+
+    /// Of a descent that left the finite numbers the term that made it do so, if one has no value where it began.
+    fn explained(&self, error: TrainError, seed: u64) -> TrainError {
+        if !matches!(error, TrainError::Model(ModelError::NonFinite { .. })) {
+            return error;
+        }
+        let terms_at_start = || {
+            let encoder = match self.options.joint.maps.is_linear() {
+                true => {
+                    let mut start = self.start(seed);
+                    let masked = (0..STATE_DIM).filter(|i| !self.active.contains(i));
+                    masked.for_each(|i| start.encoder.row_mut(i).fill(0.0));
+                    AffineMap::new("encoder", start.encoder.transpose(), start.encoder_bias)?.into()
+                }
+                false => self.networks().starting_encoder(seed)?,
+            };
+            let latent = Latent::of(&self.sets.training, &encoder);
+            check_terms(&self.sets.training, &latent, self.features)
+        };
+        terms_at_start().err().unwrap_or(error)
     }
 
     fn finish_linear(

@@ -150,6 +150,16 @@ impl NetworkTask<'_> {
         )
     }
 
+    /// The encoder before the first epoch.
+    ///
+    /// # Errors
+    /// [`TrainError::Model`] if its numbers are not finite.
+    pub fn starting_encoder(&self, seed: u64) -> Result<StateMap, TrainError> {
+        let plain = LatentBasis::unchanged(self.options.latent_dim);
+        let start = self.start(seed).encoder;
+        Ok(fold::encoder(&start, &self.frame(), &plain)?)
+    }
+
     /// The model numbers: as Adam left them, or with a telling latent basis, the decoder's last layer by least squares
     /// and Xi chosen among regressions.
     ///
