@@ -55,6 +55,9 @@ pub enum Error {
     /// A file that romc would have to replace.
     #[error("{0}: already exists; pass --force to replace it, or choose another name")]
     Exists(PathBuf),
+    /// An output that is no file.
+    #[error("{0}: is a folder; expected the name of a file")]
+    IsFolder(PathBuf),
     /// An output in a folder that is not there.
     #[error("{path}: there is no folder `{folder}`; make it first", path = path.display(), folder = folder.display())]
     NoFolder { path: PathBuf, folder: PathBuf },
@@ -77,7 +80,21 @@ impl Error {
                 matches!(error, SimplifyError::NoSamples | SimplifyError::Margin)
             }
             Self::Rename(_) => true,
-            _ => false,
+            Self::Recording(_)
+            | Self::Model(_)
+            | Self::Artifact(_)
+            | Self::Emit(_)
+            | Self::Folder(_)
+            | Self::Lower(_)
+            | Self::Sim(_)
+            | Self::Study(_)
+            | Self::Mpc(_)
+            | Self::Config { .. }
+            | Self::Exists(_)
+            | Self::IsFolder(_)
+            | Self::NoFolder { .. }
+            | Self::Read { .. }
+            | Self::Write { .. } => false,
         }
     }
 }

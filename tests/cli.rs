@@ -1096,6 +1096,58 @@ fn control_step_shorter_than_the_samples_is_refused() {
 }
 
 #[test]
+fn runs_at_the_same_time_into_one_folder_keep_each_others_files() {
+    for _ in 0..4 {
+        let folder = folder();
+        let out = path(&folder, "out");
+        let compile = |model: &str| {
+            Command::new(env!("CARGO_BIN_EXE_romc"))
+                .args([
+                    "compile",
+                    model,
+                    "--emit",
+                    "c,rust,latex",
+                    "--out-dir",
+                    &out,
+                ])
+                .current_dir(env!("CARGO_MANIFEST_DIR"))
+                .output()
+                .expect("the binary runs")
+        };
+        let models = ["models/paper-2d.json", "models/go1-d2.json", MODEL];
+        std::thread::scope(|scope| {
+            let runs = models.map(|model| scope.spawn(move || compile(model)));
+            for run in runs {
+                let output = run.join().expect("a run");
+                assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+            }
+        });
+        // every file is known as romc's, so that each run may be repeated
+        for model in models {
+            done(&[
+                "compile",
+                model,
+                "--emit",
+                "c,rust,latex",
+                "--out-dir",
+                &out,
+            ]);
+        }
+    }
+}
+
+#[test]
+fn folder_as_an_output_file_is_refused_before_the_work() {
+    let folder = folder();
+    let out = path(&folder, "");
+    let train = ["train", JUMP, "--latent-dim", "2", "--force", "--output"];
+    for output in [out.as_str(), ".."] {
+        let error = failed(&[&train[..], &[output]].concat());
+        assert!(error.contains("expected the name of a file"), "{error}");
+    }
+}
+
+#[test]
 fn study_leaves_files_of_others_alone() {
     let folder = folder();
     let (out, mine) = (path(&folder, "st"), path(&folder, "st/summary.csv"));

@@ -40,7 +40,7 @@ impl Index {
     }
 
     /// With another subscript in place of a variable.
-    fn with(&self, variable: &Ident, at: &Self) -> Self {
+    pub fn with(&self, variable: &Ident, at: &Self) -> Self {
         let mut result = Self::fixed(self.offset);
         for (stride, name) in &self.terms {
             if name == variable {

@@ -1,11 +1,13 @@
 //! Putting emitted files into a folder, whole or not at all.
 
 use std::collections::BTreeSet;
+use std::fs::OpenOptions;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use super::target::EmittedFile;
-use crate::files::{Overwrite, beside, write_whole};
+use crate::files::{Overwrite, beside};
 
 /// Names the files of the folder that were emitted, one a line.
 const MANIFEST: &str = ".romc-emitted";
@@ -67,14 +69,8 @@ pub fn write_files(
     for file in files {
         staged.add(folder, file)?;
     }
-    // The list comes first: after an interruption each finished file is known as ours. It is read
-    // again, for another run may have written to the folder meanwhile.
-    let mut known = emitted_names(folder)?;
-    known.extend(names().map(str::to_owned));
-    let list: String = known.iter().map(|name| format!("{name}\n")).collect();
-    let manifest = folder.join(MANIFEST);
-    write_whole(&manifest, |out| out.write_all(list.as_bytes()))
-        .map_err(|error| io_error(&manifest, error))?;
+    // The list comes first: after an interruption each finished file is known as ours.
+    list(folder, names())?;
     for (beside, path) in &staged.0 {
         fs::rename(beside, path).map_err(|error| io_error(path, error))?;
     }
@@ -89,6 +85,21 @@ fn emitted_names(folder: &Path) -> Result<BTreeSet<String>, FolderError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(BTreeSet::new()),
         Err(error) => Err(io_error(&manifest, error)),
     }
+}
+
+/// Adds names to the list of the folder's files: by appending, so that runs at the same time keep each
+/// other's.
+fn list<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> Result<(), FolderError> {
+    let known = emitted_names(folder)?;
+    let new: String = names
+        .filter(|name| !known.contains(*name))
+        .map(|name| format!("{name}\n"))
+        .collect();
+    let manifest = folder.join(MANIFEST);
+    let opened = OpenOptions::new().append(true).create(true).open(&manifest);
+    opened
+        .and_then(|mut file| file.write_all(new.as_bytes()))
+        .map_err(|error| io_error(&manifest, error))
 }
 
 /// Files beside their places, with these places; what has not been renamed is removed in the end.

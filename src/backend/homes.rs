@@ -22,10 +22,13 @@ pub(super) struct MatrixHome {
 impl MatrixHome {
     /// The entry at two loop variables.
     pub fn element(&self, row: &Ident, col: &Ident) -> Expr {
-        let index = Index::fixed(self.offset)
-            .plus(self.stride, row)
-            .plus(1, col);
-        Expr::Element(self.array.clone(), index)
+        Expr::Element(self.array.clone(), self.index(row, col))
+    }
+
+    /// Where in the array that is.
+    pub fn index(&self, row: &Ident, col: &Ident) -> Index {
+        let row = Index::fixed(self.offset).plus(self.stride, row);
+        row.plus(1, col)
     }
 }
 

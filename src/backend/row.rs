@@ -16,8 +16,10 @@ pub struct Row {
     pub names: [Ident; 4],
     /// Runs of blocks whose columns have terms alike, one after the other.
     pub runs: Vec<Run>,
-    /// Where the slope of a column goes.
-    pub slope: Expr,
+    /// The array that the slopes go to.
+    pub slopes: Ident,
+    /// Where in it the slope of a column goes.
+    pub slope_at: Index,
     /// Number of columns with a slope.
     pub n_slopes: usize,
     /// What is added to the lanes' total.
@@ -88,7 +90,7 @@ impl Row {
     }
 
     fn assign_slope(&self, run: &Run, at: &Index) -> Stmt {
-        let target = self.slope.with(&self.column, at);
+        let target = Expr::Element(self.slopes.clone(), self.slope_at.with(&self.column, at));
         Stmt::Assign(target, run.slope.with(&self.column, at))
     }
 

@@ -147,7 +147,8 @@ impl Translator<'_> {
             from = to;
         }
         let row = Row {
-            slope: slopes.element(&r, &i),
+            slope_at: slopes.index(&r, &i),
+            slopes: slopes.array,
             column: i,
             names,
             runs,

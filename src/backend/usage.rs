@@ -22,12 +22,18 @@ pub fn calls_kernel(body: &[Stmt]) -> bool {
 /// The arrays that are assigned in lanes.
 pub fn assigned_in_lanes(body: &[Stmt]) -> Vec<Ident> {
     let assigned = |statement: &Stmt| match statement {
-        Stmt::Row(row) => match &row.slope {
-            Expr::Element(array, _) => vec![array.clone()],
-            _ => Vec::new(),
-        },
+        Stmt::Row(row) => vec![row.slopes.clone()],
         Stmt::For(_, _, body) => assigned_in_lanes(body),
-        _ => Vec::new(),
+        Stmt::Let(..)
+        | Stmt::LetArray(..)
+        | Stmt::Declare(..)
+        | Stmt::Assign(..)
+        | Stmt::AddAssign(..)
+        | Stmt::SinCos { .. }
+        | Stmt::SinCosLane { .. }
+        | Stmt::Call(..)
+        | Stmt::DeclareLanes(_)
+        | Stmt::ForLanes(..) => Vec::new(),
     };
     body.iter().flat_map(assigned).collect()
 }

@@ -13,10 +13,13 @@ use crate::recording::{self, Recording};
 /// Tells before long work that its output could not be written.
 ///
 /// # Errors
-/// [`Error::Exists`] if the file is there and may not be replaced, [`Error::NoFolder`] if its folder
-/// is not.
+/// [`Error::IsFolder`] for a folder, [`Error::Exists`] if the file is there and may not be replaced,
+/// [`Error::NoFolder`] if its folder is not.
 pub fn check_output(path: Option<&Path>, overwrite: Overwrite) -> Result<(), Error> {
     let Some(path) = path else { return Ok(()) };
+    if path.is_dir() || path.file_name().is_none() {
+        return Err(Error::IsFolder(path.to_owned()));
+    }
     if !overwrite.allows(path) {
         return Err(Error::Exists(path.to_owned()));
     }

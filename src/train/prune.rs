@@ -15,6 +15,9 @@ const ATTEMPTS: usize = 60;
 /// Rounds of adding.
 const ROUNDS: usize = 3;
 
+/// A share of the energy, and the phase, row and column of the term that it belongs to.
+type Place = (f64, usize, usize, usize);
+
 /// Coefficients of all phases with the regressions that can fit them again.
 pub(super) struct Refined<'a> {
     /// One a phase.
@@ -93,31 +96,33 @@ impl Refined<'_> {
         }
     }
 
-    /// Terms that are not active as (share of the energy that is explained with it, phase, row, column).
-    fn terms_by_gain(&self) -> Vec<(f64, usize, usize, usize)> {
-        let mut terms = Vec::new();
-        for (phase, regression) in self.regressions.iter().enumerate() {
-            let support = self.xi[phase].map(|value| value != 0.0);
-            for column in 0..support.ncols() {
-                for (row, gain) in regression.gains(column, &support, self.ridge) {
-                    terms.push((gain, phase, row, column));
-                }
-            }
-        }
-        terms
+    /// Terms that are not active, with the share of the energy that is explained with each.
+    fn terms_by_gain(&self) -> Vec<Place> {
+        self.places(|regression, column, support| regression.gains(column, support, self.ridge))
     }
 
-    /// Active terms as (share of the energy that is lost without it, phase, row, column).
-    fn terms_by_use(&self) -> Vec<(f64, usize, usize, usize)> {
-        let mut terms = Vec::new();
+    /// Active terms, with the share of the energy that is lost without each.
+    fn terms_by_use(&self) -> Vec<Place> {
+        self.places(|regression, column, support| regression.losses(column, support, self.ridge))
+    }
+
+    /// What `shares` gives for each column of every phase.
+    fn places(
+        &self,
+        shares: impl Fn(&Regression, usize, &DMatrix<bool>) -> Vec<(usize, f64)>,
+    ) -> Vec<Place> {
+        let mut places = Vec::new();
         for (phase, regression) in self.regressions.iter().enumerate() {
             let support = self.xi[phase].map(|value| value != 0.0);
             for column in 0..support.ncols() {
-                for (row, loss) in regression.losses(column, &support, self.ridge) {
-                    terms.push((loss, phase, row, column));
-                }
+                let found = shares(regression, column, &support);
+                places.extend(
+                    found
+                        .into_iter()
+                        .map(|(row, share)| (share, phase, row, column)),
+                );
             }
         }
-        terms
+        places
     }
 }

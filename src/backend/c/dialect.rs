@@ -203,7 +203,7 @@ impl Dialect for CDialect {
         [sine, cosine]: &[String; 2],
         _is_used: [bool; 2],
     ) -> Vec<String> {
-        let (name, upper) = (&self.name, self.name.to_ascii_uppercase());
+        let (name, upper) = (&self.name, self.upper());
         let suffix = self.suffix();
         vec![
             format!("{} {sine}, {cosine};", self.real()),
@@ -248,24 +248,19 @@ impl Dialect for CDialect {
     }
 
     fn parameter(&self, parameter: &Parameter) -> String {
-        let (name, real) = (&parameter.name, self.real());
-        match parameter.role {
-            Role::Input => format!("const {real} *restrict {name}"),
-            Role::Output | Role::InOut => format!("{real} *restrict {name}"),
-            Role::Scalar => format!("{real} {name}"),
-        }
+        self.declared(parameter, "restrict ")
     }
 
     fn signature(&self, function: &Function) -> String {
         // Without `restrict` on what lanes assign, gcc keeps in registers what it has read for them;
         // with it, it reads tables once for each use.
         let in_lanes = assigned_in_lanes(&function.body);
-        let spelled = |parameter: &Parameter| match in_lanes.contains(&parameter.name) {
-            true => self.parameter(parameter).replace("*restrict ", "*"),
-            false => self.parameter(parameter),
-        };
-        let parameters: Vec<String> = function.parameters.iter().map(spelled).collect();
-        format!("void {}({})", function.name, parameters.join(", "))
+        self.head(function, |parameter| {
+            match in_lanes.contains(&parameter.name) {
+                true => "",
+                false => "restrict ",
+            }
+        })
     }
 
     fn docs(&self, _lines: &[String]) -> String {
@@ -307,6 +302,24 @@ impl CDialect {
         self.name.to_ascii_uppercase()
     }
 
+    /// The function's name and parameters, arrays with what `qualifier` says of each.
+    fn head(&self, function: &Function, qualifier: impl Fn(&Parameter) -> &'static str) -> String {
+        let parameters = function.parameters.iter();
+        let parameters: Vec<String> = parameters
+            .map(|parameter| self.declared(parameter, qualifier(parameter)))
+            .collect();
+        format!("void {}({})", function.name, parameters.join(", "))
+    }
+
+    fn declared(&self, parameter: &Parameter, qualifier: &str) -> String {
+        let (name, real) = (&parameter.name, self.real());
+        match parameter.role {
+            Role::Input => format!("const {real} *{qualifier}{name}"),
+            Role::Output | Role::InOut => format!("{real} *{qualifier}{name}"),
+            Role::Scalar => format!("{real} {name}"),
+        }
+    }
+
     /// The type of numbers.
     pub fn real(&self) -> &'static str {
         match self.precision {
@@ -326,7 +339,7 @@ impl CDialect {
     /// The documented prototype for the header; `restrict` is left to the definition, so
     /// that C++ can include it.
     pub fn prototype(&self, function: &Function) -> String {
-        let signature = self.signature(function).replace("*restrict ", "*");
+        let signature = self.head(function, |_| "");
         format!("{}{signature};", documentation(&function.docs))
     }
 }

@@ -138,7 +138,7 @@ pub fn emit(
     let header = Header {
         banner: banner.clone(),
         model: &entries.name,
-        upper: name.to_ascii_uppercase(),
+        upper: dialect.upper(),
         is_single: precision == Precision::Single,
         units: entries.units.of_robot(),
         latent_dim: entries.latent_dim,
@@ -245,7 +245,7 @@ fn kernel(dialect: &CDialect, sines: SineCosine) -> Result<String, EmitError> {
     };
     let kernel = Kernel {
         name,
-        upper: name.to_ascii_uppercase(),
+        upper: dialect.upper(),
         real: dialect.real(),
         f: dialect.suffix(),
         bits,
