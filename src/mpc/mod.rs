@@ -7,7 +7,7 @@
 //! `of_model` takes from the model what the controller needs; `online` is the controller itself,
 //! the folder that is emitted for a robot. Read `online/problem` first, which states the optimal
 //! control problem. From there one torque is made by `reference` (what to follow, encoded), `horizon` (phases and linearised dynamics of the stages,
-//! with `linearise`), `transcribe` (the conic program), `qp` (clarabel, and the check of what it
+//! with `linearise`), `layout` and `transcribe` (the conic program), `qp` (clarabel, and the check of what it
 //! returns), `controller` (plan to command; what to do without a plan) and, if asked for, `lift`
 //! (torques that the ground can answer). [`along_recording()`] runs it all on recorded jumps.
 //!

@@ -16,7 +16,7 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 31] = sources![
+const SOURCES: [(&str, &str); 32] = sources![
     "mpc/online/command.rs",
     "mpc/online/controller.rs",
     "mpc/online/curved.rs",
@@ -30,6 +30,7 @@ const SOURCES: [(&str, &str); 31] = sources![
     "mpc/online/interface/mod.rs",
     "mpc/online/interface/settings.rs",
     "mpc/online/interface/values.rs",
+    "mpc/online/layout.rs",
     "mpc/online/lift.rs",
     "mpc/online/linearise.rs",
     "mpc/online/mod.rs",

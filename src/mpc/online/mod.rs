@@ -14,6 +14,7 @@ pub mod estimate;
 mod fallback;
 mod horizon;
 pub mod interface;
+mod layout;
 pub(super) mod lift;
 pub mod linearise;
 mod plan;

@@ -1,13 +1,11 @@
 //! From the optimal control problem to the solver's matrices, whose pattern is fixed once.
 //!
-//! Unknowns of stage `k`, one stage after the other: the input `û_k`, the state `x̂_{k+1}` it leads
-//! to and, if any joint row is left, its slack `s_{k+1}`. Rows: the dynamics of all stages (zero
-//! cone), then torque, rate, joint and slack rows stage by stage (nonnegative), then one
-//! second-order cone a stage if friction of the body force is constrained. [`Transcription::write`]
-//! overwrites values only, through positions that were looked up at construction.
+//! [`layout`](super::layout) says what stands where; [`Transcription::write`] overwrites values only,
+//! through positions that were looked up at construction.
 
 use nalgebra::DMatrix;
 
+use super::layout::{Layout, block};
 use super::linearise::StageModel;
 use super::problem::{Row, StageRows};
 use super::qp::{Cone, ConeProgram};
@@ -86,13 +84,10 @@ struct StagePositions {
     force: Vec<usize>,
 }
 
-/// Layout of unknowns and rows, and where each number goes.
+/// Where each number of a step goes.
 #[derive(Debug, Clone)]
 pub struct Transcription {
-    latent_dim: usize,
-    horizon: usize,
-    rows: StageRows,
-    has_slack: bool,
+    layout: Layout,
     positions: Vec<StagePositions>,
     /// `T C_p` and the like, by phase, for the current roots.
     work: Vec<f64>,
@@ -114,21 +109,20 @@ pub struct Weights<'a> {
 impl Transcription {
     /// Lays out a problem; returns it with the program that its steps will fill.
     pub fn new(latent_dim: usize, horizon: usize, rows: StageRows) -> (Self, ConeProgram) {
-        let mut layout = Self {
-            latent_dim,
-            horizon,
-            has_slack: !rows.joint.is_empty(),
-            rows,
+        let layout = Layout::new(latent_dim, horizon, rows);
+        let (n, m) = (layout.variables(), layout.row_count());
+        let mut a = SparseColumns::from_pattern(m, n, &layout.pattern());
+        let mut transcription = Self {
+            layout,
             positions: Vec::with_capacity(horizon),
             work: vec![0.0; latent_dim],
         };
-        let (n, m) = (layout.variables(), layout.row_count());
-        let mut a = SparseColumns::from_pattern(m, n, &layout.pattern());
         for stage in 0..horizon {
-            let positions = layout.stage_positions(stage, &a);
-            layout.positions.push(positions);
+            let positions = transcription.stage_positions(stage, &a);
+            transcription.positions.push(positions);
         }
-        layout.write_constants(&mut a);
+        transcription.write_constants(&mut a);
+        let layout = &transcription.layout;
         let diagonal: Vec<(usize, usize)> = (0..n).map(|index| (index, index)).collect();
         let mut cones = vec![
             Cone::Zero(2 * latent_dim * horizon),
@@ -145,25 +139,28 @@ impl Transcription {
             b: vec![0.0; m],
             cones,
         };
-        (layout, program)
+        (transcription, program)
     }
 
     /// The rows of each stage.
     pub fn rows(&self) -> &StageRows {
-        &self.rows
+        &self.layout.rows
     }
 
     /// Writes the cost, which does not change from step to step.
     pub fn write_cost(&self, weights: &Weights<'_>, program: &mut ConeProgram) {
-        let d = self.latent_dim;
+        let d = self.layout.latent_dim;
         let scale = SLACK_PRICE / weights.joint_penalty;
-        for stage in 0..self.horizon {
-            let factor = if stage + 1 == self.horizon {
+        for stage in 0..self.layout.horizon {
+            let factor = if stage + 1 == self.layout.horizon {
                 scale * weights.terminal
             } else {
                 scale
             };
-            let (input, state) = (self.input_column(stage), self.state_column(stage));
+            let (input, state) = (
+                self.layout.input_column(stage),
+                self.layout.state_column(stage),
+            );
             for index in 0..d {
                 program
                     .p
@@ -174,15 +171,15 @@ impl Transcription {
                     .p
                     .set(state + index, state + index, factor * weights.state[index]);
             }
-            if self.has_slack {
-                program.q[self.slack_column(stage)] = SLACK_PRICE;
+            if self.layout.has_slack {
+                program.q[self.layout.slack_column(stage)] = SLACK_PRICE;
             }
         }
     }
 
     /// Writes a step's values.
     pub fn write(&mut self, step: &StepData<'_>, program: &mut ConeProgram) {
-        for index in 0..self.horizon {
+        for index in 0..self.layout.horizon {
             self.write_dynamics(index, step, program);
             self.write_inputs(index, step, program);
             self.write_joints(index, step, program);
@@ -191,8 +188,8 @@ impl Transcription {
 
     /// Latent input of a stage in a solution: `u_r + C_p û`.
     pub fn input(&self, index: usize, solution: &[f64], step: &StepData<'_>, out: &mut [f64]) {
-        let (d, stage) = (self.latent_dim, &step.stages[index]);
-        let scaled = &solution[self.input_column(index)..][..d];
+        let (d, stage) = (self.layout.latent_dim, &step.stages[index]);
+        let scaled = &solution[self.layout.input_column(index)..][..d];
         for (row, out) in out.iter_mut().enumerate() {
             let root = &step.roots[stage.phase];
             *out = stage.input[row]
@@ -212,7 +209,7 @@ impl Transcription {
         deviation: &[f64],
         out: &mut [f64],
     ) {
-        let scaled = &solution[self.state_column(index)..][..2 * self.latent_dim];
+        let scaled = &solution[self.layout.state_column(index)..][..2 * self.layout.latent_dim];
         for (((out, reference), scale), value) in
             out.iter_mut().zip(reference).zip(deviation).zip(scaled)
         {
@@ -220,157 +217,79 @@ impl Transcription {
         }
     }
 
-    fn stage_width(&self) -> usize {
-        3 * self.latent_dim + usize::from(self.has_slack)
-    }
-
-    fn variables(&self) -> usize {
-        self.horizon * self.stage_width()
-    }
-
-    fn input_column(&self, stage: usize) -> usize {
-        stage * self.stage_width()
-    }
-
-    /// Of `x̂_{stage+1}`.
-    fn state_column(&self, stage: usize) -> usize {
-        self.input_column(stage) + self.latent_dim
-    }
-
-    fn slack_column(&self, stage: usize) -> usize {
-        self.input_column(stage) + 3 * self.latent_dim
-    }
-
-    fn inequality_dim(&self) -> usize {
-        self.rows.torque.len()
-            + self.rows.rate.len()
-            + self.rows.joint.len()
-            + usize::from(self.has_slack)
-    }
-
-    fn dynamics_row(&self, stage: usize) -> usize {
-        stage * 2 * self.latent_dim
-    }
-
-    fn torque_row(&self, stage: usize) -> usize {
-        2 * self.latent_dim * self.horizon + stage * self.inequality_dim()
-    }
-
-    fn rate_row(&self, stage: usize) -> usize {
-        self.torque_row(stage) + self.rows.torque.len()
-    }
-
-    fn joint_row(&self, stage: usize) -> usize {
-        self.rate_row(stage) + self.rows.rate.len()
-    }
-
-    fn slack_row(&self, stage: usize) -> usize {
-        self.joint_row(stage) + self.rows.joint.len()
-    }
-
-    fn force_row(&self, stage: usize) -> usize {
-        self.torque_row(self.horizon) + 3 * stage
-    }
-
-    fn row_count(&self) -> usize {
-        self.force_row(if self.rows.friction.is_some() {
-            self.horizon
-        } else {
-            0
-        })
-    }
-
-    fn pattern(&self) -> Vec<(usize, usize)> {
-        let d = self.latent_dim;
-        let mut entries = Vec::new();
-        for stage in 0..self.horizon {
-            let (input, state) = (self.input_column(stage), self.state_column(stage));
-            entries.extend(block(self.dynamics_row(stage), 2 * d, input, d));
-            entries
-                .extend((0..2 * d).map(|index| (self.dynamics_row(stage) + index, state + index)));
-            if stage > 0 {
-                entries.extend(block(
-                    self.dynamics_row(stage),
-                    2 * d,
-                    self.state_column(stage - 1),
-                    2 * d,
-                ));
-                entries.extend(block(
-                    self.rate_row(stage),
-                    self.rows.rate.len(),
-                    self.input_column(stage - 1),
-                    d,
-                ));
-            }
-            entries.extend(block(
-                self.torque_row(stage),
-                self.rows.torque.len(),
-                input,
-                d,
-            ));
-            entries.extend(block(self.rate_row(stage), self.rows.rate.len(), input, d));
-            entries.extend(block(
-                self.joint_row(stage),
-                self.rows.joint.len(),
-                state,
-                d,
-            ));
-            if self.has_slack {
-                let slack = self.slack_column(stage);
-                entries.extend(
-                    (self.joint_row(stage)..=self.slack_row(stage)).map(|row| (row, slack)),
-                );
-            }
-            if self.rows.friction.is_some() {
-                entries.extend(block(self.force_row(stage), 3, input, d));
-            }
-        }
-        entries
-    }
-
     fn stage_positions(&self, stage: usize, a: &SparseColumns) -> StagePositions {
-        let d = self.latent_dim;
+        let d = self.layout.latent_dim;
         let find = |row: usize, n_rows: usize, col: usize, n_cols: usize| -> Vec<usize> {
             block(row, n_rows, col, n_cols)
                 .map(|(row, col)| a.position(row, col).expect("block belongs to the pattern"))
                 .collect()
         };
-        let (input, state) = (self.input_column(stage), self.state_column(stage));
-        let before = |row: usize, n_rows: usize, col: fn(&Self, usize) -> usize, n_cols: usize| {
+        let (input, state) = (
+            self.layout.input_column(stage),
+            self.layout.state_column(stage),
+        );
+        let before = |row: usize,
+                      n_rows: usize,
+                      col: fn(&Layout, usize) -> usize,
+                      n_cols: usize| {
             match stage {
                 0 => Vec::new(),
-                _ => find(row, n_rows, col(self, stage - 1), n_cols),
+                _ => find(row, n_rows, col(&self.layout, stage - 1), n_cols),
             }
         };
-        let force_rows = if self.rows.friction.is_some() { 3 } else { 0 };
+        let force_rows = if self.layout.rows.friction.is_some() {
+            3
+        } else {
+            0
+        };
         StagePositions {
-            input: find(self.dynamics_row(stage), 2 * d, input, d),
-            state: before(self.dynamics_row(stage), 2 * d, Self::state_column, 2 * d),
-            torque: find(self.torque_row(stage), self.rows.torque.len(), input, d),
-            rate: find(self.rate_row(stage), self.rows.rate.len(), input, d),
-            rate_before: before(
-                self.rate_row(stage),
-                self.rows.rate.len(),
-                Self::input_column,
+            input: find(self.layout.dynamics_row(stage), 2 * d, input, d),
+            state: before(
+                self.layout.dynamics_row(stage),
+                2 * d,
+                Layout::state_column,
+                2 * d,
+            ),
+            torque: find(
+                self.layout.torque_row(stage),
+                self.layout.rows.torque.len(),
+                input,
                 d,
             ),
-            joint: find(self.joint_row(stage), self.rows.joint.len(), state, d),
-            force: find(self.force_row(stage), force_rows, input, d),
+            rate: find(
+                self.layout.rate_row(stage),
+                self.layout.rows.rate.len(),
+                input,
+                d,
+            ),
+            rate_before: before(
+                self.layout.rate_row(stage),
+                self.layout.rows.rate.len(),
+                Layout::input_column,
+                d,
+            ),
+            joint: find(
+                self.layout.joint_row(stage),
+                self.layout.rows.joint.len(),
+                state,
+                d,
+            ),
+            force: find(self.layout.force_row(stage), force_rows, input, d),
         }
     }
 
     fn write_constants(&self, a: &mut SparseColumns) {
-        for stage in 0..self.horizon {
-            for index in 0..2 * self.latent_dim {
+        for stage in 0..self.layout.horizon {
+            for index in 0..2 * self.layout.latent_dim {
                 a.set(
-                    self.dynamics_row(stage) + index,
-                    self.state_column(stage) + index,
+                    self.layout.dynamics_row(stage) + index,
+                    self.layout.state_column(stage) + index,
                     -1.0,
                 );
             }
-            if self.has_slack {
-                for row in self.joint_row(stage)..=self.slack_row(stage) {
-                    a.set(row, self.slack_column(stage), -1.0);
+            if self.layout.has_slack {
+                for row in self.layout.joint_row(stage)..=self.layout.slack_row(stage) {
+                    a.set(row, self.layout.slack_column(stage), -1.0);
                 }
             }
         }
@@ -378,7 +297,7 @@ impl Transcription {
 
     /// `Â x̂_k + B̂ û_k − x̂_{k+1} = −σ⁻¹ defect`, with `x̂_0` on the right.
     fn write_dynamics(&self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
-        let (d, stage) = (self.latent_dim, &step.stages[index]);
+        let (d, stage) = (self.layout.latent_dim, &step.stages[index]);
         let positions = &self.positions[index];
         let (root, deviation) = (&step.roots[stage.phase], step.deviation);
         let values = program.a.values_mut();
@@ -399,21 +318,21 @@ impl Transcription {
                     values[positions.state[row * 2 * d + col]] = entry * deviation[col];
                 }
             }
-            program.b[self.dynamics_row(index) + row] = right;
+            program.b[self.layout.dynamics_row(index) + row] = right;
         }
     }
 
     /// Torque, rate and friction rows.
     fn write_inputs(&mut self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
-        let d = self.latent_dim;
+        let d = self.layout.latent_dim;
         let stage = &step.stages[index];
         let root = &step.roots[stage.phase];
-        let rows = stage.rows.as_ref().unwrap_or(&self.rows);
+        let rows = stage.rows.as_ref().unwrap_or(&self.layout.rows);
         for (number, row) in rows.torque.iter().enumerate() {
             let positions = &self.positions[index].torque[number * d..][..d];
             let at_reference = scaled_row(&row.row, root, &stage.input, &mut self.work);
             scatter(&self.work, positions, program.a.values_mut());
-            program.b[self.torque_row(index) + number] = row.bound - at_reference;
+            program.b[self.layout.torque_row(index) + number] = row.bound - at_reference;
         }
         for (number, row) in rows.rate.iter().enumerate() {
             let positions = &self.positions[index].rate[number * d..][..d];
@@ -423,7 +342,7 @@ impl Transcription {
                 dot(&row.row, step.last_input)
             } else {
                 let earlier = &step.stages[index - 1];
-                let rows = earlier.rows.as_ref().unwrap_or(&self.rows);
+                let rows = earlier.rows.as_ref().unwrap_or(&self.layout.rows);
                 let before = scaled_row(
                     &rows.rate[number].row,
                     &step.roots[earlier.phase],
@@ -435,9 +354,9 @@ impl Transcription {
                 scatter(&self.work, positions, program.a.values_mut());
                 before
             };
-            program.b[self.rate_row(index) + number] = row.bound - at_reference + before;
+            program.b[self.layout.rate_row(index) + number] = row.bound - at_reference + before;
         }
-        if self.rows.friction.is_some() {
+        if self.layout.rows.friction.is_some() {
             for number in 0..3 {
                 let positions = &self.positions[index].force[number * d..][..d];
                 let row = &stage.force[number * d..][..d];
@@ -447,7 +366,7 @@ impl Transcription {
                 // A stage without contact has the cone's axis as its slack: strictly inside.
                 let is_free =
                     row.iter().all(|entry| *entry == 0.0) && number == 0 && is_zero(&stage.force);
-                program.b[self.force_row(index) + number] =
+                program.b[self.layout.force_row(index) + number] =
                     if is_free { 1.0 } else { at_reference };
             }
         }
@@ -455,18 +374,21 @@ impl Transcription {
 
     /// `D_i σ ẑ − s ≤ bound − D_i z_r`, at the end of the stage.
     fn write_joints(&self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
-        let d = self.latent_dim;
+        let d = self.layout.latent_dim;
         let reference = match step.stages.get(index + 1) {
             Some(next) => &next.state[..d],
             None => step.last_position,
         };
-        let rows = step.stages[index].rows.as_ref().unwrap_or(&self.rows);
+        let rows = step.stages[index]
+            .rows
+            .as_ref()
+            .unwrap_or(&self.layout.rows);
         for (number, Row { row, bound, .. }) in rows.joint.iter().enumerate() {
             let positions = &self.positions[index].joint[number * d..][..d];
             for (col, &position) in positions.iter().enumerate() {
                 program.a.values_mut()[position] = row[col] * step.deviation[col];
             }
-            program.b[self.joint_row(index) + number] = bound - dot(row, reference);
+            program.b[self.layout.joint_row(index) + number] = bound - dot(row, reference);
         }
     }
 }
@@ -492,13 +414,4 @@ fn is_zero(values: &[f64]) -> bool {
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn block(
-    row: usize,
-    n_rows: usize,
-    col: usize,
-    n_cols: usize,
-) -> impl Iterator<Item = (usize, usize)> {
-    (row..row + n_rows).flat_map(move |row| (col..col + n_cols).map(move |col| (row, col)))
 }
