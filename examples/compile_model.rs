@@ -5,8 +5,9 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use romc::artifact;
-use romc::backend::{EmitOptions, Target, emit, write_files};
+use romc::deploy::{EmitOptions, Target, emit};
 use romc::files::Overwrite;
+use romc::files::write_files;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -4,9 +4,11 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::artifact::ArtifactError;
-use crate::artifact::import::ImportError;
-use crate::backend::typeset::RenameError;
-use crate::backend::{EmitError, FolderError};
+use crate::codegen::CodegenError;
+use crate::deploy::EmitError;
+use crate::evaluate::EvaluateError;
+use crate::files::FolderError;
+use crate::import::ImportError;
 use crate::lower::LowerError;
 use crate::model::ModelError;
 use crate::mpc::MpcError;
@@ -16,6 +18,8 @@ use crate::sim::SimError;
 use crate::simplify::SimplifyError;
 use crate::study::StudyError;
 use crate::train::TrainError;
+use crate::typeset::RenameError;
+use crate::typeset::TypesetError;
 
 /// What can go wrong between a recording and a torque.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +40,10 @@ pub enum Error {
     #[error(transparent)]
     Emit(#[from] EmitError),
     #[error(transparent)]
+    Typeset(#[from] TypesetError),
+    #[error(transparent)]
+    Codegen(#[from] CodegenError),
+    #[error(transparent)]
     Rename(#[from] RenameError),
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -43,6 +51,8 @@ pub enum Error {
     Lower(#[from] LowerError),
     #[error(transparent)]
     Sim(#[from] SimError),
+    #[error(transparent)]
+    Evaluate(#[from] EvaluateError),
     #[error(transparent)]
     Simplify(#[from] SimplifyError),
     #[error(transparent)]
@@ -84,10 +94,13 @@ impl Error {
             | Self::Model(_)
             | Self::Artifact(_)
             | Self::Emit(_)
+            | Self::Typeset(_)
+            | Self::Codegen(_)
             | Self::Folder(_)
             | Self::Lower(_)
             | Self::Sim(_)
             | Self::Study(_)
+            | Self::Evaluate(_)
             | Self::Mpc(_)
             | Self::Config { .. }
             | Self::Exists(_)

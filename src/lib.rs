@@ -1,11 +1,13 @@
 //! romc, the reduced-order model compiler.
 
 pub mod artifact;
-pub mod backend;
 pub mod cli;
+pub mod codegen;
+pub mod deploy;
 mod error;
 pub mod evaluate;
 pub mod files;
+pub mod import;
 pub mod ir;
 pub mod lower;
 pub mod model;
@@ -18,5 +20,6 @@ pub mod simplify;
 pub mod study;
 pub mod symbolic;
 pub mod train;
+pub mod typeset;
 
 pub use error::Error;

@@ -5,7 +5,9 @@ use std::path::Path;
 use std::process::Command;
 
 use romc::artifact;
-use romc::backend::{EmitOptions, EmittedFile, Precision, SineCosine, Target, Units, emit};
+use romc::codegen::{Precision, SineCosine, Units};
+use romc::deploy::{EmitOptions, Target, emit};
+use romc::files::EmittedFile;
 use romc::model::ReducedModel;
 
 /// Trigonometric candidate terms in its dynamics.
@@ -18,7 +20,7 @@ fn load(path: &str) -> ReducedModel {
 }
 
 fn write(folder: &Path, files: &[EmittedFile]) {
-    romc::backend::write_files(folder, files, romc::files::Overwrite::Refuse).expect("written");
+    romc::files::write_files(folder, files, romc::files::Overwrite::Refuse).expect("written");
 }
 
 /// Compiles C files strictly and runs the program; its output.

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use romc::backend::{EmitError, EmitOptions, EmittedFile, Target, emit};
+use romc::deploy::{EmitError, EmitOptions, Target, emit};
+use romc::files::EmittedFile;
 use romc::model::ReducedModel;
 use romc::mpc::{Controller, Lift, Measurement, MpcSettings, ReferenceSamples};
 use romc::recording::Segment;

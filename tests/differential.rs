@@ -26,9 +26,9 @@ use drivers::{Build, Workshop, contents};
 use functions::{Function, Random, functions as functions_of};
 use nalgebra::DVector;
 use romc::ir::Interpreter;
+use romc::lower::CompiledModel;
 use romc::lower::{self, Form, LowerOptions, dynamics_jacobian};
 use romc::model::{LatentVariable, ReducedModel};
-use romc::sim::CompiledModel;
 
 /// Random models of tests that compile nothing or little.
 const SOME_MODELS: u64 = 24;

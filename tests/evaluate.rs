@@ -4,7 +4,8 @@ use std::path::Path;
 
 use nalgebra::DVector;
 use romc::evaluate::{CoordinateSums, PointwiseSums};
-use romc::sim::{CompiledModel, IntegrationOptions, LatentSegment, Restart, rollout};
+use romc::lower::CompiledModel;
+use romc::sim::{IntegrationOptions, LatentSegment, Restart, rollout};
 use romc::{artifact, recording};
 
 const MODEL: &str = "models/go1-d4.json";

@@ -6,10 +6,10 @@ use std::process::Command;
 
 use nalgebra::DMatrix;
 use romc::artifact;
-use romc::backend::EmittedFile;
-use romc::backend::latex::{self, Form, LatexOptions, NumberStyle};
-use romc::backend::typeset::{Rounding, SymbolTable};
+use romc::files::EmittedFile;
 use romc::model::{FeetRule, Library, Phase, ReducedModel};
+use romc::typeset::latex::{self, Form, LatexOptions, NumberStyle};
+use romc::typeset::{Rounding, SymbolTable};
 
 /// Equations (25) and (26) as the paper prints them, without spaces and with plain parentheses.
 const PAPER_CONTACT: &str = concat!(

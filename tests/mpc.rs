@@ -2,12 +2,12 @@
 
 #[path = "mpc/control.rs"]
 mod control;
-#[path = "mpc/curved.rs"]
-mod curved;
 #[path = "mpc/failures.rs"]
 mod failures;
 #[path = "mpc/lifts.rs"]
 mod lifts;
+#[path = "mpc/nonlinear.rs"]
+mod nonlinear;
 #[path = "mpc/qp.rs"]
 mod qp;
 #[path = "mpc/random.rs"]

@@ -10,8 +10,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use functions::{Function, Random, functions as functions_of};
-use romc::backend::{EmitOptions, Target, emit, write_files};
+use romc::deploy::{EmitOptions, Target, emit};
 use romc::files::Overwrite;
+use romc::files::write_files;
 use romc::lower::{Form, LowerOptions};
 use romc::model::ReducedModel;
 use serde_json::{Value, json};

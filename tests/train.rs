@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use romc::artifact;
+use romc::lower::CompiledModel;
 use romc::model::{Activation, StandardLibrary};
 use romc::recording::{self, Recording};
 use romc::robot::Robot;
-use romc::sim::{CompiledModel, IntegrationOptions, LatentSegment, Restart, rollout};
+use romc::sim::{IntegrationOptions, LatentSegment, Restart, rollout};
 use romc::train::{
     self, LibraryChoice, Origin, Progress, Recordings, TrainError, TrainOptions, Trained, Transfer,
     Watch,

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use romc::artifact;
-use romc::backend::latex::{self, LatexOptions, NumberStyle};
-use romc::backend::markdown::{self, MarkdownOptions};
-use romc::backend::mathml::{self, MathmlOptions};
-use romc::backend::typeset::{Rounding, SymbolTable};
 use romc::model::ReducedModel;
+use romc::typeset::latex::{self, LatexOptions, NumberStyle};
+use romc::typeset::markdown::{self, MarkdownOptions};
+use romc::typeset::mathml::{self, MathmlOptions};
+use romc::typeset::{Rounding, SymbolTable};
 
 fn model(path: &str) -> ReducedModel {
     artifact::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()

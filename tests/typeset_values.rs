@@ -9,11 +9,11 @@ use nalgebra::DVector;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use romc::artifact;
-use romc::backend::typeset::{
+use romc::model::{Library, ReducedModel};
+use romc::typeset::{
     Equation, FunctionName, Math, Quantity, RobotTypeset, Rounding, Signed, Symbol, SymbolTable,
     Typeset, Variable, expression,
 };
-use romc::model::{Library, ReducedModel};
 
 type Values = BTreeMap<Symbol, f64>;
 

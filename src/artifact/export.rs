@@ -6,8 +6,8 @@ use super::manifest::{
 };
 use super::matrices::to_rows;
 use crate::model::{
-    FeetRule, InputStatistics, Library, LibrarySource, Phase, ReducedModel, ScaleFactors, Scaling,
-    Signals, StateMap,
+    CoordinateNames, FeetRule, InputStatistics, Library, LibrarySource, Phase, ReducedModel,
+    ScaleFactors, Scaling, StateMap,
 };
 
 /// All that a model file says about the model.
@@ -39,7 +39,7 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
     }
 }
 
-fn signals_entry(signals: &Signals) -> SignalsEntry {
+fn signals_entry(signals: &CoordinateNames) -> SignalsEntry {
     SignalsEntry {
         names: signals.names.clone(),
         units: signals.units.clone(),

@@ -31,7 +31,6 @@
 mod digest;
 mod error;
 mod export;
-pub mod import;
 mod manifest;
 mod matrices;
 mod print;

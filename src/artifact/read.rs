@@ -14,8 +14,8 @@ use super::manifest::{
 };
 use super::matrices::from_rows;
 use crate::model::{
-    Activation, AffineMap, FeetRule, InputStatistics, Layer, Library, ModelError, Phase,
-    ReducedModel, ScaleFactors, Scaling, Signals, StandardLibrary, StateMap,
+    Activation, AffineMap, CoordinateNames, FeetRule, InputStatistics, Layer, Library, ModelError,
+    Phase, ReducedModel, ScaleFactors, Scaling, StandardLibrary, StateMap,
 };
 use crate::robot::{Robot, STATE_DIM};
 
@@ -177,8 +177,8 @@ fn library_of(entry: LibraryEntry, latent_dim: usize) -> Result<Library, ModelEr
     })
 }
 
-fn signals_of(entry: SignalsEntry) -> Signals {
-    Signals {
+fn signals_of(entry: SignalsEntry) -> CoordinateNames {
+    CoordinateNames {
         names: entry.names,
         units: entry.units,
     }

@@ -12,13 +12,15 @@ use super::args::{
 };
 use super::output::{Table, check_output};
 use super::simplification;
-use crate::backend::latex::{Form, LatexOptions, NumberStyle};
-use crate::backend::markdown::MarkdownOptions;
-use crate::backend::mathml::MathmlOptions;
-use crate::backend::typeset::{Rounding, SymbolTable};
-use crate::backend::{self, EmitOptions, EmittedFile, Precision, SineCosine, Target, Units};
+use crate::codegen::{Precision, SineCosine, Units};
+use crate::deploy::{self, EmitOptions, Target};
+use crate::files::EmittedFile;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
+use crate::typeset::latex::{Form, LatexOptions, NumberStyle};
+use crate::typeset::markdown::MarkdownOptions;
+use crate::typeset::mathml::MathmlOptions;
+use crate::typeset::{Rounding, SymbolTable};
 use crate::{Error, artifact};
 
 /// Compiles a model into a folder.
@@ -162,7 +164,7 @@ pub fn emit(
         digest,
         ..EmitOptions::default()
     };
-    Ok(backend::emit(model, targets, &options)?)
+    Ok(deploy::emit(model, targets, &options)?)
 }
 
 /// Writes files into a folder; the path of each, with its size in bytes.
@@ -174,7 +176,7 @@ pub fn write(
     files: &[EmittedFile],
     overwrite: Overwrite,
 ) -> Result<Vec<(PathBuf, usize)>, Error> {
-    let paths = backend::write_files(folder, files, overwrite)?;
+    let paths = crate::files::write_files(folder, files, overwrite)?;
     let sizes = files.iter().map(|file| file.contents.len());
     Ok(paths.into_iter().zip(sizes).collect())
 }

@@ -13,14 +13,16 @@ use super::args::{CodeArguments, DemoArguments, EquationArguments};
 use super::mpc::NamedRun;
 use super::output::{Table, significant, spinner};
 use super::{compile, mpc as mpc_command, report, simulate};
-use crate::backend::typeset::Rounding;
-use crate::backend::{EmittedFile, Target};
+use crate::deploy::Target;
 use crate::evaluate::Assessment;
+use crate::evaluate::ReferenceInput;
+use crate::files::EmittedFile;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
-use crate::mpc::{Lift, MpcSettings, ReferenceInput};
+use crate::mpc::{Lift, MpcSettings};
 use crate::recording::Recording;
 use crate::simplify::Tolerance;
+use crate::typeset::Rounding;
 use crate::{Error, artifact, recording};
 
 /// The shipped model that the demo works with.

@@ -9,11 +9,11 @@ use serde_json::json;
 use super::Answer;
 use super::args::{ImportArguments, LibraryArgument, StoredWeights, StoredXi, TermOrder};
 use super::output::{Table, check_output, read_recordings};
-use crate::artifact::import::{
+use crate::files::Overwrite;
+use crate::import::{
     Chosen, ImportError, ImportOptions, ImportReport, LibraryChoice, LibraryOrder, WeightVectors,
     XiLayout, import, read_terms,
 };
-use crate::files::Overwrite;
 use crate::model::{ReducedModel, ScaleFactors, Scaling};
 use crate::robot::Robot;
 use crate::sim::input_statistics;

@@ -6,8 +6,8 @@ use serde_json::json;
 use super::Answer;
 use super::args::{Arguments, CompletionsArguments, ManualArguments};
 use crate::Error;
-use crate::backend::{EmittedFile, write_files};
 use crate::files::Overwrite;
+use crate::files::{EmittedFile, write_files};
 
 /// Writes `romc.1` and `romc-COMMAND.1` for each command.
 ///

@@ -9,10 +9,12 @@ use super::Answer;
 use super::args::{LiftChoice, MpcArguments, ReferenceInput};
 use super::output::{Table, check_output, progress_bar, read_recordings, significant, write_file};
 use super::report::figure_files;
-use crate::backend::{EmittedFile, write_files};
+use crate::evaluate;
+use crate::evaluate::{Run, StepRow};
 use crate::files::Overwrite;
+use crate::files::{EmittedFile, write_files};
 use crate::model::ReducedModel;
-use crate::mpc::{self, Controller, Lift, MpcSettings, Run, StepRow};
+use crate::mpc::{Controller, Lift, MpcSettings};
 use crate::recording::Recording;
 use crate::report::control_figures;
 use crate::robot::{JOINT_DIM, Robot};
@@ -36,8 +38,8 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
         ..MpcSettings::default()
     };
     let reference_input = match arguments.reference_input {
-        ReferenceInput::Recorded => mpc::ReferenceInput::Recorded,
-        ReferenceInput::None => mpc::ReferenceInput::None,
+        ReferenceInput::Recorded => evaluate::ReferenceInput::Recorded,
+        ReferenceInput::None => evaluate::ReferenceInput::None,
     };
     let recordings = read_recordings(&arguments.recordings)?;
     let runs = run_all(&model, &recordings, settings, reference_input)?;
@@ -68,14 +70,14 @@ pub fn run_all(
     model: &ReducedModel,
     recordings: &[Recording],
     settings: MpcSettings,
-    reference_input: mpc::ReferenceInput,
+    reference_input: evaluate::ReferenceInput,
 ) -> Result<Vec<NamedRun>, Error> {
     let mut controller = Controller::new(model, settings)?;
     let mut runs = Vec::with_capacity(recordings.len());
     for recording in recordings {
         let bar = progress_bar(format!("controlling along {}", recording.path.display()));
         controller.reset();
-        let run = mpc::along_recording(
+        let run = evaluate::along_recording(
             &mut controller,
             recording,
             reference_input,

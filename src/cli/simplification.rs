@@ -8,9 +8,8 @@ use serde_json::{Value, json};
 
 use super::args::SimplifyArguments;
 use super::output::{Table, read_recordings, significant, spinner};
-use crate::backend::EmittedFile;
-use crate::backend::typeset::Rounding;
 use crate::evaluate::Assessment;
+use crate::files::EmittedFile;
 use crate::model::ReducedModel;
 use crate::recording::Recording;
 use crate::sim::LatentSegment;
@@ -19,6 +18,7 @@ use crate::simplify::{
     SimplifyError, Tolerance, bound_words, certificate_json, change_words, interval_words,
     lost_words, markdown, printed, rollouts_json, simplify,
 };
+use crate::typeset::Rounding;
 use crate::{Error, artifact};
 
 /// Time between restarts of the short rollouts, as in the paper's second test.
@@ -103,7 +103,7 @@ impl Basis {
             latent: self.latent.iter().collect(),
             restart_every_s: RESTART_S,
         };
-        basis.effect(model, simplified).map(Some)
+        Ok(Some(basis.effect(model, simplified)?))
     }
 }
 

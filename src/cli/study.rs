@@ -6,13 +6,13 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::{StudyArguments, TrainMethod, TrainSettings};
-use super::intake::Intake;
 use super::output::{Table, read_recordings, significant, spinner};
+use super::prepared_recordings::Intake;
 use super::report::figure_files;
 use super::train_settings;
 use crate::Error;
-use crate::backend::{EmittedFile, check_folder, write_files};
 use crate::files::Overwrite;
+use crate::files::{EmittedFile, check_folder, write_files};
 use crate::recording::Recording;
 use crate::report::study_figures;
 use crate::robot::Robot;

@@ -8,8 +8,8 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::{TrainArguments, TrainMethod, TrainSettings};
-use super::intake::{Intake, RecordedSets};
 use super::output::{Table, check_output, significant, spinner};
+use super::prepared_recordings::{Intake, RecordedSets};
 use super::train_settings;
 use crate::files::Overwrite;
 use crate::robot::Robot;

@@ -3,14 +3,15 @@
 use super::aslip::AslipRollout;
 use super::baseline::Baseline;
 use super::coordinates::{CoordinateSums, PointwiseSums};
+use super::error::EvaluateError;
 use super::lift::{LAMBDA, LiftSums, combined_loss};
 use super::linearised::{LinearisedPhase, linearise_phases};
 use super::metrics::Fit;
-use crate::Error;
+use crate::lower::CompiledModel;
 use crate::model::ReducedModel;
 use crate::recording::{Recording, Segment};
 use crate::robot::Robot;
-use crate::sim::{CompiledModel, IntegrationOptions, LatentSegment, Restart, Rollout, rollout};
+use crate::sim::{IntegrationOptions, LatentSegment, Restart, Rollout, rollout};
 
 /// What was recorded and predicted for one segment.
 #[derive(Debug, Clone)]
@@ -58,13 +59,13 @@ impl<'a> Assessment<'a> {
     /// Simulates `model` over all segments of `recordings` and measures it.
     ///
     /// # Errors
-    /// [`Error::Model`] for a latent-only model, [`Error::Sim`] and [`Error::Recording`] for samples
+    /// [`EvaluateError::Model`] for a latent-only model, [`EvaluateError::Sim`] and [`EvaluateError::Recording`] for samples
     /// that cannot be encoded or integrated.
     pub fn over(
         model: &ReducedModel,
         recordings: &'a [Recording],
         restart_every_s: f64,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self, EvaluateError> {
         let segments: Vec<&Segment> = (recordings.iter())
             .flat_map(|recording| &recording.segments)
             .collect();
@@ -102,7 +103,7 @@ impl<'a> Assessment<'a> {
         model: &ReducedModel,
         compiled: &CompiledModel,
         segment: &'a Segment,
-    ) -> Result<(), Error> {
+    ) -> Result<(), EvaluateError> {
         let restart = Restart::Every(self.restart_every_s);
         let latent = LatentSegment::encode(model, segment)?;
         let options = IntegrationOptions::default();

@@ -2,7 +2,8 @@
 
 use nalgebra::{Complex, DMatrix};
 
-use crate::sim::{CompiledModel, LatentSegment};
+use crate::lower::CompiledModel;
+use crate::sim::LatentSegment;
 
 /// Share of the largest singular value below which a direction of the input counts as without effect.
 pub const RANK_THRESHOLD: f64 = 0.01;

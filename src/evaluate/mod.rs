@@ -5,18 +5,24 @@
 //! `docs/mathematics.md` defines each figure once. Start with `assessment.rs`, then
 //! [`metrics`](Fit).
 
+mod along_recording;
 mod aslip;
 mod assessment;
 mod baseline;
+mod control;
 mod coordinates;
+mod error;
 mod lift;
 mod linearised;
 mod metrics;
 
+pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
 pub use aslip::{Aslip, AslipRollout, AslipSums};
 pub use assessment::{Assessment, SegmentRun};
 pub use baseline::{Baseline, Template, fit_aslip};
+pub use control::{ByContact, Comparison, StepTimes, Summary};
 pub use coordinates::{CoordinateSums, PointwiseSums};
+pub use error::EvaluateError;
 pub use lift::{LAMBDA, LiftSums, combined_loss};
 pub use linearised::{LinearisedPhase, RANK_THRESHOLD, linearise_phases};
 pub use metrics::{Fit, FitSums};

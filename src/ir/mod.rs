@@ -1,7 +1,7 @@
 //! Programs: what is computed, in which order.
 //!
 //! A [`Program`] enters from `lower` (through [`ProgramBuilder`]) and leaves to
-//! the interpreter and to every backend: C, Rust and the interpreter run the
+//! the interpreter and to all code generators: C, Rust and the interpreter run the
 //! same statements in the same order with the same association, so that their
 //! results agree bit for bit. Read `program` first, then `interpret`.
 //!
@@ -21,11 +21,11 @@
 
 mod build;
 mod interpret;
-pub mod kernel;
-pub mod kernel_single;
 mod program;
 mod real;
-mod rounded;
+mod roundoff;
+pub mod sin_cos;
+pub mod sin_cos_f32;
 mod validate;
 
 pub use build::ProgramBuilder;
@@ -35,5 +35,5 @@ pub use program::{
     ValueId,
 };
 pub use real::Real;
-pub use rounded::{Range, Rounded, rounding_errors};
+pub use roundoff::{Range, Rounded, rounding_errors};
 pub use validate::IrError;

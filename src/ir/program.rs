@@ -162,7 +162,7 @@ pub enum Statement {
     Unary(Unary, ValueId),
     /// A scalar operation on two values.
     Binary(Binary, ValueId, ValueId),
-    /// Sine and cosine of all arguments by [`super::kernel::sin_cos`]:
+    /// Sine and cosine of all arguments by [`super::sin_cos::sin_cos`]:
     /// defines the n sines, then the n cosines.
     SinCos {
         /// The n arguments, in rad.

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::program::Unary;
-use super::{kernel, kernel_single};
+use super::{sin_cos, sin_cos_f32};
 
 /// A number that programs compute with: `f64`, `f32`, or [`Rounded`](super::Rounded), which
 /// bounds what `f32` loses.
@@ -57,7 +57,7 @@ impl Real for f64 {
 
     #[inline]
     fn sin_cos(self) -> (f64, f64) {
-        kernel::sin_cos(self)
+        sin_cos::sin_cos(self)
     }
 }
 
@@ -84,6 +84,6 @@ impl Real for f32 {
 
     #[inline]
     fn sin_cos(self) -> (f32, f32) {
-        kernel_single::sin_cos(self)
+        sin_cos_f32::sin_cos(self)
     }
 }

@@ -316,8 +316,8 @@ impl DenseJacobian {
             .map(|&symbol| lowering.pool.symbol_expr(symbol))
             .collect();
         let values: Vec<ValueId> = variables.iter().map(|&v| lowering.value(v)).collect();
-        let is_curved = |&(symbol, _): &(&SymbolId, &ExprId)| self.curved.contains(symbol);
-        let angles = self.used.iter().zip(&variables).filter(is_curved);
+        let is_nonlinear = |&(symbol, _): &(&SymbolId, &ExprId)| self.curved.contains(symbol);
+        let angles = self.used.iter().zip(&variables).filter(is_nonlinear);
         let angles: Vec<ExprId> = angles.map(|(_, &angle)| angle).collect();
         let (sines, cosines) = lowering.angles(&angles);
         let of_angles = |values: Vec<ValueId>| {

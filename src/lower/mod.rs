@@ -7,6 +7,7 @@
 //! added, that a power is a chain of products. Read `dynamics` first, then `expression`.
 
 mod combination;
+mod compiled;
 mod cost;
 mod dense;
 mod dynamics;
@@ -20,6 +21,7 @@ mod step;
 mod sums;
 mod wrench;
 
+pub use compiled::CompiledModel;
 pub use cost::{Form, LowerOptions};
 pub use dynamics::{JacobianPattern, dynamics, dynamics_jacobian};
 pub use error::LowerError;

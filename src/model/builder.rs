@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use serde_json::{Map, Value};
 
+use super::coordinate_names::CoordinateNames;
 use super::error::{ModelError, check_finite, check_shape};
 use super::identifier::Identifier;
 use super::library::Library;
@@ -11,7 +12,6 @@ use super::phase::{FeetRule, Phase, all_patterns};
 use super::projection::pinv_of_transpose;
 use super::rom::ReducedModel;
 use super::scaling::Scaling;
-use super::signals::Signals;
 use super::state_map::StateMap;
 use super::statistics::InputStatistics;
 use crate::robot::Robot;
@@ -29,8 +29,8 @@ pub struct ModelBuilder {
     library: Library,
     phases: Vec<Phase>,
     statistics: Vec<(String, InputStatistics)>,
-    state: Option<Signals>,
-    input: Option<Signals>,
+    state: Option<CoordinateNames>,
+    input: Option<CoordinateNames>,
     scaling: Option<Scaling>,
     encoder: Option<StateMap>,
     decoder: Option<StateMap>,
@@ -123,13 +123,13 @@ impl ModelBuilder {
     }
 
     /// Sets names and units of the state.
-    pub fn state(mut self, state: Signals) -> Self {
+    pub fn state(mut self, state: CoordinateNames) -> Self {
         self.state = Some(state);
         self
     }
 
     /// Sets names and units of the input.
-    pub fn input(mut self, input: Signals) -> Self {
+    pub fn input(mut self, input: CoordinateNames) -> Self {
         self.input = Some(input);
         self
     }
@@ -293,7 +293,7 @@ impl ModelBuilder {
     /// Checks shapes of encoder and decoder; returns the number of robot coordinates if known.
     fn check_maps(&self) -> Result<Option<usize>, ModelError> {
         let latent_dim = self.library.latent_dim();
-        let named = |signals: &Option<Signals>| signals.as_ref().map(Signals::dim);
+        let named = |signals: &Option<CoordinateNames>| signals.as_ref().map(CoordinateNames::dim);
         let state_dim = self
             .robot
             .map(|_| crate::robot::STATE_DIM)
@@ -381,7 +381,7 @@ fn identifier_of(what: &str, name: &str) -> Result<Identifier, ModelError> {
 
 fn check_robot_names(
     signals: &'static str,
-    given: &Option<Signals>,
+    given: &Option<CoordinateNames>,
     expected: &[String],
     robot: &Robot,
 ) -> Result<(), ModelError> {

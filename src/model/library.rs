@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::error::{ModelError, check_shape};
 use super::evaluation::Tape;
-use super::standard::{MAX_DEGREE, StandardLibrary};
+use super::standard_library::{MAX_DEGREE, StandardLibrary};
 use crate::symbolic::{ExprId, ExprPool, ParseError, SymbolId};
 
 /// Largest number of latent coordinates.

@@ -35,6 +35,7 @@
 mod activation;
 mod affine;
 mod builder;
+mod coordinate_names;
 mod error;
 mod evaluation;
 mod identifier;
@@ -44,8 +45,7 @@ mod phase;
 mod projection;
 mod rom;
 mod scaling;
-mod signals;
-mod standard;
+mod standard_library;
 mod state_map;
 mod statistics;
 
@@ -55,6 +55,7 @@ mod tests;
 pub use activation::Activation;
 pub use affine::AffineMap;
 pub use builder::ModelBuilder;
+pub use coordinate_names::CoordinateNames;
 pub use error::{Dimensions, ModelError, SignalPart};
 pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN};
 pub use library::{
@@ -65,7 +66,6 @@ pub use phase::{FeetRule, Phase};
 pub use projection::RANK_TOLERANCE;
 pub use rom::{LatentEquations, ReducedModel};
 pub use scaling::{ScaleFactors, Scaling};
-pub use signals::Signals;
-pub use standard::{MAX_DEGREE, StandardLibrary};
+pub use standard_library::{MAX_DEGREE, StandardLibrary};
 pub use state_map::{Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};
 pub use statistics::{InputStatistics, LatentInputStatistics};

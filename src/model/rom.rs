@@ -17,12 +17,12 @@ use nalgebra::{DMatrix, DVector};
 use serde_json::{Map, Value};
 
 use super::builder::ModelBuilder;
+use super::coordinate_names::CoordinateNames;
 use super::error::ModelError;
 use super::identifier::Identifier;
 use super::library::{CandidateTerm, Library};
 use super::phase::Phase;
 use super::scaling::Scaling;
-use super::signals::Signals;
 use super::state_map::StateMap;
 use super::statistics::InputStatistics;
 use crate::robot::{ContactFlags, Robot};
@@ -38,8 +38,8 @@ pub struct ReducedModel {
     pub(super) phases: Vec<Phase>,
     pub(super) phase_identifiers: Vec<Identifier>,
     pub(super) statistics: Vec<Option<InputStatistics>>,
-    pub(super) state: Option<Signals>,
-    pub(super) input: Option<Signals>,
+    pub(super) state: Option<CoordinateNames>,
+    pub(super) input: Option<CoordinateNames>,
     pub(super) scaling: Option<Scaling>,
     pub(super) encoder: Option<StateMap>,
     pub(super) decoder: Option<StateMap>,
@@ -101,8 +101,8 @@ impl ReducedModel {
         let decoder = self.decoder.as_ref().map(StateMap::output_dim);
         encoder
             .or(decoder)
-            .or(self.state.as_ref().map(Signals::dim))
-            .or(self.input.as_ref().map(Signals::dim))
+            .or(self.state.as_ref().map(CoordinateNames::dim))
+            .or(self.input.as_ref().map(CoordinateNames::dim))
     }
 
     /// The candidate terms.
@@ -133,12 +133,12 @@ impl ReducedModel {
     }
 
     /// Names and units of the state, if the file has them.
-    pub fn state(&self) -> Option<&Signals> {
+    pub fn state(&self) -> Option<&CoordinateNames> {
         self.state.as_ref()
     }
 
     /// Names and units of the input, if the file has them.
-    pub fn input(&self) -> Option<&Signals> {
+    pub fn input(&self) -> Option<&CoordinateNames> {
         self.input.as_ref()
     }
 

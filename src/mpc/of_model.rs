@@ -8,11 +8,12 @@ use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 
 use super::error::MpcError;
 use super::online::{
-    Controller, CurvedMaps, LatentDynamics, MpcSettings, Plant, PlantParts, PlantPhase,
+    ControlModel, ControlModelParts, ControlPhase, Controller, LatentDynamics, MpcSettings,
+    NonlinearMaps,
 };
+use crate::lower::CompiledModel;
 use crate::model::ReducedModel;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
-use crate::sim::CompiledModel;
 
 /// Share of the mean variance that is added to every variance, so that a direction in which the
 /// training inputs never moved has a finite weight.
@@ -37,16 +38,16 @@ impl Controller {
     ///
     /// # Errors
     /// [`MpcError::Control`] for settings out of range or a problem that the solver refuses, those
-    /// of [`Plant::new`] if the model lacks something and [`MpcError::Lower`] if its dynamics do
+    /// of [`ControlModel::new`] if the model lacks something and [`MpcError::Lower`] if its dynamics do
     /// not compile.
     pub fn new(model: &ReducedModel, settings: MpcSettings) -> Result<Self, MpcError> {
-        let plant = Plant::new(model)?;
+        let plant = ControlModel::new(model)?;
         let dynamics = Box::new(CompiledModel::new(model)?);
         Ok(Self::with_plant(plant, dynamics, settings)?)
     }
 }
 
-impl Plant {
+impl ControlModel {
     /// Reads off a model what the controller needs.
     ///
     /// Of a nonlinear model the matrices are those at the state that the decoder gives for `z = 0`,
@@ -86,7 +87,7 @@ impl Plant {
         for phase in 0..model.phases().len() {
             phases.push(phase_of(model, phase)?);
         }
-        Ok(Self::from_parts(PlantParts {
+        Ok(Self::from_parts(ControlModelParts {
             robot,
             encoder: scaled_columns(encoder.weights(), &state_factors),
             encoder_bias: encoder.bias().clone(),
@@ -107,7 +108,7 @@ struct ModelMaps(ReducedModel);
 
 const CHECKED: &str = "invariant: the plant was made of this model";
 
-impl CurvedMaps for ModelMaps {
+impl NonlinearMaps for ModelMaps {
     fn encode(&self, x: &[f64], z: &mut [f64]) {
         let encoded = self.0.encode(&DVector::from_column_slice(x));
         z.copy_from_slice(encoded.expect(CHECKED).as_slice());
@@ -139,14 +140,14 @@ impl CurvedMaps for ModelMaps {
         projection.ok()
     }
 
-    fn phases(&self, x: &[f64]) -> Option<Vec<PlantPhase>> {
+    fn phases(&self, x: &[f64]) -> Option<Vec<ControlPhase>> {
         let model = self.0.linearised_at(&DVector::from_column_slice(x)).ok()?;
         let phases = (0..model.phases().len()).map(|phase| phase_of(&model, phase));
         phases.collect::<Result<_, _>>().ok()
     }
 }
 
-fn phase_of(model: &ReducedModel, phase: usize) -> Result<PlantPhase, MpcError> {
+fn phase_of(model: &ReducedModel, phase: usize) -> Result<ControlPhase, MpcError> {
     let name = model.phases()[phase].name.clone();
     let latent = model.latent_input_statistics(phase)?;
     let input = model.input_statistics(phase)?;
@@ -165,7 +166,7 @@ fn phase_of(model: &ReducedModel, phase: usize) -> Result<PlantPhase, MpcError> 
     let torque_precision = Cholesky::new(torque_covariance)
         .ok_or_else(unusable)?
         .inverse();
-    Ok(PlantPhase {
+    Ok(ControlPhase {
         is_grounded: model.phase_for([false; 4]) != Some(phase),
         torque_mean: SVector::from_fn(|joint, _| input.mean[joint]),
         torque_precision: SMatrix::from_fn(|row, col| torque_precision[(row, col)]),

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use super::contents::stem;
 use super::figures::{Figure, LinePlot, Panel, Role, Series};
+use crate::evaluate::{Run, StepRow};
 use crate::model::ReducedModel;
-use crate::mpc::{Lift, MpcSettings, Run, StepRow};
+use crate::mpc::{Lift, MpcSettings};
 use crate::robot::{JOINT_DIM, Robot};
 
 const PANEL: (f64, f64) = (240.0, 150.0);

@@ -5,10 +5,10 @@ use askama::Template;
 use super::contents::{AllFigures, Content};
 use super::figures::{Figure, panel_svg};
 use crate::artifact;
-use crate::backend::EmitError;
-use crate::backend::latex::{LatexOptions, tex_cases};
-use crate::backend::mathml::{HtmlText, system};
-use crate::backend::typeset::{Rounding, SymbolTable, Typeset, words};
+use crate::typeset::TypesetError;
+use crate::typeset::latex::{LatexOptions, tex_cases};
+use crate::typeset::mathml::{HtmlText, system};
+use crate::typeset::{Rounding, SymbolTable, Typeset, words};
 
 /// Longest line of an equation, in em.
 const WIDTH_EM: f64 = 44.0;
@@ -54,12 +54,12 @@ pub struct PageOptions {
 /// The report as one HTML page: no request to anywhere, one small script for copying equations.
 ///
 /// # Errors
-/// [`EmitError`] if a candidate term has a variable without a symbol.
+/// [`TypesetError`] if a candidate term has a variable without a symbol.
 pub fn page(
     content: &Content<'_>,
     figures: &AllFigures,
     options: &PageOptions,
-) -> Result<String, EmitError> {
+) -> Result<String, TypesetError> {
     let model = content.model;
     let mut sections = vec![
         section(

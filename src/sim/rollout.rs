@@ -8,10 +8,10 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::compiled::CompiledModel;
 use super::error::SimError;
 use super::integrate::{Integration, IntegrationMethod, IntegrationOptions, integrate};
 use super::latent::LatentSegment;
+use crate::lower::CompiledModel;
 
 /// When a rollout starts again from the recorded latent state.
 #[derive(Debug, Clone, Copy, PartialEq)]

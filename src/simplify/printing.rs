@@ -4,9 +4,9 @@ use super::domain::{Domain, Samples};
 use super::error::SimplifyError;
 use super::measure::{Measured, at_samples};
 use super::workspace::Workspace;
-use crate::backend::typeset::{Decimal, Rounding};
 use crate::model::ReducedModel;
 use crate::symbolic::Interval;
+use crate::typeset::{Decimal, Rounding};
 
 /// How far a printed equation can be from the model's.
 #[derive(Clone, Debug, PartialEq)]

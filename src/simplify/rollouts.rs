@@ -1,13 +1,12 @@
 //! What simplification does to rollouts over recordings.
 
 use super::domain::Domain;
-use crate::Error;
 use crate::evaluate::CoordinateSums;
+use crate::evaluate::EvaluateError;
+use crate::lower::CompiledModel;
 use crate::model::ReducedModel;
 use crate::recording::Segment;
-use crate::sim::{
-    CompiledModel, IntegrationOptions, LatentSegment, Restart, Rollout, Window, rollout,
-};
+use crate::sim::{IntegrationOptions, LatentSegment, Restart, Rollout, Window, rollout};
 
 /// Names of the coordinates in which rollouts are compared.
 const BODY: &str = "body.";
@@ -56,12 +55,12 @@ impl RolloutBasis<'_> {
     /// Rolls both models out, whole and restarted.
     ///
     /// # Errors
-    /// [`Error::Model`] for a latent-only model, [`Error::Sim`] if the integrator refuses.
+    /// [`EvaluateError::Model`] for a latent-only model, [`EvaluateError::Sim`] if the integrator refuses.
     pub fn effect(
         &self,
         model: &ReducedModel,
         simplified: &ReducedModel,
-    ) -> Result<RolloutEffect, Error> {
+    ) -> Result<RolloutEffect, EvaluateError> {
         let (names, units) = body(model).map(|(_, name, unit)| (name, unit)).unzip();
         Ok(RolloutEffect {
             names,
@@ -76,7 +75,7 @@ impl RolloutBasis<'_> {
     ///
     /// # Errors
     /// As [`RolloutBasis::effect`].
-    pub fn errors(&self, model: &ReducedModel) -> Result<RolloutErrors, Error> {
+    pub fn errors(&self, model: &ReducedModel) -> Result<RolloutErrors, EvaluateError> {
         let coordinates: Vec<usize> = body(model).map(|(index, _, _)| index).collect();
         let compiled = CompiledModel::new(model)?;
         let mut errors = RolloutErrors {

@@ -421,7 +421,7 @@ fn printing_error_is_bounded_by_what_was_cut_off() {
     let model = single(&[("z1", 0.126), ("u1", 1.0)]);
     let ranges = vec![Some(vec![Interval::new(-2.0, 1.0); 3])];
     let domain = Domain::new(&model, ranges).expect("a box");
-    let rounding = crate::backend::typeset::Rounding::Decimals(2);
+    let rounding = crate::typeset::Rounding::Decimals(2);
     let printed = printed(&model, &domain, None, rounding).expect("evaluates");
     let bound = printed[0].bound.expect("has a box");
     assert!((bound.magnitude() - 0.008).abs() < 1e-12, "{bound}");

@@ -11,8 +11,8 @@ use super::error::TrainError;
 use super::options::TrainOptions;
 use super::report::TrainReport;
 use crate::model::{
-    FeetRule, InputStatistics, Library, Phase, ReducedModel, ScaleFactors, Scaling, Signals,
-    StateMap,
+    CoordinateNames, FeetRule, InputStatistics, Library, Phase, ReducedModel, ScaleFactors,
+    Scaling, StateMap,
 };
 use crate::recording::Recording;
 use crate::recording::phases::FeetPattern;
@@ -124,8 +124,8 @@ fn description(options: &TrainOptions, robot: &Robot) -> String {
     )
 }
 
-fn signals<const N: usize>(names: [String; N], units: [String; N]) -> Signals {
-    Signals {
+fn signals<const N: usize>(names: [String; N], units: [String; N]) -> CoordinateNames {
+    CoordinateNames {
         names: names.into(),
         units: units.into(),
     }

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::ir::kernel::{LIMIT, reduced_sin_cos, sin_cos};
+use crate::ir::sin_cos::{LIMIT, reduced_sin_cos, sin_cos};
 use crate::model::{LatentVariable, Library};
 use crate::symbolic::{ExprId, Function, Node, SymbolId};
 

@@ -16,7 +16,7 @@ use super::rollout::Candidate;
 use super::select::{Choice, Judge, select};
 use super::sparse::active_terms;
 use super::subspace::Moments;
-use super::varimax::{name_columns, varimax};
+use super::varimax::{order_and_sign, varimax};
 use crate::model::{AffineMap, StateMap};
 use crate::robot::Robot;
 
@@ -175,14 +175,14 @@ pub(super) fn encoder_over(
     options: &TrainOptions,
 ) -> Result<AffineMap, TrainError> {
     let x = training.gather(Quantity::X, None);
-    let weights = telling_basis(training, basis, options).0.transpose();
+    let weights = canonical_basis(training, basis, options).0.transpose();
     let bias = -(&weights * x.column_mean());
     Ok(AffineMap::new("encoder", weights, bias)?)
 }
 
 /// `basis T` (`18 x d`) and the orthogonal `T` (`d x d`) for which its columns are simple in the sense of varimax, in a
 /// telling order and with telling signs.
-pub(super) fn telling_basis(
+pub(super) fn canonical_basis(
     training: &Dataset,
     basis: &DMatrix<f64>,
     options: &TrainOptions,
@@ -196,7 +196,7 @@ pub(super) fn telling_basis(
         turn = varimax(&loadings(&basis));
         basis *= &turn;
     }
-    let (order, signs) = name_columns(&loadings(&basis), &[BODY_X, BODY_Z]);
+    let (order, signs) = order_and_sign(&loadings(&basis), &[BODY_X, BODY_Z]);
     let named = |matrix: DMatrix<f64>| {
         let mut named = matrix.select_columns(&order);
         for (mut column, sign) in named.column_iter_mut().zip(&signs) {

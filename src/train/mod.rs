@@ -17,7 +17,7 @@ pub mod select;
 pub mod sparse;
 pub mod subspace;
 pub mod varimax;
-pub mod weak;
+pub mod weak_form;
 
 mod assemble;
 mod error;

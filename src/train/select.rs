@@ -12,7 +12,7 @@ use super::progress::Watch;
 use super::prune::Refined;
 use super::rollout::{Candidate, Window, predict, restarted, whole};
 use super::sparse::{Pruning, Regression, active_terms};
-use super::weak::{check_terms, windowed_samples};
+use super::weak_form::{check_terms, windowed_samples};
 
 /// How a candidate was fitted, and how it did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -35,7 +35,7 @@ pub fn varimax(loadings: &DMatrix<f64>) -> DMatrix<f64> {
 ///
 /// The first coordinate of `order_by` takes the column that weighs it most, then the next one, so that a reader
 /// meets body x as z1 and body z as z2 whenever the space holds them.
-pub fn name_columns(loadings: &DMatrix<f64>, order_by: &[usize]) -> (Vec<usize>, Vec<f64>) {
+pub fn order_and_sign(loadings: &DMatrix<f64>, order_by: &[usize]) -> (Vec<usize>, Vec<f64>) {
     let mut left: Vec<usize> = (0..loadings.ncols()).collect();
     let mut order = Vec::with_capacity(left.len());
     for &coordinate in order_by {
@@ -121,7 +121,7 @@ mod tests {
     fn columns_follow_the_named_coordinates_and_point_upwards() {
         let loadings =
             DMatrix::from_row_slice(3, 3, &[0.1, 0.0, -3.0, 0.2, 5.0, 0.1, -1.0, 0.1, 0.0]);
-        let (order, signs) = name_columns(&loadings, &[0, 1]);
+        let (order, signs) = order_and_sign(&loadings, &[0, 1]);
         assert_eq!(order, [2, 1, 0]);
         assert_eq!(signs, [-1.0, 1.0, -1.0]);
     }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::Command;
 
-use romc::backend::Precision;
+use romc::codegen::Precision;
 use romc::lower::{Form, LowerOptions};
 use romc::model::ReducedModel;
 

@@ -5,8 +5,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use romc::backend::{EmitOptions, Precision, Target, emit, write_files};
+use romc::codegen::Precision;
+use romc::deploy::{EmitOptions, Target, emit};
 use romc::files::Overwrite;
+use romc::files::write_files;
 use romc::lower::LowerOptions;
 use romc::model::ReducedModel;
 

@@ -1,6 +1,6 @@
 //! Generated code in single precision: the interpreter's very numbers, and within the stated bound.
 
-use romc::backend::{Precision, worst_errors};
+use romc::codegen::{Precision, worst_errors};
 use romc::ir::{Interpreter, Range};
 use romc::lower::{Form, LowerOptions};
 use romc::model::ReducedModel;

@@ -7,10 +7,10 @@
 )]
 
 use romc::artifact;
-use romc::artifact::import::{
+use romc::deploy::{EmitOptions, Target, emit};
+use romc::import::{
     Format, ImportOptions, LibraryChoice, LibraryOrder, import_from_bytes, parse_standard,
 };
-use romc::backend::{EmitOptions, Target, emit};
 use romc::model::{ReducedModel, Scaling};
 use romc::recording::check::{CheckOptions, check, without};
 use romc::recording::preprocess::{PreprocessOptions, prepare};

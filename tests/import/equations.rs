@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use nalgebra::DVector;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use romc::artifact::import::*;
+use romc::import::*;
 use romc::model::{ReducedModel, StandardLibrary};
 
 use crate::store::*;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{DMatrix, DVector};
-use romc::artifact::import::*;
+use romc::import::*;
 use romc::model::{Activation, ModelError, Scaling};
 use zip::CompressionMethod;
 

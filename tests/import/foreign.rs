@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, DVector};
-use romc::artifact::import::*;
+use romc::import::*;
 use romc::model::{Scaling, StandardLibrary};
 use romc::robot::Robot;
 use serde_json::Value;

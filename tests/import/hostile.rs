@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use romc::artifact::import::*;
+use romc::import::*;
 use romc::model::Scaling;
 use zip::CompressionMethod;
 

@@ -1,7 +1,7 @@
 //! A model stored in any of the usual ways is the same model after its import.
 
 use nalgebra::DMatrix;
-use romc::artifact::import::*;
+use romc::import::*;
 use romc::model::ReducedModel;
 use zip::CompressionMethod;
 

@@ -4,7 +4,8 @@ use std::io::{Cursor, Write};
 use std::path::Path;
 
 use nalgebra::DMatrix;
-use romc::artifact::{self, import::*};
+use romc::artifact;
+use romc::import::*;
 use romc::model::{LibrarySource, ReducedModel};
 use safetensors::tensor::{Dtype, TensorView};
 use serde_json::Value;

@@ -1,13 +1,13 @@
 //! What the controller commands when all is well.
 
 use nalgebra::DVector;
+use romc::lower::CompiledModel;
 use romc::model::ReducedModel;
 use romc::mpc::{
     Command, ControlError, Controller, Drift, Linearisation, Measurement, MissingInput, MpcError,
     MpcSettings, ReferenceSamples, Source, Status,
 };
 use romc::robot::ContactFlags;
-use romc::sim::CompiledModel;
 
 use crate::synthetic::{D, Equations, STAND, Trajectory, decoded, model, trajectory};
 

@@ -2,13 +2,13 @@
 
 use nalgebra::{DMatrix, DVector, SVector, Vector3};
 use romc::model::{InputStatistics, ReducedModel};
-use romc::mpc::{ConsistentLift, Footing, LiftFailure, MpcSettings, Plant};
+use romc::mpc::{ConsistentLift, ControlModel, LiftFailure, MpcSettings, StanceState};
 use romc::robot::{Leg, Robot};
 
 use crate::random::Random;
 use crate::synthetic::{D, Equations, STAND, model, model_with};
 
-const FOOTING: Footing = Footing {
+const FOOTING: StanceState = StanceState {
     joints_rad: [
         0.0, 0.8, -1.6, 0.0, 0.8, -1.6, 0.0, 0.8, -1.6, 0.0, 0.8, -1.6,
     ],
@@ -74,7 +74,7 @@ fn informed_model() -> ReducedModel {
     model_with(Equations::Linear, InputStatistics { mean, covariance })
 }
 
-fn projected(plant: &Plant, torque: &[f64; 12]) -> [f64; D] {
+fn projected(plant: &ControlModel, torque: &[f64; 12]) -> [f64; D] {
     let mut u_lat = [0.0; D];
     plant.project(with_wrench(torque).as_slice(), &mut u_lat);
     u_lat
@@ -82,7 +82,7 @@ fn projected(plant: &Plant, torque: &[f64; 12]) -> [f64; D] {
 
 #[test]
 fn projecting_a_lifted_input_returns_it() {
-    let plant = Plant::new(&model(Equations::Linear)).expect("complete");
+    let plant = ControlModel::new(&model(Equations::Linear)).expect("complete");
     let mut random = Random::new(9);
     for _ in 0..50 {
         let u_lat: [f64; D] = std::array::from_fn(|_| random.normal());
@@ -96,7 +96,7 @@ fn projecting_a_lifted_input_returns_it() {
 
 #[test]
 fn consistent_lift_recovers_torques_that_obey_the_ground() {
-    let plant = Plant::new(&informed_model()).expect("complete");
+    let plant = ControlModel::new(&informed_model()).expect("complete");
     let settings = MpcSettings {
         lift_prior_weight: 1e-6,
         ..MpcSettings::default()
@@ -132,7 +132,7 @@ fn cone_violation(torque: &[f64; 12], friction: f64) -> f64 {
 }
 
 /// The cost of the lift as its documentation states it.
-fn cost(plant: &Plant, torque: &[f64; 12], u_lat: &[f64; D], weight: f64) -> f64 {
+fn cost(plant: &ControlModel, torque: &[f64; 12], u_lat: &[f64; D], weight: f64) -> f64 {
     let reached = projected(plant, torque);
     let phase = &plant.phases()[0];
     let off = SVector::<f64, 12>::from(*torque) - phase.torque_mean;
@@ -146,7 +146,7 @@ fn cost(plant: &Plant, torque: &[f64; 12], u_lat: &[f64; D], weight: f64) -> f64
 
 #[test]
 fn consistent_lift_of_a_slipping_push_stays_in_the_cones_and_nothing_near_is_better() {
-    let plant = Plant::new(&informed_model()).expect("complete");
+    let plant = ControlModel::new(&informed_model()).expect("complete");
     let settings = MpcSettings {
         foot_friction: 0.5,
         ..MpcSettings::default()
@@ -182,7 +182,7 @@ fn consistent_lift_of_a_slipping_push_stays_in_the_cones_and_nothing_near_is_bet
 
 #[test]
 fn consistent_lift_of_a_giant_input_stays_within_the_torque_limits() {
-    let plant = Plant::new(&informed_model()).expect("complete");
+    let plant = ControlModel::new(&informed_model()).expect("complete");
     let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
     let wanted = projected(&plant, &torque_for([Vector3::new(0.0, 0.0, 900.0); 4]));
     let found = lift.lift(&plant, &wanted, &FOOTING).expect("bent legs");
@@ -200,10 +200,10 @@ fn consistent_lift_of_a_giant_input_stays_within_the_torque_limits() {
 
 #[test]
 fn feet_in_the_air_have_no_cone() {
-    let plant = Plant::new(&informed_model()).expect("complete");
+    let plant = ControlModel::new(&informed_model()).expect("complete");
     let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
     let wanted = projected(&plant, &torque_for([Vector3::new(8.0, 0.0, -6.0); 4]));
-    let flying = Footing {
+    let flying = StanceState {
         feet: [false; 4],
         phase: 1,
         ..FOOTING
@@ -217,7 +217,7 @@ fn feet_in_the_air_have_no_cone() {
 
 #[test]
 fn stretched_leg_is_a_failure_in_contact_only() {
-    let plant = Plant::new(&informed_model()).expect("complete");
+    let plant = ControlModel::new(&informed_model()).expect("complete");
     let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
     let mut stretched = FOOTING;
     stretched.joints_rad[5] = 0.0;

@@ -3,9 +3,8 @@
 use std::path::Path;
 
 use nalgebra::DMatrix;
-use romc::mpc::{
-    Controller, Lift, MpcSettings, ReferenceInput, Source, along_recording, lift_comparison,
-};
+use romc::evaluate::{ReferenceInput, along_recording, lift_comparison};
+use romc::mpc::{Controller, Lift, MpcSettings, Source};
 use romc::recording::{Recording, Segment};
 
 use crate::synthetic::{Equations, Trajectory, model, trajectory};

@@ -1,10 +1,10 @@
 //! A made-up robot model that is random but stable, and trajectories that it follows exactly.
 
 use nalgebra::{DMatrix, DVector};
+use romc::lower::CompiledModel;
 use romc::model::{AffineMap, FeetRule, InputStatistics, Library, Phase, ReducedModel, Scaling};
 use romc::mpc::ReferenceSamples;
 use romc::robot::{ContactFlags, Robot};
-use romc::sim::CompiledModel;
 
 use crate::random::Random;
 

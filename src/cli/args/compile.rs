@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::command::OutputArguments;
-use crate::backend::Target;
-use crate::backend::typeset::MOST_DIGITS;
+use crate::deploy::Target;
 use crate::simplify::Tolerance;
+use crate::typeset::MOST_DIGITS;
 
 /// `romc compile`
 #[derive(Debug, Args)]

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::command::OutputArguments;
 use super::number::{at_least_one, positive_seconds};
-use crate::artifact::import::{Format, ImportError, Mapping, PhaseRule, parse_standard};
+use crate::import::{Format, ImportError, Mapping, PhaseRule, parse_standard};
 use crate::model::{Activation, StandardLibrary};
 
 /// Kinds of files that can be imported.

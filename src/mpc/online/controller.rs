@@ -5,13 +5,13 @@ use std::time::Instant;
 use nalgebra::{DMatrix, SVector};
 
 use super::command::{Command, Source, Status};
+use super::control_model::ControlModel;
 use super::dynamics::LatentDynamics;
 use super::error::ControlError;
 use super::fallback::Memory;
-use super::horizon::{Contact, Horizon, Scene};
-use super::lift::{ConsistentLift, Footing, LiftFailure};
+use super::horizon::{Contact, Horizon, StageInputs};
+use super::lift::{ConsistentLift, LiftFailure, StanceState};
 use super::plan::Plan;
-use super::plant::Plant;
 use super::problem::{ROW_MARGIN, StageRows, row_selection};
 use super::qp::{Outcome, QpSolver};
 use super::reference::{Reference, ReferenceSamples};
@@ -34,16 +34,16 @@ const SMALL_FORCE_N: f64 = 1.0;
 /// measurements make sense again, so do commands.
 #[derive(Debug)]
 pub struct Controller {
-    pub(super) plant: Plant,
+    pub(super) plant: ControlModel,
     /// The plant with its maps at the last state that was believed, if they depend on the state.
-    local: Option<Plant>,
+    local: Option<ControlModel>,
     dynamics: Box<dyn LatentDynamics>,
     pub(super) settings: MpcSettings,
     /// Rows for any reference; the transcription has those that matter near the present one.
     rows: StageRows,
     transcription: Transcription,
     solver: QpSolver,
-    roots: Vec<DMatrix<f64>>,
+    input_cholesky: Vec<DMatrix<f64>>,
     horizon: Horizon,
     consistent: Option<ConsistentLift>,
     pub(super) reference: Option<Reference>,
@@ -73,7 +73,7 @@ impl Controller {
     /// [`ControlError::Setting`] for settings out of range and [`ControlError::Solver`] if the
     /// solver refuses the problem.
     pub fn with_plant(
-        plant: Plant,
+        plant: ControlModel,
         dynamics: Box<dyn LatentDynamics>,
         settings: MpcSettings,
     ) -> Result<Self, ControlError> {
@@ -89,7 +89,7 @@ impl Controller {
         Ok(Self {
             dynamics,
             solver: QpSolver::new(program, settings.qp)?,
-            roots: roots(&plant),
+            input_cholesky: input_cholesky(&plant),
             plan: Plan::new(d, settings.horizon, settings.step_s),
             posture: vec![0.0; 2 * d],
             memory: Memory::new(d),
@@ -105,20 +105,20 @@ impl Controller {
     }
 
     /// The model's numbers.
-    pub fn plant(&self) -> &Plant {
+    pub fn plant(&self) -> &ControlModel {
         &self.plant
     }
 
     /// The same with the maps at the last measured state, where they depend on the state: what
     /// inputs are projected and lifted by.
-    pub fn local_plant(&self) -> &Plant {
+    pub fn local_plant(&self) -> &ControlModel {
         self.local.as_ref().unwrap_or(&self.plant)
     }
 
     /// Takes the maps at a state (18, SI units), as each measurement does, if they depend on it; where
     /// the encoder's Jacobian has not full row rank the maps stay those of the state before.
     pub fn stand_at(&mut self, x: &[f64]) {
-        if !self.plant.is_curved() {
+        if !self.plant.is_nonlinear() {
             return;
         }
         let mut z = vec![0.0; self.plant.latent_dim()];
@@ -164,9 +164,9 @@ impl Controller {
     /// As [`Reference::new`] and [`QpSolver::new`]; the old reference stays.
     pub fn set_reference(&mut self, samples: ReferenceSamples<'_>) -> Result<(), ControlError> {
         let mut reference = Reference::new(&self.plant, samples)?;
-        if self.plant.is_curved() {
+        if self.plant.is_nonlinear() {
             self.plant.take_statistics_at(&mean_state(samples.x));
-            self.roots = roots(&self.plant);
+            self.input_cholesky = input_cholesky(&self.plant);
         }
         if !reference.has_input() && self.settings.missing_input == MissingInput::Estimate {
             reference.estimate_input(&self.plant, self.dynamics.as_mut());
@@ -202,17 +202,17 @@ impl Controller {
         Ok(())
     }
 
-    /// Torques, N m, that this controller's lift makes of a latent input on a footing; not clamped.
+    /// Torques, N m, that this controller's lift makes of a latent input on a stance; not clamped.
     ///
     /// # Errors
     /// [`LiftFailure`] of the consistent lift; the transpose lift has none.
     pub fn lift(
         &mut self,
         u_lat: &[f64],
-        footing: &Footing,
+        stance: &StanceState,
     ) -> Result<[f64; JOINT_DIM], LiftFailure> {
         match &mut self.consistent {
-            Some(lift) => lift.lift(&self.plant, u_lat, footing),
+            Some(lift) => lift.lift(&self.plant, u_lat, stance),
             None => {
                 let input = self.local_plant().lift(u_lat);
                 Ok(std::array::from_fn(|joint| input[joint]))
@@ -288,14 +288,15 @@ impl Controller {
         self.plant.encode(measurement.x, z);
         self.plant
             .encode_velocity_at(measurement.x, measurement.dx, dz);
-        let surprise = self.plan.surprise(
+        let normalised_innovation = self.plan.normalised_innovation(
             measurement.time_s,
             &self.memory.measured,
             reference.deviation(),
         );
         let fallback = &self.settings.fallback;
-        if surprise.is_some_and(|surprise| surprise.is_nan() || surprise > fallback.jump_deviations)
-        {
+        if normalised_innovation.is_some_and(|normalised_innovation| {
+            normalised_innovation.is_nan() || normalised_innovation > fallback.jump_deviations
+        }) {
             self.memory.disbelieved += 1;
             if self.memory.disbelieved <= fallback.jump_patience {
                 return Err(Status::MeasurementJump);
@@ -311,7 +312,7 @@ impl Controller {
         let Some(reference) = &self.reference else {
             return Status::NoReference;
         };
-        let scene = Scene {
+        let inputs = StageInputs {
             plant: &self.plant,
             settings: &self.settings,
             reference,
@@ -321,7 +322,7 @@ impl Controller {
         let (time_s, feet) = (measurement.time_s, measurement.feet);
         let contact = self
             .horizon
-            .prepare(&scene, self.dynamics.as_mut(), time_s, feet);
+            .prepare(&inputs, self.dynamics.as_mut(), time_s, feet);
         let last = self.settings.horizon - 1;
         let step = StepData {
             stages: self.horizon.stages(),
@@ -329,7 +330,7 @@ impl Controller {
             measured: &self.memory.measured,
             last_input: &self.memory.input,
             deviation: reference.deviation(),
-            roots: &self.roots,
+            input_cholesky: &self.input_cholesky,
         };
         self.transcription.write(&step, self.solver.program_mut());
         let outcome = self.solver.solve();
@@ -358,7 +359,7 @@ impl Controller {
             );
         }
         command.slack = self.largest_violation();
-        self.memory.footing = Some(Footing {
+        self.memory.stance = Some(StanceState {
             joints_rad: std::array::from_fn(|joint| measurement.x[joint]),
             attitude_rad: [measurement.x[15], measurement.x[16]],
             feet: measurement.feet,
@@ -406,9 +407,9 @@ impl Controller {
         command.joint_position_rad = self.plant.clamp_joints(self.plant.decode_joints(z));
         command.joint_velocity_rad_s = self.plant.decode_joint_velocities_at(z, dz);
         let lifted = self.local_plant().lift(input);
-        let torque = match (&mut self.consistent, &self.memory.footing) {
+        let torque = match (&mut self.consistent, &self.memory.stance) {
             (None, _) => std::array::from_fn(|joint| lifted[joint]),
-            (Some(lift), Some(footing)) => match lift.lift(&self.plant, input, footing) {
+            (Some(lift), Some(stance)) => match lift.lift(&self.plant, input, stance) {
                 Ok(torque) => torque,
                 Err(_) => return false,
             },
@@ -426,14 +427,14 @@ impl Controller {
         lifted: &[f64; STATE_DIM],
         torque_nm: &[f64; JOINT_DIM],
     ) -> Option<f64> {
-        let footing = self.memory.footing.as_ref()?;
-        if !footing.feet.contains(&true) {
+        let stance = self.memory.stance.as_ref()?;
+        if !stance.feet.contains(&true) {
             return None;
         }
         let map = self
             .plant
             .robot()
-            .wrench_map(&footing.joints_rad, footing.feet)
+            .wrench_map(&stance.joints_rad, stance.feet)
             .ok()?;
         let produced = map * SVector::<f64, JOINT_DIM>::from(*torque_nm);
         let force = SVector::<f64, 6>::from_fn(|axis, _| lifted[JOINT_DIM + axis]);
@@ -442,7 +443,7 @@ impl Controller {
 }
 
 /// Scales of the inputs by phase.
-fn roots(plant: &Plant) -> Vec<DMatrix<f64>> {
+fn input_cholesky(plant: &ControlModel) -> Vec<DMatrix<f64>> {
     let phases = plant.phases().iter();
     phases.map(|phase| phase.latent_root.clone()).collect()
 }

@@ -21,8 +21,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
+use super::control_model::{ControlModel, ControlPhase};
 use super::dynamics::LatentDynamics;
-use super::plant::{Plant, PlantPhase};
 
 /// Half width of the window in which velocities are fitted by a straight line, s.
 const HALF_WINDOW_S: f64 = 0.016 + 1e-9;
@@ -51,7 +51,7 @@ struct Evidence {
 
 /// Latent inputs, `latent_dim` a sample.
 pub(super) fn estimate_input(
-    plant: &Plant,
+    plant: &ControlModel,
     dynamics: &mut dyn LatentDynamics,
     motion: &Motion<'_>,
 ) -> Vec<f64> {
@@ -78,7 +78,7 @@ pub(super) fn estimate_input(
 }
 
 /// Adds `S Bᵀ (B S Bᵀ + R)⁻¹ y` to the inputs of one phase's samples.
-fn add_estimates(phase: &PlantPhase, evidence: &[Evidence], input: &mut [f64]) {
+fn add_estimates(phase: &ControlPhase, evidence: &[Evidence], input: &mut [f64]) {
     let d = phase.latent_mean.len();
     // A covariance of fewer samples than this says nothing about the residual.
     if evidence.len() < 4 * d {

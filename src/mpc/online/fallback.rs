@@ -5,7 +5,7 @@
 
 use super::command::{Command, Source, Status};
 use super::controller::Controller;
-use super::lift::Footing;
+use super::lift::StanceState;
 use crate::robot::JOINT_DIM;
 
 /// What a fallback goes back to.
@@ -14,7 +14,7 @@ pub(super) struct Memory {
     pub time_s: Option<f64>,
     pub measured: Vec<f64>,
     pub input: Vec<f64>,
-    pub footing: Option<Footing>,
+    pub stance: Option<StanceState>,
     pub joint_velocity: [f64; JOINT_DIM],
     /// Feed-forward part of the last torques, without a hold's damping.
     pub feed_forward_nm: [f64; JOINT_DIM],
@@ -29,7 +29,7 @@ impl Memory {
             time_s: None,
             measured: vec![0.0; 2 * latent_dim],
             input: vec![0.0; latent_dim],
-            footing: None,
+            stance: None,
             joint_velocity: [0.0; JOINT_DIM],
             feed_forward_nm: [0.0; JOINT_DIM],
             joint_position: None,

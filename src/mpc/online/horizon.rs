@@ -1,9 +1,9 @@
 //! The stages of the horizon at a control step: phases, reference, linearised dynamics.
 
+use super::control_model::ControlModel;
 use super::dynamics::LatentDynamics;
 use super::linearise::{Lineariser, StageModel};
 use super::plan::Plan;
-use super::plant::Plant;
 use super::problem::{BodyFriction, StageRows};
 use super::reference::Reference;
 use super::settings::{Drift, Linearisation, MpcSettings};
@@ -39,9 +39,9 @@ pub struct Horizon {
 
 /// What the stages are prepared from.
 #[derive(Debug, Clone, Copy)]
-pub struct Scene<'a> {
+pub struct StageInputs<'a> {
     /// The model's numbers.
-    pub plant: &'a Plant,
+    pub plant: &'a ControlModel,
     /// The settings.
     pub settings: &'a MpcSettings,
     /// What to follow.
@@ -87,22 +87,22 @@ impl Horizon {
     /// Prepares all stages from a time on with the feet as measured then.
     pub fn prepare(
         &mut self,
-        scene: &Scene<'_>,
+        inputs: &StageInputs<'_>,
         dynamics: &mut dyn LatentDynamics,
         time_s: f64,
         feet: ContactFlags,
     ) -> Contact {
-        let contact = self.schedule(scene, time_s, feet);
-        self.reuse(scene.settings, time_s);
+        let contact = self.schedule(inputs, time_s, feet);
+        self.reuse(inputs.settings, time_s);
         for index in 0..self.stages.len() {
-            let start_s = time_s + index as f64 * scene.settings.step_s;
+            let start_s = time_s + index as f64 * inputs.settings.step_s;
             let is_made = self.made_for[index]
                 .is_some_and(|made| (made - start_s).abs() < TIME_TOLERANCE_S)
                 && self.stages[index].phase == self.phases[index];
             if !is_made {
-                self.make_reference(scene, index, start_s);
-                self.linearise(scene, dynamics, index, start_s);
-                self.made_for[index] = match scene.settings.linearisation {
+                self.make_reference(inputs, index, start_s);
+                self.linearise(inputs, dynamics, index, start_s);
+                self.made_for[index] = match inputs.settings.linearisation {
                     Linearisation::Reference => Some(start_s),
                     Linearisation::LastPlan => None,
                 };
@@ -112,13 +112,13 @@ impl Horizon {
     }
 
     /// Phases of all stages: the reference's, changed where the feet disagree.
-    fn schedule(&mut self, scene: &Scene<'_>, time_s: f64, feet: ContactFlags) -> Contact {
-        let Scene {
+    fn schedule(&mut self, inputs: &StageInputs<'_>, time_s: f64, feet: ContactFlags) -> Contact {
+        let StageInputs {
             plant,
             settings,
             reference,
             ..
-        } = *scene;
+        } = *inputs;
         let scheduled = |time_s: f64| {
             plant
                 .phase_for(reference.feet_at(time_s))
@@ -169,13 +169,13 @@ impl Horizon {
         }
     }
 
-    fn make_reference(&mut self, scene: &Scene<'_>, index: usize, start_s: f64) {
-        let Scene {
+    fn make_reference(&mut self, inputs: &StageInputs<'_>, index: usize, start_s: f64) {
+        let StageInputs {
             plant,
             settings,
             reference,
             ..
-        } = *scene;
+        } = *inputs;
         let stage = &mut self.stages[index];
         stage.phase = self.phases[index];
         reference.state_at(start_s, &mut stage.state);
@@ -188,7 +188,7 @@ impl Horizon {
         stage.rows = reference.robot_state_at(start_s).and_then(|x| {
             let z = &self.ends[index][..plant.latent_dim()];
             let local = plant.tangent_at(&x, z)?;
-            scene.rows.with_maps_of(&local, settings)
+            inputs.rows.with_maps_of(&local, settings)
         });
         let local = stage.rows.as_ref().and_then(|rows| rows.friction.as_ref());
         if let Some(friction) = local.or(self.friction.as_ref()) {
@@ -203,17 +203,17 @@ impl Horizon {
 
     fn linearise(
         &mut self,
-        scene: &Scene<'_>,
+        inputs: &StageInputs<'_>,
         dynamics: &mut dyn LatentDynamics,
         index: usize,
         start_s: f64,
     ) {
-        let Scene {
+        let StageInputs {
             settings,
             reference,
             plan,
             ..
-        } = *scene;
+        } = *inputs;
         let trusts_reference = match settings.drift {
             Drift::Automatic => reference.has_input(),
             Drift::Reference => true,

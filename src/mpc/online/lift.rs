@@ -18,8 +18,8 @@
 
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector};
 
+use super::control_model::{ControlModel, ControlPhase};
 use super::error::ControlError;
-use super::plant::{Plant, PlantPhase};
 use super::problem::upright;
 use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver};
 use super::settings::MpcSettings;
@@ -36,7 +36,7 @@ const BOUND_ROWS: usize = 2 * JOINT_DIM;
 
 /// Posture and contact that a lift is made for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Footing {
+pub struct StanceState {
     /// Joint positions, rad.
     pub joints_rad: [f64; JOINT_DIM],
     /// Roll and pitch, rad.
@@ -75,7 +75,7 @@ impl ConsistentLift {
     ///
     /// # Errors
     /// [`ControlError::Solver`] if the conic solver refuses the program.
-    pub fn new(plant: &Plant, settings: &MpcSettings) -> Result<Self, ControlError> {
+    pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Result<Self, ControlError> {
         let projection = plant.projection_matrix();
         let row = |latent: usize| projection.row(latent);
         Ok(Self {
@@ -102,7 +102,7 @@ impl ConsistentLift {
     }
 
     /// Takes the projection of another plant: that at the measured state, where it depends on it.
-    pub fn take_projection(&mut self, plant: &Plant) {
+    pub fn take_projection(&mut self, plant: &ControlModel) {
         let projection = plant.projection_matrix();
         for (latent, row) in projection.row_iter().enumerate() {
             self.by_torque[latent] = std::array::from_fn(|joint| row[joint]);
@@ -110,23 +110,23 @@ impl ConsistentLift {
         }
     }
 
-    /// Torques, N m, for a latent input on a footing.
+    /// Torques, N m, for a latent input on a stance.
     ///
     /// # Errors
     /// [`LiftFailure`] if a leg in contact is singular or the program is not solved.
     pub fn lift(
         &mut self,
-        plant: &Plant,
+        plant: &ControlModel,
         u_lat: &[f64],
-        footing: &Footing,
+        stance: &StanceState,
     ) -> Result<[f64; JOINT_DIM], LiftFailure> {
         self.iterations = 0;
         let wrench = plant
             .robot()
-            .wrench_map(&footing.joints_rad, footing.feet)
+            .wrench_map(&stance.joints_rad, stance.feet)
             .map_err(|_| LiftFailure::SingularLeg)?;
-        let forces = foot_forces(plant, footing).ok_or(LiftFailure::SingularLeg)?;
-        let (hessian, gradient) = self.cost(&plant.phases()[footing.phase], &wrench, u_lat);
+        let forces = foot_forces(plant, stance).ok_or(LiftFailure::SingularLeg)?;
+        let (hessian, gradient) = self.cost(&plant.phases()[stance.phase], &wrench, u_lat);
         if let Some(factor) = Cholesky::new(hessian) {
             let torque = factor.solve(&-gradient);
             if self.is_allowed(&torque, &forces) {
@@ -144,7 +144,7 @@ impl ConsistentLift {
     /// Hessian and gradient at zero of half the cost, by torques in N m.
     fn cost(
         &self,
-        phase: &PlantPhase,
+        phase: &ControlPhase,
         wrench: &SMatrix<f64, 6, JOINT_DIM>,
         u_lat: &[f64],
     ) -> (TorqueSquare, Torque) {
@@ -230,15 +230,15 @@ impl ConsistentLift {
 }
 
 /// The upright force of each foot in contact by its leg's torques, or none if a leg is singular.
-pub(crate) fn foot_forces(
-    plant: &Plant,
-    footing: &Footing,
+pub fn foot_forces(
+    plant: &ControlModel,
+    stance: &StanceState,
 ) -> Option<[Option<Matrix3<f64>>; FOOT_DIM]> {
-    let rotation = Matrix3::from_fn(|row, col| upright(footing.attitude_rad)[row][col]);
+    let rotation = Matrix3::from_fn(|row, col| upright(stance.attitude_rad)[row][col]);
     let mut forces = [None; FOOT_DIM];
     for leg in Leg::ALL {
-        if footing.feet[leg.index()] {
-            let joints = leg.of_joints(&footing.joints_rad);
+        if stance.feet[leg.index()] {
+            let joints = leg.of_joints(&stance.joints_rad);
             forces[leg.index()] = Some(rotation * plant.robot().foot_force_map(leg, &joints).ok()?);
         }
     }

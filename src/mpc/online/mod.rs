@@ -1,13 +1,13 @@
 //! What runs at the robot: from a plant, its dynamics and a reference to commands.
 //!
-//! In: a [`Plant`] (plain numbers), [`LatentDynamics`], a reference, measurements. Out: commands.
+//! In: a [`ControlModel`] (plain numbers), [`LatentDynamics`], a reference, measurements. Out: commands.
 //! Nothing here knows of models, programs or recordings: besides nalgebra and clarabel these files
 //! import [`robot`](crate::robot) alone, because `romc compile --emit controller` emits this very
 //! folder. Read `problem` first.
 
 mod command;
+mod control_model;
 mod controller;
-mod curved;
 mod dynamics;
 mod error;
 pub mod estimate;
@@ -17,8 +17,8 @@ pub mod interface;
 mod layout;
 pub(super) mod lift;
 pub mod linearise;
+mod nonlinear;
 mod plan;
-mod plant;
 pub mod problem;
 mod prune;
 mod qp;
@@ -28,13 +28,14 @@ mod sparse;
 mod transcribe;
 
 pub use command::{Command, Source, Status};
+pub use control_model::{ControlModel, ControlModelParts, ControlPhase};
 pub use controller::{Controller, Measurement};
-pub use curved::CurvedMaps;
 pub use dynamics::LatentDynamics;
 pub use error::ControlError;
-pub use lift::{ConsistentLift, Footing, LiftFailure};
+pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces};
+pub use nonlinear::NonlinearMaps;
 pub use plan::Plan;
-pub use plant::{Plant, PlantParts, PlantPhase};
+pub use problem::upright;
 pub use qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, SolverProfile};
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{

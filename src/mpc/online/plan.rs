@@ -88,7 +88,12 @@ impl Plan {
 
     /// Largest deviation of a state from the one that the plan predicts for a time, in multiples
     /// of `deviation`; none if the plan does not reach that far.
-    pub fn surprise(&self, time_s: f64, state: &[f64], deviation: &[f64]) -> Option<f64> {
+    pub fn normalised_innovation(
+        &self,
+        time_s: f64,
+        state: &[f64],
+        deviation: &[f64],
+    ) -> Option<f64> {
         let passed = (time_s - self.start_s?) / self.step_s;
         let stages = self.inputs.len() / self.latent_dim;
         if !(passed >= 0.0 && passed <= stages as f64) {

@@ -39,7 +39,7 @@
 
 use nalgebra::DVector;
 
-use super::plant::Plant;
+use super::control_model::ControlModel;
 use super::prune::needed_rows;
 use super::reference::Reference;
 use super::settings::{Lift, MpcSettings, RowSelection};
@@ -92,7 +92,7 @@ pub struct BodyFriction {
 }
 
 impl BodyFriction {
-    fn new(plant: &Plant, coefficient: f64) -> Self {
+    fn new(plant: &ControlModel, coefficient: f64) -> Self {
         let weight = plant.robot().mass_kg() * GRAVITY;
         let lift = plant.lift_matrix();
         let rows = JOINT_DIM..JOINT_DIM + 3;
@@ -129,11 +129,11 @@ impl StageRows {
     /// 2 % of the limit, and torque rows that in no phase an input within `INPUT_REACH` standard
     /// deviations of the training inputs can reach. A plan may pass a limit that was left out, by
     /// 2 % or by asking for an input unlike any in training; the command is clamped and does not.
-    pub fn new(plant: &Plant, settings: &MpcSettings) -> Self {
+    pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Self {
         Self::selected(plant, settings, row_selection(plant, settings))
     }
 
-    fn selected(plant: &Plant, settings: &MpcSettings, selection: RowSelection) -> Self {
+    fn selected(plant: &ControlModel, settings: &MpcSettings, selection: RowSelection) -> Self {
         let select = |rows: Vec<Row>| match selection {
             RowSelection::All => rows,
             RowSelection::Needed => needed_rows(rows, ROW_MARGIN),
@@ -163,8 +163,8 @@ impl StageRows {
 }
 
 /// Rows of maps that depend on the state are all kept: which of them matter depends on it too.
-pub(super) fn row_selection(plant: &Plant, settings: &MpcSettings) -> RowSelection {
-    match plant.is_curved() {
+pub(super) fn row_selection(plant: &ControlModel, settings: &MpcSettings) -> RowSelection {
+    match plant.is_nonlinear() {
         true => RowSelection::All,
         false => settings.rows,
     }
@@ -173,7 +173,7 @@ pub(super) fn row_selection(plant: &Plant, settings: &MpcSettings) -> RowSelecti
 impl StageRows {
     /// The same rows with the maps of `plant`, those at a stage's reference; none if a row vanishes
     /// there, so that the rows are not the same.
-    pub fn with_maps_of(&self, plant: &Plant, settings: &MpcSettings) -> Option<Self> {
+    pub fn with_maps_of(&self, plant: &ControlModel, settings: &MpcSettings) -> Option<Self> {
         let rows = Self::selected(plant, settings, RowSelection::All);
         let shape = |rows: &Self| (rows.torque.len(), rows.rate.len(), rows.joint.len());
         (shape(&rows) == shape(self)).then_some(rows)
@@ -201,7 +201,7 @@ impl StageRows {
 
 /// Whether an input within `INPUT_REACH` standard deviations reaches a row's bound in some phase:
 /// the farthest that such inputs go along the row is `row · m + reach ‖Cᵀ row‖`.
-fn is_reachable(plant: &Plant, row: &Row) -> bool {
+fn is_reachable(plant: &ControlModel, row: &Row) -> bool {
     let direction = DVector::from_column_slice(&row.row);
     plant.phases().iter().any(|phase| {
         let spread = phase.latent_root.tr_mul(&direction).norm();
@@ -210,12 +210,12 @@ fn is_reachable(plant: &Plant, row: &Row) -> bool {
 }
 
 /// Both sides of every torque limit; joints that the lift does not reach have none.
-pub(super) fn torque_rows(plant: &Plant) -> Vec<Row> {
+pub(super) fn torque_rows(plant: &ControlModel) -> Vec<Row> {
     let limits = plant.robot().torque_limit_nm();
     both_sides(plant, |joint| limits[joint])
 }
 
-fn both_sides(plant: &Plant, limit: impl Fn(usize) -> f64) -> Vec<Row> {
+fn both_sides(plant: &ControlModel, limit: impl Fn(usize) -> f64) -> Vec<Row> {
     let lift = plant.lift_matrix();
     let mut rows = Vec::new();
     for joint in 0..JOINT_DIM {
@@ -238,7 +238,7 @@ fn both_sides(plant: &Plant, limit: impl Fn(usize) -> f64) -> Vec<Row> {
 }
 
 /// Both sides of every joint limit, divided by half the joint's range.
-pub(super) fn joint_rows(plant: &Plant) -> Vec<Row> {
+pub(super) fn joint_rows(plant: &ControlModel) -> Vec<Row> {
     let (decoder, bias) = (plant.decoder_matrix(), plant.decoder_bias());
     let mut rows = Vec::new();
     for (joint, (lower, upper)) in plant.robot().joint_limit_rad().iter().enumerate() {
@@ -260,7 +260,7 @@ pub(super) fn joint_rows(plant: &Plant) -> Vec<Row> {
 
 /// Rotation from the body frame to an upright frame with the same heading, `R_y(pitch) R_x(roll)`,
 /// row-major.
-pub(crate) fn upright(attitude: [f64; 2]) -> [[f64; 3]; 3] {
+pub fn upright(attitude: [f64; 2]) -> [[f64; 3]; 3] {
     let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) =
         (attitude[0].sin_cos(), attitude[1].sin_cos());
     [

@@ -1,9 +1,9 @@
 //! The trajectory that the controller follows, in latent coordinates.
 
+use super::control_model::ControlModel;
 use super::dynamics::LatentDynamics;
 use super::error::ControlError;
 use super::estimate::{Motion, estimate_input};
-use super::plant::Plant;
 use crate::robot::{ContactFlags, FOOT_DIM, STATE_DIM};
 
 /// A trajectory in SI units as its user has it: samples one after the other.
@@ -58,7 +58,7 @@ impl Reference {
     /// disagree, [`ControlError::ReferenceValue`] for values that are not finite,
     /// [`ControlError::ReferenceTime`] if time does not increase and [`ControlError::ReferencePhase`] if a
     /// foot pattern selects no phase.
-    pub fn new(plant: &Plant, samples: ReferenceSamples<'_>) -> Result<Self, ControlError> {
+    pub fn new(plant: &ControlModel, samples: ReferenceSamples<'_>) -> Result<Self, ControlError> {
         check(plant, &samples)?;
         let d = plant.latent_dim();
         let count = samples.time_s.len();
@@ -81,7 +81,7 @@ impl Reference {
                 .chunks_exact(STATE_DIM)
                 .map(|x| [x[15], x[16]])
                 .collect(),
-            x: match plant.is_curved() {
+            x: match plant.is_nonlinear() {
                 true => samples.x.to_vec(),
                 false => Vec::new(),
             },
@@ -94,7 +94,11 @@ impl Reference {
 
     /// Gives a trajectory that comes without its input the one that the model finds behind its
     /// accelerations.
-    pub(super) fn estimate_input(&mut self, plant: &Plant, dynamics: &mut dyn LatentDynamics) {
+    pub(super) fn estimate_input(
+        &mut self,
+        plant: &ControlModel,
+        dynamics: &mut dyn LatentDynamics,
+    ) {
         let phase: Vec<usize> = self
             .feet
             .iter()
@@ -241,7 +245,7 @@ fn row(values: &[f64], sample: usize) -> &[f64] {
     &values[sample * STATE_DIM..(sample + 1) * STATE_DIM]
 }
 
-fn project_all(plant: &Plant, x: &[f64], u: &[f64]) -> Vec<f64> {
+fn project_all(plant: &ControlModel, x: &[f64], u: &[f64]) -> Vec<f64> {
     let d = plant.latent_dim();
     let mut latent = vec![0.0; u.len() / STATE_DIM * d];
     let samples = x.chunks_exact(STATE_DIM).zip(u.chunks_exact(STATE_DIM));
@@ -265,7 +269,7 @@ fn integrate(time_s: &[f64], values: &[f64], width: usize) -> Vec<f64> {
 
 /// Scale of `(z, dz)` for a trajectory that stands still: the change of each latent alone that
 /// moves some joint by `STILL_SHARE` of half its range, and that change within `STILL_TIME_S`.
-fn still_deviations(plant: &Plant) -> Vec<f64> {
+fn still_deviations(plant: &ControlModel) -> Vec<f64> {
     let d = plant.latent_dim();
     let limits = plant.robot().joint_limit_rad();
     let positions = (0..d).map(|latent| {
@@ -315,7 +319,7 @@ fn deviations(state: &[f64], still: &[f64]) -> Vec<f64> {
     deviation
 }
 
-fn check(plant: &Plant, samples: &ReferenceSamples<'_>) -> Result<(), ControlError> {
+fn check(plant: &ControlModel, samples: &ReferenceSamples<'_>) -> Result<(), ControlError> {
     let count = samples.time_s.len();
     if count < 2 {
         return Err(ControlError::ReferenceLen {

@@ -63,7 +63,7 @@ pub struct StepData<'a> {
     /// Scale `σ` of the states, `2 latent_dim`.
     pub deviation: &'a [f64],
     /// Scale `C_p` of the inputs by phase.
-    pub roots: &'a [DMatrix<f64>],
+    pub input_cholesky: &'a [DMatrix<f64>],
 }
 
 /// Positions of one stage's entries in the values of `A`.
@@ -89,7 +89,7 @@ struct StagePositions {
 pub struct Transcription {
     layout: Layout,
     positions: Vec<StagePositions>,
-    /// `T C_p` and the like, by phase, for the current roots.
+    /// `T C_p` and the like, by phase, for the current input_cholesky.
     work: Vec<f64>,
 }
 
@@ -191,7 +191,7 @@ impl Transcription {
         let (d, stage) = (self.layout.latent_dim, &step.stages[index]);
         let scaled = &solution[self.layout.input_column(index)..][..d];
         for (row, out) in out.iter_mut().enumerate() {
-            let root = &step.roots[stage.phase];
+            let root = &step.input_cholesky[stage.phase];
             *out = stage.input[row]
                 + (0..=row)
                     .map(|col| root[(row, col)] * scaled[col])
@@ -299,7 +299,7 @@ impl Transcription {
     fn write_dynamics(&self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
         let (d, stage) = (self.layout.latent_dim, &step.stages[index]);
         let positions = &self.positions[index];
-        let (root, deviation) = (&step.roots[stage.phase], step.deviation);
+        let (root, deviation) = (&step.input_cholesky[stage.phase], step.deviation);
         let values = program.a.values_mut();
         for row in 0..2 * d {
             let scale = 1.0 / deviation[row];
@@ -326,7 +326,7 @@ impl Transcription {
     fn write_inputs(&mut self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
         let d = self.layout.latent_dim;
         let stage = &step.stages[index];
-        let root = &step.roots[stage.phase];
+        let root = &step.input_cholesky[stage.phase];
         let rows = stage.rows.as_ref().unwrap_or(&self.layout.rows);
         for (number, row) in rows.torque.iter().enumerate() {
             let positions = &self.positions[index].torque[number * d..][..d];
@@ -345,7 +345,7 @@ impl Transcription {
                 let rows = earlier.rows.as_ref().unwrap_or(&self.layout.rows);
                 let before = scaled_row(
                     &rows.rate[number].row,
-                    &step.roots[earlier.phase],
+                    &step.input_cholesky[earlier.phase],
                     &earlier.input,
                     &mut self.work,
                 );

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::draw::{Anchor, FONT, Mark, Paint, PanelDrawing, draw_panel};
 use super::figure::{Figure, Panel, Role};
-use crate::backend::mathml::HtmlText;
+use crate::typeset::mathml::HtmlText;
 
 /// One panel as an `svg` element that takes its colours from the page.
 pub fn panel_svg(figure: &Figure, panel: &Panel) -> String {

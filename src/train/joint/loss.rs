@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::batch::Batch;
 use super::multiply::{Columns, add_product, add_transposed, product_into};
 use super::parameters::Parameters;
-use super::schedule::pull_to_zero;
+use super::schedule::l1_subgradient;
 use super::unroll::{Pulls, Unroll, Window};
 use crate::train::features::{FeatureValues, Features};
 
@@ -141,7 +141,7 @@ impl<'a> JointLoss<'a> {
         let l1 = {
             let xi = &parameters.xi;
             let pull = self.weights.l1 * (1.0 / xi.len() as f64);
-            pull_to_zero(xi, pull, &mut self.gradient.xi)
+            l1_subgradient(xi, pull, &mut self.gradient.xi)
         };
         Losses {
             decoder,

@@ -26,7 +26,7 @@ use crate::train::progress::Watch;
 use crate::train::random::Random;
 use crate::train::report::{SeedReport, Trained};
 use crate::train::seeds::{Best, Seeds};
-use crate::train::weak::check_terms;
+use crate::train::weak_form::check_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
 ///

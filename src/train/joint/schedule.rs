@@ -103,7 +103,7 @@ impl MaskedAdam {
 }
 
 /// (19), the mean of the coefficients' magnitudes; adds `pull` times the gradient of their sum.
-pub(super) fn pull_to_zero(xi: &DMatrix<f64>, pull: f64, gradient: &mut DMatrix<f64>) -> f64 {
+pub(super) fn l1_subgradient(xi: &DMatrix<f64>, pull: f64, gradient: &mut DMatrix<f64>) -> f64 {
     if pull != 0.0 {
         for (g, value) in gradient.iter_mut().zip(xi.iter()) {
             *g += if *value == 0.0 {

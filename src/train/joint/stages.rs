@@ -10,7 +10,7 @@ use super::adam::Adam;
 use super::batch::Batch;
 use super::loss::{InputProjection, JointLoss, LossWeights, Losses};
 use super::parameters::Parameters;
-use super::schedule::{MaskedAdam, Schedule, pull_to_zero};
+use super::schedule::{MaskedAdam, Schedule, l1_subgradient};
 use crate::train::features::{FeatureValues, Features};
 
 /// Told after every epoch: its number, the losses, the active terms. Answers whether to go on.
@@ -216,7 +216,7 @@ impl XiMoments {
         };
         let mut gradient = (own - &self.latent) * (2.0 * weights.ddz * latent_scale);
         gradient += (decoded - &self.real) * (2.0 * weights.ddx * real_scale);
-        losses.l1 = pull_to_zero(xi, weights.l1 / xi.len() as f64, &mut gradient);
+        losses.l1 = l1_subgradient(xi, weights.l1 / xi.len() as f64, &mut gradient);
         (losses, gradient)
     }
 }

@@ -12,7 +12,7 @@ use crate::train::features::{FeatureValues, Features};
 use crate::train::joint::batch::Batch;
 use crate::train::joint::loss::{LossWeights, Losses};
 use crate::train::joint::multiply::{Columns, add_product, add_transposed};
-use crate::train::joint::schedule::pull_to_zero;
+use crate::train::joint::schedule::l1_subgradient;
 use crate::train::joint::unroll::{Pulls, Unroll, Window};
 use crate::train::random::Random;
 
@@ -226,7 +226,7 @@ impl<'a> NetworkLoss<'a> {
         let (bptt, pulled) =
             self.pull_through_library(batch, &encoded, (xi, &theta), &onto_predicted);
         let pull_xi = self.weights.l1 * (1.0 / xi.len() as f64);
-        let l1 = pull_to_zero(xi, pull_xi, &mut self.gradient.xi[batch.phase]);
+        let l1 = l1_subgradient(xi, pull_xi, &mut self.gradient.xi[batch.phase]);
         for (block, start) in [(0, 0), (n, d)] {
             let mut rows = pull.rows_mut(block, n);
             rows += pulled.columns(start, d);

@@ -12,7 +12,7 @@ use crate::robot::STATE_DIM;
 use crate::train::dataset::Quantity;
 use crate::train::error::TrainError;
 use crate::train::features::Features;
-use crate::train::finish::{Fitted, Sets, fit_dynamics, telling_basis};
+use crate::train::finish::{Fitted, Sets, canonical_basis, fit_dynamics};
 use crate::train::joint::batch::Batch;
 use crate::train::joint::loss::{LossWeights, Losses};
 use crate::train::latent::{fit_affine, map_samples, mean_jacobian};
@@ -229,7 +229,7 @@ impl NetworkTask<'_> {
             None => DMatrix::identity(d, d),
         };
         let mean = &white * mean_jacobian(encoder, x);
-        let (_, rotation) = telling_basis(&self.sets.training, &mean.transpose(), self.options);
+        let (_, rotation) = canonical_basis(&self.sets.training, &mean.transpose(), self.options);
         let turn = rotation.transpose() * white;
         let back = match turn.clone().try_inverse() {
             Some(back) => back,

@@ -12,7 +12,7 @@ use crate::train::joint::adam::Adam;
 use crate::train::joint::batch::Batch;
 use crate::train::joint::loss::{LossWeights, Losses};
 use crate::train::joint::multiply::{Columns, add_product, add_transposed};
-use crate::train::joint::schedule::{MaskedAdam, Schedule, pull_to_zero};
+use crate::train::joint::schedule::{MaskedAdam, Schedule, l1_subgradient};
 use crate::train::joint::stages::Listener;
 
 /// Encoder, decoder and Xi together; every batch moves the Xi of its phase.
@@ -240,7 +240,7 @@ impl XiSamples {
         let mut gradient = DMatrix::zeros(xi.nrows(), d);
         let (theta, pull) = (Columns::all(&self.theta), Columns::all(&pull));
         add_transposed(&mut gradient, 1.0, theta, pull);
-        losses.l1 = pull_to_zero(xi, weights.l1 / xi.len() as f64, &mut gradient);
+        losses.l1 = l1_subgradient(xi, weights.l1 / xi.len() as f64, &mut gradient);
         (losses, gradient)
     }
 }

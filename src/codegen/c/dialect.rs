@@ -1,0 +1,362 @@
+//! How C99 spells statements.
+
+use crate::codegen::code::{Argument, ConstTable, Function, MathFunction, Parameter, Role, Span};
+use crate::codegen::dialect::{Dialect, LaneDialect};
+use crate::codegen::line_wrapping::{braced, comment_lines};
+use crate::codegen::literal::Literal;
+use crate::codegen::precision::Precision;
+use crate::codegen::requirements::assigned_in_lanes;
+use crate::ir::LANES;
+
+/// C99 with the names of one model.
+#[derive(Clone, Debug)]
+pub struct CDialect {
+    /// Identifier of the model, the beginning of all external and helper names.
+    pub name: String,
+    /// Floating-point numbers of the code.
+    pub precision: Precision,
+}
+
+/// Keywords of C and C++, and the library names that generated files use.
+const RESERVED: [&str; 107] = [
+    "auto",
+    "break",
+    "case",
+    "char",
+    "const",
+    "continue",
+    "default",
+    "do",
+    "double",
+    "else",
+    "enum",
+    "extern",
+    "float",
+    "for",
+    "goto",
+    "if",
+    "inline",
+    "int",
+    "long",
+    "register",
+    "restrict",
+    "return",
+    "short",
+    "signed",
+    "sizeof",
+    "static",
+    "struct",
+    "switch",
+    "typedef",
+    "union",
+    "unsigned",
+    "void",
+    "volatile",
+    "while",
+    "bool",
+    "true",
+    "false",
+    "catch",
+    "class",
+    "delete",
+    "explicit",
+    "export",
+    "friend",
+    "mutable",
+    "namespace",
+    "new",
+    "noexcept",
+    "nullptr",
+    "operator",
+    "private",
+    "protected",
+    "public",
+    "template",
+    "this",
+    "throw",
+    "try",
+    "typeid",
+    "typename",
+    "using",
+    "virtual",
+    "and",
+    "or",
+    "not",
+    "xor",
+    "main",
+    "sin",
+    "cos",
+    "tan",
+    "tanh",
+    "exp",
+    "log",
+    "sqrt",
+    "fabs",
+    "memcpy",
+    "size_t",
+    "uint64_t",
+    "y0",
+    "y1",
+    "yn",
+    "j0",
+    "j1",
+    "jn",
+    "gamma",
+    "signgam",
+    "abs",
+    "asm",
+    "typeof",
+    "constexpr",
+    "concept",
+    "requires",
+    "import",
+    "module",
+    "alignas",
+    "alignof",
+    "static_assert",
+    "thread_local",
+    "decltype",
+    "div",
+    "index",
+    "time",
+    "erf",
+    "I",
+    "NULL",
+    "errno",
+    "stdin",
+    "stdout",
+    "stderr",
+];
+
+impl Dialect for CDialect {
+    fn reserved(&self) -> &'static [&'static str] {
+        &RESERVED
+    }
+
+    fn literal(&self, literal: Literal) -> String {
+        format!("{}{}", literal.digits(self.precision), self.suffix())
+    }
+
+    fn apply(&self, function: MathFunction, argument: &str) -> String {
+        let name = match function {
+            MathFunction::Sqrt => "sqrt",
+            MathFunction::Abs => "fabs",
+            MathFunction::Sign => return format!("{}_sign({argument})", self.name),
+            MathFunction::Tan => "tan",
+            MathFunction::Tanh => "tanh",
+            MathFunction::Exp => "exp",
+            MathFunction::Log => "log",
+        };
+        format!("{name}{}({argument})", self.suffix())
+    }
+
+    fn let_scalar(&self, name: &str, value: &str) -> String {
+        format!("const {} {name} = {value};", self.real())
+    }
+
+    fn let_array(&self, name: &str, elements: &[String]) -> String {
+        format!(
+            "const {} {name}[{}] = {};",
+            self.real(),
+            elements.len(),
+            braced(elements, " ")
+        )
+    }
+
+    fn declare(&self, name: &str, len: usize) -> String {
+        format!("{} {name}[{len}];", self.real())
+    }
+
+    fn for_loop(&self, variable: &str, count: usize) -> String {
+        format!("for (size_t {variable} = 0; {variable} < {count}; ++{variable})")
+    }
+
+    fn discard(&self, parameter: &str) -> String {
+        format!("(void){parameter};")
+    }
+
+    fn multiply_add(&self) -> Option<&'static str> {
+        None
+    }
+
+    fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String {
+        let passed: Vec<String> = arguments
+            .iter()
+            .map(|argument| match argument {
+                Argument::Read(span) | Argument::Write(span) => pointer(span),
+            })
+            .collect();
+        match callee {
+            Some(callee) => format!("{callee}({});", passed.join(", ")),
+            None => {
+                let n = arguments.first().map_or(0, |argument| match argument {
+                    Argument::Read(span) | Argument::Write(span) => span.len,
+                });
+                format!("{}_sin_cos({n}, {});", self.name, passed.join(", "))
+            }
+        }
+    }
+
+    fn sin_cos_lane(
+        &self,
+        argument: &str,
+        [sine, cosine]: &[String; 2],
+        _is_used: [bool; 2],
+    ) -> Vec<String> {
+        let (name, upper) = (&self.name, self.upper());
+        let suffix = self.suffix();
+        vec![
+            format!("{} {sine}, {cosine};", self.real()),
+            format!("{name}_sin_cos_reduced({argument}, &{sine}, &{cosine});"),
+            // A choice between numbers: compilers vectorise it where they do not vectorise a
+            // comparison that becomes an integer.
+            format!(
+                "beyond[lane] = fabs{suffix}({argument}) <= {upper}_ANGLE_LIMIT ? beyond[lane] : 1.0{suffix};"
+            ),
+        ]
+    }
+
+    fn lanes(&self) -> Option<&dyn LaneDialect> {
+        Some(self)
+    }
+
+    fn table_base(&self, prefix: &str) -> String {
+        format!("{prefix}table")
+    }
+
+    fn table(&self, table: &ConstTable) -> String {
+        let rows: Vec<String> = table
+            .entries
+            .chunks(table.cols)
+            .map(|row| {
+                let row: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
+                format!("    {}", braced(&row, "\n     "))
+            })
+            .collect();
+        let aligned = match table.is_in_lanes {
+            true => format!(" {}_ALIGNED", self.upper()),
+            false => String::new(),
+        };
+        format!(
+            "static const {}{aligned} {}[{}][{}] = {{\n{},\n}};",
+            self.real(),
+            table.name,
+            table.rows,
+            table.cols,
+            rows.join(",\n")
+        )
+    }
+
+    fn parameter(&self, parameter: &Parameter) -> String {
+        self.declared(parameter, "restrict ")
+    }
+
+    fn signature(&self, function: &Function) -> String {
+        // Without `restrict` on what lanes assign, gcc keeps in registers what it has read for them;
+        // with it, it reads tables once for each use.
+        let in_lanes = assigned_in_lanes(&function.body);
+        self.head(function, |parameter| {
+            match in_lanes.contains(&parameter.name) {
+                true => "",
+                false => "restrict ",
+            }
+        })
+    }
+
+    fn docs(&self, _lines: &[String]) -> String {
+        // The header has the documentation.
+        String::new()
+    }
+}
+
+impl LaneDialect for CDialect {
+    fn declare(&self, sums: &str) -> String {
+        format!("{}_eight {sums};", self.name)
+    }
+
+    fn for_lanes(&self, variable: &str) -> String {
+        let step = format!("{}_LANE_STEP", self.upper());
+        format!("for (size_t {variable} = 0; {variable} < {LANES}; {variable} += {step})")
+    }
+
+    fn read(&self, element: &str) -> String {
+        format!("{}_READ({element})", self.upper())
+    }
+
+    fn write(&self, element: &str) -> String {
+        format!("{}_WRITE({element})", self.upper())
+    }
+
+    fn sums(&self, sums: &str, variable: &str) -> String {
+        format!("{}_SUMS({sums}, {variable})", self.upper())
+    }
+
+    fn total(&self, sums: &str) -> String {
+        format!("{}_LANE_TOTAL({sums})", self.upper())
+    }
+}
+
+impl CDialect {
+    /// What macros begin with.
+    pub fn upper(&self) -> String {
+        self.name.to_ascii_uppercase()
+    }
+
+    /// The function's name and parameters, arrays with what `qualifier` says of each.
+    fn head(&self, function: &Function, qualifier: impl Fn(&Parameter) -> &'static str) -> String {
+        let parameters = function.parameters.iter();
+        let parameters: Vec<String> = parameters
+            .map(|parameter| self.declared(parameter, qualifier(parameter)))
+            .collect();
+        format!("void {}({})", function.name, parameters.join(", "))
+    }
+
+    fn declared(&self, parameter: &Parameter, qualifier: &str) -> String {
+        let (name, real) = (&parameter.name, self.real());
+        match parameter.role {
+            Role::Input => format!("const {real} *{qualifier}{name}"),
+            Role::Output | Role::InOut => format!("{real} *{qualifier}{name}"),
+            Role::Scalar => format!("{real} {name}"),
+        }
+    }
+
+    /// The type of numbers.
+    pub fn real(&self) -> &'static str {
+        match self.precision {
+            Precision::Double => "double",
+            Precision::Single => "float",
+        }
+    }
+
+    /// What literals and library functions of that type end with.
+    pub fn suffix(&self) -> &'static str {
+        match self.precision {
+            Precision::Double => "",
+            Precision::Single => "f",
+        }
+    }
+
+    /// The documented prototype for the header; `restrict` is left to the definition, so
+    /// that C++ can include it.
+    pub fn prototype(&self, function: &Function) -> String {
+        let signature = self.head(function, |_| "");
+        format!("{}{signature};", documentation(&function.docs))
+    }
+}
+
+/// A documentation comment, one paragraph a line.
+pub fn documentation(lines: &[String]) -> String {
+    let body: Vec<String> = comment_lines(lines, 94)
+        .iter()
+        .map(|line| format!(" * {}", line.replace("*/", "* /")))
+        .collect();
+    format!("/**\n{}\n */\n", body.join("\n"))
+}
+
+fn pointer(span: &Span) -> String {
+    if span.offset == 0 {
+        span.array.to_string()
+    } else {
+        format!("&{}[{}]", span.array, span.offset)
+    }
+}

@@ -1,0 +1,267 @@
+//! Code as typed statements, before a dialect spells it.
+
+use super::ident::Ident;
+use super::lanes::Row;
+use super::literal::Literal;
+
+/// A subscript `offset + sum_i stride_i * name_i`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Index {
+    /// Strides and the variables that they multiply.
+    pub terms: Vec<(usize, Ident)>,
+    /// What is added.
+    pub offset: usize,
+}
+
+impl Index {
+    /// A constant subscript.
+    pub fn fixed(offset: usize) -> Self {
+        Self {
+            terms: Vec::new(),
+            offset,
+        }
+    }
+
+    /// A loop variable.
+    pub fn variable(name: &Ident) -> Self {
+        Self::fixed(0).plus(1, name)
+    }
+
+    /// With `stride * name` added.
+    pub fn plus(mut self, stride: usize, name: &Ident) -> Self {
+        self.terms.push((stride, name.clone()));
+        self
+    }
+
+    /// With a constant added.
+    pub fn shifted(mut self, by: usize) -> Self {
+        self.offset += by;
+        self
+    }
+
+    /// With another subscript in place of a variable.
+    pub fn with(&self, variable: &Ident, at: &Self) -> Self {
+        let mut result = Self::fixed(self.offset);
+        for (stride, name) in &self.terms {
+            if name == variable {
+                result.offset += stride * at.offset;
+                let scaled = at.terms.iter().map(|(inner, name)| (stride * inner, name));
+                result
+                    .terms
+                    .extend(scaled.map(|(s, name)| (s, name.clone())));
+            } else {
+                result.terms.push((*stride, name.clone()));
+            }
+        }
+        result
+    }
+}
+
+/// Operators between two operands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Infix {
+    /// `+`
+    Add,
+    /// `-`
+    Sub,
+    /// `*`
+    Mul,
+    /// `/`
+    Div,
+}
+
+/// Functions of one argument that every target has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MathFunction {
+    /// Square root.
+    Sqrt,
+    /// Absolute value.
+    Abs,
+    /// -1, 0 or 1.
+    Sign,
+    /// Tangent.
+    Tan,
+    /// Hyperbolic tangent.
+    Tanh,
+    /// Exponential.
+    Exp,
+    /// Natural logarithm.
+    Log,
+}
+
+/// An expression.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Expr {
+    /// A number.
+    Literal(Literal),
+    /// A scalar variable.
+    Name(Ident),
+    /// `array[index]`
+    Element(Ident, Index),
+    /// `table[row][col]`
+    Entry(Ident, Index, Index),
+    /// `-a`
+    Negate(Box<Expr>),
+    /// `a op b`
+    Infix(Infix, Box<Expr>, Box<Expr>),
+    /// `f(a)`
+    Apply(MathFunction, Box<Expr>),
+    /// The sums of all lanes, within a loop of a variable over lanes.
+    Lanes(Ident, Ident),
+    /// The total of the sums of all lanes.
+    LaneTotal(Ident),
+}
+
+impl Expr {
+    /// `a op b`
+    pub fn infix(op: Infix, a: Expr, b: Expr) -> Self {
+        Self::Infix(op, Box::new(a), Box::new(b))
+    }
+
+    /// With another subscript in place of a variable.
+    pub fn with(&self, variable: &Ident, at: &Index) -> Self {
+        match self {
+            Self::Literal(_) | Self::Name(_) | Self::Lanes(..) | Self::LaneTotal(_) => self.clone(),
+            Self::Element(array, index) => Self::Element(array.clone(), index.with(variable, at)),
+            Self::Entry(table, row, col) => Self::Entry(
+                table.clone(),
+                row.with(variable, at),
+                col.with(variable, at),
+            ),
+            Self::Negate(a) => Self::Negate(Box::new(a.with(variable, at))),
+            Self::Infix(op, a, b) => Self::infix(*op, a.with(variable, at), b.with(variable, at)),
+            Self::Apply(function, a) => Self::Apply(*function, Box::new(a.with(variable, at))),
+        }
+    }
+}
+
+/// `len` elements of an array from `offset` on, handed to a function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Span {
+    /// The array.
+    pub array: Ident,
+    /// First element.
+    pub offset: usize,
+    /// Number of elements.
+    pub len: usize,
+    /// Length of the whole array.
+    pub of: usize,
+    /// Whether the array is a parameter of the function rather than a local array.
+    pub is_parameter: bool,
+}
+
+impl Span {
+    /// Whether the span is the whole array.
+    pub fn is_whole(&self) -> bool {
+        self.offset == 0 && self.len == self.of
+    }
+}
+
+/// An argument of a call of a generated function.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Argument {
+    /// Elements that are read.
+    Read(Span),
+    /// Elements that are written.
+    Write(Span),
+}
+
+/// A statement.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stmt {
+    /// A named scalar that never changes.
+    Let(Ident, Expr),
+    /// A named array that never changes.
+    LetArray(Ident, Vec<Expr>),
+    /// An array whose elements are assigned later; in languages without lanes they are zero before.
+    Declare(Ident, usize),
+    /// `target = value`
+    Assign(Expr, Expr),
+    /// `target += value`
+    AddAssign(Expr, Expr),
+    /// A loop of the variable from 0 to below the count.
+    For(Ident, usize, Vec<Stmt>),
+    /// Sines and cosines of a span by the kernel.
+    SinCos {
+        /// Arguments.
+        arguments: Span,
+        /// Where the sines go.
+        sines: Span,
+        /// Where the cosines go.
+        cosines: Span,
+    },
+    /// Sine and cosine of one argument by the kernel's core, which notes arguments beyond
+    /// its limit for the whole block of lanes.
+    SinCosLane {
+        /// The argument.
+        argument: Expr,
+        /// New scalar for the sine.
+        sine: Ident,
+        /// New scalar for the cosine.
+        cosine: Ident,
+        /// Whether sine and cosine are read.
+        is_used: [bool; 2],
+    },
+    /// A call of another generated function.
+    Call(Ident, Vec<Argument>),
+    /// The columns of one row; languages with lanes run them side by side.
+    Row(Box<Row>),
+    /// Sums of the lanes, which are assigned later.
+    DeclareLanes(Ident),
+    /// A loop of the variable over the lanes, or all of them at once.
+    ForLanes(Ident, Vec<Stmt>),
+}
+
+/// What a parameter of a generated function is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// An array that is read.
+    Input,
+    /// An array that is written.
+    Output,
+    /// An array that is read, then written.
+    InOut,
+    /// A scalar that is read.
+    Scalar,
+}
+
+/// A parameter of a generated function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its name.
+    pub name: Ident,
+    /// Number of elements.
+    pub len: usize,
+    /// What it is for.
+    pub role: Role,
+}
+
+/// A constant matrix with static storage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConstTable {
+    /// Its name.
+    pub name: Ident,
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub cols: usize,
+    /// Entries, row-major.
+    pub entries: Vec<Literal>,
+    /// Whether rows are read in lanes.
+    pub is_in_lanes: bool,
+}
+
+/// A generated function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Function {
+    /// Its name.
+    pub name: Ident,
+    /// Lines of documentation.
+    pub docs: Vec<String>,
+    /// Parameters in order.
+    pub parameters: Vec<Parameter>,
+    /// Parameters that the body does not mention.
+    pub unused: Vec<Ident>,
+    /// What it does.
+    pub body: Vec<Stmt>,
+}

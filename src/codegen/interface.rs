@@ -1,0 +1,463 @@
+//! What is generated for a model: programs, with names, roles and documentation.
+
+use super::code::Role;
+use super::precision::{Precision, stated_bounds};
+use super::units::Units;
+use crate::ir::{Program, Slot, Statement, Unary};
+use crate::lower::{self, JacobianPattern, LowerError, LowerOptions};
+use crate::model::{CoordinateNames, ModelError, ReducedModel, StateMap};
+
+/// Longest equation that documentation spells out, in terms.
+const MOST_TERMS: usize = 40;
+
+/// A function to be generated from a program.
+#[derive(Clone, Debug)]
+pub struct FunctionSpec {
+    /// Name without the model's, such as `contact_dynamics`.
+    pub name: String,
+    /// The program.
+    pub program: Program,
+    /// Parameters in order.
+    pub parameters: Vec<EntryParameter>,
+    /// Lines of documentation.
+    pub docs: Vec<String>,
+}
+
+/// A parameter of an entry.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EntryParameter {
+    /// Name of the slot.
+    pub name: String,
+    /// Number of elements; an output may have none.
+    pub len: usize,
+    /// What it is for.
+    pub role: Role,
+}
+
+/// The functions of one phase.
+#[derive(Clone, Debug)]
+pub struct PhaseInterface {
+    /// Name of the phase as an identifier.
+    pub identifier: String,
+    /// `ddz`.
+    pub dynamics: FunctionSpec,
+    /// `ddz` and its Jacobian.
+    pub jacobian: FunctionSpec,
+    /// Where the Jacobian's entries stand.
+    pub pattern: JacobianPattern,
+    /// One Runge-Kutta step.
+    pub step: FunctionSpec,
+}
+
+/// Everything that is generated for a model.
+#[derive(Clone, Debug)]
+pub struct ModelInterface {
+    /// Name of the model as an identifier.
+    pub identifier: String,
+    /// Name of the model.
+    pub name: String,
+    /// Units of robot coordinates at the interface.
+    pub units: Units,
+    /// Number of latent coordinates.
+    pub latent_dim: usize,
+    /// Number of robot coordinates, if the model speaks of any.
+    pub state_dim: Option<usize>,
+    /// The generalised inputs and the maps, where the model has the data for them.
+    pub maps: Vec<FunctionSpec>,
+    /// Phases in the order of the model.
+    pub phases: Vec<PhaseInterface>,
+}
+
+impl PhaseInterface {
+    /// An angle beyond the kernel's limit for the test of batches, or one within it if the
+    /// accelerations have functions that overflow there.
+    pub fn far_angle(&self, precision: Precision) -> f64 {
+        let overflows = self.dynamics.program.statements().iter().any(|statement| {
+            matches!(
+                statement,
+                Statement::Unary(Unary::Exp | Unary::Tan | Unary::Tanh | Unary::Log, _)
+            )
+        });
+        match (overflows, precision) {
+            (true, _) => 0.125,
+            (false, Precision::Double) => 9000.125,
+            (false, Precision::Single) => 160.125,
+        }
+    }
+}
+
+impl ModelInterface {
+    /// Lowers all functions of a model.
+    ///
+    /// # Errors
+    /// [`LowerError`] if a phase cannot be lowered.
+    pub fn new(
+        model: &ReducedModel,
+        options: &LowerOptions,
+        units: Units,
+    ) -> Result<Self, LowerError> {
+        let model = &units.convert(model)?;
+        let phases = (0..model.phases().len())
+            .map(|phase| phase_entries(model, phase, options))
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            identifier: model.identifier().to_string(),
+            name: model.name().to_owned(),
+            units,
+            latent_dim: model.latent_dim(),
+            state_dim: model.state_dim(),
+            maps: match units {
+                Units::Si => input_entry(model)?
+                    .into_iter()
+                    .chain(map_entries(model, units)?)
+                    .collect(),
+                Units::Scaled => map_entries(model, units)?,
+            },
+            phases,
+        })
+    }
+
+    /// Adds to the documentation of each function how far single precision may be off.
+    pub fn state_bounds(&mut self) {
+        let phases = self.phases.iter_mut();
+        let of_phases =
+            phases.flat_map(|phase| [&mut phase.dynamics, &mut phase.jacobian, &mut phase.step]);
+        for entry in self.maps.iter_mut().chain(of_phases) {
+            let bounds = stated_bounds(entry);
+            entry.docs.push(bounds);
+        }
+    }
+
+    /// All entries in the order in which they are generated.
+    pub fn all(&self) -> impl Iterator<Item = &FunctionSpec> {
+        let phases = self
+            .phases
+            .iter()
+            .flat_map(|phase| [&phase.dynamics, &phase.jacobian, &phase.step]);
+        self.maps.iter().chain(phases)
+    }
+}
+
+/// What computes the input of the maps, if the model is over a known robot's coordinates.
+fn input_entry(model: &ReducedModel) -> Result<Option<FunctionSpec>, LowerError> {
+    let Some(program) = lower::generalised_input(model)? else {
+        return Ok(None);
+    };
+    let robot = model.robot()?.name();
+    let docs = vec![
+        format!(
+            "Generalised inputs of the {robot}: u = [tau; sum of F_k; sum of p_k x F_k] over the feet on \
+             the ground, F_k = -J_k^-T tau_k the force on the body (equations 4 to 7, 22, 23)."
+        ),
+        "x: robot coordinates in SI units, of which the joint angles count (0 to 11, rad). tau: joint \
+         torques (N m). feet: 1 on the ground, 0 in the air, order fr, fl, rr, rl. u: the torques \
+         (N m), force (N) and moment (N m) on the body."
+            .to_owned(),
+        "Axes are parallel to the body's: x forward, y left, z up. The arm p_k of a moment is the foot in \
+         its own hip frame, as in the data that models are learned from."
+            .to_owned(),
+        "A leg on the ground that is fully stretched, or whose foot is on its axis of abduction, gives \
+         infinities or no numbers, and huge forces near there: then keep the last u."
+            .to_owned(),
+        shapes(&program),
+    ];
+    Ok(Some(entry(program.name().to_owned(), program, docs)))
+}
+
+fn map_entries(model: &ReducedModel, units: Units) -> Result<Vec<FunctionSpec>, LowerError> {
+    let (state, input) = match units {
+        Units::Si => (model.state(), model.input()),
+        // Their units are those of SI values.
+        Units::Scaled => (None, None),
+    };
+    let unit = units.of_robot();
+    let n = format!("robot coordinates in {unit}");
+    let is_nonlinear =
+        |map: Result<&StateMap, ModelError>| map.is_ok_and(|m| m.as_affine().is_none());
+    let equations = MapEquations {
+        curved_encoder: is_nonlinear(model.encoder_map()),
+        curved_decoder: is_nonlinear(model.decoder_map()),
+    };
+    let (at_x, at_z) = equations.points();
+    let candidates = [
+        (
+            lower::encode(model),
+            equations.encode(),
+            format!(
+                "x: {n}. z: latent coordinates (scaled).{}",
+                elements("x", state)
+            ),
+        ),
+        (
+            lower::encode_velocity(model),
+            equations.encode_velocity(),
+            format!("{at_x}dx: velocities of the {n}. dz: latent velocities (scaled)."),
+        ),
+        (
+            lower::decode(model),
+            equations.decode(),
+            format!(
+                "z: latent coordinates (scaled). x: {n}.{}",
+                elements("x", state)
+            ),
+        ),
+        (
+            lower::decode_velocity(model),
+            equations.decode_velocity(),
+            format!("{at_z}dz: latent velocities (scaled). dx: velocities of the {n}."),
+        ),
+        (
+            lower::project_input(model),
+            equations.project_input(),
+            format!(
+                "{at_x}u: generalised inputs in {unit}. u_lat: latent inputs (scaled).{}",
+                elements("u", input)
+            ),
+        ),
+        (
+            lower::lift_input(model),
+            equations.lift_input(),
+            format!(
+                "{at_x}u_lat: latent inputs (scaled). u: generalised inputs in {unit}.{}",
+                elements("u", input)
+            ),
+        ),
+    ];
+    let mut entries = Vec::new();
+    for (program, title, text) in candidates {
+        match program {
+            Ok(program) => {
+                let title = match units {
+                    Units::Si => title.to_owned(),
+                    Units::Scaled => without_factors(title),
+                };
+                let docs = vec![title, text, shapes(&program)];
+                entries.push(entry(program.name().to_owned(), program, docs));
+            }
+            Err(LowerError::Model(ModelError::Missing { .. })) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(entries)
+}
+
+/// An equation of the maps between scaled values.
+fn without_factors(title: &str) -> String {
+    [
+        ("(s_x x)", "x"),
+        ("(s_x dx)", "dx"),
+        ("(s_u u)", "u"),
+        ("s_x x", "x"),
+        (" / s_x", ""),
+        (" / s_u", ""),
+    ]
+    .into_iter()
+    .fold(title.to_owned(), |text, (from, to)| text.replace(from, to))
+}
+
+/// The equations of the maps in words of the documentation, for linear and nonlinear models.
+struct MapEquations {
+    curved_encoder: bool,
+    curved_decoder: bool,
+}
+
+impl MapEquations {
+    /// What the first argument of the encoder's and the decoder's functions is, if they take one.
+    fn points(&self) -> (&'static str, &'static str) {
+        let x = "x: robot coordinates at which the Jacobian is taken, SI units. ";
+        let z = "z: latent coordinates at which the Jacobian is taken (scaled). ";
+        (
+            if self.curved_encoder { x } else { "" },
+            if self.curved_decoder { z } else { "" },
+        )
+    }
+
+    fn encode(&self) -> &'static str {
+        match self.curved_encoder {
+            false => "Latent coordinates: z = W_e (s_x x) + b_e.",
+            true => "Latent coordinates: z = E(s_x x) with the nonlinear encoder E.",
+        }
+    }
+
+    fn encode_velocity(&self) -> &'static str {
+        match self.curved_encoder {
+            false => "Latent velocities: dz = W_e (s_x dx); velocities take no bias.",
+            true => "Latent velocities: dz = J (s_x dx) with J, the encoder's Jacobian at s_x x.",
+        }
+    }
+
+    fn decode(&self) -> &'static str {
+        match self.curved_decoder {
+            false => "Robot coordinates: x = (W_d z + b_d) / s_x.",
+            true => "Robot coordinates: x = D(z) / s_x with the nonlinear decoder D.",
+        }
+    }
+
+    fn decode_velocity(&self) -> &'static str {
+        match self.curved_decoder {
+            false => "Robot velocities: dx = (W_d dz) / s_x; velocities take no bias.",
+            true => "Robot velocities: dx = (J dz) / s_x with J, the decoder's Jacobian at z.",
+        }
+    }
+
+    fn project_input(&self) -> &'static str {
+        match self.curved_encoder {
+            false => "Latent inputs: u_lat = pinv(W_e^T) (s_u u).",
+            true => {
+                "Latent inputs: u_lat = pinv(J^T) (s_u u) with J, the encoder's Jacobian at s_x x, \
+                 by the normal equations; not finite where J has not full row rank."
+            }
+        }
+    }
+
+    fn lift_input(&self) -> &'static str {
+        match self.curved_encoder {
+            false => "Generalised inputs: u = (W_e^T u_lat) / s_u.",
+            true => {
+                "Generalised inputs: u = (J^T u_lat) / s_u with J, the encoder's Jacobian at s_x x."
+            }
+        }
+    }
+}
+
+fn phase_entries(
+    model: &ReducedModel,
+    phase: usize,
+    options: &LowerOptions,
+) -> Result<PhaseInterface, LowerError> {
+    let identifier = model.phase_identifier(phase).to_string();
+    let equations = equations(model, phase)?;
+    let name = &model.phase(phase)?.name;
+
+    let program = lower::dynamics(model, phase, options)?;
+    let mut docs = vec![format!(
+        "Latent accelerations of phase `{name}`: ddz = Xi^T Theta(z, dz, u_lat), scaled units."
+    )];
+    docs.extend(equations);
+    docs.push(shapes(&program));
+    let dynamics = entry(format!("{identifier}_dynamics"), program, docs);
+
+    let (program, pattern) = lower::dynamics_jacobian(model, phase, options)?;
+    let docs = vec![
+        format!(
+            "Latent accelerations of phase `{name}` and the structural nonzeros of their \
+             Jacobian d ddz / d (z, dz, u_lat), row-major."
+        ),
+        shapes(&program),
+    ];
+    let mut jacobian = entry(format!("{identifier}_dynamics_jacobian"), program, docs);
+    if pattern.is_empty() {
+        jacobian.parameters.push(EntryParameter {
+            name: "jacobian".to_owned(),
+            len: 0,
+            role: Role::Output,
+        });
+    }
+
+    let program = lower::rk4_step(model, phase, options)?;
+    let docs = vec![
+        format!(
+            "Advances the latent state of phase `{name}` by h seconds: one step of the classical \
+             Runge-Kutta method with u_lat held."
+        ),
+        shapes(&program),
+    ];
+    Ok(PhaseInterface {
+        step: entry(format!("{identifier}_step"), program, docs),
+        identifier,
+        dynamics,
+        jacobian,
+        pattern,
+    })
+}
+
+/// An entry whose outputs of the same name as an input are updated in place.
+fn entry(name: String, program: Program, docs: Vec<String>) -> FunctionSpec {
+    let is_in = |slots: &[Slot], name: &str| slots.iter().any(|slot| slot.name == name);
+    let mut parameters: Vec<EntryParameter> = program
+        .inputs()
+        .iter()
+        .map(|slot| EntryParameter {
+            name: slot.name.clone(),
+            len: slot.len,
+            role: if is_in(program.outputs(), &slot.name) {
+                Role::InOut
+            } else if slot.name == "h" {
+                Role::Scalar
+            } else {
+                Role::Input
+            },
+        })
+        .collect();
+    for slot in program.outputs() {
+        if !is_in(program.inputs(), &slot.name) {
+            parameters.push(EntryParameter {
+                name: slot.name.clone(),
+                len: slot.len,
+                role: Role::Output,
+            });
+        }
+    }
+    FunctionSpec {
+        name,
+        program,
+        parameters,
+        docs,
+    }
+}
+
+/// "Lengths: z 2, dz 2, u_lat 2, ddz 2."
+fn shapes(program: &Program) -> String {
+    let mut names: Vec<String> = Vec::new();
+    for slot in program.inputs().iter().chain(program.outputs()) {
+        let text = format!("{} {}", slot.name, slot.len);
+        if slot.name != "h" && !names.contains(&text) {
+            names.push(text);
+        }
+    }
+    format!("Lengths: {}.", names.join(", "))
+}
+
+/// " `x[0]` fr.hx (rad), ..." if the model names its coordinates.
+fn elements(array: &str, signals: Option<&CoordinateNames>) -> String {
+    let Some(signals) = signals else {
+        return String::new();
+    };
+    let pairs = signals.names.iter().zip(&signals.units).enumerate();
+    let list: Vec<String> = pairs
+        .map(|(k, (name, unit))| format!("{array}[{k}] {name} ({unit})"))
+        .collect();
+    format!(" {}.", list.join(", "))
+}
+
+/// The equations of a phase, one line each; long ones only as a count of terms.
+fn equations(model: &ReducedModel, phase: usize) -> Result<Vec<String>, LowerError> {
+    let mut lines = Vec::new();
+    for row in 0..model.latent_dim() {
+        let terms = model.active_terms(phase, row)?;
+        let mut right = String::new();
+        for (coefficient, term) in terms.iter().take(MOST_TERMS) {
+            let sign = match (right.is_empty(), *coefficient < 0.0) {
+                (true, false) => "",
+                (true, true) => "-",
+                (false, false) => " + ",
+                (false, true) => " - ",
+            };
+            let text = term.text();
+            let factor = match text {
+                "1" => String::new(),
+                _ if text.contains(['+', '-']) => format!("*({text})"),
+                _ => format!("*{text}"),
+            };
+            right.push_str(&format!("{sign}{:?}{factor}", coefficient.abs()));
+        }
+        if terms.is_empty() {
+            right.push('0');
+        }
+        if terms.len() > MOST_TERMS {
+            right = format!("a sum of {} terms", terms.len());
+        }
+        lines.push(format!("ddz{} = {right}", row + 1));
+    }
+    Ok(lines)
+}

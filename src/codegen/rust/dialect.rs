@@ -1,0 +1,257 @@
+//! How Rust spells statements.
+
+use crate::codegen::code::{Argument, ConstTable, Function, MathFunction, Parameter, Role, Span};
+use crate::codegen::dialect::Dialect;
+use crate::codegen::line_wrapping::{braced, comment_lines};
+use crate::codegen::literal::Literal;
+use crate::codegen::precision::Precision;
+
+/// Rust without `std` or allocation.
+#[derive(Clone, Copy, Debug)]
+pub struct RustDialect {
+    /// Floating-point numbers of the code.
+    pub precision: Precision,
+}
+
+impl RustDialect {
+    /// The type of numbers.
+    pub fn real(&self) -> &'static str {
+        match self.precision {
+            Precision::Double => "f64",
+            Precision::Single => "f32",
+        }
+    }
+}
+
+/// Keywords of Rust and the names that generated crates use themselves.
+const RESERVED: [&str; 62] = [
+    "abstract",
+    "as",
+    "async",
+    "await",
+    "become",
+    "box",
+    "break",
+    "const",
+    "continue",
+    "crate",
+    "do",
+    "dyn",
+    "else",
+    "enum",
+    "extern",
+    "false",
+    "final",
+    "fn",
+    "for",
+    "gen",
+    "if",
+    "impl",
+    "in",
+    "let",
+    "loop",
+    "macro",
+    "match",
+    "mod",
+    "move",
+    "mut",
+    "override",
+    "priv",
+    "pub",
+    "ref",
+    "return",
+    "self",
+    "static",
+    "struct",
+    "super",
+    "trait",
+    "true",
+    "try",
+    "type",
+    "typeof",
+    "unsafe",
+    "unsized",
+    "use",
+    "virtual",
+    "where",
+    "while",
+    "yield",
+    "f64",
+    "f32",
+    "usize",
+    "std",
+    "core",
+    "libm",
+    "math",
+    "sin_cos",
+    "sin_cos_reduced",
+    "sign",
+    "union",
+];
+
+impl Dialect for RustDialect {
+    fn reserved(&self) -> &'static [&'static str] {
+        &RESERVED
+    }
+
+    fn literal(&self, literal: Literal) -> String {
+        literal.digits(self.precision)
+    }
+
+    fn apply(&self, function: MathFunction, argument: &str) -> String {
+        let name = match function {
+            MathFunction::Sqrt => "sqrt",
+            MathFunction::Abs => "abs",
+            MathFunction::Sign => "sign",
+            MathFunction::Tan => "tan",
+            MathFunction::Tanh => "tanh",
+            MathFunction::Exp => "exp",
+            MathFunction::Log => "log",
+        };
+        format!("math::{name}({argument})")
+    }
+
+    fn let_scalar(&self, name: &str, value: &str) -> String {
+        format!("let {name} = {value};")
+    }
+
+    fn let_array(&self, name: &str, elements: &[String]) -> String {
+        format!(
+            "let {name}: [{}; {}] = [{}];",
+            self.real(),
+            elements.len(),
+            elements.join(", ")
+        )
+    }
+
+    fn declare(&self, name: &str, len: usize) -> String {
+        format!("let mut {name} = [0.0_{}; {len}];", self.real())
+    }
+
+    fn for_loop(&self, variable: &str, count: usize) -> String {
+        format!("for {variable} in 0..{count}")
+    }
+
+    fn discard(&self, parameter: &str) -> String {
+        format!("let _ = {parameter};")
+    }
+
+    fn multiply_add(&self) -> Option<&'static str> {
+        Some("math::mul_add")
+    }
+
+    fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String {
+        let passed: Vec<String> = arguments.iter().map(reference).collect();
+        format!("{}({});", callee.unwrap_or("sin_cos"), passed.join(", "))
+    }
+
+    fn sin_cos_lane(&self, argument: &str, names: &[String; 2], is_used: [bool; 2]) -> Vec<String> {
+        let name = |which: usize| {
+            if is_used[which] {
+                names[which].as_str()
+            } else {
+                "_"
+            }
+        };
+        let (sine, cosine) = (name(0), name(1));
+        vec![
+            format!("let ({sine}, {cosine}) = sin_cos_reduced({argument});"),
+            format!(
+                "beyond[lane] = if math::abs({argument}) <= ANGLE_LIMIT {{ beyond[lane] }} else {{ 1.0 }};"
+            ),
+        ]
+    }
+
+    fn table_base(&self, _prefix: &str) -> String {
+        "TABLE".to_owned()
+    }
+
+    fn table(&self, table: &ConstTable) -> String {
+        let rows: Vec<String> = table
+            .entries
+            .chunks(table.cols)
+            .map(|row| {
+                let row: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
+                let row = braced(&row, "\n     ");
+                format!("    [{}]", row.trim_matches(['{', '}']))
+            })
+            .collect();
+        let (name, real, cols, n) = (&table.name, self.real(), table.cols, table.rows);
+        let rows = rows.join(",\n");
+        match table.is_in_lanes {
+            true => {
+                format!("static {name}: &[[{real}; {cols}]; {n}] = &Aligned([\n{rows},\n]).0;")
+            }
+            false => format!("static {name}: [[{real}; {cols}]; {n}] = [\n{rows},\n];"),
+        }
+    }
+
+    fn parameter(&self, parameter: &Parameter) -> String {
+        let (name, len, real) = (&parameter.name, parameter.len, self.real());
+        match parameter.role {
+            Role::Input => format!("{name}: &[{real}; {len}]"),
+            Role::Output | Role::InOut => format!("{name}: &mut [{real}; {len}]"),
+            Role::Scalar => format!("{name}: {real}"),
+        }
+    }
+
+    fn signature(&self, function: &Function) -> String {
+        let parameters: Vec<String> = function
+            .parameters
+            .iter()
+            .map(|p| self.parameter(p))
+            .collect();
+        format!("pub fn {}({})", function.name, parameters.join(", "))
+    }
+
+    fn docs(&self, lines: &[String]) -> String {
+        documentation(lines)
+    }
+}
+
+/// A documentation comment; equations are in a text block, so that no markup applies.
+pub fn documentation(lines: &[String]) -> String {
+    let mut text = String::new();
+    let (equations, prose): (Vec<&String>, Vec<&String>) =
+        lines.iter().partition(|line| line.starts_with("ddz"));
+    for (position, paragraph) in prose.iter().enumerate() {
+        if position > 0 {
+            text.push_str("///\n");
+        }
+        for line in comment_lines(&[(*paragraph).clone()], 94) {
+            text.push_str(&format!("/// {}\n", plain(line.trim_start())));
+        }
+    }
+    if !equations.is_empty() {
+        text.push_str("///\n/// ```text\n");
+        for equation in equations {
+            for line in comment_lines(std::slice::from_ref(equation), 94) {
+                text.push_str(&format!("/// {line}\n"));
+            }
+        }
+        text.push_str("/// ```\n");
+    }
+    text
+}
+
+/// Brackets would be read as links.
+fn plain(line: &str) -> String {
+    line.replace('[', "\\[").replace(']', "\\]")
+}
+
+fn reference(argument: &Argument) -> String {
+    let (span, by): (&Span, &str) = match argument {
+        Argument::Read(span) => (span, "&"),
+        Argument::Write(span) => (span, "&mut "),
+    };
+    match (span.is_whole(), span.is_parameter) {
+        (true, true) => span.array.to_string(),
+        (true, false) => format!("{by}{}", span.array),
+        (false, _) => format!(
+            "{by}{}[{}..{}]",
+            span.array,
+            span.offset,
+            span.offset + span.len
+        ),
+    }
+}

@@ -1,0 +1,70 @@
+//! The constants of the sine-and-cosine kernel as text.
+
+use super::literal::Literal;
+use super::precision::Precision;
+use crate::ir::{sin_cos, sin_cos_f32};
+
+/// Spelled constants, in the order in which kernels use them.
+#[derive(Clone, Debug)]
+pub struct KernelText {
+    /// Largest magnitude of an argument.
+    pub limit: String,
+    /// 2/pi.
+    pub two_over_pi: String,
+    /// What rounds to an integer when added.
+    pub round: String,
+    /// pi/2 in three parts.
+    pub pi_2: Vec<String>,
+    /// Coefficients of the sine.
+    pub sin: Vec<String>,
+    /// Coefficients of the cosine.
+    pub cos: Vec<String>,
+}
+
+impl KernelText {
+    /// The constants in a precision, each spelled by `spell`.
+    pub fn new(precision: Precision, spell: &dyn Fn(Literal) -> String) -> Self {
+        match precision {
+            Precision::Double => Self::spelled(
+                spell,
+                [sin_cos::LIMIT, sin_cos::TWO_OVER_PI, sin_cos::ROUND],
+                [&sin_cos::PI_2, &sin_cos::SIN, &sin_cos::COS],
+            ),
+            Precision::Single => {
+                let wide = |values: [f32; 3]| values.map(f64::from);
+                Self::spelled(
+                    spell,
+                    wide([
+                        sin_cos_f32::LIMIT,
+                        sin_cos_f32::TWO_OVER_PI,
+                        sin_cos_f32::ROUND,
+                    ]),
+                    [
+                        &wide(sin_cos_f32::PI_2),
+                        &wide(sin_cos_f32::SIN),
+                        &wide(sin_cos_f32::COS),
+                    ],
+                )
+            }
+        }
+    }
+
+    fn spelled(spell: &dyn Fn(Literal) -> String, single: [f64; 3], lists: [&[f64]; 3]) -> Self {
+        let text =
+            |value: f64| spell(Literal::new(value).expect("the kernel's constants are finite"));
+        let signed = |&value: &f64| match value < 0.0 {
+            true => format!("({})", text(value)),
+            false => text(value),
+        };
+        let [pi_2, sin, cos] = lists.map(|values| values.iter().map(signed).collect());
+        let [limit, two_over_pi, round] = single.map(text);
+        Self {
+            limit,
+            two_over_pi,
+            round,
+            pi_2,
+            sin,
+            cos,
+        }
+    }
+}

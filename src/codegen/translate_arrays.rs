@@ -1,0 +1,256 @@
+//! Array statements as loops.
+
+use super::code::{Argument, Expr, Index, Infix, Span, Stmt};
+use super::ident::Ident;
+use super::lanes::{Row, Run};
+use super::translate::Translator;
+use crate::ir::{Group, LANES, Slopes, TableId, ValueId};
+
+/// A group of functions where its numbers live.
+struct GroupCode {
+    table: Ident,
+    values: Span,
+    slopes: SlopeCode,
+}
+
+enum SlopeCode {
+    One,
+    Plus(Span),
+    Minus(Span),
+}
+
+impl Translator<'_> {
+    pub(super) fn sin_cos(&mut self, first: usize, arguments: &[ValueId]) {
+        let n = arguments.len();
+        if self.lane.is_some() {
+            for (k, &argument) in arguments.iter().enumerate() {
+                self.sin_cos_lane(first + k, first + n + k, argument);
+            }
+            return;
+        }
+        let arguments = self.span_with_rest(arguments);
+        let sines = self.padded_home(first, n, "s");
+        let cosines = self.padded_home(first + n, n, "c");
+        self.body.push(Stmt::SinCos {
+            arguments,
+            sines,
+            cosines,
+        });
+    }
+
+    fn table(&mut self, id: TableId) -> Ident {
+        self.names.tables.name(&self.program.tables()[id.index()])
+    }
+
+    fn sin_cos_lane(&mut self, sine_value: usize, cosine_value: usize, argument: ValueId) {
+        let argument = self.named(argument);
+        let [sine, cosine] = ["s", "c"].map(|name| self.names.locals.mint(name));
+        self.spell(sine_value, Expr::Name(sine.clone()));
+        self.spell(cosine_value, Expr::Name(cosine.clone()));
+        self.body.push(Stmt::SinCosLane {
+            argument,
+            sine,
+            cosine,
+            is_used: [sine_value, cosine_value].map(|value| self.n_uses[value] > 0),
+        });
+    }
+
+    /// A loop over four rows a time for each section of weights.
+    pub(super) fn accumulate(&mut self, first: usize, table: TableId, sections: &[Vec<ValueId>]) {
+        let cols = self.program.tables()[table.index()].cols();
+        let name = self.table(table);
+        if sections.is_empty() {
+            for k in 0..cols {
+                let entry = Expr::Entry(name.clone(), Index::fixed(0), Index::fixed(k));
+                self.spell(first + k, entry);
+            }
+            return;
+        }
+        let weights: Vec<Span> = sections.iter().map(|section| self.span(section)).collect();
+        let home = self.home(first, cols, "y");
+        let (i, k) = (self.names.locals.mint("i"), self.names.locals.mint("k"));
+        let target = || Expr::Element(home.array.clone(), Index::variable(&i).shifted(home.offset));
+        let entry = |row: Index| Expr::Entry(name.clone(), row, Index::variable(&i));
+        let offset = Stmt::Assign(target(), entry(Index::fixed(0)));
+        self.body.push(Stmt::For(i.clone(), cols, vec![offset]));
+        let add = |value| Stmt::For(i.clone(), cols, vec![Stmt::AddAssign(target(), value)]);
+        let mut row = 1;
+        for w in weights {
+            let product = |index: Index| {
+                let weight = Expr::Element(w.array.clone(), index.clone().shifted(w.offset));
+                Expr::infix(Infix::Mul, entry(index.shifted(row)), weight)
+            };
+            let blocks = w.len / 4;
+            if blocks > 0 {
+                let term = |n: usize| product(Index::fixed(n).plus(4, &k));
+                let front = Expr::infix(Infix::Add, term(0), term(1));
+                let back = Expr::infix(Infix::Add, term(2), term(3));
+                let sum = Expr::infix(Infix::Add, front, back);
+                self.body.push(Stmt::For(k.clone(), blocks, vec![add(sum)]));
+            }
+            for n in 4 * blocks..w.len {
+                self.body.push(add(product(Index::fixed(n))));
+            }
+            row += w.len;
+        }
+    }
+
+    /// A constant table, copied to where its entries belong.
+    pub(super) fn constants(&mut self, first: usize, table: TableId) {
+        let shape = &self.program.tables()[table.index()];
+        let (rows, cols) = (shape.rows(), shape.cols());
+        let name = self.table(table);
+        let home = self.matrix_storage(first, rows, cols);
+        let (r, i) = (self.names.locals.mint("r"), self.names.locals.mint("i"));
+        let entry = Expr::Entry(name, Index::variable(&r), Index::variable(&i));
+        let assign = Stmt::Assign(home.element(&r, &i), entry);
+        let inner = Stmt::For(i, cols, vec![assign]);
+        self.body.push(Stmt::For(r, rows, vec![inner]));
+    }
+
+    /// One loop over the rows.
+    pub(super) fn separable(
+        &mut self,
+        first: usize,
+        start: &[ValueId],
+        base: Option<&[ValueId]>,
+        groups: &[Group],
+        cols: usize,
+    ) {
+        let rows = start.len();
+        let r = self.names.locals.mint("r");
+        let start = self.at(start, &r);
+        let base = base.map(|base| self.span(base));
+        let groups: Vec<GroupCode> = groups.iter().map(|group| self.group(group)).collect();
+        let sums = self.home(first, rows, "y");
+        let slopes = self.matrix_storage(first + rows, rows, cols);
+        let i = self.names.locals.mint("i");
+        let names = ["k", "l", "q", "p"].map(|name| self.names.locals.mint(name));
+
+        let mut bounds: Vec<usize> = groups.iter().map(|group| group.values.len).collect();
+        let width = base.as_ref().map_or(0, |base| base.len / rows);
+        bounds.extend(base.iter().map(|_| width));
+        bounds.sort_unstable();
+        bounds.dedup();
+        let mut runs = Vec::new();
+        let mut from = 0;
+        for to in bounds {
+            let here = groups.iter().filter(|group| group.values.len > from);
+            let base = base.as_ref().filter(|_| width > from);
+            let (term, slope) = column(here, base.map(|base| (base, width)), &r, &i);
+            let blocks = from / LANES..to / LANES;
+            runs.push(Run {
+                blocks,
+                term,
+                slope,
+            });
+            from = to;
+        }
+        let row = Row {
+            slope_at: slopes.index(&r, &i),
+            slopes: slopes.array,
+            column: i,
+            names,
+            runs,
+            n_slopes: cols,
+            start,
+            sum: Expr::Element(sums.array, Index::variable(&r).shifted(sums.offset)),
+        };
+        self.body
+            .push(Stmt::For(r, rows, vec![Stmt::Row(Box::new(row))]));
+    }
+
+    /// The value at a loop's variable: an entry of a table if the values are the entries of its
+    /// first row, an element of an array if not.
+    fn at(&mut self, values: &[ValueId], variable: &Ident) -> Expr {
+        if let Expr::Entry(table, row, _) = self.named(values[0]) {
+            let entry = |col| Expr::Entry(table.clone(), row.clone(), col);
+            let mut indexed = values.iter().enumerate();
+            if indexed.all(|(k, &value)| self.named(value) == entry(Index::fixed(k))) {
+                return entry(Index::variable(variable));
+            }
+        }
+        let span = self.span(values);
+        Expr::Element(span.array, Index::variable(variable).shifted(span.offset))
+    }
+
+    fn group(&mut self, group: &Group) -> GroupCode {
+        GroupCode {
+            table: self
+                .names
+                .tables
+                .name_in_lanes(&self.program.tables()[group.table.index()]),
+            values: self.span(&group.values),
+            slopes: match &group.slopes {
+                Slopes::One => SlopeCode::One,
+                Slopes::Plus(values) => SlopeCode::Plus(self.span(values)),
+                Slopes::Minus(values) => SlopeCode::Minus(self.span(values)),
+            },
+        }
+    }
+
+    pub(super) fn call(&mut self, first: usize, callee: usize, arguments: &[ValueId]) {
+        let program = &self.program.callees()[callee];
+        let mut passed = Vec::new();
+        let mut rest = arguments;
+        for slot in program.inputs() {
+            let (these, others) = rest.split_at(slot.len);
+            passed.push(Argument::Read(self.whole_span(these)));
+            rest = others;
+        }
+        let mut next = first;
+        for slot in program.outputs() {
+            let home = self.output_home(next, slot.len).filter(Span::is_whole);
+            let home = match home {
+                Some(home) => self.allocate(next, home),
+                None => self.local_home(next, slot.len, &slot.name),
+            };
+            passed.push(Argument::Write(home));
+            next += slot.len;
+        }
+        let callee = self.names.callees[callee].clone();
+        self.body.push(Stmt::Call(callee, passed));
+    }
+}
+
+/// Term and slope of column `i` of row `r`; the base comes with the length of its rows.
+fn column<'a>(
+    groups: impl Iterator<Item = &'a GroupCode>,
+    base: Option<(&Span, usize)>,
+    r: &Ident,
+    i: &Ident,
+) -> (Expr, Expr) {
+    let (mut term, mut slope): (Option<Expr>, Option<Expr>) = (None, None);
+    if let Some((base, width)) = base {
+        let index = Index::fixed(base.offset).plus(width, r).plus(1, i);
+        slope = Some(Expr::Element(base.array.clone(), index));
+    }
+    for group in groups {
+        let entry = || {
+            let (row, col) = (Index::variable(r), Index::variable(i));
+            Expr::Entry(group.table.clone(), row, col)
+        };
+        let times = |span: &Span| {
+            let index = Index::variable(i).shifted(span.offset);
+            let element = Expr::Element(span.array.clone(), index);
+            Expr::infix(Infix::Mul, entry(), element)
+        };
+        term = Some(joined(term, Infix::Add, times(&group.values)));
+        slope = Some(match &group.slopes {
+            SlopeCode::One => joined(slope, Infix::Add, entry()),
+            SlopeCode::Plus(span) => joined(slope, Infix::Add, times(span)),
+            SlopeCode::Minus(span) => joined(slope, Infix::Sub, times(span)),
+        });
+    }
+    let invariant = "one group has a part in every column";
+    (term.expect(invariant), slope.expect(invariant))
+}
+
+/// `a op b`, or `b` alone (negated for a difference) if there is no `a`.
+fn joined(a: Option<Expr>, op: Infix, b: Expr) -> Expr {
+    match (a, op) {
+        (Some(a), op) => Expr::infix(op, a, b),
+        (None, Infix::Sub) => Expr::Negate(Box::new(b)),
+        (None, Infix::Add | Infix::Mul | Infix::Div) => b,
+    }
+}

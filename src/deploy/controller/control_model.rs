@@ -1,0 +1,115 @@
+//! The numbers of a model as `src/control_model.rs`.
+
+use askama::Template;
+use nalgebra::Dim;
+use nalgebra::storage::RawStorage;
+
+use crate::codegen::interface::{ModelInterface, PhaseInterface};
+use crate::mpc::{ControlModel, ControlPhase};
+use crate::robot::STATE_DIM;
+
+/// Numbers a line.
+const WIDTH: usize = 5;
+
+/// `src/control_model.rs`.
+#[derive(Template)]
+#[template(
+    path = "controller/control_model.askama",
+    config = "templates/askama.toml"
+)]
+pub struct ControlModelText<'a> {
+    banner: String,
+    model: &'a str,
+    name: &'a str,
+    robot: &'a str,
+    latent_dim: usize,
+    state_dim: usize,
+    encoder: Numbers,
+    encoder_bias: Numbers,
+    decoder: Numbers,
+    decoder_bias: Numbers,
+    lift: Numbers,
+    projection: Numbers,
+    phase_of_feet: String,
+    phases: Vec<PhaseNumbers<'a>>,
+}
+
+struct PhaseNumbers<'a> {
+    name: &'a str,
+    identifier: &'a str,
+    upper: String,
+    nnz: usize,
+    is_grounded: bool,
+    latent_mean: Numbers,
+    latent_root: Numbers,
+    torque_mean: Numbers,
+    torque_precision: Numbers,
+}
+
+/// A matrix as a Rust array, row by row.
+struct Numbers {
+    len: usize,
+    text: String,
+}
+
+impl Numbers {
+    fn new<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
+        matrix: &nalgebra::Matrix<f64, R, C, S>,
+    ) -> Self {
+        let texts: Vec<String> = matrix
+            .row_iter()
+            .flat_map(|row| {
+                row.iter()
+                    .map(|value| format!("{value:?}"))
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        let lines: Vec<String> = texts.chunks(WIDTH).map(|line| line.join(", ")).collect();
+        Self {
+            len: texts.len(),
+            text: format!("[\n    {},\n]", lines.join(",\n    ")),
+        }
+    }
+}
+
+impl<'a> ControlModelText<'a> {
+    /// The text for a plant.
+    pub fn new(entries: &'a ModelInterface, plant: &'a ControlModel, banner: String) -> Self {
+        let parts = plant.parts();
+        let pairs = entries.phases.iter().zip(plant.phases());
+        Self {
+            banner,
+            model: &entries.name,
+            name: &entries.identifier,
+            robot: plant.robot().name(),
+            latent_dim: plant.latent_dim(),
+            state_dim: STATE_DIM,
+            encoder: Numbers::new(&parts.encoder),
+            encoder_bias: Numbers::new(&parts.encoder_bias),
+            decoder: Numbers::new(&parts.decoder),
+            decoder_bias: Numbers::new(&parts.decoder_bias),
+            lift: Numbers::new(&parts.lift),
+            projection: Numbers::new(&parts.projection),
+            phase_of_feet: format!("{:?}", parts.phase_of_feet),
+            phases: pairs
+                .map(|(entries, phase)| PhaseNumbers::new(entries, phase))
+                .collect(),
+        }
+    }
+}
+
+impl<'a> PhaseNumbers<'a> {
+    fn new(entries: &'a PhaseInterface, phase: &'a ControlPhase) -> Self {
+        Self {
+            name: &phase.name,
+            identifier: &entries.identifier,
+            upper: entries.identifier.to_ascii_uppercase(),
+            nnz: entries.pattern.len(),
+            is_grounded: phase.is_grounded,
+            latent_mean: Numbers::new(&phase.latent_mean),
+            latent_root: Numbers::new(&phase.latent_root),
+            torque_mean: Numbers::new(&phase.torque_mean),
+            torque_precision: Numbers::new(&phase.torque_precision),
+        }
+    }
+}

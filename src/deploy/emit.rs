@@ -1,0 +1,191 @@
+//! A model to the files of the chosen targets.
+
+use std::str::FromStr;
+
+use super::controller;
+use super::error::EmitError;
+use crate::codegen::script::{matlab, python};
+use crate::codegen::{Precision, SineCosine, Units, c, interface::ModelInterface, rust};
+use crate::files::EmittedFile;
+use crate::lower::{LowerError, LowerOptions};
+use crate::model::ReducedModel;
+use crate::typeset::latex::{self, LatexOptions};
+use crate::typeset::markdown::{self, MarkdownOptions};
+use crate::typeset::mathml::{self, MathmlOptions};
+
+/// What can be generated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Target {
+    /// Equations, table of coefficients and nomenclature for papers.
+    Latex,
+    /// C99: header, source, self-test and CMake project.
+    C,
+    /// A Rust crate without `std` or allocation.
+    Rust,
+    /// Equations in GitHub's Markdown.
+    Markdown,
+    /// Equations for web pages.
+    Mathml,
+    /// A Python module on NumPy.
+    Python,
+    /// A Python module of CasADi functions.
+    Casadi,
+    /// A function file for MATLAB and Octave.
+    Matlab,
+    /// The controller as a crate with a C interface.
+    Controller,
+}
+
+impl Target {
+    /// All targets, in the order in which they are listed.
+    pub const ALL: [Target; 9] = [
+        Target::Latex,
+        Target::C,
+        Target::Rust,
+        Target::Markdown,
+        Target::Mathml,
+        Target::Python,
+        Target::Casadi,
+        Target::Matlab,
+        Target::Controller,
+    ];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Latex => "latex",
+            Self::C => "c",
+            Self::Rust => "rust",
+            Self::Markdown => "markdown",
+            Self::Mathml => "mathml",
+            Self::Python => "python",
+            Self::Casadi => "casadi",
+            Self::Matlab => "matlab",
+            Self::Controller => "controller",
+        }
+    }
+}
+
+impl FromStr for Target {
+    type Err = EmitError;
+
+    fn from_str(name: &str) -> Result<Self, EmitError> {
+        let known = Self::ALL.into_iter().find(|target| target.name() == name);
+        known.ok_or_else(|| EmitError::UnknownTarget {
+            found: name.to_owned(),
+            expected: Self::ALL.map(Self::name).join(", "),
+        })
+    }
+}
+
+/// How files are made from a model.
+#[derive(Clone, Debug, Default)]
+pub struct EmitOptions {
+    /// How programs are made.
+    pub lower: LowerOptions,
+    /// How equations are set in LaTeX.
+    pub latex: LatexOptions,
+    /// How equations are set in Markdown.
+    pub markdown: MarkdownOptions,
+    /// How equations are set in MathML.
+    pub mathml: MathmlOptions,
+    /// Floating-point numbers of C and Rust.
+    pub precision: Precision,
+    /// What computes sines and cosines in C and Rust.
+    pub sines: SineCosine,
+    /// Units of robot coordinates in generated code.
+    pub units: Units,
+    /// Digest of the model file, for the first line of generated code.
+    pub digest: Option<String>,
+}
+
+/// The files of the chosen targets, each with its path below the output folder; a target that is chosen
+/// twice gives them once.
+///
+/// Equal models and options give equal bytes.
+///
+/// # Errors
+/// [`EmitError::Codegen`] if a phase cannot be lowered or single precision cannot hold a constant,
+/// [`EmitError::Typeset`] if a variable has no symbol in print, [`EmitError::Control`] and [`EmitError::Nonlinear`] for models that cannot be
+/// controlled.
+pub fn emit(
+    model: &ReducedModel,
+    targets: &[Target],
+    options: &EmitOptions,
+) -> Result<Vec<EmittedFile>, EmitError> {
+    let provenance = provenance(model, options.digest.as_deref());
+    let (precision, sines) = (options.precision, options.sines);
+    let mut entries = EntriesOnDemand {
+        model,
+        options,
+        compiled: None,
+        scripts: None,
+    };
+    let mut files = Vec::new();
+    for (position, target) in targets.iter().enumerate() {
+        if targets[..position].contains(target) {
+            continue;
+        }
+        files.extend(match target {
+            Target::C => c::emit(entries.compiled()?, &provenance, precision, sines)?,
+            Target::Rust => rust::emit(entries.compiled()?, &provenance, precision, sines)?,
+            Target::Python => python::emit(entries.scripts()?, &provenance)?,
+            Target::Casadi => python::emit_casadi(entries.scripts()?, &provenance)?,
+            Target::Matlab => matlab::emit(entries.scripts()?, &provenance)?,
+            Target::Latex => latex::emit(model, &options.latex)?,
+            Target::Markdown => markdown::emit(model, &options.markdown)?,
+            Target::Mathml => mathml::emit(model, &options.mathml)?,
+            Target::Controller => controller::emit(model, &options.lower, &provenance)?,
+        });
+    }
+    Ok(files)
+}
+
+/// What code is generated from, made when the first target asks.
+struct EntriesOnDemand<'a> {
+    model: &'a ReducedModel,
+    options: &'a EmitOptions,
+    compiled: Option<ModelInterface>,
+    scripts: Option<ModelInterface>,
+}
+
+impl EntriesOnDemand<'_> {
+    /// For C and Rust, with the error of single precision in the documentation.
+    fn compiled(&mut self) -> Result<&ModelInterface, EmitError> {
+        let entries = match self.compiled.take() {
+            Some(entries) => entries,
+            None => {
+                let mut entries = self.in_double()?;
+                self.options.precision.check(&entries)?;
+                if self.options.precision == Precision::Single {
+                    entries.state_bounds();
+                }
+                entries
+            }
+        };
+        Ok(self.compiled.insert(entries))
+    }
+
+    /// For languages that compute in double precision alone.
+    fn scripts(&mut self) -> Result<&ModelInterface, EmitError> {
+        let entries = match self.scripts.take() {
+            Some(entries) => entries,
+            None => self.in_double()?,
+        };
+        Ok(self.scripts.insert(entries))
+    }
+
+    fn in_double(&self) -> Result<ModelInterface, LowerError> {
+        ModelInterface::new(self.model, &self.options.lower, self.options.units)
+    }
+}
+
+/// The first line of generated code, without comment signs.
+fn provenance(model: &ReducedModel, digest: Option<&str>) -> String {
+    let digest = digest.map_or(String::new(), |digest| format!(", digest {digest}"));
+    format!(
+        "Generated by romc {} from model `{}`{digest}. Do not edit.",
+        env!("CARGO_PKG_VERSION"),
+        model.name(),
+    )
+}

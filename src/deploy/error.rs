@@ -1,0 +1,43 @@
+//! How emission fails.
+
+use crate::codegen::CodegenError;
+use crate::lower::LowerError;
+use crate::mpc::MpcError;
+use crate::typeset::TypesetError;
+
+/// Why the files of a target could not be made from a model.
+#[derive(Debug, thiserror::Error)]
+pub enum EmitError {
+    /// The equations cannot be printed.
+    #[error(transparent)]
+    Typeset(#[from] TypesetError),
+    /// No code can be generated.
+    #[error(transparent)]
+    Codegen(#[from] CodegenError),
+    /// The model cannot be lowered.
+    #[error(transparent)]
+    Lower(#[from] LowerError),
+    /// There is no such target.
+    #[error("target `{found}`: expected one of {expected}")]
+    UnknownTarget {
+        /// The name given.
+        found: String,
+        /// The names that there are.
+        expected: String,
+    },
+    /// The model lacks what a controller needs.
+    #[error("the controller cannot be generated")]
+    Control(#[from] MpcError),
+    /// Encoder or decoder of a model for control are not affine.
+    #[error(
+        "model `{model}`: generated controllers take affine encoders and decoders, this one has \
+         layers with an activation"
+    )]
+    Nonlinear {
+        /// Name of the model.
+        model: String,
+    },
+    /// A template failed to render.
+    #[error("a template failed")]
+    Template(#[from] askama::Error),
+}

@@ -1,0 +1,12 @@
+//! A model to files: the targets of `romc compile`, and the controller as a crate.
+//!
+//! A model enters [`emit()`]; files in memory leave, which [`write_files`](crate::files::write_files) puts
+//! into a folder. Equations come from `typeset`, code from `codegen`; `controller` adds the sources of
+//! `mpc/online` and `robot` and the model's numbers. Read `emit` first.
+
+mod controller;
+mod emit;
+mod error;
+
+pub use emit::{EmitOptions, Target, emit};
+pub use error::EmitError;

@@ -1,0 +1,384 @@
+//! The controller along a recording: each control step sees the measured state, its reference is
+//! the recording itself.
+//!
+//! This is not a closed loop, the robot does not feel the commands. It asks what the controller
+//! would have commanded where the robot really was, and compares with what was commanded then.
+//!
+//! ```
+//! use std::path::Path;
+//! use romc::evaluate::{ReferenceInput, along_recording};
+//! use romc::mpc::{Controller, MpcSettings};
+//!
+//! let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+//! let model = romc::artifact::read(&root.join("models/go1-d4.json"))?;
+//! let jump = romc::recording::read(&root.join("examples/recordings/go1/test_01.csv.gz"))?;
+//! let mut controller = Controller::new(&model, MpcSettings::default())?;
+//! let run = along_recording(&mut controller, &jump, ReferenceInput::Recorded, |_, _| {})?;
+//! assert_eq!(run.summary.limit_violations, 0);
+//! assert!(run.summary.torque_r2.contact > Some(0.85));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use super::control::{Comparison, Summary, Tally};
+use crate::mpc::{
+    Command, ControlError, Controller, Lift, Measurement, MpcError, ReferenceSamples, Source,
+    StanceState, Status, foot_forces, upright,
+};
+use crate::recording::{Recording, Segment};
+use crate::robot::{ContactFlags, JOINT_DIM, Robot, STATE_DIM};
+
+/// Whether the recorded input is part of the reference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ReferenceInput {
+    /// The recorded input is the reference input.
+    Recorded,
+    /// The controller has to find the input by itself.
+    None,
+}
+
+/// One control step along a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepRow {
+    /// Segment of the recording, from zero.
+    pub segment: usize,
+    /// Time of the measurement, s.
+    pub time_s: f64,
+    /// Index of the phase of the first stage, if there was a plan.
+    pub phase: Option<usize>,
+    /// How the step ended.
+    pub status: Status,
+    /// Where the command comes from.
+    pub source: Source,
+    /// Wall time of the step, µs.
+    pub solve_us: f64,
+    /// Interior-point iterations.
+    pub iterations: u32,
+    /// Latent input.
+    pub u_lat: Vec<f64>,
+    /// Lifted input in SI units: with the transpose lift `W_eᵀ u_lat`, with the consistent lift the
+    /// torques and the force that they produce.
+    pub input: [f64; STATE_DIM],
+    /// Commanded torques, N m.
+    pub torque_nm: [f64; JOINT_DIM],
+    /// Recorded torques, N m, averaged over the time that the command is held.
+    pub recorded_torque_nm: [f64; JOINT_DIM],
+    /// Reference in latent coordinates.
+    pub z_reference: Vec<f64>,
+    /// Measurement in latent coordinates.
+    pub z: Vec<f64>,
+    /// Latent position that the step's own plan expects at the end of its horizon.
+    pub z_planned: Option<Vec<f64>>,
+}
+
+/// A step may be shorter than the time between samples by what rounds it.
+const STEP_SLACK: f64 = 0.99;
+
+/// All steps along a recording, and what they come to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// The steps, segment by segment.
+    pub rows: Vec<StepRow>,
+    /// The summary.
+    pub summary: Summary,
+}
+
+/// Runs the controller along a recording, one segment after the other.
+///
+/// Recorded torques beyond twice the robot's limits are no torques of the robot: steps with one are
+/// left out of the comparison and counted. As reference input torques are clamped to the limits.
+/// `progress(done, total)` is called once a control step.
+///
+/// # Errors
+/// Those of [`Controller::set_reference`], [`MpcError::Step`] if the controller's step is shorter
+/// than the recording's, and [`MpcError::Recording`] if the recording's inputs cannot be computed.
+pub fn along_recording(
+    controller: &mut Controller,
+    recording: &Recording,
+    reference_input: ReferenceInput,
+    mut progress: impl FnMut(usize, usize),
+) -> Result<Run, MpcError> {
+    let step_s = controller.settings().step_s;
+    for segment in recording.segments.iter().filter(|s| s.len() >= 2) {
+        let recorded_s = segment.mean_step_s();
+        if step_s < STEP_SLACK * recorded_s {
+            return Err(MpcError::Step {
+                path: recording.path.clone(),
+                found_s: step_s,
+                recorded_s,
+            });
+        }
+    }
+    let schedules: Vec<Vec<usize>> = recording
+        .segments
+        .iter()
+        .map(|segment| control_samples(&segment.time_s, step_s))
+        .collect();
+    let total = schedules.iter().map(Vec::len).sum();
+    let mut rows = Vec::with_capacity(total);
+    let mut tally = Tally::default();
+    for (number, (segment, schedule)) in recording.segments.iter().zip(&schedules).enumerate() {
+        if segment.len() < 2 {
+            continue;
+        }
+        let input = clamped_input(segment, controller.plant().robot())?;
+        set_reference(controller, segment, reference_input, &input)?;
+        for &sample in schedule {
+            rows.push(one_step(controller, segment, number, sample, &mut tally));
+            progress(rows.len(), total);
+        }
+    }
+    tally.lift = lift_comparison(controller, recording)?;
+    Ok(Run {
+        summary: tally.summary(),
+        rows,
+    })
+}
+
+/// R² of the torques that the controller's lift makes of exactly projected recorded inputs, at
+/// every sample: what the lift alone loses.
+///
+/// # Errors
+/// [`MpcError::Recording`] if the recording's inputs cannot be computed.
+pub fn lift_comparison(
+    controller: &mut Controller,
+    recording: &Recording,
+) -> Result<Comparison, MpcError> {
+    let mut comparison = Comparison::default();
+    let mut u_lat = vec![0.0; controller.plant().latent_dim()];
+    for segment in &recording.segments {
+        let input = clamped_input(segment, controller.plant().robot())?;
+        for (sample, u) in input.chunks_exact(STATE_DIM).enumerate() {
+            let recorded = segment.torque(sample);
+            if !is_plausible(controller.plant().robot(), &recorded) {
+                continue;
+            }
+            controller.stand_at(segment.x.column(sample).as_slice());
+            controller.local_plant().project(u, &mut u_lat);
+            let Some(stance) = stance(controller, segment, sample) else {
+                continue;
+            };
+            if let Ok(torque) = controller.lift(&u_lat, &stance) {
+                comparison.add(segment.feet[sample], &torque, &recorded);
+            }
+        }
+    }
+    Ok(comparison)
+}
+
+/// Samples at which a controller with period `step_s` acts: the first at or after each multiple,
+/// as long as the command's whole hold lies within the recording.
+fn control_samples(time_s: &[f64], step_s: f64) -> Vec<usize> {
+    let mut samples = Vec::new();
+    let (Some(&first), Some(&last)) = (time_s.first(), time_s.last()) else {
+        return samples;
+    };
+    let mut sample = 0;
+    for step in 0.. {
+        let due = first + step as f64 * step_s;
+        if due + step_s > last + 1e-9 {
+            return samples;
+        }
+        while time_s[sample] < due - 1e-9 {
+            sample += 1;
+        }
+        samples.push(sample);
+    }
+    samples
+}
+
+fn one_step(
+    controller: &mut Controller,
+    segment: &Segment,
+    number: usize,
+    sample: usize,
+    tally: &mut Tally,
+) -> StepRow {
+    let time_s = segment.time_s[sample];
+    let feet = segment.feet[sample];
+    let (x, dx) = (segment.x.column(sample), segment.dx.column(sample));
+    let measurement = Measurement {
+        time_s,
+        x: x.as_slice(),
+        dx: dx.as_slice(),
+        feet,
+    };
+    let command = controller.step(measurement);
+    let recorded = held_torque(segment, sample, controller.settings().step_s);
+    let d = controller.plant().latent_dim();
+    let mut z = vec![0.0; d];
+    controller.plant().encode(x.as_slice(), &mut z);
+    let mut reference = vec![0.0; 2 * d];
+    if let Some(trajectory) = controller.reference() {
+        trajectory.state_at(time_s, &mut reference);
+    }
+    tally.count(&command);
+    match recorded {
+        Some(recorded) if is_plausible(controller.plant().robot(), &recorded) => {
+            tally.torque.add(feet, &command.torque_nm, &recorded);
+        }
+        Some(_) | None => tally.implausible += 1,
+    }
+    let limits = controller.plant().robot().torque_limit_nm();
+    tally.limit_violations += usize::from(exceeds(&command.torque_nm, limits, 1.0));
+    if command.status.has_plan() {
+        tally.tracking.extend(controller.planned_deviations());
+    }
+    let stance = stance(controller, segment, sample);
+    if let Some(violated) = friction_violated(controller, &command, stance.as_ref()) {
+        *tally.friction_violations.get_or_insert(0) += usize::from(violated);
+    }
+    StepRow {
+        segment: number,
+        time_s,
+        phase: command.phase,
+        status: command.status,
+        source: command.source,
+        solve_us: command.solve_us,
+        iterations: command.iterations,
+        input: lifted_input(controller, &command, segment, sample),
+        torque_nm: command.torque_nm,
+        recorded_torque_nm: recorded.unwrap_or([0.0; JOINT_DIM]),
+        z_reference: reference[..d].to_vec(),
+        u_lat: command.u_lat,
+        z,
+        z_planned: (command.status.has_plan())
+            .then(|| controller.plan().end(controller.settings().horizon - 1)[..d].to_vec()),
+    }
+}
+
+fn set_reference(
+    controller: &mut Controller,
+    segment: &Segment,
+    reference_input: ReferenceInput,
+    input: &[f64],
+) -> Result<(), ControlError> {
+    controller.set_reference(ReferenceSamples {
+        time_s: &segment.time_s,
+        x: segment.x.as_slice(),
+        dx: segment.dx.as_slice(),
+        u: match reference_input {
+            ReferenceInput::Recorded => Some(input),
+            ReferenceInput::None => None,
+        },
+        feet: &segment.feet,
+    })
+}
+
+/// Recorded inputs, 18 values a sample, made from torques within the robot's limits.
+fn clamped_input(segment: &Segment, robot: &Robot) -> Result<Vec<f64>, MpcError> {
+    let input = segment.input(robot)?;
+    let mut values = input.as_slice().to_vec();
+    for (sample, u) in values.chunks_exact_mut(STATE_DIM).enumerate() {
+        let recorded = segment.torque(sample);
+        if !exceeds(&recorded, robot.torque_limit_nm(), 1.0) {
+            continue;
+        }
+        let torque: [f64; JOINT_DIM] = std::array::from_fn(|joint| {
+            let limit = robot.torque_limit_nm()[joint];
+            recorded[joint].clamp(-limit, limit)
+        });
+        u[..JOINT_DIM].copy_from_slice(&torque);
+        if let Ok(wrench) =
+            robot.body_wrench(&segment.joints(sample), &torque, segment.feet[sample])
+        {
+            u[JOINT_DIM..].copy_from_slice(wrench.as_slice());
+        }
+    }
+    Ok(values)
+}
+
+/// Mean recorded torques over the time that a command is held; none if one is not finite.
+fn held_torque(segment: &Segment, sample: usize, step_s: f64) -> Option<[f64; JOINT_DIM]> {
+    let until = segment.time_s[sample] + step_s - 1e-9;
+    let count = segment.time_s[sample..]
+        .iter()
+        .take_while(|&&time_s| time_s < until)
+        .count();
+    let mut mean = [0.0; JOINT_DIM];
+    for held in sample..sample + count {
+        for (mean, torque) in mean.iter_mut().zip(segment.torque(held)) {
+            *mean += torque / count as f64;
+        }
+    }
+    mean.iter().all(|torque| torque.is_finite()).then_some(mean)
+}
+
+fn is_plausible(robot: &Robot, torque_nm: &[f64; JOINT_DIM]) -> bool {
+    !exceeds(torque_nm, robot.torque_limit_nm(), 2.0)
+}
+
+fn exceeds(torque_nm: &[f64; JOINT_DIM], limits: &[f64; JOINT_DIM], factor: f64) -> bool {
+    torque_nm
+        .iter()
+        .zip(limits)
+        .any(|(torque, limit)| torque.is_nan() || torque.abs() > factor * limit)
+}
+
+fn stance(controller: &Controller, segment: &Segment, sample: usize) -> Option<StanceState> {
+    let feet: ContactFlags = segment.feet[sample];
+    Some(StanceState {
+        joints_rad: segment.joints(sample),
+        attitude_rad: [segment.x[(15, sample)], segment.x[(16, sample)]],
+        feet,
+        phase: controller.plant().phase_for(feet)?,
+    })
+}
+
+fn lifted_input(
+    controller: &Controller,
+    command: &Command,
+    segment: &Segment,
+    sample: usize,
+) -> [f64; STATE_DIM] {
+    let mut input = controller.local_plant().lift(&command.u_lat);
+    match controller.settings().lift {
+        Lift::Transpose => {}
+        Lift::Consistent => {
+            let robot = controller.plant().robot();
+            input[..JOINT_DIM].copy_from_slice(&command.torque_nm);
+            let wrench = robot.body_wrench(
+                &segment.joints(sample),
+                &command.torque_nm,
+                segment.feet[sample],
+            );
+            if let Ok(wrench) = wrench {
+                input[JOINT_DIM..].copy_from_slice(wrench.as_slice());
+            }
+        }
+    }
+    input
+}
+
+/// Whether a command leaves a friction cone that the controller constrains, by more than a
+/// thousandth of the robot's weight; none if it constrains none here.
+fn friction_violated(
+    controller: &Controller,
+    command: &Command,
+    stance: Option<&StanceState>,
+) -> Option<bool> {
+    let stance = stance.filter(|stance| stance.feet.contains(&true))?;
+    let (plant, settings) = (controller.plant(), controller.settings());
+    let tolerance_n = 1e-3 * plant.robot().mass_kg() * 9.81;
+    match settings.lift {
+        Lift::Consistent => {
+            let forces = foot_forces(plant, stance)?;
+            Some(forces.iter().enumerate().any(|(leg, force)| {
+                force.is_some_and(|map| {
+                    let torque = std::array::from_fn::<f64, 3, _>(|joint| {
+                        command.torque_nm[3 * leg + joint]
+                    });
+                    let force = map * nalgebra::Vector3::from(torque);
+                    force.x.hypot(force.y) > settings.foot_friction * force.z + tolerance_n
+                })
+            }))
+        }
+        Lift::Transpose => {
+            let coefficient = settings.body_friction?;
+            let lifted = controller.local_plant().lift(&command.u_lat);
+            let rotation = upright(stance.attitude_rad);
+            let force =
+                rotation.map(|row| (0..3).map(|k| row[k] * lifted[JOINT_DIM + k]).sum::<f64>());
+            Some(force[0].hypot(force[1]) > coefficient * force[2] + tolerance_n)
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! Files that appear whole or not at all, and the folders that hold emitted files.
+//!
+//! Imports nothing; every stage that writes goes through here: [`write_whole`] replaces one file in one
+//! step, [`write_files`] puts [`EmittedFile`]s into a folder and lists them there as made by romc.
+
+mod emitted;
+mod folder;
+mod whole;
+
+pub use emitted::EmittedFile;
+pub use folder::{FolderError, check_folder, write_files};
+pub use whole::{Overwrite, write_whole};

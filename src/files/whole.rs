@@ -1,0 +1,94 @@
+//! One file, written beside its place and then renamed.
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Whether a file that is there already may be replaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Overwrite {
+    /// Refuse.
+    Refuse,
+    /// Replace it (`--force`).
+    Replace,
+}
+
+impl Overwrite {
+    /// From the state of a `--force` flag.
+    pub fn when_forced(force: bool) -> Self {
+        if force { Self::Replace } else { Self::Refuse }
+    }
+
+    /// Whether a file at `path` may be written.
+    pub fn allows(self, path: &Path) -> bool {
+        match self {
+            Self::Refuse => path.symlink_metadata().is_err(),
+            Self::Replace => true,
+        }
+    }
+}
+
+/// Replaces `path` by what `fill` writes, in one step.
+///
+/// # Errors
+/// Those of the file system; then `path` is as it was, and nothing is left beside it.
+pub fn write_whole(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    let beside = beside(path)?;
+    let written = fill_file(&beside, fill).and_then(|()| fs::rename(&beside, path));
+    if written.is_err() {
+        // The first error is the one worth telling; a file that cannot be removed changes nothing.
+        let _ = fs::remove_file(&beside);
+    }
+    written
+}
+
+fn fill_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut file = BufWriter::new(File::create(path)?);
+    fill(&mut file)?;
+    file.into_inner()?.sync_all()
+}
+
+/// A hidden name in the same folder that no other process uses.
+pub(super) fn beside(path: &Path) -> io::Result<PathBuf> {
+    let name = path
+        .file_name()
+        .ok_or_else(|| io::Error::from(io::ErrorKind::InvalidFilename))?;
+    let mut part = OsString::from(".");
+    part.push(name);
+    part.push(format!(".{}.part", std::process::id()));
+    Ok(path.with_file_name(part))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn write_whole_leaves_the_old_file_when_filling_fails() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("model.json");
+        write_whole(&path, |out| out.write_all(b"first")).expect("a new file");
+        let failed = write_whole(&path, |out| {
+            out.write_all(b"half")?;
+            Err(io::Error::other("disk full"))
+        });
+        assert!(failed.is_err());
+        assert_eq!(fs::read(&path).expect("still there"), b"first");
+        let left = fs::read_dir(folder.path()).expect("readable");
+        assert_eq!(left.count(), 1, "no part stays behind");
+    }
+
+    #[test]
+    fn refuse_allows_only_what_is_not_there() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("out.csv");
+        assert!(Overwrite::Refuse.allows(&path));
+        fs::write(&path, "x").expect("writable");
+        assert!(!Overwrite::when_forced(false).allows(&path));
+        assert!(Overwrite::when_forced(true).allows(&path));
+    }
+}

@@ -1,0 +1,55 @@
+//! Models trained elsewhere: safetensors, NumPy's npz, equations as text.
+//!
+//! What enters: a file, and in [`ImportOptions`] what tensors do not carry (the candidate terms,
+//! when each phase holds, the scale factors). What leaves: a model checked like any other, and an
+//! [`ImportReport`] that tells which tensor was taken for what and how it was turned, or an
+//! [`ImportError`] that names file, tensor, what was found and what was expected.
+//! Read `run.rs` first; `assign.rs` decides which tensor is what, `layout.rs` how it is stored,
+//! `latent.rs` takes equations apart.
+//!
+//! ```
+//! use romc::import::{Format, ImportOptions, import_from_bytes};
+//!
+//! let text = "[contact]\nddz1 = -4*z1 - 0.1*dz1 + 2*(u1 - 0.5)\n[flight]\nddz1 = -1\n";
+//! let options = ImportOptions { name: "hopper".into(), ..ImportOptions::default() };
+//! let imported = import_from_bytes("hopper.txt", Format::Equations, text.as_bytes(), &options)?;
+//! let terms: Vec<&str> = imported.model.library().terms().iter().map(|t| t.text()).collect();
+//! assert_eq!(terms, ["1", "z1", "dz1", "u1"]);
+//! assert_eq!(imported.model.phases()[0].xi.as_slice(), [-1.0, -4.0, -0.1, 2.0]);
+//!
+//! let text = "[contact]\nddz1 = 4*z2\n";
+//! let error = import_from_bytes("hopper.txt", Format::Equations, text.as_bytes(), &options);
+//! assert_eq!(
+//!     error.unwrap_err().to_string(),
+//!     "hopper.txt:2:10: found `z2`, expected z1, dz1 or u1"
+//! );
+//! # Ok::<(), romc::import::ImportError>(())
+//! ```
+
+mod assemble;
+mod assign;
+mod equations;
+mod error;
+mod latent;
+mod layout;
+mod library;
+mod names;
+mod npy;
+mod npz;
+mod options;
+mod report;
+mod role;
+mod run;
+mod safetensors;
+mod tensors;
+mod terms;
+
+pub use error::ImportError;
+pub use library::read_terms;
+pub use options::{
+    Format, ImportOptions, LibraryChoice, LibraryOrder, PhaseRule, WeightVectors, XiLayout,
+    parse_standard,
+};
+pub use report::{Chosen, ImportReport, Layout, Note, ReadEquation, UnusedTensor, UsedTensor};
+pub use role::{Mapping, Part, Role};
+pub use run::{Imported, import, import_from_bytes};

@@ -1,0 +1,322 @@
+//! The numbers of one model on one robot, in SI units on the robot's side.
+//!
+//! Everything the controller needs besides the latent dynamics: the affine maps with their scale
+//! factors multiplied in, limits, and for each phase the distribution of the training inputs.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+use super::error::ControlError;
+use super::nonlinear::NonlinearMaps;
+use crate::robot::{ContactFlags, JOINT_DIM, Robot, STATE_DIM};
+
+/// Maps, limits and input statistics of a model on its robot.
+#[derive(Debug, Clone)]
+pub struct ControlModel {
+    latent_dim: usize,
+    parts: ControlModelParts,
+    /// The maps of which the matrices are those at one state, if they are not the same at all.
+    curved: Option<Arc<dyn NonlinearMaps>>,
+}
+
+/// The numbers of a [`ControlModel`], with scale factors multiplied in: SI units on the robot's side.
+#[derive(Debug, Clone)]
+pub struct ControlModelParts {
+    /// The robot.
+    pub robot: &'static Robot,
+    /// `W_e s_x`, `latent_dim × 18`.
+    pub encoder: DMatrix<f64>,
+    /// `b_e`, `latent_dim`.
+    pub encoder_bias: DVector<f64>,
+    /// `W_d / s_x`, `18 × latent_dim`.
+    pub decoder: DMatrix<f64>,
+    /// `b_d / s_x`, 18.
+    pub decoder_bias: DVector<f64>,
+    /// `W_eᵀ / s_u`, `18 × latent_dim`.
+    pub lift: DMatrix<f64>,
+    /// `pinv(W_eᵀ) s_u`, `latent_dim × 18`.
+    pub projection: DMatrix<f64>,
+    /// The model's phases, in its order.
+    pub phases: Vec<ControlPhase>,
+    /// The phase that each foot pattern selects, bit `k` of the position for foot `k`.
+    pub phase_of_feet: [Option<usize>; 16],
+}
+
+/// What the training inputs of one phase looked like.
+#[derive(Debug, Clone)]
+pub struct ControlPhase {
+    /// Name of the phase.
+    pub name: String,
+    /// Whether it has feet on the ground: another phase, or none, is selected by no foot.
+    pub is_grounded: bool,
+    /// Mean latent input, `latent_dim`.
+    pub latent_mean: DVector<f64>,
+    /// Lower Cholesky factor of the latent input's covariance, `latent_dim` square.
+    pub latent_root: DMatrix<f64>,
+    /// Mean torques, N m.
+    pub torque_mean: SVector<f64, JOINT_DIM>,
+    /// Inverse covariance of the torques, 1/(N m)².
+    pub torque_precision: SMatrix<f64, JOINT_DIM, JOINT_DIM>,
+}
+
+impl ControlModel {
+    /// A plant of given numbers.
+    ///
+    /// # Errors
+    /// [`ControlError::Shape`] if a map or a phase's statistics do not have the shape that the
+    /// encoder's number of rows asks for.
+    pub fn from_parts(parts: ControlModelParts) -> Result<Self, ControlError> {
+        parts.check()?;
+        Ok(Self {
+            latent_dim: parts.encoder.nrows(),
+            parts,
+            curved: None,
+        })
+    }
+
+    /// The plant with maps that depend on the state; its matrices are then those at one state.
+    pub fn with_curved(self, maps: Arc<dyn NonlinearMaps>) -> Self {
+        Self {
+            curved: Some(maps),
+            ..self
+        }
+    }
+
+    /// Whether the maps depend on the state.
+    pub fn is_nonlinear(&self) -> bool {
+        self.curved.is_some()
+    }
+
+    /// The plant of affine maps that touch the encoder at `x` (18, SI units) and the decoder at
+    /// `z`; none for a plant whose maps are affine anyway, and where the encoder's Jacobian has not
+    /// full row rank.
+    pub fn tangent_at(&self, x: &[f64], z: &[f64]) -> Option<Self> {
+        let maps = self.curved.as_ref()?;
+        let (encoder, decoder) = (maps.encoder_jacobian(x), maps.decoder_jacobian(z));
+        let mut value = vec![0.0; self.latent_dim];
+        maps.encode(x, &mut value);
+        let encoder_bias = DVector::from_vec(value) - &encoder * DVector::from_column_slice(x);
+        let decoded = DVector::from_column_slice(&maps.decode(z));
+        let decoder_bias = decoded - &decoder * DVector::from_column_slice(z);
+        Some(Self {
+            latent_dim: self.latent_dim,
+            parts: ControlModelParts {
+                encoder,
+                encoder_bias,
+                decoder,
+                decoder_bias,
+                lift: maps.lift(x),
+                projection: maps.projection(x)?,
+                ..self.parts.clone()
+            },
+            curved: None,
+        })
+    }
+
+    /// Takes the statistics of the training inputs as they are projected at `x`, if the maps depend
+    /// on the state and have full rank there.
+    pub(super) fn take_statistics_at(&mut self, x: &[f64]) {
+        if let Some(phases) = self.curved.as_ref().and_then(|maps| maps.phases(x)) {
+            self.parts.phases = phases;
+        }
+    }
+
+    /// The numbers.
+    pub fn parts(&self) -> &ControlModelParts {
+        &self.parts
+    }
+
+    /// The robot.
+    pub fn robot(&self) -> &'static Robot {
+        self.parts.robot
+    }
+
+    /// Number of latent coordinates.
+    pub fn latent_dim(&self) -> usize {
+        self.latent_dim
+    }
+
+    /// All phases, in the model's order.
+    pub fn phases(&self) -> &[ControlPhase] {
+        &self.parts.phases
+    }
+
+    /// The phase that a foot pattern selects, or none.
+    pub fn phase_for(&self, feet: ContactFlags) -> Option<usize> {
+        let bits = feet
+            .iter()
+            .enumerate()
+            .map(|(foot, &down)| usize::from(down) << foot)
+            .sum::<usize>();
+        self.parts.phase_of_feet[bits]
+    }
+
+    /// `z = W_e s_x x + b_e`, or the nonlinear encoder's; `x` in SI units (18), `z` is overwritten.
+    pub fn encode(&self, x: &[f64], z: &mut [f64]) {
+        if let Some(maps) = &self.curved {
+            return maps.encode(x, z);
+        }
+        z.copy_from_slice(self.parts.encoder_bias.as_slice());
+        add_product(&self.parts.encoder, x, z);
+    }
+
+    /// `dz = W_e s_x dx`; `dx` in SI units (18), `dz` is overwritten.
+    pub fn encode_velocity(&self, dx: &[f64], dz: &mut [f64]) {
+        dz.fill(0.0);
+        add_product(&self.parts.encoder, dx, dz);
+    }
+
+    /// The same with the Jacobian at `x` if the encoder is nonlinear.
+    pub fn encode_velocity_at(&self, x: &[f64], dx: &[f64], dz: &mut [f64]) {
+        match &self.curved {
+            None => self.encode_velocity(dx, dz),
+            Some(maps) => {
+                dz.fill(0.0);
+                add_product(&maps.encoder_jacobian(x), dx, dz);
+            }
+        }
+    }
+
+    /// Joint positions, rad, that the decoder gives for `z`.
+    pub fn decode_joints(&self, z: &[f64]) -> [f64; JOINT_DIM] {
+        if let Some(maps) = &self.curved {
+            let x = maps.decode(z);
+            return std::array::from_fn(|joint| x[joint]);
+        }
+        std::array::from_fn(|joint| {
+            self.parts.decoder_bias[joint] + row_product(&self.parts.decoder, joint, z)
+        })
+    }
+
+    /// Joint velocities, rad/s, that the decoder gives for `dz`.
+    pub fn decode_joint_velocities(&self, dz: &[f64]) -> [f64; JOINT_DIM] {
+        std::array::from_fn(|joint| row_product(&self.parts.decoder, joint, dz))
+    }
+
+    /// The same with the Jacobian at `z` if the decoder is nonlinear.
+    pub fn decode_joint_velocities_at(&self, z: &[f64], dz: &[f64]) -> [f64; JOINT_DIM] {
+        match &self.curved {
+            None => self.decode_joint_velocities(dz),
+            Some(maps) => {
+                let jacobian = maps.decoder_jacobian(z);
+                std::array::from_fn(|joint| row_product(&jacobian, joint, dz))
+            }
+        }
+    }
+
+    /// `u_lat = pinv(J_Eᵀ) s_u u` with the Jacobian at `x` if the encoder is nonlinear and has full
+    /// row rank there; else as [`ControlModel::project`].
+    pub fn project_at(&self, x: &[f64], u: &[f64], u_lat: &mut [f64]) {
+        u_lat.fill(0.0);
+        let local = self.curved.as_ref().and_then(|maps| maps.projection(x));
+        add_product(local.as_ref().unwrap_or(&self.parts.projection), u, u_lat);
+    }
+
+    /// `u_lat = pinv(W_eᵀ) s_u u`; `u` in SI units (18), `u_lat` is overwritten.
+    pub fn project(&self, u: &[f64], u_lat: &mut [f64]) {
+        u_lat.fill(0.0);
+        add_product(&self.parts.projection, u, u_lat);
+    }
+
+    /// `u = W_eᵀ u_lat / s_u` in SI units: 12 torques, force, moment.
+    pub fn lift(&self, u_lat: &[f64]) -> [f64; STATE_DIM] {
+        std::array::from_fn(|input| row_product(&self.parts.lift, input, u_lat))
+    }
+
+    /// The matrix of [`ControlModel::lift`], `18 × latent_dim`.
+    pub fn lift_matrix(&self) -> &DMatrix<f64> {
+        &self.parts.lift
+    }
+
+    /// The matrix of [`ControlModel::project`], `latent_dim × 18`.
+    pub fn projection_matrix(&self) -> &DMatrix<f64> {
+        &self.parts.projection
+    }
+
+    /// The matrix of the decoder in SI units, `18 × latent_dim`.
+    pub fn decoder_matrix(&self) -> &DMatrix<f64> {
+        &self.parts.decoder
+    }
+
+    /// The bias of the decoder in SI units, 18.
+    pub fn decoder_bias(&self) -> &DVector<f64> {
+        &self.parts.decoder_bias
+    }
+
+    /// The torques within the robot's limits that are nearest to these; zero for what is not a
+    /// number.
+    pub fn clamp_torque(&self, torque_nm: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
+        std::array::from_fn(|joint| {
+            let limit = self.parts.robot.torque_limit_nm()[joint];
+            if torque_nm[joint].is_nan() {
+                0.0
+            } else {
+                torque_nm[joint].clamp(-limit, limit)
+            }
+        })
+    }
+
+    /// The joint positions within the robot's limits that are nearest to these.
+    pub fn clamp_joints(&self, joints_rad: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
+        std::array::from_fn(|joint| {
+            let (lower, upper) = self.parts.robot.joint_limit_rad()[joint];
+            joints_rad[joint].clamp(lower, upper)
+        })
+    }
+}
+
+/// `out += M v`, without allocating.
+pub(super) fn add_product(matrix: &DMatrix<f64>, vector: &[f64], out: &mut [f64]) {
+    for (col, factor) in vector.iter().enumerate() {
+        for (out, entry) in out.iter_mut().zip(matrix.column(col).iter()) {
+            *out += entry * factor;
+        }
+    }
+}
+
+/// Row `row` of `M v`.
+fn row_product(matrix: &DMatrix<f64>, row: usize, vector: &[f64]) -> f64 {
+    vector
+        .iter()
+        .enumerate()
+        .map(|(col, factor)| matrix[(row, col)] * factor)
+        .sum()
+}
+
+impl ControlModelParts {
+    /// Checks every shape against the encoder's number of rows.
+    fn check(&self) -> Result<(), ControlError> {
+        let d = self.encoder.nrows();
+        let mut shapes = vec![
+            ("encoder", self.encoder.shape(), (d, STATE_DIM)),
+            ("encoder bias", self.encoder_bias.shape(), (d, 1)),
+            ("decoder", self.decoder.shape(), (STATE_DIM, d)),
+            ("decoder bias", self.decoder_bias.shape(), (STATE_DIM, 1)),
+            ("lift", self.lift.shape(), (STATE_DIM, d)),
+            ("projection", self.projection.shape(), (d, STATE_DIM)),
+        ];
+        for phase in &self.phases {
+            shapes.push(("latent mean", phase.latent_mean.shape(), (d, 1)));
+            shapes.push(("latent root", phase.latent_root.shape(), (d, d)));
+        }
+        for phase in self.phase_of_feet.into_iter().flatten() {
+            shapes.push((
+                "phases",
+                (self.phases.len().min(phase + 1), 1),
+                (phase + 1, 1),
+            ));
+        }
+        match shapes
+            .into_iter()
+            .find(|(_, found, expected)| found != expected)
+        {
+            None => Ok(()),
+            Some((name, found, expected)) => Err(ControlError::Shape {
+                name,
+                found,
+                expected,
+            }),
+        }
+    }
+}

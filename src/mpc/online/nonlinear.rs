@@ -1,0 +1,36 @@
+//! What the controller asks of maps that are not the same at every state.
+
+use std::fmt::Debug;
+
+use nalgebra::DMatrix;
+
+use super::control_model::ControlPhase;
+use crate::robot::STATE_DIM;
+
+/// A nonlinear encoder and decoder with their Jacobians, in SI units on the robot's side.
+///
+/// The matrices of a [`ControlModel`](super::ControlModel) are then those at one state, and
+/// [`ControlModel::tangent_at`](super::ControlModel::tangent_at) gives the plant of another.
+pub trait NonlinearMaps: Debug + Send + Sync {
+    /// Writes `z = E(s_x x)`.
+    fn encode(&self, x: &[f64], z: &mut [f64]);
+
+    /// `x = D(z) / s_x`.
+    fn decode(&self, z: &[f64]) -> [f64; STATE_DIM];
+
+    /// `J_E s_x` at `x`, `latent_dim × 18`.
+    fn encoder_jacobian(&self, x: &[f64]) -> DMatrix<f64>;
+
+    /// `J_D / s_x` at `z`, `18 × latent_dim`.
+    fn decoder_jacobian(&self, z: &[f64]) -> DMatrix<f64>;
+
+    /// `J_Eᵀ / s_u` at `x`, `18 × latent_dim`.
+    fn lift(&self, x: &[f64]) -> DMatrix<f64>;
+
+    /// `pinv(J_Eᵀ) s_u` at `x`, `latent_dim × 18`; none where the Jacobian has not full row rank.
+    fn projection(&self, x: &[f64]) -> Option<DMatrix<f64>>;
+
+    /// The phases with the statistics of the training inputs projected at `x`; none as for
+    /// [`NonlinearMaps::projection`].
+    fn phases(&self, x: &[f64]) -> Option<Vec<ControlPhase>>;
+}

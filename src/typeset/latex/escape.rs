@@ -1,0 +1,172 @@
+//! The one way for text of a model file into a TeX file.
+
+use std::fmt;
+
+/// Text from outside, printed so that TeX shows its characters and runs none of
+/// them: every special character becomes a command, control characters and line
+/// ends become a space, and characters that pdfTeX does not know by default their code
+/// point in brackets. The result never contains a line break, so it is as safe
+/// inside a comment as in the running text.
+///
+/// ```
+/// use romc::typeset::latex::TexText;
+/// assert_eq!(TexText(r"50% \input{x}").to_string(), r"50\% \textbackslash{}input\{x\}");
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct TexText<'a>(pub &'a str);
+
+impl fmt::Display for TexText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut previous = ' ';
+        for character in self.0.chars() {
+            // Two of these in a row are a ligature.
+            if character == previous && "-,".contains(character) {
+                f.write_str("{}")?;
+            }
+            previous = character;
+            match escaped(character) {
+                Some(text) => f.write_str(text)?,
+                None if is_plain(character) => write!(f, "{character}")?,
+                None => write!(f, "[U+{:04X}]", u32::from(character))?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Text from outside for a `%` comment: as it is, but on one line. TeX skips the
+/// rest of a comment's line without looking at it, so only a line end could let
+/// something out.
+#[derive(Clone, Copy, Debug)]
+pub struct CommentText<'a>(pub &'a str);
+
+impl fmt::Display for CommentText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for character in self.0.chars() {
+            let ends_line = character.is_control() || matches!(character, '\u{2028}' | '\u{2029}');
+            write!(f, "{}", if ends_line { ' ' } else { character })?;
+        }
+        Ok(())
+    }
+}
+
+/// The command for a character that TeX would not print as it is.
+fn escaped(character: char) -> Option<&'static str> {
+    let text = match character {
+        '\\' => r"\textbackslash{}",
+        '{' => r"\{",
+        '}' => r"\}",
+        '$' => r"\$",
+        '&' => r"\&",
+        '#' => r"\#",
+        '%' => r"\%",
+        '_' => r"\_",
+        '^' => r"\textasciicircum{}",
+        '~' => r"\textasciitilde{}",
+        '<' => r"\textless{}",
+        '>' => r"\textgreater{}",
+        '|' => r"\textbar{}",
+        '"' => r"\textquotedbl{}",
+        '\'' => r"\textquotesingle{}",
+        '`' => r"\textasciigrave{}",
+        '\u{2013}' => r"\textendash{}",
+        '\u{2014}' => r"\textemdash{}",
+        '\u{2018}' => r"\textquoteleft{}",
+        '\u{2019}' => r"\textquoteright{}",
+        '\u{201C}' => r"\textquotedblleft{}",
+        '\u{201D}' => r"\textquotedblright{}",
+        '\u{2026}' => r"\dots{}",
+        '°' => r"\textdegree{}",
+        'µ' => r"\textmu{}",
+        '±' => r"\textpm{}",
+        '×' => r"\texttimes{}",
+        '·' => r"\textperiodcentered{}",
+        '²' => r"\texttwosuperior{}",
+        '³' => r"\textthreesuperior{}",
+        _ if character.is_control() || character.is_whitespace() => " ",
+        _ => return None,
+    };
+    Some(text)
+}
+
+/// ASCII letters, digits and harmless marks, and the Latin letters that the
+/// default fonts of pdfTeX carry.
+fn is_plain(character: char) -> bool {
+    character.is_ascii_alphanumeric()
+        || "!()*+,-./:;=?@[] ".contains(character)
+        || "ÀÁÂÃÄÅÆÇÈÉÊËÌÍÎÏÑÒÓÔÕÖØÙÚÛÜÝßàáâãäåæçèéêëìíîïñòóôõöøùúûüýÿČčĎďĚěŇňŘřŠšŤťŮůŽžŁłŃńŚśŹźŻżŐőŰű"
+            .contains(character)
+}
+
+/// A name reduced to what a `\label` and a file name can hold: ASCII letters and
+/// digits, everything else a hyphen.
+///
+/// ```
+/// use romc::typeset::latex::label;
+/// assert_eq!(label("rear stance_2"), "rear-stance-2");
+/// ```
+pub fn label(name: &str) -> String {
+    name.chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Characters that change how TeX reads what follows.
+    const ACTIVE: &str = "$&#%_^~";
+
+    #[test]
+    fn text_escape_leaves_no_active_character_bare() {
+        for hostile in [
+            r"\input{x}",
+            "50% of $x_1$ & #2",
+            "^^5cinput",
+            "~tilde_under",
+            "a\\\\b",
+            "}\\end{document}",
+        ] {
+            let text = TexText(hostile).to_string();
+            let mut previous = ' ';
+            for character in text.chars() {
+                assert!(!ACTIVE.contains(character) || previous == '\\', "{text}");
+                previous = character;
+            }
+            // Every backslash begins one of the commands of the table.
+            for piece in text.split('\\').skip(1) {
+                let known = piece.starts_with("text")
+                    || piece.starts_with(['{', '}', '$', '&', '#', '%', '_']);
+                assert!(known, "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn text_escape_has_no_line_break_so_that_comments_end_where_they_should() {
+        let text = TexText("a\r\nb\u{2028}c\u{85}d\u{0b}e\u{0}f").to_string();
+        assert_eq!(text, "a  b c d e f");
+    }
+
+    #[test]
+    fn comment_text_stays_on_its_line() {
+        let text = CommentText("a\r\\input{x}\nb\u{85}c\u{2028}d").to_string();
+        assert_eq!(text, "a \\input{x} b c d");
+    }
+
+    #[test]
+    fn text_escape_spells_unknown_characters_by_code_point() {
+        assert_eq!(TexText("跳 ü").to_string(), "[U+8DF3] ü");
+    }
+
+    #[test]
+    fn text_escape_breaks_ligatures() {
+        assert_eq!(TexText("a--b-c").to_string(), "a-{}-b-c");
+    }
+
+    #[test]
+    fn label_keeps_letters_and_digits_only() {
+        assert_eq!(label(r"a}\b%c"), "a--b-c");
+    }
+}

@@ -1,0 +1,47 @@
+//! Equations for papers: a [`ReducedModel`](crate::model::ReducedModel) enters,
+//! LaTeX files leave.
+//!
+//! Read [`document`](self::emit) first: it names the files. The layout of terms
+//! and the rounding are done by [`typeset`](crate::typeset); here it gets
+//! its spelling ([`TexMath`]), its line breaks, tables and comments. Names from a
+//! model file pass through [`TexText`] and nothing else.
+//!
+//! ```
+//! use nalgebra::DMatrix;
+//! use romc::typeset::latex::{self, LatexOptions};
+//! use romc::model::{FeetRule, Library, Phase, ReducedModel};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let library = Library::from_terms(1, &["1".into(), "dz1".into(), "sin(dz1)".into()])?;
+//! let model = ReducedModel::builder("flight-only", library)
+//!     .phase(Phase {
+//!         name: "flight".into(),
+//!         feet: FeetRule::None,
+//!         xi: DMatrix::from_column_slice(3, 1, &[0.29, -1.22, -1.0]),
+//!     })
+//!     .build()?;
+//! let files = latex::emit(&model, &LatexOptions::default())?;
+//! assert_eq!(files[0].path, "flight_only.tex");
+//! let equation = r"\ddot{z}_1 = 0.29 - 1.22\dot{z}_1 - 1.00\sin(\dot{z}_1)";
+//! assert!(files[0].contents.contains(equation));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! In a paper: `\usepackage{amsmath}` in the preamble, then `\input{flight_only}` for all
+//! phases, or `\input{flight_only_flight}` for one, and `\eqref{eq:flight-only:flight}` to
+//! refer to it.
+
+mod document;
+mod escape;
+mod lines;
+mod math;
+mod nomenclature;
+mod options;
+mod table;
+
+pub use document::emit;
+pub use escape::{CommentText, TexText, label};
+pub use lines::tex_cases;
+pub use math::{NumberStyle, TexMath, TexNumber, TexSymbol, TexTerms};
+pub use options::{Form, LatexOptions};

@@ -1,0 +1,31 @@
+//! Equations laid out for print, before they have a spelling.
+//!
+//! A [`ReducedModel`](crate::model::ReducedModel) enters; a [`Typeset`] leaves: one
+//! [`EquationSystem`] a phase, made of [`Math`] trees in which fractions, roots,
+//! parentheses, signs and rounded coefficients have their final place. [`latex`],
+//! [`markdown`] and [`mathml`] spell the same trees. Read [`tree`] first, then
+//! [`expression()`] (from the algebra to the tree) and [`equations`].
+
+mod decimal;
+pub mod equations;
+mod error;
+pub mod expression;
+pub mod latex;
+pub mod markdown;
+pub mod mathml;
+pub mod robot;
+mod rounder;
+mod symbols;
+pub mod tree;
+mod width;
+pub mod words;
+
+pub use decimal::{Decimal, MOST_DIGITS, Rounding};
+pub use equations::{CoefficientRow, CoefficientTable, Equation, EquationSystem, Typeset};
+pub use error::TypesetError;
+pub use expression::{Leading, UnknownSymbol, expression, with_coefficient};
+pub use robot::{RobotTypeset, RobotTypesetError};
+pub use rounder::{Place, RoundingReport};
+pub use symbols::{Quantity, RenameError, SymbolTable, Variable};
+pub use tree::{FunctionName, GREEK, Glyph, Math, Signed, Symbol};
+pub use width::{EQUALS, OPERATOR, break_lines, sum_width, symbol_width, width};
