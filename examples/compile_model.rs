@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use romc::artifact;
 use romc::deploy::{EmitOptions, Target, emit};
+use romc::equations::Equations;
 use romc::files::Overwrite;
 use romc::files::write_files;
 
@@ -30,7 +31,7 @@ fn compile(model: &Path, folder: &Path) -> Result<(), Box<dyn std::error::Error>
         digest: Some(artifact::digest(&model).short()),
         ..EmitOptions::default()
     };
-    let files = emit(&model, &[Target::C, Target::Rust], &options)?;
+    let files = emit(&Equations::of(&model), &[Target::C, Target::Rust], &options)?;
     for path in write_files(folder, &files, Overwrite::Refuse)? {
         println!("{}", path.display());
     }

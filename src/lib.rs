@@ -4,6 +4,7 @@ pub mod artifact;
 pub mod cli;
 pub mod codegen;
 pub mod deploy;
+pub mod equations;
 mod error;
 pub mod evaluate;
 pub mod files;

@@ -7,6 +7,7 @@ use std::process::Command;
 use romc::artifact;
 use romc::codegen::{Precision, SineCosine, Units};
 use romc::deploy::{EmitOptions, Target, emit};
+use romc::equations::Equations;
 use romc::files::EmittedFile;
 use romc::model::ReducedModel;
 
@@ -57,7 +58,8 @@ fn library_sines_pass_the_self_tests_in_both_precisions() {
             ..EmitOptions::default()
         };
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let files = emit(&model, &[Target::C, Target::Rust], &options).expect("emits");
+        let files =
+            emit(&Equations::of(&model), &[Target::C, Target::Rust], &options).expect("emits");
         write(folder.path(), &files);
         run_c(
             folder.path(),
@@ -77,7 +79,7 @@ fn library_sines_leave_the_kernel_out() {
             sines,
             ..EmitOptions::default()
         };
-        let files = emit(&model, &[Target::C], &options).expect("emits");
+        let files = emit(&Equations::of(&model), &[Target::C], &options).expect("emits");
         let is_source = |file: &&EmittedFile| file.path.ends_with("paper_2d.c");
         let file = files.iter().find(is_source).expect("a C file");
         file.contents.clone()
@@ -97,7 +99,7 @@ fn encoded_and_lifted(units: Units, x: &[f64], u_lat: &[f64]) -> Vec<f64> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     write(
         folder.path(),
-        &emit(&model, &[Target::C], &options).expect("emits"),
+        &emit(&Equations::of(&model), &[Target::C], &options).expect("emits"),
     );
     let list = |values: &[f64]| {
         let texts: Vec<String> = values.iter().map(|v| format!("{v:?}")).collect();

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use romc::deploy::{EmitError, EmitOptions, Target, emit};
+use romc::equations::Equations;
 use romc::files::EmittedFile;
 use romc::model::ReducedModel;
 use romc::mpc::{Controller, Lift, Measurement, MpcSettings, ReferenceSamples};
@@ -31,7 +32,12 @@ fn shipped(name: &str) -> ReducedModel {
 }
 
 fn emitted(model: &ReducedModel) -> Vec<EmittedFile> {
-    emit(model, &[Target::Controller], &EmitOptions::default()).expect("a complete model")
+    emit(
+        &Equations::of(model),
+        &[Target::Controller],
+        &EmitOptions::default(),
+    )
+    .expect("a complete model")
 }
 
 /// Runs a command and returns its output, which must be a success.
@@ -288,7 +294,11 @@ fn emission_is_the_same_twice_and_names_its_origin_in_every_source() {
 #[test]
 fn model_without_a_robot_or_with_activations_is_refused_with_the_reason() {
     let paper = shipped("paper-2d");
-    let refused = emit(&paper, &[Target::Controller], &EmitOptions::default());
+    let refused = emit(
+        &Equations::of(&paper),
+        &[Target::Controller],
+        &EmitOptions::default(),
+    );
     assert!(matches!(refused, Err(EmitError::Control(_))), "{refused:?}");
 
     let path = root().join("models/go1-d4.json");
@@ -301,7 +311,11 @@ fn model_without_a_robot_or_with_activations_is_refused_with_the_reason() {
     let bent = folder.path().join("bent.json");
     fs::write(&bent, manifest.to_string()).expect("written");
     let bent = romc::artifact::read(&bent).expect("a nonlinear model");
-    let refused = emit(&bent, &[Target::Controller], &EmitOptions::default());
+    let refused = emit(
+        &Equations::of(&bent),
+        &[Target::Controller],
+        &EmitOptions::default(),
+    );
     assert!(
         matches!(&refused, Err(EmitError::Nonlinear { model }) if model == "go1-d4"),
         "{refused:?}"

@@ -25,6 +25,7 @@ use agreement::{Rule, Tally, compare};
 use drivers::{Build, Workshop, contents};
 use functions::{Function, Random, functions as functions_of};
 use nalgebra::DVector;
+use romc::equations::Equations;
 use romc::ir::Interpreter;
 use romc::lower::CompiledModel;
 use romc::lower::{self, Form, LowerOptions, dynamics_jacobian};
@@ -401,8 +402,9 @@ fn compiled_jacobians_equal_symbolic_derivatives_and_finite_differences() {
 fn check_jacobian(model: &ReducedModel, phase: usize) {
     let d = model.latent_dim();
     let mut compiled = CompiledModel::new(model).expect("lowers");
-    let equations = model.equations(phase).expect("the phase exists");
-    let mut pool = equations.pool.clone();
+    let (mut pool, sums) = Equations::as_learned(model)
+        .sums(phase)
+        .expect("the phase exists");
     let mut random = Random(11);
     let mut ddz = vec![0.0; d];
     let mut jacobian = nalgebra::DMatrix::zeros(d, 3 * d);
@@ -428,7 +430,7 @@ fn check_jacobian(model: &ReducedModel, phase: usize) {
         let (above, below) = (side(1.0), side(-1.0));
         let symbol = model.library().symbol(variable).expect("a variable");
         for row in 0..d {
-            let exact = pool.derivative(equations.ddz[row], symbol);
+            let exact = pool.derivative(sums[row], symbol);
             let value_of = |symbol| {
                 let position = LatentVariable::all(d)
                     .position(|v| model.library().symbol(v) == Some(symbol))
@@ -457,7 +459,8 @@ fn jacobian_pattern_lists_each_entry_once_in_row_major_order() {
     for model in models::shipped() {
         for phase in 0..model.phases().len() {
             let options = LowerOptions::default();
-            let (program, pattern) = dynamics_jacobian(&model, phase, &options).expect("lowers");
+            let (program, pattern) =
+                dynamics_jacobian(&Equations::of(&model), phase, &options).expect("lowers");
             let places: Vec<(usize, usize)> = pattern
                 .rows
                 .iter()

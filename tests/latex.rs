@@ -6,6 +6,7 @@ use std::process::Command;
 
 use nalgebra::DMatrix;
 use romc::artifact;
+use romc::equations::Equations;
 use romc::files::EmittedFile;
 use romc::model::{FeetRule, Library, Phase, ReducedModel};
 use romc::typeset::latex::{self, Form, LatexOptions, NumberStyle};
@@ -150,7 +151,7 @@ fn one_term(term: &str, coefficient: f64) -> String {
         rounding: Rounding::Exact,
         ..LatexOptions::default()
     };
-    let files = latex::emit(&model, &options).unwrap();
+    let files = latex::emit(&Equations::of(&model), &options).unwrap();
     let line = files[0]
         .contents
         .lines()
@@ -187,7 +188,11 @@ fn normal_form(text: &str) -> Vec<String> {
 
 #[test]
 fn paper_model_prints_equations_25_and_26_as_published() {
-    let files = latex::emit(&model("paper-2d.json"), &LatexOptions::default()).unwrap();
+    let files = latex::emit(
+        &Equations::of(&model("paper-2d.json")),
+        &LatexOptions::default(),
+    )
+    .unwrap();
     let text = equations(&files, "paper_2d.tex");
     assert_eq!(normal_form(&text), [PAPER_CONTACT, PAPER_FLIGHT]);
     assert!(
@@ -203,7 +208,7 @@ fn every_shipped_model_prints_each_active_term_once() {
             form: Form::Cases,
             ..LatexOptions::default()
         };
-        let files = latex::emit(&model, &options).unwrap();
+        let files = latex::emit(&Equations::of(&model), &options).unwrap();
         let systems = normal_form(&files[0].contents);
         assert_eq!(systems.len(), model.phases().len(), "{}", path.display());
         for (system, phase) in systems.iter().zip(model.phases()) {
@@ -275,7 +280,10 @@ fn rounding_to_zero_is_told_with_the_term() {
         rounding: Rounding::Decimals(2),
         ..LatexOptions::default()
     };
-    let text = equations(&latex::emit(&model, &fixed).unwrap(), "small.tex");
+    let text = equations(
+        &latex::emit(&Equations::of(&model), &fixed).unwrap(),
+        "small.tex",
+    );
     assert!(text.contains(r"\ddot{z}_1 = 0.75z_1"), "{text}");
     assert!(
         text.contains("The largest rounding error is 4.9e-3"),
@@ -286,7 +294,7 @@ fn rounding_to_zero_is_told_with_the_term() {
         text.contains("left out: contact, ddz1: 4.9e-3 * u1"),
         "{text}"
     );
-    let default = latex::emit(&model, &LatexOptions::default()).unwrap();
+    let default = latex::emit(&Equations::of(&model), &LatexOptions::default()).unwrap();
     let text = equations(&default, "small.tex");
     assert!(text.contains(r"\ddot{z}_1 = 0.75z_1 + 0.005u_1"), "{text}");
     assert!(!text.contains("left out"), "{text}");
@@ -308,7 +316,10 @@ fn coefficient_of_one_is_left_out_only_when_it_is_exactly_one() {
             rounding: Rounding::Significant(3),
             ..LatexOptions::default()
         };
-        let text = equations(&latex::emit(&model, &options).unwrap(), "one.tex");
+        let text = equations(
+            &latex::emit(&Equations::of(&model), &options).unwrap(),
+            "one.tex",
+        );
         let expected = format!("\\ddot{{z}}_1 = {expected}\n");
         assert!(text.contains(&expected), "{text}");
     }
@@ -327,7 +338,7 @@ fn hostile_description_reaches_the_document_only_escaped() {
         })
         .build()
         .unwrap();
-    let files = latex::emit(&model, &LatexOptions::default()).unwrap();
+    let files = latex::emit(&Equations::of(&model), &LatexOptions::default()).unwrap();
     let text = equations(&files, "m-preview.tex");
     assert!(
         text.contains(r"100\% \textbackslash{}input\{/etc/passwd\} \$x\$"),
@@ -340,7 +351,7 @@ fn hostile_description_reaches_the_document_only_escaped() {
 #[test]
 fn shipped_models_compile_to_pdf() {
     for (path, model) in shipped_models() {
-        let files = latex::emit(&model, &LatexOptions::default()).unwrap();
+        let files = latex::emit(&Equations::of(&model), &LatexOptions::default()).unwrap();
         println!("{}", path.display());
         typeset(&files, model.identifier().as_str());
     }
@@ -361,7 +372,10 @@ fn every_kind_of_term_compiles_to_pdf_in_each_form() {
             symbols: symbols.clone(),
             ..LatexOptions::default()
         };
-        typeset(&latex::emit(&model, &options).unwrap(), "every_kind");
+        typeset(
+            &latex::emit(&Equations::of(&model), &options).unwrap(),
+            "every_kind",
+        );
     }
 }
 
@@ -372,7 +386,7 @@ fn equations_of_width_22_fit_a_column_of_a_two_column_paper() {
             width_em: 22.0,
             ..LatexOptions::default()
         };
-        let mut files = latex::emit(&model, &options).unwrap();
+        let mut files = latex::emit(&Equations::of(&model), &options).unwrap();
         let stem = model.identifier();
         // Columns of 252 pt as in IEEE conference papers.
         let paper = format!(
@@ -391,8 +405,8 @@ fn equations_of_width_22_fit_a_column_of_a_two_column_paper() {
 fn emission_is_identical_from_run_to_run() {
     let options = LatexOptions::default();
     assert_eq!(
-        latex::emit(&every_kind(), &options).unwrap(),
-        latex::emit(&every_kind(), &options).unwrap()
+        latex::emit(&Equations::of(&every_kind()), &options).unwrap(),
+        latex::emit(&Equations::of(&every_kind()), &options).unwrap()
     );
 }
 

@@ -11,6 +11,7 @@ use std::process::Command;
 
 use functions::{Function, Random, functions as functions_of};
 use romc::deploy::{EmitOptions, Target, emit};
+use romc::equations::Equations;
 use romc::files::Overwrite;
 use romc::files::write_files;
 use romc::lower::{Form, LowerOptions};
@@ -43,7 +44,7 @@ fn cases(folder: &Path, target: Target, ending: &str) -> Vec<Value> {
             lower: LowerOptions { form },
             ..EmitOptions::default()
         };
-        let files = emit(&model, &[target], &options).expect("emits");
+        let files = emit(&Equations::of(&model), &[target], &options).expect("emits");
         let name = model.identifier().as_str();
         let own = folder.join(name);
         write_files(&own, &files, Overwrite::Refuse).expect("written");

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use romc::artifact;
+use romc::equations::Equations;
 use romc::model::ReducedModel;
 use romc::typeset::latex::{self, LatexOptions, NumberStyle};
 use romc::typeset::markdown::{self, MarkdownOptions};
@@ -20,7 +21,12 @@ fn without_version(text: &str) -> String {
 
 #[test]
 fn latex_of_the_paper_model_is_stable() {
-    for file in latex::emit(&model("models/paper-2d.json"), &LatexOptions::default()).unwrap() {
+    for file in latex::emit(
+        &Equations::of(&model("models/paper-2d.json")),
+        &LatexOptions::default(),
+    )
+    .unwrap()
+    {
         insta::assert_snapshot!(
             format!("latex__{}", file.path),
             without_version(&file.contents)
@@ -39,7 +45,7 @@ fn latex_of_a_model_with_robot_is_stable() {
         digest: Some("0123456789abcdef".to_owned()),
         ..LatexOptions::default()
     };
-    for file in latex::emit(&model, &options).unwrap() {
+    for file in latex::emit(&Equations::of(&model), &options).unwrap() {
         insta::assert_snapshot!(
             format!("latex__{}", file.path),
             without_version(&file.contents)
@@ -50,7 +56,7 @@ fn latex_of_a_model_with_robot_is_stable() {
 #[test]
 fn latex_of_every_function_is_stable() {
     let model = model("tests/fixtures/models/every-function.json");
-    let files = latex::emit(&model, &LatexOptions::default()).unwrap();
+    let files = latex::emit(&Equations::of(&model), &LatexOptions::default()).unwrap();
     insta::assert_snapshot!(
         "latex__every_function.tex",
         without_version(&files[0].contents)
@@ -63,7 +69,8 @@ fn markdown_is_stable() {
         "models/paper-2d.json",
         "tests/fixtures/models/every-function.json",
     ] {
-        let files = markdown::emit(&model(name), &MarkdownOptions::default()).unwrap();
+        let files =
+            markdown::emit(&Equations::of(&model(name)), &MarkdownOptions::default()).unwrap();
         let name = format!("markdown__{}", files[0].path);
         insta::assert_snapshot!(name, without_version(&files[0].contents));
     }
@@ -75,7 +82,7 @@ fn mathml_is_stable() {
         "models/paper-2d.json",
         "tests/fixtures/models/every-function.json",
     ] {
-        let files = mathml::emit(&model(name), &MathmlOptions::default()).unwrap();
+        let files = mathml::emit(&Equations::of(&model(name)), &MathmlOptions::default()).unwrap();
         let name = format!("mathml__{}", files[0].path);
         insta::assert_snapshot!(name, without_version(&files[0].contents));
     }

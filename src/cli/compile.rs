@@ -14,6 +14,7 @@ use super::output::{Table, check_output};
 use super::simplification;
 use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::{self, EmitOptions, Target};
+use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
@@ -164,7 +165,7 @@ pub fn emit(
         digest,
         ..EmitOptions::default()
     };
-    Ok(deploy::emit(model, targets, &options)?)
+    Ok(deploy::emit(&Equations::of(model), targets, &options)?)
 }
 
 /// Writes files into a folder; the path of each, with its size in bytes.

@@ -3,6 +3,7 @@
 use super::code::Role;
 use super::precision::{Precision, stated_bounds};
 use super::units::Units;
+use crate::equations::Equations;
 use crate::ir::{Program, Slot, Statement, Unary};
 use crate::lower::{self, JacobianPattern, LowerError, LowerOptions};
 use crate::model::{CoordinateNames, ModelError, ReducedModel, StateMap};
@@ -92,13 +93,13 @@ impl ModelInterface {
     /// # Errors
     /// [`LowerError`] if a phase cannot be lowered.
     pub fn new(
-        model: &ReducedModel,
+        system: &Equations<'_>,
         options: &LowerOptions,
         units: Units,
     ) -> Result<Self, LowerError> {
-        let model = &units.convert(model)?;
+        let model = &units.convert(system.model())?;
         let phases = (0..model.phases().len())
-            .map(|phase| phase_entries(model, phase, options))
+            .map(|phase| phase_entries(system, phase, options))
             .collect::<Result<_, _>>()?;
         Ok(Self {
             identifier: model.identifier().to_string(),
@@ -321,15 +322,15 @@ impl MapEquations {
 }
 
 fn phase_entries(
-    model: &ReducedModel,
+    system: &Equations<'_>,
     phase: usize,
     options: &LowerOptions,
 ) -> Result<PhaseInterface, LowerError> {
-    let identifier = model.phase_identifier(phase).to_string();
-    let equations = equations(model, phase)?;
-    let name = &model.phase(phase)?.name;
+    let identifier = system.model().phase_identifier(phase).to_string();
+    let equations = equations(system, phase)?;
+    let name = &system.phase(phase)?.name;
 
-    let program = lower::dynamics(model, phase, options)?;
+    let program = lower::dynamics(system, phase, options)?;
     let mut docs = vec![format!(
         "Latent accelerations of phase `{name}`: ddz = Xi^T Theta(z, dz, u_lat), scaled units."
     )];
@@ -337,7 +338,7 @@ fn phase_entries(
     docs.push(shapes(&program));
     let dynamics = entry(format!("{identifier}_dynamics"), program, docs);
 
-    let (program, pattern) = lower::dynamics_jacobian(model, phase, options)?;
+    let (program, pattern) = lower::dynamics_jacobian(system, phase, options)?;
     let docs = vec![
         format!(
             "Latent accelerations of phase `{name}` and the structural nonzeros of their \
@@ -354,7 +355,7 @@ fn phase_entries(
         });
     }
 
-    let program = lower::rk4_step(model, phase, options)?;
+    let program = lower::rk4_step(system, phase, options)?;
     let docs = vec![
         format!(
             "Advances the latent state of phase `{name}` by h seconds: one step of the classical \
@@ -431,10 +432,11 @@ fn elements(array: &str, signals: Option<&CoordinateNames>) -> String {
 }
 
 /// The equations of a phase, one line each; long ones only as a count of terms.
-fn equations(model: &ReducedModel, phase: usize) -> Result<Vec<String>, LowerError> {
+fn equations(system: &Equations<'_>, phase: usize) -> Result<Vec<String>, LowerError> {
     let mut lines = Vec::new();
-    for row in 0..model.latent_dim() {
-        let terms = model.active_terms(phase, row)?;
+    let of_phase = system.phase(phase)?;
+    for row in 0..system.latent_dim() {
+        let terms: Vec<_> = of_phase.summands(system, row).collect();
         let mut right = String::new();
         for (coefficient, term) in terms.iter().take(MOST_TERMS) {
             let sign = match (right.is_empty(), *coefficient < 0.0) {

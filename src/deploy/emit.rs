@@ -1,4 +1,4 @@
-//! A model to the files of the chosen targets.
+//! Equations to the files of the chosen targets.
 
 use std::str::FromStr;
 
@@ -6,6 +6,7 @@ use super::controller;
 use super::error::EmitError;
 use crate::codegen::script::{matlab, python};
 use crate::codegen::{Precision, SineCosine, Units, c, interface::ModelInterface, rust};
+use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::lower::{LowerError, LowerOptions};
 use crate::model::ReducedModel;
@@ -102,21 +103,21 @@ pub struct EmitOptions {
 /// The files of the chosen targets, each with its path below the output folder; a target that is chosen
 /// twice gives them once.
 ///
-/// Equal models and options give equal bytes.
+/// Equal equations and options give equal bytes.
 ///
 /// # Errors
 /// [`EmitError::Codegen`] if a phase cannot be lowered or single precision cannot hold a constant,
 /// [`EmitError::Typeset`] if a variable has no symbol in print, [`EmitError::Control`] and [`EmitError::Nonlinear`] for models that cannot be
 /// controlled.
 pub fn emit(
-    model: &ReducedModel,
+    equations: &Equations<'_>,
     targets: &[Target],
     options: &EmitOptions,
 ) -> Result<Vec<EmittedFile>, EmitError> {
-    let provenance = provenance(model, options.digest.as_deref());
+    let provenance = provenance(equations.model(), options.digest.as_deref());
     let (precision, sines) = (options.precision, options.sines);
     let mut entries = EntriesOnDemand {
-        model,
+        equations,
         options,
         compiled: None,
         scripts: None,
@@ -132,10 +133,10 @@ pub fn emit(
             Target::Python => python::emit(entries.scripts()?, &provenance)?,
             Target::Casadi => python::emit_casadi(entries.scripts()?, &provenance)?,
             Target::Matlab => matlab::emit(entries.scripts()?, &provenance)?,
-            Target::Latex => latex::emit(model, &options.latex)?,
-            Target::Markdown => markdown::emit(model, &options.markdown)?,
-            Target::Mathml => mathml::emit(model, &options.mathml)?,
-            Target::Controller => controller::emit(model, &options.lower, &provenance)?,
+            Target::Latex => latex::emit(equations, &options.latex)?,
+            Target::Markdown => markdown::emit(equations, &options.markdown)?,
+            Target::Mathml => mathml::emit(equations, &options.mathml)?,
+            Target::Controller => controller::emit(equations, &options.lower, &provenance)?,
         });
     }
     Ok(files)
@@ -143,7 +144,7 @@ pub fn emit(
 
 /// What code is generated from, made when the first target asks.
 struct EntriesOnDemand<'a> {
-    model: &'a ReducedModel,
+    equations: &'a Equations<'a>,
     options: &'a EmitOptions,
     compiled: Option<ModelInterface>,
     scripts: Option<ModelInterface>,
@@ -176,7 +177,7 @@ impl EntriesOnDemand<'_> {
     }
 
     fn in_double(&self) -> Result<ModelInterface, LowerError> {
-        ModelInterface::new(self.model, &self.options.lower, self.options.units)
+        ModelInterface::new(self.equations, &self.options.lower, self.options.units)
     }
 }
 

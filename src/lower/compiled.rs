@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{JacobianPattern, LowerError, LowerOptions};
+use crate::equations::Equations;
 use crate::ir::Interpreter;
 use crate::lower;
 use crate::model::ReducedModel;
@@ -35,16 +36,17 @@ impl CompiledModel {
     /// # Errors
     /// As [`lower::dynamics_jacobian`].
     pub fn new(model: &ReducedModel) -> Result<Self, LowerError> {
+        let system = &Equations::of(model);
         let options = LowerOptions::default();
         let phases = (0..model.phases().len())
             .map(|phase| {
-                let (jacobian, pattern) = lower::dynamics_jacobian(model, phase, &options)?;
+                let (jacobian, pattern) = lower::dynamics_jacobian(system, phase, &options)?;
                 Ok(CompiledPhase {
-                    dynamics: Interpreter::new(&lower::dynamics(model, phase, &options)?),
+                    dynamics: Interpreter::new(&lower::dynamics(system, phase, &options)?),
                     jacobian: Interpreter::new(&jacobian),
                     entries: vec![0.0; pattern.len()],
                     pattern,
-                    step: Interpreter::new(&lower::rk4_step(model, phase, &options)?),
+                    step: Interpreter::new(&lower::rk4_step(system, phase, &options)?),
                     next: vec![0.0; 2 * model.latent_dim()],
                 })
             })

@@ -8,8 +8,9 @@ use super::dense::{self, DenseJacobian};
 use super::error::LowerError;
 use super::expression::ExpressionLowering;
 use super::nested::{Demand, Nested, Shared};
+use crate::equations::Equations;
 use crate::ir::{Program, ProgramBuilder, ValueId};
-use crate::model::{LatentVariable, ReducedModel};
+use crate::model::LatentVariable;
 use crate::symbolic::{ExprId, ExprPool, SymbolId};
 
 /// Where the structural nonzeros of `d ddz / d (z, dz, u_lat)` stand, row-major.
@@ -40,14 +41,14 @@ impl JacobianPattern {
 /// [`LowerError::Model`] if there is no such phase, [`LowerError::NonFinite`] if a
 /// coefficient overflows when folded.
 pub fn dynamics(
-    model: &ReducedModel,
+    system: &Equations<'_>,
     phase: usize,
     options: &LowerOptions,
 ) -> Result<Program, LowerError> {
-    let equations = accelerations(model, phase)?;
-    let mut pool = model.library().pool().clone();
+    let equations = accelerations(system, phase)?;
+    let mut pool = system.pool().clone();
     let (mut builder, ddz) = if options.uses_tables(&equations) {
-        let mut lowering = start(model, &pool, "dynamics");
+        let mut lowering = start(system, &pool, "dynamics");
         lowering.prepare(&expressions(&equations));
         let ddz = dense::accelerations(&mut lowering, &equations);
         (lowering.builder, ddz)
@@ -55,7 +56,7 @@ pub fn dynamics(
         let demand = Demand::new(&mut pool, &equations);
         let nest = |equation| demand.nest(&mut pool, equation);
         let sums: Vec<Nested> = equations.iter().map(nest).collect();
-        let mut lowering = start(model, &pool, "dynamics");
+        let mut lowering = start(system, &pool, "dynamics");
         let ddz = values(&mut lowering, &sums);
         (lowering.builder, ddz)
     };
@@ -70,21 +71,21 @@ pub fn dynamics(
 /// # Errors
 /// As [`dynamics`].
 pub fn dynamics_jacobian(
-    model: &ReducedModel,
+    system: &Equations<'_>,
     phase: usize,
     options: &LowerOptions,
 ) -> Result<(Program, JacobianPattern), LowerError> {
-    let equations = accelerations(model, phase)?;
-    let mut pool = model.library().pool().clone();
+    let equations = accelerations(system, phase)?;
+    let mut pool = system.pool().clone();
     let mut entries = Vec::new();
     let mut pattern = JacobianPattern {
         rows: Vec::new(),
         cols: Vec::new(),
     };
     for (row, equation) in equations.iter().enumerate() {
-        for (col, variable) in LatentVariable::all(model.latent_dim()).enumerate() {
-            let derivative = equation.derivative(&mut pool, symbol(model, variable));
-            check_finite(model, phase, row, &derivative)?;
+        for (col, variable) in LatentVariable::all(system.latent_dim()).enumerate() {
+            let derivative = equation.derivative(&mut pool, system.symbol(variable));
+            check_finite(system, phase, row, &derivative)?;
             if !derivative.is_zero() {
                 pattern.rows.push(row);
                 pattern.cols.push(col);
@@ -93,10 +94,10 @@ pub fn dynamics_jacobian(
         }
     }
     let (mut builder, ddz, jacobian) = if options.uses_tables(&equations) {
-        dense_jacobian(model, &mut pool, &equations, &pattern)
+        dense_jacobian(system, &mut pool, &equations, &pattern)
     } else {
-        let sums = nested_jacobian(model, &mut pool, &equations, entries, &pattern);
-        let mut lowering = start(model, &pool, "dynamics_jacobian");
+        let sums = nested_jacobian(system, &mut pool, &equations, entries, &pattern);
+        let mut lowering = start(system, &pool, "dynamics_jacobian");
         let mut ddz = values(&mut lowering, &sums);
         let jacobian = ddz.split_off(equations.len());
         (lowering.builder, ddz, jacobian)
@@ -111,7 +112,7 @@ pub fn dynamics_jacobian(
 /// Accelerations, then the entries of the pattern, in nested form: what a variable was taken
 /// out of in an acceleration is a part of its derivative by that variable.
 fn nested_jacobian(
-    model: &ReducedModel,
+    system: &Equations<'_>,
     pool: &mut ExprPool,
     equations: &[Combination],
     entries: Vec<Combination>,
@@ -120,9 +121,9 @@ fn nested_jacobian(
     let demand = Demand::new(pool, equations.iter().chain(&entries));
     let nest = |equation| demand.nest(pool, equation);
     let mut sums: Vec<Nested> = equations.iter().map(nest).collect();
-    let variables: Vec<LatentVariable> = LatentVariable::all(model.latent_dim()).collect();
+    let variables: Vec<LatentVariable> = LatentVariable::all(system.latent_dim()).collect();
     for ((&row, &col), mut entry) in pattern.rows.iter().zip(&pattern.cols).zip(entries) {
-        let variable = pool.symbol_expr(symbol(model, variables[col]));
+        let variable = pool.symbol_expr(system.symbol(variables[col]));
         let shared = sums[row].part_of(variable, &entry).map(|group| {
             let known = &sums[row].groups[group].single.items;
             entry.items.retain(|item| !known.contains(item));
@@ -137,16 +138,16 @@ fn nested_jacobian(
 
 /// Accelerations and the entries of the pattern by tables.
 fn dense_jacobian(
-    model: &ReducedModel,
+    system: &Equations<'_>,
     pool: &mut ExprPool,
     equations: &[Combination],
     pattern: &JacobianPattern,
 ) -> (ProgramBuilder, Vec<ValueId>, Vec<ValueId>) {
-    let columns: Vec<SymbolId> = LatentVariable::all(model.latent_dim())
-        .map(|variable| symbol(model, variable))
+    let columns: Vec<SymbolId> = LatentVariable::all(system.latent_dim())
+        .map(|variable| system.symbol(variable))
         .collect();
     let dense = DenseJacobian::new(pool, equations, &columns);
-    let mut lowering = start(model, pool, "dynamics_jacobian");
+    let mut lowering = start(system, pool, "dynamics_jacobian");
     let mut roots = expressions(equations);
     roots.extend(dense.expressions());
     lowering.prepare(&roots);
@@ -159,23 +160,22 @@ fn dense_jacobian(
 }
 
 /// The right-hand sides with folded coefficients, one a latent coordinate.
-fn accelerations(model: &ReducedModel, phase: usize) -> Result<Vec<Combination>, LowerError> {
-    let coefficients = model.phase(phase)?;
-    let library = model.library();
-    (0..model.latent_dim())
+fn accelerations(system: &Equations<'_>, phase: usize) -> Result<Vec<Combination>, LowerError> {
+    let phase_equations = system.phase(phase)?;
+    (0..system.latent_dim())
         .map(|row| {
-            let summands = coefficients
-                .active_terms(row)
-                .map(|(term, coefficient)| (coefficient, library.term(term).expr()));
-            let equation = Combination::collect(library.pool(), summands);
-            check_finite(model, phase, row, &equation)?;
+            let summands = phase_equations
+                .summands(system, row)
+                .map(|(coefficient, term)| (coefficient, term.expr()));
+            let equation = Combination::collect(system.pool(), summands);
+            check_finite(system, phase, row, &equation)?;
             Ok(equation)
         })
         .collect()
 }
 
 fn check_finite(
-    model: &ReducedModel,
+    system: &Equations<'_>,
     phase: usize,
     row: usize,
     combination: &Combination,
@@ -183,7 +183,7 @@ fn check_finite(
     match combination.non_finite() {
         None => Ok(()),
         Some(value) => Err(LowerError::NonFinite {
-            phase: model.phase(phase)?.name.clone(),
+            phase: system.phase(phase)?.name.clone(),
             output: row + 1,
             value,
         }),
@@ -191,8 +191,8 @@ fn check_finite(
 }
 
 /// A lowering whose program has the inputs `z`, `dz` and `u_lat`.
-fn start<'a>(model: &ReducedModel, pool: &'a ExprPool, name: &str) -> ExpressionLowering<'a> {
-    let d = model.latent_dim();
+fn start<'a>(system: &Equations<'_>, pool: &'a ExprPool, name: &str) -> ExpressionLowering<'a> {
+    let d = system.latent_dim();
     let mut builder = ProgramBuilder::new(name);
     let inputs = [
         builder.input("z", d),
@@ -201,16 +201,9 @@ fn start<'a>(model: &ReducedModel, pool: &'a ExprPool, name: &str) -> Expression
     ];
     let variables: HashMap<SymbolId, ValueId> = LatentVariable::all(d)
         .zip(inputs.into_iter().flatten())
-        .map(|(variable, value)| (symbol(model, variable), value))
+        .map(|(variable, value)| (system.symbol(variable), value))
         .collect();
     ExpressionLowering::new(pool, builder, variables)
-}
-
-fn symbol(model: &ReducedModel, variable: LatentVariable) -> SymbolId {
-    model
-        .library()
-        .symbol(variable)
-        .expect("variables up to latent_dim are in the library's pool")
 }
 
 fn expressions(combinations: &[Combination]) -> Vec<ExprId> {

@@ -3,8 +3,8 @@
 use super::cost::LowerOptions;
 use super::dynamics::dynamics;
 use super::error::LowerError;
+use crate::equations::Equations;
 use crate::ir::{Binary, Program, ProgramBuilder, ValueId};
-use crate::model::ReducedModel;
 
 /// The program of one fourth-order Runge-Kutta step of `d/dt (z, dz) = (dz, ddz)` over
 /// `h` seconds with constant `u_lat`: inputs `z`, `dz`, `u_lat`, `h`; outputs `z`, `dz`
@@ -13,12 +13,12 @@ use crate::model::ReducedModel;
 /// # Errors
 /// As [`dynamics`].
 pub fn rk4_step(
-    model: &ReducedModel,
+    system: &Equations<'_>,
     phase: usize,
     options: &LowerOptions,
 ) -> Result<Program, LowerError> {
-    let accelerations = dynamics(model, phase, options)?;
-    let d = model.latent_dim();
+    let accelerations = dynamics(system, phase, options)?;
+    let d = system.latent_dim();
     let mut builder = ProgramBuilder::new("step");
     let z = builder.input("z", d);
     let dz = builder.input("dz", d);

@@ -64,7 +64,7 @@ pub use library::{
 };
 pub use phase::{FeetRule, Phase};
 pub use projection::RANK_TOLERANCE;
-pub use rom::{LatentEquations, ReducedModel};
+pub use rom::ReducedModel;
 pub use scaling::{ScaleFactors, Scaling};
 pub use standard_library::{MAX_DEGREE, StandardLibrary};
 pub use state_map::{Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};

@@ -26,7 +26,6 @@ use super::scaling::Scaling;
 use super::state_map::StateMap;
 use super::statistics::InputStatistics;
 use crate::robot::{ContactFlags, Robot};
-use crate::symbolic::{ExprId, ExprPool};
 
 /// A checked reduced-order model; made by [`ReducedModel::builder`] or read from a model file.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,15 +47,6 @@ pub struct ReducedModel {
     pub(super) robot: Option<&'static Robot>,
     pub(super) sample_time_s: Option<f64>,
     pub(super) provenance: Map<String, Value>,
-}
-
-/// The accelerations of one phase as expressions.
-#[derive(Clone)]
-pub struct LatentEquations {
-    /// A clone of the library's pool, with the sums added.
-    pub pool: ExprPool,
-    /// `ddz`, one expression a latent coordinate.
-    pub ddz: Vec<ExprId>,
 }
 
 impl ReducedModel {
@@ -248,25 +238,6 @@ impl ReducedModel {
             .active_terms(output)
             .map(|(term, coefficient)| (coefficient, self.library.term(term)))
             .collect())
-    }
-
-    /// The accelerations of one phase as canonical sums, in a clone of the library's pool.
-    ///
-    /// # Errors
-    /// [`ModelError::PhaseIndex`].
-    pub fn equations(&self, phase: usize) -> Result<LatentEquations, ModelError> {
-        let phase = self.phase(phase)?;
-        let mut pool = self.library.pool().clone();
-        let mut ddz = Vec::with_capacity(self.latent_dim());
-        for output in 0..self.latent_dim() {
-            let mut summands = Vec::new();
-            for (term, coefficient) in phase.active_terms(output) {
-                let factor = pool.number(coefficient);
-                summands.push(pool.mul(factor, self.library.term(term).expr()));
-            }
-            ddz.push(pool.sum(&summands));
-        }
-        Ok(LatentEquations { pool, ddz })
     }
 
     /// The phase with this index.

@@ -313,9 +313,9 @@ proptest! {
         let part = |from: usize| DVector::from_row_slice(&point[from..from + 2]);
         let (z, dz, u_lat) = (part(0), part(2), part(4));
         let expected = model.ddz(0, &z, &dz, &u_lat).unwrap();
-        let equations = model.equations(0).unwrap();
-        for (expr, expected) in equations.ddz.iter().zip(expected.iter()) {
-            let value = equations.pool.evaluate(*expr, &|symbol| {
+        let (pool, sums) = crate::equations::Equations::of(&model).sums(0).unwrap();
+        for (expr, expected) in sums.iter().zip(expected.iter()) {
+            let value = pool.evaluate(*expr, &|symbol| {
                 match model.library().variable(symbol).unwrap() {
                     LatentVariable::Z(i) => z[i],
                     LatentVariable::Dz(i) => dz[i],

@@ -5,6 +5,7 @@ use askama::Template;
 use super::contents::{AllFigures, Content};
 use super::figures::{Figure, panel_svg};
 use crate::artifact;
+use crate::equations::Equations;
 use crate::typeset::TypesetError;
 use crate::typeset::latex::{LatexOptions, tex_cases};
 use crate::typeset::mathml::{HtmlText, system};
@@ -125,7 +126,8 @@ pub fn page(
             &[],
         ));
     }
-    let typeset = Typeset::new(model, &SymbolTable::default(), Rounding::default())?;
+    let equations = &Equations::of(model);
+    let typeset = Typeset::new(equations, &SymbolTable::default(), Rounding::default())?;
     let page = Page {
         name: HtmlText(model.name()).to_string(),
         description: HtmlText(model.description()).to_string(),
@@ -137,7 +139,7 @@ pub fn page(
         remarks: (options.remarks.iter())
             .map(|remark| HtmlText(remark).to_string())
             .collect(),
-        phases: phases(content, &typeset),
+        phases: phases(equations, &typeset),
         rounding: HtmlText(&words::rounding(Rounding::default(), &typeset.rounding)).to_string(),
         sections,
         provenance: (model.provenance().iter())
@@ -171,12 +173,12 @@ const SIMPLIFICATION_WORDS: [&str; 2] = [
 
 const STUDY_WORDS: &str = "One model for every latent dimension and seed, judged on recordings that were not trained on. With more coordinates the decoder errs less and the equations grow.";
 
-fn phases(content: &Content<'_>, typeset: &Typeset) -> Vec<PhaseView> {
+fn phases(latent: &Equations<'_>, typeset: &Typeset) -> Vec<PhaseView> {
     let options = LatexOptions {
         width_em: WIDTH_EM,
         ..LatexOptions::default()
     };
-    (typeset.systems.iter().zip(content.model.phases()))
+    (typeset.systems.iter().zip(latent.phases()))
         .enumerate()
         .map(|(index, (equations, phase))| PhaseView {
             index,

@@ -1,9 +1,13 @@
 //! How long equations are, and what they depend on.
 
+use std::collections::BTreeSet;
+
 use super::error::SimplifyError;
+use crate::equations::Equations;
 use crate::ir::{Program, Statement};
 use crate::lower::{self, Form, LowerOptions};
-use crate::model::{LatentVariable, ReducedModel};
+use crate::model::LatentVariable;
+use crate::symbolic::SymbolId;
 
 /// Significant decimal digits of the shortest texts that read back as the coefficients.
 pub(super) fn digits(xi: &[f64]) -> usize {
@@ -17,11 +21,11 @@ pub(super) fn digits(xi: &[f64]) -> usize {
 }
 
 /// Operations of the straight-line code of `ddz`.
-pub(super) fn operations(model: &ReducedModel, phase: usize) -> Result<usize, SimplifyError> {
+pub(super) fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyError> {
     let options = LowerOptions {
         form: Form::StraightLine,
     };
-    let program: Program = lower::dynamics(model, phase, &options)?;
+    let program: Program = lower::dynamics(system, phase, &options)?;
     let counted = program.statements().iter().enumerate();
     Ok(counted
         .map(|(index, statement)| match statement {
@@ -32,19 +36,13 @@ pub(super) fn operations(model: &ReducedModel, phase: usize) -> Result<usize, Si
 }
 
 /// The variables that any `ddz` of a phase depends on, in the order of [`LatentVariable::all`].
-pub(super) fn variables(model: &ReducedModel, phase: usize) -> Vec<LatentVariable> {
-    let (library, xi) = (model.library(), &model.phases()[phase].xi);
-    let active = (library.terms().iter().enumerate())
-        .filter(|(row, _)| xi.row(*row).iter().any(|&coefficient| coefficient != 0.0));
-    let symbols: Vec<_> = active
-        .flat_map(|(_, term)| library.pool().symbols_of(term.expr()))
+pub(super) fn variables(system: &Equations<'_>, phase: usize) -> Vec<LatentVariable> {
+    let summands = system.phases()[phase].ddz.iter().flatten();
+    let terms: BTreeSet<usize> = summands.map(|summand| summand.term).collect();
+    let symbols: BTreeSet<SymbolId> = (terms.into_iter())
+        .flat_map(|term| system.pool().symbols_of(system.terms()[term].expr()))
         .collect();
-    let acts = |variable: &LatentVariable| {
-        library
-            .symbol(*variable)
-            .is_some_and(|symbol| symbols.contains(&symbol))
-    };
-    LatentVariable::all(model.latent_dim())
-        .filter(acts)
+    LatentVariable::all(system.latent_dim())
+        .filter(|variable| symbols.contains(&system.symbol(*variable)))
         .collect()
 }

@@ -12,6 +12,7 @@ use super::measure::{Measured, at_samples};
 use super::tolerance::Tolerance;
 use super::workspace::Workspace;
 use crate::artifact;
+use crate::equations::Equations;
 use crate::model::{LatentVariable, ReducedModel};
 use crate::symbolic::Interval;
 
@@ -77,9 +78,10 @@ pub fn simplify(
         );
         simplified = simplified.into_builder().provenance(provenance).build()?;
     }
+    let (old, new) = (Equations::of(model), Equations::of(&simplified));
     for (phase, certificate) in certificate.phases.iter_mut().enumerate() {
-        certificate.operations = (operations(model, phase)?, operations(&simplified, phase)?);
-        let (before, after) = (variables(model, phase), variables(&simplified, phase));
+        certificate.operations = (operations(&old, phase)?, operations(&new, phase)?);
+        let (before, after) = (variables(&old, phase), variables(&new, phase));
         certificate.lost = before.into_iter().filter(|v| !after.contains(v)).collect();
     }
     Ok(Simplified {

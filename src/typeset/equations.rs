@@ -1,6 +1,6 @@
 //! A model's latent dynamics as equations to print, and what rounding did to them.
 
-use crate::model::{CandidateTerm, Phase, ReducedModel};
+use crate::equations::{Equations, PhaseEquations};
 
 use super::decimal::{Decimal, Rounding};
 use super::expression::{UnknownSymbol, expression};
@@ -56,29 +56,28 @@ pub struct Typeset {
 }
 
 impl Typeset {
-    /// Lays out the equations of `model`: `ddz = Xi^T Theta(z, dz, u_lat)` a phase, terms in
-    /// library order, coefficients rounded by `rounding`.
+    /// Lays out the equations of each phase, terms in their order, coefficients rounded by
+    /// `rounding`.
     ///
     /// # Errors
     /// [`UnknownSymbol`] if a candidate term uses a variable that the latent model has not.
     pub fn new(
-        model: &ReducedModel,
+        system: &Equations<'_>,
         symbols: &SymbolTable,
         rounding: Rounding,
     ) -> Result<Self, UnknownSymbol> {
-        let library = model.library();
-        let terms = library
+        let terms = system
             .terms()
             .iter()
-            .map(|term| expression(library.pool(), term.expr(), symbols))
+            .map(|term| expression(system.pool(), term.expr(), symbols))
             .collect::<Result<Vec<_>, _>>()?;
         let mut layout = Layout {
-            model,
+            system,
             symbols,
             terms,
             rounder: Rounder::new(rounding),
         };
-        let systems = model
+        let systems = system
             .phases()
             .iter()
             .map(|phase| layout.system(phase))
@@ -93,7 +92,7 @@ impl Typeset {
 }
 
 struct Layout<'a> {
-    model: &'a ReducedModel,
+    system: &'a Equations<'a>,
     symbols: &'a SymbolTable,
     terms: Vec<Signed>,
     rounder: Rounder,
@@ -107,8 +106,8 @@ impl Layout<'_> {
         })
     }
 
-    fn system(&mut self, phase: &Phase) -> EquationSystem {
-        let equations = (0..self.model.latent_dim())
+    fn system(&mut self, phase: &PhaseEquations) -> EquationSystem {
+        let equations = (0..self.system.latent_dim())
             .map(|output| self.equation(phase, output))
             .collect();
         EquationSystem {
@@ -117,22 +116,21 @@ impl Layout<'_> {
         }
     }
 
-    fn equation(&mut self, phase: &Phase, output: usize) -> Equation {
-        let column = phase.xi.column(output);
-        let names = self.model.library().terms().iter().map(CandidateTerm::text);
-        let terms = self.terms.iter().zip(names).zip(column.iter());
+    fn equation(&mut self, phase: &PhaseEquations, output: usize) -> Equation {
         let left = self.acceleration(output);
+        let texts = self.system.terms();
+        let summands = phase.ddz[output].iter().map(|summand| {
+            let term = summand.term;
+            (summand.coefficient, texts[term].text(), &self.terms[term])
+        });
         let output = format!("ddz{}", output + 1);
-        self.rounder.equation(
-            left,
-            (&phase.name, &output),
-            terms.map(|((term, text), coefficient)| (*coefficient, text, term)),
-        )
+        self.rounder
+            .equation(left, (&phase.name, &output), summands)
     }
 
     fn table(&self) -> CoefficientTable {
-        let outputs = 0..self.model.latent_dim();
-        let phases = self.model.phases();
+        let outputs = 0..self.system.latent_dim();
+        let phases = self.system.phases();
         let columns = phases
             .iter()
             .flat_map(|phase| {
@@ -142,15 +140,18 @@ impl Layout<'_> {
                     .map(|output| (name.clone(), self.acceleration(output)))
             })
             .collect();
+        let xi: Vec<_> = (0..phases.len())
+            .map(|phase| self.system.coefficients(phase))
+            .collect();
         let rows = self
             .terms
             .iter()
             .enumerate()
             .map(|(row, term)| CoefficientRow {
                 term: term.clone(),
-                coefficients: phases
+                coefficients: xi
                     .iter()
-                    .flat_map(|phase| outputs.clone().map(|output| phase.xi[(row, output)]))
+                    .flat_map(|xi| outputs.clone().map(move |output| xi[(row, output)]))
                     .map(|value| {
                         let printed = self.rounder.round(value);
                         (!printed.is_zero()).then_some(printed)

@@ -3,7 +3,8 @@
 
 use nalgebra::DVector;
 
-use crate::model::{AffineMap, CandidateTerm, ReducedModel};
+use crate::equations::Equations;
+use crate::model::AffineMap;
 
 use super::decimal::{Decimal, Rounding};
 use super::equations::{Equation, EquationSystem};
@@ -48,17 +49,18 @@ pub enum RobotTypesetError {
 }
 
 impl RobotTypeset {
-    /// Lays out `model` in robot coordinates; `None` for a model without encoder, decoder,
+    /// Lays out a model in robot coordinates; `None` for a model without encoder, decoder,
     /// scaling or names of its state.
     ///
     /// # Errors
     /// [`RobotTypesetError`] if a candidate term uses a variable that the latent model has not,
     /// or a coefficient is too large for a float in SI units.
     pub fn new(
-        model: &ReducedModel,
+        system: &Equations<'_>,
         symbols: &SymbolTable,
         rounding: Rounding,
     ) -> Result<Option<Self>, RobotTypesetError> {
+        let model = system.model();
         let (Some(state), Ok(map), Ok(decoder), Ok(factors)) = (
             model.state(),
             model.encoder(),
@@ -69,21 +71,20 @@ impl RobotTypeset {
         };
         let decoder = decoder.weights();
         let coordinates = coordinate_symbols(&state.names);
-        let library = model.library();
-        let terms = library
+        let terms = system
             .terms()
             .iter()
-            .map(|term| expression(library.pool(), term.expr(), symbols))
+            .map(|term| expression(system.pool(), term.expr(), symbols))
             .collect::<Result<Vec<_>, _>>()?;
         let (encoder, negligible_weights) = encoder(map, &factors, symbols, &coordinates)?;
         let mut rounder = Rounder::new(rounding);
         let mut systems = Vec::new();
-        for phase in model.phases() {
-            let xi = &phase.xi;
+        for (index, phase) in system.phases().iter().enumerate() {
+            let xi = &system.coefficients(index);
             let mut equations = Vec::with_capacity(coordinates.len());
             for (row, symbol) in coordinates.iter().enumerate() {
                 let output = format!("dd({})", state.names[row]);
-                let texts = library.terms().iter().map(CandidateTerm::text);
+                let texts = system.terms().iter().map(|term| term.text());
                 let entries = terms
                     .iter()
                     .zip(texts)
@@ -217,7 +218,11 @@ mod tests {
         let found = |text: &str| {
             let model = crate::artifact::read_from_bytes("huge.json", text.as_bytes())
                 .expect("all numbers are finite");
-            RobotTypeset::new(&model, &SymbolTable::default(), Rounding::Exact)
+            RobotTypeset::new(
+                &Equations::of(&model),
+                &SymbolTable::default(),
+                Rounding::Exact,
+            )
         };
         assert_eq!(
             found(text),

@@ -7,6 +7,7 @@ use std::process::Command;
 
 use romc::codegen::Precision;
 use romc::deploy::{EmitOptions, Target, emit};
+use romc::equations::Equations;
 use romc::files::Overwrite;
 use romc::files::write_files;
 use romc::lower::LowerOptions;
@@ -40,7 +41,7 @@ impl Workshop {
         };
         let folder = tempfile::tempdir().expect("a temporary folder");
         for model in models {
-            let files = emit(model, &[Target::C, Target::Rust], &options);
+            let files = emit(&Equations::of(model), &[Target::C, Target::Rust], &options);
             let files = files.unwrap_or_else(|error| panic!("{}: {error}", model.name()));
             let own = folder.path().join(model.identifier().as_str());
             write_files(&own, &files, Overwrite::Refuse).expect("written");

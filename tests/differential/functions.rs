@@ -1,5 +1,6 @@
 //! The generated functions of a model, as the interpreter knows them.
 
+use romc::equations::Equations;
 use romc::ir::{Interpreter, Program};
 use romc::lower::{self, JacobianPattern, LowerOptions};
 use romc::model::{ModelError, ReducedModel, StateMap};
@@ -136,7 +137,7 @@ pub fn functions(model: &ReducedModel, n_points: usize, options: &LowerOptions) 
     for phase in 0..model.phases().len() {
         let phase_name = model.phase_identifier(phase);
         let named = |what: &str| format!("{phase_name}_{what}");
-        let program = lower::dynamics(model, phase, options).expect("lowers");
+        let program = lower::dynamics(&Equations::of(model), phase, options).expect("lowers");
         let batch = (named("dynamics_batch"), program.clone());
         list.push(function(
             named("dynamics"),
@@ -145,7 +146,8 @@ pub fn functions(model: &ReducedModel, n_points: usize, options: &LowerOptions) 
             n_points,
         ));
         list.push(function(batch.0, batch.1, Kind::Batch(phase), BATCH_POINTS));
-        let (program, pattern) = lower::dynamics_jacobian(model, phase, options).expect("lowers");
+        let (program, pattern) =
+            lower::dynamics_jacobian(&Equations::of(model), phase, options).expect("lowers");
         let kind = Kind::Jacobian(phase, pattern);
         list.push(function(
             named("dynamics_jacobian"),
@@ -153,7 +155,7 @@ pub fn functions(model: &ReducedModel, n_points: usize, options: &LowerOptions) 
             kind,
             n_points,
         ));
-        let program = lower::rk4_step(model, phase, options).expect("lowers");
+        let program = lower::rk4_step(&Equations::of(model), phase, options).expect("lowers");
         list.push(function(
             named("step"),
             program,

@@ -17,9 +17,9 @@ use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
 use crate::codegen::rust;
 use crate::deploy::EmitError;
+use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::lower::LowerOptions;
-use crate::model::ReducedModel;
 use crate::mpc::ControlModel;
 use crate::mpc::interface::{Settings, TEXTS};
 use crate::robot::{Robot, STATE_DIM};
@@ -125,17 +125,18 @@ struct ExamplePy<'a> {
 /// [`EmitError::Control`] if the model lacks something that control needs,
 /// [`EmitError::Lower`] and [`EmitError::Template`].
 pub fn emit(
-    model: &ReducedModel,
+    equations: &Equations<'_>,
     options: &LowerOptions,
     provenance: &str,
 ) -> Result<Vec<EmittedFile>, EmitError> {
+    let model = equations.model();
     if !model.is_linear() {
         return Err(EmitError::Nonlinear {
             model: model.name().to_owned(),
         });
     }
     let plant = ControlModel::new(model)?;
-    let entries = &ModelInterface::new(model, options, Units::Si)?;
+    let entries = &ModelInterface::new(equations, options, Units::Si)?;
     let name = entries.identifier.as_str();
     let folder = format!("{name}-controller");
     let mut files = Vec::new();

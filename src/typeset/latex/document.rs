@@ -2,6 +2,7 @@
 
 use askama::Template;
 
+use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::model::ReducedModel;
 use crate::typeset::TypesetError;
@@ -14,7 +15,7 @@ use super::nomenclature::{self, Entry};
 use super::options::LatexOptions;
 use super::table::{self, TableBlock};
 
-/// The LaTeX files of `model`; NAME is its identifier:
+/// The LaTeX files of a model; NAME is its identifier:
 ///
 /// - `NAME.tex`: the equations of each phase, to be taken in by `\input`;
 /// - `NAME_PHASE.tex`: the same equations, one phase a file, to be placed one by one;
@@ -30,17 +31,18 @@ use super::table::{self, TableBlock};
 /// # Errors
 /// [`TypesetError`] if a candidate term has a variable without a symbol.
 pub fn emit(
-    model: &ReducedModel,
+    system: &Equations<'_>,
     options: &LatexOptions,
 ) -> Result<Vec<EmittedFile>, TypesetError> {
-    let typeset = Typeset::new(model, &options.symbols, options.rounding)?;
+    let model = system.model();
+    let typeset = Typeset::new(system, &options.symbols, options.rounding)?;
     let stem = model.identifier().as_str();
     let header = Header { model, options };
-    let equations = Equations {
+    let equations = EquationsFile {
         header: header.equations(&typeset.rounding),
         systems: phases(model, &typeset.systems, "", options),
     };
-    let robot = RobotTypeset::new(model, &options.symbols, options.rounding)?
+    let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?
         .map(|robot| robot_equations(model, &robot, &header));
     let coefficients = Table {
         header: header.short("Needs booktabs and, for more than 40 terms, longtable."),
@@ -76,12 +78,12 @@ pub fn emit(
 /// The equations of each phase in a file of their own.
 fn phase_files(
     model: &ReducedModel,
-    equations: &Equations,
+    equations: &EquationsFile,
     header: &Header<'_>,
 ) -> Result<Vec<EmittedFile>, TypesetError> {
     let stem = model.identifier();
     let one_phase = |(place, system): (usize, &System)| {
-        let one = Equations {
+        let one = EquationsFile {
             header: header.short("One phase of the equations, with the same label."),
             systems: vec![system.clone()],
         };
@@ -104,7 +106,7 @@ fn phase_files(
     config = "templates/askama.toml",
     syntax = "latex"
 )]
-struct Equations {
+struct EquationsFile {
     header: String,
     systems: Vec<System>,
 }
@@ -126,7 +128,7 @@ impl System {
     fn sentence(&self) -> String {
         let label = &self.label;
         let number = if self.aligned {
-            format!(r"Equations \eqref{{{label}:1}} and on")
+            format!(r"EquationsFile \eqref{{{label}:1}} and on")
         } else {
             format!(r"Equation \eqref{{{label}}}")
         };
@@ -199,7 +201,11 @@ fn phases(
 }
 
 /// The encoder's rows, then the robot's accelerations a phase.
-fn robot_equations(model: &ReducedModel, robot: &RobotTypeset, header: &Header<'_>) -> Equations {
+fn robot_equations(
+    model: &ReducedModel,
+    robot: &RobotTypeset,
+    header: &Header<'_>,
+) -> EquationsFile {
     let label = format!("eq:{}-robot:encoder", label(model.name()));
     let encoder = EquationSystem {
         phase: "encoder".to_owned(),
@@ -219,7 +225,7 @@ fn robot_equations(model: &ReducedModel, robot: &RobotTypeset, header: &Header<'
     }];
     systems.extend(phases(model, &robot.systems, "-robot", header.options));
     let note = "Robot coordinates q in SI units (rad, m); z, u as in the latent equations, scaled.";
-    Equations {
+    EquationsFile {
         header: format!("{}\n% {note}", header.equations(&robot.rounding)),
         systems,
     }

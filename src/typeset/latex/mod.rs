@@ -1,4 +1,4 @@
-//! Equations for papers: a [`ReducedModel`](crate::model::ReducedModel) enters,
+//! Equations for papers: [`Equations`](crate::equations::Equations) enter,
 //! LaTeX files leave.
 //!
 //! Read [`document`](self::emit) first: it names the files. The layout of terms
@@ -8,6 +8,7 @@
 //!
 //! ```
 //! use nalgebra::DMatrix;
+//! use romc::equations::Equations;
 //! use romc::typeset::latex::{self, LatexOptions};
 //! use romc::model::{FeetRule, Library, Phase, ReducedModel};
 //!
@@ -20,7 +21,7 @@
 //!         xi: DMatrix::from_column_slice(3, 1, &[0.29, -1.22, -1.0]),
 //!     })
 //!     .build()?;
-//! let files = latex::emit(&model, &LatexOptions::default())?;
+//! let files = latex::emit(&Equations::of(&model), &LatexOptions::default())?;
 //! assert_eq!(files[0].path, "flight_only.tex");
 //! let equation = r"\ddot{z}_1 = 0.29 - 1.22\dot{z}_1 - 1.00\sin(\dot{z}_1)";
 //! assert!(files[0].contents.contains(equation));

@@ -2,8 +2,8 @@
 
 use askama::Template;
 
+use crate::equations::Equations;
 use crate::files::EmittedFile;
-use crate::model::ReducedModel;
 use crate::typeset::TypesetError;
 use crate::typeset::latex::{LatexOptions, NumberStyle, TexMath, TexNumber, TexSymbol, tex_cases};
 use crate::typeset::{CoefficientRow, Rounding, SymbolTable, Typeset, words};
@@ -40,10 +40,11 @@ impl Default for MarkdownOptions {
 /// # Errors
 /// [`TypesetError`] if a candidate term has a variable without a symbol.
 pub fn emit(
-    model: &ReducedModel,
+    system: &Equations<'_>,
     options: &MarkdownOptions,
 ) -> Result<Vec<EmittedFile>, TypesetError> {
-    let typeset = Typeset::new(model, &options.symbols, options.rounding)?;
+    let model = system.model();
+    let typeset = Typeset::new(system, &options.symbols, options.rounding)?;
     let latex = LatexOptions {
         width_em: options.width_em,
         ..LatexOptions::default()

@@ -2,8 +2,8 @@
 
 use askama::Template;
 
+use crate::equations::Equations;
 use crate::files::EmittedFile;
-use crate::model::ReducedModel;
 use crate::typeset::TypesetError;
 use crate::typeset::latex::{LatexOptions, tex_cases};
 use crate::typeset::{
@@ -93,10 +93,11 @@ fn row(left: &str, right: &str, indent: f64) -> String {
 /// # Errors
 /// [`TypesetError`] if a candidate term has a variable without a symbol.
 pub fn emit(
-    model: &ReducedModel,
+    latent: &Equations<'_>,
     options: &MathmlOptions,
 ) -> Result<Vec<EmittedFile>, TypesetError> {
-    let typeset = Typeset::new(model, &options.symbols, options.rounding)?;
+    let model = latent.model();
+    let typeset = Typeset::new(latent, &options.symbols, options.rounding)?;
     let phases = typeset
         .systems
         .iter()

@@ -1,0 +1,34 @@
+//! The latent dynamics as equations, between a model and everything that prints or emits it.
+//!
+//! A [`ReducedModel`](crate::model::ReducedModel) enters, [`Equations`] leave: for each phase the
+//! accelerations as sums of coefficients times expressions over named variables, in library order,
+//! in one pool. Equations in LaTeX, Markdown and MathML, programs, scripts, certificates and
+//! reports are made from them; nothing else reads Xi to print or emit. Read `system.rs` first.
+//!
+//! ```
+//! use nalgebra::DMatrix;
+//! use romc::equations::Equations;
+//! use romc::model::{FeetRule, Library, Phase, ReducedModel};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let terms = ["1", "dz1", "sin(z1)"].map(str::to_owned);
+//! let model = ReducedModel::builder("pendulum", Library::from_terms(1, &terms)?)
+//!     .phase(Phase {
+//!         name: "contact".into(),
+//!         feet: FeetRule::Any,
+//!         xi: DMatrix::from_column_slice(3, 1, &[0.0, -0.3, -9.81]),
+//!     })
+//!     .build()?;
+//! let equations = Equations::of(&model);
+//! let ddz1: Vec<_> = equations.phases()[0]
+//!     .summands(&equations, 0)
+//!     .map(|(coefficient, term)| (coefficient, term.text()))
+//!     .collect();
+//! assert_eq!(ddz1, [(-0.3, "dz1"), (-9.81, "sin(z1)")]);
+//! # Ok(())
+//! # }
+//! ```
+
+mod system;
+
+pub use system::{Equations, PhaseEquations, Summand};

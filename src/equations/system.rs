@@ -1,0 +1,167 @@
+//! The accelerations of all phases as sums of coefficients times expressions.
+
+use std::borrow::Cow;
+
+use nalgebra::DMatrix;
+
+use crate::model::{
+    CandidateTerm, FeetRule, LatentVariable, ModelError, Phase, ReducedModel, TermId,
+};
+use crate::symbolic::{ExprId, ExprPool, SymbolId};
+
+/// One summand of an equation: `coefficient * terms[term]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Summand {
+    /// The factor, finite and not zero; scaled units.
+    pub coefficient: f64,
+    /// Index into [`Equations::terms`].
+    pub term: usize,
+}
+
+/// The accelerations of one phase.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhaseEquations {
+    /// Name, such as `contact`.
+    pub name: String,
+    /// Foot patterns that select the phase.
+    pub feet: FeetRule,
+    /// The right-hand sides `ddz1`, `ddz2` and so on; terms are distinct and in ascending order.
+    pub ddz: Vec<Vec<Summand>>,
+}
+
+/// `ddz = Xi^T Theta(z, dz, u_lat)` of all phases of a model, with the model whose maps, names and
+/// scale factors belong to it.
+#[derive(Clone)]
+pub struct Equations<'a> {
+    model: Cow<'a, ReducedModel>,
+    pool: ExprPool,
+    terms: Vec<CandidateTerm>,
+    phases: Vec<PhaseEquations>,
+}
+
+impl<'a> Equations<'a> {
+    /// The equations of a model as they are printed and emitted.
+    pub fn of(model: &'a ReducedModel) -> Self {
+        Self::as_learned(model)
+    }
+
+    /// Coefficients times candidate terms exactly as the model has them.
+    pub fn as_learned(model: &'a ReducedModel) -> Self {
+        let phases = model.phases().iter().map(|phase| PhaseEquations {
+            name: phase.name.clone(),
+            feet: phase.feet.clone(),
+            ddz: (0..model.latent_dim())
+                .map(|o| summands(phase, o))
+                .collect(),
+        });
+        Self {
+            pool: model.library().pool().clone(),
+            terms: model.library().terms().to_vec(),
+            phases: phases.collect(),
+            model: Cow::Borrowed(model),
+        }
+    }
+
+    /// The model with maps, names and scale factors; its Xi may be that of equal, longer equations.
+    pub fn model(&self) -> &ReducedModel {
+        &self.model
+    }
+
+    /// Number of latent coordinates.
+    pub fn latent_dim(&self) -> usize {
+        self.model.latent_dim()
+    }
+
+    /// The pool of the terms. Clone it to build on them: ids stay valid in the clone.
+    pub fn pool(&self) -> &ExprPool {
+        &self.pool
+    }
+
+    /// The distinct terms in the order in which they are printed; a term may be unused.
+    pub fn terms(&self) -> &[CandidateTerm] {
+        &self.terms
+    }
+
+    /// All phases, in the model's order.
+    pub fn phases(&self) -> &[PhaseEquations] {
+        &self.phases
+    }
+
+    /// The phase with this index.
+    ///
+    /// # Errors
+    /// [`ModelError::PhaseIndex`].
+    pub fn phase(&self, phase: usize) -> Result<&PhaseEquations, ModelError> {
+        self.phases.get(phase).ok_or(ModelError::PhaseIndex {
+            found: phase,
+            count: self.phases.len(),
+        })
+    }
+
+    /// The symbol of a variable in the pool.
+    ///
+    /// # Panics
+    /// If its index is not below `latent_dim`.
+    pub fn symbol(&self, variable: LatentVariable) -> SymbolId {
+        let symbol = self.model.library().symbol(variable);
+        symbol.expect("variables up to latent_dim are in the library's pool")
+    }
+
+    /// The accelerations of one phase as canonical sums, in a clone of the pool.
+    ///
+    /// # Errors
+    /// [`ModelError::PhaseIndex`].
+    pub fn sums(&self, phase: usize) -> Result<(ExprPool, Vec<ExprId>), ModelError> {
+        let phase = self.phase(phase)?;
+        let mut pool = self.pool.clone();
+        let mut sums = Vec::with_capacity(phase.ddz.len());
+        for output in 0..phase.ddz.len() {
+            let mut products = Vec::new();
+            for (coefficient, term) in phase.summands(self, output) {
+                let factor = pool.number(coefficient);
+                products.push(pool.mul(factor, term.expr()));
+            }
+            sums.push(pool.sum(&products));
+        }
+        Ok((pool, sums))
+    }
+
+    /// The coefficients of a phase as a matrix, one row per term, one column per acceleration.
+    ///
+    /// # Panics
+    /// If there is no such phase.
+    pub fn coefficients(&self, phase: usize) -> DMatrix<f64> {
+        let mut xi = DMatrix::zeros(self.terms.len(), self.latent_dim());
+        for (output, equation) in self.phases[phase].ddz.iter().enumerate() {
+            for summand in equation {
+                xi[(summand.term, output)] = summand.coefficient;
+            }
+        }
+        xi
+    }
+}
+
+impl PhaseEquations {
+    /// The summands of one acceleration, as coefficients and terms of `equations`.
+    pub fn summands<'e>(
+        &'e self,
+        equations: &'e Equations<'_>,
+        output: usize,
+    ) -> impl Iterator<Item = (f64, &'e CandidateTerm)> + 'e {
+        let terms = equations.terms();
+        (self.ddz[output].iter()).map(|summand| (summand.coefficient, &terms[summand.term]))
+    }
+
+    /// Number of summands of all accelerations.
+    pub fn active_count(&self) -> usize {
+        self.ddz.iter().map(Vec::len).sum()
+    }
+}
+
+fn summands(phase: &Phase, output: usize) -> Vec<Summand> {
+    let summand = |(term, coefficient): (TermId, f64)| Summand {
+        coefficient,
+        term: term.index(),
+    };
+    phase.active_terms(output).map(summand).collect()
+}
