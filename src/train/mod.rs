@@ -20,8 +20,10 @@ pub mod varimax;
 pub mod weak_form;
 
 mod assemble;
+mod data_sets;
+mod dynamics_fit;
 mod error;
-mod finish;
+mod judge;
 mod options;
 #[cfg(test)]
 mod oscillator;
@@ -32,9 +34,11 @@ mod report;
 mod seeds;
 mod smooth;
 mod split;
+mod task;
 
 pub use assemble::{Origin, SourceFile};
-pub use closed_form::{Recordings, closed_form};
+pub use closed_form::closed_form;
+pub use data_sets::Recordings;
 pub use dataset::{MIN_SAMPLES, ScaleOptions};
 pub use error::TrainError;
 pub use joint::{Integrator, Unroll, joint};

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 
-use super::finish::Fitted;
+use super::dynamics_fit::Fitted;
 use crate::model::{LatentVariable, Library};
 
 /// Mean over pairs of runs of (coefficients active in both) / (coefficients active in either), all phases together,

@@ -3,9 +3,9 @@
 use nalgebra::DMatrix;
 
 use super::features::Features;
+use super::judge::Judge;
 use super::progress::Watch;
 use super::rollout::Candidate;
-use super::select::Judge;
 use super::sparse::Regression;
 
 /// Share of the score that a term must bring to be added.

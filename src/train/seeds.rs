@@ -1,13 +1,16 @@
-//! What the seeds of a training come to: a seed without a model ends nothing as long as another one has a model.
+//! The seeds of a training: one without a model is left out as long as another one has a model.
 
 use nalgebra::DMatrix;
 
+use super::assemble::{Origin, Parts, assemble};
+use super::dynamics_fit::Fitted;
 use super::error::TrainError;
-use super::finish::Fitted;
 use super::overlap::support_overlap;
 use super::progress::Watch;
-use super::report::SeedReport;
+use super::report::{SeedReport, Trained};
+use super::task::Task;
 use crate::model::{Library, ModelError};
+use crate::robot::Robot;
 
 /// Outcomes of the seeds so far.
 #[derive(Default)]
@@ -17,16 +20,16 @@ pub(super) struct Seeds {
     failure: Option<TrainError>,
 }
 
-/// The seed of least score, and the figures of all that have a model, best first.
-pub(super) struct Best {
-    pub fitted: Fitted,
-    pub reports: Vec<SeedReport>,
+/// The seed of least score, and the reports of all that have a model, best first.
+struct Best {
+    fitted: Fitted,
+    reports: Vec<SeedReport>,
     /// Overlap of the supports, see [`support_overlap`].
-    pub overlap: Option<f64>,
+    overlap: Option<f64>,
 }
 
 impl Seeds {
-    /// Keeps what a seed came to.
+    /// Keeps the outcome of a seed.
     ///
     /// # Errors
     /// Those that other seeds would have as well.
@@ -48,11 +51,39 @@ impl Seeds {
         Ok(())
     }
 
+    /// The model of the best seed of `task`.
+    ///
+    /// # Errors
+    /// The first seed's if none has a model, [`TrainError::Cancelled`] if none was begun.
+    pub fn into_model(
+        self,
+        task: Task<'_>,
+        robot: &'static Robot,
+        method: &str,
+        origin: &Origin,
+    ) -> Result<Trained, TrainError> {
+        let best = self.best(&task.library, &task.moments.state)?;
+        let mut report = task.report(&best.fitted);
+        // A single seed without losses has nothing that the report does not say.
+        if best.reports.len() > 1 || best.reports[0].losses.is_some() {
+            (report.seeds, report.support_overlap) = (best.reports, best.overlap);
+        }
+        let parts = Parts {
+            library: task.library,
+            encoder: best.fitted.encoder,
+            decoder: best.fitted.decoder,
+            xi: best.fitted.xi,
+        };
+        let (options, training) = (task.options, &task.sets.training);
+        let model = assemble(parts, training, robot, options, method, origin, &report)?;
+        Ok(Trained { model, report })
+    }
+
     /// The best seed; `state_covariance` (18 x 18) is that of the training states in scaled units.
     ///
     /// # Errors
     /// The first seed's if none has a model, [`TrainError::Cancelled`] if none was begun.
-    pub fn best(
+    fn best(
         mut self,
         library: &Library,
         state_covariance: &DMatrix<f64>,

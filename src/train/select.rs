@@ -6,11 +6,12 @@ use serde::{Deserialize, Serialize};
 use super::dataset::Dataset;
 use super::error::TrainError;
 use super::features::Features;
+use super::judge::Judge;
 use super::latent::Latent;
 use super::options::RegressionOptions;
 use super::progress::Watch;
 use super::prune::Refined;
-use super::rollout::{Candidate, Window, predict, restarted, whole};
+use super::rollout::Candidate;
 use super::sparse::{Pruning, Regression, active_terms};
 use super::weak_form::{check_terms, windowed_samples};
 
@@ -39,64 +40,6 @@ pub struct Selected {
     pub choice: Choice,
     /// How many candidates were tried.
     pub candidates: usize,
-}
-
-/// Samples to judge candidates on.
-pub struct Judge<'a> {
-    dataset: &'a Dataset,
-    latent: &'a [Latent],
-    short: Vec<Window>,
-    long: Vec<Window>,
-    inverse_std: Vec<f64>,
-    rollout_weight: f64,
-}
-
-impl<'a> Judge<'a> {
-    /// Judges on these jumps.
-    pub fn new(dataset: &'a Dataset, latent: &'a [Latent], rollout_weight: f64) -> Self {
-        let d = latent.first().map_or(0, |first| first.z.nrows());
-        let inverse_std = (0..d)
-            .map(|row| 1.0 / row_std(latent, row).max(f64::MIN_POSITIVE))
-            .collect();
-        let (short, long) = (restarted(dataset, 0.1), whole(dataset));
-        Self {
-            dataset,
-            latent,
-            short,
-            long,
-            inverse_std,
-            rollout_weight,
-        }
-    }
-
-    /// Score of a candidate, see [`Choice::score`]; infinite if a rollout diverges.
-    pub fn score(&self, candidate: Candidate<'_>) -> f64 {
-        let short = self.error(candidate, &self.short);
-        if !short.is_finite() || self.rollout_weight == 0.0 {
-            return short;
-        }
-        short + self.rollout_weight * self.error(candidate, &self.long)
-    }
-
-    fn error(&self, candidate: Candidate<'_>, windows: &[Window]) -> f64 {
-        let predictions = predict(candidate, self.dataset, self.latent, windows);
-        let (mut square, mut count) = (0.0, 0);
-        for (window, prediction) in windows.iter().zip(&predictions) {
-            let truth = self.latent[window.jump]
-                .z
-                .columns(window.start + 1, window.steps);
-            for (row, scale) in self.inverse_std.iter().enumerate() {
-                square += (prediction.row(row) - truth.row(row)).norm_squared() * scale * scale;
-            }
-            count += prediction.len();
-        }
-        let error = (square / count.max(1) as f64).sqrt();
-        if error.is_finite() {
-            error
-        } else {
-            f64::INFINITY
-        }
-    }
 }
 
 /// Fits all combinations of the options and takes, among those within the slack of the best, the sparsest.
@@ -324,29 +267,4 @@ fn starts(tried: Vec<Fitted>, windows: &[usize], limit: f64) -> Vec<Fitted> {
     let mut ranked: Vec<(bool, Fitted)> = rank.into_iter().zip(within).collect();
     ranked.sort_by_key(|(later, _)| *later);
     ranked.into_iter().map(|(_, fitted)| fitted).collect()
-}
-
-fn row_std(latent: &[Latent], row: usize) -> f64 {
-    let n = latent
-        .iter()
-        .map(|samples| samples.z.ncols())
-        .sum::<usize>()
-        .max(1) as f64;
-    let mean = latent
-        .iter()
-        .map(|samples| samples.z.row(row).sum())
-        .sum::<f64>()
-        / n;
-    let square: f64 = latent
-        .iter()
-        .flat_map(|samples| {
-            samples
-                .z
-                .row(row)
-                .iter()
-                .map(|z| (z - mean).powi(2))
-                .collect::<Vec<_>>()
-        })
-        .sum();
-    (square / n).sqrt()
 }

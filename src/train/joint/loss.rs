@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 use super::batch::Batch;
 use super::multiply::{Columns, add_product, add_transposed, product_into};
 use super::parameters::Parameters;
-use super::schedule::l1_subgradient;
 use super::unroll::{Pulls, Unroll, Window};
 use crate::train::features::{FeatureValues, Features};
 
@@ -319,6 +318,20 @@ impl<'a> JointLoss<'a> {
         add_transposed(&mut input, 1.0, Columns::all(&batch.u), pulled);
         self.gradient.encoder += projection.pull_back(&parameters.encoder, &input);
     }
+}
+
+/// (19), the mean of the coefficients' magnitudes; adds `scale` times a subgradient of their sum.
+pub(super) fn l1_subgradient(xi: &DMatrix<f64>, scale: f64, gradient: &mut DMatrix<f64>) -> f64 {
+    if scale != 0.0 {
+        for (g, value) in gradient.iter_mut().zip(xi.iter()) {
+            *g += if *value == 0.0 {
+                0.0
+            } else {
+                scale * value.signum()
+            };
+        }
+    }
+    xi.iter().map(|value| value.abs()).sum::<f64>() / xi.len() as f64
 }
 
 /// `pinv(W_e^T)^T = V (V^T V)^-1` for `V = W_e^T`: latent inputs of samples in rows are `u` times this.

@@ -12,20 +12,18 @@ use super::parameters::Parameters;
 use super::stages::{train_decoder, train_together, train_xi, train_xi_unrolled};
 use crate::model::{AffineMap, ModelError};
 use crate::robot::{Robot, STATE_DIM};
-use crate::train::assemble::{Origin, Parts, assemble};
-use crate::train::closed_form::Recordings;
+use crate::train::assemble::Origin;
+use crate::train::data_sets::Recordings;
 use crate::train::dataset::Quantity;
+use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
-use crate::train::features::Features;
-use crate::train::finish::{
-    Fitted, Sets, active_coordinates, check_latent_dim, encoder_over, fit_dynamics,
-};
 use crate::train::latent::{Latent, least_squares_decoder};
 use crate::train::options::{JointOptions, TrainOptions, Transfer};
 use crate::train::progress::Watch;
 use crate::train::random::Random;
 use crate::train::report::{SeedReport, Trained};
-use crate::train::seeds::{Best, Seeds};
+use crate::train::seeds::Seeds;
+use crate::train::task::Task;
 use crate::train::weak_form::check_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
@@ -44,11 +42,7 @@ pub fn joint(
     origin: &Origin,
     watch: &mut Watch<'_>,
 ) -> Result<Trained, TrainError> {
-    let sets = Sets::new(recordings, robot, options)?;
-    let active = active_coordinates(&sets.moments(), options);
-    check_latent_dim(options, &active)?;
-    let library = options.library()?;
-    let features = Features::new(&library);
+    let task = Task::new(recordings, robot, options)?;
     let scaling = options.scaling.factors();
     let batch_options = BatchOptions {
         phases: &options.phases,
@@ -57,14 +51,11 @@ pub fn joint(
         smoothing: options.regression.smoothing,
     };
     let training = batches(recordings.training, robot, &batch_options)?;
-    let task = Task {
-        sets: &sets,
+    let trainer = Trainer {
+        task: &task,
         batches: &training,
-        features: &features,
-        active: &active,
-        options,
     };
-    let runs = task.run_seeds(watch);
+    let runs = trainer.run_seeds(watch);
 
     let validation = batches(recordings.validation, robot, &batch_options)?;
     let judged = if validation.is_empty() {
@@ -75,42 +66,17 @@ pub fn joint(
     let mut seeds = Seeds::default();
     for run in runs {
         let seed = run.seed;
-        let outcome = task.finish(run, judged, watch);
-        let outcome = outcome.map_err(|error| task.explained(error, seed));
+        let outcome = trainer.finish(run, judged, watch);
+        let outcome = outcome.map_err(|error| trainer.explained(error, seed));
         seeds.add(seed, outcome, watch)?;
     }
-    let Best {
-        fitted,
-        reports,
-        overlap,
-    } = seeds.best(&library, &sets.moments().state)?;
-    let mut report = sets.report(&features, &fitted, &active);
-    (report.seeds, report.support_overlap) = (reports, overlap);
-    let parts = Parts {
-        library,
-        encoder: fitted.encoder,
-        decoder: fitted.decoder,
-        xi: fitted.xi,
-    };
-    let model = assemble(
-        parts,
-        &sets.training,
-        robot,
-        options,
-        "joint",
-        origin,
-        &report,
-    )?;
-    Ok(Trained { model, report })
+    seeds.into_model(task, robot, "joint", origin)
 }
 
 /// What all seeds share.
-struct Task<'a> {
-    sets: &'a Sets,
+struct Trainer<'a> {
+    task: &'a Task<'a>,
     batches: &'a [Batch],
-    features: &'a Features,
-    active: &'a [usize],
-    options: &'a TrainOptions,
 }
 
 /// What one seed has learned.
@@ -132,7 +98,7 @@ struct LinearMaps {
     xi: Vec<DMatrix<f64>>,
 }
 
-impl Task<'_> {
+impl Trainer<'_> {
     /// Trains all seeds on the threads of the options, in rounds, none of which begins after a cancellation; results
     /// are in the order of the seeds.
     fn run_seeds(&self, watch: &mut Watch<'_>) -> Vec<Run> {
@@ -140,8 +106,8 @@ impl Task<'_> {
             threads,
             ref schedule,
             ..
-        } = self.options.joint;
-        let seeds = self.options.seeds();
+        } = self.task.options.joint;
+        let seeds = self.task.options.seeds();
         watch.stage(
             "training encoder, decoder and dynamics",
             seeds.len() * schedule.total(),
@@ -177,9 +143,9 @@ impl Task<'_> {
     }
 
     fn run_seed(&self, seed: u64, cancel: &AtomicBool, news: &Sender<String>) -> Run {
-        let options = &self.options.joint;
+        let options = &self.task.options.joint;
         let weights = LossWeights {
-            lift: self.options.encoder.lift_weight,
+            lift: self.task.options.encoder.lift_weight,
             ..options.weights
         };
         let mut tell = |epoch: usize, losses: &Losses, active: usize| {
@@ -206,11 +172,8 @@ impl Task<'_> {
 
     fn networks(&self) -> NetworkTask<'_> {
         NetworkTask {
-            sets: self.sets,
+            task: self.task,
             batches: self.batches,
-            features: self.features,
-            active: self.active,
-            options: self.options,
         }
     }
 
@@ -221,17 +184,19 @@ impl Task<'_> {
         cancel: &AtomicBool,
         tell: &mut dyn FnMut(usize, &Losses, usize),
     ) -> (LinearMaps, Losses) {
-        let options = &self.options.joint;
+        let options = &self.task.options.joint;
         let contact: Vec<&Batch> = self
             .batches
             .iter()
             .filter(|batch| batch.phase == 0)
             .collect();
         let mut parameters = self.start(seed);
-        let coordinate_weights = self.options.encoder.coordinate_weights();
-        let mut loss =
-            JointLoss::new(self.features, weights, coordinate_weights).with_unroll(options.unroll);
-        let mask: Vec<bool> = (0..STATE_DIM).map(|i| self.active.contains(&i)).collect();
+        let coordinate_weights = self.task.options.encoder.coordinate_weights();
+        let mut loss = JointLoss::new(&self.task.features, weights, coordinate_weights)
+            .with_unroll(options.unroll);
+        let mask: Vec<bool> = (0..STATE_DIM)
+            .map(|i| self.task.active.contains(&i))
+            .collect();
         let mut listener = |epoch: usize, losses: &Losses, active: usize| {
             tell(epoch, losses, active);
             !cancel.load(Ordering::Relaxed)
@@ -259,12 +224,16 @@ impl Task<'_> {
     fn start(&self, seed: u64) -> Parameters {
         let JointOptions {
             xi_start, transfer, ..
-        } = self.options.joint;
+        } = self.task.options.joint;
         let mut random = Random::new(seed);
-        let (d, p) = (self.options.latent_dim, self.features.library_dim());
+        let (d, p) = (
+            self.task.options.latent_dim,
+            self.task.features.library_dim(),
+        );
         let mut parameters = Parameters::random(STATE_DIM, d, p, xi_start, &mut random);
         if transfer == Transfer::Chosen {
             let mean = self
+                .task
                 .sets
                 .training
                 .gather(Quantity::X, Some(0))
@@ -277,26 +246,26 @@ impl Task<'_> {
 
     /// Steps two and three as published.
     fn transfer(&self, run: &mut LinearMaps, weights: LossWeights, cancel: &AtomicBool) {
-        let schedule = &self.options.joint.schedule;
+        let schedule = &self.task.options.joint.schedule;
         let mut listener = |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
         let all: Vec<&Batch> = self.batches.iter().collect();
         train_decoder(&mut run.parameters, &all, schedule, &mut listener);
-        for phase in 0..self.sets.training.phases.patterns.len() {
+        for phase in 0..self.task.sets.training.phases.patterns.len() {
             let own: Vec<&Batch> = self
                 .batches
                 .iter()
                 .filter(|batch| batch.phase == phase)
                 .collect();
             let start = DMatrix::from_element(
-                self.features.library_dim(),
-                self.options.latent_dim,
-                self.options.joint.xi_start,
+                self.task.features.library_dim(),
+                self.task.options.latent_dim,
+                self.task.options.joint.xi_start,
             );
             let xi = if weights.bptt == 0.0 {
                 train_xi(
                     &run.parameters,
                     &own,
-                    self.features,
+                    &self.task.features,
                     weights,
                     schedule,
                     start,
@@ -304,9 +273,9 @@ impl Task<'_> {
                 )
                 .0
             } else {
-                let coordinate_weights = self.options.encoder.coordinate_weights();
-                let mut loss = JointLoss::new(self.features, weights, coordinate_weights)
-                    .with_unroll(self.options.joint.unroll);
+                let coordinate_weights = self.task.options.encoder.coordinate_weights();
+                let mut loss = JointLoss::new(&self.task.features, weights, coordinate_weights)
+                    .with_unroll(self.task.options.joint.unroll);
                 let parameters = Parameters {
                     xi: start,
                     ..run.parameters.clone()
@@ -335,20 +304,15 @@ impl Task<'_> {
             Learned::Linear(maps) => self.finish_linear(maps, watch)?,
             Learned::Networks(maps) => self.networks().finish(maps, watch)?,
         };
-        let score = match (self.options.joint.transfer, &run.learned) {
-            (Transfer::Chosen, _) => fitted
-                .choice
-                .as_ref()
-                .map_or(f64::INFINITY, |(choice, _)| choice.score),
+        let score = match (self.task.options.joint.transfer, &run.learned) {
+            (Transfer::Chosen, _) => fitted.score(),
             (Transfer::Published, Learned::Linear(maps)) => self.published_score(maps, judged),
             (Transfer::Published, Learned::Networks(maps)) => {
                 self.networks().published_score(maps, judged)
             }
         };
         let seed = (run.seed, score);
-        let report = self
-            .sets
-            .seed_report(self.features, &fitted, seed, Some(run.losses));
+        let report = self.task.seed_report(&fitted, seed, Some(run.losses));
         Ok((report, fitted))
     }
 
@@ -358,17 +322,17 @@ impl Task<'_> {
             return error;
         }
         let terms_at_start = || {
-            let encoder = match self.options.joint.maps.is_linear() {
+            let encoder = match self.task.options.joint.maps.is_linear() {
                 true => {
                     let mut start = self.start(seed);
-                    let masked = (0..STATE_DIM).filter(|i| !self.active.contains(i));
+                    let masked = (0..STATE_DIM).filter(|i| !self.task.active.contains(i));
                     masked.for_each(|i| start.encoder.row_mut(i).fill(0.0));
                     AffineMap::new("encoder", start.encoder.transpose(), start.encoder_bias)?.into()
                 }
                 false => self.networks().starting_encoder(seed)?,
             };
-            let latent = Latent::of(&self.sets.training, &encoder);
-            check_terms(&self.sets.training, &latent, self.features)
+            let latent = Latent::of(&self.task.sets.training, &encoder);
+            check_terms(&self.task.sets.training, &latent, &self.task.features)
         };
         terms_at_start().err().unwrap_or(error)
     }
@@ -378,25 +342,24 @@ impl Task<'_> {
         maps: &LinearMaps,
         watch: &mut Watch<'_>,
     ) -> Result<Fitted, TrainError> {
-        match self.options.joint.transfer {
+        match self.task.options.joint.transfer {
             Transfer::Published => published(maps),
             Transfer::Chosen => {
                 let basis = maps.parameters.encoder.clone().qr().q();
-                let encoder = encoder_over(&self.sets.training, &basis, self.options)?.into();
-                let decoder = least_squares_decoder(&self.sets.training, &encoder)?.into();
-                let maps = (encoder, decoder);
-                fit_dynamics(self.sets, self.features, maps, self.options, watch)
+                let encoder = self.task.encoder_over(&basis)?.into();
+                let decoder = least_squares_decoder(&self.task.sets.training, &encoder)?.into();
+                self.task.fit_dynamics((encoder, decoder), watch)
             }
         }
     }
 
     /// Mean combined loss over batches of all phases.
     fn published_score(&self, run: &LinearMaps, judged: &[Batch]) -> f64 {
-        let weights = self.options.joint.weights;
+        let weights = self.task.options.joint.weights;
         let mut loss = JointLoss::new(
-            self.features,
+            &self.task.features,
             weights,
-            self.options.encoder.coordinate_weights(),
+            self.task.options.encoder.coordinate_weights(),
         );
         let mut parameters = run.parameters.clone();
         let mut total = 0.0;

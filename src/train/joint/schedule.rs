@@ -101,17 +101,3 @@ impl MaskedAdam {
             .for_each(|(value, _)| *value = 0.0);
     }
 }
-
-/// (19), the mean of the coefficients' magnitudes; adds `pull` times the gradient of their sum.
-pub(super) fn l1_subgradient(xi: &DMatrix<f64>, pull: f64, gradient: &mut DMatrix<f64>) -> f64 {
-    if pull != 0.0 {
-        for (g, value) in gradient.iter_mut().zip(xi.iter()) {
-            *g += if *value == 0.0 {
-                0.0
-            } else {
-                pull * value.signum()
-            };
-        }
-    }
-    xi.iter().map(|value| value.abs()).sum::<f64>() / xi.len() as f64
-}

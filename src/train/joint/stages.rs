@@ -8,9 +8,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::adam::Adam;
 use super::batch::Batch;
-use super::loss::{InputProjection, JointLoss, LossWeights, Losses};
+use super::loss::{InputProjection, JointLoss, LossWeights, Losses, l1_subgradient};
 use super::parameters::Parameters;
-use super::schedule::{MaskedAdam, Schedule, l1_subgradient};
+use super::schedule::{MaskedAdam, Schedule};
 use crate::train::features::{FeatureValues, Features};
 
 /// Told after every epoch: its number, the losses, the active terms. Answers whether to go on.

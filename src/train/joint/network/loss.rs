@@ -10,9 +10,8 @@ use super::projection::InputProjections;
 use crate::model::Activation;
 use crate::train::features::{FeatureValues, Features};
 use crate::train::joint::batch::Batch;
-use crate::train::joint::loss::{LossWeights, Losses};
+use crate::train::joint::loss::{LossWeights, Losses, l1_subgradient};
 use crate::train::joint::multiply::{Columns, add_product, add_transposed};
-use crate::train::joint::schedule::l1_subgradient;
 use crate::train::joint::unroll::{Pulls, Unroll, Window};
 use crate::train::random::Random;
 

@@ -10,28 +10,22 @@ use super::stages::{train_decoder, train_together, train_xi};
 use crate::model::{AffineMap, Layer, StateMap};
 use crate::robot::STATE_DIM;
 use crate::train::dataset::Quantity;
+use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
-use crate::train::features::Features;
-use crate::train::finish::{Fitted, Sets, canonical_basis, fit_dynamics};
 use crate::train::joint::batch::Batch;
 use crate::train::joint::loss::{LossWeights, Losses};
 use crate::train::latent::{fit_affine, map_samples, mean_jacobian};
-use crate::train::options::{JointOptions, TrainOptions, Transfer};
+use crate::train::options::{JointOptions, Transfer};
 use crate::train::progress::Watch;
 use crate::train::random::Random;
+use crate::train::task::Task;
 
 /// What all seeds share.
 pub struct NetworkTask<'a> {
-    /// Training and validation jumps.
-    pub(in crate::train) sets: &'a Sets,
+    /// Data, library and options.
+    pub(in crate::train) task: &'a Task<'a>,
     /// Of the training recordings.
     pub(in crate::train) batches: &'a [Batch],
-    /// The library.
-    pub(in crate::train) features: &'a Features,
-    /// Coordinates that the encoder may look at.
-    pub(in crate::train) active: &'a [usize],
-    /// What to train and how.
-    pub(in crate::train) options: &'a TrainOptions,
 }
 
 /// Networks and coefficients of one seed.
@@ -58,12 +52,12 @@ impl NetworkTask<'_> {
             unroll,
             transfer,
             ..
-        } = &self.options.joint;
+        } = &self.task.options.joint;
         let frame = self.frame();
         let mut parameters = self.start(seed);
-        let coordinate_weights = self.options.encoder.coordinate_weights();
+        let coordinate_weights = self.task.options.encoder.coordinate_weights();
         let mut loss = NetworkLoss::new(
-            self.features,
+            &self.task.features,
             weights,
             coordinate_weights,
             frame.clone(),
@@ -93,7 +87,7 @@ impl NetworkTask<'_> {
             train_decoder(&mut parameters, &all, &frame, schedule, &mut quiet);
             for phase in 0..parameters.xi.len() {
                 let own: Vec<&Batch> = of_phase(phase).collect();
-                parameters.xi[phase].fill(self.options.joint.xi_start);
+                parameters.xi[phase].fill(self.task.options.joint.xi_start);
                 train_xi(
                     &mut parameters,
                     phase,
@@ -110,29 +104,36 @@ impl NetworkTask<'_> {
 
     /// Units in which the networks see the states: as they are, as published, or centred and in standard deviations.
     fn frame(&self) -> Frame {
-        let mask: Vec<bool> = (0..STATE_DIM).map(|i| self.active.contains(&i)).collect();
+        let mask: Vec<bool> = (0..STATE_DIM)
+            .map(|i| self.task.active.contains(&i))
+            .collect();
         let plain = Frame::plain(&mask);
-        if self.options.joint.transfer == Transfer::Published {
+        if self.task.options.joint.transfer == Transfer::Published {
             return plain;
         }
-        let x = self.sets.training.gather(Quantity::X, None);
-        let least = self.options.encoder.least_std * self.options.scaling.state;
+        let x = self.task.sets.training.gather(Quantity::X, None);
+        let least = self.task.options.encoder.least_std * self.task.options.scaling.state;
         let spread: DVector<f64> = x
             .column_variance()
             .map(|variance| variance.sqrt().max(least).max(1e-6));
-        let energy: f64 = self.active.iter().map(|&i| spread[i] * spread[i]).sum();
+        let energy: f64 = self
+            .task
+            .active
+            .iter()
+            .map(|&i| spread[i] * spread[i])
+            .sum();
         Frame {
             mean: x.column_mean(),
             factors: plain.factors.component_div(&spread),
             spread,
-            latent: (energy / self.active.len().max(1) as f64).sqrt(),
+            latent: (energy / self.task.active.len().max(1) as f64).sqrt(),
         }
     }
 
     /// Where a seed starts.
     fn start(&self, seed: u64) -> NetworkParameters {
-        let JointOptions { xi_start, maps, .. } = &self.options.joint;
-        let d = self.options.latent_dim;
+        let JointOptions { xi_start, maps, .. } = &self.task.options.joint;
+        let d = self.task.options.latent_dim;
         let widths = |from: usize, hidden: &[usize], to: usize| {
             let mut widths = vec![from];
             widths.extend(hidden);
@@ -141,11 +142,11 @@ impl NetworkTask<'_> {
         };
         let encoder = widths(STATE_DIM, &maps.encoder_layers, d);
         let decoder = widths(d, &maps.decoder_layers, STATE_DIM);
-        let phases = self.sets.training.phases.patterns.len();
+        let phases = self.task.sets.training.phases.patterns.len();
         NetworkParameters::random(
             (&encoder, &decoder),
             maps.activation,
-            (self.features.library_dim(), phases, *xi_start),
+            (self.task.features.library_dim(), phases, *xi_start),
             &mut Random::new(seed),
         )
     }
@@ -155,7 +156,7 @@ impl NetworkTask<'_> {
     /// # Errors
     /// [`TrainError::Model`] if its numbers are not finite.
     pub fn starting_encoder(&self, seed: u64) -> Result<StateMap, TrainError> {
-        let plain = LatentBasis::unchanged(self.options.latent_dim);
+        let plain = LatentBasis::unchanged(self.task.options.latent_dim);
         let start = self.start(seed).encoder;
         Ok(fold::encoder(&start, &self.frame(), &plain)?)
     }
@@ -171,10 +172,10 @@ impl NetworkTask<'_> {
         watch: &mut Watch<'_>,
     ) -> Result<Fitted, TrainError> {
         let TrainedNetworks { parameters, frame } = trained;
-        let plain = LatentBasis::unchanged(self.options.latent_dim);
+        let plain = LatentBasis::unchanged(self.task.options.latent_dim);
         let encoder = fold::encoder(&parameters.encoder, frame, &plain)?;
-        let x = self.sets.training.gather(Quantity::X, None);
-        if self.options.joint.transfer == Transfer::Published {
+        let x = self.task.sets.training.gather(Quantity::X, None);
+        if self.task.options.joint.transfer == Transfer::Published {
             return Ok(Fitted {
                 decoder: fold::decoder(&parameters.decoder, frame, &plain)?,
                 weights: mean_jacobian(&encoder, &x),
@@ -187,22 +188,16 @@ impl NetworkTask<'_> {
         let encoder = fold::encoder(&parameters.encoder, frame, &basis)?;
         let decoder = fold::decoder(&parameters.decoder, frame, &basis)?;
         let decoder = with_fitted_last_layer(&decoder, &x, &map_samples(&encoder, &x))?;
-        fit_dynamics(
-            self.sets,
-            self.features,
-            (encoder, decoder),
-            self.options,
-            watch,
-        )
+        self.task.fit_dynamics((encoder, decoder), watch)
     }
 
     /// Mean combined loss over batches of all phases.
     pub fn published_score(&self, trained: &TrainedNetworks, judged: &[Batch]) -> f64 {
-        let weights = self.options.joint.weights;
+        let weights = self.task.options.joint.weights;
         let mut loss = NetworkLoss::new(
-            self.features,
+            &self.task.features,
             weights,
-            self.options.encoder.coordinate_weights(),
+            self.task.options.encoder.coordinate_weights(),
             trained.frame.clone(),
             &trained.parameters,
         );
@@ -216,7 +211,7 @@ impl NetworkTask<'_> {
     /// The latent basis in which `J J^T` is the identity in the mean, rotated by varimax of the mean Jacobian, with
     /// the latents in a telling order and their mean at 0.
     fn basis(&self, encoder: &StateMap, x: &DMatrix<f64>) -> LatentBasis {
-        let d = self.options.latent_dim;
+        let d = self.task.options.latent_dim;
         let gram = x.column_iter().fold(DMatrix::zeros(d, d), |sum, x| {
             let jacobian = encoder
                 .jacobian(&x.into_owned())
@@ -229,7 +224,7 @@ impl NetworkTask<'_> {
             None => DMatrix::identity(d, d),
         };
         let mean = &white * mean_jacobian(encoder, x);
-        let (_, rotation) = canonical_basis(&self.sets.training, &mean.transpose(), self.options);
+        let (_, rotation) = self.task.canonical_basis(&mean.transpose());
         let turn = rotation.transpose() * white;
         let back = match turn.clone().try_inverse() {
             Some(back) => back,

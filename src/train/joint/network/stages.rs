@@ -10,9 +10,9 @@ use super::loss::{Frame, NetworkLoss, NetworkParameters, encode};
 use crate::train::features::{FeatureValues, Features};
 use crate::train::joint::adam::Adam;
 use crate::train::joint::batch::Batch;
-use crate::train::joint::loss::{LossWeights, Losses};
+use crate::train::joint::loss::{LossWeights, Losses, l1_subgradient};
 use crate::train::joint::multiply::{Columns, add_product, add_transposed};
-use crate::train::joint::schedule::{MaskedAdam, Schedule, l1_subgradient};
+use crate::train::joint::schedule::{MaskedAdam, Schedule};
 use crate::train::joint::stages::Listener;
 
 /// Encoder, decoder and Xi together; every batch moves the Xi of its phase.

@@ -1,0 +1,169 @@
+//! From learned maps to a model's numbers: latent basis, chosen dynamics, metrics of the fit.
+
+use nalgebra::DMatrix;
+
+use super::dataset::Quantity;
+use super::error::TrainError;
+use super::features::Features;
+use super::joint::Losses;
+use super::judge::Judge;
+use super::latent::{Latent, input_projection, lift_samples, mean_jacobian};
+use super::metrics::{Assessed, BODY_X, BODY_Z, measure};
+use super::progress::Watch;
+use super::report::{PhaseTerms, SeedReport, TrainReport};
+use super::rollout::Candidate;
+use super::select::{Choice, select};
+use super::sparse::active_terms;
+use super::task::Task;
+use super::varimax::{order_and_sign, varimax};
+use crate::model::{AffineMap, StateMap};
+use crate::robot::Robot;
+
+/// Numbers of a model before they are put together.
+pub(super) struct Fitted {
+    pub encoder: StateMap,
+    pub decoder: StateMap,
+    /// `W_e`, of a nonlinear encoder the mean of its Jacobian over the training samples.
+    pub weights: DMatrix<f64>,
+    pub xi: Vec<DMatrix<f64>>,
+    /// The regression, if Xi was chosen among regressions, and how many were tried.
+    pub choice: Option<(Choice, usize)>,
+}
+
+impl Fitted {
+    /// Score of the chosen regression, infinite without one.
+    pub fn score(&self) -> f64 {
+        (self.choice.as_ref()).map_or(f64::INFINITY, |(choice, _)| choice.score)
+    }
+
+    fn assessed<'a>(&'a self, features: &'a Features) -> Assessed<'a> {
+        Assessed {
+            candidate: Candidate {
+                features,
+                xi: &self.xi,
+            },
+            encoder: &self.encoder,
+            decoder: &self.decoder,
+        }
+    }
+}
+
+impl Task<'_> {
+    /// The encoder over a space with orthonormal `basis` (`18 x d`): in its canonical basis, `b_e = -W_e mean(x)`.
+    pub fn encoder_over(&self, basis: &DMatrix<f64>) -> Result<AffineMap, TrainError> {
+        let x = self.sets.training.gather(Quantity::X, None);
+        let weights = self.canonical_basis(basis).0.transpose();
+        let bias = -(&weights * x.column_mean());
+        Ok(AffineMap::new("encoder", weights, bias)?)
+    }
+
+    /// `basis T` (`18 x d`) and the orthogonal `T` (`d x d`) for which its columns are simple in the sense of varimax,
+    /// with body x and body z first and positive dominant entries.
+    pub fn canonical_basis(&self, basis: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+        let x = self.sets.training.gather(Quantity::X, None);
+        let std = x.column_variance().map(f64::sqrt);
+        let loadings = |basis: &DMatrix<f64>| DMatrix::from_diagonal(&std) * basis;
+        let mut basis = basis.clone();
+        let mut turn = DMatrix::identity(basis.ncols(), basis.ncols());
+        if self.options.encoder.rotate {
+            turn = varimax(&loadings(&basis));
+            basis *= &turn;
+        }
+        let (order, signs) = order_and_sign(&loadings(&basis), &[BODY_X, BODY_Z]);
+        let arranged = |matrix: DMatrix<f64>| {
+            let mut arranged = matrix.select_columns(&order);
+            for (mut column, sign) in arranged.column_iter_mut().zip(&signs) {
+                column *= *sign;
+            }
+            arranged
+        };
+        (arranged(basis), arranged(turn))
+    }
+
+    /// Chosen dynamics for an encoder and its decoder.
+    pub fn fit_dynamics(
+        &self,
+        (encoder, decoder): (StateMap, StateMap),
+        watch: &mut Watch<'_>,
+    ) -> Result<Fitted, TrainError> {
+        let (training, judged) = (&self.sets.training, self.sets.judged());
+        let latent = Latent::of(training, &encoder);
+        let judged_latent = Latent::of(judged, &encoder);
+        let options = &self.options.regression;
+        let judge = Judge::new(judged, &judged_latent, options.rollout_weight);
+        let selected = select(training, &latent, &self.features, &judge, options, watch)?;
+        Ok(Fitted {
+            weights: mean_jacobian(&encoder, &training.gather(Quantity::X, None)),
+            encoder,
+            decoder,
+            xi: selected.xi,
+            choice: Some((selected.choice, selected.candidates)),
+        })
+    }
+
+    /// The metrics of one seed.
+    pub fn seed_report(
+        &self,
+        fitted: &Fitted,
+        (seed, score): (u64, f64),
+        losses: Option<Losses>,
+    ) -> SeedReport {
+        let x = self.sets.training.gather(Quantity::X, None);
+        let std = x.column_variance().map(f64::sqrt);
+        let names = Robot::state_names();
+        let rows = fitted.weights.row_iter();
+        SeedReport {
+            seed,
+            score,
+            losses,
+            active: fitted.xi.iter().map(active_terms).sum(),
+            dominant: rows
+                .map(|row| names[row.transpose().component_mul(&std).iamax()].clone())
+                .collect(),
+            judged: measure(fitted.assessed(&self.features), self.sets.judged()),
+        }
+    }
+
+    /// The metrics of fitted numbers.
+    pub fn report(&self, fitted: &Fitted) -> TrainReport {
+        let assessed = fitted.assessed(&self.features);
+        let names = Robot::state_names();
+        let sets = &self.sets;
+        let phases = sets.training.phases.names().into_iter().zip(&fitted.xi);
+        let (choice, candidates) = fitted.choice.clone().unzip();
+        let validated = !sets.validation.jumps.is_empty();
+        TrainReport {
+            encoded: self.active.iter().map(|&i| names[i].clone()).collect(),
+            lift_loss: self.lift_loss(&fitted.encoder),
+            active_terms: phases
+                .map(|(phase, xi)| PhaseTerms {
+                    phase,
+                    active: active_terms(xi),
+                })
+                .collect(),
+            choice,
+            candidates: candidates.unwrap_or(0),
+            seeds: Vec::new(),
+            support_overlap: None,
+            training: measure(assessed, &sets.training),
+            validation: validated.then(|| measure(assessed, &sets.validation)),
+        }
+    }
+
+    /// Share of the training input's energy that the latent input cannot carry.
+    fn lift_loss(&self, encoder: &StateMap) -> f64 {
+        if let Some(linear) = encoder.as_affine() {
+            let (weights, input) = (linear.weights(), &self.moments.input);
+            let carried = &input_projection(weights) * input * weights.transpose();
+            return 1.0 - carried.trace() / input.trace().max(f64::MIN_POSITIVE);
+        }
+        let training = &self.sets.training;
+        let latent = Latent::of(training, encoder);
+        let (mut missed, mut total) = (0.0, 0.0);
+        for (jump, samples) in training.jumps.iter().zip(&latent) {
+            missed += (lift_samples(encoder, &jump.x, &samples.u_lat) - &jump.u).norm_squared();
+            total += jump.u.norm_squared();
+        }
+        missed / total.max(f64::MIN_POSITIVE)
+    }
+}

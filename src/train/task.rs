@@ -1,0 +1,53 @@
+//! One training as every method sees it, checked before any map is learned.
+
+use super::data_sets::{DataSets, Recordings};
+use super::error::TrainError;
+use super::features::Features;
+use super::options::TrainOptions;
+use super::subspace::Moments;
+use crate::model::Library;
+use crate::robot::Robot;
+
+/// Data, library and options that all seeds share.
+pub(super) struct Task<'a> {
+    pub sets: DataSets,
+    /// Of the training samples.
+    pub moments: Moments,
+    pub library: Library,
+    pub features: Features,
+    /// Coordinates that the encoder may use.
+    pub active: Vec<usize>,
+    pub options: &'a TrainOptions,
+}
+
+impl<'a> Task<'a> {
+    /// Reads the data sets and checks them against the options.
+    ///
+    /// # Errors
+    /// [`TrainError`]: options out of range, too few samples, too many latent coordinates.
+    pub fn new(
+        recordings: Recordings<'_>,
+        robot: &Robot,
+        options: &'a TrainOptions,
+    ) -> Result<Self, TrainError> {
+        let sets = DataSets::new(recordings, robot, options)?;
+        let moments = sets.moments();
+        let least_std = options.encoder.least_std * options.scaling.state;
+        let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
+        if options.latent_dim == 0 || options.latent_dim > active.len() {
+            return Err(TrainError::LatentDim {
+                requested: options.latent_dim,
+                active: active.len(),
+            });
+        }
+        let library = options.library()?;
+        Ok(Self {
+            sets,
+            moments,
+            features: Features::new(&library),
+            library,
+            active,
+            options,
+        })
+    }
+}
