@@ -9,7 +9,7 @@ use std::{fs, io};
 use super::emitted::EmittedFile;
 use super::whole::{Overwrite, beside};
 
-/// Names the files of the folder that were emitted, one a line.
+/// Names the files of the folder that were emitted, one per line.
 const MANIFEST: &str = ".romc-emitted";
 
 /// Why files could not be written.
@@ -120,7 +120,7 @@ impl Staged {
 impl Drop for Staged {
     fn drop(&mut self) {
         for (beside, _) in &self.0 {
-            // After success there is nothing; after an error, that one is to be told.
+            // After success there is nothing; after an error, that one is reported.
             let _ = fs::remove_file(beside);
         }
     }

@@ -1,4 +1,4 @@
-//! What can go wrong between a robot's name and a body wrench.
+//! Errors of robots: unknown names, joint angles, singular legs.
 
 use thiserror::Error;
 

@@ -8,7 +8,7 @@ use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::{ControlModel, ControlPhase};
 use crate::robot::STATE_DIM;
 
-/// Numbers a line.
+/// Numbers per line.
 const WIDTH: usize = 5;
 
 /// `src/control_model.rs`.

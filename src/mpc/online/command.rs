@@ -1,4 +1,4 @@
-//! What a control step returns.
+//! The result of a control step.
 
 use crate::robot::JOINT_DIM;
 

@@ -89,7 +89,7 @@ impl ControlModel {
     }
 
     /// The plant of affine maps that touch the encoder at `x` (18, SI units) and the decoder at
-    /// `z`; none for a plant whose maps are affine anyway, and where the encoder's Jacobian has not
+    /// `z`; none for a model whose maps are affine anyway, and where the encoder's Jacobian has not
     /// full row rank.
     pub fn tangent_at(&self, x: &[f64], z: &[f64]) -> Option<Self> {
         let maps = self.curved.as_ref()?;

@@ -116,7 +116,7 @@ impl Controller {
     }
 
     /// Takes the maps at a state (18, SI units), as each measurement does, if they depend on it; where
-    /// the encoder's Jacobian has not full row rank the maps stay those of the state before.
+    /// the encoder's Jacobian does not have full row rank the maps stay those of the state before.
     pub fn stand_at(&mut self, x: &[f64]) {
         if !self.plant.is_nonlinear() {
             return;
@@ -448,7 +448,7 @@ fn input_cholesky(plant: &ControlModel) -> Vec<DMatrix<f64>> {
     phases.map(|phase| phase.latent_root.clone()).collect()
 }
 
-/// Mean of states, 18 values a sample.
+/// Mean of states, 18 values per sample.
 fn mean_state(x: &[f64]) -> [f64; STATE_DIM] {
     let count = (x.len() / STATE_DIM).max(1) as f64;
     std::array::from_fn(|i| x.iter().skip(i).step_by(STATE_DIM).sum::<f64>() / count)

@@ -1,4 +1,4 @@
-//! What the controller asks of a model's equations of motion.
+//! The interface between the controller and a model's equations of motion.
 
 use std::fmt::Debug;
 

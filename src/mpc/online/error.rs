@@ -1,4 +1,4 @@
-//! What can go wrong before a controller runs.
+//! Errors of setting up a controller.
 
 use thiserror::Error;
 

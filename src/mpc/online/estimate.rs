@@ -13,8 +13,8 @@
 //! û = m + S Bᵀ (B S Bᵀ + R)⁻¹ y.
 //! ```
 //!
-//! `S` is the covariance of the training inputs. How far the model's accelerations are to be
-//! believed, `R`, the reference tells itself: input and residual of a least-squares model are
+//! `S` is the covariance of the training inputs. `R`, the covariance of the model's errors, is
+//! estimated from the reference: input and residual of a least-squares model are
 //! uncorrelated, so `Cov(y) = B S Bᵀ + R`, and `R` is what `B S Bᵀ` leaves of the sample covariance
 //! (in units of the standard deviations of `y`, eigenvalues not below `RESIDUAL_FLOOR`). Latents
 //! whose acceleration the model hardly explains then hardly count.

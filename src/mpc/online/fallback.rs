@@ -1,4 +1,4 @@
-//! What is commanded when a step has no plan to trust.
+//! Commands of a step without a trusted plan.
 //!
 //! First the last good plan, shifted, for as many stages as the settings allow; then a hold: the
 //! posture stays, the feed-forward torque fades, the joints are damped.

@@ -1,4 +1,4 @@
-//! What runs at the robot: from a plant, its dynamics and a reference to commands.
+//! The controller proper: from maps, dynamics and a reference to commands.
 //!
 //! In: a [`ControlModel`] (plain numbers), [`LatentDynamics`], a reference, measurements. Out: commands.
 //! Nothing here knows of models, programs or recordings: besides nalgebra and clarabel these files

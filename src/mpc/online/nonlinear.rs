@@ -1,4 +1,4 @@
-//! What the controller asks of maps that are not the same at every state.
+//! Maps of nonlinear encoders and decoders, which depend on the state.
 
 use std::fmt::Debug;
 
@@ -27,7 +27,7 @@ pub trait NonlinearMaps: Debug + Send + Sync {
     /// `J_Eᵀ / s_u` at `x`, `18 × latent_dim`.
     fn lift(&self, x: &[f64]) -> DMatrix<f64>;
 
-    /// `pinv(J_Eᵀ) s_u` at `x`, `latent_dim × 18`; none where the Jacobian has not full row rank.
+    /// `pinv(J_Eᵀ) s_u` at `x`, `latent_dim × 18`; none where the Jacobian does not have full row rank.
     fn projection(&self, x: &[f64]) -> Option<DMatrix<f64>>;
 
     /// The phases with the statistics of the training inputs projected at `x`; none as for

@@ -76,7 +76,7 @@ pub struct StageRows {
     pub torque: Vec<Row>,
     /// `± D_i z / q_half,i ≤ …`, those that can be active.
     pub joint: Vec<Row>,
-    /// Torque rows of which the rate is limited, and by how much a stage; empty if it is not.
+    /// Torque rows of which the rate is limited, and by how much per stage; empty if it is not.
     pub rate: Vec<Row>,
     /// Friction of the body force, if it is constrained.
     pub friction: Option<BodyFriction>,

@@ -11,11 +11,11 @@ use crate::robot::{ContactFlags, FOOT_DIM, STATE_DIM};
 pub struct ReferenceSamples<'a> {
     /// Time of each sample, s, increasing.
     pub time_s: &'a [f64],
-    /// States, 18 values a sample.
+    /// States, 18 values per sample.
     pub x: &'a [f64],
-    /// Velocities, 18 values a sample.
+    /// Velocities, 18 values per sample.
     pub dx: &'a [f64],
-    /// Generalised inputs (12 torques, force, moment), 18 values a sample, if they are known; the
+    /// Generalised inputs (12 torques, force, moment), 18 values per sample, if they are known; the
     /// controller estimates them if not.
     pub u: Option<&'a [f64]>,
     /// Feet in contact.
@@ -36,7 +36,7 @@ pub struct Reference {
     input_integral: Option<Vec<f64>>,
     input_ends: [Vec<f64>; 2],
     feet: Vec<ContactFlags>,
-    /// Roll and pitch a sample.
+    /// Roll and pitch, one pair per sample.
     attitude: Vec<[f64; 2]>,
     /// Robot states, 18 a sample, for maps that depend on them; else empty.
     x: Vec<f64>,

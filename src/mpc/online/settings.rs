@@ -1,4 +1,4 @@
-//! What a user can choose about the controller, with the values that it starts from.
+//! Settings of the controller and their defaults.
 
 use super::error::ControlError;
 use super::qp::QpSettings;

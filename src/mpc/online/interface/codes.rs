@@ -25,11 +25,11 @@ pub(super) fn guarded<T>(action: impl FnOnce() -> Result<T, ControlError>) -> Re
     match catch_unwind(AssertUnwindSafe(action)) {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(error)) => {
-            tell(&error.to_string());
+            report(&error.to_string());
             Err(code_of(&error))
         }
         Err(_) => {
-            tell("the controller broke down inside");
+            report("the controller broke down inside");
             Err(INTERNAL)
         }
     }
@@ -54,7 +54,7 @@ thread_local! {
 }
 
 /// Leaves a message for [`last_error`].
-pub fn tell(message: &str) {
+pub fn report(message: &str) {
     let text = CString::new(message.replace('\0', " ")).unwrap_or_default();
     LAST_ERROR.with_borrow_mut(|last| *last = text);
 }

@@ -7,7 +7,7 @@ use super::super::controller::{Controller, Measurement};
 use super::super::error::ControlError;
 use super::super::reference::ReferenceSamples;
 use super::super::settings::MpcSettings;
-use super::codes::{BAD_POINTER, INTERNAL, guarded, tell};
+use super::codes::{BAD_POINTER, INTERNAL, guarded, report};
 use super::settings::Settings;
 use super::values::{RawCommand, RawMeasurement, RawReference};
 use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM};
@@ -47,7 +47,7 @@ impl<const D: usize> Handle<D> {
     /// trajectory leaves the old one.
     pub fn set_reference(&mut self, raw: &RawReference<'_>) -> i32 {
         let is_missing = |name: &str| {
-            tell(&format!("reference: `{name}` is null or not aligned"));
+            report(&format!("reference: `{name}` is null or not aligned"));
             BAD_POINTER
         };
         let Some(time_s) = raw.time_s else {

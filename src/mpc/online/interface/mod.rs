@@ -11,7 +11,7 @@ mod values;
 
 pub use codes::{
     BAD_POINTER, BAD_SETTING, INTERNAL, SOLVER_REFUSED, TEXTS, TIME_ORDER, UNKNOWN_FEET,
-    last_error, status_text, tell,
+    last_error, report, status_text,
 };
 pub use handle::Handle;
 pub use settings::Settings;

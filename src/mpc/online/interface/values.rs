@@ -1,4 +1,4 @@
-//! What goes through the interface: a trajectory and measurements in, a command out.
+//! Values of the C interface: a trajectory and measurements in, a command out.
 
 use crate::robot::{JOINT_DIM, Robot};
 
@@ -44,13 +44,13 @@ impl<const D: usize> RawCommand<D> {
 pub struct RawReference<'a> {
     /// Time of each sample, s.
     pub time_s: Option<&'a [f64]>,
-    /// States, 18 values a sample.
+    /// States, 18 values per sample.
     pub x: Option<&'a [f64]>,
-    /// Velocities, 18 values a sample.
+    /// Velocities, 18 values per sample.
     pub dx: Option<&'a [f64]>,
-    /// Inputs, 18 values a sample, unless there are none; the inner `None` is a bad pointer.
+    /// Inputs, 18 values per sample, unless there are none; the inner `None` is a bad pointer.
     pub u: Option<Option<&'a [f64]>>,
-    /// Feet in contact, 4 values a sample, zero in the air.
+    /// Feet in contact, 4 values per sample, zero in the air.
     pub feet: Option<&'a [u8]>,
 }
 
