@@ -8,7 +8,7 @@ use crate::codegen::CodegenError;
 use crate::deploy::EmitError;
 use crate::evaluate::EvaluateError;
 use crate::files::FolderError;
-use crate::import::ImportError;
+use crate::import::{ImportError, NameError};
 use crate::lower::LowerError;
 use crate::model::ModelError;
 use crate::mpc::MpcError;
@@ -35,6 +35,8 @@ pub enum Error {
     Artifact(#[from] ArtifactError),
     #[error(transparent)]
     Import(Box<ImportError>),
+    #[error(transparent)]
+    Name(#[from] NameError),
     #[error(transparent)]
     Train(#[from] TrainError),
     #[error(transparent)]
@@ -89,7 +91,7 @@ impl Error {
             Self::Simplify(error) => {
                 matches!(error, SimplifyError::NoSamples | SimplifyError::Margin)
             }
-            Self::Rename(_) => true,
+            Self::Rename(_) | Self::Name(_) => true,
             Self::Recording(_)
             | Self::Model(_)
             | Self::Artifact(_)

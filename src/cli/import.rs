@@ -11,7 +11,7 @@ use super::args::{ImportArguments, LibraryArgument, StoredWeights, StoredXi, Ter
 use super::output::{Table, check_output, read_recordings};
 use crate::files::Overwrite;
 use crate::import::{
-    Chosen, ImportError, ImportOptions, ImportReport, LibraryChoice, LibraryOrder, WeightVectors,
+    Chosen, ImportError, ImportOptions, ImportReport, LibraryChoice, LibraryOrder, SymbolNames, WeightVectors,
     XiLayout, import, read_terms,
 };
 use crate::model::{ReducedModel, ScaleFactors, Scaling};
@@ -106,6 +106,7 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
             StoredXi::TermsByLatent => XiLayout::TermsByLatent,
             StoredXi::LatentByTerms => XiLayout::LatentByTerms,
         }),
+        symbols: SymbolNames::parse(&arguments.symbols)?,
         library: library(arguments)?,
         latent_dim: arguments.latent_dim,
         phases: arguments.phase.clone(),

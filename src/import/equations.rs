@@ -49,6 +49,21 @@ pub(super) struct Sections {
 
 /// Cuts a text into sections and equations, and checks that they are complete.
 pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Sections, ImportError> {
+    let text = text_of(file, bytes)?;
+    let mut reader = Reader {
+        file,
+        sections: Vec::new(),
+    };
+    for (index, line) in text.lines().enumerate() {
+        let line_without_comment = line.split('#').next().unwrap_or("");
+        reader.line(index + 1, line_without_comment)?;
+    }
+    let expected = "equations such as `ddz1 = 0.5*z1 + u1`";
+    complete(file, reader.sections, text.lines().count(), expected)
+}
+
+/// The bytes of a file as text, without a byte order mark.
+pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Result<&'b str, ImportError> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
         let line = before.matches('\n').count() + 1;
@@ -65,19 +80,10 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Sections, ImportError> {
             "equations in UTF-8",
         )
     })?;
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let mut reader = Reader {
-        file,
-        sections: Vec::new(),
-    };
-    for (index, line) in text.lines().enumerate() {
-        let line_without_comment = line.split('#').next().unwrap_or("");
-        reader.line(index + 1, line_without_comment)?;
-    }
-    reader.finish(text.lines().count())
+    Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }
 
-fn refused(
+pub(super) fn refused(
     file: &str,
     line: usize,
     column: usize,
@@ -212,44 +218,52 @@ impl Reader<'_> {
         });
         Ok(())
     }
+}
 
-    fn finish(mut self, lines: usize) -> Result<Sections, ImportError> {
-        let outputs = self.sections.iter().flat_map(|section| &section.equations);
-        let Some(last) = outputs.map(|equation| equation.output).max() else {
-            let expected = "equations such as `ddz1 = 0.5*z1 + u1`";
-            return Err(refused(
-                self.file,
-                lines.max(1),
-                1,
-                "the end of the text",
-                expected,
-            ));
+/// The sections with their equations in order, if each phase has all of them.
+pub(super) fn complete(
+    file: &str,
+    mut sections: Vec<Section>,
+    lines: usize,
+    expected: &str,
+) -> Result<Sections, ImportError> {
+    let outputs = sections.iter().flat_map(|section| &section.equations);
+    let Some(last) = outputs.map(|equation| equation.output).max() else {
+        return Err(refused(file, lines.max(1), 1, "the end of the text", expected));
+    };
+    let latent_dim = last + 1;
+    for section in &mut sections {
+        section.equations.sort_by_key(|equation| equation.output);
+        let missing = |output: &usize| {
+            let mut equations = section.equations.iter();
+            !equations.any(|equation| equation.output == *output)
         };
-        let latent_dim = last + 1;
-        for section in &mut self.sections {
-            section.equations.sort_by_key(|equation| equation.output);
-            let complete = |output: &usize| {
-                let mut equations = section.equations.iter();
-                !equations.any(|equation| equation.output == *output)
+        if let Some(output) = (0..latent_dim).find(missing) {
+            let phase = match &section.phase {
+                Some(phase) => format!("phase `[{phase}]`"),
+                None => "equations".to_owned(),
             };
-            if let Some(output) = (0..latent_dim).find(complete) {
-                let phase = match &section.phase {
-                    Some(phase) => format!("phase `[{phase}]`"),
-                    None => "equations".to_owned(),
-                };
-                let found = format!("{phase} without ddz{}", output + 1);
-                let expected = format!("ddz1 to ddz{latent_dim} (`ddz{} = 0` if none)", output + 1);
-                return Err(refused(self.file, section.line, 1, found, expected));
-            }
+            let found = format!("{phase} without ddz{}", output + 1);
+            let expected = format!("ddz1 to ddz{latent_dim} (`ddz{} = 0` if none)", output + 1);
+            return Err(refused(file, section.line, 1, found, expected));
         }
-        Ok(Sections {
-            latent_dim,
-            sections: self.sections,
-        })
     }
+    Ok(Sections {
+        latent_dim,
+        sections,
+    })
 }
 
 impl Equation {
+    /// An equation from pieces of its right side: line, column and text.
+    pub(super) fn new(output: usize, line: usize, pieces: Vec<(usize, usize, String)>) -> Self {
+        Self {
+            output,
+            line,
+            pieces,
+        }
+    }
+
     /// Builds the right side in a pool.
     pub(super) fn parse(
         &self,

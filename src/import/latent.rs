@@ -154,17 +154,19 @@ fn phases_in_order<'s>(
     options: &ImportOptions,
 ) -> Result<Vec<Ordered<'s>>, ImportError> {
     let mut ordered = Vec::new();
-    for section in &sections.sections {
-        let name = match (&section.phase, options.phases.as_slice()) {
-            (Some(name), _) => name.clone(),
-            (None, [only]) => only.name.clone(),
-            (None, _) => {
+    let by_order = options.phases.len() == sections.sections.len();
+    for (place, section) in sections.sections.iter().enumerate() {
+        let name = match &section.phase {
+            Some(name) => name.clone(),
+            None if by_order => options.phases[place].name.clone(),
+            None => {
                 return Err(ImportError::Text {
                     file: file.to_owned(),
                     line: section.line,
                     column: 1,
                     found: "equations of no phase".to_owned(),
-                    expected: "a phase such as `[contact]` before them, or one --phase NAME=FEET"
+                    expected: "a phase such as `[contact]` before them (LaTeX: `% Phase contact`, or a \
+                               label that ends in its name), or one --phase NAME=FEET for each"
                         .to_owned(),
                 });
             }

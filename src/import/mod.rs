@@ -31,6 +31,7 @@ mod assign;
 mod equations;
 mod error;
 mod latent;
+mod latex;
 mod layout;
 mod library;
 mod names;
@@ -45,6 +46,7 @@ mod tensors;
 mod terms;
 
 pub use error::ImportError;
+pub use latex::{NameError, SymbolNames};
 pub use library::read_terms;
 pub use options::{
     Format, ImportOptions, LibraryChoice, LibraryOrder, PhaseRule, WeightVectors, XiLayout,

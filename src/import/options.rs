@@ -6,6 +6,7 @@ use std::str::FromStr;
 use serde::Serialize;
 
 use super::error::ImportError;
+use super::latex::SymbolNames;
 use super::role::Mapping;
 use crate::model::{Activation, FeetRule, Scaling, StandardLibrary};
 use crate::robot::{ContactFlags, FOOT_DIM, Robot};
@@ -20,6 +21,8 @@ pub enum Format {
     Npz,
     /// Equations of the latent accelerations as text.
     Equations,
+    /// The same as LaTeX, in a `.tex` or Markdown file.
+    Latex,
 }
 
 impl Format {
@@ -35,6 +38,7 @@ impl Format {
             Some("safetensors") => return Ok(Format::Safetensors),
             Some("npz") => return Ok(Format::Npz),
             Some("txt" | "eq" | "equations") => return Ok(Format::Equations),
+            Some("tex" | "ltx" | "md" | "markdown") => return Ok(Format::Latex),
             Some("pt" | "pth" | "ckpt" | "bin") => {
                 "a safetensors file: in Python, safetensors.torch.save_file(model.state_dict(), \
                  \"model.safetensors\")"
@@ -51,8 +55,8 @@ impl Format {
                  model"
             }
             Some(_) | None => {
-                "a file that ends in .safetensors, .npz or .txt (equations), or --format to say \
-                 what it is"
+                "a file that ends in .safetensors, .npz, .txt (equations), .tex or .md (LaTeX), or \
+                 --format to say what it is"
             }
         };
         Err(ImportError::UnknownFormat {
@@ -71,6 +75,7 @@ impl Format {
             Format::Safetensors => "safetensors",
             Format::Npz => "npz",
             Format::Equations => "equations",
+            Format::Latex => "latex",
         }
     }
 }
@@ -235,6 +240,8 @@ pub struct ImportOptions {
     pub activation: Option<Activation>,
     /// How coefficients are stored, if their shape does not tell or is to be checked.
     pub xi_layout: Option<XiLayout>,
+    /// How LaTeX writes the variables.
+    pub symbols: SymbolNames,
     /// The candidate terms; equations bring their own.
     pub library: Option<LibraryChoice>,
     /// Number of latent coordinates, if shapes do not tell or is to be checked.

@@ -11,6 +11,7 @@ use super::assemble::{self, ImportNotes, Parts};
 use super::equations;
 use super::error::ImportError;
 use super::latent;
+use super::latex;
 use super::npz;
 use super::options::{Format, ImportOptions};
 use super::report::{ImportReport, ReadEquation};
@@ -63,7 +64,7 @@ pub fn import_from_bytes(
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
     let max = match format {
-        Format::Equations => equations::MAX_TEXT_BYTES,
+        Format::Equations | Format::Latex => equations::MAX_TEXT_BYTES,
         Format::Safetensors | Format::Npz => MAX_FILE_BYTES,
     };
     if bytes.len() as u64 > max {
@@ -85,7 +86,15 @@ pub fn import_from_bytes(
             let (parts, news) = assemble::parts(&TensorFile::new(file, bytes, infos)?, options)?;
             (parts, news, Vec::new())
         }
-        Format::Equations => of_equations(file, bytes, options)?,
+        Format::Equations => of_equations(file, &equations::read(file, bytes)?, options)?,
+        Format::Latex => {
+            let usual = ["contact", "flight"].map(str::to_owned).into_iter();
+            let known: Vec<String> = (options.phases.iter().map(|rule| rule.name.clone()))
+                .chain(usual)
+                .collect();
+            let sections = latex::read(file, bytes, &options.symbols, &known)?;
+            of_equations(file, &sections, options)?
+        }
     };
     let origin = Origin {
         file,
@@ -97,11 +106,10 @@ pub fn import_from_bytes(
 
 fn of_equations(
     file: &str,
-    bytes: &[u8],
+    sections: &equations::Sections,
     options: &ImportOptions,
 ) -> Result<(Parts, ImportNotes, Vec<ReadEquation>), ImportError> {
-    let sections = equations::read(file, bytes)?;
-    let found = latent::latent(file, &sections, options)?;
+    let found = latent::latent(file, sections, options)?;
     let parts = Parts {
         library: found.library,
         phases: found.phases,

@@ -14,6 +14,7 @@
 //! | `diff`, `jacobian`, `substitute` | derivatives and substitution |
 //! | `expand`, `collect`, `horner`, `poly`, `rational`, `trig`, `rules` | rewriting, each way when asked |
 //! | `simplify`, `cost`, `region` | choosing the cheapest of equal forms |
+//! | `canonical/` | a normal form with exact coefficients, to decide equality |
 //!
 //! No algorithm recurses on the machine's stack, and none iterates a hash map towards a result.
 //!
@@ -36,6 +37,7 @@
 
 mod bounds;
 mod build;
+mod canonical;
 mod collect;
 mod cost;
 mod diff;
@@ -63,6 +65,7 @@ mod simplify;
 mod substitute;
 mod trig;
 
+pub use canonical::{CanonicalForm, CanonicalForms, Coefficient, Literal};
 pub use display::Display;
 pub use expand::ExpandLimits;
 pub use interval::Interval;

@@ -129,6 +129,20 @@ impl ExprPool {
         self.parse_within(text, allowed, ParseLimits::default())
     }
 
+    /// As [`parse`](ExprPool::parse), with symbols for numbers: where `literal` gives a name for
+    /// the text of a number, it is the symbol of that name, so that it is never rounded or folded.
+    ///
+    /// # Errors
+    /// As [`parse`](ExprPool::parse).
+    pub fn parse_with_literals(
+        &mut self,
+        text: &str,
+        allowed: &dyn Fn(&str) -> bool,
+        literal: &dyn Fn(&str) -> Option<String>,
+    ) -> Result<ExprId, ParseError> {
+        self.read(text, allowed, literal, ParseLimits::default())
+    }
+
     /// As [`parse`](ExprPool::parse), within given limits.
     ///
     /// # Errors
@@ -137,6 +151,16 @@ impl ExprPool {
         &mut self,
         text: &str,
         allowed: &dyn Fn(&str) -> bool,
+        limits: ParseLimits,
+    ) -> Result<ExprId, ParseError> {
+        self.read(text, allowed, &|_| None, limits)
+    }
+
+    fn read(
+        &mut self,
+        text: &str,
+        allowed: &dyn Fn(&str) -> bool,
+        literal: &dyn Fn(&str) -> Option<String>,
         limits: ParseLimits,
     ) -> Result<ExprId, ParseError> {
         if text.len() > limits.length {
@@ -149,6 +173,7 @@ impl ExprPool {
         let mut parser = Parser {
             pool: self,
             allowed,
+            literal,
             limits,
             groups: vec![Group::new(Opener::Text)],
             depth: 0,
@@ -198,6 +223,8 @@ impl Group {
 struct Parser<'p> {
     pool: &'p mut ExprPool,
     allowed: &'p dyn Fn(&str) -> bool,
+    /// The symbol that stands for the text of a number.
+    literal: &'p dyn Fn(&str) -> Option<String>,
     limits: ParseLimits,
     groups: Vec<Group>,
     /// Open groups and pending powers.
@@ -233,7 +260,10 @@ impl Parser<'_> {
                 group.negative = !group.negative;
                 Ok(None)
             }
-            TokenKind::Number(number) => Ok(Some(self.pool.constant(number))),
+            TokenKind::Number(number) => Ok(Some(match (self.literal)(token.text) {
+                Some(name) => self.pool.symbol(&name),
+                None => self.pool.constant(number),
+            })),
             TokenKind::Open => self.open(Opener::Parenthesis, token).map(|()| None),
             TokenKind::Name(name) => {
                 let called = tokens[*next].kind == TokenKind::Open;

@@ -18,6 +18,8 @@ pub enum StoredFormat {
     Npz,
     /// Equations as text: `[contact]`, then `ddz1 = 0.36 - 0.16*dz1 + u1` and so on
     Equations,
+    /// Equations as LaTeX, in a .tex or Markdown file
+    Latex,
 }
 
 impl From<StoredFormat> for Format {
@@ -26,6 +28,7 @@ impl From<StoredFormat> for Format {
             StoredFormat::Safetensors => Format::Safetensors,
             StoredFormat::Npz => Format::Npz,
             StoredFormat::Equations => Format::Equations,
+            StoredFormat::Latex => Format::Latex,
         }
     }
 }
@@ -85,10 +88,11 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
                   Examples:\n  \
                   romc import net.safetensors --library degree=1,trigonometric,inputs --scaling 0.1 \\\n      \
                   --map xi.contact=Xi_c --map xi.flight=Xi_f --robot go1 --output my-model.json\n  \
-                  romc import equations.txt --phase contact=any --phase flight=none --output hopper.json"
+                  romc import equations.txt --phase contact=any --phase flight=none --output hopper.json\n  \
+                  romc import paper.tex --symbols z1=x --symbols z2=theta --output paper.json"
 )]
 pub struct ImportArguments {
-    /// What to import: .safetensors, .npz, or equations as .txt
+    /// What to import: .safetensors, .npz, or equations as .txt, .tex or .md
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// The model file to write
@@ -109,6 +113,9 @@ pub struct ImportArguments {
     /// How coefficients are stored, if their shape does not tell
     #[arg(long, value_enum)]
     pub xi_layout: Option<StoredXi>,
+    /// Another name that LaTeX has for a variable, such as z1=x or u2=F_z; can be repeated
+    #[arg(long, value_name = "VARIABLE=NAME")]
+    pub symbols: Vec<String>,
     /// Candidate terms: `degree=N[,trigonometric][,inputs]`, or a file with the list of terms
     #[arg(long, value_name = "LIBRARY", value_parser = library_argument)]
     pub library: Option<LibraryArgument>,

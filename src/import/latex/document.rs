@@ -1,0 +1,277 @@
+//! The displays of a document, macros expanded.
+
+use std::collections::HashMap;
+
+use super::super::equations::refused;
+use super::super::error::ImportError;
+use super::token::{Kind, Token};
+
+/// Most tokens that macros may make of one display.
+const MAX_EXPANDED: usize = 200_000;
+/// Environments of mathematics of their own.
+const DISPLAYS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath \
+    dgroup cases dcases aligned alignedat split gathered";
+/// Environments whose contents are no LaTeX.
+const VERBATIM: &str = "verbatim Verbatim lstlisting minted comment filecontents";
+
+/// What of a document matters, in its order.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Item {
+    /// A comment, or a heading in Markdown.
+    Comment(String),
+    /// The tokens between the ends of a display.
+    Display(Vec<Token>),
+}
+
+/// A macro; without a body if its definition has a form that is not read.
+struct Macro {
+    parameters: usize,
+    body: Option<Vec<Token>>,
+}
+
+/// Whether `list` has the word `name`, its star aside.
+pub(super) fn is_one_of(list: &str, name: &str) -> bool {
+    let name = name.trim_end_matches('*');
+    list.split_whitespace().any(|word| word == name)
+}
+
+/// Finds the displays.
+pub(super) fn items(file: &str, tokens: &[Token]) -> Result<Vec<Item>, ImportError> {
+    let mut scanner = Scanner { file, tokens, at: 0, macros: HashMap::new() };
+    let mut items = Vec::new();
+    while let Some(token) = scanner.next() {
+        let found = match &token.kind {
+            Kind::Comment(text) => {
+                items.push(Item::Comment(text.clone()));
+                continue;
+            }
+            Kind::Begin(name) if is_one_of(DISPLAYS, name) => {
+                Some(scanner.until(token, &Kind::End(name.clone()), Some(&token.kind))?)
+            }
+            Kind::Begin(name) if is_one_of(VERBATIM, name) => {
+                scanner.until(token, &Kind::End(name.clone()), None)?;
+                None
+            }
+            Kind::Command(name) if name == "[" => {
+                Some(scanner.until(token, &Kind::Command("]".to_owned()), None)?)
+            }
+            Kind::Display => Some(scanner.until(token, &Kind::Display, None)?),
+            Kind::Dollar => {
+                scanner.skip_inline(&Kind::Dollar);
+                None
+            }
+            Kind::Command(name) if name == "(" => {
+                scanner.skip_inline(&Kind::Command(")".to_owned()));
+                None
+            }
+            Kind::Command(name) => {
+                scanner.definition(name);
+                None
+            }
+            _ => None,
+        };
+        if let Some(display) = found {
+            items.push(Item::Display(scanner.expanded(display)?));
+        }
+    }
+    Ok(items)
+}
+
+struct Scanner<'t> {
+    file: &'t str,
+    tokens: &'t [Token],
+    at: usize,
+    macros: HashMap<String, Macro>,
+}
+
+impl<'t> Scanner<'t> {
+    fn next(&mut self) -> Option<&'t Token> {
+        let token = self.tokens.get(self.at);
+        self.at += 1;
+        token
+    }
+
+    fn peek(&self) -> Option<&'t Kind> {
+        self.tokens.get(self.at).map(|token| &token.kind)
+    }
+
+    /// The tokens up to `end`, which is passed; `nested` opens another of the same.
+    fn until(
+        &mut self,
+        start: &Token,
+        end: &Kind,
+        nested: Option<&Kind>,
+    ) -> Result<&'t [Token], ImportError> {
+        let first = self.at;
+        let mut depth = 0;
+        while let Some(token) = self.next() {
+            if token.kind == *end {
+                if depth == 0 {
+                    return Ok(&self.tokens[first..self.at - 1]);
+                }
+                depth -= 1;
+            } else if Some(&token.kind) == nested {
+                depth += 1;
+            }
+        }
+        let end = Token { kind: end.clone(), ..start.clone() }.quoted();
+        let found = format!("{} without its end", start.quoted());
+        Err(refused(self.file, start.line, start.column, found, end))
+    }
+
+    /// Passes mathematics inside a paragraph.
+    fn skip_inline(&mut self, end: &Kind) {
+        while let Some(token) = self.next() {
+            if token.kind == *end || token.kind == Kind::Paragraph {
+                return;
+            }
+        }
+    }
+
+    /// The tokens of a group, or one token.
+    fn argument(&mut self) -> Option<&'t [Token]> {
+        let first = self.at;
+        let token = self.next()?;
+        if token.kind != Kind::Open {
+            return Some(&self.tokens[first..=first]);
+        }
+        let mut depth = 1;
+        while let Some(token) = self.next() {
+            match token.kind {
+                Kind::Open => depth += 1,
+                Kind::Close => depth -= 1,
+                _ => {}
+            }
+            if depth == 0 {
+                return Some(&self.tokens[first + 1..self.at - 1]);
+            }
+        }
+        None
+    }
+
+    /// Keeps the macro that a command defines, if it defines one.
+    fn definition(&mut self, command: &str) {
+        let is_operator = command == "DeclareMathOperator";
+        let is_new = matches!(command, "newcommand" | "renewcommand" | "providecommand");
+        if !is_operator && !is_new && command != "def" {
+            return;
+        }
+        if self.peek() == Some(&Kind::Character('*')) {
+            self.at += 1;
+        }
+        let Some([Token { kind: Kind::Command(name), .. }]) = self.argument() else {
+            return;
+        };
+        let parameters = if is_new { self.bracketed_count() } else { self.listed_count() };
+        let has_default = self.peek() == Some(&Kind::Character('['));
+        let Some(body) = self.argument() else { return };
+        let body = match is_operator {
+            false => body.to_vec(),
+            true => {
+                let of = |kind| Token { kind, ..self.tokens[self.at - 1].clone() };
+                let mut operator = vec![of(Kind::Command("operatorname".to_owned())), of(Kind::Open)];
+                operator.extend_from_slice(body);
+                operator.push(of(Kind::Close));
+                operator
+            }
+        };
+        let is_plain = !has_default && parameters.is_some();
+        let entry = Macro { parameters: parameters.unwrap_or(0), body: is_plain.then_some(body) };
+        self.macros.insert(name.clone(), entry);
+    }
+
+    /// The number in `[2]`; none is zero.
+    fn bracketed_count(&mut self) -> Option<usize> {
+        if self.peek() != Some(&Kind::Character('[')) {
+            return Some(0);
+        }
+        self.at += 1;
+        let count = match self.peek()? {
+            Kind::Number(text) => text.parse().ok().filter(|count| *count <= 9),
+            _ => None,
+        };
+        self.at += 2;
+        count
+    }
+
+    /// How many parameters `\def\name#1#2{` lists; nothing for other text before the brace.
+    fn listed_count(&mut self) -> Option<usize> {
+        let mut count = Some(0);
+        while let Some(kind) = self.peek().filter(|kind| **kind != Kind::Open) {
+            count = match kind {
+                Kind::Parameter(number) if count.is_some_and(|c| c + 1 == *number) => Some(*number),
+                _ => None,
+            };
+            self.at += 1;
+        }
+        count
+    }
+
+    /// The tokens of a display with its macros replaced; what a macro makes stands at its place.
+    fn expanded(&self, display: &[Token]) -> Result<Vec<Token>, ImportError> {
+        let mut expanded = Vec::with_capacity(display.len());
+        let mut pending: Vec<Token> = display.iter().rev().cloned().collect();
+        let mut budget = MAX_EXPANDED;
+        while let Some(token) = pending.pop() {
+            let found = match &token.kind {
+                Kind::Command(name) => self.macros.get(name),
+                _ => None,
+            };
+            let Some(found) = found else {
+                expanded.push(token);
+                continue;
+            };
+            let refuse = |found: &str, expected: &str| {
+                let found = format!("{}, {found}", token.quoted());
+                Err(refused(self.file, token.line, token.column, found, expected))
+            };
+            let Some(body) = &found.body else {
+                return refuse("a macro with optional or delimited arguments", "a macro with plain arguments");
+            };
+            let mut arguments = Vec::new();
+            for _ in 0..found.parameters {
+                match take_argument(&mut pending) {
+                    Some(argument) => arguments.push(argument),
+                    None => return refuse("a macro without its arguments", "an argument for each parameter"),
+                }
+            }
+            let parts = body.iter().rev().flat_map(|part| match &part.kind {
+                Kind::Parameter(number) => match arguments.get(number.wrapping_sub(1)) {
+                    Some(argument) => argument.iter().rev().cloned().collect(),
+                    None => Vec::new(),
+                },
+                kind => vec![Token { kind: kind.clone(), line: token.line, column: token.column }],
+            });
+            let before = pending.len();
+            pending.extend(parts.take(budget + 1));
+            let passed: usize = arguments.iter().map(Vec::len).sum();
+            budget = match budget.checked_sub(1 + passed + pending.len() - before) {
+                Some(rest) => rest,
+                None => return refuse("a macro that expands without end", "macros that end"),
+            };
+        }
+        Ok(expanded)
+    }
+}
+
+/// Takes a group without its braces, or one token, from the end of a reversed list.
+fn take_argument(pending: &mut Vec<Token>) -> Option<Vec<Token>> {
+    let first = pending.pop()?;
+    if first.kind != Kind::Open {
+        return Some(vec![first]);
+    }
+    let mut argument = Vec::new();
+    let mut depth = 1;
+    while let Some(token) = pending.pop() {
+        match token.kind {
+            Kind::Open => depth += 1,
+            Kind::Close => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 {
+            return Some(argument);
+        }
+        argument.push(token);
+    }
+    None
+}

@@ -1,0 +1,21 @@
+//! Equations of latent accelerations as LaTeX prints them, in `.tex` and Markdown files.
+//!
+//! A document enters; sections of equations in the grammar of candidate terms leave, each piece
+//! with its place in the document, so that every later fault is reported there. Displays without
+//! a left side `\ddot z_k =` are skipped, as is the text around them; inside a display that is
+//! read, whatever has no meaning here is an error with line and column, never a guess.
+//!
+//! Read `token.rs` (characters to tokens), `document.rs` (displays and macros), `sections.rs`
+//! (displays to equations and phases), `expression.rs` (one right side) in this order.
+
+mod document;
+mod expression;
+mod names;
+mod sections;
+mod token;
+
+#[cfg(test)]
+mod tests;
+
+pub use names::{NameError, SymbolNames};
+pub(super) use sections::read;

@@ -1,0 +1,257 @@
+//! From a document's displays to sections of equations: one per phase.
+
+use super::super::equations::{Section, Sections, complete, refused, text_of};
+use super::super::error::ImportError;
+use super::document::{Item, is_one_of, items};
+use super::expression::{Digits, Reader};
+use super::names::SymbolNames;
+use super::token::{Kind, Token, of_markdown, of_tex};
+
+/// Environments that only arrange lines.
+const LAYOUTS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath dgroup \
+    cases dcases aligned alignedat split gathered subequations";
+
+/// Reads the equations of a document.
+///
+/// `known` are names of phases, which labels may end in; the phase of a comment `Phase NAME` (a
+/// heading in Markdown) goes before that of a label.
+///
+/// # Errors
+/// [`ImportError::Text`] with the place, what was found and what was expected.
+pub(in crate::import) fn read(
+    file: &str,
+    bytes: &[u8],
+    names: &SymbolNames,
+    known: &[String],
+) -> Result<Sections, ImportError> {
+    let text = text_of(file, bytes)?;
+    let is_markdown = file.ends_with(".md") || file.ends_with(".markdown");
+    let tokens = if is_markdown { of_markdown(text) } else { of_tex(text) };
+    let items = items(file, &tokens)?;
+    let mut document = Document {
+        file,
+        names,
+        known,
+        digits: None,
+        phase: None,
+        starts_phase: false,
+        strange: None,
+        sections: Vec::new(),
+    };
+    let has_indices = has_indexed_left_side(file, &items)?;
+    for item in &items {
+        match item {
+            Item::Comment(text) => document.comment(text),
+            Item::Display(tokens) => document.display(tokens, !has_indices)?,
+        }
+    }
+    if let (true, Some((token, found))) = (document.sections.is_empty(), document.strange) {
+        let expected = format!("\\ddot z_1 and so on, with {}", names.expected());
+        return Err(refused(file, token.line, token.column, found, expected));
+    }
+    let expected = "a display such as \\begin{align} \\ddot z_1 &= 0.5 z_1 + u_1 \\end{align}";
+    complete(file, document.sections, text.lines().count(), expected)
+}
+
+/// Whether a left side `\ddot z_1` has an index, so that `z` alone is no coordinate.
+fn has_indexed_left_side(file: &str, items: &[Item]) -> Result<bool, ImportError> {
+    let default = SymbolNames::default();
+    for item in items {
+        let Item::Display(tokens) = item else { continue };
+        let Ok(mut reader) = Reader::new(file, &default, tokens) else { continue };
+        for at in dotted(reader.tokens()) {
+            if let Some((symbol, _)) = reader.left_side(at)
+                && reader.output(&symbol).is_some()
+            {
+                return Ok(true);
+            }
+        }
+    }
+    Ok(false)
+}
+
+/// Places of `\ddot`.
+fn dotted(tokens: &[Token]) -> Vec<usize> {
+    (0..tokens.len()).filter(|place| tokens[*place].is_command("ddot")).collect()
+}
+
+/// The tokens without `\begin` and `\end` of environments that arrange lines, and without the
+/// brace that `\left\{` puts before them.
+fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
+    let mut flat: Vec<Token> = Vec::with_capacity(tokens.len());
+    let mut open: Vec<&Token> = Vec::new();
+    let mut at = 0;
+    while let Some(token) = tokens.get(at) {
+        at += 1;
+        match &token.kind {
+            Kind::Begin(name) if is_one_of(LAYOUTS, name) => {
+                open.push(token);
+                if flat.len() >= 2 && flat[flat.len() - 2].is_command("left") {
+                    flat.truncate(flat.len() - 2);
+                }
+                if name.starts_with("alignat") || name.starts_with("alignedat") {
+                    at += 3 * usize::from(tokens.get(at).is_some_and(|t| t.kind == Kind::Open));
+                } else if tokens.get(at).is_some_and(|t| t.kind == Kind::Character('[')) {
+                    // A vertical position such as [t].
+                    at += 3;
+                }
+            }
+            Kind::End(name) if is_one_of(LAYOUTS, name) => {
+                if open.pop().map(|begin| &begin.kind) != Some(&Kind::Begin(name.clone())) {
+                    let expected = "environments that end in the order in which they begin";
+                    return Err(refused(file, token.line, token.column, token.quoted(), expected));
+                }
+                if tokens.get(at).is_some_and(|token| token.is_command("right")) {
+                    at += 2;
+                }
+            }
+            _ => flat.push(token.clone()),
+        }
+    }
+    match open.first() {
+        None => Ok(flat),
+        Some(token) => {
+            let found = format!("{} without its end", token.quoted());
+            Err(refused(file, token.line, token.column, found, "environments that end inside their display"))
+        }
+    }
+}
+
+struct Document<'d> {
+    file: &'d str,
+    names: &'d SymbolNames,
+    known: &'d [String],
+    digits: Option<Digits>,
+    /// The phase that the last comment names.
+    phase: Option<String>,
+    /// Whether it was named since the last equation.
+    starts_phase: bool,
+    /// The first left side of a variable that is not known.
+    strange: Option<(Token, String)>,
+    sections: Vec<Section>,
+}
+
+impl Document<'_> {
+    fn comment(&mut self, text: &str) {
+        let text = text.trim();
+        if let Some(name) = text.strip_prefix("Phase ") {
+            let name = name.split(": ").next().unwrap_or(name);
+            let name = name.trim().trim_end_matches([':', '.']).trim();
+            self.phase = (!name.is_empty()).then(|| name.to_owned());
+            self.starts_phase = self.phase.is_some();
+        }
+        if let Some(rest) = text.strip_prefix("Coefficients have ") {
+            let mut words = rest.split_whitespace();
+            let count = words.next().and_then(|word| word.parse().ok());
+            self.digits = match (count, words.next()) {
+                (Some(count), Some("significant")) => Some(Digits::Significant(count)),
+                (Some(count), Some("decimals.")) => Some(Digits::Decimals(count)),
+                _ => None,
+            };
+        }
+    }
+
+    fn display(&mut self, tokens: &[Token], alone: bool) -> Result<(), ImportError> {
+        if !tokens.iter().any(|token| token.is_command("ddot")) {
+            return Ok(());
+        }
+        let flat = flattened(self.file, tokens);
+        let mut reader = match &flat {
+            Ok(flat) => Reader::new(self.file, self.names, flat)?,
+            Err(_) => Reader::new(self.file, self.names, tokens)?,
+        };
+        (reader.alone, reader.digits) = (alone, self.digits);
+        let mut left_sides = Vec::new();
+        let mut strange = None;
+        for at in dotted(reader.tokens()) {
+            let Some((symbol, after)) = reader.left_side(at) else { continue };
+            let token = reader.tokens()[at].clone();
+            match reader.output(&symbol) {
+                Some(output) => left_sides.push((output, at, after, token)),
+                None if strange.is_none() => strange = Some((token, symbol.quoted())),
+                None => {}
+            }
+        }
+        if left_sides.is_empty() {
+            if self.strange.is_none() {
+                self.strange = strange;
+            }
+            return Ok(());
+        }
+        flat?;
+        let refuse = |token: &Token, found: String, expected: &str| {
+            Err(refused(self.file, token.line, token.column, found, expected))
+        };
+        if let Some((token, found)) = strange {
+            return refuse(&token, found, &self.names.expected());
+        }
+        if let Some(token) = reader.printed(0, left_sides[0].1) {
+            return refuse(&token, token.quoted(), "a left side such as `\\ddot z_1 =`");
+        }
+        let total = reader.tokens().len();
+        let shared = self.label(&reader.tokens()[..left_sides[0].1]);
+        for (place, (output, _, after, token)) in left_sides.iter().enumerate() {
+            let end = left_sides.get(place + 1).map_or(total, |next| next.1);
+            let label = shared.clone().or_else(|| self.label(&reader.tokens()[*after..end]));
+            let before = place.checked_sub(1).map_or(0, |previous| left_sides[previous].2);
+            for token in &reader.tokens()[before..*after] {
+                if let Kind::Comment(text) = &token.kind {
+                    let text = text.clone();
+                    self.comment(&text);
+                }
+            }
+            let equation = reader.equation(*output, token.line, *after, end)?;
+            let section = self.section(*output, token, label)?;
+            section.equations.push(equation);
+        }
+        Ok(())
+    }
+
+    /// The phase that a label among `tokens` ends in.
+    fn label(&self, tokens: &[Token]) -> Option<String> {
+        let label = tokens.iter().find_map(|token| match &token.kind {
+            Kind::Label(label) => Some(label.as_str()),
+            _ => None,
+        })?;
+        // Rows of one system are numbered: eq:model:contact:2.
+        let stem = label.trim_end_matches(|c: char| c.is_ascii_digit());
+        let stem = stem.strip_suffix(':').filter(|stem| *stem != label).unwrap_or(label);
+        let plain = |text: &str| text.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
+        let ends_in = |name: &&String| {
+            let rest = [label, stem].into_iter().find_map(|label| {
+                plain(label).strip_suffix(&plain(name)).map(str::to_owned)
+            });
+            !name.is_empty() && rest.is_some_and(|rest| rest.is_empty() || rest.ends_with('-'))
+        };
+        let known = self.known.iter().filter(ends_in).max_by_key(|name| name.len());
+        let last = || stem.rsplit_once(':').map(|(_, last)| last.to_owned());
+        (known.cloned().or_else(last)).filter(|name| !name.bytes().all(|byte| byte.is_ascii_digit()))
+    }
+
+    /// The section that an equation belongs to: the open one, or a new one where a comment or
+    /// label names another phase, or where the left side is there already.
+    fn section(&mut self, output: usize, token: &Token, label: Option<String>) -> Result<&mut Section, ImportError> {
+        let named = match std::mem::take(&mut self.starts_phase) {
+            true => self.phase.clone(),
+            false => None,
+        };
+        let is_new = match self.sections.last() {
+            None => true,
+            Some(open) => {
+                let repeats = open.equations.iter().any(|equation| equation.output == output);
+                let other_label = self.phase.is_none() && label.is_some() && label != open.phase;
+                named.is_some() || repeats || other_label
+            }
+        };
+        if is_new {
+            let named = named.or(label.filter(|_| self.phase.is_none()));
+            if let Some(earlier) = (self.sections.iter()).find(|section| named.is_some() && section.phase == named) {
+                let name = named.unwrap_or_default();
+                let found = format!("phase `{name}` again, as in line {}", earlier.line);
+                return Err(refused(self.file, token.line, token.column, found, "each phase once"));
+            }
+            self.sections.push(Section { phase: named, line: token.line, equations: Vec::new() });
+        }
+        Ok(self.sections.last_mut().expect("one was just made if there was none"))
+    }
+}

@@ -1,0 +1,300 @@
+//! Tokens of LaTeX with their places, line by line.
+
+/// One token and where it starts, both counted from 1.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Token {
+    pub(super) kind: Kind,
+    pub(super) line: usize,
+    pub(super) column: usize,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Kind {
+    /// `\frac`, `\,`; without its backslash.
+    Command(String),
+    /// `\begin{...}`.
+    Begin(String),
+    /// `\end{...}`.
+    End(String),
+    /// `\label{...}`.
+    Label(String),
+    Open,
+    Close,
+    Superscript,
+    Subscript,
+    Align,
+    /// `\\` with its optional star and distance.
+    Break,
+    Dollar,
+    /// `$$`, or a fence of mathematics in Markdown.
+    Display,
+    /// Digits with at most one point, and an exponent as in `1.2e-3`.
+    Number(String),
+    /// `#1`.
+    Parameter(usize),
+    /// The text after `%`; a heading in Markdown.
+    Comment(String),
+    /// An empty line.
+    Paragraph,
+    Character(char),
+}
+
+impl Token {
+    /// The token in quotes, for messages.
+    pub(super) fn quoted(&self) -> String {
+        let text = match &self.kind {
+            Kind::Command(name) => format!("\\{name}"),
+            Kind::Begin(name) => format!("\\begin{{{name}}}"),
+            Kind::End(name) => format!("\\end{{{name}}}"),
+            Kind::Label(name) => format!("\\label{{{name}}}"),
+            Kind::Open => "{".to_owned(),
+            Kind::Close => "}".to_owned(),
+            Kind::Superscript => "^".to_owned(),
+            Kind::Subscript => "_".to_owned(),
+            Kind::Align => "&".to_owned(),
+            Kind::Break => "\\\\".to_owned(),
+            Kind::Dollar => "$".to_owned(),
+            Kind::Display => "$$".to_owned(),
+            Kind::Number(text) => text.clone(),
+            Kind::Parameter(number) => format!("#{number}"),
+            Kind::Comment(_) => "%".to_owned(),
+            Kind::Paragraph => return "an empty line".to_owned(),
+            Kind::Character(character) => character.escape_debug().to_string(),
+        };
+        let short: String = text.chars().take(40).collect();
+        format!("`{short}`")
+    }
+
+    pub(super) fn is_command(&self, name: &str) -> bool {
+        matches!(&self.kind, Kind::Command(command) if command == name)
+    }
+}
+
+/// Tokens of a TeX file.
+pub(super) fn of_tex(text: &str) -> Vec<Token> {
+    let mut tokens = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        Line::new(line, index + 1, 1).read(&mut tokens);
+    }
+    tokens
+}
+
+/// Tokens of the displays in a Markdown file (`math` fences and `$$`), with its headings as
+/// comments; other text gives comments only where it speaks of the coefficients' digits.
+pub(super) fn of_markdown(text: &str) -> Vec<Token> {
+    let mut tokens = Vec::new();
+    let mut fence: Option<bool> = None;
+    let mut in_display = false;
+    for (index, line) in text.lines().enumerate() {
+        let number = index + 1;
+        let mut push = |kind| {
+            tokens.push(Token { kind, line: number, column: 1 });
+        };
+        let content = line.trim();
+        if let Some(is_math) = fence {
+            match (content == "```", is_math) {
+                (true, _) => {
+                    fence = None;
+                    if is_math {
+                        push(Kind::Display);
+                    }
+                }
+                (false, true) => Line::new(line, number, 1).read(&mut tokens),
+                (false, false) => {}
+            }
+            continue;
+        }
+        if !in_display && let Some(language) = content.strip_prefix("```") {
+            let is_math = language.trim() == "math";
+            fence = Some(is_math);
+            if is_math {
+                push(Kind::Display);
+            }
+            continue;
+        }
+        if !in_display && content.starts_with('#') {
+            let heading = content.trim_start_matches('#').trim();
+            push(Kind::Comment(unescaped(heading)));
+            continue;
+        }
+        let mut column = 1;
+        for (place, part) in line.split("$$").enumerate() {
+            if place > 0 {
+                in_display = !in_display;
+                tokens.push(Token { kind: Kind::Display, line: number, column: column - 2 });
+            }
+            if in_display {
+                Line::new(part, number, column).read(&mut tokens);
+            } else if !part.trim().is_empty() {
+                tokens.push(Token {
+                    kind: Kind::Comment(part.to_owned()),
+                    line: number,
+                    column,
+                });
+            }
+            column += part.chars().count() + 2;
+        }
+    }
+    tokens
+}
+
+/// Markdown's backslashes before punctuation taken away.
+fn unescaped(text: &str) -> String {
+    let mut plain = String::new();
+    let mut characters = text.chars().peekable();
+    while let Some(character) = characters.next() {
+        let escapes = character == '\\' && characters.peek().is_some_and(char::is_ascii_punctuation);
+        if !escapes {
+            plain.push(character);
+        } else if let Some(next) = characters.next() {
+            plain.push(next);
+        }
+    }
+    plain
+}
+
+/// One line being read.
+struct Line {
+    characters: Vec<char>,
+    next: usize,
+    number: usize,
+    /// Column of the first character.
+    start: usize,
+}
+
+impl Line {
+    fn new(text: &str, number: usize, start: usize) -> Self {
+        let characters = text.chars().collect();
+        Self { characters, next: 0, number, start }
+    }
+
+    fn peek(&self, ahead: usize) -> Option<char> {
+        self.characters.get(self.next + ahead).copied()
+    }
+
+    fn take_while(&mut self, accepts: impl Fn(char) -> bool) -> String {
+        let start = self.next;
+        while self.peek(0).is_some_and(&accepts) {
+            self.next += 1;
+        }
+        self.characters[start..self.next].iter().collect()
+    }
+
+    fn read(mut self, tokens: &mut Vec<Token>) {
+        if self.characters.iter().all(|c| c.is_whitespace()) {
+            let kind = Kind::Paragraph;
+            tokens.push(Token { kind, line: self.number, column: self.start });
+        }
+        while let Some(first) = self.peek(0) {
+            let column = self.start + self.next;
+            if first.is_whitespace() {
+                self.next += 1;
+                continue;
+            }
+            let kind = self.token(first);
+            tokens.push(Token { kind, line: self.number, column });
+        }
+    }
+
+    fn token(&mut self, first: char) -> Kind {
+        let starts_decimal =
+            first == '.' && self.peek(1).is_some_and(|c| c.is_ascii_digit());
+        if first.is_ascii_digit() || starts_decimal {
+            return self.number();
+        }
+        self.next += 1;
+        match first {
+            '\\' => self.command(),
+            '%' => {
+                let rest = self.characters[self.next..].iter().collect::<String>();
+                self.next = self.characters.len();
+                Kind::Comment(rest.trim().to_owned())
+            }
+            '{' => Kind::Open,
+            '}' => Kind::Close,
+            '^' => Kind::Superscript,
+            '_' => Kind::Subscript,
+            '&' => Kind::Align,
+            '$' if self.peek(0) == Some('$') => {
+                self.next += 1;
+                Kind::Display
+            }
+            '$' => Kind::Dollar,
+            '#' => match self.peek(0).and_then(|c| c.to_digit(10)) {
+                Some(digit) => {
+                    self.next += 1;
+                    Kind::Parameter(digit as usize)
+                }
+                None => Kind::Character('#'),
+            },
+            '\u{2212}' => Kind::Character('-'),
+            '·' | '⋅' | '×' => Kind::Command("cdot".to_owned()),
+            _ => Kind::Character(first),
+        }
+    }
+
+    /// Digits, a point with digits after it, and an exponent with digits.
+    fn number(&mut self) -> Kind {
+        let digit = |c: char| c.is_ascii_digit();
+        let mut text = self.take_while(digit);
+        if self.peek(0) == Some('.') && self.peek(1).is_some_and(digit) {
+            self.next += 1;
+            text = format!("{text}.{}", self.take_while(digit));
+        }
+        let sign = usize::from(matches!(self.peek(1), Some('+' | '-')));
+        if matches!(self.peek(0), Some('e' | 'E')) && self.peek(1 + sign).is_some_and(digit) {
+            let exponent: String = self.characters[self.next..=self.next + sign].iter().collect();
+            self.next += 1 + sign;
+            text = format!("{text}{exponent}{}", self.take_while(digit));
+        }
+        Kind::Number(text)
+    }
+
+    fn command(&mut self) -> Kind {
+        let name = self.take_while(|c| c.is_ascii_alphabetic());
+        if name.is_empty() {
+            let Some(symbol) = self.peek(0) else {
+                return Kind::Command(" ".to_owned());
+            };
+            self.next += 1;
+            if symbol == '\\' {
+                self.skip_distance();
+                return Kind::Break;
+            }
+            return Kind::Command(symbol.to_string());
+        }
+        let kind: fn(String) -> Kind = match name.as_str() {
+            "begin" => Kind::Begin,
+            "end" => Kind::End,
+            "label" => Kind::Label,
+            "newline" => return Kind::Break,
+            _ => return Kind::Command(name),
+        };
+        let open = self.next + self.characters[self.next..].iter().take_while(|c| **c == ' ').count();
+        let rest = &self.characters[open.min(self.characters.len())..];
+        match (rest.first(), rest.iter().position(|c| *c == '}')) {
+            (Some('{'), Some(close)) => {
+                self.next = open + close + 1;
+                kind(rest[1..close].iter().collect::<String>().trim().to_owned())
+            }
+            _ => Kind::Command(name),
+        }
+    }
+
+    /// The star and the distance in brackets that may follow `\\`.
+    fn skip_distance(&mut self) {
+        if self.peek(0) == Some('*') {
+            self.next += 1;
+        }
+        let rest = &self.characters[self.next..];
+        let open = rest.iter().take_while(|c| **c == ' ').count();
+        let Some(close) = rest.iter().position(|c| *c == ']') else { return };
+        let is_distance = rest.get(open) == Some(&'[')
+            && close > open + 1
+            && (rest[open + 1..close].iter()).all(|c| c.is_ascii_alphanumeric() || " .-\\".contains(*c))
+            && rest[close - 1].is_ascii_alphabetic();
+        if is_distance {
+            self.next += close + 1;
+        }
+    }
+}

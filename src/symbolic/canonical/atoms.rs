@@ -1,0 +1,63 @@
+//! Factors of a normal form that are not taken apart, and the primes of constants.
+
+use num_bigint::BigInt;
+use num_integer::Integer;
+use num_rational::BigRational;
+use num_traits::{One, Signed, ToPrimitive};
+
+use super::polynomial::CanonicalForm;
+use crate::symbolic::node::{ExprId, SymbolId};
+
+/// A factor of a monomial.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Atom {
+    Symbol(SymbolId),
+    /// A sum with leading coefficient one, to negative powers only.
+    Sum(CanonicalForm),
+    /// `form^(1/index)`, to powers below the index.
+    Root(CanonicalForm, u32),
+    Log(CanonicalForm),
+    Abs(CanonicalForm),
+    Sign(CanonicalForm),
+    Tan(CanonicalForm),
+    Tanh(CanonicalForm),
+    /// An expression that is too large to take apart, or has no value.
+    Opaque(ExprId),
+}
+
+/// Largest divisor that is tried.
+const LARGEST_DIVISOR: u64 = 2_000;
+
+/// A positive number as a product of primes to integer powers. What is left after small divisors
+/// counts as a prime.
+pub(super) fn prime_powers(value: &BigRational) -> Vec<(BigInt, i32)> {
+    let mut powers: Vec<(BigInt, i32)> = Vec::new();
+    for (part, sign) in [(value.numer(), 1), (value.denom(), -1)] {
+        let mut rest = part.abs();
+        for divisor in (2..=LARGEST_DIVISOR).filter(|d| *d == 2 || d % 2 == 1) {
+            if rest.is_one() {
+                break;
+            }
+            if rest.to_u64().is_some_and(|rest| divisor * divisor > rest) {
+                break;
+            }
+            let divisor = BigInt::from(divisor);
+            let mut count = 0;
+            loop {
+                let (quotient, remainder) = rest.div_rem(&divisor);
+                if remainder != BigInt::ZERO {
+                    break;
+                }
+                rest = quotient;
+                count += sign;
+            }
+            if count != 0 {
+                powers.push((divisor, count));
+            }
+        }
+        if !rest.is_one() {
+            powers.push((rest, sign));
+        }
+    }
+    powers
+}

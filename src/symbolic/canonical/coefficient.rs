@@ -1,0 +1,187 @@
+//! Complex rational coefficients with a radius.
+
+use std::hash::{Hash, Hasher};
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, Signed, ToPrimitive, Zero};
+
+/// Widens a radius by more than the rounding errors of the operations on it.
+const OUTWARD: f64 = 1.0 + 1e-12;
+
+/// A decimal as it is written: its exact value, and half a unit of its last digit where the
+/// decimal stands for a rounded number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Literal {
+    /// The exact value.
+    pub value: BigRational,
+    /// Largest distance of the number that was rounded; 0 for an exact one.
+    pub radius: f64,
+}
+
+impl Literal {
+    /// Reads digits with at most one point and an exponent, such as `0.36` or `1.2e-3`.
+    ///
+    /// `None` for other texts and for exponents beyond 400.
+    pub fn parse(text: &str, is_rounded: bool) -> Option<Self> {
+        let (digits, exponent) = match text.split_once(['e', 'E']) {
+            Some((digits, exponent)) => (digits, exponent.parse::<i32>().ok()?),
+            None => (text, 0),
+        };
+        let (before, after) = digits.split_once('.').unwrap_or((digits, ""));
+        let mantissa: BigInt = format!("{before}{after}").parse().ok()?;
+        let last = exponent.checked_sub(i32::try_from(after.len()).ok()?)?;
+        if !(-800..=400).contains(&last) {
+            return None;
+        }
+        let unit = power_of_ten(last);
+        let radius = match is_rounded {
+            true => 0.5 * unit.to_f64().unwrap_or(f64::INFINITY),
+            false => 0.0,
+        };
+        Some(Self { value: BigRational::from(mantissa) * unit, radius })
+    }
+
+    /// The shortest decimal that reads back to a finite float.
+    pub fn of_f64(value: f64) -> Option<Self> {
+        let magnitude = Self::parse(&format!("{:?}", value.abs()), false)?;
+        let value = if value < 0.0 { -magnitude.value } else { magnitude.value };
+        Some(Self { value, radius: 0.0 })
+    }
+}
+
+fn power_of_ten(exponent: i32) -> BigRational {
+    let power = BigRational::from(BigInt::from(10).pow(exponent.unsigned_abs()));
+    if exponent < 0 { power.recip() } else { power }
+}
+
+/// `re + i im`, known to `radius` in magnitude.
+#[derive(Clone, Debug)]
+pub struct Coefficient {
+    pub(super) re: BigRational,
+    pub(super) im: BigRational,
+    /// Bound of the distance from the number that was rounded.
+    pub(super) radius: f64,
+}
+
+impl PartialEq for Coefficient {
+    fn eq(&self, other: &Self) -> bool {
+        self.re == other.re && self.im == other.im && self.radius.to_bits() == other.radius.to_bits()
+    }
+}
+
+impl Eq for Coefficient {}
+
+impl Hash for Coefficient {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        (&self.re, &self.im, self.radius.to_bits()).hash(state);
+    }
+}
+
+impl Coefficient {
+    pub(super) fn real(re: BigRational, radius: f64) -> Self {
+        Self { re, im: BigRational::zero(), radius }
+    }
+
+    pub(super) fn integer(value: i64) -> Self {
+        Self::real(BigRational::from(BigInt::from(value)), 0.0)
+    }
+
+    pub(super) fn complex(re: BigRational, im: BigRational) -> Self {
+        Self { re, im, radius: 0.0 }
+    }
+
+    /// `numerator/denominator` times the imaginary unit.
+    pub(super) fn imaginary(numerator: i64, denominator: i64) -> Self {
+        let im = BigRational::new(numerator.into(), denominator.into());
+        Self::complex(BigRational::zero(), im)
+    }
+
+    /// Whether the value is zero; its radius may not be.
+    pub fn is_zero(&self) -> bool {
+        self.re.is_zero() && self.im.is_zero()
+    }
+
+    /// The magnitude of the value.
+    pub fn magnitude(&self) -> f64 {
+        let part = |value: &BigRational| value.to_f64().unwrap_or(f64::INFINITY);
+        part(&self.re).hypot(part(&self.im))
+    }
+
+    /// Largest distance that rounded decimals allow.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Whether zero is among the numbers that it may stand for.
+    pub fn may_be_zero(&self) -> bool {
+        self.is_zero() || self.magnitude() <= self.radius * (1.0 + 1e-9)
+    }
+
+    /// The value without its radius.
+    pub(super) fn exact(&self) -> Self {
+        Self { radius: 0.0, ..self.clone() }
+    }
+
+    /// The value if it is real.
+    pub(super) fn as_real(&self) -> Option<&BigRational> {
+        self.im.is_zero().then_some(&self.re)
+    }
+
+    pub(super) fn is_one(&self) -> bool {
+        self.im.is_zero() && self.re.is_one()
+    }
+
+    /// Whether the first part that is not zero is below zero.
+    pub(super) fn is_negative(&self) -> bool {
+        self.re.is_negative() || (self.re.is_zero() && self.im.is_negative())
+    }
+
+    /// `|re| + |im|`: a positive factor that scales with the value.
+    pub(super) fn size(&self) -> BigRational {
+        self.re.abs() + self.im.abs()
+    }
+
+    pub(super) fn negated(&self) -> Self {
+        Self { re: -self.re.clone(), im: -self.im.clone(), radius: self.radius }
+    }
+
+    pub(super) fn plus(&self, other: &Self) -> Self {
+        let radius = match (self.radius, other.radius) {
+            (0.0, radius) | (radius, 0.0) => radius,
+            (a, b) => (a + b) * OUTWARD,
+        };
+        Self { re: &self.re + &other.re, im: &self.im + &other.im, radius }
+    }
+
+    pub(super) fn times(&self, other: &Self) -> Self {
+        let radius = match (self.radius, other.radius) {
+            (0.0, 0.0) => 0.0,
+            (a, b) => (self.magnitude() * b + other.magnitude() * a + a * b) * OUTWARD,
+        };
+        let (re, im) = match (self.im.is_zero(), other.im.is_zero()) {
+            (true, true) => (&self.re * &other.re, BigRational::zero()),
+            (true, false) => (&self.re * &other.re, &self.re * &other.im),
+            (false, true) => (&self.re * &other.re, &self.im * &other.re),
+            (false, false) => (
+                &self.re * &other.re - &self.im * &other.im,
+                &self.re * &other.im + &self.im * &other.re,
+            ),
+        };
+        Self { re, im, radius }
+    }
+
+    /// The reciprocal; `None` for zero, or where zero is within the radius.
+    pub(super) fn reciprocal(&self) -> Option<Self> {
+        let square = &self.re * &self.re + &self.im * &self.im;
+        let magnitude = self.magnitude();
+        if square.is_zero() || self.radius >= magnitude {
+            return None;
+        }
+        let radius = match self.radius {
+            0.0 => 0.0,
+            radius => radius / (magnitude * (magnitude - radius)) * OUTWARD,
+        };
+        Some(Self { re: &self.re / &square, im: -(&self.im / &square), radius })
+    }
+}

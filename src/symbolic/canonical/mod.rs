@@ -1,0 +1,39 @@
+//! A normal form with exact coefficients, which decides whether two expressions are equal.
+//!
+//! Sines, cosines and exponentials become exponentials `exp(P)` with complex rational polynomials
+//! `P`, so that products, squares, sums and multiples of angles need no rule of their own; sums of
+//! `c * x^k * exp(P)` with distinct `x^k exp(P)` are zero only if every `c` is. Roots, logarithms,
+//! magnitudes, tangents and reciprocals of sums are atoms with arguments in normal form;
+//! [`CanonicalForms::without_fractions`] removes the last two kinds by multiplying out.
+//!
+//! Each number may carry a radius: the half unit of the last digit of a decimal in print. Radii
+//! add up through all operations, and arguments of functions that agree within them count as equal.
+//!
+//! Two expressions with the same form have the same value wherever both are defined. Different
+//! forms prove a difference only where no atoms depend on each other (`sqrt(1 + x)` and
+//! `sqrt(x + x^2)` do), so a difference should be confirmed at a point.
+//!
+//! ```
+//! use romc::symbolic::{CanonicalForms, ExprPool};
+//!
+//! let mut pool = ExprPool::new();
+//! let a = pool.parse("2*sin(z1)*cos(z1) + 1/(z1 - 1)", &|_| true)?;
+//! let b = pool.parse("sin(2*z1) + (z1 + 1)/(z1^2 - 1)", &|_| true)?;
+//! let mut forms = CanonicalForms::new(&pool, &[a, b], &|_| None);
+//! let difference = forms.of(a).minus(&forms.of(b));
+//! let difference = forms.without_fractions(&difference).expect("it is small");
+//! assert!(difference.is_zero());
+//! # Ok::<(), romc::symbolic::ParseError>(())
+//! ```
+
+mod atoms;
+mod coefficient;
+mod forms;
+mod polynomial;
+
+#[cfg(test)]
+mod tests;
+
+pub use coefficient::{Coefficient, Literal};
+pub use forms::CanonicalForms;
+pub use polynomial::CanonicalForm;

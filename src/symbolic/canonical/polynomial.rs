@@ -1,0 +1,198 @@
+//! Sums of coefficients times products of atoms and one exponential.
+
+use std::collections::BTreeMap;
+
+use num_rational::BigRational;
+use num_traits::Zero;
+
+use super::coefficient::Coefficient;
+
+/// Most terms of a form, and most products of terms that one multiplication makes.
+const MAX_TERMS: usize = 2_000;
+const MAX_PRODUCTS: usize = 40_000;
+
+/// `prod_k atom_k^power_k * exp(sum_j c_j monomial_j)`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) struct Monomial {
+    /// Atoms by their numbers, ascending, with powers that are not zero.
+    pub(super) powers: Vec<(u32, i32)>,
+    /// The exponential's argument: real and imaginary parts of its coefficients, not both zero.
+    pub(super) exponent: Vec<(Monomial, (BigRational, BigRational))>,
+}
+
+impl Monomial {
+    pub(super) fn atom(atom: u32, power: i32) -> Self {
+        Self { powers: vec![(atom, power)], exponent: Vec::new() }
+    }
+
+    pub(super) fn is_one(&self) -> bool {
+        self.powers.is_empty() && self.exponent.is_empty()
+    }
+
+    pub(super) fn power_of(&self, atom: u32) -> i32 {
+        let found = self.powers.iter().find(|(known, _)| *known == atom);
+        found.map_or(0, |(_, power)| *power)
+    }
+
+    pub(super) fn without(&self, atom: u32) -> Self {
+        let powers = self.powers.iter().copied().filter(|(known, _)| *known != atom);
+        Self { powers: powers.collect(), exponent: self.exponent.clone() }
+    }
+
+    /// The product; powers saturate far beyond what is ever expanded.
+    pub(super) fn times(&self, other: &Self) -> Self {
+        let mut powers: BTreeMap<u32, i32> = self.powers.iter().copied().collect();
+        for (atom, power) in &other.powers {
+            let sum = powers.entry(*atom).or_insert(0);
+            *sum = sum.saturating_add(*power);
+        }
+        powers.retain(|_, power| *power != 0);
+        let exponent = match (self.exponent.is_empty(), other.exponent.is_empty()) {
+            (_, true) => self.exponent.clone(),
+            (true, _) => other.exponent.clone(),
+            (false, false) => {
+                let mut sum: BTreeMap<Monomial, (BigRational, BigRational)> = self.exponent.iter().cloned().collect();
+                for (monomial, (re, im)) in &other.exponent {
+                    let entry = sum.entry(monomial.clone()).or_insert_with(|| (BigRational::zero(), BigRational::zero()));
+                    entry.0 += re;
+                    entry.1 += im;
+                }
+                sum.retain(|_, (re, im)| !re.is_zero() || !im.is_zero());
+                sum.into_iter().collect()
+            }
+        };
+        Self { powers: powers.into_iter().collect(), exponent }
+    }
+
+    pub(super) fn reciprocal(&self) -> Self {
+        let negated = |(monomial, (re, im)): &(Monomial, (BigRational, BigRational))| {
+            (monomial.clone(), (-re.clone(), -im.clone()))
+        };
+        Self {
+            powers: self.powers.iter().map(|(atom, power)| (*atom, power.saturating_neg())).collect(),
+            exponent: self.exponent.iter().map(negated).collect(),
+        }
+    }
+}
+
+/// A sum in normal form, made by [`CanonicalForms`](super::CanonicalForms).
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct CanonicalForm {
+    pub(super) terms: BTreeMap<Monomial, Coefficient>,
+}
+
+impl CanonicalForm {
+    pub(super) fn constant(coefficient: Coefficient) -> Self {
+        Self::term(coefficient, Monomial::default())
+    }
+
+    pub(super) fn term(coefficient: Coefficient, monomial: Monomial) -> Self {
+        let mut form = Self::default();
+        form.add(coefficient, monomial);
+        form
+    }
+
+    /// Adds a term. A coefficient of value zero is kept as long as it has a radius.
+    pub(super) fn add(&mut self, coefficient: Coefficient, monomial: Monomial) {
+        let sum = match self.terms.remove(&monomial) {
+            Some(before) => before.plus(&coefficient),
+            None => coefficient,
+        };
+        if !sum.is_zero() || sum.radius > 0.0 {
+            self.terms.insert(monomial, sum);
+        }
+    }
+
+    /// Whether every coefficient has the value zero.
+    pub fn is_zero(&self) -> bool {
+        self.terms.values().all(Coefficient::is_zero)
+    }
+
+    /// Whether zero is among the sums that it may stand for, each coefficient taken by itself.
+    pub fn may_be_zero(&self) -> bool {
+        self.terms.values().all(Coefficient::may_be_zero)
+    }
+
+    /// The coefficients.
+    pub fn coefficients(&self) -> impl Iterator<Item = &Coefficient> {
+        self.terms.values()
+    }
+
+    /// The value if there is nothing but a number.
+    pub(super) fn as_constant(&self) -> Option<Coefficient> {
+        let mut terms = self.terms.iter();
+        match (terms.next(), terms.next()) {
+            (None, _) => Some(Coefficient::integer(0)),
+            (Some((monomial, coefficient)), None) if monomial.is_one() => Some(coefficient.clone()),
+            _ => None,
+        }
+    }
+
+    /// Coefficient and monomial if there is one term.
+    pub(super) fn as_term(&self) -> Option<(&Coefficient, &Monomial)> {
+        let mut terms = self.terms.iter();
+        match (terms.next(), terms.next()) {
+            (Some((monomial, coefficient)), None) => Some((coefficient, monomial)),
+            _ => None,
+        }
+    }
+
+    /// The coefficient of the last monomial.
+    pub(super) fn leading(&self) -> Option<&Coefficient> {
+        self.terms.last_key_value().map(|(_, coefficient)| coefficient)
+    }
+
+    pub(super) fn has_radius(&self) -> bool {
+        self.terms.values().any(|coefficient| coefficient.radius > 0.0)
+    }
+
+    /// The values without their radii.
+    pub(super) fn exact(&self) -> Self {
+        let terms = self.terms.iter().filter(|(_, coefficient)| !coefficient.is_zero());
+        Self { terms: terms.map(|(monomial, c)| (monomial.clone(), c.exact())).collect() }
+    }
+
+    pub(super) fn scaled(&self, factor: &Coefficient) -> Self {
+        let mut scaled = Self::default();
+        for (monomial, coefficient) in &self.terms {
+            scaled.add(coefficient.times(factor), monomial.clone());
+        }
+        scaled
+    }
+
+    /// `self + other`.
+    pub fn plus(&self, other: &Self) -> Self {
+        let (mut sum, rest) = match self.terms.len() >= other.terms.len() {
+            true => (self.clone(), other),
+            false => (other.clone(), self),
+        };
+        for (monomial, coefficient) in &rest.terms {
+            sum.add(coefficient.clone(), monomial.clone());
+        }
+        sum
+    }
+
+    /// `self - other`.
+    pub fn minus(&self, other: &Self) -> Self {
+        self.plus(&other.scaled(&Coefficient::integer(-1)))
+    }
+
+    /// Pairs of terms of a product, if they are not too many.
+    pub(super) fn products(&self, other: &Self) -> Option<Vec<(Coefficient, Monomial)>> {
+        let count = self.terms.len().checked_mul(other.terms.len())?;
+        if count > MAX_PRODUCTS {
+            return None;
+        }
+        let mut products = Vec::with_capacity(count);
+        for (monomial, coefficient) in &self.terms {
+            for (other_monomial, other_coefficient) in &other.terms {
+                products.push((coefficient.times(other_coefficient), monomial.times(other_monomial)));
+            }
+        }
+        Some(products)
+    }
+
+    pub(super) fn is_small(&self) -> bool {
+        self.terms.len() <= MAX_TERMS
+    }
+}
