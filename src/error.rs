@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::artifact::ArtifactError;
+use crate::check::CheckError;
 use crate::codegen::CodegenError;
 use crate::deploy::EmitError;
 use crate::evaluate::EvaluateError;
@@ -35,6 +36,8 @@ pub enum Error {
     Artifact(#[from] ArtifactError),
     #[error(transparent)]
     Import(Box<ImportError>),
+    #[error(transparent)]
+    Check(#[from] CheckError),
     #[error(transparent)]
     Name(#[from] NameError),
     #[error(transparent)]
@@ -91,7 +94,8 @@ impl Error {
             Self::Simplify(error) => {
                 matches!(error, SimplifyError::NoSamples | SimplifyError::Margin)
             }
-            Self::Rename(_) | Self::Name(_) => true,
+            // Exit code 1 of `check` says that two files differ.
+            Self::Rename(_) | Self::Name(_) | Self::Check(_) => true,
             Self::Recording(_)
             | Self::Model(_)
             | Self::Artifact(_)

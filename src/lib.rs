@@ -1,6 +1,7 @@
 //! romc, the reduced-order model compiler.
 
 pub mod artifact;
+pub mod check;
 pub mod cli;
 pub mod codegen;
 pub mod deploy;

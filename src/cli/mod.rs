@@ -5,6 +5,7 @@
 //! to stdout; progress, warnings and errors go to stderr. Start with [`args`].
 
 pub mod args;
+mod check;
 mod compile;
 mod demo;
 mod import;
@@ -46,15 +47,15 @@ pub struct Answer {
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let json = arguments.command.wants_json();
-    let printed = execute(arguments.command).map(|answer| {
-        if json {
-            format!("{}\n", answer.json)
-        } else {
-            answer.text
-        }
+    let printed = execute(arguments.command).map(|(answer, code)| match json {
+        true => (format!("{}\n", answer.json), code),
+        false => (answer.text, code),
     });
     match printed {
-        Ok(text) => print(&text),
+        Ok((text, code)) => match print(&text) {
+            ExitCode::SUCCESS => code,
+            failed => failed,
+        },
         Err(error) => {
             tell(&error);
             match error.is_usage() {
@@ -65,8 +66,10 @@ pub fn run() -> ExitCode {
     }
 }
 
-fn execute(command: Command) -> Result<Answer, Error> {
-    match command {
+/// Runs a command; the exit code of one that ran is 0, or 1 for files that `check` finds different.
+fn execute(command: Command) -> Result<(Answer, ExitCode), Error> {
+    let answer = match command {
+        Command::Check(arguments) => return check::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
@@ -78,7 +81,8 @@ fn execute(command: Command) -> Result<Answer, Error> {
         Command::Report(arguments) => report::run(&arguments),
         Command::Manual(arguments) => manual::pages(&arguments),
         Command::Completions(arguments) => Ok(manual::completions(&arguments)),
-    }
+    };
+    answer.map(|answer| (answer, ExitCode::SUCCESS))
 }
 
 /// Prints to stdout; a reader that has gone away (`| head`) is no failure.

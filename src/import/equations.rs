@@ -271,14 +271,17 @@ impl Equation {
         latent_dim: usize,
         pool: &mut ExprPool,
     ) -> Result<ExprId, ImportError> {
-        let texts: Vec<&str> = self
-            .pieces
-            .iter()
+        let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
+        pool.parse(&self.text(), &known)
+            .map_err(|error| self.parse_error(file, latent_dim, error))
+    }
+
+    /// The right side in the grammar of candidate terms.
+    pub(super) fn text(&self) -> String {
+        let texts: Vec<&str> = (self.pieces.iter())
             .map(|(_, _, text)| text.as_str())
             .collect();
-        let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
-        pool.parse(&texts.join("\n"), &known)
-            .map_err(|error| self.parse_error(file, latent_dim, error))
+        texts.join("\n")
     }
 
     /// Line and column of a character of the right side, counted from 1 over all pieces.

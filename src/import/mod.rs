@@ -42,6 +42,7 @@ mod report;
 mod role;
 mod run;
 mod safetensors;
+mod systems;
 mod tensors;
 mod terms;
 
@@ -55,3 +56,4 @@ pub use options::{
 pub use report::{Chosen, ImportReport, Layout, Note, ReadEquation, UnusedTensor, UsedTensor};
 pub use role::{Mapping, Part, Role};
 pub use run::{Imported, import, import_from_bytes};
+pub use systems::{ReadEquations, ReadSystem, read_equations};

@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand};
 
+use super::check::CheckArguments;
 use super::compile::CompileArguments;
 use super::import::ImportArguments;
 use super::manual::{CompletionsArguments, ManualArguments};
@@ -36,6 +37,8 @@ pub enum Command {
     Study(StudyArguments),
     /// Take over a model trained elsewhere: safetensors, npz, PySINDy, equations as text
     Import(ImportArguments),
+    /// Prove that two models, equation files or LaTeX papers say the same, or show where they differ
+    Check(CheckArguments),
     /// Compile a model to equations, code (C, Rust, Python, MATLAB) or a controller
     Compile(CompileArguments),
     /// Roll a model out over recordings and measure how far it drifts
@@ -59,6 +62,7 @@ impl Command {
             Self::Train(arguments) => arguments.output_format.json,
             Self::Study(arguments) => arguments.output_format.json,
             Self::Import(arguments) => arguments.output_format.json,
+            Self::Check(arguments) => arguments.output_format.json,
             Self::Compile(arguments) => arguments.output_format.json,
             Self::Simulate(arguments) => arguments.output_format.json,
             Self::Mpc(arguments) => arguments.output_format.json,

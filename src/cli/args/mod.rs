@@ -3,6 +3,7 @@
 //! The command line enters; [`Arguments`] leaves, with everything checked that needs no file. Read
 //! `command.rs` first; each other file holds the commands of one family.
 
+mod check;
 mod command;
 mod compile;
 mod import;
@@ -11,6 +12,7 @@ mod number;
 mod run;
 mod train;
 
+pub use check::CheckArguments;
 pub use command::{Arguments, Command, OutputArguments};
 pub use compile::{
     CodeArguments, CompileArguments, EquationArguments, FormChoice, PrecisionChoice,

@@ -6,6 +6,8 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Signed, ToPrimitive, Zero};
 
+use crate::symbolic::number::Number;
+
 /// Widens a radius by more than the rounding errors of the operations on it.
 const OUTWARD: f64 = 1.0 + 1e-12;
 
@@ -40,6 +42,11 @@ impl Literal {
             false => 0.0,
         };
         Some(Self { value: BigRational::from(mantissa) * unit, radius })
+    }
+
+    /// The value as the nearest float, or one beside it.
+    pub fn to_f64(&self) -> f64 {
+        self.value.to_f64().unwrap_or(f64::NAN)
     }
 
     /// The shortest decimal that reads back to a finite float.
@@ -78,6 +85,22 @@ impl Hash for Coefficient {
     }
 }
 
+impl From<Literal> for Coefficient {
+    fn from(literal: Literal) -> Self {
+        Self::real(literal.value, literal.radius)
+    }
+}
+
+impl From<Number> for Coefficient {
+    fn from(number: Number) -> Self {
+        let value = match number.as_rational() {
+            Some((top, bottom)) => BigRational::new(top.into(), bottom.into()),
+            None => Literal::of_f64(number.to_f64()).map_or_else(BigRational::zero, |l| l.value),
+        };
+        Self::real(value, 0.0)
+    }
+}
+
 impl Coefficient {
     pub(super) fn real(re: BigRational, radius: f64) -> Self {
         Self { re, im: BigRational::zero(), radius }
@@ -106,6 +129,11 @@ impl Coefficient {
     pub fn magnitude(&self) -> f64 {
         let part = |value: &BigRational| value.to_f64().unwrap_or(f64::INFINITY);
         part(&self.re).hypot(part(&self.im))
+    }
+
+    /// The real part as a float.
+    pub fn to_f64(&self) -> f64 {
+        self.re.to_f64().unwrap_or(f64::NAN)
     }
 
     /// Largest distance that rounded decimals allow.
@@ -142,11 +170,13 @@ impl Coefficient {
         self.re.abs() + self.im.abs()
     }
 
-    pub(super) fn negated(&self) -> Self {
-        Self { re: -self.re.clone(), im: -self.im.clone(), radius: self.radius }
+    /// `self - other`.
+    pub fn minus(&self, other: &Self) -> Self {
+        self.plus(&other.times(&Self::integer(-1)))
     }
 
-    pub(super) fn plus(&self, other: &Self) -> Self {
+    /// `self + other`.
+    pub fn plus(&self, other: &Self) -> Self {
         let radius = match (self.radius, other.radius) {
             (0.0, radius) | (radius, 0.0) => radius,
             (a, b) => (a + b) * OUTWARD,
@@ -154,7 +184,8 @@ impl Coefficient {
         Self { re: &self.re + &other.re, im: &self.im + &other.im, radius }
     }
 
-    pub(super) fn times(&self, other: &Self) -> Self {
+    /// `self * other`.
+    pub fn times(&self, other: &Self) -> Self {
         let radius = match (self.radius, other.radius) {
             (0.0, 0.0) => 0.0,
             (a, b) => (self.magnitude() * b + other.magnitude() * a + a * b) * OUTWARD,

@@ -170,15 +170,9 @@ impl<'p> CanonicalForms<'p> {
     fn node(&mut self, expr: ExprId) -> Option<CanonicalForm> {
         let pool = self.pool;
         match pool.node(expr) {
-            Node::Number(number) => {
-                let value = match number.as_rational() {
-                    Some((top, bottom)) => BigRational::new(top.into(), bottom.into()),
-                    None => Literal::of_f64(number.to_f64())?.value,
-                };
-                Some(CanonicalForm::constant(Coefficient::real(value, 0.0)))
-            }
+            Node::Number(number) => Some(CanonicalForm::constant(Coefficient::from(*number))),
             Node::Symbol(symbol) => Some(match (self.literal)(*symbol) {
-                Some(literal) => CanonicalForm::constant(Coefficient::real(literal.value, literal.radius)),
+                Some(literal) => CanonicalForm::constant(Coefficient::from(literal)),
                 None => self.atom(Atom::Symbol(*symbol)),
             }),
             Node::Sum(terms) => {

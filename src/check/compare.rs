@@ -1,0 +1,296 @@
+//! Pairs phases and equations, and decides each pair.
+
+use std::collections::HashMap;
+
+use serde::Serialize;
+
+use super::CheckOptions;
+use super::point::{Gap, Search, Sides, search};
+use super::side::{RightSide, Side, SidePhase, literal};
+use crate::symbolic::{CanonicalForms, Coefficient, ExprId, ExprPool, Node, Number};
+
+/// Most terms that a difference names.
+const MAX_TERMS: usize = 5;
+
+/// Both files, phase by phase.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// Phases of the first file in its order, then those that only the second has.
+    pub phases: Vec<PhaseComparison>,
+}
+
+/// One phase of both files.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhaseComparison {
+    /// Its name, or its place from 1 where no file names it.
+    pub name: String,
+    /// One entry per acceleration.
+    pub equations: Vec<EquationComparison>,
+}
+
+/// One acceleration in both files.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EquationComparison {
+    /// `ddz1` and so on.
+    pub output: String,
+    /// What is known of it.
+    pub verdict: Verdict,
+    /// A point where only one side has a value.
+    pub one_sided: Option<Gap>,
+}
+
+/// Whether two right sides are equal.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Verdict {
+    /// Proven equal wherever both have a value.
+    Equal,
+    /// Proven equal but for the rounding of printed decimals, which moves coefficients of the
+    /// normal form by at most this.
+    EqualAsPrinted(f64),
+    /// Different at a point.
+    Different(Difference),
+    /// Neither a proof nor a point; the largest difference that was seen, and terms that differ.
+    Undecided(Option<Gap>, Vec<TermDifference>),
+    /// The first (`false`) or second (`true`) file does not have it.
+    Missing(bool),
+}
+
+/// A point of difference and the terms that cause it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// Where, and both values.
+    pub gap: Gap,
+    /// Terms with different coefficients as the files write them, largest difference first.
+    pub terms: Vec<TermDifference>,
+}
+
+/// A term and its coefficient in both files.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TermDifference {
+    /// The term in the grammar of candidate terms.
+    pub term: String,
+    /// Coefficient in the first file, 0 without the term.
+    pub left: f64,
+    /// Coefficient in the second file.
+    pub right: f64,
+}
+
+impl Verdict {
+    /// Whether it is a proof of equality.
+    pub fn is_equal(&self) -> bool {
+        matches!(self, Verdict::Equal | Verdict::EqualAsPrinted(_))
+    }
+}
+
+impl Comparison {
+    /// Whether every equation of every phase is proven equal.
+    pub fn says_the_same(&self) -> bool {
+        self.verdicts().all(Verdict::is_equal)
+    }
+
+    /// The verdicts of all equations.
+    pub fn verdicts(&self) -> impl Iterator<Item = &Verdict> {
+        self.phases.iter().flat_map(|phase| &phase.equations).map(|equation| &equation.verdict)
+    }
+}
+
+/// Compares two files.
+pub fn compare(left: &Side, right: &Side, options: &CheckOptions) -> Comparison {
+    let outputs = left.latent_dim.max(right.latent_dim);
+    let phases = paired(&left.phases, &right.phases).into_iter().enumerate().map(|(place, pair)| {
+        let name = (pair.iter().flatten()).find_map(|phase| phase.name.clone());
+        let name = name.unwrap_or_else(|| (place + 1).to_string());
+        let equations = (0..outputs).map(|output| {
+            let ddz = pair.map(|phase| phase.and_then(|phase| phase.ddz.get(output)));
+            let output = format!("ddz{}", output + 1);
+            let (verdict, one_sided) = match ddz {
+                [Some(a), Some(b)] => decide([left, right], [a, b], &name, options),
+                [first, _] => (Verdict::Missing(first.is_some()), None),
+            };
+            EquationComparison { output, verdict, one_sided }
+        });
+        PhaseComparison { name: name.clone(), equations: equations.collect() }
+    });
+    Comparison { phases: phases.collect() }
+}
+
+/// Phases by name; those without a name in one of the files by their order among the rest.
+fn paired<'p>(left: &'p [SidePhase], right: &'p [SidePhase]) -> Vec<[Option<&'p SidePhase>; 2]> {
+    let mut taken = vec![false; right.len()];
+    let mut pairs: Vec<[Option<&SidePhase>; 2]> = left.iter().map(|phase| [Some(phase), None]).collect();
+    for [phase, partner] in &mut pairs {
+        let name = phase.and_then(|phase| phase.name.as_ref());
+        let found = right.iter().position(|other| name.is_some() && other.name.as_ref() == name);
+        if let Some(place) = found {
+            (*partner, taken[place]) = (Some(&right[place]), true);
+        }
+    }
+    for [phase, partner] in pairs.iter_mut().filter(|pair| pair[1].is_none()) {
+        let is_named = phase.is_some_and(|phase| phase.name.is_some());
+        let free = (0..right.len()).find(|place| !taken[*place] && !(is_named && right[*place].name.is_some()));
+        if let Some(place) = free {
+            (*partner, taken[place]) = (Some(&right[place]), true);
+        }
+    }
+    let rest = right.iter().zip(&taken).filter(|(_, taken)| !**taken);
+    pairs.extend(rest.map(|(phase, _)| [None, Some(phase)]));
+    pairs
+}
+
+fn decide(
+    files: [&Side; 2],
+    ddz: [&RightSide; 2],
+    phase: &str,
+    options: &CheckOptions,
+) -> (Verdict, Option<Gap>) {
+    let mut pool = ExprPool::new();
+    let whole = [0, 1].map(|side| files[side].build(ddz[side], &mut pool));
+    let table = Table::of(&mut pool, whole);
+    let rest = [0, 1].map(|side| {
+        let terms: Vec<ExprId> = table.differing().flat_map(|row| row.terms[side].clone()).collect();
+        pool.sum(&terms)
+    });
+    // The exact side first: rounded arguments of the other are compared with its own.
+    let order = if files[0].is_rounded && !files[1].is_rounded { [1, 0] } else { [0, 1] };
+    let proof = proof(&pool, whole, rest, order);
+    let groups: Vec<ExprId> = table.differing().map(|row| row.rest).collect();
+    let sides = Sides::new(&pool, whole, rest);
+    let found = search(&sides, phase, &options.domain, &groups, proof.is_some());
+    let Search { gap, largest, one_sided, has_common_point } = found;
+    let verdict = match (proof, gap) {
+        (Some(verdict), None) if has_common_point || one_sided.is_none() => verdict,
+        (_, Some(gap)) => Verdict::Different(Difference { gap, terms: table.largest(&pool) }),
+        (_, None) => Verdict::Undecided(largest, table.largest(&pool)),
+    };
+    (verdict, one_sided)
+}
+
+/// A proof that what is left of both sides is equal.
+fn proof(pool: &ExprPool, whole: [ExprId; 2], rest: [ExprId; 2], order: [usize; 2]) -> Option<Verdict> {
+    if rest == [ExprId::ZERO; 2] {
+        return Some(Verdict::Equal);
+    }
+    let literal = |symbol| literal(pool, symbol);
+    let mut forms = CanonicalForms::new(pool, &whole, &literal);
+    let [first, second] = order.map(|side| forms.of(rest[side]));
+    let difference = first.minus(&second);
+    let verdict = |form: &crate::symbolic::CanonicalForm, rounding: f64| {
+        let largest = form.coefficients().map(Coefficient::magnitude).fold(rounding, f64::max);
+        match (form.is_zero() && rounding == 0.0, form.may_be_zero()) {
+            (true, _) => Some(Verdict::Equal),
+            (_, true) => Some(Verdict::EqualAsPrinted(largest)),
+            _ => None,
+        }
+    };
+    if let Some(verdict) = verdict(&difference, forms.rounding()) {
+        return Some(verdict);
+    }
+    let cleared = forms.without_fractions(&difference)?;
+    verdict(&cleared, forms.rounding())
+}
+
+/// Terms of both sides by what they are without their numbers.
+struct Table {
+    rows: Vec<Row>,
+}
+
+struct Row {
+    rest: ExprId,
+    coefficients: [Coefficient; 2],
+    /// The terms with their numbers, for each side.
+    terms: [Vec<ExprId>; 2],
+}
+
+impl Row {
+    fn difference(&self) -> Coefficient {
+        self.coefficients[0].minus(&self.coefficients[1])
+    }
+}
+
+impl Table {
+    fn of(pool: &mut ExprPool, whole: [ExprId; 2]) -> Self {
+        let mut rows: Vec<Row> = Vec::new();
+        let mut places: HashMap<ExprId, usize> = HashMap::new();
+        for (side, expr) in whole.into_iter().enumerate() {
+            let mut open = vec![(ExprId::ONE, Coefficient::from(Number::ONE), expr)];
+            while let Some((factor, scale, expr)) = open.pop() {
+                let (coefficient, rest) = without_numbers(pool, expr);
+                let numbers: Vec<ExprId> = numbers_of(pool, expr);
+                let factor = pool.product(&[&[factor], numbers.as_slice()].concat());
+                let coefficient = scale.times(&coefficient);
+                if let Node::Sum(terms) = pool.node(rest) {
+                    let terms = terms.to_vec();
+                    open.extend(terms.into_iter().map(|term| (factor, coefficient.clone(), term)));
+                    continue;
+                }
+                let place = *places.entry(rest).or_insert_with(|| {
+                    let zero = Coefficient::from(Number::ZERO);
+                    rows.push(Row {
+                        rest,
+                        coefficients: [zero.clone(), zero],
+                        terms: [Vec::new(), Vec::new()],
+                    });
+                    rows.len() - 1
+                });
+                let term = pool.product(&[factor, rest]);
+                let row = &mut rows[place];
+                row.coefficients[side] = row.coefficients[side].plus(&coefficient);
+                row.terms[side].push(term);
+            }
+        }
+        Self { rows }
+    }
+
+    /// Rows whose coefficients are not the same exact number.
+    fn differing(&self) -> impl Iterator<Item = &Row> {
+        self.rows.iter().filter(|row| {
+            let difference = row.difference();
+            !difference.is_zero() || difference.radius() > 0.0
+        })
+    }
+
+    /// The rows that rounding does not explain, largest difference first.
+    fn largest(&self, pool: &ExprPool) -> Vec<TermDifference> {
+        let mut rows: Vec<&Row> = self.rows.iter().filter(|row| !row.difference().may_be_zero()).collect();
+        rows.sort_by(|a, b| b.difference().magnitude().total_cmp(&a.difference().magnitude()));
+        rows.truncate(MAX_TERMS);
+        let term = |row: &&Row| {
+            let [left, right] = [&row.coefficients[0], &row.coefficients[1]].map(Coefficient::to_f64);
+            let text = pool.display(row.rest).to_string().replace(['#', '~'], "");
+            let term = match text.char_indices().nth(60) {
+                Some((end, _)) => format!("{}...", &text[..end]),
+                None => text,
+            };
+            TermDifference { term, left, right }
+        };
+        rows.iter().map(term).collect()
+    }
+}
+
+/// The factors of a term that are numbers or stand for decimals.
+fn numbers_of(pool: &ExprPool, expr: ExprId) -> Vec<ExprId> {
+    let factors = pool.factors_of(expr).iter().copied();
+    factors.filter(|factor| value_of(pool, *factor).is_some()).collect()
+}
+
+/// The product of a term's numbers, and the term without them.
+fn without_numbers(pool: &mut ExprPool, expr: ExprId) -> (Coefficient, ExprId) {
+    let factors = pool.factors_of(expr).to_vec();
+    let mut coefficient = Coefficient::from(Number::ONE);
+    let mut rest = Vec::with_capacity(factors.len());
+    for factor in factors {
+        match value_of(pool, factor) {
+            Some(value) => coefficient = coefficient.times(&value),
+            None => rest.push(factor),
+        }
+    }
+    (coefficient, pool.product(&rest))
+}
+
+fn value_of(pool: &ExprPool, factor: ExprId) -> Option<Coefficient> {
+    match pool.node(factor) {
+        Node::Number(number) => Some(Coefficient::from(*number)),
+        Node::Symbol(symbol) => literal(pool, *symbol).map(Coefficient::from),
+        _ => None,
+    }
+}

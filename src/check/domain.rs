@@ -1,0 +1,48 @@
+//! Ranges of variables in which two sides are compared.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::error::CheckError;
+use crate::model::{LatentVariable, MAX_LATENT_DIM};
+
+/// A range per variable and phase; -1 to 1 where there is none.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CheckDomain {
+    phases: BTreeMap<String, BTreeMap<String, [f64; 2]>>,
+}
+
+impl CheckDomain {
+    /// Reads a TOML text: a table per phase with ranges such as `z1 = [-0.2, 0.4]`, scaled units.
+    ///
+    /// # Errors
+    /// [`CheckError::Domain`] for other keys and for ranges without a finite width of at least 0.
+    pub fn from_toml(path: &Path, text: &str) -> Result<Self, CheckError> {
+        let refused = |message: String| CheckError::Domain { path: path.to_owned(), message };
+        let phases: BTreeMap<String, BTreeMap<String, [f64; 2]>> =
+            toml::from_str(text).map_err(|error| refused(error.to_string()))?;
+        for (phase, ranges) in &phases {
+            for (name, [lo, hi]) in ranges {
+                let place = format!("[{phase}] `{name}`");
+                if LatentVariable::from_name(name, MAX_LATENT_DIM).is_none() {
+                    return Err(refused(format!("{place}: expected z1, dz1, u1 and so on")));
+                }
+                if !(lo.is_finite() && hi.is_finite() && lo <= hi) {
+                    let found = format!("{place}: found [{lo}, {hi}], expected two rising finite numbers");
+                    return Err(refused(found));
+                }
+            }
+        }
+        Ok(Self { phases })
+    }
+
+    /// The range of a variable; `None` where the domain says nothing.
+    pub fn range(&self, phase: &str, variable: &str) -> Option<[f64; 2]> {
+        self.phases.get(phase)?.get(variable).copied()
+    }
+
+    /// Names of the phases with ranges.
+    pub fn phases(&self) -> impl Iterator<Item = &str> {
+        self.phases.keys().map(String::as_str)
+    }
+}

@@ -1,0 +1,56 @@
+//! Why two files could not be compared.
+
+use std::io;
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use crate::artifact::ArtifactError;
+use crate::import::ImportError;
+use crate::symbolic::ParseError;
+
+/// What is wrong with a file that is to be compared.
+#[derive(Debug, Error)]
+pub enum CheckError {
+    /// The file system refused.
+    #[error("{}: cannot read the file", path.display())]
+    Io { path: PathBuf, source: io::Error },
+    /// A file of another kind.
+    #[error(
+        "{file}: found {found}, expected a model (.json), equations as text (.txt), or LaTeX (.tex, .md)"
+    )]
+    Kind { file: String, found: String },
+    /// A model that cannot be read.
+    #[error(transparent)]
+    Model(Box<ArtifactError>),
+    /// Equations that cannot be read.
+    #[error(transparent)]
+    Equations(Box<ImportError>),
+    /// An equation that is too large once its numbers are kept as they are written.
+    #[error("{file}:{line}: not a usable equation")]
+    Expression {
+        file: String,
+        /// Line of its left side; 0 in a model.
+        line: usize,
+        source: ParseError,
+    },
+    /// A domain that cannot be used.
+    #[error("{}: {message}", path.display())]
+    Domain {
+        path: PathBuf,
+        /// Table, key, what was found and expected.
+        message: String,
+    },
+}
+
+impl From<ArtifactError> for CheckError {
+    fn from(error: ArtifactError) -> Self {
+        Self::Model(Box::new(error))
+    }
+}
+
+impl From<ImportError> for CheckError {
+    fn from(error: ImportError) -> Self {
+        Self::Equations(Box::new(error))
+    }
+}

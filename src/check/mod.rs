@@ -1,0 +1,49 @@
+//! Whether two sets of equations say the same.
+//!
+//! Two files enter, each a model, equations as text, LaTeX or Markdown; a [`Comparison`] leaves:
+//! for each phase and acceleration a proof that the two sides are equal, or a point where they
+//! differ, by how much, and in which terms. Numbers count as the decimals that they are written
+//! as; those of LaTeX and Markdown as rounded in their last digit, unless [`CheckOptions::exact`].
+//!
+//! `side.rs` reads a file, `compare.rs` pairs phases and equations and proves equality with the
+//! normal form of [`CanonicalForms`](crate::symbolic::CanonicalForms), `point.rs` searches for a
+//! point of difference in interval arithmetic. Read `compare.rs` first.
+//!
+//! ```
+//! use romc::check::{CheckOptions, Side, compare};
+//!
+//! let options = CheckOptions::default();
+//! let text = Side::from_bytes("a.txt", b"ddz1 = 0.3612*sin(2*z1)", &options, &[])?;
+//! let paper = br"\[\ddot z_1 = 0.72\sin z_1\cos z_1\]";
+//! let paper = Side::from_bytes("b.tex", paper, &options, &[])?;
+//! let comparison = compare(&text, &paper, &options);
+//! assert!(comparison.says_the_same());
+//! # Ok::<(), romc::check::CheckError>(())
+//! ```
+
+mod compare;
+mod domain;
+mod error;
+mod point;
+mod side;
+
+pub use compare::{
+    Comparison, Difference, EquationComparison, PhaseComparison, TermDifference, Verdict, compare,
+};
+pub use domain::CheckDomain;
+pub use error::CheckError;
+pub use point::{Gap, Point};
+pub use side::{Side, read_sides};
+
+use crate::import::SymbolNames;
+
+/// How files are read and compared.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CheckOptions {
+    /// Take decimals of LaTeX and Markdown as exact too.
+    pub exact: bool,
+    /// Names that LaTeX has for the variables.
+    pub symbols: SymbolNames,
+    /// Ranges in which points of difference are searched.
+    pub domain: CheckDomain,
+}

@@ -1,0 +1,168 @@
+//! Search for a point where two expressions differ by more than rounding explains.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+use super::domain::CheckDomain;
+use super::side::literal;
+use crate::symbolic::{ExprId, ExprPool, Interval, SymbolId};
+
+/// Points that are tried without a proof of equality, and with one, where they only show where
+/// both sides have values.
+const POINTS: usize = 3_000;
+const POINTS_OF_EQUALS: usize = 64;
+/// Points after which the first difference found is taken.
+const ENOUGH: usize = 200;
+/// How far points reach without a domain, each in its turn.
+const SCALES: [f64; 8] = [1.0, 1.0, 1.0, 0.3, 3.0, 0.03, 10.0, 100.0];
+
+/// Values of variables by name.
+pub type Point = BTreeMap<String, f64>;
+
+/// Both sides at a point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gap {
+    /// The variables that occur.
+    pub point: Point,
+    /// Value of the first file's side.
+    pub left: f64,
+    /// Value of the second file's side.
+    pub right: f64,
+}
+
+/// What the search found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Search {
+    /// A point where the sides differ by more than rounding explains.
+    pub(super) gap: Option<Gap>,
+    /// The point with the largest difference, which rounding may explain.
+    pub(super) largest: Option<Gap>,
+    /// A point where only one side has a value (the other is NaN).
+    pub(super) one_sided: Option<Gap>,
+    /// Whether both sides have values anywhere.
+    pub(super) has_common_point: bool,
+}
+
+/// The two sides of one equation.
+pub(super) struct Sides<'s> {
+    pub(super) pool: &'s ExprPool,
+    /// The whole right sides.
+    pub(super) whole: [ExprId; 2],
+    /// The same without the terms that both have; the difference is that of the whole sides.
+    pub(super) rest: [ExprId; 2],
+    /// Value and radius of each symbol that stands for a decimal.
+    literals: HashMap<SymbolId, (f64, f64)>,
+}
+
+impl<'s> Sides<'s> {
+    pub(super) fn new(pool: &'s ExprPool, whole: [ExprId; 2], rest: [ExprId; 2]) -> Self {
+        let symbols = whole.iter().flat_map(|side| pool.symbols_of(*side));
+        let literals = symbols.filter_map(|symbol| {
+            let literal = literal(pool, symbol)?;
+            Some((symbol, (literal.to_f64(), literal.radius)))
+        });
+        Self { pool, whole, rest, literals: literals.collect() }
+    }
+}
+
+/// Tries points of a fixed sequence: all variables at once, and single groups of them with the
+/// others zero, so that one small term can be seen beside large ones.
+pub(super) fn search(
+    sides: &Sides<'_>,
+    phase: &str,
+    domain: &CheckDomain,
+    groups: &[ExprId],
+    is_proven: bool,
+) -> Search {
+    let pool = sides.pool;
+    let variables: Vec<SymbolId> = (sides.whole.iter())
+        .flat_map(|side| pool.symbols_of(*side))
+        .filter(|symbol| !sides.literals.contains_key(symbol))
+        .collect::<BTreeSet<_>>()
+        .into_iter()
+        .collect();
+    let ranges: Vec<Option<[f64; 2]>> =
+        variables.iter().map(|symbol| domain.range(phase, pool.symbol_name(*symbol))).collect();
+    let has_domain = ranges.iter().any(Option::is_some);
+    let groups: Vec<BTreeSet<SymbolId>> =
+        groups.iter().map(|expr| pool.symbols_of(*expr)).collect();
+    let mut random = ChaCha8Rng::seed_from_u64(12);
+    let mut search = Search::default();
+    let mut best = 0.0;
+    for attempt in 0..if is_proven { POINTS_OF_EQUALS } else { POINTS } {
+        let scale = if has_domain { 1.0 } else { SCALES[attempt % SCALES.len()] };
+        let group = (attempt % 3 == 2).then(|| groups.get(attempt / 3 % groups.len().max(1))).flatten();
+        let values: BTreeMap<SymbolId, f64> = (variables.iter().zip(&ranges))
+            .map(|(symbol, range)| {
+                let share = random.next_u32() as f64 / f64::from(u32::MAX);
+                let value = match range {
+                    Some([lo, hi]) => lo + share * (hi - lo),
+                    None => scale * (2.0 * share - 1.0),
+                };
+                let is_off = group.is_some_and(|group| !group.contains(symbol));
+                (*symbol, if is_off { range.map_or(0.0, |[lo, hi]| 0.0_f64.clamp(lo, hi)) } else { short(value) })
+            })
+            .collect();
+        let gap = sides.at(&values);
+        match (gap.left.is_nan(), gap.right.is_nan()) {
+            (false, false) if gap.left.is_finite() && gap.right.is_finite() => {
+                search.has_common_point = true;
+            }
+            (true, false) | (false, true) if scale <= 1.0 => {
+                search.one_sided.get_or_insert(gap);
+                continue;
+            }
+            _ => continue,
+        }
+        let size = (gap.left - gap.right).abs() / (1.0 + gap.left.abs().max(gap.right.abs()));
+        if sides.are_apart(&values) {
+            if search.gap.is_none() || size > best {
+                (best, search.gap) = (size, Some(gap));
+            }
+        } else if search.gap.is_none() {
+            let largest = search.largest.as_ref().map_or(0.0, |gap| (gap.left - gap.right).abs());
+            if (gap.left - gap.right).abs() > largest {
+                search.largest = Some(gap);
+            }
+        }
+        if search.gap.is_some() && attempt >= ENOUGH {
+            break;
+        }
+    }
+    search
+}
+
+/// The value with four significant digits, so that a point can be typed.
+fn short(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
+impl Sides<'_> {
+    fn at(&self, values: &BTreeMap<SymbolId, f64>) -> Gap {
+        let value_of = |symbol: SymbolId| match self.literals.get(&symbol) {
+            Some((value, _)) => *value,
+            None => values.get(&symbol).copied().unwrap_or(0.0),
+        };
+        let both = self.pool.evaluate_all(&self.whole, &value_of);
+        Gap {
+            point: (values.iter())
+                .map(|(symbol, value)| (self.pool.symbol_name(*symbol).to_owned(), *value))
+                .collect(),
+            left: both[0],
+            right: both[1],
+        }
+    }
+
+    /// Whether the bounds of both sides, rounding of decimals included, have no number in common.
+    fn are_apart(&self, values: &BTreeMap<SymbolId, f64>) -> bool {
+        let range_of = |symbol: SymbolId| match self.literals.get(&symbol) {
+            Some((value, radius)) => Interval::new((value - radius).next_down(), (value + radius).next_up()),
+            None => Interval::point(values.get(&symbol).copied().unwrap_or(0.0)),
+        };
+        let bounds = self.pool.evaluate_intervals(&self.rest, &range_of);
+        let [left, right] = [bounds[0], bounds[1]];
+        !left.is_empty() && !right.is_empty() && (left.hi() < right.lo() || right.hi() < left.lo())
+    }
+}

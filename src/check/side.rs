@@ -1,0 +1,195 @@
+//! One of two files that are compared, with its numbers as they are written.
+
+use std::fs;
+use std::path::Path;
+
+use super::CheckOptions;
+use super::error::CheckError;
+use crate::artifact;
+use crate::equations::Equations;
+use crate::import::{Format, read_equations};
+use crate::model::{LatentVariable, ReducedModel};
+use crate::symbolic::{ExprId, ExprPool, Literal, Number, SymbolId};
+
+/// Marks of symbols that stand for decimals: exact ones, and ones rounded in their last digit.
+const EXACT: char = '#';
+const ROUNDED: char = '~';
+
+/// The equations of one file.
+#[derive(Clone, Debug)]
+pub struct Side {
+    /// The file as it was named.
+    pub file: String,
+    /// Number of latent coordinates.
+    pub latent_dim: usize,
+    pub(super) is_rounded: bool,
+    pub(super) phases: Vec<SidePhase>,
+}
+
+/// The right sides of one phase.
+#[derive(Clone, Debug)]
+pub(super) struct SidePhase {
+    pub(super) name: Option<String>,
+    pub(super) ddz: Vec<RightSide>,
+}
+
+/// A right side as text.
+#[derive(Clone, Debug)]
+pub(super) enum RightSide {
+    /// Coefficients and terms of a model.
+    Summands(Vec<(f64, String)>),
+    /// One expression, and the line of its left side.
+    Text(usize, String),
+}
+
+/// Reads two files. Labels of LaTeX end in the names of the other file's phases.
+///
+/// # Errors
+/// [`CheckError`] for the first that cannot be read.
+pub fn read_sides(paths: [&Path; 2], options: &CheckOptions) -> Result<[Side; 2], CheckError> {
+    let is_latex = |path: &Path| matches!(Format::of_path(path), Ok(Format::Latex));
+    let read = |path: &Path, known: &[String]| {
+        let bytes = fs::read(path).map_err(|source| CheckError::Io { path: path.to_owned(), source })?;
+        Side::from_bytes(&path.display().to_string(), &bytes, options, known)
+    };
+    if is_latex(paths[0]) && !is_latex(paths[1]) {
+        let second = read(paths[1], &[])?;
+        return Ok([read(paths[0], &second.phase_names())?, second]);
+    }
+    let first = read(paths[0], &[])?;
+    let known = first.phase_names();
+    Ok([first, read(paths[1], &known)?])
+}
+
+impl Side {
+    /// Reads a file in memory; the ending of its name says what it is. `known` are names of phases
+    /// that labels of LaTeX may end in, besides `contact` and `flight`.
+    ///
+    /// # Errors
+    /// [`CheckError`].
+    pub fn from_bytes(
+        file: &str,
+        bytes: &[u8],
+        options: &CheckOptions,
+        known: &[String],
+    ) -> Result<Self, CheckError> {
+        let ending = Path::new(file).extension().map(|ending| ending.to_string_lossy().to_lowercase());
+        if ending.as_deref() == Some("json") {
+            return Ok(Self::of_model(file, &artifact::read_from_bytes(file, bytes)?));
+        }
+        let format = match Format::of_path(Path::new(file)) {
+            Ok(format @ (Format::Equations | Format::Latex)) => format,
+            Ok(_) | Err(_) => {
+                return Err(CheckError::Kind {
+                    file: file.to_owned(),
+                    found: ending.map_or("no ending".to_owned(), |ending| format!("the ending `.{ending}`")),
+                });
+            }
+        };
+        let usual = ["contact", "flight"].map(str::to_owned);
+        let known: Vec<String> = known.iter().cloned().chain(usual).collect();
+        let read = read_equations(file, format, bytes, &options.symbols, &known)?;
+        let side = Self {
+            file: file.to_owned(),
+            latent_dim: read.latent_dim,
+            is_rounded: format == Format::Latex && !options.exact,
+            phases: (read.systems.into_iter())
+                .map(|system| SidePhase {
+                    name: system.phase,
+                    ddz: (system.right_sides.into_iter())
+                        .map(|(line, text)| RightSide::Text(line, text))
+                        .collect(),
+                })
+                .collect(),
+        };
+        side.check()?;
+        Ok(side)
+    }
+
+    /// The equations of a model as it was learned.
+    pub fn of_model(file: &str, model: &ReducedModel) -> Self {
+        let equations = Equations::as_learned(model);
+        let phases = equations.phases().iter().map(|phase| SidePhase {
+            name: Some(phase.name.clone()),
+            ddz: (0..model.latent_dim())
+                .map(|output| {
+                    let summands = phase.summands(&equations, output);
+                    RightSide::Summands(summands.map(|(c, term)| (c, term.text().to_owned())).collect())
+                })
+                .collect(),
+        });
+        Self {
+            file: file.to_owned(),
+            latent_dim: model.latent_dim(),
+            is_rounded: false,
+            phases: phases.collect(),
+        }
+    }
+
+    /// Names of the phases that have one.
+    pub fn phase_names(&self) -> Vec<String> {
+        self.phases.iter().filter_map(|phase| phase.name.clone()).collect()
+    }
+
+    /// Builds every right side once, so that later ones are known to build.
+    fn check(&self) -> Result<(), CheckError> {
+        let mut pool = ExprPool::new();
+        for right_side in self.phases.iter().flat_map(|phase| &phase.ddz) {
+            let RightSide::Text(line, text) = right_side else { continue };
+            self.parse(text, &mut pool).map_err(|source| CheckError::Expression {
+                file: self.file.clone(),
+                line: *line,
+                source,
+            })?;
+        }
+        Ok(())
+    }
+
+    fn parse(&self, text: &str, pool: &mut ExprPool) -> Result<ExprId, crate::symbolic::ParseError> {
+        let known = |name: &str| LatentVariable::from_name(name, self.latent_dim).is_some();
+        pool.parse_with_literals(text, &known, &|number| self.literal_name(number))
+    }
+
+    /// The symbol of a decimal; integers of exact files are numbers of the pool.
+    fn literal_name(&self, number: &str) -> Option<String> {
+        let is_integer = number.bytes().all(|byte| byte.is_ascii_digit());
+        let literal = Literal::parse(number, self.is_rounded)?;
+        let is_plain = is_integer || (!self.is_rounded && literal.value.is_integer());
+        let mark = if self.is_rounded { ROUNDED } else { EXACT };
+        (!is_plain || (is_integer && number.parse::<i64>().is_err())).then(|| format!("{mark}{number}"))
+    }
+
+    /// Builds a right side, with symbols for decimals.
+    pub(super) fn build(&self, right_side: &RightSide, pool: &mut ExprPool) -> ExprId {
+        match right_side {
+            RightSide::Text(_, text) => {
+                self.parse(text, pool).expect("the text was parsed when the file was read")
+            }
+            RightSide::Summands(summands) => {
+                let products: Vec<ExprId> = (summands.iter())
+                    .map(|(coefficient, term)| {
+                        let term = self.parse(term, pool).expect("terms of a model parse");
+                        let size = coefficient.abs();
+                        let whole = Number::from_f64(size).filter(|number| number.is_exact());
+                        let factor = match whole {
+                            Some(number) => pool.constant(number),
+                            None => pool.symbol(&format!("{EXACT}{size:?}")),
+                        };
+                        let product = pool.mul(factor, term);
+                        if *coefficient < 0.0 { pool.neg(product) } else { product }
+                    })
+                    .collect();
+                pool.sum(&products)
+            }
+        }
+    }
+}
+
+/// The decimal that a symbol stands for.
+pub(super) fn literal(pool: &ExprPool, symbol: SymbolId) -> Option<Literal> {
+    let name = pool.symbol_name(symbol);
+    match name.strip_prefix(ROUNDED) {
+        Some(digits) => Literal::parse(digits, true),
+        None => Literal::parse(name.strip_prefix(EXACT)?, false),
+    }
+}

@@ -1,0 +1,167 @@
+//! `romc check`: two files in, equal or a point of difference out.
+
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+use serde_json::{Value, json};
+
+use super::Answer;
+use super::args::CheckArguments;
+use super::output::significant;
+use crate::Error;
+use crate::check::{
+    CheckDomain, CheckError, CheckOptions, Comparison, EquationComparison, Gap, Side,
+    TermDifference, Verdict, compare, read_sides,
+};
+use crate::import::SymbolNames;
+
+/// Compares two files. The exit code is 0 if they are proven equal and 1 otherwise.
+///
+/// # Errors
+/// [`Error::Check`] for files that cannot be read.
+pub fn run(arguments: &CheckArguments) -> Result<(Answer, ExitCode), Error> {
+    let options = CheckOptions {
+        exact: arguments.exact,
+        symbols: SymbolNames::parse(&arguments.symbols)?,
+        domain: domain(arguments)?,
+    };
+    let [left, right] = read_sides([&arguments.left, &arguments.right], &options)?;
+    let comparison = compare(&left, &right, &options);
+    let is_equal = comparison.says_the_same();
+    let answer = Answer {
+        text: text(&left, &right, &comparison),
+        json: json!({
+            "command": "check",
+            "files": [&left.file, &right.file],
+            "equal": is_equal,
+            "exact": comparison.verdicts().all(|verdict| *verdict == Verdict::Equal),
+            "phases": comparison.phases.iter().map(|phase| json!({
+                "phase": phase.name,
+                "equations": phase.equations.iter().map(equation_json).collect::<Vec<_>>(),
+            })).collect::<Vec<_>>(),
+        }),
+    };
+    let code = if is_equal { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+    Ok((answer, code))
+}
+
+fn domain(arguments: &CheckArguments) -> Result<CheckDomain, CheckError> {
+    let Some(path) = &arguments.domain else {
+        return Ok(CheckDomain::default());
+    };
+    let text = std::fs::read_to_string(path)
+        .map_err(|source| CheckError::Io { path: path.clone(), source })?;
+    CheckDomain::from_toml(path, &text)
+}
+
+/// The comparison for people.
+fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
+    let mut text = format!("A: {}\nB: {}\n", left.file, right.file);
+    for phase in &comparison.phases {
+        let _ = writeln!(text, "\nphase {}", phase.name);
+        for equation in &phase.equations {
+            let _ = writeln!(text, "  {}: {}", equation.output, verdict_text(&equation.verdict));
+            if let Some(gap) = &equation.one_sided {
+                let (has, lacks) = if gap.left.is_nan() { ("B", "A") } else { ("A", "B") };
+                let _ = writeln!(text, "    note: {has} has a value at {}, {lacks} has none", place(gap));
+            }
+        }
+    }
+    let count = |wanted: fn(&Verdict) -> bool| comparison.verdicts().filter(|v| wanted(v)).count();
+    let (all, exact) = (count(|_| true), count(|verdict| *verdict == Verdict::Equal));
+    let equal = count(Verdict::is_equal);
+    let rounded = match equal - exact {
+        0 => String::new(),
+        n => format!(", {n} of them up to the printed digits"),
+    };
+    let summary = match comparison.says_the_same() {
+        true => format!("A and B say the same: {all} equations proven equal{rounded}"),
+        false => format!("A and B do not say the same: {equal} of {all} equations proven equal{rounded}"),
+    };
+    let _ = writeln!(text, "\n{summary}");
+    text
+}
+
+fn verdict_text(verdict: &Verdict) -> String {
+    match verdict {
+        Verdict::Equal => "proven equal".to_owned(),
+        Verdict::EqualAsPrinted(rounding) => format!(
+            "proven equal up to the printed digits (coefficients differ by at most {})",
+            significant(*rounding)
+        ),
+        Verdict::Different(difference) => {
+            format!("different{}{}", gap_text(&difference.gap), terms_text(&difference.terms))
+        }
+        Verdict::Undecided(largest, terms) => {
+            let seen = match largest {
+                Some(gap) => format!("; the largest difference seen is{}", gap_text(gap)),
+                None => "; no difference was seen at any point".to_owned(),
+            };
+            format!("not decided: no proof, and no point where the difference is beyond rounding{seen}{}", terms_text(terms))
+        }
+        Verdict::Missing(in_second) => {
+            format!("missing in {}", if *in_second { "B" } else { "A" })
+        }
+    }
+}
+
+fn gap_text(gap: &Gap) -> String {
+    format!(
+        " at {}\n    A = {}, B = {}, A - B = {}",
+        place(gap),
+        gap.left,
+        gap.right,
+        significant(gap.left - gap.right)
+    )
+}
+
+fn place(gap: &Gap) -> String {
+    let values: Vec<String> = (gap.point.iter())
+        .map(|(name, value)| format!("{name} = {value}"))
+        .collect();
+    match values.is_empty() {
+        true => "every point".to_owned(),
+        false => values.join(", "),
+    }
+}
+
+fn terms_text(terms: &[TermDifference]) -> String {
+    let lines = terms.iter().map(|term| {
+        format!("\n    {}: {} in A, {} in B", term.term, term.left, term.right)
+    });
+    lines.collect()
+}
+
+fn equation_json(equation: &EquationComparison) -> Value {
+    let mut entry = json!({ "equation": equation.output });
+    match &equation.verdict {
+        Verdict::Equal => entry["verdict"] = json!("equal"),
+        Verdict::EqualAsPrinted(rounding) => {
+            entry["verdict"] = json!("equal as printed");
+            entry["rounding"] = json!(rounding);
+        }
+        Verdict::Different(difference) => {
+            entry["verdict"] = json!("different");
+            entry["point"] = gap_json(&difference.gap);
+            entry["terms"] = json!(difference.terms);
+        }
+        Verdict::Undecided(largest, terms) => {
+            entry["verdict"] = json!("not decided");
+            entry["point"] = largest.as_ref().map_or(Value::Null, gap_json);
+            entry["terms"] = json!(terms);
+        }
+        Verdict::Missing(in_second) => {
+            entry["verdict"] = json!("missing");
+            entry["missing_in"] = json!(if *in_second { "B" } else { "A" });
+        }
+    }
+    if let Some(gap) = &equation.one_sided {
+        entry["one_sided"] = gap_json(gap);
+    }
+    entry
+}
+
+/// Both values at a point; a side without a value is null.
+fn gap_json(gap: &Gap) -> Value {
+    json!({ "at": gap.point, "a": gap.left, "b": gap.right, "difference": gap.left - gap.right })
+}
