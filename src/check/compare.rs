@@ -62,6 +62,9 @@ pub struct Difference {
     pub gap: Gap,
     /// Terms with different coefficients as the files write them, largest difference first.
     pub terms: Vec<TermDifference>,
+    /// Whether the terms differ by more than the rounding of their own coefficients, but not by
+    /// more than that of all coefficients at any one point that was tried.
+    pub beside_rounding: bool,
 }
 
 /// A term and its coefficient in both files.
@@ -90,44 +93,63 @@ impl Comparison {
 
     /// The verdicts of all equations.
     pub fn verdicts(&self) -> impl Iterator<Item = &Verdict> {
-        self.phases.iter().flat_map(|phase| &phase.equations).map(|equation| &equation.verdict)
+        self.phases
+            .iter()
+            .flat_map(|phase| &phase.equations)
+            .map(|equation| &equation.verdict)
     }
 }
 
 /// Compares two files.
 pub fn compare(left: &Side, right: &Side, options: &CheckOptions) -> Comparison {
     let outputs = left.latent_dim.max(right.latent_dim);
-    let phases = paired(&left.phases, &right.phases).into_iter().enumerate().map(|(place, pair)| {
-        let name = (pair.iter().flatten()).find_map(|phase| phase.name.clone());
-        let name = name.unwrap_or_else(|| (place + 1).to_string());
-        let equations = (0..outputs).map(|output| {
-            let ddz = pair.map(|phase| phase.and_then(|phase| phase.ddz.get(output)));
-            let output = format!("ddz{}", output + 1);
-            let (verdict, one_sided) = match ddz {
-                [Some(a), Some(b)] => decide([left, right], [a, b], &name, options),
-                [first, _] => (Verdict::Missing(first.is_some()), None),
-            };
-            EquationComparison { output, verdict, one_sided }
+    let phases = paired(&left.phases, &right.phases)
+        .into_iter()
+        .enumerate()
+        .map(|(place, pair)| {
+            let name = (pair.iter().flatten()).find_map(|phase| phase.name.clone());
+            let name = name.unwrap_or_else(|| (place + 1).to_string());
+            let equations = (0..outputs).map(|output| {
+                let ddz = pair.map(|phase| phase.and_then(|phase| phase.ddz.get(output)));
+                let output = format!("ddz{}", output + 1);
+                let (verdict, one_sided) = match ddz {
+                    [Some(a), Some(b)] => decide([left, right], [a, b], &name, options),
+                    [first, _] => (Verdict::Missing(first.is_some()), None),
+                };
+                EquationComparison {
+                    output,
+                    verdict,
+                    one_sided,
+                }
+            });
+            PhaseComparison {
+                name: name.clone(),
+                equations: equations.collect(),
+            }
         });
-        PhaseComparison { name: name.clone(), equations: equations.collect() }
-    });
-    Comparison { phases: phases.collect() }
+    Comparison {
+        phases: phases.collect(),
+    }
 }
 
 /// Phases by name; those without a name in one of the files by their order among the rest.
 fn paired<'p>(left: &'p [SidePhase], right: &'p [SidePhase]) -> Vec<[Option<&'p SidePhase>; 2]> {
     let mut taken = vec![false; right.len()];
-    let mut pairs: Vec<[Option<&SidePhase>; 2]> = left.iter().map(|phase| [Some(phase), None]).collect();
+    let mut pairs: Vec<[Option<&SidePhase>; 2]> =
+        left.iter().map(|phase| [Some(phase), None]).collect();
     for [phase, partner] in &mut pairs {
         let name = phase.and_then(|phase| phase.name.as_ref());
-        let found = right.iter().position(|other| name.is_some() && other.name.as_ref() == name);
+        let found = right
+            .iter()
+            .position(|other| name.is_some() && other.name.as_ref() == name);
         if let Some(place) = found {
             (*partner, taken[place]) = (Some(&right[place]), true);
         }
     }
     for [phase, partner] in pairs.iter_mut().filter(|pair| pair[1].is_none()) {
         let is_named = phase.is_some_and(|phase| phase.name.is_some());
-        let free = (0..right.len()).find(|place| !taken[*place] && !(is_named && right[*place].name.is_some()));
+        let free = (0..right.len())
+            .find(|place| !taken[*place] && !(is_named && right[*place].name.is_some()));
         if let Some(place) = free {
             (*partner, taken[place]) = (Some(&right[place]), true);
         }
@@ -146,27 +168,58 @@ fn decide(
     let mut pool = ExprPool::new();
     let whole = [0, 1].map(|side| files[side].build(ddz[side], &mut pool));
     let table = Table::of(&mut pool, whole);
-    let rest = [0, 1].map(|side| {
-        let terms: Vec<ExprId> = table.differing().flat_map(|row| row.terms[side].clone()).collect();
-        pool.sum(&terms)
-    });
+    let rest = [0, 1].map(|side| table.sum(&mut pool, side, |_| true));
+    let unexplained =
+        [0, 1].map(|side| table.sum(&mut pool, side, |row| !row.difference().may_be_zero()));
     // The exact side first: rounded arguments of the other are compared with its own.
-    let order = if files[0].is_rounded && !files[1].is_rounded { [1, 0] } else { [0, 1] };
+    let order = if files[0].is_rounded && !files[1].is_rounded {
+        [1, 0]
+    } else {
+        [0, 1]
+    };
     let proof = proof(&pool, whole, rest, order);
-    let groups: Vec<ExprId> = table.differing().map(|row| row.rest).collect();
-    let sides = Sides::new(&pool, whole, rest);
-    let found = search(&sides, phase, &options.domain, &groups, proof.is_some());
-    let Search { gap, largest, one_sided, has_common_point } = found;
+    let searched = |rest: [ExprId; 2], rows: &[&Row]| {
+        let groups: Vec<ExprId> = rows.iter().map(|row| row.rest).collect();
+        let sides = Sides::new(&pool, whole, rest);
+        search(&sides, phase, &options.domain, &groups, proof.is_some())
+    };
+    let rows: Vec<&Row> = table.differing().collect();
+    let mut found = searched(rest, &rows);
+    let mut beside_rounding = false;
+    if proof.is_none() && found.gap.is_none() {
+        // Rounding of some terms can hide the difference of others at every single point.
+        let rows: Vec<&Row> = (table.differing())
+            .filter(|row| !row.difference().may_be_zero())
+            .collect();
+        found.gap = searched(unexplained, &rows).gap;
+        beside_rounding = found.gap.is_some();
+    }
+    let Search {
+        gap,
+        largest,
+        one_sided,
+        has_common_point,
+    } = found;
+    let terms = || table.largest(&pool);
     let verdict = match (proof, gap) {
         (Some(verdict), None) if has_common_point || one_sided.is_none() => verdict,
-        (_, Some(gap)) => Verdict::Different(Difference { gap, terms: table.largest(&pool) }),
-        (_, None) => Verdict::Undecided(largest, table.largest(&pool)),
+        (_, Some(gap)) => Verdict::Different(Difference {
+            gap,
+            terms: terms(),
+            beside_rounding,
+        }),
+        (_, None) => Verdict::Undecided(largest, terms()),
     };
     (verdict, one_sided)
 }
 
 /// A proof that what is left of both sides is equal.
-fn proof(pool: &ExprPool, whole: [ExprId; 2], rest: [ExprId; 2], order: [usize; 2]) -> Option<Verdict> {
+fn proof(
+    pool: &ExprPool,
+    whole: [ExprId; 2],
+    rest: [ExprId; 2],
+    order: [usize; 2],
+) -> Option<Verdict> {
     if rest == [ExprId::ZERO; 2] {
         return Some(Verdict::Equal);
     }
@@ -175,7 +228,10 @@ fn proof(pool: &ExprPool, whole: [ExprId; 2], rest: [ExprId; 2], order: [usize; 
     let [first, second] = order.map(|side| forms.of(rest[side]));
     let difference = first.minus(&second);
     let verdict = |form: &crate::symbolic::CanonicalForm, rounding: f64| {
-        let largest = form.coefficients().map(Coefficient::magnitude).fold(rounding, f64::max);
+        let largest = form
+            .coefficients()
+            .map(Coefficient::magnitude)
+            .fold(rounding, f64::max);
         match (form.is_zero() && rounding == 0.0, form.may_be_zero()) {
             (true, _) => Some(Verdict::Equal),
             (_, true) => Some(Verdict::EqualAsPrinted(largest)),
@@ -220,7 +276,11 @@ impl Table {
                 let coefficient = scale.times(&coefficient);
                 if let Node::Sum(terms) = pool.node(rest) {
                     let terms = terms.to_vec();
-                    open.extend(terms.into_iter().map(|term| (factor, coefficient.clone(), term)));
+                    open.extend(
+                        terms
+                            .into_iter()
+                            .map(|term| (factor, coefficient.clone(), term)),
+                    );
                     continue;
                 }
                 let place = *places.entry(rest).or_insert_with(|| {
@@ -249,13 +309,29 @@ impl Table {
         })
     }
 
+    /// The sum of one side's terms in the rows that differ and are `wanted`.
+    fn sum(&self, pool: &mut ExprPool, side: usize, wanted: impl Fn(&Row) -> bool) -> ExprId {
+        let rows = self.differing().filter(|row| wanted(row));
+        let terms: Vec<ExprId> = rows.flat_map(|row| row.terms[side].clone()).collect();
+        pool.sum(&terms)
+    }
+
     /// The rows that rounding does not explain, largest difference first.
     fn largest(&self, pool: &ExprPool) -> Vec<TermDifference> {
-        let mut rows: Vec<&Row> = self.rows.iter().filter(|row| !row.difference().may_be_zero()).collect();
-        rows.sort_by(|a, b| b.difference().magnitude().total_cmp(&a.difference().magnitude()));
+        let mut rows: Vec<&Row> = self
+            .rows
+            .iter()
+            .filter(|row| !row.difference().may_be_zero())
+            .collect();
+        rows.sort_by(|a, b| {
+            b.difference()
+                .magnitude()
+                .total_cmp(&a.difference().magnitude())
+        });
         rows.truncate(MAX_TERMS);
         let term = |row: &&Row| {
-            let [left, right] = [&row.coefficients[0], &row.coefficients[1]].map(Coefficient::to_f64);
+            let [left, right] =
+                [&row.coefficients[0], &row.coefficients[1]].map(Coefficient::to_f64);
             let text = pool.display(row.rest).to_string().replace(['#', '~'], "");
             let term = match text.char_indices().nth(60) {
                 Some((end, _)) => format!("{}...", &text[..end]),
@@ -270,7 +346,9 @@ impl Table {
 /// The factors of a term that are numbers or stand for decimals.
 fn numbers_of(pool: &ExprPool, expr: ExprId) -> Vec<ExprId> {
     let factors = pool.factors_of(expr).iter().copied();
-    factors.filter(|factor| value_of(pool, *factor).is_some()).collect()
+    factors
+        .filter(|factor| value_of(pool, *factor).is_some())
+        .collect()
 }
 
 /// The product of a term's numbers, and the term without them.

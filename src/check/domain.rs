@@ -18,7 +18,10 @@ impl CheckDomain {
     /// # Errors
     /// [`CheckError::Domain`] for other keys and for ranges without a finite width of at least 0.
     pub fn from_toml(path: &Path, text: &str) -> Result<Self, CheckError> {
-        let refused = |message: String| CheckError::Domain { path: path.to_owned(), message };
+        let refused = |message: String| CheckError::Domain {
+            path: path.to_owned(),
+            message,
+        };
         let phases: BTreeMap<String, BTreeMap<String, [f64; 2]>> =
             toml::from_str(text).map_err(|error| refused(error.to_string()))?;
         for (phase, ranges) in &phases {
@@ -28,7 +31,8 @@ impl CheckDomain {
                     return Err(refused(format!("{place}: expected z1, dz1, u1 and so on")));
                 }
                 if !(lo.is_finite() && hi.is_finite() && lo <= hi) {
-                    let found = format!("{place}: found [{lo}, {hi}], expected two rising finite numbers");
+                    let found =
+                        format!("{place}: found [{lo}, {hi}], expected two rising finite numbers");
                     return Err(refused(found));
                 }
             }

@@ -63,7 +63,12 @@ impl<'s> Sides<'s> {
             let literal = literal(pool, symbol)?;
             Some((symbol, (literal.to_f64(), literal.radius)))
         });
-        Self { pool, whole, rest, literals: literals.collect() }
+        Self {
+            pool,
+            whole,
+            rest,
+            literals: literals.collect(),
+        }
     }
 }
 
@@ -83,8 +88,10 @@ pub(super) fn search(
         .collect::<BTreeSet<_>>()
         .into_iter()
         .collect();
-    let ranges: Vec<Option<[f64; 2]>> =
-        variables.iter().map(|symbol| domain.range(phase, pool.symbol_name(*symbol))).collect();
+    let ranges: Vec<Option<[f64; 2]>> = variables
+        .iter()
+        .map(|symbol| domain.range(phase, pool.symbol_name(*symbol)))
+        .collect();
     let has_domain = ranges.iter().any(Option::is_some);
     let groups: Vec<BTreeSet<SymbolId>> =
         groups.iter().map(|expr| pool.symbols_of(*expr)).collect();
@@ -92,8 +99,14 @@ pub(super) fn search(
     let mut search = Search::default();
     let mut best = 0.0;
     for attempt in 0..if is_proven { POINTS_OF_EQUALS } else { POINTS } {
-        let scale = if has_domain { 1.0 } else { SCALES[attempt % SCALES.len()] };
-        let group = (attempt % 3 == 2).then(|| groups.get(attempt / 3 % groups.len().max(1))).flatten();
+        let scale = if has_domain {
+            1.0
+        } else {
+            SCALES[attempt % SCALES.len()]
+        };
+        let group = (attempt % 3 == 2)
+            .then(|| groups.get(attempt / 3 % groups.len().max(1)))
+            .flatten();
         let values: BTreeMap<SymbolId, f64> = (variables.iter().zip(&ranges))
             .map(|(symbol, range)| {
                 let share = random.next_u32() as f64 / f64::from(u32::MAX);
@@ -102,7 +115,14 @@ pub(super) fn search(
                     None => scale * (2.0 * share - 1.0),
                 };
                 let is_off = group.is_some_and(|group| !group.contains(symbol));
-                (*symbol, if is_off { range.map_or(0.0, |[lo, hi]| 0.0_f64.clamp(lo, hi)) } else { short(value) })
+                (
+                    *symbol,
+                    if is_off {
+                        range.map_or(0.0, |[lo, hi]| 0.0_f64.clamp(lo, hi))
+                    } else {
+                        short(value)
+                    },
+                )
             })
             .collect();
         let gap = sides.at(&values);
@@ -122,7 +142,10 @@ pub(super) fn search(
                 (best, search.gap) = (size, Some(gap));
             }
         } else if search.gap.is_none() {
-            let largest = search.largest.as_ref().map_or(0.0, |gap| (gap.left - gap.right).abs());
+            let largest = search
+                .largest
+                .as_ref()
+                .map_or(0.0, |gap| (gap.left - gap.right).abs());
             if (gap.left - gap.right).abs() > largest {
                 search.largest = Some(gap);
             }
@@ -158,7 +181,9 @@ impl Sides<'_> {
     /// Whether the bounds of both sides, rounding of decimals included, have no number in common.
     fn are_apart(&self, values: &BTreeMap<SymbolId, f64>) -> bool {
         let range_of = |symbol: SymbolId| match self.literals.get(&symbol) {
-            Some((value, radius)) => Interval::new((value - radius).next_down(), (value + radius).next_up()),
+            Some((value, radius)) => {
+                Interval::new((value - radius).next_down(), (value + radius).next_up())
+            }
             None => Interval::point(values.get(&symbol).copied().unwrap_or(0.0)),
         };
         let bounds = self.pool.evaluate_intervals(&self.rest, &range_of);

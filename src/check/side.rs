@@ -49,7 +49,10 @@ pub(super) enum RightSide {
 pub fn read_sides(paths: [&Path; 2], options: &CheckOptions) -> Result<[Side; 2], CheckError> {
     let is_latex = |path: &Path| matches!(Format::of_path(path), Ok(Format::Latex));
     let read = |path: &Path, known: &[String]| {
-        let bytes = fs::read(path).map_err(|source| CheckError::Io { path: path.to_owned(), source })?;
+        let bytes = fs::read(path).map_err(|source| CheckError::Io {
+            path: path.to_owned(),
+            source,
+        })?;
         Side::from_bytes(&path.display().to_string(), &bytes, options, known)
     };
     if is_latex(paths[0]) && !is_latex(paths[1]) {
@@ -73,16 +76,23 @@ impl Side {
         options: &CheckOptions,
         known: &[String],
     ) -> Result<Self, CheckError> {
-        let ending = Path::new(file).extension().map(|ending| ending.to_string_lossy().to_lowercase());
+        let ending = Path::new(file)
+            .extension()
+            .map(|ending| ending.to_string_lossy().to_lowercase());
         if ending.as_deref() == Some("json") {
-            return Ok(Self::of_model(file, &artifact::read_from_bytes(file, bytes)?));
+            return Ok(Self::of_model(
+                file,
+                &artifact::read_from_bytes(file, bytes)?,
+            ));
         }
         let format = match Format::of_path(Path::new(file)) {
             Ok(format @ (Format::Equations | Format::Latex)) => format,
             Ok(_) | Err(_) => {
                 return Err(CheckError::Kind {
                     file: file.to_owned(),
-                    found: ending.map_or("no ending".to_owned(), |ending| format!("the ending `.{ending}`")),
+                    found: ending.map_or("no ending".to_owned(), |ending| {
+                        format!("the ending `.{ending}`")
+                    }),
                 });
             }
         };
@@ -114,7 +124,11 @@ impl Side {
             ddz: (0..model.latent_dim())
                 .map(|output| {
                     let summands = phase.summands(&equations, output);
-                    RightSide::Summands(summands.map(|(c, term)| (c, term.text().to_owned())).collect())
+                    RightSide::Summands(
+                        summands
+                            .map(|(c, term)| (c, term.text().to_owned()))
+                            .collect(),
+                    )
                 })
                 .collect(),
         });
@@ -128,43 +142,58 @@ impl Side {
 
     /// Names of the phases that have one.
     pub fn phase_names(&self) -> Vec<String> {
-        self.phases.iter().filter_map(|phase| phase.name.clone()).collect()
+        self.phases
+            .iter()
+            .filter_map(|phase| phase.name.clone())
+            .collect()
     }
 
     /// Builds every right side once, so that later ones are known to build.
     fn check(&self) -> Result<(), CheckError> {
         let mut pool = ExprPool::new();
         for right_side in self.phases.iter().flat_map(|phase| &phase.ddz) {
-            let RightSide::Text(line, text) = right_side else { continue };
-            self.parse(text, &mut pool).map_err(|source| CheckError::Expression {
-                file: self.file.clone(),
-                line: *line,
-                source,
-            })?;
+            let RightSide::Text(line, text) = right_side else {
+                continue;
+            };
+            self.parse(text, &mut pool)
+                .map_err(|source| CheckError::Expression {
+                    file: self.file.clone(),
+                    line: *line,
+                    source,
+                })?;
         }
         Ok(())
     }
 
-    fn parse(&self, text: &str, pool: &mut ExprPool) -> Result<ExprId, crate::symbolic::ParseError> {
+    fn parse(
+        &self,
+        text: &str,
+        pool: &mut ExprPool,
+    ) -> Result<ExprId, crate::symbolic::ParseError> {
         let known = |name: &str| LatentVariable::from_name(name, self.latent_dim).is_some();
         pool.parse_with_literals(text, &known, &|number| self.literal_name(number))
     }
 
-    /// The symbol of a decimal; integers of exact files are numbers of the pool.
+    /// The symbol of a decimal. Integers are numbers of the pool, and multiples of 1/2 of exact
+    /// files, which floats hold exactly.
     fn literal_name(&self, number: &str) -> Option<String> {
-        let is_integer = number.bytes().all(|byte| byte.is_ascii_digit());
+        if number.bytes().all(|byte| byte.is_ascii_digit()) && number.parse::<i64>().is_ok() {
+            return None;
+        }
         let literal = Literal::parse(number, self.is_rounded)?;
-        let is_plain = is_integer || (!self.is_rounded && literal.value.is_integer());
+        if !self.is_rounded && (2.0 * literal.to_f64()).fract() == 0.0 && number.len() < 10 {
+            return None;
+        }
         let mark = if self.is_rounded { ROUNDED } else { EXACT };
-        (!is_plain || (is_integer && number.parse::<i64>().is_err())).then(|| format!("{mark}{number}"))
+        Some(format!("{mark}{number}"))
     }
 
     /// Builds a right side, with symbols for decimals.
     pub(super) fn build(&self, right_side: &RightSide, pool: &mut ExprPool) -> ExprId {
         match right_side {
-            RightSide::Text(_, text) => {
-                self.parse(text, pool).expect("the text was parsed when the file was read")
-            }
+            RightSide::Text(_, text) => self
+                .parse(text, pool)
+                .expect("the text was parsed when the file was read"),
             RightSide::Summands(summands) => {
                 let products: Vec<ExprId> = (summands.iter())
                     .map(|(coefficient, term)| {
@@ -176,7 +205,11 @@ impl Side {
                             None => pool.symbol(&format!("{EXACT}{size:?}")),
                         };
                         let product = pool.mul(factor, term);
-                        if *coefficient < 0.0 { pool.neg(product) } else { product }
+                        if *coefficient < 0.0 {
+                            pool.neg(product)
+                        } else {
+                            product
+                        }
                     })
                     .collect();
                 pool.sum(&products)

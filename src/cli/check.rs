@@ -41,7 +41,11 @@ pub fn run(arguments: &CheckArguments) -> Result<(Answer, ExitCode), Error> {
             })).collect::<Vec<_>>(),
         }),
     };
-    let code = if is_equal { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+    let code = if is_equal {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    };
     Ok((answer, code))
 }
 
@@ -49,8 +53,10 @@ fn domain(arguments: &CheckArguments) -> Result<CheckDomain, CheckError> {
     let Some(path) = &arguments.domain else {
         return Ok(CheckDomain::default());
     };
-    let text = std::fs::read_to_string(path)
-        .map_err(|source| CheckError::Io { path: path.clone(), source })?;
+    let text = std::fs::read_to_string(path).map_err(|source| CheckError::Io {
+        path: path.clone(),
+        source,
+    })?;
     CheckDomain::from_toml(path, &text)
 }
 
@@ -60,10 +66,23 @@ fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
     for phase in &comparison.phases {
         let _ = writeln!(text, "\nphase {}", phase.name);
         for equation in &phase.equations {
-            let _ = writeln!(text, "  {}: {}", equation.output, verdict_text(&equation.verdict));
+            let _ = writeln!(
+                text,
+                "  {}: {}",
+                equation.output,
+                verdict_text(&equation.verdict)
+            );
             if let Some(gap) = &equation.one_sided {
-                let (has, lacks) = if gap.left.is_nan() { ("B", "A") } else { ("A", "B") };
-                let _ = writeln!(text, "    note: {has} has a value at {}, {lacks} has none", place(gap));
+                let (has, lacks) = if gap.left.is_nan() {
+                    ("B", "A")
+                } else {
+                    ("A", "B")
+                };
+                let _ = writeln!(
+                    text,
+                    "    note: {has} has a value at {}, {lacks} has none",
+                    place(gap)
+                );
             }
         }
     }
@@ -76,7 +95,9 @@ fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
     };
     let summary = match comparison.says_the_same() {
         true => format!("A and B say the same: {all} equations proven equal{rounded}"),
-        false => format!("A and B do not say the same: {equal} of {all} equations proven equal{rounded}"),
+        false => {
+            format!("A and B do not say the same: {equal} of {all} equations proven equal{rounded}")
+        }
     };
     let _ = writeln!(text, "\n{summary}");
     text
@@ -90,14 +111,22 @@ fn verdict_text(verdict: &Verdict) -> String {
             significant(*rounding)
         ),
         Verdict::Different(difference) => {
-            format!("different{}{}", gap_text(&difference.gap), terms_text(&difference.terms))
+            let how = match difference.beside_rounding {
+                true => "different in terms beside those that rounding explains,",
+                false => "different",
+            };
+            let (gap, terms) = (gap_text(&difference.gap), terms_text(&difference.terms));
+            format!("{how}{gap}{terms}")
         }
         Verdict::Undecided(largest, terms) => {
             let seen = match largest {
                 Some(gap) => format!("; the largest difference seen is{}", gap_text(gap)),
                 None => "; no difference was seen at any point".to_owned(),
             };
-            format!("not decided: no proof, and no point where the difference is beyond rounding{seen}{}", terms_text(terms))
+            format!(
+                "not decided: no proof, and no point where the difference is beyond rounding{seen}{}",
+                terms_text(terms)
+            )
         }
         Verdict::Missing(in_second) => {
             format!("missing in {}", if *in_second { "B" } else { "A" })
@@ -127,7 +156,10 @@ fn place(gap: &Gap) -> String {
 
 fn terms_text(terms: &[TermDifference]) -> String {
     let lines = terms.iter().map(|term| {
-        format!("\n    {}: {} in A, {} in B", term.term, term.left, term.right)
+        format!(
+            "\n    {}: {} in A, {} in B",
+            term.term, term.left, term.right
+        )
     });
     lines.collect()
 }
@@ -144,6 +176,7 @@ fn equation_json(equation: &EquationComparison) -> Value {
             entry["verdict"] = json!("different");
             entry["point"] = gap_json(&difference.gap);
             entry["terms"] = json!(difference.terms);
+            entry["beside_rounding"] = json!(difference.beside_rounding);
         }
         Verdict::Undecided(largest, terms) => {
             entry["verdict"] = json!("not decided");

@@ -11,8 +11,8 @@ use super::args::{ImportArguments, LibraryArgument, StoredWeights, StoredXi, Ter
 use super::output::{Table, check_output, read_recordings};
 use crate::files::Overwrite;
 use crate::import::{
-    Chosen, ImportError, ImportOptions, ImportReport, LibraryChoice, LibraryOrder, SymbolNames, WeightVectors,
-    XiLayout, import, read_terms,
+    Chosen, ImportError, ImportOptions, ImportReport, LibraryChoice, LibraryOrder, SymbolNames,
+    WeightVectors, XiLayout, import, read_terms,
 };
 use crate::model::{ReducedModel, ScaleFactors, Scaling};
 use crate::robot::Robot;

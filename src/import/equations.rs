@@ -229,7 +229,13 @@ pub(super) fn complete(
 ) -> Result<Sections, ImportError> {
     let outputs = sections.iter().flat_map(|section| &section.equations);
     let Some(last) = outputs.map(|equation| equation.output).max() else {
-        return Err(refused(file, lines.max(1), 1, "the end of the text", expected));
+        return Err(refused(
+            file,
+            lines.max(1),
+            1,
+            "the end of the text",
+            expected,
+        ));
     };
     let latent_dim = last + 1;
     for section in &mut sections {

@@ -165,9 +165,10 @@ fn phases_in_order<'s>(
                     line: section.line,
                     column: 1,
                     found: "equations of no phase".to_owned(),
-                    expected: "a phase such as `[contact]` before them (LaTeX: `% Phase contact`, or a \
+                    expected:
+                        "a phase such as `[contact]` before them (LaTeX: `% Phase contact`, or a \
                                label that ends in its name), or one --phase NAME=FEET for each"
-                        .to_owned(),
+                            .to_owned(),
                 });
             }
         };

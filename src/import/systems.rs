@@ -57,7 +57,13 @@ pub fn read_equations(
             equation.parse(file, read.latent_dim, &mut ExprPool::new())?;
             right_sides.push((equation.line, equation.text()));
         }
-        systems.push(ReadSystem { phase: section.phase.clone(), right_sides });
+        systems.push(ReadSystem {
+            phase: section.phase.clone(),
+            right_sides,
+        });
     }
-    Ok(ReadEquations { latent_dim: read.latent_dim, systems })
+    Ok(ReadEquations {
+        latent_dim: read.latent_dim,
+        systems,
+    })
 }

@@ -65,7 +65,7 @@ mod simplify;
 mod substitute;
 mod trig;
 
-pub use canonical::{CanonicalForm, CanonicalForms, Coefficient, Literal};
+pub use canonical::{CanonicalForm, CanonicalForms, Coefficient, Literal, Rational};
 pub use display::Display;
 pub use expand::ExpandLimits;
 pub use interval::Interval;

@@ -37,7 +37,12 @@ pub(super) fn is_one_of(list: &str, name: &str) -> bool {
 
 /// Finds the displays.
 pub(super) fn items(file: &str, tokens: &[Token]) -> Result<Vec<Item>, ImportError> {
-    let mut scanner = Scanner { file, tokens, at: 0, macros: HashMap::new() };
+    let mut scanner = Scanner {
+        file,
+        tokens,
+        at: 0,
+        macros: HashMap::new(),
+    };
     let mut items = Vec::new();
     while let Some(token) = scanner.next() {
         let found = match &token.kind {
@@ -114,7 +119,11 @@ impl<'t> Scanner<'t> {
                 depth += 1;
             }
         }
-        let end = Token { kind: end.clone(), ..start.clone() }.quoted();
+        let end = Token {
+            kind: end.clone(),
+            ..start.clone()
+        }
+        .quoted();
         let found = format!("{} without its end", start.quoted());
         Err(refused(self.file, start.line, start.column, found, end))
     }
@@ -159,24 +168,43 @@ impl<'t> Scanner<'t> {
         if self.peek() == Some(&Kind::Character('*')) {
             self.at += 1;
         }
-        let Some([Token { kind: Kind::Command(name), .. }]) = self.argument() else {
+        let Some(
+            [
+                Token {
+                    kind: Kind::Command(name),
+                    ..
+                },
+            ],
+        ) = self.argument()
+        else {
             return;
         };
-        let parameters = if is_new { self.bracketed_count() } else { self.listed_count() };
+        let parameters = if is_new {
+            self.bracketed_count()
+        } else {
+            self.listed_count()
+        };
         let has_default = self.peek() == Some(&Kind::Character('['));
         let Some(body) = self.argument() else { return };
         let body = match is_operator {
             false => body.to_vec(),
             true => {
-                let of = |kind| Token { kind, ..self.tokens[self.at - 1].clone() };
-                let mut operator = vec![of(Kind::Command("operatorname".to_owned())), of(Kind::Open)];
+                let of = |kind| Token {
+                    kind,
+                    ..self.tokens[self.at - 1].clone()
+                };
+                let mut operator =
+                    vec![of(Kind::Command("operatorname".to_owned())), of(Kind::Open)];
                 operator.extend_from_slice(body);
                 operator.push(of(Kind::Close));
                 operator
             }
         };
         let is_plain = !has_default && parameters.is_some();
-        let entry = Macro { parameters: parameters.unwrap_or(0), body: is_plain.then_some(body) };
+        let entry = Macro {
+            parameters: parameters.unwrap_or(0),
+            body: is_plain.then_some(body),
+        };
         self.macros.insert(name.clone(), entry);
     }
 
@@ -223,16 +251,30 @@ impl<'t> Scanner<'t> {
             };
             let refuse = |found: &str, expected: &str| {
                 let found = format!("{}, {found}", token.quoted());
-                Err(refused(self.file, token.line, token.column, found, expected))
+                Err(refused(
+                    self.file,
+                    token.line,
+                    token.column,
+                    found,
+                    expected,
+                ))
             };
             let Some(body) = &found.body else {
-                return refuse("a macro with optional or delimited arguments", "a macro with plain arguments");
+                return refuse(
+                    "a macro with optional or delimited arguments",
+                    "a macro with plain arguments",
+                );
             };
             let mut arguments = Vec::new();
             for _ in 0..found.parameters {
                 match take_argument(&mut pending) {
                     Some(argument) => arguments.push(argument),
-                    None => return refuse("a macro without its arguments", "an argument for each parameter"),
+                    None => {
+                        return refuse(
+                            "a macro without its arguments",
+                            "an argument for each parameter",
+                        );
+                    }
                 }
             }
             let parts = body.iter().rev().flat_map(|part| match &part.kind {
@@ -240,7 +282,11 @@ impl<'t> Scanner<'t> {
                     Some(argument) => argument.iter().rev().cloned().collect(),
                     None => Vec::new(),
                 },
-                kind => vec![Token { kind: kind.clone(), line: token.line, column: token.column }],
+                kind => vec![Token {
+                    kind: kind.clone(),
+                    line: token.line,
+                    column: token.column,
+                }],
             });
             let before = pending.len();
             pending.extend(parts.take(budget + 1));

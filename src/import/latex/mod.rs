@@ -6,13 +6,15 @@
 //! read, whatever has no meaning here is an error with line and column, never a guess.
 //!
 //! Read `token.rs` (characters to tokens), `document.rs` (displays and macros), `sections.rs`
-//! (displays to equations and phases), `expression.rs` (one right side) in this order.
+//! (displays to equations and phases), `reader.rs` and `expression.rs` (one right side) in this order.
 
 mod document;
 mod expression;
 mod names;
+mod reader;
 mod sections;
 mod token;
+mod variables;
 
 #[cfg(test)]
 mod tests;

@@ -16,7 +16,9 @@ pub(super) fn is_greek(command: &str) -> bool {
 
 /// Why a name for a variable was refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{entry}`: expected `VARIABLE=NAME`, such as `z1=x`, `z2=theta` or `u1=F_lin,x`, each variable and name once")]
+#[error(
+    "`{entry}`: expected `VARIABLE=NAME`, such as `z1=x`, `z2=theta` or `u1=F_lin,x`, each variable and name once"
+)]
 pub struct NameError {
     /// The entry as given.
     pub entry: String,
@@ -40,7 +42,9 @@ impl SymbolNames {
     pub fn parse<S: AsRef<str>>(entries: &[S]) -> Result<Self, NameError> {
         let mut names = BTreeMap::new();
         for entry in entries.iter().map(AsRef::as_ref) {
-            let refused = || NameError { entry: entry.to_owned() };
+            let refused = || NameError {
+                entry: entry.to_owned(),
+            };
             let (left, right) = entry.split_once('=').ok_or_else(refused)?;
             let variable = LatentVariable::from_name(left.trim(), MAX_LATENT_DIM)
                 .filter(|variable| !matches!(variable, LatentVariable::Dz(_)))
@@ -49,7 +53,9 @@ impl SymbolNames {
                 .filter(|c| !c.is_whitespace() && !"{}\\".contains(*c))
                 .collect();
             let is_name = name.starts_with(|c: char| c.is_ascii_alphabetic())
-                && name.chars().all(|c| c.is_ascii_alphanumeric() || "_,".contains(c));
+                && name
+                    .chars()
+                    .all(|c| c.is_ascii_alphanumeric() || "_,".contains(c));
             if !is_name || names.values().any(|other| *other == variable) {
                 return Err(refused());
             }
@@ -60,7 +66,7 @@ impl SymbolNames {
         Ok(Self { names })
     }
 
-    /// The variable of a name as [`Symbol`](super::expression) spells it: `z_1`, `F_lin,x`.
+    /// The variable of a name as `Symbol` spells it: `z_1`, `F_lin,x`.
     ///
     /// `alone` allows `z` and `u` without a subscript, for the first of each.
     pub(super) fn variable(&self, name: &str, alone: bool) -> Option<LatentVariable> {
@@ -82,7 +88,9 @@ impl SymbolNames {
     pub(super) fn expected(&self) -> String {
         let renamed: Vec<&str> = self.names.keys().map(String::as_str).collect();
         match renamed.is_empty() {
-            true => "z_1, \\dot z_1, u_1 and so on (--symbols VARIABLE=NAME for other names)".to_owned(),
+            true => {
+                "z_1, \\dot z_1, u_1 and so on (--symbols VARIABLE=NAME for other names)".to_owned()
+            }
             false => format!("{}, z_k or u_k, with dots or without", renamed.join(", ")),
         }
     }

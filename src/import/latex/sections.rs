@@ -3,8 +3,8 @@
 use super::super::equations::{Section, Sections, complete, refused, text_of};
 use super::super::error::ImportError;
 use super::document::{Item, is_one_of, items};
-use super::expression::{Digits, Reader};
 use super::names::SymbolNames;
+use super::reader::{Digits, Reader};
 use super::token::{Kind, Token, of_markdown, of_tex};
 
 /// Environments that only arrange lines.
@@ -26,7 +26,11 @@ pub(in crate::import) fn read(
 ) -> Result<Sections, ImportError> {
     let text = text_of(file, bytes)?;
     let is_markdown = file.ends_with(".md") || file.ends_with(".markdown");
-    let tokens = if is_markdown { of_markdown(text) } else { of_tex(text) };
+    let tokens = if is_markdown {
+        of_markdown(text)
+    } else {
+        of_tex(text)
+    };
     let items = items(file, &tokens)?;
     let mut document = Document {
         file,
@@ -57,8 +61,12 @@ pub(in crate::import) fn read(
 fn has_indexed_left_side(file: &str, items: &[Item]) -> Result<bool, ImportError> {
     let default = SymbolNames::default();
     for item in items {
-        let Item::Display(tokens) = item else { continue };
-        let Ok(mut reader) = Reader::new(file, &default, tokens) else { continue };
+        let Item::Display(tokens) = item else {
+            continue;
+        };
+        let Ok(mut reader) = Reader::new(file, &default, tokens) else {
+            continue;
+        };
         for at in dotted(reader.tokens()) {
             if let Some((symbol, _)) = reader.left_side(at)
                 && reader.output(&symbol).is_some()
@@ -72,7 +80,9 @@ fn has_indexed_left_side(file: &str, items: &[Item]) -> Result<bool, ImportError
 
 /// Places of `\ddot`.
 fn dotted(tokens: &[Token]) -> Vec<usize> {
-    (0..tokens.len()).filter(|place| tokens[*place].is_command("ddot")).collect()
+    (0..tokens.len())
+        .filter(|place| tokens[*place].is_command("ddot"))
+        .collect()
 }
 
 /// The tokens without `\begin` and `\end` of environments that arrange lines, and without the
@@ -91,7 +101,10 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
                 }
                 if name.starts_with("alignat") || name.starts_with("alignedat") {
                     at += 3 * usize::from(tokens.get(at).is_some_and(|t| t.kind == Kind::Open));
-                } else if tokens.get(at).is_some_and(|t| t.kind == Kind::Character('[')) {
+                } else if tokens
+                    .get(at)
+                    .is_some_and(|t| t.kind == Kind::Character('['))
+                {
                     // A vertical position such as [t].
                     at += 3;
                 }
@@ -99,9 +112,18 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
             Kind::End(name) if is_one_of(LAYOUTS, name) => {
                 if open.pop().map(|begin| &begin.kind) != Some(&Kind::Begin(name.clone())) {
                     let expected = "environments that end in the order in which they begin";
-                    return Err(refused(file, token.line, token.column, token.quoted(), expected));
+                    return Err(refused(
+                        file,
+                        token.line,
+                        token.column,
+                        token.quoted(),
+                        expected,
+                    ));
                 }
-                if tokens.get(at).is_some_and(|token| token.is_command("right")) {
+                if tokens
+                    .get(at)
+                    .is_some_and(|token| token.is_command("right"))
+                {
                     at += 2;
                 }
             }
@@ -112,7 +134,13 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
         None => Ok(flat),
         Some(token) => {
             let found = format!("{} without its end", token.quoted());
-            Err(refused(file, token.line, token.column, found, "environments that end inside their display"))
+            Err(refused(
+                file,
+                token.line,
+                token.column,
+                found,
+                "environments that end inside their display",
+            ))
         }
     }
 }
@@ -164,7 +192,9 @@ impl Document<'_> {
         let mut left_sides = Vec::new();
         let mut strange = None;
         for at in dotted(reader.tokens()) {
-            let Some((symbol, after)) = reader.left_side(at) else { continue };
+            let Some((symbol, after)) = reader.left_side(at) else {
+                continue;
+            };
             let token = reader.tokens()[at].clone();
             match reader.output(&symbol) {
                 Some(output) => left_sides.push((output, at, after, token)),
@@ -180,7 +210,13 @@ impl Document<'_> {
         }
         flat?;
         let refuse = |token: &Token, found: String, expected: &str| {
-            Err(refused(self.file, token.line, token.column, found, expected))
+            Err(refused(
+                self.file,
+                token.line,
+                token.column,
+                found,
+                expected,
+            ))
         };
         if let Some((token, found)) = strange {
             return refuse(&token, found, &self.names.expected());
@@ -192,8 +228,12 @@ impl Document<'_> {
         let shared = self.label(&reader.tokens()[..left_sides[0].1]);
         for (place, (output, _, after, token)) in left_sides.iter().enumerate() {
             let end = left_sides.get(place + 1).map_or(total, |next| next.1);
-            let label = shared.clone().or_else(|| self.label(&reader.tokens()[*after..end]));
-            let before = place.checked_sub(1).map_or(0, |previous| left_sides[previous].2);
+            let label = shared
+                .clone()
+                .or_else(|| self.label(&reader.tokens()[*after..end]));
+            let before = place
+                .checked_sub(1)
+                .map_or(0, |previous| left_sides[previous].2);
             for token in &reader.tokens()[before..*after] {
                 if let Kind::Comment(text) = &token.kind {
                     let text = text.clone();
@@ -215,22 +255,35 @@ impl Document<'_> {
         })?;
         // Rows of one system are numbered: eq:model:contact:2.
         let stem = label.trim_end_matches(|c: char| c.is_ascii_digit());
-        let stem = stem.strip_suffix(':').filter(|stem| *stem != label).unwrap_or(label);
+        let stem = stem
+            .strip_suffix(':')
+            .filter(|stem| *stem != label)
+            .unwrap_or(label);
         let plain = |text: &str| text.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         let ends_in = |name: &&String| {
-            let rest = [label, stem].into_iter().find_map(|label| {
-                plain(label).strip_suffix(&plain(name)).map(str::to_owned)
-            });
+            let rest = [label, stem]
+                .into_iter()
+                .find_map(|label| plain(label).strip_suffix(&plain(name)).map(str::to_owned));
             !name.is_empty() && rest.is_some_and(|rest| rest.is_empty() || rest.ends_with('-'))
         };
-        let known = self.known.iter().filter(ends_in).max_by_key(|name| name.len());
+        let known = self
+            .known
+            .iter()
+            .filter(ends_in)
+            .max_by_key(|name| name.len());
         let last = || stem.rsplit_once(':').map(|(_, last)| last.to_owned());
-        (known.cloned().or_else(last)).filter(|name| !name.bytes().all(|byte| byte.is_ascii_digit()))
+        (known.cloned().or_else(last))
+            .filter(|name| !name.bytes().all(|byte| byte.is_ascii_digit()))
     }
 
     /// The section that an equation belongs to: the open one, or a new one where a comment or
     /// label names another phase, or where the left side is there already.
-    fn section(&mut self, output: usize, token: &Token, label: Option<String>) -> Result<&mut Section, ImportError> {
+    fn section(
+        &mut self,
+        output: usize,
+        token: &Token,
+        label: Option<String>,
+    ) -> Result<&mut Section, ImportError> {
         let named = match std::mem::take(&mut self.starts_phase) {
             true => self.phase.clone(),
             false => None,
@@ -238,20 +291,38 @@ impl Document<'_> {
         let is_new = match self.sections.last() {
             None => true,
             Some(open) => {
-                let repeats = open.equations.iter().any(|equation| equation.output == output);
+                let repeats = open
+                    .equations
+                    .iter()
+                    .any(|equation| equation.output == output);
                 let other_label = self.phase.is_none() && label.is_some() && label != open.phase;
                 named.is_some() || repeats || other_label
             }
         };
         if is_new {
             let named = named.or(label.filter(|_| self.phase.is_none()));
-            if let Some(earlier) = (self.sections.iter()).find(|section| named.is_some() && section.phase == named) {
+            if let Some(earlier) =
+                (self.sections.iter()).find(|section| named.is_some() && section.phase == named)
+            {
                 let name = named.unwrap_or_default();
                 let found = format!("phase `{name}` again, as in line {}", earlier.line);
-                return Err(refused(self.file, token.line, token.column, found, "each phase once"));
+                return Err(refused(
+                    self.file,
+                    token.line,
+                    token.column,
+                    found,
+                    "each phase once",
+                ));
             }
-            self.sections.push(Section { phase: named, line: token.line, equations: Vec::new() });
+            self.sections.push(Section {
+                phase: named,
+                line: token.line,
+                equations: Vec::new(),
+            });
         }
-        Ok(self.sections.last_mut().expect("one was just made if there was none"))
+        Ok(self
+            .sections
+            .last_mut()
+            .expect("one was just made if there was none"))
     }
 }

@@ -31,29 +31,75 @@ fn right_side(latex: &str) -> String {
 #[test]
 fn constructs_mean_what_they_print() {
     for (latex, expected) in [
-        (r"0.36 - 0.16\dot{z}_1 - 0.75\sin\left(\dot{z}_1\right) + 0.11u_1", "0.36 - 0.16*dz1 + 0.11*u1 - 0.75*sin(dz1)"),
-        (r"-\sin\dot z_1\cos 2z_2 + \tanh\!\bigl(z_1\bigr)", "tanh(z1) - cos(2*z2)*sin(dz1)"),
-        (r"\frac{1}{2} z_1 + \frac12 z_2 + \dfrac{z_1}{1+z_2^2}", "0.5*z1 + 0.5*z2 + z1/(1 + z2^2)"),
-        (r"\sin^2 z_1 + \cos^{2}(\dot z_{2})", "sin(z1)^2 + cos(dz2)^2"),
-        (r"{\dot z}_1 + \dot{z_2} + \dot{z}_{2}^{3} + z^2_1", "dz1 + dz2 + z1^2 + dz2^3"),
-        (r"\num{1.2e-3} z_1 + 1.5 \times 10^{-3} z_2 - \num{-2}", "2 + 0.0012*z1 + 0.0015*z2"),
-        (r"e^{-z_1} + \exp(z_2)\,\mathrm{e}^{z_1} + \exp(z_1)^{2}", "exp(-z1) + exp(z1)^2 + exp(z1)*exp(z2)"),
-        (r"|z_1| + \left|\dot z_1 - 1\right| + \lvert z_2 \rvert u_1", "u1*abs(z2) + abs(z1) + abs(-1 + dz1)"),
-        (r"\sqrt{z_1} + \sqrt[3]{z_2} + \ln z_1 + \log(z_2)", "z2^(1/3) + log(z1) + log(z2) + sqrt(z1)"),
-        (r"\operatorname{sgn}(z_1) + \mathop{\mathrm{sgn}}(\dot z_1)", "sign(z1) + sign(dz1)"),
+        (
+            r"0.36 - 0.16\dot{z}_1 - 0.75\sin\left(\dot{z}_1\right) + 0.11u_1",
+            "0.36 - 0.16*dz1 + 0.11*u1 - 0.75*sin(dz1)",
+        ),
+        (
+            r"-\sin\dot z_1\cos 2z_2 + \tanh\!\bigl(z_1\bigr)",
+            "tanh(z1) - cos(2*z2)*sin(dz1)",
+        ),
+        (
+            r"\frac{1}{2} z_1 + \frac12 z_2 + \dfrac{z_1}{1+z_2^2}",
+            "z1/2 + z2/2 + z1/(1 + z2^2)",
+        ),
+        (
+            r"\sin^2 z_1 + \cos^{2}(\dot z_{2})",
+            "sin(z1)^2 + cos(dz2)^2",
+        ),
+        (
+            r"{\dot z}_1 + \dot{z_2} + \dot{z}_{2}^{3} + z^2_1",
+            "dz1 + dz2 + z1^2 + dz2^3",
+        ),
+        (
+            r"\num{1.2e-3} z_1 + 1.5 \times 10^{-3} z_2 - \num{-2}",
+            "2 + 0.0012*z1 + 0.0015*z2",
+        ),
+        (
+            r"e^{-z_1} + \exp(z_2)\,\mathrm{e}^{z_1} + \exp(z_1)^{2}",
+            "exp(-z1) + exp(z1)^2 + exp(z1)*exp(z2)",
+        ),
+        (
+            r"|z_1| + \left|\dot z_1 - 1\right| + \lvert z_2 \rvert u_1",
+            "u1*abs(z2) + abs(z1) + abs(-1 + dz1)",
+        ),
+        (
+            r"\sqrt{z_1} + \sqrt[3]{z_2} + \ln z_1 + \log(z_2)",
+            "z2^(1/3) + log(z1) + log(z2) + sqrt(z1)",
+        ),
+        (
+            r"\operatorname{sgn}(z_1) + \mathop{\mathrm{sgn}}(\dot z_1)",
+            "sign(z1) + sign(dz1)",
+        ),
         (r"2 \cdot 3 z_1 * z_2 \times u_2", "6*z1*z2*u2"),
         (r"z_1(z_1 + 1)\left[2 - z_2\right]", "(1 + z1)*z1*(2 - z2)"),
-        (r"\begin{aligned}[t] & z_1 \\[2pt] & {} - 2 z_2, \end{aligned} \tag{25}\label{x}", "z1 - 2*z2"),
+        (
+            r"\begin{aligned}[t] & z_1 \\[2pt] & {} - 2 z_2, \end{aligned} \tag{25}\label{x}",
+            "z1 - 2*z2",
+        ),
         (r"z_1 \quad \text{in contact,}", "z1"),
-        (r"z_1(t) + u_{\mathrm{lat},2} + z_1/2 + 1/2 z_2", "0.5*z1 + 0.5*z2 + u2"),
+        (
+            r"z_1(t) + u_{\mathrm{lat},2} + z_1/2 + 1/2 z_2",
+            "z1 + z1/2 + z2/2 + u2",
+        ),
         ("2z_1 − 3·z_2 % a comment\n + u_1", "2*z1 - 3*z2 + u1"),
-        (r"\sin(z_1) z_2 + \sin{z_1} u_1 + \sin z_1^2", "z2*sin(z1) + u1*sin(z1) + sin(z1^2)"),
-        (r"z_1^{-2} + z_1^{1/2} + (z_1)^2", "z1^2 + z1^(-2) + sqrt(z1)"),
+        (
+            r"\sin(z_1) z_2 + \sin{z_1} u_1 + \sin z_1^2",
+            "z2*sin(z1) + u1*sin(z1) + sin(z1^2)",
+        ),
+        (
+            r"z_1^{-2} + z_1^{1/2} + (z_1)^2",
+            "z1^2 + z1^(-2) + sqrt(z1)",
+        ),
         (r"- - z_1 + -z_2", "z1 - z2"),
     ] {
         let mut pool = ExprPool::new();
         let expected = pool.parse(expected, &|_| true).expect(expected);
-        assert_eq!(right_side(latex), pool.display(expected).to_string(), "{latex}");
+        assert_eq!(
+            right_side(latex),
+            pool.display(expected).to_string(),
+            "{latex}"
+        );
     }
 }
 
@@ -89,10 +135,20 @@ fn unreadable_constructs_are_named_with_their_place() {
     ] {
         let text = format!("\\[\\ddot z_1={latex}\\]\n\\[\\ddot z_2 = 0\\]");
         let error = named(&text, &[]).expect_err(latex);
-        let ImportError::Text { line: at_line, column: at_column, found: what, .. } = &error else {
+        let ImportError::Text {
+            line: at_line,
+            column: at_column,
+            found: what,
+            ..
+        } = &error
+        else {
             panic!("{latex}: {error}");
         };
-        assert_eq!((*at_line, *at_column, what.as_str()), (line, column, found), "{latex}: {error}");
+        assert_eq!(
+            (*at_line, *at_column, what.as_str()),
+            (line, column, found),
+            "{latex}: {error}"
+        );
     }
 }
 
@@ -115,7 +171,10 @@ fn documents_are_read_with_their_macros_and_phases() {
     assert_eq!(
         found,
         [
-            (Some("contact".to_owned()), texts(&["0.5*dz1 - sign(dz2)", "0"])),
+            (
+                Some("contact".to_owned()),
+                texts(&["1/2*dz1 - sign(dz2)", "0"])
+            ),
             (Some("flight".to_owned()), texts(&["1", "u2"])),
             (Some("rear stance".to_owned()), texts(&["3", "4"])),
         ]
@@ -125,18 +184,31 @@ fn documents_are_read_with_their_macros_and_phases() {
 #[test]
 fn other_names_stand_for_the_variables_that_they_are_given_to() {
     let text = r"\[\ddot x = \dot x F_{\mathrm{lin},x}, \ddot\theta = \sin\theta - \dot\theta\]";
-    let found = named(text, &["z1=x", "z2=theta", "u1=F_lin,x"]).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(found[0].1, ["dz1*u1", "-dz2 + sin(z2)"]);
+    let found =
+        named(text, &["z1=x", "z2=theta", "u1=F_lin,x"]).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(found[0].1, ["u1*dz1", "-dz2 + sin(z2)"]);
     let error = named(text, &[]).expect_err("x is no variable").to_string();
-    assert!(error.starts_with(r"paper.tex:1:3: found `\ddot x`, expected"), "{error}");
-    assert!(SymbolNames::parse(&["dz1=v"]).is_err() && SymbolNames::parse(&["z1=x", "z2=x"]).is_err());
-    assert_eq!(named(r"\[\ddot z = -4z + u\]", &[]).expect("one coordinate")[0].1, ["-4*z1 + u1"]);
+    assert!(
+        error.starts_with(r"paper.tex:1:3: found `\ddot x`, expected"),
+        "{error}"
+    );
+    assert!(
+        SymbolNames::parse(&["dz1=v"]).is_err() && SymbolNames::parse(&["z1=x", "z2=x"]).is_err()
+    );
+    assert_eq!(
+        named(r"\[\ddot z = -4z + u\]", &[]).expect("one coordinate")[0].1,
+        ["u1 - 4*z1"]
+    );
 }
 
 #[test]
 fn hostile_documents_end_with_an_error() {
     let deep = |open: &str, close: &str| {
-        format!("\\[\\ddot z_1 = {}z_1{}\\]", open.repeat(50_000), close.repeat(50_000))
+        format!(
+            "\\[\\ddot z_1 = {}z_1{}\\]",
+            open.repeat(50_000),
+            close.repeat(50_000)
+        )
     };
     for text in [
         deep("(", ")"),
@@ -147,12 +219,19 @@ fn hostile_documents_end_with_an_error() {
         deep("\\dot{", "}"),
         deep("\\sqrt{", "}"),
         "\\def\\a{\\a\\a}\\[\\ddot z_1 = \\a\\]".to_owned(),
-        format!("\\def\\a#1{{{}}}\\[\\ddot z_1 = \\a{{{}}}\\]", "#1".repeat(9_000), "z_1".repeat(9_000)),
+        format!(
+            "\\def\\a#1{{{}}}\\[\\ddot z_1 = \\a{{{}}}\\]",
+            "#1".repeat(9_000),
+            "z_1".repeat(9_000)
+        ),
         "\\begin{align}\\ddot z_1 = 1".to_owned(),
         "\\[\\begin{cases}\\ddot z_1 = 1\\]".to_owned(),
         "\\[\\ddot z_1 = 1\\end{cases}\\]".to_owned(),
     ] {
         let short: String = text.chars().take(60).collect();
-        assert!(matches!(named(&text, &[]), Err(ImportError::Text { .. })), "{short}");
+        assert!(
+            matches!(named(&text, &[]), Err(ImportError::Text { .. })),
+            "{short}"
+        );
     }
 }

@@ -59,7 +59,8 @@ impl Token {
             Kind::Parameter(number) => format!("#{number}"),
             Kind::Comment(_) => "%".to_owned(),
             Kind::Paragraph => return "an empty line".to_owned(),
-            Kind::Character(character) => character.escape_debug().to_string(),
+            Kind::Character(c) if c.is_control() => c.escape_debug().to_string(),
+            Kind::Character(character) => character.to_string(),
         };
         let short: String = text.chars().take(40).collect();
         format!("`{short}`")
@@ -88,7 +89,11 @@ pub(super) fn of_markdown(text: &str) -> Vec<Token> {
     for (index, line) in text.lines().enumerate() {
         let number = index + 1;
         let mut push = |kind| {
-            tokens.push(Token { kind, line: number, column: 1 });
+            tokens.push(Token {
+                kind,
+                line: number,
+                column: 1,
+            });
         };
         let content = line.trim();
         if let Some(is_math) = fence {
@@ -121,7 +126,11 @@ pub(super) fn of_markdown(text: &str) -> Vec<Token> {
         for (place, part) in line.split("$$").enumerate() {
             if place > 0 {
                 in_display = !in_display;
-                tokens.push(Token { kind: Kind::Display, line: number, column: column - 2 });
+                tokens.push(Token {
+                    kind: Kind::Display,
+                    line: number,
+                    column: column - 2,
+                });
             }
             if in_display {
                 Line::new(part, number, column).read(&mut tokens);
@@ -143,7 +152,8 @@ fn unescaped(text: &str) -> String {
     let mut plain = String::new();
     let mut characters = text.chars().peekable();
     while let Some(character) = characters.next() {
-        let escapes = character == '\\' && characters.peek().is_some_and(char::is_ascii_punctuation);
+        let escapes =
+            character == '\\' && characters.peek().is_some_and(char::is_ascii_punctuation);
         if !escapes {
             plain.push(character);
         } else if let Some(next) = characters.next() {
@@ -165,7 +175,12 @@ struct Line {
 impl Line {
     fn new(text: &str, number: usize, start: usize) -> Self {
         let characters = text.chars().collect();
-        Self { characters, next: 0, number, start }
+        Self {
+            characters,
+            next: 0,
+            number,
+            start,
+        }
     }
 
     fn peek(&self, ahead: usize) -> Option<char> {
@@ -183,7 +198,11 @@ impl Line {
     fn read(mut self, tokens: &mut Vec<Token>) {
         if self.characters.iter().all(|c| c.is_whitespace()) {
             let kind = Kind::Paragraph;
-            tokens.push(Token { kind, line: self.number, column: self.start });
+            tokens.push(Token {
+                kind,
+                line: self.number,
+                column: self.start,
+            });
         }
         while let Some(first) = self.peek(0) {
             let column = self.start + self.next;
@@ -192,13 +211,16 @@ impl Line {
                 continue;
             }
             let kind = self.token(first);
-            tokens.push(Token { kind, line: self.number, column });
+            tokens.push(Token {
+                kind,
+                line: self.number,
+                column,
+            });
         }
     }
 
     fn token(&mut self, first: char) -> Kind {
-        let starts_decimal =
-            first == '.' && self.peek(1).is_some_and(|c| c.is_ascii_digit());
+        let starts_decimal = first == '.' && self.peek(1).is_some_and(|c| c.is_ascii_digit());
         if first.is_ascii_digit() || starts_decimal {
             return self.number();
         }
@@ -243,7 +265,9 @@ impl Line {
         }
         let sign = usize::from(matches!(self.peek(1), Some('+' | '-')));
         if matches!(self.peek(0), Some('e' | 'E')) && self.peek(1 + sign).is_some_and(digit) {
-            let exponent: String = self.characters[self.next..=self.next + sign].iter().collect();
+            let exponent: String = self.characters[self.next..=self.next + sign]
+                .iter()
+                .collect();
             self.next += 1 + sign;
             text = format!("{text}{exponent}{}", self.take_while(digit));
         }
@@ -270,7 +294,11 @@ impl Line {
             "newline" => return Kind::Break,
             _ => return Kind::Command(name),
         };
-        let open = self.next + self.characters[self.next..].iter().take_while(|c| **c == ' ').count();
+        let open = self.next
+            + self.characters[self.next..]
+                .iter()
+                .take_while(|c| **c == ' ')
+                .count();
         let rest = &self.characters[open.min(self.characters.len())..];
         match (rest.first(), rest.iter().position(|c| *c == '}')) {
             (Some('{'), Some(close)) => {
@@ -288,10 +316,13 @@ impl Line {
         }
         let rest = &self.characters[self.next..];
         let open = rest.iter().take_while(|c| **c == ' ').count();
-        let Some(close) = rest.iter().position(|c| *c == ']') else { return };
+        let Some(close) = rest.iter().position(|c| *c == ']') else {
+            return;
+        };
         let is_distance = rest.get(open) == Some(&'[')
             && close > open + 1
-            && (rest[open + 1..close].iter()).all(|c| c.is_ascii_alphanumeric() || " .-\\".contains(*c))
+            && (rest[open + 1..close].iter())
+                .all(|c| c.is_ascii_alphanumeric() || " .-\\".contains(*c))
             && rest[close - 1].is_ascii_alphabetic();
         if is_distance {
             self.next += close + 1;

@@ -1,11 +1,11 @@
 //! Factors of a normal form that are not taken apart, and the primes of constants.
 
-use num_bigint::BigInt;
+use num_bigint::{BigInt, BigUint};
 use num_integer::Integer;
-use num_rational::BigRational;
-use num_traits::{One, Signed, ToPrimitive};
+use num_traits::ToPrimitive;
 
 use super::polynomial::CanonicalForm;
+use super::rational::Rational;
 use crate::symbolic::node::{ExprId, SymbolId};
 
 /// A factor of a monomial.
@@ -30,33 +30,33 @@ const LARGEST_DIVISOR: u64 = 2_000;
 
 /// A positive number as a product of primes to integer powers. What is left after small divisors
 /// counts as a prime.
-pub(super) fn prime_powers(value: &BigRational) -> Vec<(BigInt, i32)> {
+pub(super) fn prime_powers(value: &Rational) -> Vec<(BigInt, i32)> {
     let mut powers: Vec<(BigInt, i32)> = Vec::new();
-    for (part, sign) in [(value.numer(), 1), (value.denom(), -1)] {
-        let mut rest = part.abs();
+    for (part, sign) in [(value.numerator(), 1), (value.denominator(), -1)] {
+        let mut rest = part.magnitude().clone();
         for divisor in (2..=LARGEST_DIVISOR).filter(|d| *d == 2 || d % 2 == 1) {
-            if rest.is_one() {
+            if rest == BigUint::from(1_u8) {
                 break;
             }
             if rest.to_u64().is_some_and(|rest| divisor * divisor > rest) {
                 break;
             }
-            let divisor = BigInt::from(divisor);
+            let divisor = BigUint::from(divisor);
             let mut count = 0;
             loop {
                 let (quotient, remainder) = rest.div_rem(&divisor);
-                if remainder != BigInt::ZERO {
+                if remainder != BigUint::ZERO {
                     break;
                 }
                 rest = quotient;
                 count += sign;
             }
             if count != 0 {
-                powers.push((divisor, count));
+                powers.push((divisor.into(), count));
             }
         }
-        if !rest.is_one() {
-            powers.push((rest, sign));
+        if rest != BigUint::from(1_u8) {
+            powers.push((rest.into(), sign));
         }
     }
     powers

@@ -3,8 +3,8 @@
 use std::hash::{Hash, Hasher};
 
 use num_bigint::BigInt;
-use num_rational::BigRational;
-use num_traits::{One, Signed, ToPrimitive, Zero};
+
+use super::rational::Rational;
 
 use crate::symbolic::number::Number;
 
@@ -16,7 +16,7 @@ const OUTWARD: f64 = 1.0 + 1e-12;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Literal {
     /// The exact value.
-    pub value: BigRational,
+    pub value: Rational,
     /// Largest distance of the number that was rounded; 0 for an exact one.
     pub radius: f64,
 }
@@ -38,42 +38,51 @@ impl Literal {
         }
         let unit = power_of_ten(last);
         let radius = match is_rounded {
-            true => 0.5 * unit.to_f64().unwrap_or(f64::INFINITY),
+            true => 0.5 * unit.to_f64(),
             false => 0.0,
         };
-        Some(Self { value: BigRational::from(mantissa) * unit, radius })
+        Some(Self {
+            value: &Rational::from(mantissa) * &unit,
+            radius,
+        })
     }
 
     /// The value as the nearest float, or one beside it.
     pub fn to_f64(&self) -> f64 {
-        self.value.to_f64().unwrap_or(f64::NAN)
+        self.value.to_f64()
     }
 
     /// The shortest decimal that reads back to a finite float.
     pub fn of_f64(value: f64) -> Option<Self> {
         let magnitude = Self::parse(&format!("{:?}", value.abs()), false)?;
-        let value = if value < 0.0 { -magnitude.value } else { magnitude.value };
+        let value = if value < 0.0 {
+            -magnitude.value
+        } else {
+            magnitude.value
+        };
         Some(Self { value, radius: 0.0 })
     }
 }
 
-fn power_of_ten(exponent: i32) -> BigRational {
-    let power = BigRational::from(BigInt::from(10).pow(exponent.unsigned_abs()));
+fn power_of_ten(exponent: i32) -> Rational {
+    let power = Rational::from(BigInt::from(10).pow(exponent.unsigned_abs()));
     if exponent < 0 { power.recip() } else { power }
 }
 
 /// `re + i im`, known to `radius` in magnitude.
 #[derive(Clone, Debug)]
 pub struct Coefficient {
-    pub(super) re: BigRational,
-    pub(super) im: BigRational,
+    pub(super) re: Rational,
+    pub(super) im: Rational,
     /// Bound of the distance from the number that was rounded.
     pub(super) radius: f64,
 }
 
 impl PartialEq for Coefficient {
     fn eq(&self, other: &Self) -> bool {
-        self.re == other.re && self.im == other.im && self.radius.to_bits() == other.radius.to_bits()
+        self.re == other.re
+            && self.im == other.im
+            && self.radius.to_bits() == other.radius.to_bits()
     }
 }
 
@@ -94,30 +103,38 @@ impl From<Literal> for Coefficient {
 impl From<Number> for Coefficient {
     fn from(number: Number) -> Self {
         let value = match number.as_rational() {
-            Some((top, bottom)) => BigRational::new(top.into(), bottom.into()),
-            None => Literal::of_f64(number.to_f64()).map_or_else(BigRational::zero, |l| l.value),
+            Some((top, bottom)) => Rational::new(top, bottom),
+            None => Literal::of_f64(number.to_f64()).map_or_else(Rational::zero, |l| l.value),
         };
         Self::real(value, 0.0)
     }
 }
 
 impl Coefficient {
-    pub(super) fn real(re: BigRational, radius: f64) -> Self {
-        Self { re, im: BigRational::zero(), radius }
+    pub(super) fn real(re: Rational, radius: f64) -> Self {
+        Self {
+            re,
+            im: Rational::zero(),
+            radius,
+        }
     }
 
     pub(super) fn integer(value: i64) -> Self {
-        Self::real(BigRational::from(BigInt::from(value)), 0.0)
+        Self::real(Rational::from(BigInt::from(value)), 0.0)
     }
 
-    pub(super) fn complex(re: BigRational, im: BigRational) -> Self {
-        Self { re, im, radius: 0.0 }
+    pub(super) fn complex(re: Rational, im: Rational) -> Self {
+        Self {
+            re,
+            im,
+            radius: 0.0,
+        }
     }
 
     /// `numerator/denominator` times the imaginary unit.
     pub(super) fn imaginary(numerator: i64, denominator: i64) -> Self {
-        let im = BigRational::new(numerator.into(), denominator.into());
-        Self::complex(BigRational::zero(), im)
+        let im = Rational::new(numerator, denominator);
+        Self::complex(Rational::zero(), im)
     }
 
     /// Whether the value is zero; its radius may not be.
@@ -127,13 +144,12 @@ impl Coefficient {
 
     /// The magnitude of the value.
     pub fn magnitude(&self) -> f64 {
-        let part = |value: &BigRational| value.to_f64().unwrap_or(f64::INFINITY);
-        part(&self.re).hypot(part(&self.im))
+        self.re.to_f64().hypot(self.im.to_f64())
     }
 
     /// The real part as a float.
     pub fn to_f64(&self) -> f64 {
-        self.re.to_f64().unwrap_or(f64::NAN)
+        self.re.to_f64()
     }
 
     /// Largest distance that rounded decimals allow.
@@ -148,11 +164,14 @@ impl Coefficient {
 
     /// The value without its radius.
     pub(super) fn exact(&self) -> Self {
-        Self { radius: 0.0, ..self.clone() }
+        Self {
+            radius: 0.0,
+            ..self.clone()
+        }
     }
 
     /// The value if it is real.
-    pub(super) fn as_real(&self) -> Option<&BigRational> {
+    pub(super) fn as_real(&self) -> Option<&Rational> {
         self.im.is_zero().then_some(&self.re)
     }
 
@@ -166,8 +185,8 @@ impl Coefficient {
     }
 
     /// `|re| + |im|`: a positive factor that scales with the value.
-    pub(super) fn size(&self) -> BigRational {
-        self.re.abs() + self.im.abs()
+    pub(super) fn size(&self) -> Rational {
+        &self.re.abs() + &self.im.abs()
     }
 
     /// `self - other`.
@@ -181,7 +200,11 @@ impl Coefficient {
             (0.0, radius) | (radius, 0.0) => radius,
             (a, b) => (a + b) * OUTWARD,
         };
-        Self { re: &self.re + &other.re, im: &self.im + &other.im, radius }
+        Self {
+            re: &self.re + &other.re,
+            im: &self.im + &other.im,
+            radius,
+        }
     }
 
     /// `self * other`.
@@ -191,12 +214,12 @@ impl Coefficient {
             (a, b) => (self.magnitude() * b + other.magnitude() * a + a * b) * OUTWARD,
         };
         let (re, im) = match (self.im.is_zero(), other.im.is_zero()) {
-            (true, true) => (&self.re * &other.re, BigRational::zero()),
+            (true, true) => (&self.re * &other.re, Rational::zero()),
             (true, false) => (&self.re * &other.re, &self.re * &other.im),
             (false, true) => (&self.re * &other.re, &self.im * &other.re),
             (false, false) => (
-                &self.re * &other.re - &self.im * &other.im,
-                &self.re * &other.im + &self.im * &other.re,
+                &(&self.re * &other.re) - &(&self.im * &other.im),
+                &(&self.re * &other.im) + &(&self.im * &other.re),
             ),
         };
         Self { re, im, radius }
@@ -204,7 +227,7 @@ impl Coefficient {
 
     /// The reciprocal; `None` for zero, or where zero is within the radius.
     pub(super) fn reciprocal(&self) -> Option<Self> {
-        let square = &self.re * &self.re + &self.im * &self.im;
+        let square = &(&self.re * &self.re) + &(&self.im * &self.im);
         let magnitude = self.magnitude();
         if square.is_zero() || self.radius >= magnitude {
             return None;
@@ -213,6 +236,10 @@ impl Coefficient {
             0.0 => 0.0,
             radius => radius / (magnitude * (magnitude - radius)) * OUTWARD,
         };
-        Some(Self { re: &self.re / &square, im: -(&self.im / &square), radius })
+        Some(Self {
+            re: &self.re * &square.recip(),
+            im: -(&self.im * &square.recip()),
+            radius,
+        })
     }
 }

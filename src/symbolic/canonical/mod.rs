@@ -30,6 +30,9 @@ mod atoms;
 mod coefficient;
 mod forms;
 mod polynomial;
+mod products;
+mod rational;
+mod roots;
 
 #[cfg(test)]
 mod tests;
@@ -37,3 +40,4 @@ mod tests;
 pub use coefficient::{Coefficient, Literal};
 pub use forms::CanonicalForms;
 pub use polynomial::CanonicalForm;
+pub use rational::Rational;

@@ -2,10 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use num_rational::BigRational;
-use num_traits::Zero;
-
 use super::coefficient::Coefficient;
+use super::rational::Rational;
 
 /// Most terms of a form, and most products of terms that one multiplication makes.
 const MAX_TERMS: usize = 2_000;
@@ -17,12 +15,15 @@ pub(super) struct Monomial {
     /// Atoms by their numbers, ascending, with powers that are not zero.
     pub(super) powers: Vec<(u32, i32)>,
     /// The exponential's argument: real and imaginary parts of its coefficients, not both zero.
-    pub(super) exponent: Vec<(Monomial, (BigRational, BigRational))>,
+    pub(super) exponent: Vec<(Monomial, (Rational, Rational))>,
 }
 
 impl Monomial {
     pub(super) fn atom(atom: u32, power: i32) -> Self {
-        Self { powers: vec![(atom, power)], exponent: Vec::new() }
+        Self {
+            powers: vec![(atom, power)],
+            exponent: Vec::new(),
+        }
     }
 
     pub(super) fn is_one(&self) -> bool {
@@ -35,8 +36,15 @@ impl Monomial {
     }
 
     pub(super) fn without(&self, atom: u32) -> Self {
-        let powers = self.powers.iter().copied().filter(|(known, _)| *known != atom);
-        Self { powers: powers.collect(), exponent: self.exponent.clone() }
+        let powers = self
+            .powers
+            .iter()
+            .copied()
+            .filter(|(known, _)| *known != atom);
+        Self {
+            powers: powers.collect(),
+            exponent: self.exponent.clone(),
+        }
     }
 
     /// The product; powers saturate far beyond what is ever expanded.
@@ -51,25 +59,35 @@ impl Monomial {
             (_, true) => self.exponent.clone(),
             (true, _) => other.exponent.clone(),
             (false, false) => {
-                let mut sum: BTreeMap<Monomial, (BigRational, BigRational)> = self.exponent.iter().cloned().collect();
+                let mut sum: BTreeMap<Monomial, (Rational, Rational)> =
+                    self.exponent.iter().cloned().collect();
                 for (monomial, (re, im)) in &other.exponent {
-                    let entry = sum.entry(monomial.clone()).or_insert_with(|| (BigRational::zero(), BigRational::zero()));
-                    entry.0 += re;
-                    entry.1 += im;
+                    let entry = sum
+                        .entry(monomial.clone())
+                        .or_insert_with(|| (Rational::zero(), Rational::zero()));
+                    entry.0 = &entry.0 + re;
+                    entry.1 = &entry.1 + im;
                 }
                 sum.retain(|_, (re, im)| !re.is_zero() || !im.is_zero());
                 sum.into_iter().collect()
             }
         };
-        Self { powers: powers.into_iter().collect(), exponent }
+        Self {
+            powers: powers.into_iter().collect(),
+            exponent,
+        }
     }
 
     pub(super) fn reciprocal(&self) -> Self {
-        let negated = |(monomial, (re, im)): &(Monomial, (BigRational, BigRational))| {
+        let negated = |(monomial, (re, im)): &(Monomial, (Rational, Rational))| {
             (monomial.clone(), (-re.clone(), -im.clone()))
         };
         Self {
-            powers: self.powers.iter().map(|(atom, power)| (*atom, power.saturating_neg())).collect(),
+            powers: self
+                .powers
+                .iter()
+                .map(|(atom, power)| (*atom, power.saturating_neg()))
+                .collect(),
             exponent: self.exponent.iter().map(negated).collect(),
         }
     }
@@ -139,17 +157,28 @@ impl CanonicalForm {
 
     /// The coefficient of the last monomial.
     pub(super) fn leading(&self) -> Option<&Coefficient> {
-        self.terms.last_key_value().map(|(_, coefficient)| coefficient)
+        self.terms
+            .last_key_value()
+            .map(|(_, coefficient)| coefficient)
     }
 
     pub(super) fn has_radius(&self) -> bool {
-        self.terms.values().any(|coefficient| coefficient.radius > 0.0)
+        self.terms
+            .values()
+            .any(|coefficient| coefficient.radius > 0.0)
     }
 
     /// The values without their radii.
     pub(super) fn exact(&self) -> Self {
-        let terms = self.terms.iter().filter(|(_, coefficient)| !coefficient.is_zero());
-        Self { terms: terms.map(|(monomial, c)| (monomial.clone(), c.exact())).collect() }
+        let terms = self
+            .terms
+            .iter()
+            .filter(|(_, coefficient)| !coefficient.is_zero());
+        Self {
+            terms: terms
+                .map(|(monomial, c)| (monomial.clone(), c.exact()))
+                .collect(),
+        }
     }
 
     pub(super) fn scaled(&self, factor: &Coefficient) -> Self {
@@ -186,7 +215,10 @@ impl CanonicalForm {
         let mut products = Vec::with_capacity(count);
         for (monomial, coefficient) in &self.terms {
             for (other_monomial, other_coefficient) in &other.terms {
-                products.push((coefficient.times(other_coefficient), monomial.times(other_monomial)));
+                products.push((
+                    coefficient.times(other_coefficient),
+                    monomial.times(other_monomial),
+                ));
             }
         }
         Some(products)

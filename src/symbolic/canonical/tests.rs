@@ -16,7 +16,8 @@ fn difference(a: &str, b: &str) -> (CanonicalForm, f64) {
     let literal = |symbol: SymbolId| {
         let name = pool.symbol_name(symbol);
         let rounded = name.strip_prefix('~').map(|digits| (digits, true));
-        let (digits, is_rounded) = rounded.or(name.strip_prefix('#').map(|digits| (digits, false)))?;
+        let (digits, is_rounded) =
+            rounded.or(name.strip_prefix('#').map(|digits| (digits, false)))?;
         Literal::parse(digits, is_rounded)
     };
     let mut forms = CanonicalForms::new(&pool, &[left, right], &literal);
@@ -102,17 +103,27 @@ fn rounded_decimals_agree_within_half_a_unit_of_their_last_digit() {
     assert!(agree("0.3612*x - 51.046", "~0.36*x - 51.05"));
     assert!(!agree("0.3652*x", "~0.36*x"));
     assert!(agree("0.35*x*y + 0.24*x", "~x*(0.3*y + 0.2) + 0.0*x"));
-    assert!(agree("sin(0.3612*x) + exp(-1.21*y)", "~sin(0.36*x) + exp(-1.2*y)"));
+    assert!(agree(
+        "sin(0.3612*x) + exp(-1.21*y)",
+        "~sin(0.36*x) + exp(-1.2*y)"
+    ));
     assert!(!agree("sin(0.3612*x)", "~sin(0.35*x)"));
     assert!(agree("x/(1.204 + y)", "~x/(1.2 + y)"));
     assert!(agree("x/0.333", "~x/0.33"));
     let (form, rounding) = difference("sin(0.3612*x)", "~sin(0.36*x)");
-    assert!(form.is_zero() && (rounding - 0.0012).abs() < 1e-15, "{rounding}");
+    assert!(
+        form.is_zero() && (rounding - 0.0012).abs() < 1e-15,
+        "{rounding}"
+    );
     assert!(!difference("0.3612*x", "~0.36*x").0.is_zero());
 }
 
 #[test]
 fn large_powers_stay_whole_and_equal_to_themselves() {
-    assert!(difference("(x + y + z)^900 + sin(x)", "sin(x) + (z + x + y)^900").0.is_zero());
+    assert!(
+        difference("(x + y + z)^900 + sin(x)", "sin(x) + (z + x + y)^900")
+            .0
+            .is_zero()
+    );
     assert!(!difference("(x + y + z)^900", "(x + y)^900").0.may_be_zero());
 }

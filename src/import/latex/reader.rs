@@ -1,0 +1,268 @@
+//! A display being read: its tokens, groups, and the pieces made of it.
+
+use super::super::equations::refused;
+use super::super::error::ImportError;
+use super::names::SymbolNames;
+use super::token::{Kind, Token};
+
+/// Most nested groups.
+pub(super) const MAX_DEPTH: usize = 60;
+/// Commands that change only how the page looks; those of the second list take an argument.
+pub(super) const INVISIBLE: &str = ", ; : ! > quad qquad enspace thinspace medspace thickspace negthinspace \
+    displaystyle textstyle scriptstyle limits nolimits nonumber notag allowbreak nobreak \
+    allowdisplaybreaks hfill hfil mathstrut strut relax big Big bigg Bigg centering noindent par \
+    smallskip medskip bigskip";
+pub(super) const INVISIBLE_WITH_ARGUMENT: &str =
+    "tag hspace vspace mspace hskip phantom hphantom vphantom color cline";
+/// Commands that only choose a font.
+pub(super) const FONTS: &str = "mathrm mathit mathbf mathsf mathtt bm boldsymbol pmb text textrm textit textup \
+    mathnormal operatorname mathop mathord mathbin mathopen mathclose mathinner mbox";
+pub(super) const SIZES: &str = "bigl Bigl biggl Biggl bigr Bigr biggr Biggr bigm";
+
+/// How integers of a document's coefficients were rounded, where it says so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Digits {
+    /// Places after the point.
+    Decimals(usize),
+    /// Significant digits.
+    Significant(usize),
+}
+
+/// A variable with its dots: `\ddot z_1` is `z_1` and 2.
+pub(super) struct Symbol {
+    pub(super) name: String,
+    pub(super) dots: usize,
+    pub(super) place: (usize, usize),
+}
+
+impl Symbol {
+    /// The variable in quotes, for messages.
+    pub(super) fn quoted(&self) -> String {
+        let dots = ["", "\\dot ", "\\ddot ", "\\dddot "][self.dots.min(3)];
+        format!("`{dots}{}`", self.name)
+    }
+}
+
+/// What was read last, where it decides whether a product may go on without a sign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Last {
+    Number,
+    Other,
+    /// A function whose argument had no parentheses.
+    Bare,
+    /// The same with a number as its argument.
+    BareNumber,
+}
+
+pub(super) struct Reader<'a> {
+    pub(super) file: &'a str,
+    pub(super) names: &'a SymbolNames,
+    /// Whether `z` and `u` need no subscript.
+    pub(super) alone: bool,
+    pub(super) digits: Option<Digits>,
+    pub(super) tokens: Vec<Token>,
+    /// For each opening brace, where it closes.
+    pub(super) closing: Vec<usize>,
+    pub(super) at: usize,
+    pub(super) end: usize,
+    pub(super) depth: usize,
+    /// Whether each open delimiter is a bar.
+    pub(super) bars: Vec<bool>,
+    pub(super) pieces: Vec<(usize, usize, String)>,
+}
+
+pub(super) const BARE: &str = "parentheses around the argument of the function before";
+
+pub(super) type Read<T> = Result<T, ImportError>;
+
+pub(super) fn has(list: &str, word: &str) -> bool {
+    list.split_whitespace().any(|known| known == word)
+}
+
+impl<'a> Reader<'a> {
+    /// A reader of one display's tokens.
+    ///
+    /// # Errors
+    /// [`ImportError::Text`] for braces without partner.
+    pub(super) fn new(file: &'a str, names: &'a SymbolNames, tokens: &[Token]) -> Read<Self> {
+        let tokens = with_split_digits(tokens);
+        let mut closing = vec![0; tokens.len()];
+        let mut open = Vec::new();
+        for (place, token) in tokens.iter().enumerate() {
+            match token.kind {
+                Kind::Open => open.push(place),
+                Kind::Close => match open.pop() {
+                    Some(start) => closing[start] = place,
+                    None => open.extend([place, place]),
+                },
+                _ => {}
+            }
+        }
+        if let Some(token) = open.first().map(|place| &tokens[*place]) {
+            let found = format!("{} without its partner", token.quoted());
+            return Err(refused(
+                file,
+                token.line,
+                token.column,
+                found,
+                "braces in pairs",
+            ));
+        }
+        let end = tokens.len();
+        Ok(Self {
+            file,
+            names,
+            alone: false,
+            digits: None,
+            tokens,
+            closing,
+            at: 0,
+            end,
+            depth: 0,
+            bars: Vec::new(),
+            pieces: Vec::new(),
+        })
+    }
+
+    /// Passes what prints nothing; what follows, or nothing at the end.
+    pub(super) fn peek(&mut self) -> Option<&Token> {
+        while self.at < self.end {
+            let after = match &self.tokens[self.at].kind {
+                Kind::Align | Kind::Break | Kind::Label(_) | Kind::Comment(_) | Kind::Paragraph => {
+                    self.at + 1
+                }
+                Kind::Character('~') => self.at + 1,
+                Kind::Open if self.closing[self.at] == self.at + 1 => self.at + 2,
+                Kind::Command(name) if name == " " || has(INVISIBLE, name) || has(SIZES, name) => {
+                    self.at + 1
+                }
+                Kind::Command(name) if has(INVISIBLE_WITH_ARGUMENT, name) => {
+                    let star = usize::from(self.kind(self.at + 1) == Some(&Kind::Character('*')));
+                    self.after_argument(self.at + 1 + star)
+                }
+                _ => break,
+            };
+            self.at = after;
+        }
+        (self.at < self.end).then(|| &self.tokens[self.at])
+    }
+
+    pub(super) fn kind(&self, at: usize) -> Option<&Kind> {
+        self.tokens[..self.end].get(at).map(|token| &token.kind)
+    }
+
+    /// The place behind the group or token at `at`.
+    pub(super) fn after_argument(&self, at: usize) -> usize {
+        match self.kind(at) {
+            Some(Kind::Open) => self.closing[at] + 1,
+            Some(_) => at + 1,
+            None => at,
+        }
+    }
+
+    pub(super) fn character(&mut self, wanted: char) -> bool {
+        let found = self
+            .peek()
+            .is_some_and(|token| token.kind == Kind::Character(wanted));
+        self.at += usize::from(found);
+        found
+    }
+
+    pub(super) fn command(&mut self, wanted: &str) -> bool {
+        let found = self.peek().is_some_and(|token| token.is_command(wanted));
+        self.at += usize::from(found);
+        found
+    }
+
+    /// Refuses what comes next.
+    pub(super) fn unexpected<T>(&mut self, expected: &str) -> Read<T> {
+        let (line, column, found) = match self.peek() {
+            Some(token) => (token.line, token.column, token.quoted()),
+            None => {
+                let last = self.tokens[..self.end].last();
+                let found = match self.tokens.get(self.end) {
+                    Some(next) => next.quoted(),
+                    None => "the end of the equation".to_owned(),
+                };
+                last.map_or((1, 1, found.clone()), |t| (t.line, t.column, found))
+            }
+        };
+        Err(refused(self.file, line, column, found, expected))
+    }
+
+    pub(super) fn here(&mut self) -> (usize, usize) {
+        self.peek()
+            .map_or((1, 1), |token| (token.line, token.column))
+    }
+
+    pub(super) fn push(&mut self, (line, column): (usize, usize), text: impl Into<String>) {
+        self.pieces.push((line, column, text.into()));
+    }
+
+    /// Runs `read` on the group or token that comes next, which must be used up.
+    pub(super) fn inside<T>(&mut self, read: impl FnOnce(&mut Self) -> Read<T>) -> Read<T> {
+        if self.peek().is_none() {
+            return self.unexpected("an argument");
+        }
+        self.depth += 1;
+        if self.depth > MAX_DEPTH {
+            return self.unexpected(&format!("at most {MAX_DEPTH} nested groups"));
+        }
+        let mut range = (self.at, self.at + 1);
+        let mut after = self.at + 1;
+        match &self.tokens[self.at].kind {
+            Kind::Open => {
+                after = self.closing[self.at] + 1;
+                range = (self.at + 1, after - 1);
+            }
+            Kind::Number(text) if text.len() > 1 => {
+                return self.unexpected("braces around an argument of several digits");
+            }
+            _ => {}
+        }
+        let outer_end = std::mem::replace(&mut self.end, range.1);
+        self.at = range.0;
+        let bars = std::mem::take(&mut self.bars);
+        let value = read(self)?;
+        if self.peek().is_some() {
+            return self.unexpected("an operator or the end of the group");
+        }
+        (self.bars, self.depth) = (bars, self.depth - 1);
+        (self.at, self.end) = (after, outer_end);
+        Ok(value)
+    }
+}
+
+/// The tokens with digits apart where LaTeX takes one digit as an argument: `x^12`, `\frac12`.
+fn with_split_digits(tokens: &[Token]) -> Vec<Token> {
+    let mut split: Vec<Token> = Vec::with_capacity(tokens.len());
+    for token in tokens {
+        let arguments = match split.last().map(|before| &before.kind) {
+            Some(Kind::Superscript | Kind::Subscript) => 1,
+            Some(Kind::Command(name)) if name == "sqrt" => 1,
+            Some(Kind::Command(name)) if name.ends_with("frac") => 2,
+            _ => 0,
+        };
+        let Kind::Number(text) = &token.kind else {
+            split.push(token.clone());
+            continue;
+        };
+        let digits = text
+            .bytes()
+            .take_while(u8::is_ascii_digit)
+            .count()
+            .min(arguments);
+        let parts = (0..digits).map(|place| (place, &text[place..=place]));
+        for (place, part) in
+            parts.chain(Some((digits, &text[digits..])).filter(|rest| !rest.1.is_empty()))
+        {
+            let kind = Kind::Number(part.to_owned());
+            split.push(Token {
+                kind,
+                line: token.line,
+                column: token.column + place,
+            });
+        }
+    }
+    split
+}

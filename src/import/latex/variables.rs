@@ -1,0 +1,301 @@
+//! Functions with their arguments, and variables with dots and subscripts.
+
+use super::super::equations::refused;
+use super::names::is_greek;
+use super::reader::{FONTS, INVISIBLE, Last, Read, Reader, Symbol, has};
+use super::token::Kind;
+use crate::model::LatentVariable;
+
+impl Reader<'_> {
+    /// A function's name at the reader's place, and the place behind it.
+    pub(super) fn function_name(&self) -> Option<(String, usize)> {
+        let Some(Kind::Command(command)) = self.kind(self.at) else {
+            return None;
+        };
+        if let Some(name) = function(command) {
+            return Some((name.to_owned(), self.at + 1));
+        }
+        if !has(FONTS, command) || self.kind(self.at + 1) != Some(&Kind::Open) {
+            return None;
+        }
+        let close = self.closing[self.at + 1];
+        let word: String = (self.tokens[self.at + 2..close].iter())
+            .filter_map(|token| match &token.kind {
+                Kind::Character(letter) => Some(*letter),
+                Kind::Command(inner) if has(FONTS, inner) => None,
+                Kind::Open | Kind::Close => None,
+                _ => Some('?'),
+            })
+            .collect();
+        let name = match word.as_str() {
+            "e" if self.kind(close + 1) == Some(&Kind::Superscript) => {
+                return Some(("e".to_owned(), close + 2));
+            }
+            "sgn" | "sign" => "sign",
+            "abs" => "abs",
+            "sqrt" => "sqrt",
+            word => function(word)?,
+        };
+        Some((name.to_owned(), close + 1))
+    }
+
+    pub(super) fn call(&mut self, place: (usize, usize), name: &str) -> Read<Last> {
+        if name == "e" {
+            return self.exponential(place);
+        }
+        let mut power = None;
+        if self
+            .peek()
+            .is_some_and(|token| token.kind == Kind::Superscript)
+        {
+            self.at += 1;
+            power =
+                Some(self.inside(|reader| {
+                    match reader.peek().map(|token| token.kind.clone()) {
+                        Some(Kind::Number(text)) => {
+                            reader.at += 1;
+                            Ok(text)
+                        }
+                        _ => reader.unexpected(
+                            "a positive power; an inverse function has no reading here",
+                        ),
+                    }
+                })?);
+        }
+        self.push(place, format!("{name}("));
+        let argument = self.here();
+        let last = match self.peek().map(|token| token.kind.clone()) {
+            Some(Kind::Character('(' | '[')) => self.delimited(argument).map(|()| Last::Other)?,
+            Some(Kind::Command(opener)) if opener == "left" && !self.opens_bar() => {
+                self.delimited(argument).map(|()| Last::Other)?
+            }
+            Some(Kind::Open) => self
+                .inside(|reader| reader.sum(false))
+                .map(|()| Last::Other)?,
+            _ => self.bare_argument()?,
+        };
+        self.push(place, ")");
+        match power {
+            Some(power) => self.push(place, format!("^({power})")),
+            None if last == Last::Other => self.powers(place)?,
+            None => {}
+        }
+        Ok(last)
+    }
+
+    /// `\sin 2\dot z_1`: numbers and one more factor.
+    pub(super) fn bare_argument(&mut self) -> Read<Last> {
+        self.deepen()?;
+        let first = self.factor(false)?;
+        let place = self.here();
+        let next = self.peek().map(|token| token.kind.clone());
+        let goes_on = match &next {
+            Some(Kind::Command(name)) if function(name).is_some() => false,
+            Some(kind) => self.starts_factor(kind) && !matches!(kind, Kind::Number(_)),
+            None => false,
+        };
+        let is_dot =
+            matches!(&next, Some(Kind::Command(name)) if matches!(name.as_str(), "cdot" | "times"));
+        let is_number = first == Last::Number && !(goes_on && !is_dot);
+        if first == Last::Number && !is_number {
+            self.push(place, "*");
+            self.factor(false)?;
+        }
+        self.depth -= 1;
+        Ok(if is_number {
+            Last::BareNumber
+        } else {
+            Last::Bare
+        })
+    }
+
+    pub(super) fn variable(&mut self, place: (usize, usize), symbol: &Symbol) -> Read<Last> {
+        let variable = self.names.variable(&symbol.name, self.alone);
+        let name = match (variable, symbol.dots) {
+            (Some(variable @ (LatentVariable::Z(_) | LatentVariable::U(_))), 0) => {
+                variable.to_string()
+            }
+            (Some(LatentVariable::Z(index)), 1) => LatentVariable::Dz(index).to_string(),
+            _ => {
+                let (line, column) = symbol.place;
+                return Err(refused(
+                    self.file,
+                    line,
+                    column,
+                    symbol.quoted(),
+                    self.names.expected(),
+                ));
+            }
+        };
+        self.push(place, name);
+        self.skip_time();
+        self.powers(place)?;
+        Ok(Last::Other)
+    }
+
+    /// Passes `(t)` behind a variable.
+    pub(super) fn skip_time(&mut self) {
+        let start = self.at;
+        let is_time = self.character('(') && self.character('t') && self.character(')');
+        if !is_time {
+            self.at = start;
+        }
+    }
+
+    /// Reads a variable with dots and subscript; nothing if there is none.
+    pub(super) fn symbol(&mut self) -> Read<Option<Symbol>> {
+        let place = self.here();
+        let Some((name, dots)) = self.glyph(0)? else {
+            return Ok(None);
+        };
+        let mut symbol = Symbol { name, dots, place };
+        self.subscript(&mut symbol)?;
+        // A power may stand before the subscript: both follow the same letter.
+        let power = self.at;
+        if !symbol.name.contains('_') && self.peek().is_some_and(|t| t.kind == Kind::Superscript) {
+            let behind = self.after_argument(self.at + 1);
+            if self.kind(behind) == Some(&Kind::Subscript) {
+                self.at = behind;
+                self.subscript(&mut symbol)?;
+                let end = self.at;
+                self.tokens[power..end].rotate_left(behind - power);
+                self.relink(power, end);
+                self.at = power + (end - behind);
+            }
+        }
+        Ok(Some(symbol))
+    }
+
+    /// Finds the partners of braces again between two places.
+    pub(super) fn relink(&mut self, from: usize, to: usize) {
+        let mut open = Vec::new();
+        for place in from..to {
+            match self.tokens[place].kind {
+                Kind::Open => open.push(place),
+                Kind::Close => {
+                    if let Some(start) = open.pop() {
+                        self.closing[start] = place;
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// A letter, a Greek letter or a word, with dots above it.
+    pub(super) fn glyph(&mut self, depth: usize) -> Read<Option<(String, usize)>> {
+        let Some(kind) = self.peek().map(|token| token.kind.clone()) else {
+            return Ok(None);
+        };
+        let at = self.at;
+        match &kind {
+            Kind::Character(letter) if letter.is_ascii_alphabetic() => {
+                self.at += 1;
+                Ok(Some((letter.to_string(), 0)))
+            }
+            Kind::Command(name) if is_greek(name) => {
+                self.at += 1;
+                Ok(Some((name.clone(), 0)))
+            }
+            Kind::Command(name)
+                if depth < 8 && matches!(name.as_str(), "dot" | "ddot" | "dddot") =>
+            {
+                self.at += 1;
+                let more = name.len() - 2;
+                let inner = self.inside(|reader| {
+                    let Some((name, dots)) = reader.glyph(depth + 1)? else {
+                        return Ok(None);
+                    };
+                    let mut symbol = Symbol {
+                        name,
+                        dots,
+                        place: (0, 0),
+                    };
+                    reader.subscript(&mut symbol)?;
+                    Ok(reader.peek().is_none().then_some(symbol))
+                });
+                match inner.ok().flatten() {
+                    Some(symbol) => Ok(Some((symbol.name, symbol.dots + more))),
+                    None => {
+                        self.at = at + 1;
+                        self.unexpected("a variable under the dots")
+                    }
+                }
+            }
+            Kind::Command(name) if has(FONTS, name) => {
+                self.at += 1;
+                let close = self.after_argument(self.at);
+                let word = self.word(self.at, close);
+                self.at = close;
+                Ok(word.map(|word| (word, 0)))
+            }
+            Kind::Open if depth < 8 => {
+                let close = self.closing[at];
+                let end = std::mem::replace(&mut self.end, close);
+                self.at += 1;
+                let inner = self.glyph(depth + 1)?;
+                let is_whole = self.peek().is_none();
+                self.end = end;
+                self.at = if is_whole { close + 1 } else { at };
+                Ok(inner.filter(|_| is_whole))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// Reads `_1`, `_{10}`, `_{\mathrm{lat},1}` behind a variable.
+    pub(super) fn subscript(&mut self, symbol: &mut Symbol) -> Read<()> {
+        if self
+            .peek()
+            .is_none_or(|token| token.kind != Kind::Subscript)
+        {
+            return Ok(());
+        }
+        self.at += 1;
+        let parts = self.inside(|reader| {
+            let word = reader.word(reader.at, reader.end);
+            match word {
+                Some(word) => {
+                    reader.at = reader.end;
+                    Ok(word)
+                }
+                None => reader.unexpected("a subscript of letters, digits and commas"),
+            }
+        })?;
+        if symbol.name.contains('_') {
+            return self.unexpected("one subscript");
+        }
+        symbol.name = format!("{}_{parts}", symbol.name);
+        Ok(())
+    }
+
+    /// Letters, digits and commas between two places, fonts aside.
+    pub(super) fn word(&self, from: usize, to: usize) -> Option<String> {
+        let mut word = String::new();
+        for token in &self.tokens[from..to.min(self.end)] {
+            match &token.kind {
+                Kind::Character(c) if c.is_ascii_alphabetic() || *c == ',' => word.push(*c),
+                Kind::Number(text) if !text.contains(['.', '+', '-']) => word.push_str(text),
+                Kind::Command(name) if is_greek(name) => word.push_str(name),
+                Kind::Command(name) if has(FONTS, name) || has(INVISIBLE, name) => {}
+                Kind::Open | Kind::Close => {}
+                _ => return None,
+            }
+        }
+        (!word.is_empty()).then_some(word)
+    }
+}
+
+/// The grammar's name of a function that LaTeX has a command for.
+pub(super) fn function(command: &str) -> Option<&'static str> {
+    Some(match command {
+        "sin" => "sin",
+        "cos" => "cos",
+        "tan" => "tan",
+        "tanh" => "tanh",
+        "exp" => "exp",
+        "ln" | "log" => "log",
+        "sgn" | "sign" => "sign",
+        _ => return None,
+    })
+}

@@ -1,0 +1,140 @@
+//! Products and powers of normal forms, with the powers of atoms in their ranges.
+
+use super::atoms::Atom;
+use super::coefficient::Coefficient;
+use super::forms::CanonicalForms;
+use super::polynomial::{CanonicalForm, Monomial};
+
+/// Largest power of a sum that is multiplied out, and of a single term.
+const MAX_SUM_POWER: u32 = 40;
+const MAX_TERM_POWER: u32 = 2_000;
+/// Most terms that are looked at while one product is put in order.
+const MAX_STEPS: usize = 200_000;
+
+impl CanonicalForms<'_> {
+    pub(super) fn product(
+        &mut self,
+        a: &CanonicalForm,
+        b: &CanonicalForm,
+    ) -> Option<CanonicalForm> {
+        let products = a.products(b)?;
+        self.settled(products)
+    }
+
+    /// The sum of terms, with the powers of roots, magnitudes and signs in their ranges.
+    pub(super) fn settled(
+        &mut self,
+        mut pending: Vec<(Coefficient, Monomial)>,
+    ) -> Option<CanonicalForm> {
+        let mut form = CanonicalForm::default();
+        let mut steps = 0;
+        while let Some((coefficient, monomial)) = pending.pop() {
+            steps += 1;
+            if steps > MAX_STEPS {
+                return None;
+            }
+            match self.rewritten(&monomial)? {
+                None => form.add(coefficient, monomial),
+                Some((rest, factor)) => pending.extend(
+                    (factor.terms.iter())
+                        .map(|(other, scale)| (coefficient.times(scale), rest.times(other))),
+                ),
+            }
+        }
+        Some(form)
+    }
+
+    /// A monomial with one atom out of range, as a monomial without it times a form. The outer
+    /// option is empty if that is too large.
+    #[allow(clippy::type_complexity, reason = "a pair that is taken apart at once")]
+    pub(super) fn rewritten(
+        &mut self,
+        monomial: &Monomial,
+    ) -> Option<Option<(Monomial, CanonicalForm)>> {
+        for &(atom, power) in &monomial.powers {
+            let with_power = |power: i32| match power {
+                0 => monomial.without(atom),
+                _ => monomial.without(atom).times(&Monomial::atom(atom, power)),
+            };
+            match self.atoms[atom as usize].clone() {
+                Atom::Sum(sum) if power > 0 => {
+                    return Some(Some((with_power(0), self.power(&sum, power)?)));
+                }
+                Atom::Root(base, index) => {
+                    let index = i32::try_from(index).ok()?;
+                    let (whole, rest) = (power.div_euclid(index), power.rem_euclid(index));
+                    if whole != 0 {
+                        return Some(Some((with_power(rest), self.power(&base, whole)?)));
+                    }
+                }
+                Atom::Abs(base) => {
+                    let rest = power.rem_euclid(2);
+                    if rest != power {
+                        return Some(Some((with_power(rest), self.power(&base, power - rest)?)));
+                    }
+                    let sign = self.numbers.get(&Atom::Sign(base.clone())).copied();
+                    let sign = sign.map_or((0, 0), |sign| (sign, monomial.power_of(sign)));
+                    if sign.1 > 0 {
+                        // |x| sign(x) = x, |x| sign(x)^2 = |x|.
+                        let rest = monomial.without(sign.0);
+                        return Some(Some(match sign.1 % 2 {
+                            0 => (rest, CanonicalForm::constant(Coefficient::integer(1))),
+                            _ => (rest.without(atom), base),
+                        }));
+                    }
+                }
+                Atom::Sign(_) if !(0..=2).contains(&power) => {
+                    let rest = 2 - power.rem_euclid(2);
+                    let one = CanonicalForm::constant(Coefficient::integer(1));
+                    return Some(Some((with_power(rest), one)));
+                }
+                _ => {}
+            }
+        }
+        Some(None)
+    }
+
+    pub(super) fn power(&mut self, base: &CanonicalForm, exponent: i32) -> Option<CanonicalForm> {
+        let one = CanonicalForm::constant(Coefficient::integer(1));
+        if exponent == 0 {
+            return Some(one);
+        }
+        let base = if exponent < 0 {
+            self.reciprocal(base)?
+        } else {
+            base.clone()
+        };
+        let count = exponent.unsigned_abs();
+        let limit = if base.terms.len() > 1 {
+            MAX_SUM_POWER
+        } else {
+            MAX_TERM_POWER
+        };
+        if count > limit {
+            return None;
+        }
+        let (mut power, mut square, mut rest) = (one, base, count);
+        loop {
+            if rest % 2 == 1 {
+                power = self.product(&power, &square)?;
+            }
+            rest /= 2;
+            if rest == 0 {
+                return Some(power);
+            }
+            square = self.product(&square, &square)?;
+        }
+    }
+
+    pub(super) fn reciprocal(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
+        let leading = form.leading()?;
+        if let Some((coefficient, monomial)) = form.as_term() {
+            let reciprocal = (coefficient.reciprocal()?, monomial.reciprocal());
+            return self.settled(vec![reciprocal]);
+        }
+        let factor = leading.exact().reciprocal()?;
+        let monic = self.argument(form.scaled(&factor));
+        let atom = self.number(Atom::Sum(monic));
+        Some(CanonicalForm::term(factor, Monomial::atom(atom, -1)))
+    }
+}

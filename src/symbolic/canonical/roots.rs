@@ -1,0 +1,247 @@
+//! Roots, logarithms, exponentials and magnitudes of normal forms.
+
+use num_bigint::BigInt;
+use num_traits::ToPrimitive;
+
+use super::atoms::{Atom, prime_powers};
+use super::coefficient::Coefficient;
+use super::forms::{CanonicalForms, MAX_ROOT, exponentials};
+use super::polynomial::{CanonicalForm, Monomial};
+use super::rational::Rational;
+
+impl CanonicalForms<'_> {
+    /// `scale * prod base^power * exp(E)` of a form that is positive where it is used: a positive
+    /// number, forms that are positive there, and the exponential.
+    pub(super) fn split(&mut self, form: &CanonicalForm) -> Option<Split> {
+        let form = self.argument(form.clone());
+        let scale = form.leading()?.size();
+        let inverse = Coefficient::real(scale.recip(), 0.0);
+        let Some((coefficient, monomial)) = form.as_term() else {
+            let factors = vec![(form.scaled(&inverse), 1)];
+            return Some(Split {
+                scale,
+                factors,
+                exponent: CanonicalForm::default(),
+            });
+        };
+        let mut factors = Vec::new();
+        let mut rest = Monomial::default();
+        for &(atom, power) in &monomial.powers {
+            let base = CanonicalForm::term(Coefficient::integer(1), Monomial::atom(atom, 1));
+            match &self.atoms[atom as usize] {
+                Atom::Root(..) | Atom::Abs(_) => factors.push((base, power)),
+                _ if self.positive.contains(&atom) => factors.push((base, power)),
+                _ if power % 2 == 0 => factors.push((self.abs(&base)?, power)),
+                _ => rest = rest.times(&Monomial::atom(atom, power)),
+            }
+        }
+        let sign = coefficient.times(&inverse);
+        match rest.powers[..] {
+            [] if sign.is_one() => {}
+            [] => return None,
+            [(atom, power)] => {
+                factors.push((CanonicalForm::term(sign, Monomial::atom(atom, 1)), power))
+            }
+            _ => factors.push((CanonicalForm::term(sign, rest), 1)),
+        }
+        let mut exponent = CanonicalForm::default();
+        for (monomial, (re, im)) in &monomial.exponent {
+            exponent.add(
+                Coefficient::complex(re.clone(), im.clone()),
+                monomial.clone(),
+            );
+        }
+        Some(Split {
+            scale,
+            factors,
+            exponent,
+        })
+    }
+
+    pub(super) fn log(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
+        let split = self.split(form)?;
+        let mut sum = split.exponent;
+        for (prime, power) in prime_powers(&split.scale) {
+            let prime = CanonicalForm::constant(Coefficient::real(prime.into(), 0.0));
+            let log = self.atom(Atom::Log(prime));
+            sum = sum.plus(&log.scaled(&Coefficient::integer(power.into())));
+        }
+        for (base, power) in split.factors {
+            let (base, index) = self.radicand(base);
+            let share = Rational::new(power, index);
+            let log = self.atom(Atom::Log(base));
+            sum = sum.plus(&log.scaled(&Coefficient::real(share, 0.0)));
+        }
+        Some(sum)
+    }
+
+    pub(super) fn root(&mut self, form: &CanonicalForm, index: u32) -> Option<CanonicalForm> {
+        if form.is_zero() {
+            return Some(CanonicalForm::default());
+        }
+        let split = self.split(form)?;
+        let share = Rational::new(1, index);
+        let mut root = self.exp(split.exponent.scaled(&Coefficient::real(share, 0.0)))?;
+        let primes = prime_powers(&split.scale)
+            .into_iter()
+            .map(|(prime, power)| {
+                (
+                    CanonicalForm::constant(Coefficient::real(prime.into(), 0.0)),
+                    power,
+                )
+            });
+        for (base, power) in primes.chain(split.factors) {
+            let (base, inner) = self.radicand(base);
+            let exponent = Rational::new(power, BigInt::from(index) * inner);
+            let factor = self.positive_power(&base, &exponent)?;
+            root = self.product(&root, &factor)?;
+        }
+        Some(root)
+    }
+
+    /// What stands under a root, with its index; anything else with 1.
+    pub(super) fn radicand(&self, base: CanonicalForm) -> (CanonicalForm, u32) {
+        match base.as_term() {
+            Some((coefficient, monomial))
+                if coefficient.is_one() && monomial.exponent.is_empty() =>
+            {
+                match monomial.powers[..] {
+                    [(atom, 1)] => match &self.atoms[atom as usize] {
+                        Atom::Root(radicand, index) => (radicand.clone(), *index),
+                        _ => (base, 1),
+                    },
+                    _ => (base, 1),
+                }
+            }
+            _ => (base, 1),
+        }
+    }
+
+    /// `base ^ exponent` of a positive base.
+    pub(super) fn positive_power(
+        &mut self,
+        base: &CanonicalForm,
+        exponent: &Rational,
+    ) -> Option<CanonicalForm> {
+        let whole = exponent.floor().to_i32()?;
+        let rest = exponent - &Rational::from(exponent.floor());
+        let power = self.power(base, whole)?;
+        if rest.is_zero() {
+            return Some(power);
+        }
+        let index = rest
+            .denominator()
+            .to_i64()
+            .filter(|index| *index <= MAX_ROOT)?;
+        let root = self.number(Atom::Root(base.clone(), u32::try_from(index).ok()?));
+        let root = CanonicalForm::term(
+            Coefficient::integer(1),
+            Monomial::atom(root, rest.numerator().to_i32()?),
+        );
+        self.product(&power, &root)
+    }
+
+    /// `exp`: multiples of logarithms become powers of what they are logarithms of.
+    pub(super) fn exp(&mut self, argument: CanonicalForm) -> Option<CanonicalForm> {
+        let argument = self.argument(argument);
+        let mut rest = CanonicalForm::default();
+        let mut product = CanonicalForm::constant(Coefficient::integer(1));
+        for (monomial, coefficient) in &argument.terms {
+            let log = match (monomial.powers.as_slice(), monomial.exponent.is_empty()) {
+                ([(atom, 1)], true) => match &self.atoms[*atom as usize] {
+                    Atom::Log(base) => Some(base.clone()),
+                    _ => None,
+                },
+                _ => None,
+            };
+            let factor = match (log, coefficient.as_real()) {
+                (Some(base), Some(exponent)) => self.positive_power(&base, exponent),
+                _ => None,
+            };
+            match factor {
+                Some(factor) => product = self.product(&product, &factor)?,
+                None => rest.add(coefficient.clone(), monomial.clone()),
+            }
+        }
+        let [exponential, _] = exponentials(&rest, false);
+        self.product(&product, &exponential)
+    }
+
+    pub(super) fn abs(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
+        let form = self.argument(form.clone());
+        let Some(leading) = form.leading() else {
+            return Some(form);
+        };
+        let scale = Coefficient::real(leading.size(), 0.0);
+        let sign = if leading.is_negative() { -1 } else { 1 };
+        let normed = form
+            .scaled(&scale.reciprocal()?)
+            .scaled(&Coefficient::integer(sign));
+        let Some((coefficient, monomial)) = normed.as_term().filter(|(c, _)| c.is_one()) else {
+            return Some(self.atom(Atom::Abs(normed)).scaled(&scale));
+        };
+        let mut product = CanonicalForm::term(
+            coefficient.clone(),
+            Monomial {
+                powers: Vec::new(),
+                exponent: monomial.exponent.clone(),
+            },
+        );
+        for &(atom, power) in &monomial.powers {
+            let base = CanonicalForm::term(Coefficient::integer(1), Monomial::atom(atom, 1));
+            let is_positive = self.positive.contains(&atom)
+                || matches!(self.atoms[atom as usize], Atom::Root(..) | Atom::Abs(_));
+            let factor = match is_positive || power % 2 == 0 {
+                true => self.power(&base, power)?,
+                false => {
+                    let magnitude = self.atom(Atom::Abs(base));
+                    self.power(&magnitude, power)?
+                }
+            };
+            product = self.product(&product, &factor)?;
+        }
+        Some(product.scaled(&scale))
+    }
+
+    pub(super) fn sign(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
+        let form = self.argument(form.clone());
+        let Some(leading) = form.leading() else {
+            return Some(form);
+        };
+        let sign = Coefficient::integer(if leading.is_negative() { -1 } else { 1 });
+        if let Some(constant) = form.as_constant()
+            && constant.as_real().is_some()
+        {
+            return Some(CanonicalForm::constant(sign));
+        }
+        let size = Coefficient::real(leading.size(), 0.0).reciprocal()?;
+        let normed = form.scaled(&size).scaled(&sign);
+        let is_symbol = |atom: &u32| matches!(self.atoms[*atom as usize], Atom::Symbol(_));
+        let factors: Option<Vec<(u32, i32)>> =
+            normed.as_term().and_then(|(coefficient, monomial)| {
+                let symbols = monomial.powers.iter().all(|(atom, _)| is_symbol(atom));
+                (coefficient.is_one() && symbols).then(|| monomial.powers.clone())
+            });
+        let Some(factors) = factors else {
+            return Some(self.atom(Atom::Sign(normed)).scaled(&sign));
+        };
+        let mut product = CanonicalForm::constant(sign);
+        for (atom, power) in factors {
+            if self.positive.contains(&atom) {
+                continue;
+            }
+            let base = CanonicalForm::term(Coefficient::integer(1), Monomial::atom(atom, 1));
+            let factor = self.atom(Atom::Sign(base));
+            let factor = self.power(&factor, 2 - (power.abs() % 2))?;
+            product = self.product(&product, &factor)?;
+        }
+        Some(product)
+    }
+}
+
+/// See [`CanonicalForms::split`].
+pub(super) struct Split {
+    pub(super) scale: Rational,
+    pub(super) factors: Vec<(CanonicalForm, i32)>,
+    pub(super) exponent: CanonicalForm,
+}

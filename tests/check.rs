@@ -1,0 +1,8 @@
+//! `romc check`: models against their own print, mutated ones, papers typed by hand, and the command.
+
+#[path = "check/command.rs"]
+mod command;
+#[path = "check/models.rs"]
+mod models;
+#[path = "check/papers.rs"]
+mod papers;

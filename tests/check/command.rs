@@ -1,0 +1,149 @@
+//! The command from outside: exit codes, text and JSON.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn check(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_romc"))
+        .arg("check")
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("the binary runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[test]
+fn equal_files_exit_with_0_and_say_how_far_rounding_reaches() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(
+        folder.path().join("a.txt"),
+        "[contact]\nddz1 = 0.3612*sin(2*z1)\n",
+    )
+    .expect("written");
+    let paper =
+        r"\begin{equation}\label{eq:contact} \ddot z_1 = 0.72\sin z_1\cos z_1 \end{equation}";
+    fs::write(folder.path().join("b.tex"), paper).expect("written");
+    let output = check(folder.path(), &["a.txt", "b.tex"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert_eq!(
+        text(&output.stdout),
+        "A: a.txt\nB: b.tex\n\nphase contact\n  ddz1: proven equal up to the printed digits \
+         (coefficients differ by at most 0.0006000)\n\nA and B say the same: 1 equations proven \
+         equal, 1 of them up to the printed digits\n"
+    );
+    let output = check(folder.path(), &["a.txt", "b.tex", "--exact", "--json"]);
+    assert_eq!(output.status.code(), Some(1), "decimals as written differ");
+    let value: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(value["equal"], false);
+    assert_eq!(value["phases"][0]["equations"][0]["verdict"], "different");
+    let output = check(folder.path(), &["a.txt", "a.txt"]);
+    assert_eq!(output.status.code(), Some(0));
+    assert!(text(&output.stdout).ends_with("A and B say the same: 1 equations proven equal\n"));
+}
+
+#[test]
+fn different_files_exit_with_1_and_a_point_inside_the_domain() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, contents: &str| {
+        fs::write(folder.path().join(name), contents).expect("written")
+    };
+    write(
+        "a.txt",
+        "[contact]\nddz1 = 0.5*z1 + u1\n[flight]\nddz1 = -1 + log(z1)\n",
+    );
+    write(
+        "b.txt",
+        "[contact]\nddz1 = 0.5*z1 - u1\n[flight]\nddz1 = -1 + log(abs(z1))\n[rear]\nddz1 = 0\n",
+    );
+    write(
+        "domain.toml",
+        "[contact]\nz1 = [4.0, 5.0]\nu1 = [2.0, 2.5]\n",
+    );
+    let output = check(
+        folder.path(),
+        &["a.txt", "b.txt", "--domain", "domain.toml", "--json"],
+    );
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    let value: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let contact = &value["phases"][0]["equations"][0];
+    let at = |name: &str| contact["point"]["at"][name].as_f64().expect("a value");
+    assert!((4.0..=5.0).contains(&at("z1")) && (2.0..=2.5).contains(&at("u1")));
+    let difference = contact["point"]["difference"].as_f64().expect("a number");
+    assert!((difference - 2.0 * at("u1")).abs() < 1e-9);
+    assert_eq!(contact["terms"][0]["term"], "u1");
+    let flight = &value["phases"][1]["equations"][0];
+    assert_eq!(flight["verdict"], "equal");
+    assert!(flight["one_sided"]["a"].is_null() && flight["one_sided"]["b"].is_number());
+    assert_eq!(value["phases"][2]["equations"][0]["missing_in"], "A");
+}
+
+#[test]
+fn unreadable_files_exit_with_2_and_name_the_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(
+        folder.path().join("a.tex"),
+        "\\[\\ddot z_1 = \\sinh z_1\\]\n",
+    )
+    .expect("written");
+    fs::write(folder.path().join("b.txt"), "ddz1 = z1").expect("written");
+    fs::write(folder.path().join("c.npz"), "").expect("written");
+    fs::write(folder.path().join("d.toml"), "[contact]\nx = [0, 1]\n").expect("written");
+    for (arguments, message) in [
+        (
+            vec!["a.tex", "b.txt"],
+            "error: a.tex:1:15: found `\\sinh`, expected",
+        ),
+        (
+            vec!["b.txt", "c.npz"],
+            "error: c.npz: found the ending `.npz`, expected a model",
+        ),
+        (
+            vec!["b.txt", "none.txt"],
+            "error: none.txt: cannot read the file",
+        ),
+        (
+            vec!["b.txt", "b.txt", "--domain", "d.toml"],
+            "error: d.toml: [contact] `x`: expected z1",
+        ),
+        (
+            vec!["b.txt", "b.txt", "--symbols", "y=x"],
+            "error: `y=x`: expected `VARIABLE=NAME`",
+        ),
+    ] {
+        let output = check(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        let stderr = text(&output.stderr);
+        assert!(stderr.starts_with(message), "{stderr}");
+        assert!(output.stdout.is_empty());
+    }
+}
+
+#[test]
+fn papers_become_models() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/papers/align.tex");
+    let output = Command::new(env!("CARGO_BIN_EXE_romc"))
+        .args([
+            "import",
+            paper.to_str().expect("a name"),
+            "--output",
+            "paper.json",
+        ])
+        .current_dir(folder.path())
+        .output()
+        .expect("the binary runs");
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/paper-2d.json");
+    let output = check(
+        folder.path(),
+        &["paper.json", shipped.to_str().expect("a name")],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stdout));
+}
