@@ -54,5 +54,6 @@ targets! {
     gzip_recordings_of_the_corpus_never_panic: recording_gz, at least 4;
     npz_files_of_the_corpus_never_panic: import_npz, at least 2;
     safetensors_files_of_the_corpus_never_panic: import_safetensors, at least 1;
+    latex_of_the_corpus_never_panics_and_equals_itself: import_latex, at least 7;
     equations_of_the_corpus_never_panic: import_equations, at least 2;
 }

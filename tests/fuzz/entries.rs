@@ -7,6 +7,7 @@
 )]
 
 use romc::artifact;
+use romc::check::{CheckOptions, Side, compare};
 use romc::deploy::{EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::import::{
@@ -179,12 +180,22 @@ pub fn import_equations(bytes: &[u8]) {
     imported(Format::Equations, bytes);
 }
 
+pub fn import_latex(bytes: &[u8]) {
+    imported(Format::Latex, bytes);
+    let options = CheckOptions::default();
+    if let Ok(side) = Side::from_bytes("fuzz.tex", bytes, &options, &[])
+        && bytes.len() < 2048
+    {
+        assert!(compare(&side, &side, &options).says_the_same());
+    }
+}
+
 /// A model that is imported is written and reads back equal.
 fn imported(format: Format, bytes: &[u8]) {
     let library = parse_standard("degree=1,inputs").expect("a shorthand");
     let options = ImportOptions {
         name: "fuzz".to_owned(),
-        library: (format != Format::Equations)
+        library: matches!(format, Format::Npz | Format::Safetensors)
             .then_some(LibraryChoice::Standard(library, LibraryOrder::Author)),
         scaling: Some(Scaling::uniform(0.1)),
         ..ImportOptions::default()
