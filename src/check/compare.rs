@@ -149,7 +149,7 @@ fn paired<'p>(left: &'p [SidePhase], right: &'p [SidePhase]) -> Vec<[Option<&'p 
     for [phase, partner] in pairs.iter_mut().filter(|pair| pair[1].is_none()) {
         let is_named = phase.is_some_and(|phase| phase.name.is_some());
         let free = (0..right.len())
-            .find(|place| !taken[*place] && !(is_named && right[*place].name.is_some()));
+            .find(|place| !(taken[*place] || is_named && right[*place].name.is_some()));
         if let Some(place) = free {
             (*partner, taken[place]) = (Some(&right[place]), true);
         }

@@ -4,7 +4,10 @@ use super::*;
 use crate::import::error::ImportError;
 use crate::symbolic::ExprPool;
 
-fn named(text: &str, names: &[&str]) -> Result<Vec<(Option<String>, Vec<String>)>, ImportError> {
+/// Phases with the texts of their right sides.
+type Phases = Vec<(Option<String>, Vec<String>)>;
+
+fn named(text: &str, names: &[&str]) -> Result<Phases, ImportError> {
     let names = SymbolNames::parse(names).expect("names of the test");
     let known = ["contact", "flight", "rear stance"].map(str::to_owned);
     let sections = read("paper.tex", text.as_bytes(), &names, &known)?;

@@ -96,7 +96,7 @@ impl Reader<'_> {
         };
         let is_dot =
             matches!(&next, Some(Kind::Command(name)) if matches!(name.as_str(), "cdot" | "times"));
-        let is_number = first == Last::Number && !(goes_on && !is_dot);
+        let is_number = first == Last::Number && (is_dot || !goes_on);
         if first == Last::Number && !is_number {
             self.push(place, "*");
             self.factor(false)?;
