@@ -34,10 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let started = std::time::Instant::now();
     let (cancel, mut listener) = (AtomicBool::new(false), |_| ());
     let trained = train(
-        Recordings {
-            training: &training,
-            validation: &validation,
-        },
+        Recordings::new(&training, &validation),
         robot,
         &options,
         &Origin::new("cargo run --release --example train_model", &training),

@@ -38,10 +38,7 @@ fn train_with(
 ) -> Result<Trained, TrainError> {
     let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
     let origin = Origin::new("romc train", training);
-    let recordings = Recordings {
-        training,
-        validation,
-    };
+    let recordings = Recordings::new(training, validation);
     train::closed_form(
         recordings,
         go1(),
@@ -230,10 +227,7 @@ fn cancelled_training_ends_without_a_model_when_none_is_complete() {
     let (cancel, mut listener) = (AtomicBool::new(true), |_: Progress| ());
     let training = jumps("train", 1);
     let result = train::closed_form(
-        Recordings {
-            training: &training,
-            validation: &[],
-        },
+        Recordings::new(&training, &[]),
         go1(),
         &TrainOptions::new("m", 2),
         &Origin::new("romc train", &training),
@@ -255,10 +249,7 @@ fn cancelled_at(
         }
     };
     let training = jumps("train", 2);
-    let recordings = Recordings {
-        training: &training,
-        validation: &[],
-    };
+    let recordings = Recordings::new(&training, &[]);
     let mut watch = Watch::new(&mut listener, &cancel);
     method(recordings, go1(), options, &Origin::default(), &mut watch)
 }
@@ -340,10 +331,7 @@ fn joint(training: &[Recording], options: &TrainOptions, news: &mut Vec<String>)
             news.push(text);
         }
     };
-    let recordings = Recordings {
-        training,
-        validation: &[],
-    };
+    let recordings = Recordings::new(training, &[]);
     let origin = Origin::new("romc train", training);
     let mut watch = Watch::new(&mut listener, &cancel);
     train::joint(recordings, go1(), options, &origin, &mut watch).expect("trains")
@@ -428,10 +416,7 @@ fn hidden_layers_are_refused_where_they_make_no_sense() {
     options.joint.maps.encoder_layers = vec![8, 1];
     let training = jumps("train", 1);
     let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
-    let recordings = Recordings {
-        training: &training,
-        validation: &[],
-    };
+    let recordings = Recordings::new(&training, &[]);
     let mut watch = Watch::new(&mut listener, &cancel);
     let narrow = train::joint(recordings, go1(), &options, &Origin::default(), &mut watch);
     assert!(

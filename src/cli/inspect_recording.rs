@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::output::{Table, significant};
 use crate::Error;
-use crate::recording::check::{CheckOptions, Finding, check};
+use crate::recording::check::{Finding, check};
 use crate::recording::{PhaseRule, PhaseSpan, Recording, Segment, Stance};
 use crate::robot::{JOINT_DIM, Robot};
 
@@ -24,7 +24,7 @@ const FINDINGS_SHOWN: usize = 12;
 /// # Errors
 /// [`Error::Recording`] if no phase rule covers the feet.
 pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
-    let findings = check(recording, robot, &CheckOptions::default());
+    let findings = check(recording, robot);
     let rule = PhaseRule::three_phase().with_min_samples(CHATTER);
     let mut text = format!(
         "{}: {} samples in {} segments\n",

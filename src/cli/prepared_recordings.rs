@@ -1,115 +1,141 @@
-//! Recordings on their way into a training: divided into sets, checked, made ready.
+//! Recordings on their way into a training: divided into sets, checked, conditioned while they are read.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde_json::{Value, json};
 
 use super::args::{TrainArguments, TrainSettings};
 use super::inspect_recording::finding_json;
-use super::output::read_recordings;
 use super::train_settings;
 use crate::Error;
 use crate::recording::check::Finding;
-use crate::recording::{ConditionOptions, ImplausibleSamples, Recording, condition};
+use crate::recording::{
+    self, ConditionOptions, ImplausibleSamples, Recording, RecordingError, RecordingFile,
+    RecordingFiles,
+};
 use crate::robot::Robot;
 
-/// The recordings of a training as the files have them.
+/// A jump of a divided set: its file, its segment there, and the first row.
+type Place = (PathBuf, usize, usize);
+
+/// The recordings of a training; their files are read when the samples are needed.
 pub struct RecordedSets {
     /// What the model is fitted to.
-    pub training: Vec<Recording>,
+    pub training: Arc<RecordingFiles>,
     /// What chooses between candidates.
-    pub validation: Vec<Recording>,
+    pub validation: Arc<RecordingFiles>,
     /// What nothing sees before the end.
-    pub test: Vec<Recording>,
+    pub test: Arc<RecordingFiles>,
+    /// The jumps of each set, if they were divided.
+    pub divided: Option<[Vec<Place>; 3]>,
+    options: ConditionOptions,
 }
 
 impl RecordedSets {
-    /// Reads what the arguments name, divided by their shares if they have any.
+    /// The recordings that the arguments name, divided by their shares if they have any, to be conditioned as the
+    /// settings say.
     ///
     /// # Errors
-    /// [`Error::Recording`] for a file, [`Error::Train`] for fewer jumps than sets.
-    pub fn read(arguments: &TrainArguments, seed: u64) -> Result<Self, Error> {
-        let training = read_recordings(&arguments.recordings)?;
+    /// [`Error::Recording`] for a file, [`Error::Train`] for fewer jumps than sets or a filter that does not exist.
+    pub fn new(
+        arguments: &TrainArguments,
+        settings: &TrainSettings,
+        robot: &'static Robot,
+        seed: u64,
+    ) -> Result<Self, Error> {
         let Some(split) = arguments.split else {
-            return Ok(Self {
-                training,
-                validation: read_recordings(&arguments.validation)?,
-                test: read_recordings(&arguments.test)?,
-            });
+            let paths = [
+                &arguments.recordings[..],
+                &arguments.validation,
+                &arguments.test,
+            ];
+            return Self::whole(paths, settings, robot);
         };
-        let sets = split.of(&training, seed)?;
-        Ok(Self {
-            training: sets.training,
-            validation: sets.validation,
-            test: sets.test,
-        })
+        let jumps = jumps_of(&arguments.recordings)?;
+        let sets = split.of(jumps.len(), seed)?;
+        let sets = sets.map(|set| -> Vec<Place> {
+            let places = set.into_iter().map(|jump| jumps[jump].clone());
+            places.collect()
+        });
+        let files = sets.each_ref().map(|set| chosen_segments(set));
+        let mut divided = Self::of_files(files, settings, robot)?;
+        divided.divided = Some(sets);
+        Ok(divided)
     }
 
-    /// Which jumps came into which set: file and first row of each.
-    pub fn json(&self) -> Value {
-        let places = |set: &[Recording]| -> Vec<Value> {
-            let jumps = set.iter().flat_map(|recording| &recording.segments);
-            jumps
-                .map(|jump| json!({ "file": jump.path.display().to_string(), "row": jump.first_row }))
-                .collect()
-        };
-        json!({
-            "training": places(&self.training),
-            "validation": places(&self.validation),
-            "test": places(&self.test),
-        })
-    }
-}
-
-/// Makes recordings ready as the settings say, and keeps what it found.
-pub struct Intake {
-    robot: &'static Robot,
-    options: ConditionOptions,
-    findings: Vec<(PathBuf, Finding)>,
-    left_out: usize,
-}
-
-impl Intake {
-    /// An intake that has seen nothing yet.
+    /// Whole files for training, validation and test.
     ///
     /// # Errors
     /// [`Error::Train`] for a filter that does not exist.
-    pub fn new(settings: &TrainSettings, robot: &'static Robot) -> Result<Self, Error> {
+    pub fn whole(
+        paths: [&[PathBuf]; 3],
+        settings: &TrainSettings,
+        robot: &'static Robot,
+    ) -> Result<Self, Error> {
+        let whole = |path: &PathBuf| RecordingFile {
+            path: path.clone(),
+            segments: None,
+        };
+        let files = paths.map(|paths| paths.iter().map(whole).collect());
+        Self::of_files(files, settings, robot)
+    }
+
+    fn of_files(
+        files: [Vec<RecordingFile>; 3],
+        settings: &TrainSettings,
+        robot: &'static Robot,
+    ) -> Result<Self, Error> {
+        let options = train_settings::conditioning(settings)?;
+        let [training, validation, test] =
+            files.map(|files| Arc::new(RecordingFiles::new(files, robot, options.clone())));
         Ok(Self {
-            robot,
-            options: train_settings::conditioning(settings)?,
-            findings: Vec::new(),
-            left_out: 0,
+            training,
+            validation,
+            test,
+            divided: None,
+            options,
         })
     }
 
-    /// The recordings of one set, made ready.
-    ///
-    /// # Errors
-    /// [`Error::Recording`] where too little remains.
-    pub fn take(&mut self, set: &[Recording]) -> Result<Vec<Recording>, Error> {
-        let mut ready = Vec::with_capacity(set.len());
-        for recording in set {
-            let conditioned = condition(recording, self.robot, &self.options)?;
-            let found = conditioned.findings.into_iter();
-            self.findings
-                .extend(found.map(|finding| (recording.path.clone(), finding)));
-            self.left_out += conditioned.left_out;
-            ready.push(conditioned.recording);
-        }
-        Ok(ready)
+    /// Which jumps came into which set, file and first row of each, if they were divided.
+    pub fn json(&self) -> Option<Value> {
+        let places = |set: &[Place]| -> Vec<Value> {
+            let jumps = set.iter();
+            jumps
+                .map(|(path, _, row)| json!({ "file": path.display().to_string(), "row": row }))
+                .collect()
+        };
+        let [training, validation, test] = self.divided.as_ref()?;
+        Some(json!({
+            "training": places(training),
+            "validation": places(validation),
+            "test": places(test),
+        }))
     }
 
-    /// Tells on stderr which files have implausible samples, and what became of them.
-    pub fn tell(&self) {
+    /// The findings with their files, and the number of samples left out, as far as files were read.
+    fn notes(&self) -> (Vec<(PathBuf, Finding)>, usize) {
+        let sets = [&self.training, &self.validation, &self.test];
+        let notes = sets.map(|set| set.notes());
+        let left_out = notes.iter().map(|notes| notes.left_out).sum();
+        (
+            notes.into_iter().flat_map(|notes| notes.findings).collect(),
+            left_out,
+        )
+    }
+
+    /// Reports on stderr which files have implausible samples, and what became of them.
+    pub fn report_findings(&self) {
+        let (findings, left_out) = self.notes();
         let mut files: Vec<&Path> = Vec::new();
-        for (file, _) in &self.findings {
+        for (file, _) in &findings {
             if !files.contains(&file.as_path()) {
                 files.push(file);
             }
         }
         for file in files {
-            let of_file = self.findings.iter().filter(|(path, _)| path == file);
+            let of_file = findings.iter().filter(|(path, _)| path == file);
             let runs: Vec<&Finding> = of_file.map(|(_, finding)| finding).collect();
             eprintln!(
                 "note: {}: {} implausible runs of samples, such as {}",
@@ -119,10 +145,10 @@ impl Intake {
             );
         }
         match self.options.implausible {
-            ImplausibleSamples::LeaveOut if self.left_out > 0 => {
-                eprintln!("note: {} samples are left out", self.left_out);
+            ImplausibleSamples::LeaveOut if left_out > 0 => {
+                eprintln!("note: {left_out} samples are left out");
             }
-            ImplausibleSamples::Keep if !self.findings.is_empty() => eprintln!(
+            ImplausibleSamples::Keep if !findings.is_empty() => eprintln!(
                 "note: they stay; `romc inspect` lists them, --leave-out-implausible leaves them out"
             ),
             ImplausibleSamples::LeaveOut | ImplausibleSamples::Keep => {}
@@ -130,12 +156,54 @@ impl Intake {
     }
 
     /// Every finding with its place, and how many samples were left out.
-    pub fn json(&self) -> Value {
-        let findings = self.findings.iter().map(|(file, finding)| {
+    pub fn findings_json(&self) -> Value {
+        let (findings, left_out) = self.notes();
+        let findings = findings.iter().map(|(file, finding)| {
             let mut value = finding_json(finding);
             value["file"] = json!(file.display().to_string());
             value
         });
-        json!({ "implausible": findings.collect::<Vec<_>>(), "left_out": self.left_out })
+        json!({ "implausible": findings.collect::<Vec<_>>(), "left_out": left_out })
     }
+}
+
+/// All recordings of a set of files, in memory.
+///
+/// # Errors
+/// [`Error::Recording`] for the first that cannot be read, or of which too little remains.
+pub fn read_all(files: &RecordingFiles) -> Result<Vec<Recording>, Error> {
+    let mut all = Vec::new();
+    files.for_each(|recording| {
+        all.push(recording);
+        Ok::<_, RecordingError>(())
+    })?;
+    Ok(all)
+}
+
+/// Every jump of these files.
+fn jumps_of(paths: &[PathBuf]) -> Result<Vec<Place>, Error> {
+    let mut jumps = Vec::new();
+    for path in paths {
+        let recording = recording::read(path)?;
+        let segments = recording.segments.iter().enumerate();
+        jumps.extend(segments.map(|(index, segment)| (path.clone(), index, segment.first_row)));
+    }
+    Ok(jumps)
+}
+
+/// The files of a set of jumps; neighbours in the same file are read together.
+fn chosen_segments(jumps: &[Place]) -> Vec<RecordingFile> {
+    let mut files: Vec<RecordingFile> = Vec::new();
+    for (path, segment, _) in jumps {
+        match files.last_mut() {
+            Some(file) if file.path == *path => {
+                file.segments.get_or_insert_default().push(*segment);
+            }
+            Some(_) | None => files.push(RecordingFile {
+                path: path.clone(),
+                segments: Some(vec![*segment]),
+            }),
+        }
+    }
+    files
 }

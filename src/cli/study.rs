@@ -6,8 +6,8 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::{StudyArguments, TrainMethod, TrainSettings};
-use super::output::{Table, read_recordings, significant, spinner};
-use super::prepared_recordings::Intake;
+use super::output::{Table, significant, spinner};
+use super::prepared_recordings::{RecordedSets, read_all};
 use super::report::figure_files;
 use super::train_settings;
 use crate::Error;
@@ -17,7 +17,7 @@ use crate::recording::Recording;
 use crate::report::study_figures;
 use crate::robot::Robot;
 use crate::study::{self, Plan, Shard, Spread, Store, Summary, cells_csv};
-use crate::train::{Origin, Recordings};
+use crate::train::Origin;
 
 /// The tables of a study.
 const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
@@ -61,10 +61,14 @@ fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
 fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let settings = settings(arguments)?;
     let robot = Robot::by_name(settings.robot.as_deref().unwrap_or("go1"))?;
-    let mut intake = Intake::new(&settings, robot)?;
-    let training = intake.take(&read_recordings(&arguments.recordings)?)?;
-    let validation = intake.take(&read_recordings(&arguments.validation)?)?;
-    intake.tell();
+    let recorded = RecordedSets::whole(
+        [&arguments.recordings, &arguments.validation, &[]],
+        &settings,
+        robot,
+    )?;
+    let training = read_all(&recorded.training)?;
+    let validation = read_all(&recorded.validation)?;
+    recorded.report_findings();
     let plan = plan(arguments, &settings, &training, &validation);
     let store = Store::create(&arguments.out_dir, plan)?;
     let bar = spinner("training");
@@ -74,12 +78,15 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
         let left = store.missing().len();
         bar.set_message(format!("{} of {total} models trained", total - left));
     };
-    let sets = Recordings {
-        training: &training,
-        validation: &validation,
-    };
     let shard = arguments.shard.unwrap_or(Shard::WHOLE);
-    study::run(&store, shard, sets, robot, &options, &finished)?;
+    study::run(
+        &store,
+        shard,
+        [&training, &validation],
+        robot,
+        &options,
+        &finished,
+    )?;
     bar.finish_and_clear();
     Ok(store)
 }

@@ -9,7 +9,7 @@ use serde_json::json;
 use super::Answer;
 use super::args::{TrainArguments, TrainMethod, TrainSettings};
 use super::output::{Table, check_output, significant, spinner};
-use super::prepared_recordings::{Intake, RecordedSets};
+use super::prepared_recordings::{RecordedSets, read_all};
 use super::train_settings;
 use crate::files::Overwrite;
 use crate::robot::Robot;
@@ -30,22 +30,25 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let method = train_settings::method(&settings);
     let robot = Robot::by_name(settings.robot.as_deref().unwrap_or("go1"))?;
     let options = train_settings::options(&settings, latent_dim, model_name(arguments));
-    let recorded = RecordedSets::read(arguments, options.seed)?;
-    let mut intake = Intake::new(&settings, robot)?;
-    let training = intake.take(&recorded.training)?;
-    let validation = intake.take(&recorded.validation)?;
-    let test = intake.take(&recorded.test)?;
-    intake.tell();
-    let sets = Recordings {
-        training: &training,
-        validation: &validation,
-    };
+    let recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
+    // a fault of the test recordings ends the command before the training
+    read_all(&recorded.test)?;
+    let sets = Recordings::new(&recorded.training, &recorded.validation);
     let files = arguments.recordings.iter().chain(&arguments.validation);
     let origin = Origin::of_files(command_line(arguments, &settings, method), files);
 
     let bar = spinner("training");
+    let mut findings_reported = false;
+    let mut report_findings = || {
+        if !std::mem::replace(&mut findings_reported, true) {
+            bar.suspend(|| recorded.report_findings());
+        }
+    };
     let mut listener = |news: Progress| match news {
-        Progress::Stage { name, .. } => bar.set_message(name),
+        Progress::Stage { name, .. } => {
+            report_findings();
+            bar.set_message(name);
+        }
         Progress::Done { text, .. } => bar.set_message(text),
     };
     let mut watch = Watch::new(&mut listener, stop_on_interrupt());
@@ -53,21 +56,22 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         TrainMethod::ClosedForm => train::closed_form,
         TrainMethod::Joint => train::joint,
     };
-    let trained = learn(sets, robot, &options, &origin, &mut watch)?;
+    let trained = learn(sets, robot, &options, &origin, &mut watch);
+    report_findings();
+    let trained = trained?;
     bar.finish_and_clear();
     artifact::write_with(&arguments.output, &trained.model, overwrite)?;
-    let mut answer = match test.is_empty() {
+    let mut answer = match recorded.test.is_empty() {
         true => answer(arguments, &trained, None),
         false => {
-            let tested = train::assess(&trained.model, &test)?;
+            let tested = train::assess(&trained.model, &recorded.test)?;
             answer(arguments, &trained, Some(&tested))
         }
     };
-    answer.json["recordings"] = intake.json();
-    if arguments.split.is_some() {
-        answer.json["split"] = recorded.json();
-        let sizes = [&training, &validation, &test].map(|set| set.len());
-        let [training, validation, test] = sizes;
+    answer.json["recordings"] = recorded.findings_json();
+    if let (Some(sets), Some(json)) = (&recorded.divided, recorded.json()) {
+        answer.json["split"] = json;
+        let [training, validation, test] = sets.each_ref().map(Vec::len);
         let _ = writeln!(
             answer.text,
             "\nof the jumps {training} were for training, {validation} for validation, {test} for test"

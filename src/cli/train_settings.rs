@@ -12,9 +12,10 @@ use super::args::{
 };
 use crate::Error;
 use crate::model::{Activation, StandardLibrary};
-use crate::recording::preprocess::SmoothedRows;
 use crate::recording::smoothing::SavitzkyGolay;
-use crate::recording::{Accelerations, ConditionOptions, ImplausibleSamples, PhaseRule};
+use crate::recording::{
+    Accelerations, ConditionOptions, ImplausibleSamples, PhaseRule, SmoothedRows,
+};
 use crate::train::{Integrator, LibraryChoice, MIN_SAMPLES, MapOptions, TrainError, TrainOptions};
 
 /// The options that the settings describe.

@@ -8,13 +8,13 @@ use super::coordinate_names::CoordinateNames;
 use super::error::{ModelError, check_finite, check_shape};
 use super::identifier::Identifier;
 use super::library::Library;
-use super::phase::{FeetRule, Phase, all_patterns};
+use super::phase::{Phase, all_patterns};
 use super::projection::pinv_of_transpose;
 use super::rom::ReducedModel;
 use super::scaling::Scaling;
 use super::state_map::StateMap;
 use super::statistics::InputStatistics;
-use crate::robot::Robot;
+use crate::robot::{FeetRule, Robot};
 
 const MAX_PHASES: usize = 16;
 const MAX_STATE_DIM: usize = 256;

@@ -52,6 +52,7 @@ mod statistics;
 #[cfg(test)]
 mod tests;
 
+pub use crate::robot::FeetRule;
 pub use activation::Activation;
 pub use affine::AffineMap;
 pub use builder::ModelBuilder;
@@ -62,7 +63,7 @@ pub use library::{
     CandidateTerm, LatentVariable, Library, LibraryError, LibrarySource, MAX_LATENT_DIM,
     MAX_LIBRARY_DIM, MAX_TERM_LEN, TermId,
 };
-pub use phase::{FeetRule, Phase};
+pub use phase::Phase;
 pub use projection::RANK_TOLERANCE;
 pub use rom::ReducedModel;
 pub use scaling::{ScaleFactors, Scaling};

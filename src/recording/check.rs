@@ -14,49 +14,27 @@ use super::error::RecordingError;
 use super::segment::{Recording, Segment};
 use crate::robot::{JOINT_DIM, Robot, STATE_DIM};
 
-/// How far a sample may go before it is reported.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CheckOptions {
-    /// Torque over the robot's limit that is still accepted.
-    pub torque_factor: f64,
-    /// Angle beyond a joint's limits that is still accepted, in rad.
-    pub joint_margin_rad: f64,
-    /// Speed over a joint's limit that is still accepted.
-    pub speed_factor: f64,
-    /// Largest speed of the body along an axis, in m/s.
-    pub body_speed_m_s: f64,
-    /// Largest rate of a body angle, in rad/s.
-    pub body_rate_rad_s: f64,
-    /// Disagreement of a rate with differences, as a share of the 95th
-    /// percentile of that rate, that is still accepted on top of the floor
-    /// and of what the noise of the differentiated column explains.
-    pub consistency_share: f64,
-    /// Floor of that disagreement for velocities: joints, body linear, body angular.
-    pub velocity_floor: [f64; 3],
-    /// The same for accelerations.
-    pub acceleration_floor: [f64; 3],
-    /// Equal consecutive velocities at an extreme that count as clipped.
-    pub clipped_samples: usize,
-    /// Departure of a time step from the median, as a share of it.
-    pub step_share: f64,
-}
-
-impl Default for CheckOptions {
-    fn default() -> Self {
-        CheckOptions {
-            torque_factor: 1.1,
-            joint_margin_rad: 0.05,
-            speed_factor: 1.1,
-            body_speed_m_s: 10.0,
-            body_rate_rad_s: 30.0,
-            consistency_share: 0.3,
-            velocity_floor: [1.0, 0.2, 0.5],
-            acceleration_floor: [100.0, 10.0, 50.0],
-            clipped_samples: 5,
-            step_share: 0.5,
-        }
-    }
-}
+/// Torque over the robot's limit that is still accepted.
+const TORQUE_FACTOR: f64 = 1.1;
+/// Angle beyond a joint's limits that is still accepted, in rad.
+const JOINT_MARGIN_RAD: f64 = 0.05;
+/// Speed over a joint's limit that is still accepted.
+const SPEED_FACTOR: f64 = 1.1;
+/// Largest speed of the body along an axis, in m/s.
+const BODY_SPEED_M_S: f64 = 10.0;
+/// Largest rate of a body angle, in rad/s.
+const BODY_RATE_RAD_S: f64 = 30.0;
+/// Disagreement of a rate with differences, as a share of the 95th percentile of that rate, that is still accepted on
+/// top of the floor and of what the noise of the differentiated column explains.
+const CONSISTENCY_SHARE: f64 = 0.3;
+/// Floor of that disagreement for velocities: joints, body linear, body angular.
+const VELOCITY_FLOOR: [f64; 3] = [1.0, 0.2, 0.5];
+/// The same for accelerations.
+const ACCELERATION_FLOOR: [f64; 3] = [100.0, 10.0, 50.0];
+/// Equal consecutive velocities at an extreme that count as clipped.
+const CLIPPED_SAMPLES: usize = 5;
+/// Departure of a time step from the median, as a share of it.
+const STEP_SHARE: f64 = 0.5;
 
 /// What is wrong with a run of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -141,13 +119,12 @@ impl fmt::Display for Finding {
 /// Everything implausible in a recording, in the order of its rows.
 ///
 /// Neighbouring samples with the same fault in the same column are one finding.
-pub fn check(recording: &Recording, robot: &Robot, options: &CheckOptions) -> Vec<Finding> {
+pub fn check(recording: &Recording, robot: &Robot) -> Vec<Finding> {
     let mut out = Vec::new();
     for (index, segment) in recording.segments.iter().enumerate() {
         let mut scan = Scan {
             segment,
             index,
-            options,
             found: &mut out,
         };
         scan.limits(robot);
@@ -205,7 +182,6 @@ pub fn without(
 struct Scan<'a> {
     segment: &'a Segment,
     index: usize,
-    options: &'a CheckOptions,
     found: &'a mut Vec<Finding>,
 }
 
@@ -244,23 +220,26 @@ impl Scan<'_> {
     }
 
     fn limits(&mut self, robot: &Robot) {
-        let (segment, options) = (self.segment, self.options);
+        let segment = self.segment;
         for i in 0..JOINT_DIM {
-            let bound = robot.torque_limit_nm()[i] * options.torque_factor;
+            let bound = robot.torque_limit_nm()[i] * TORQUE_FACTOR;
             self.column(Implausible::Torque, Column::Torque(i), |j| {
                 above(segment.torque_nm[(i, j)], bound)
             });
             let (low, high) = robot.joint_limit_rad()[i];
-            let margin = options.joint_margin_rad;
             self.column(Implausible::JointAngle, Column::Position(i), |j| {
-                outside(segment.x[(i, j)], low - margin, high + margin)
+                outside(
+                    segment.x[(i, j)],
+                    low - JOINT_MARGIN_RAD,
+                    high + JOINT_MARGIN_RAD,
+                )
             });
         }
         for i in 0..STATE_DIM {
             let bound = match group(i) {
-                0 => robot.joint_speed_limit_rad_s()[i] * options.speed_factor,
-                1 => options.body_speed_m_s,
-                _ => options.body_rate_rad_s,
+                0 => robot.joint_speed_limit_rad_s()[i] * SPEED_FACTOR,
+                1 => BODY_SPEED_M_S,
+                _ => BODY_RATE_RAD_S,
             };
             self.column(Implausible::Speed, Column::Velocity(i), |j| {
                 above(segment.dx[(i, j)], bound)
@@ -274,22 +253,21 @@ impl Scan<'_> {
     }
 
     fn consistency(&mut self) {
-        let (segment, options) = (self.segment, self.options);
-        let share = options.consistency_share;
+        let segment = self.segment;
         for i in 0..STATE_DIM {
             let (x, dx, ddx) = (
                 row(&segment.x, i),
                 row(&segment.dx, i),
                 row(&segment.ddx, i),
             );
-            let slack = options.velocity_floor[group(i)]
-                + share * quantile(dx.iter().map(|v| v.abs()), 0.95)
+            let slack = VELOCITY_FLOOR[group(i)]
+                + CONSISTENCY_SHARE * quantile(dx.iter().map(|v| v.abs()), 0.95)
                 + noise(&segment.time_s, &x);
             self.column(Implausible::Velocity, Column::Velocity(i), |j| {
                 disagrees(&segment.time_s, &x, &dx, j, slack)
             });
-            let slack = options.acceleration_floor[group(i)]
-                + share * quantile(ddx.iter().map(|v| v.abs()), 0.95)
+            let slack = ACCELERATION_FLOOR[group(i)]
+                + CONSISTENCY_SHARE * quantile(ddx.iter().map(|v| v.abs()), 0.95)
                 + noise(&segment.time_s, &dx);
             self.column(Implausible::Acceleration, Column::Acceleration(i), |j| {
                 disagrees(&segment.time_s, &dx, &ddx, j, slack)
@@ -313,7 +291,7 @@ impl Scan<'_> {
             let mut clipped = vec![false; n];
             while start < n {
                 let run = (start..n).take_while(|j| at_extreme(*j)).count();
-                if run >= self.options.clipped_samples {
+                if run >= CLIPPED_SAMPLES {
                     clipped[start..start + run].fill(true);
                 }
                 start += run + 1;
@@ -325,7 +303,7 @@ impl Scan<'_> {
     }
 
     fn time_steps(&mut self) {
-        let (segment, share) = (self.segment, self.options.step_share);
+        let segment = self.segment;
         let mut steps: Vec<f64> = segment.time_s.windows(2).map(|w| w[1] - w[0]).collect();
         steps.sort_by(f64::total_cmp);
         let Some(median) = steps.get(steps.len() / 2).copied() else {
@@ -333,7 +311,7 @@ impl Scan<'_> {
         };
         self.column(Implausible::TimeStep, Column::Time, |j| {
             let step = segment.time_s[j] - segment.time_s[j.checked_sub(1)?];
-            ((step - median).abs() > share * median).then_some((step, median))
+            ((step - median).abs() > STEP_SHARE * median).then_some((step, median))
         });
     }
 }

@@ -1,10 +1,12 @@
 //! What happens to recordings before anything learns from them: implausible samples are found and,
 //! when asked, left out; accelerations are recomputed and rows smoothed, when asked.
 
-use super::check::{CheckOptions, Finding, check, without};
+use nalgebra::DMatrix;
+
+use super::check::{Finding, check, without};
 use super::error::RecordingError;
-use super::preprocess::{SmoothedRows, differences, smoothed};
-use super::segment::Recording;
+use super::preprocess::differences;
+use super::segment::{Recording, Segment};
 use super::smoothing::SavitzkyGolay;
 use crate::robot::Robot;
 
@@ -28,12 +30,20 @@ pub enum Accelerations {
     Differences,
 }
 
+/// Rows that a filter is applied to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SmoothedRows {
+    /// Accelerations only: the targets of the regression.
+    #[default]
+    Accelerations,
+    /// State, rates, accelerations, torques and recorded wrench.
+    All,
+}
+
 /// The steps of [`condition`]; by default the recording stays as it is.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ConditionOptions {
-    /// What counts as implausible.
-    pub check: CheckOptions,
-    /// What becomes of it.
+    /// What becomes of implausible samples.
     pub implausible: ImplausibleSamples,
     /// Shortest piece between samples left out that is kept; shorter ones go too.
     pub least_samples: usize,
@@ -59,18 +69,28 @@ pub struct Conditioned {
 /// # Errors
 /// [`RecordingError::TooShort`] if nothing long enough remains, or a segment is shorter than the filter.
 pub fn condition(
-    recording: &Recording,
+    recording: Recording,
     robot: &Robot,
     options: &ConditionOptions,
 ) -> Result<Conditioned, RecordingError> {
-    let findings = check(recording, robot, &options.check);
+    let findings = check(&recording, robot);
+    conditioned(recording, findings, options)
+}
+
+/// Applies the steps to a recording with these findings.
+pub(super) fn conditioned(
+    recording: Recording,
+    findings: Vec<Finding>,
+    options: &ConditionOptions,
+) -> Result<Conditioned, RecordingError> {
+    let n_samples = recording.sample_count();
     let mut kept = match options.implausible {
         ImplausibleSamples::LeaveOut if !findings.is_empty() => {
-            long_enough(without(recording, &findings)?.0, options.least_samples)?
+            long_enough(without(&recording, &findings)?.0, options.least_samples)?
         }
-        ImplausibleSamples::LeaveOut | ImplausibleSamples::Keep => recording.clone(),
+        ImplausibleSamples::LeaveOut | ImplausibleSamples::Keep => recording,
     };
-    let left_out = recording.sample_count() - kept.sample_count();
+    let left_out = n_samples - kept.sample_count();
     for segment in &mut kept.segments {
         match options.accelerations {
             Accelerations::Recorded => {}
@@ -79,7 +99,7 @@ pub fn condition(
             }
         }
         if let Some((filter, rows)) = &options.smoothing {
-            *segment = smoothed(segment, filter, *rows)?;
+            smooth(segment, filter, *rows)?;
         }
     }
     Ok(Conditioned {
@@ -87,6 +107,31 @@ pub fn condition(
         findings,
         left_out,
     })
+}
+
+/// Smooths a segment along time.
+fn smooth(
+    segment: &mut Segment,
+    filter: &SavitzkyGolay,
+    rows: SmoothedRows,
+) -> Result<(), RecordingError> {
+    let smooth = |m: &DMatrix<f64>| {
+        filter.smooth(m).ok_or_else(|| RecordingError::TooShort {
+            path: segment.path.clone(),
+            row: segment.row(0),
+            found: segment.len(),
+            expected: filter.window(),
+        })
+    };
+    let ddx = smooth(&segment.ddx)?;
+    if rows == SmoothedRows::All {
+        let [x, dx, torque_nm] = [&segment.x, &segment.dx, &segment.torque_nm].map(&smooth);
+        let body_wrench = segment.body_wrench.as_ref().map(&smooth).transpose()?;
+        (segment.x, segment.dx, segment.torque_nm) = (x?, dx?, torque_nm?);
+        segment.body_wrench = body_wrench;
+    }
+    segment.ddx = ddx;
+    Ok(())
 }
 
 /// The recording without segments under `least` samples.
@@ -109,10 +154,7 @@ fn long_enough(mut recording: Recording, least: usize) -> Result<Recording, Reco
 mod tests {
     use std::path::PathBuf;
 
-    use nalgebra::DMatrix;
-
     use super::*;
-    use crate::recording::Segment;
 
     /// A robot that stands still, with noise on the accelerations, and one torque that no motor gives.
     fn recording() -> Recording {
@@ -151,7 +193,7 @@ mod tests {
     #[test]
     fn condition_by_default_reports_with_place_and_changes_nothing() {
         let recording = recording();
-        let out = condition(&recording, go1(), &ConditionOptions::default()).expect("sound");
+        let out = condition(recording.clone(), go1(), &ConditionOptions::default()).expect("sound");
         assert_eq!(out.recording, recording);
         assert_eq!(out.left_out, 0);
         let places: Vec<_> = out
@@ -174,7 +216,7 @@ mod tests {
             least_samples: 50,
             ..ConditionOptions::default()
         };
-        let out = condition(&recording(), go1(), &options).expect("sound");
+        let out = condition(recording(), go1(), &options).expect("sound");
         let pieces: Vec<_> = (out.recording.segments.iter())
             .map(|piece| (piece.first_row, piece.len()))
             .collect();
@@ -185,7 +227,7 @@ mod tests {
             least_samples: 150,
             ..options
         };
-        let error = condition(&recording(), go1(), &options).expect_err("nothing remains");
+        let error = condition(recording(), go1(), &options).expect_err("nothing remains");
         assert!(matches!(
             error,
             RecordingError::TooShort {
@@ -205,7 +247,9 @@ mod tests {
             ..ConditionOptions::default()
         };
         let before = recording();
-        let out = condition(&before, go1(), &smooth).expect("sound").recording;
+        let out = condition(before.clone(), go1(), &smooth)
+            .expect("sound")
+            .recording;
         let ddx = |recording: &Recording| recording.segments[0].ddx.clone();
         assert!(ddx(&out).norm() < 0.3 * ddx(&before).norm());
         assert_eq!(out.segments[0].torque_nm, before.segments[0].torque_nm);
@@ -214,9 +258,29 @@ mod tests {
             accelerations: Accelerations::Differences,
             ..ConditionOptions::default()
         };
-        let out = condition(&before, go1(), &differences)
+        let out = condition(before.clone(), go1(), &differences)
             .expect("sound")
             .recording;
         assert_eq!(ddx(&out).amax(), 0.0);
+    }
+
+    #[test]
+    fn smoothing_longer_than_a_segment_is_an_error() {
+        let mut short = recording();
+        short.segments[0] = short.segments[0].slice(0..5);
+        let filter = SavitzkyGolay::new(11, 2).expect("a filter");
+        let options = ConditionOptions {
+            smoothing: Some((filter, SmoothedRows::All)),
+            ..ConditionOptions::default()
+        };
+        let error = condition(short, go1(), &options).expect_err("five samples");
+        assert!(matches!(
+            error,
+            RecordingError::TooShort {
+                found: 5,
+                expected: 11,
+                ..
+            }
+        ));
     }
 }

@@ -10,6 +10,9 @@ use crate::robot::RobotError;
 /// Faults of recordings. Rows are lines of the file: 1 is the header.
 #[derive(Debug, Error)]
 pub enum RecordingError {
+    /// A file has other samples than when it was read before.
+    #[error("{path}: changed while its samples were in use, expected the same samples again")]
+    Changed { path: PathBuf },
     /// The file does not exist.
     #[error("{}: no such file", path.display())]
     Missing {

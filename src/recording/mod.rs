@@ -35,6 +35,7 @@ pub mod check;
 pub mod columns;
 pub mod condition;
 pub mod csv;
+pub mod files;
 pub mod phases;
 pub mod preprocess;
 pub mod segment;
@@ -48,7 +49,10 @@ mod table;
 
 pub use self::csv::{read, read_from_bytes};
 pub use self::write::{WriteOptions, write, write_with};
-pub use condition::{Accelerations, ConditionOptions, Conditioned, ImplausibleSamples, condition};
+pub use condition::{
+    Accelerations, ConditionOptions, Conditioned, ImplausibleSamples, SmoothedRows, condition,
+};
 pub use error::RecordingError;
+pub use files::{RecordingFile, RecordingFiles, Source};
 pub use phases::{PhaseRule, PhaseSpan, Stance};
 pub use segment::{Recording, Segment};

@@ -9,29 +9,7 @@ use std::ops::Range;
 
 use super::error::RecordingError;
 use super::segment::Segment;
-use crate::robot::ContactFlags;
-
-/// The feet that select a phase.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum FeetPattern {
-    /// At least one foot is down.
-    Any,
-    /// No foot is down.
-    None,
-    /// Exactly one of these patterns.
-    OneOf(Vec<ContactFlags>),
-}
-
-impl FeetPattern {
-    /// Whether a sample's contact matches.
-    pub fn matches(&self, feet: ContactFlags) -> bool {
-        match self {
-            FeetPattern::Any => feet.contains(&true),
-            FeetPattern::None => !feet.contains(&true),
-            FeetPattern::OneOf(patterns) => patterns.contains(&feet),
-        }
-    }
-}
+use crate::robot::{ContactFlags, FeetRule};
 
 /// A phase and its feet.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,7 +17,7 @@ pub struct PhasePattern {
     /// Name of the phase.
     pub name: String,
     /// Feet that select it.
-    pub feet: FeetPattern,
+    pub feet: FeetRule,
 }
 
 /// How samples are assigned to phases.
@@ -85,8 +63,8 @@ impl PhaseRule {
     /// The paper's synchronous jump: `contact` (any foot), `flight` (none).
     pub fn two_phase() -> Self {
         Self::new(vec![
-            pattern("contact", FeetPattern::Any),
-            pattern("flight", FeetPattern::None),
+            pattern("contact", FeetRule::Any),
+            pattern("flight", FeetRule::None),
         ])
     }
 
@@ -98,9 +76,9 @@ impl PhaseRule {
             .filter(|feet: &ContactFlags| feet.contains(&true))
             .partition(|feet| !feet[0] && !feet[1]);
         Self::new(vec![
-            pattern("contact", FeetPattern::OneOf(front)),
-            pattern("rear", FeetPattern::OneOf(rear)),
-            pattern("flight", FeetPattern::None),
+            pattern("contact", FeetRule::Patterns(front)),
+            pattern("rear", FeetRule::Patterns(rear)),
+            pattern("flight", FeetRule::None),
         ])
     }
 
@@ -149,7 +127,7 @@ impl PhaseRule {
     }
 }
 
-fn pattern(name: &str, feet: FeetPattern) -> PhasePattern {
+fn pattern(name: &str, feet: FeetRule) -> PhasePattern {
     PhasePattern {
         name: name.to_owned(),
         feet,
@@ -312,7 +290,7 @@ mod tests {
     #[test]
     fn spans_exact_patterns_give_transitions_to_the_side_with_more_feet() {
         let exact = |name: &str, feet: [u8; 4]| {
-            pattern(name, FeetPattern::OneOf(vec![feet.map(|f| f == 1)]))
+            pattern(name, FeetRule::Patterns(vec![feet.map(|f| f == 1)]))
         };
         let rule = PhaseRule::new(vec![
             exact("all", [1, 1, 1, 1]),
@@ -343,7 +321,7 @@ mod tests {
 
     #[test]
     fn spans_no_pattern_matches_is_an_error_with_row_and_feet() {
-        let rule = PhaseRule::new(vec![pattern("flight", FeetPattern::None)]);
+        let rule = PhaseRule::new(vec![pattern("flight", FeetRule::None)]);
         let error = rule.spans(&segment(&[(3, [1, 1, 0, 0])])).unwrap_err();
         let text = error.to_string();
         assert!(matches!(error, RecordingError::NoPhase { row: 2, .. }));

@@ -1,5 +1,5 @@
 //! From segments to phases ready for training: accelerations by differences,
-//! smoothing, resampling of each phase to whole batches (section IV-C4).
+//! resampling of each phase to whole batches (section IV-C4).
 //!
 //! Nothing crosses the border of a segment. Scaling belongs to the model.
 
@@ -8,55 +8,6 @@ use nalgebra::DMatrix;
 use super::error::RecordingError;
 use super::phases::{PhaseRule, PhaseSpan};
 use super::segment::{Recording, Segment};
-use super::smoothing::SavitzkyGolay;
-
-/// How values between samples are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Interpolation {
-    /// Straight lines.
-    #[default]
-    Linear,
-    /// Cubic Hermite curves with slopes by differences.
-    Cubic,
-}
-
-/// What a filter is applied to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum SmoothedRows {
-    /// Accelerations only: the targets of the regression.
-    #[default]
-    Accelerations,
-    /// State, rates, accelerations, torques and recorded wrench.
-    All,
-}
-
-/// The steps of [`prepare`]; by default the paper's two phases, without contact
-/// chatter under 5 samples, in batches of 100 rows.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PreprocessOptions {
-    /// Assignment of samples to phases.
-    pub rule: PhaseRule,
-    /// Whether accelerations are recomputed from velocities.
-    pub recompute_accelerations: bool,
-    /// Filter, applied to whole segments before they are divided.
-    pub smoothing: Option<(SavitzkyGolay, SmoothedRows)>,
-    /// Rows that each phase becomes a multiple of; `None` leaves samples alone.
-    pub batch: Option<usize>,
-    /// Interpolation between samples when resampling.
-    pub interpolation: Interpolation,
-}
-
-impl Default for PreprocessOptions {
-    fn default() -> Self {
-        PreprocessOptions {
-            rule: PhaseRule::two_phase().with_min_samples(5),
-            recompute_accelerations: false,
-            smoothing: None,
-            batch: Some(100),
-            interpolation: Interpolation::Linear,
-        }
-    }
-}
 
 /// One phase of one segment, as training takes it.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,38 +20,24 @@ pub struct PhaseData {
     pub samples: Segment,
 }
 
-/// The phases of every segment of a recording.
+/// The phases of every segment of a recording, each resampled to a multiple of `batch` rows.
 ///
 /// # Errors
-/// [`RecordingError::TooShort`] for a span of one sample that has to be
-/// resampled or a segment shorter than the filter, [`RecordingError::NoPhase`],
+/// [`RecordingError::TooShort`] for a span of one sample, [`RecordingError::NoPhase`],
 /// [`RecordingError::Batch`].
 pub fn prepare(
     recording: &Recording,
-    options: &PreprocessOptions,
+    rule: &PhaseRule,
+    batch: usize,
 ) -> Result<Vec<PhaseData>, RecordingError> {
     let mut out = Vec::new();
     for (index, segment) in recording.segments.iter().enumerate() {
-        let mut segment = segment.clone();
-        if options.recompute_accelerations {
-            segment.ddx = differences(&segment.time_s, &segment.dx);
-        }
-        if let Some((filter, rows)) = &options.smoothing {
-            segment = smoothed(&segment, filter, *rows)?;
-        }
-        for span in options.rule.spans(&segment)? {
+        for span in rule.spans(segment)? {
             let part = segment.slice(span.range.clone());
-            let samples = match options.batch {
-                None => part,
-                Some(batch) => {
-                    let rows = batch_rows(part.len(), batch)?;
-                    resampled(&part, rows, options.interpolation)?
-                }
-            };
             out.push(PhaseData {
+                samples: resampled(&part, batch_rows(part.len(), batch)?)?,
                 span,
                 segment: index,
-                samples,
             });
         }
     }
@@ -111,7 +48,7 @@ pub fn prepare(
 ///
 /// # Errors
 /// [`RecordingError::Batch`] for a batch below 2.
-pub fn batch_rows(samples: usize, batch: usize) -> Result<usize, RecordingError> {
+fn batch_rows(samples: usize, batch: usize) -> Result<usize, RecordingError> {
     if batch < 2 {
         return Err(RecordingError::Batch { found: batch });
     }
@@ -145,48 +82,13 @@ pub fn differences(time_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
-/// A segment smoothed along time.
-///
-/// # Errors
-/// [`RecordingError::TooShort`] if it has fewer samples than the window.
-pub fn smoothed(
-    segment: &Segment,
-    filter: &SavitzkyGolay,
-    rows: SmoothedRows,
-) -> Result<Segment, RecordingError> {
-    let smooth = |m: &DMatrix<f64>| {
-        filter.smooth(m).ok_or_else(|| RecordingError::TooShort {
-            path: segment.path.clone(),
-            row: segment.row(0),
-            found: segment.len(),
-            expected: filter.window(),
-        })
-    };
-    let mut out = segment.clone();
-    out.ddx = smooth(&segment.ddx)?;
-    match rows {
-        SmoothedRows::Accelerations => {}
-        SmoothedRows::All => {
-            out.x = smooth(&segment.x)?;
-            out.dx = smooth(&segment.dx)?;
-            out.torque_nm = smooth(&segment.torque_nm)?;
-            out.body_wrench = segment.body_wrench.as_ref().map(smooth).transpose()?;
-        }
-    }
-    Ok(out)
-}
-
-/// A segment at `rows` equally spaced times over the same duration.
+/// A segment at `rows` equally spaced times over the same duration, by straight lines between samples.
 ///
 /// Contact flags are those of the nearest sample.
 ///
 /// # Errors
 /// [`RecordingError::TooShort`] if it has one sample or `rows` is below 2.
-pub fn resampled(
-    segment: &Segment,
-    rows: usize,
-    interpolation: Interpolation,
-) -> Result<Segment, RecordingError> {
+fn resampled(segment: &Segment, rows: usize) -> Result<Segment, RecordingError> {
     let n = segment.len();
     if n < 2 || rows < 2 {
         return Err(RecordingError::TooShort {
@@ -197,7 +99,7 @@ pub fn resampled(
         });
     }
     let places = places(&segment.time_s, rows);
-    let along = |m: &DMatrix<f64>| interpolate(&segment.time_s, m, &places, interpolation);
+    let along = |m: &DMatrix<f64>| interpolate(m, &places);
     Ok(Segment {
         path: segment.path.clone(),
         first_row: segment.first_row,
@@ -243,28 +145,11 @@ fn places(time_s: &[f64], rows: usize) -> Vec<Place> {
         .collect()
 }
 
-fn interpolate(
-    time_s: &[f64],
-    rows: &DMatrix<f64>,
-    places: &[Place],
-    interpolation: Interpolation,
-) -> DMatrix<f64> {
-    let slopes = match interpolation {
-        Interpolation::Linear => None,
-        Interpolation::Cubic => Some(differences(time_s, rows)),
-    };
+fn interpolate(rows: &DMatrix<f64>, places: &[Place]) -> DMatrix<f64> {
     DMatrix::from_fn(rows.nrows(), places.len(), |row, i| {
-        let Place { left, share: s, .. } = places[i];
+        let Place { left, share, .. } = places[i];
         let (a, b) = (rows[(row, left)], rows[(row, left + 1)]);
-        let line = a + s * (b - a);
-        let Some(slopes) = &slopes else {
-            return line;
-        };
-        // Hermite: the line plus what the end slopes add, which vanishes at both ends.
-        let step = time_s[left + 1] - time_s[left];
-        let (from, to) = (slopes[(row, left)] * step, slopes[(row, left + 1)] * step);
-        let rise = b - a;
-        line + s * (1.0 - s) * ((1.0 - s) * (from - rise) - s * (to - rise))
+        a + share * (b - a)
     })
 }
 
@@ -302,38 +187,29 @@ mod tests {
     #[test]
     fn resampled_same_count_returns_the_samples() {
         let segment = sample_segment(50);
-        for kind in [Interpolation::Linear, Interpolation::Cubic] {
-            let same = resampled(&segment, 50, kind).unwrap();
-            assert!((&same.x - &segment.x).amax() < 1e-12);
-            assert!((&same.torque_nm - &segment.torque_nm).amax() < 1e-12);
-            assert_eq!(same.feet, segment.feet);
-        }
+        let same = resampled(&segment, 50).unwrap();
+        assert!((&same.x - &segment.x).amax() < 1e-12);
+        assert!((&same.torque_nm - &segment.torque_nm).amax() < 1e-12);
+        assert_eq!(same.feet, segment.feet);
     }
 
     #[test]
-    fn resampled_polynomials_are_exact_to_the_interpolations_degree() {
+    fn resampled_straight_lines_are_exact_for_unequal_steps() {
         let mut segment = sample_segment(40);
         segment.time_s = unequal_times(40);
         let time = segment.time_s.clone();
         segment.x = DMatrix::from_fn(18, 40, |i, j| i as f64 + time[j]);
-        segment.dx = DMatrix::from_fn(18, 40, |i, j| i as f64 * time[j] * time[j]);
-        let linear = resampled(&segment, 173, Interpolation::Linear).unwrap();
-        let cubic = resampled(&segment, 173, Interpolation::Cubic).unwrap();
-        for (j, t) in cubic.time_s.iter().enumerate() {
-            assert!((linear.x[(3, j)] - (3.0 + t)).abs() < 1e-12);
-            // The end slopes are first order, so the outermost steps are not exact.
-            let inside = *t > time[1] && *t < time[38];
-            let error = (cubic.dx[(17, j)] - 17.0 * t * t).abs();
-            assert!(error < if inside { 1e-12 } else { 1e-4 }, "{j}: {error:e}");
+        let fine = resampled(&segment, 173).unwrap();
+        for (j, t) in fine.time_s.iter().enumerate() {
+            assert!((fine.x[(3, j)] - (3.0 + t)).abs() < 1e-12);
         }
-        assert_eq!(cubic.time_s[0], time[0]);
-        assert_eq!(cubic.time_s[172], time[39]);
+        assert_eq!((fine.time_s[0], fine.time_s[172]), (time[0], time[39]));
     }
 
     #[test]
     fn resampled_rows_point_into_the_file() {
         let segment = sample_segment(119);
-        let out = resampled(&segment, 200, Interpolation::Linear).unwrap();
+        let out = resampled(&segment, 200).unwrap();
         assert_eq!((out.row(0), out.row(199)), (2, 120));
         assert!((out.mean_step_s() - 0.002 * 118.0 / 199.0).abs() < 1e-15);
     }
@@ -341,7 +217,7 @@ mod tests {
     #[test]
     fn resampled_single_sample_is_an_error_with_its_row() {
         let one = sample_segment(5).slice(3..4);
-        let error = resampled(&one, 100, Interpolation::Linear).unwrap_err();
+        let error = resampled(&one, 100).unwrap_err();
         assert!(matches!(
             error,
             RecordingError::TooShort {
@@ -363,7 +239,7 @@ mod tests {
             segments: vec![jump, second],
             ignored_columns: Vec::new(),
         };
-        let phases = prepare(&recording, &PreprocessOptions::default()).unwrap();
+        let phases = prepare(&recording, &PhaseRule::two_phase(), 100).unwrap();
         let found: Vec<_> = phases
             .iter()
             .map(|p| (p.segment, p.span.phase, p.samples.len()))
@@ -380,29 +256,6 @@ mod tests {
             phases[1].samples.x.column(0),
             recording.segments[0].x.column(150)
         );
-    }
-
-    #[test]
-    fn prepare_smoothing_longer_than_a_segment_is_an_error() {
-        let recording = Recording {
-            path: PathBuf::from("short.csv"),
-            segments: vec![sample_segment(5)],
-            ignored_columns: Vec::new(),
-        };
-        let filter = SavitzkyGolay::new(11, 2).unwrap();
-        let options = PreprocessOptions {
-            smoothing: Some((filter, SmoothedRows::All)),
-            ..PreprocessOptions::default()
-        };
-        let error = prepare(&recording, &options).unwrap_err();
-        assert!(matches!(
-            error,
-            RecordingError::TooShort {
-                found: 5,
-                expected: 11,
-                ..
-            }
-        ));
     }
 
     #[test]

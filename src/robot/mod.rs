@@ -20,6 +20,7 @@
 //! # Ok::<(), romc::robot::RobotError>(())
 //! ```
 
+pub mod feet;
 pub mod joints;
 pub mod kinematics;
 pub mod registry;
@@ -28,6 +29,7 @@ pub mod wrench;
 mod error;
 
 pub use error::RobotError;
+pub use feet::FeetRule;
 pub use joints::{
     BODY_DIM, BODY_NAMES, ContactFlags, FOOT_DIM, JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM,
 };

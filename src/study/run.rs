@@ -18,7 +18,7 @@ use crate::train::{
 /// Seeds of the joint method are random starts, as published. The closed form finds the same model from every start,
 /// so its seed `s` leaves out every fifth training jump, beginning with the `s`-th: its spread says how much the
 /// recordings matter. Where the encoder may look at fewer coordinates than the latent space has, the mask is lifted.
-/// `options` gives the settings for a latent dimension, `finished` hears of every cell. The result does not depend on
+/// `[training, validation]` are the recordings, `options` gives the settings for a latent dimension, `finished` hears of every cell. The result does not depend on
 /// the number of threads.
 ///
 /// # Errors
@@ -26,7 +26,7 @@ use crate::train::{
 pub fn run(
     store: &Store,
     shard: Shard,
-    recordings: Recordings<'_>,
+    [training, validation]: [&[Recording]; 2],
     robot: &'static Robot,
     options: &(dyn Fn(usize) -> TrainOptions + Sync),
     finished: &(dyn Fn(CellId) + Sync),
@@ -47,7 +47,13 @@ pub fn run(
                 while let Some(&id) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let cell = Cell {
                         id,
-                        outcome: train(id, recordings, robot, options(id.latent_dim), is_joint),
+                        outcome: train(
+                            id,
+                            [training, validation],
+                            robot,
+                            options(id.latent_dim),
+                            is_joint,
+                        ),
                     };
                     if let Err(error) = store.put(&cell) {
                         failed
@@ -69,7 +75,7 @@ pub fn run(
 
 fn train(
     id: CellId,
-    recordings: Recordings<'_>,
+    [training, validation]: [&[Recording]; 2],
     robot: &'static Robot,
     mut options: TrainOptions,
     is_joint: bool,
@@ -78,20 +84,17 @@ fn train(
     options.n_seeds = 1;
     options.joint.threads = 1;
     let training: Vec<Recording> = if is_joint {
-        recordings.training.to_vec()
+        training.to_vec()
     } else {
-        without_fold(recordings.training, id.seed)
+        without_fold(training, id.seed)
     };
-    let sets = Recordings {
-        training: &training,
-        validation: recordings.validation,
-    };
+    let sets = Recordings::new(&training, validation);
     let learn = |options: &TrainOptions| -> Result<Trained, TrainError> {
         let never = AtomicBool::new(false);
         let mut deaf = |_| {};
         let mut watch = Watch::new(&mut deaf, &never);
         let method = if is_joint { joint } else { closed_form };
-        method(sets, robot, options, &Origin::default(), &mut watch)
+        method(sets.clone(), robot, options, &Origin::default(), &mut watch)
     };
     let mut trained = learn(&options);
     if matches!(trained, Err(TrainError::LatentDim { .. })) {

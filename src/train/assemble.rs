@@ -6,16 +6,14 @@ use nalgebra::DMatrix;
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
-use super::dataset::{Dataset, Quantity};
+use super::dataset::Dataset;
 use super::error::TrainError;
 use super::options::TrainOptions;
 use super::report::TrainReport;
 use crate::model::{
-    CoordinateNames, FeetRule, InputStatistics, Library, Phase, ReducedModel, ScaleFactors,
-    Scaling, StateMap,
+    CoordinateNames, Library, Phase, ReducedModel, ScaleFactors, Scaling, StateMap,
 };
 use crate::recording::Recording;
-use crate::recording::phases::FeetPattern;
 use crate::robot::Robot;
 
 /// The trained parts of a model.
@@ -100,18 +98,13 @@ pub(super) fn assemble(
         .sample_time_s(median_step_s(dataset))
         .provenance(provenance(options, method, origin, report)?);
     for (index, (pattern, xi)) in dataset.phases.patterns.iter().zip(parts.xi).enumerate() {
-        let feet = match &pattern.feet {
-            FeetPattern::Any => FeetRule::Any,
-            FeetPattern::None => FeetRule::None,
-            FeetPattern::OneOf(patterns) => FeetRule::Patterns(patterns.clone()),
-        };
         builder = builder
             .phase(Phase {
                 name: pattern.name.clone(),
-                feet,
+                feet: pattern.feet.clone(),
                 xi,
             })
-            .input_statistics(pattern.name.clone(), input_statistics(dataset, index));
+            .input_statistics(pattern.name.clone(), dataset.input_statistics(index));
     }
     Ok(builder.build()?)
 }
@@ -129,15 +122,6 @@ fn signals<const N: usize>(names: [String; N], units: [String; N]) -> Coordinate
         names: names.into(),
         units: units.into(),
     }
-}
-
-/// Mean and covariance of the SI inputs of one phase.
-fn input_statistics(dataset: &Dataset, phase: usize) -> InputStatistics {
-    let mut u = dataset.gather(Quantity::U, Some(phase));
-    for (mut row, factor) in u.row_iter_mut().zip(dataset.scaling.input.iter()) {
-        row /= *factor;
-    }
-    InputStatistics::of_samples(&u)
 }
 
 fn median_step_s(dataset: &Dataset) -> f64 {

@@ -68,6 +68,6 @@ fn fit(
     let encoder = task.encoder_over(&subspace.basis)?.into();
     let decoder = least_squares_decoder(&task.sets.training, &encoder)?.into();
     let fitted = task.fit_dynamics((encoder, decoder), watch)?;
-    let report = task.seed_report(&fitted, (seed, fitted.score()), None);
+    let report = task.seed_report(&fitted, (seed, fitted.score()), None)?;
     Ok((report, fitted))
 }

@@ -1,19 +1,28 @@
 //! Training and validation jumps of one training.
 
-use super::dataset::{Dataset, Quantity};
+use super::dataset::Dataset;
 use super::error::TrainError;
 use super::options::TrainOptions;
-use super::subspace::Moments;
-use crate::recording::Recording;
+use crate::recording::Source;
 use crate::robot::Robot;
 
 /// Recordings to learn from and to choose by.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Recordings<'a> {
     /// Fitted.
-    pub training: &'a [Recording],
+    pub training: Source<'a>,
     /// Used to choose between candidates; without any, the training recordings are.
-    pub validation: &'a [Recording],
+    pub validation: Source<'a>,
+}
+
+impl<'a> Recordings<'a> {
+    /// These recordings, each in memory or in files.
+    pub fn new(training: impl Into<Source<'a>>, validation: impl Into<Source<'a>>) -> Self {
+        Self {
+            training: training.into(),
+            validation: validation.into(),
+        }
+    }
 }
 
 /// The recordings cut into phases, scaled.
@@ -31,19 +40,13 @@ impl DataSets {
     ) -> Result<Self, TrainError> {
         options.check()?;
         let (scaling, smoothing) = (options.scaling.factors(), options.regression.smoothing);
-        let read = |set| Dataset::new(set, robot, &options.phases, &scaling, smoothing);
+        let read = |set: Source<'_>| Dataset::new(set, robot, &options.phases, &scaling, smoothing);
         let training = read(recordings.training)?;
         training.check_for_training()?;
         Ok(Self {
             training,
             validation: read(recordings.validation)?,
         })
-    }
-
-    /// Moments of the training samples.
-    pub fn moments(&self) -> Moments {
-        let gather = |quantity| self.training.gather(quantity, None);
-        Moments::new(&gather(Quantity::X), &gather(Quantity::U))
     }
 
     /// The jumps that candidates are judged by.

@@ -2,14 +2,16 @@
 
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::error::TrainError;
 use super::smooth::moving_average;
-use crate::recording::phases::FeetPattern;
-use crate::recording::{PhaseRule, Recording, Segment};
-use crate::robot::{JOINT_DIM, Robot, STATE_DIM};
+use super::subspace::Moments;
+use crate::model::InputStatistics;
+use crate::recording::{PhaseRule, RecordingError, RecordingFiles, Segment, Source};
+use crate::robot::{FeetRule, JOINT_DIM, Robot, STATE_DIM};
 
 /// Fewest samples of a segment, and of a phase over all segments.
 pub const MIN_SAMPLES: usize = 50;
@@ -82,16 +84,23 @@ pub struct Jump {
     pub time_s: Vec<f64>,
     /// States, `18 x n`.
     pub x: DMatrix<f64>,
-    /// Velocities, `18 x n`.
-    pub dx: DMatrix<f64>,
-    /// Accelerations smoothed within each phase, `18 x n`.
-    pub ddx: DMatrix<f64>,
     /// Inputs `[tau; F]`, `18 x n`.
     pub u: DMatrix<f64>,
+    /// Velocities and accelerations; `None` where the dataset reads them again when they are needed.
+    pub rates: Option<Rates>,
     /// Index of the model's phase at every sample.
     pub phase: Vec<usize>,
     /// Maximal runs of one phase.
     pub spans: Vec<(usize, Range<usize>)>,
+}
+
+/// Derivatives of the states of one jump, scaled units.
+#[derive(Clone, Debug)]
+pub struct Rates {
+    /// Velocities, `18 x n`.
+    pub dx: DMatrix<f64>,
+    /// Accelerations smoothed within each phase, `18 x n`.
+    pub ddx: DMatrix<f64>,
 }
 
 impl Jump {
@@ -115,6 +124,10 @@ pub struct Dataset {
     pub phases: PhaseRule,
     /// Units of everything in [`Self::jumps`].
     pub scaling: Scaling,
+    /// Window of the moving average over accelerations, in samples.
+    pub(super) smoothing: usize,
+    /// Where rates that are not held are read again.
+    pub(super) files: Option<Arc<RecordingFiles>>,
 }
 
 /// Which quantity of a [`Jump`] to gather.
@@ -122,68 +135,182 @@ pub struct Dataset {
 pub enum Quantity {
     /// States.
     X,
-    /// Velocities.
-    Dx,
-    /// Smoothed accelerations.
-    Ddx,
     /// Inputs.
     U,
 }
 
+/// Samples of a set of files whose rates are held in memory (some 20 MB); those of larger sets are read again.
+const HELD_SAMPLES: usize = 65_536;
+/// Columns of a block of samples: a multiple of the depth of the blocks in which products are summed, so that a sum over
+/// blocks has the bits of the sum over all samples.
+const BLOCK: usize = 8192;
+
 impl Dataset {
-    /// Takes the samples of `recordings`, cut into `phases`.
+    /// Takes the samples of recordings, cut into `phases`.
     ///
     /// `smoothing` is the window of the moving average over accelerations, in samples.
     ///
     /// # Errors
     /// [`TrainError::TooFewSamples`] for a segment under 50 samples; [`TrainError::Recording`] where no phase
-    /// matches or a leg in contact is singular.
-    pub fn new(
-        recordings: &[Recording],
+    /// matches, a leg in contact is singular, or a file cannot be read.
+    pub fn new<'a>(
+        recordings: impl Into<Source<'a>>,
         robot: &Robot,
         phases: &PhaseRule,
         scaling: &Scaling,
         smoothing: usize,
     ) -> Result<Self, TrainError> {
-        let source = Source {
-            robot,
-            phases,
-            scaling,
-            smoothing,
-        };
-        let segments = recordings.iter().flat_map(|recording| &recording.segments);
-        let jumps = segments
-            .map(|segment| source.jump(segment))
-            .collect::<Result<_, _>>()?;
-        Ok(Self {
-            jumps,
+        let source = recordings.into();
+        let mut dataset = Self {
+            jumps: Vec::new(),
             phases: phases.clone(),
             scaling: scaling.clone(),
+            smoothing,
+            files: None,
+        };
+        let mut n_samples = 0;
+        source.for_each(|recording| {
+            for segment in &recording.segments {
+                let jump = dataset.jump(segment, robot)?;
+                n_samples += jump.len();
+                dataset.jumps.push(jump);
+            }
+            if let Source::Files(files) = &source
+                && n_samples > HELD_SAMPLES
+            {
+                let jumps = dataset.jumps.iter_mut();
+                jumps.for_each(|jump| jump.rates = None);
+                dataset.files = Some(Arc::clone(files));
+            }
+            Ok::<_, TrainError>(())
+        })?;
+        Ok(dataset)
+    }
+
+    /// Passes every jump with its rates to `take`.
+    ///
+    /// # Errors
+    /// [`TrainError::Recording`] for a file that can no longer be read, or has other samples than before.
+    pub fn for_each(&self, mut take: impl FnMut(&Jump, &Rates)) -> Result<(), TrainError> {
+        let Some(files) = &self.files else {
+            for jump in &self.jumps {
+                take(jump, jump.rates.as_ref().expect("invariant: held"));
+            }
+            return Ok(());
+        };
+        let mut jumps = self.jumps.iter();
+        files.for_each(|recording| {
+            for segment in &recording.segments {
+                let jump = jumps.next().filter(|jump| jump.time_s == segment.time_s);
+                let changed = || RecordingError::Changed {
+                    path: recording.path.clone(),
+                };
+                let jump = jump.ok_or_else(changed)?;
+                take(jump, &self.rates(segment, &jump.spans));
+            }
+            Ok(())
         })
     }
 
     /// Samples of one quantity side by side, of one phase or of all, `18 x samples`.
     pub fn gather(&self, quantity: Quantity, phase: Option<usize>) -> DMatrix<f64> {
-        let total = self.samples(phase);
-        let mut gathered = DMatrix::zeros(STATE_DIM, total);
-        let mut at = 0;
+        let all = std::iter::once(self.samples(phase));
+        let mut gathered = self.cut(quantity, phase, all);
+        gathered.next().expect("invariant: one width")
+    }
+
+    /// The same in blocks.
+    pub fn blocks(
+        &self,
+        quantity: Quantity,
+        phase: Option<usize>,
+    ) -> impl Iterator<Item = DMatrix<f64>> {
+        self.cut(quantity, phase, block_widths(self.samples(phase)))
+    }
+
+    fn cut(
+        &self,
+        quantity: Quantity,
+        phase: Option<usize>,
+        widths: impl Iterator<Item = usize>,
+    ) -> impl Iterator<Item = DMatrix<f64>> {
+        let mut spans: Vec<(&DMatrix<f64>, Range<usize>)> = Vec::new();
         for jump in &self.jumps {
-            let source = match quantity {
+            let samples = match quantity {
                 Quantity::X => &jump.x,
-                Quantity::Dx => &jump.dx,
-                Quantity::Ddx => &jump.ddx,
                 Quantity::U => &jump.u,
             };
-            for (index, range) in &jump.spans {
-                if phase.is_none_or(|wanted| wanted == *index) {
-                    gathered
-                        .columns_mut(at, range.len())
-                        .copy_from(&source.columns(range.start, range.len()));
-                    at += range.len();
+            let own = jump.spans.iter();
+            let own = own.filter(|(index, _)| phase.is_none_or(|wanted| wanted == *index));
+            spans.extend(own.map(|(_, range)| (samples, range.clone())));
+        }
+        let mut spans = spans.into_iter().peekable();
+        widths.map(move |width| {
+            let mut block = DMatrix::zeros(STATE_DIM, width);
+            let mut at = 0;
+            while at < width {
+                let (samples, range) = spans.peek_mut().expect("invariant: as many samples");
+                let count = range.len().min(width - at);
+                block
+                    .columns_mut(at, count)
+                    .copy_from(&samples.columns(range.start, count));
+                (range.start, at) = (range.start + count, at + count);
+                if range.start == range.end {
+                    spans.next();
+                }
+            }
+            block
+        })
+    }
+
+    /// Mean of one quantity over the samples of one phase or of all.
+    pub fn mean(&self, quantity: Quantity, phase: Option<usize>) -> DVector<f64> {
+        mean(self.blocks(quantity, phase), self.samples(phase))
+    }
+
+    /// Standard deviation of every state over all samples.
+    pub fn state_std(&self) -> DVector<f64> {
+        let share = 1.0 / self.samples(None) as f64;
+        let mut variance = self.mean(Quantity::X, None).map(|mean| -(mean * mean));
+        for block in self.blocks(Quantity::X, None) {
+            for column in block.column_iter() {
+                for (sum, value) in variance.iter_mut().zip(&column) {
+                    *sum += share * value * value;
                 }
             }
         }
-        gathered
+        variance.map(f64::sqrt)
+    }
+
+    /// Covariance of the states and second moment of the inputs about zero, over all samples.
+    pub fn moments(&self) -> Moments {
+        let mean = self.mean(Quantity::X, None);
+        let deviations = self.blocks(Quantity::X, None).map(|x| centred(x, &mean));
+        let n = self.samples(None).max(1) as f64;
+        Moments {
+            state: sum_of_squares(deviations) / n,
+            input: sum_of_squares(self.blocks(Quantity::U, None)) / n,
+        }
+    }
+
+    /// Mean and covariance of the SI inputs of one phase; all zero without a sample.
+    pub fn input_statistics(&self, phase: usize) -> InputStatistics {
+        let blocks = || {
+            self.blocks(Quantity::U, Some(phase)).map(|mut u| {
+                for (mut row, factor) in u.row_iter_mut().zip(&self.scaling.input) {
+                    row /= *factor;
+                }
+                u
+            })
+        };
+        let n = self.samples(Some(phase));
+        let mean = mean(blocks(), n);
+        let squares = sum_of_squares(blocks().map(|u| centred(u, &mean)));
+        let covariance = squares / n.max(1) as f64;
+        InputStatistics {
+            mean,
+            covariance: (&covariance + covariance.transpose()) * 0.5,
+        }
     }
 
     /// Number of samples of one phase or of all.
@@ -208,8 +335,8 @@ impl Dataset {
             let found = self.samples(Some(index));
             if found < MIN_SAMPLES {
                 let needed = match phase.feet {
-                    FeetPattern::None => "all feet leave the ground",
-                    FeetPattern::Any | FeetPattern::OneOf(_) => "these feet touch the ground",
+                    FeetRule::None => "all feet leave the ground",
+                    FeetRule::Any | FeetRule::Patterns(_) => "these feet touch the ground",
                 };
                 return Err(TrainError::PhaseSamples {
                     phase: phase.name.clone(),
@@ -221,18 +348,8 @@ impl Dataset {
         }
         Ok(())
     }
-}
 
-/// What turns a segment into a jump.
-struct Source<'a> {
-    robot: &'a Robot,
-    phases: &'a PhaseRule,
-    scaling: &'a Scaling,
-    smoothing: usize,
-}
-
-impl Source<'_> {
-    fn jump(&self, segment: &Segment) -> Result<Jump, TrainError> {
+    fn jump(&self, segment: &Segment, robot: &Robot) -> Result<Jump, TrainError> {
         let n = segment.len();
         if n < MIN_SAMPLES {
             return Err(TrainError::TooFewSamples {
@@ -244,27 +361,57 @@ impl Source<'_> {
         }
         let mut phase = vec![0; n];
         let mut spans = Vec::new();
-        let mut ddx = DMatrix::zeros(STATE_DIM, n);
         for span in self.phases.spans(segment)? {
             phase[span.range.clone()].fill(span.phase);
-            let smooth = moving_average(
-                &segment.ddx.columns_range(span.range.clone()).into_owned(),
-                self.smoothing,
-            );
-            ddx.columns_range_mut(span.range.clone()).copy_from(&smooth);
             spans.push((span.phase, span.range));
         }
         Ok(Jump {
             path: segment.path.clone(),
             time_s: segment.time_s.clone(),
             x: scaled(segment.x.clone(), &self.scaling.state),
-            dx: scaled(segment.dx.clone(), &self.scaling.state),
-            ddx: scaled(ddx, &self.scaling.state),
-            u: scaled(segment.input(self.robot)?, &self.scaling.input),
+            u: scaled(segment.input(robot)?, &self.scaling.input),
+            rates: match self.files {
+                None => Some(self.rates(segment, &spans)),
+                Some(_) => None,
+            },
             phase,
             spans,
         })
     }
+
+    fn rates(&self, segment: &Segment, spans: &[(usize, Range<usize>)]) -> Rates {
+        let mut ddx = DMatrix::zeros(STATE_DIM, segment.len());
+        for (_, range) in spans {
+            let span = segment.ddx.columns_range(range.clone()).into_owned();
+            ddx.columns_range_mut(range.clone())
+                .copy_from(&moving_average(&span, self.smoothing));
+        }
+        Rates {
+            dx: scaled(segment.dx.clone(), &self.scaling.state),
+            ddx: scaled(ddx, &self.scaling.state),
+        }
+    }
+}
+
+/// Widths of the blocks that so many samples are divided into; the last one is never narrow, as products of a few
+/// columns are summed another way.
+pub fn block_widths(mut samples: usize) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let width = if samples < 2 * BLOCK { samples } else { BLOCK };
+        samples -= width;
+        (width > 0).then_some(width)
+    })
+}
+
+/// Mean of `n` samples in the columns of blocks.
+fn mean(blocks: impl Iterator<Item = DMatrix<f64>>, n: usize) -> DVector<f64> {
+    let mut mean = DVector::zeros(STATE_DIM);
+    for block in blocks {
+        for column in block.column_iter() {
+            mean.axpy(1.0 / n as f64, &column, 1.0);
+        }
+    }
+    mean
 }
 
 /// Every row times its factor.
@@ -273,4 +420,26 @@ fn scaled(mut rows: DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
         .zip(factors.iter())
         .for_each(|(mut row, factor)| row *= *factor);
     rows
+}
+
+/// Samples in columns less their mean.
+pub fn centred(mut samples: DMatrix<f64>, mean: &DVector<f64>) -> DMatrix<f64> {
+    samples
+        .column_iter_mut()
+        .for_each(|mut column| column -= mean);
+    samples
+}
+
+/// Sum of `a a^T` over blocks.
+fn sum_of_squares(blocks: impl Iterator<Item = DMatrix<f64>>) -> DMatrix<f64> {
+    let mut sum = DMatrix::zeros(STATE_DIM, STATE_DIM);
+    for block in blocks {
+        sum_product(&mut sum, &block, &block);
+    }
+    sum
+}
+
+/// Adds `a b^T` of one block.
+pub fn sum_product(sum: &mut DMatrix<f64>, a: &DMatrix<f64>, b: &DMatrix<f64>) {
+    sum.gemm(1.0, a, &b.transpose(), 1.0);
 }

@@ -8,7 +8,7 @@ use super::features::Features;
 use super::joint::Losses;
 use super::judge::Judge;
 use super::latent::{Latent, input_projection, lift_samples, mean_jacobian};
-use super::metrics::{Assessed, BODY_X, BODY_Z, measure};
+use super::metrics::{Assessed, BODY_X, BODY_Z, SetMetrics, measure, measure_encoded};
 use super::progress::Watch;
 use super::report::{PhaseTerms, SeedReport, TrainReport};
 use super::rollout::Candidate;
@@ -28,6 +28,8 @@ pub(super) struct Fitted {
     pub xi: Vec<DMatrix<f64>>,
     /// The regression, if Xi was chosen among regressions, and how many were tried.
     pub choice: Option<(Choice, usize)>,
+    /// Metrics on the training jumps, if they were measured with the fit.
+    pub training: Option<SetMetrics>,
 }
 
 impl Fitted {
@@ -51,17 +53,15 @@ impl Fitted {
 impl Task<'_> {
     /// The encoder over a space with orthonormal `basis` (`18 x d`): in its canonical basis, `b_e = -W_e mean(x)`.
     pub fn encoder_over(&self, basis: &DMatrix<f64>) -> Result<AffineMap, TrainError> {
-        let x = self.sets.training.gather(Quantity::X, None);
         let weights = self.canonical_basis(basis).0.transpose();
-        let bias = -(&weights * x.column_mean());
+        let bias = -(&weights * self.sets.training.mean(Quantity::X, None));
         Ok(AffineMap::new("encoder", weights, bias)?)
     }
 
     /// `basis T` (`18 x d`) and the orthogonal `T` (`d x d`) for which its columns are simple in the sense of varimax,
     /// with body x and body z first and positive dominant entries.
     pub fn canonical_basis(&self, basis: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
-        let x = self.sets.training.gather(Quantity::X, None);
-        let std = x.column_variance().map(f64::sqrt);
+        let std = self.sets.training.state_std();
         let loadings = |basis: &DMatrix<f64>| DMatrix::from_diagonal(&std) * basis;
         let mut basis = basis.clone();
         let mut turn = DMatrix::identity(basis.ncols(), basis.ncols());
@@ -87,18 +87,30 @@ impl Task<'_> {
         watch: &mut Watch<'_>,
     ) -> Result<Fitted, TrainError> {
         let (training, judged) = (&self.sets.training, self.sets.judged());
-        let latent = Latent::of(training, &encoder);
-        let judged_latent = Latent::of(judged, &encoder);
+        let latent = Latent::of(training, &encoder)?;
+        let validated = match self.sets.validation.jumps.is_empty() {
+            true => None,
+            false => Some(Latent::of(judged, &encoder)?),
+        };
+        let judged_latent = validated.as_ref().unwrap_or(&latent);
         let options = &self.options.regression;
-        let judge = Judge::new(judged, &judged_latent, options.rollout_weight);
+        let judge = Judge::new(judged, judged_latent, options.rollout_weight);
         let selected = select(training, &latent, &self.features, &judge, options, watch)?;
-        Ok(Fitted {
-            weights: mean_jacobian(&encoder, &training.gather(Quantity::X, None)),
+        let weights = match encoder.as_affine() {
+            Some(linear) => linear.weights().clone(),
+            None => mean_jacobian(&encoder, &training.gather(Quantity::X, None)),
+        };
+        let mut fitted = Fitted {
+            weights,
             encoder,
             decoder,
             xi: selected.xi,
             choice: Some((selected.choice, selected.candidates)),
-        })
+            training: None,
+        };
+        let measured = measure_encoded(fitted.assessed(&self.features), training, &latent);
+        fitted.training = Some(measured);
+        Ok(fitted)
     }
 
     /// The metrics of one seed.
@@ -107,12 +119,11 @@ impl Task<'_> {
         fitted: &Fitted,
         (seed, score): (u64, f64),
         losses: Option<Losses>,
-    ) -> SeedReport {
-        let x = self.sets.training.gather(Quantity::X, None);
-        let std = x.column_variance().map(f64::sqrt);
+    ) -> Result<SeedReport, TrainError> {
+        let std = self.sets.training.state_std();
         let names = Robot::state_names();
         let rows = fitted.weights.row_iter();
-        SeedReport {
+        Ok(SeedReport {
             seed,
             score,
             losses,
@@ -120,21 +131,26 @@ impl Task<'_> {
             dominant: rows
                 .map(|row| names[row.transpose().component_mul(&std).iamax()].clone())
                 .collect(),
-            judged: measure(fitted.assessed(&self.features), self.sets.judged()),
-        }
+            judged: measure(fitted.assessed(&self.features), self.sets.judged())?,
+        })
     }
 
     /// The metrics of fitted numbers.
-    pub fn report(&self, fitted: &Fitted) -> TrainReport {
+    pub fn report(&self, fitted: &Fitted) -> Result<TrainReport, TrainError> {
         let assessed = fitted.assessed(&self.features);
         let names = Robot::state_names();
         let sets = &self.sets;
         let phases = sets.training.phases.names().into_iter().zip(&fitted.xi);
         let (choice, candidates) = fitted.choice.clone().unzip();
         let validated = !sets.validation.jumps.is_empty();
-        TrainReport {
+        let training = match &fitted.training {
+            Some(measured) => measured.clone(),
+            None => measure(assessed, &sets.training)?,
+        };
+        let validation = validated.then(|| measure(assessed, &sets.validation));
+        Ok(TrainReport {
             encoded: self.active.iter().map(|&i| names[i].clone()).collect(),
-            lift_loss: self.lift_loss(&fitted.encoder),
+            lift_loss: self.lift_loss(&fitted.encoder)?,
             active_terms: phases
                 .map(|(phase, xi)| PhaseTerms {
                     phase,
@@ -145,25 +161,25 @@ impl Task<'_> {
             candidates: candidates.unwrap_or(0),
             seeds: Vec::new(),
             support_overlap: None,
-            training: measure(assessed, &sets.training),
-            validation: validated.then(|| measure(assessed, &sets.validation)),
-        }
+            training,
+            validation: validation.transpose()?,
+        })
     }
 
     /// Share of the training input's energy that the latent input cannot carry.
-    fn lift_loss(&self, encoder: &StateMap) -> f64 {
+    fn lift_loss(&self, encoder: &StateMap) -> Result<f64, TrainError> {
         if let Some(linear) = encoder.as_affine() {
             let (weights, input) = (linear.weights(), &self.moments.input);
             let carried = &input_projection(weights) * input * weights.transpose();
-            return 1.0 - carried.trace() / input.trace().max(f64::MIN_POSITIVE);
+            return Ok(1.0 - carried.trace() / input.trace().max(f64::MIN_POSITIVE));
         }
         let training = &self.sets.training;
-        let latent = Latent::of(training, encoder);
+        let latent = Latent::of(training, encoder)?;
         let (mut missed, mut total) = (0.0, 0.0);
         for (jump, samples) in training.jumps.iter().zip(&latent) {
             missed += (lift_samples(encoder, &jump.x, &samples.u_lat) - &jump.u).norm_squared();
             total += jump.u.norm_squared();
         }
-        missed / total.max(f64::MIN_POSITIVE)
+        Ok(missed / total.max(f64::MIN_POSITIVE))
     }
 }

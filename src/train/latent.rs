@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixViewMut, DVector};
 
-use super::dataset::{Dataset, Jump, Quantity};
+use super::dataset::{Dataset, Jump, Quantity, Rates, block_widths, centred, sum_product};
 use super::error::TrainError;
 use crate::model::{AffineMap, ModelError, StateMap};
 
@@ -25,21 +25,30 @@ pub struct Latent {
 
 impl Latent {
     /// Encodes every jump.
-    pub fn of(dataset: &Dataset, encoder: &StateMap) -> Vec<Latent> {
-        let Some(affine) = encoder.as_affine() else {
-            let jumps = dataset.jumps.iter();
-            return jumps.map(|jump| Self::along(jump, encoder)).collect();
-        };
-        let projection = input_projection(affine.weights());
-        dataset
-            .jumps
-            .iter()
-            .map(|jump| Self::of_jump(jump, affine, &projection))
-            .collect()
+    ///
+    /// # Errors
+    /// As [`Dataset::for_each`].
+    pub fn of(dataset: &Dataset, encoder: &StateMap) -> Result<Vec<Latent>, TrainError> {
+        let linear = encoder
+            .as_affine()
+            .map(|affine| (affine, input_projection(affine.weights())));
+        let mut all = Vec::with_capacity(dataset.jumps.len());
+        dataset.for_each(|jump, rates| {
+            all.push(match &linear {
+                Some((encoder, projection)) => Self {
+                    z: affine(encoder, &jump.x),
+                    dz: encoder.weights() * &rates.dx,
+                    ddz: encoder.weights() * &rates.ddx,
+                    u_lat: projection * &jump.u,
+                },
+                None => Self::along(jump, rates, encoder),
+            });
+        })?;
+        Ok(all)
     }
 
     /// Encodes a jump with the Jacobian at every sample.
-    fn along(jump: &Jump, encoder: &StateMap) -> Self {
+    fn along(jump: &Jump, rates: &Rates, encoder: &StateMap) -> Self {
         let empty = DMatrix::zeros(encoder.output_dim(), jump.len());
         let mut latent = Self {
             z: empty.clone(),
@@ -49,11 +58,11 @@ impl Latent {
         };
         for sample in 0..jump.len() {
             let column = |matrix: &DMatrix<f64>| matrix.column(sample).into_owned();
-            let (x, dx) = (column(&jump.x), column(&jump.dx));
+            let (x, dx) = (column(&jump.x), column(&rates.dx));
             let derivatives = [
                 encoder.apply(&x),
                 encoder.apply_velocity(&x, &dx),
-                encoder.apply_acceleration(&x, &dx, &column(&jump.ddx)),
+                encoder.apply_acceleration(&x, &dx, &column(&rates.ddx)),
             ];
             let into = [&mut latent.z, &mut latent.dz, &mut latent.ddz];
             for (matrix, value) in into.into_iter().zip(derivatives) {
@@ -66,39 +75,41 @@ impl Latent {
         latent
     }
 
-    fn of_jump(jump: &Jump, encoder: &AffineMap, projection: &DMatrix<f64>) -> Self {
-        Self {
-            z: affine(encoder, &jump.x),
-            dz: encoder.weights() * &jump.dx,
-            ddz: encoder.weights() * &jump.ddx,
-            u_lat: projection * &jump.u,
-        }
-    }
-
-    /// `[z, dz, u_lat]` of the samples of one phase, `n x 3 latent_dim`, and `ddz^T`, `n x latent_dim`.
-    pub fn regression_samples(
-        dataset: &Dataset,
-        latent: &[Latent],
+    /// Blocks of the samples of one phase: `[z, dz, u_lat]`, `n x 3 latent_dim`, and `ddz^T`, `n x latent_dim`.
+    pub fn regression_blocks<'a>(
+        dataset: &'a Dataset,
+        latent: &'a [Latent],
         phase: usize,
-    ) -> (DMatrix<f64>, DMatrix<f64>) {
+    ) -> impl Iterator<Item = (DMatrix<f64>, DMatrix<f64>)> + 'a {
         let d = latent.first().map_or(0, |first| first.z.nrows());
-        let n = dataset.samples(Some(phase));
-        let (mut variables, mut target) = (DMatrix::zeros(n, 3 * d), DMatrix::zeros(n, d));
-        let mut at = 0;
-        for (jump, samples) in dataset.jumps.iter().zip(latent) {
-            for (_, range) in jump.spans.iter().filter(|(index, _)| *index == phase) {
-                let count = range.len();
-                samples.copy_variables(range.clone(), &mut variables.rows_mut(at, count));
+        let jumps = dataset.jumps.iter().zip(latent);
+        let spans = jumps.flat_map(move |(jump, samples)| {
+            let own = jump.spans.iter().filter(move |(index, _)| *index == phase);
+            own.map(move |(_, range)| (samples, range.clone()))
+        });
+        let mut spans = spans.peekable();
+        block_widths(dataset.samples(Some(phase))).map(move |width| {
+            let (mut variables, mut target) =
+                (DMatrix::zeros(width, 3 * d), DMatrix::zeros(width, d));
+            let mut at = 0;
+            while at < width {
+                let (samples, range) = spans.peek_mut().expect("invariant: as many samples");
+                let count = range.len().min(width - at);
+                let part = range.start..range.start + count;
+                samples.copy_variables(part.clone(), &mut variables.rows_mut(at, count));
                 target
                     .rows_mut(at, count)
-                    .tr_copy_from(&samples.ddz.columns_range(range.clone()));
-                at += count;
+                    .tr_copy_from(&samples.ddz.columns_range(part));
+                (range.start, at) = (range.start + count, at + count);
+                if range.start == range.end {
+                    spans.next();
+                }
             }
-        }
-        (variables, target)
+            (variables, target)
+        })
     }
 
-    /// Jump and sample of a row of [`Self::regression_samples`], if there are so many.
+    /// Jump and sample of a row of [`Self::regression_blocks`], if there are so many.
     pub fn place_of_row(dataset: &Dataset, phase: usize, row: usize) -> Option<(&Jump, usize)> {
         let spans = dataset
             .jumps
@@ -191,8 +202,26 @@ pub fn least_squares_decoder(
     dataset: &Dataset,
     encoder: &StateMap,
 ) -> Result<AffineMap, TrainError> {
-    let x = dataset.gather(Quantity::X, None);
-    Ok(fit_affine(&x, &map_samples(encoder, &x))?)
+    let d = encoder.output_dim();
+    let x_mean = dataset.mean(Quantity::X, None);
+    let share = 1.0 / dataset.samples(None) as f64;
+    let encoded = || {
+        let blocks = dataset.blocks(Quantity::X, None);
+        blocks.map(|x| (map_samples(encoder, &x), x))
+    };
+    let mut z_mean = DVector::zeros(d);
+    for (z, _) in encoded() {
+        let columns = z.column_iter();
+        columns.for_each(|column| z_mean.axpy(share, &column, 1.0));
+    }
+    let mut gram = DMatrix::zeros(d, d);
+    let mut cross = DMatrix::zeros(x_mean.len(), d);
+    for (z, x) in encoded() {
+        let (x, z) = (centred(x, &x_mean), centred(z, &z_mean));
+        sum_product(&mut gram, &z, &z);
+        sum_product(&mut cross, &x, &z);
+    }
+    Ok(solve_affine((&gram, &cross), x_mean, &z_mean)?)
 }
 
 /// The affine map of least square error from samples `z` to samples `x`, both in columns.
@@ -201,21 +230,22 @@ pub fn least_squares_decoder(
 /// [`ModelError::NonFinite`] if a weight is not finite.
 pub fn fit_affine(x: &DMatrix<f64>, z: &DMatrix<f64>) -> Result<AffineMap, ModelError> {
     let (x_mean, z_mean) = (x.column_mean(), z.column_mean());
-    let (x_centred, z_centred) = (centred(x, &x_mean), centred(z, &z_mean));
-    let gram = &z_centred * z_centred.transpose();
-    let floor = 1e-12 * gram.trace().max(f64::MIN_POSITIVE);
-    let inverse = gram
-        .pseudo_inverse(floor)
-        .expect("the tolerance is positive");
-    let weights = x_centred * z_centred.transpose() * inverse;
-    let bias = x_mean - &weights * z_mean;
-    AffineMap::new("decoder", weights, bias)
+    let (x, z) = (centred(x.clone(), &x_mean), centred(z.clone(), &z_mean));
+    let (gram, cross) = (&z * z.transpose(), x * z.transpose());
+    solve_affine((&gram, &cross), x_mean, &z_mean)
 }
 
-fn centred(samples: &DMatrix<f64>, mean: &DVector<f64>) -> DMatrix<f64> {
-    let mut shifted = samples.clone();
-    for mut column in shifted.column_iter_mut() {
-        column -= mean;
-    }
-    shifted
+/// The affine map from the sums of `z z^T` and `x z^T` about the means.
+fn solve_affine(
+    (gram, cross): (&DMatrix<f64>, &DMatrix<f64>),
+    x_mean: DVector<f64>,
+    z_mean: &DVector<f64>,
+) -> Result<AffineMap, ModelError> {
+    let floor = 1e-12 * gram.trace().max(f64::MIN_POSITIVE);
+    let inverse = (gram.clone())
+        .pseudo_inverse(floor)
+        .expect("the tolerance is positive");
+    let weights = cross * inverse;
+    let bias = x_mean - &weights * z_mean;
+    AffineMap::new("decoder", weights, bias)
 }

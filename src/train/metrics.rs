@@ -1,16 +1,16 @@
 //! How good a model is on a set of jumps.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::dataset::{Dataset, Scaling};
+use super::dataset::{Dataset, Quantity, Scaling};
 use super::error::TrainError;
-use super::features::Features;
+use super::features::{FeatureValues, Features};
 use super::latent::{Latent, lift_samples, map_samples};
 use super::rollout::{Candidate, Window, predict, restarted, whole};
-use crate::model::{FeetRule, ReducedModel, StateMap};
-use crate::recording::phases::{FeetPattern, PhasePattern};
-use crate::recording::{PhaseRule, Recording};
+use crate::model::{ReducedModel, StateMap};
+use crate::recording::phases::PhasePattern;
+use crate::recording::{PhaseRule, Source};
 use crate::robot::JOINT_DIM;
 
 /// Row of body x in the state; y and z follow.
@@ -56,14 +56,17 @@ pub(super) struct Assessed<'a> {
 ///
 /// # Errors
 /// [`TrainError`] if the model has no encoder, decoder, scaling or robot, or the recordings do not fit it.
-pub fn assess(model: &ReducedModel, recordings: &[Recording]) -> Result<SetMetrics, TrainError> {
+pub fn assess<'a>(
+    model: &ReducedModel,
+    recordings: impl Into<Source<'a>>,
+) -> Result<SetMetrics, TrainError> {
     let scaling = Scaling {
         state: model.state_factors()?,
         input: model.input_factors()?,
     };
     let patterns = model.phases().iter().map(|phase| PhasePattern {
         name: phase.name.clone(),
-        feet: pattern(&phase.feet),
+        feet: phase.feet.clone(),
     });
     let phases = PhaseRule::new(patterns.collect());
     let dataset = Dataset::new(recordings, model.robot()?, &phases, &scaling, SMOOTHING)?;
@@ -81,29 +84,30 @@ pub fn assess(model: &ReducedModel, recordings: &[Recording]) -> Result<SetMetri
         encoder: model.encoder_map()?,
         decoder: model.decoder_map()?,
     };
-    Ok(measure(assessed, &dataset))
-}
-
-fn pattern(rule: &FeetRule) -> FeetPattern {
-    match rule {
-        FeetRule::Any => FeetPattern::Any,
-        FeetRule::None => FeetPattern::None,
-        FeetRule::Patterns(patterns) => FeetPattern::OneOf(patterns.clone()),
-    }
+    measure(assessed, &dataset)
 }
 
 /// Measures a model on a dataset.
-pub(super) fn measure(model: Assessed<'_>, dataset: &Dataset) -> SetMetrics {
-    let latent = Latent::of(dataset, model.encoder);
+pub(super) fn measure(model: Assessed<'_>, dataset: &Dataset) -> Result<SetMetrics, TrainError> {
+    let latent = Latent::of(dataset, model.encoder)?;
+    Ok(measure_encoded(model, dataset, &latent))
+}
+
+/// Measures a model on a dataset that it has encoded already.
+pub(super) fn measure_encoded(
+    model: Assessed<'_>,
+    dataset: &Dataset,
+    latent: &[Latent],
+) -> SetMetrics {
     let [prediction_x_m, prediction_z_m] =
-        body_rms(model, dataset, &latent, &restarted(dataset, SHORT_S));
-    let [rollout_x_m, rollout_z_m] = body_rms(model, dataset, &latent, &whole(dataset));
+        body_rms(model, dataset, latent, &restarted(dataset, SHORT_S));
+    let [rollout_x_m, rollout_z_m] = body_rms(model, dataset, latent, &whole(dataset));
     SetMetrics {
-        decoder_mse: decoder_mse(model, dataset, &latent),
+        decoder_mse: decoder_mse(model, dataset, latent),
         ddz_r2: (0..dataset.phases.patterns.len())
-            .map(|phase| ddz_r2(model.candidate, dataset, &latent, phase))
+            .map(|phase| ddz_r2(model.candidate, dataset, latent, phase))
             .collect(),
-        torque_r2: torque_r2(model.encoder, dataset, &latent),
+        torque_r2: torque_r2(model.encoder, dataset, latent),
         prediction_x_m,
         prediction_z_m,
         rollout_x_m: rollout_x_m.is_finite().then_some(rollout_x_m),
@@ -148,47 +152,63 @@ fn decoder_mse(model: Assessed<'_>, dataset: &Dataset, latent: &[Latent]) -> f64
 }
 
 fn ddz_r2(candidate: Candidate<'_>, dataset: &Dataset, latent: &[Latent], phase: usize) -> f64 {
-    let (variables, target) = Latent::regression_samples(dataset, latent, phase);
-    let theta = candidate
-        .features
-        .evaluate(&variables, &mut Default::default());
-    r_squared(
-        &(theta * &candidate.xi[phase]).transpose(),
-        &target.transpose(),
-    )
+    let blocks = || {
+        Latent::regression_blocks(dataset, latent, phase)
+            .map(|(variables, target)| (variables, target.transpose()))
+    };
+    let mut mean = DVector::zeros(candidate.features.latent_dim());
+    let share = 1.0 / dataset.samples(Some(phase)) as f64;
+    for (_, target) in blocks() {
+        let columns = target.column_iter();
+        columns.for_each(|column| mean.axpy(share, &column, 1.0));
+    }
+    let mut sums = Determination::about(mean);
+    let mut values = FeatureValues::default();
+    for (variables, target) in blocks() {
+        let theta = candidate.features.evaluate(&variables, &mut values);
+        sums.add(&(theta * &candidate.xi[phase]).transpose(), &target);
+    }
+    sums.r2()
 }
 
 fn torque_r2(encoder: &StateMap, dataset: &Dataset, latent: &[Latent]) -> f64 {
-    let lifted: Vec<_> = dataset
-        .jumps
-        .iter()
-        .zip(latent)
-        .map(|(jump, samples)| lift_samples(encoder, &jump.x, &samples.u_lat))
-        .collect();
-    let total = dataset.samples(None);
-    let (mut predicted, mut recorded) = (
-        DMatrix::zeros(JOINT_DIM, total),
-        DMatrix::zeros(JOINT_DIM, total),
-    );
-    let mut at = 0;
-    for (jump, u) in dataset.jumps.iter().zip(&lifted) {
-        predicted
-            .columns_mut(at, jump.len())
-            .copy_from(&u.rows(0, JOINT_DIM));
-        recorded
-            .columns_mut(at, jump.len())
-            .copy_from(&jump.u.rows(0, JOINT_DIM));
-        at += jump.len();
+    let mean = dataset
+        .mean(Quantity::U, None)
+        .rows(0, JOINT_DIM)
+        .into_owned();
+    let mut sums = Determination::about(mean);
+    for (jump, samples) in dataset.jumps.iter().zip(latent) {
+        let lifted = lift_samples(encoder, &jump.x, &samples.u_lat);
+        let torques = |u: &DMatrix<f64>| u.rows(0, JOINT_DIM).into_owned();
+        sums.add(&torques(&lifted), &torques(&jump.u));
     }
-    r_squared(&predicted, &recorded)
+    sums.r2()
 }
 
-/// `1 - sum of squared errors / sum of squares about each row's mean`, over all rows together.
-fn r_squared(predicted: &DMatrix<f64>, truth: &DMatrix<f64>) -> f64 {
-    let mean = truth.column_mean();
-    let spread: f64 = truth
-        .column_iter()
-        .map(|column| (column - &mean).norm_squared())
-        .sum();
-    1.0 - (predicted - truth).norm_squared() / spread.max(f64::MIN_POSITIVE)
+/// Sums of a coefficient of determination over all rows together, each about its mean; samples are columns.
+struct Determination {
+    mean: DVector<f64>,
+    residual: f64,
+    spread: f64,
+}
+
+impl Determination {
+    fn about(mean: DVector<f64>) -> Self {
+        Self {
+            mean,
+            residual: 0.0,
+            spread: 0.0,
+        }
+    }
+
+    fn add(&mut self, predicted: &DMatrix<f64>, truth: &DMatrix<f64>) {
+        for (predicted, truth) in predicted.column_iter().zip(truth.column_iter()) {
+            self.residual += (predicted - truth).norm_squared();
+            self.spread += (truth - &self.mean).norm_squared();
+        }
+    }
+
+    fn r2(&self) -> f64 {
+        1.0 - self.residual / self.spread.max(f64::MIN_POSITIVE)
+    }
 }

@@ -49,4 +49,4 @@ pub use options::{
 };
 pub use progress::{Progress, Watch};
 pub use report::{PhaseTerms, SeedReport, TrainReport, Trained};
-pub use split::{Split, SplitJumps};
+pub use split::Split;

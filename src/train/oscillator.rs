@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::dataset::{Dataset, Jump, ScaleOptions};
+use super::dataset::{Dataset, Jump, Rates, ScaleOptions};
 use super::latent::Latent;
 use crate::recording::PhaseRule;
 use crate::robot::STATE_DIM;
@@ -39,9 +39,11 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
             path: PathBuf::from("oscillator.csv"),
             time_s: (0..n).map(|i| i as f64 * STEP_S).collect(),
             x: lift(&samples.z),
-            dx: lift(&samples.dz),
-            ddx: lift(&samples.ddz),
             u: lift(&samples.u_lat),
+            rates: Some(Rates {
+                dx: lift(&samples.dz),
+                ddx: lift(&samples.ddz),
+            }),
             phase: (0..n).map(|i| usize::from(i >= LIFT_OFF)).collect(),
             spans: vec![(0, 0..LIFT_OFF), (1, LIFT_OFF..n)],
         }
@@ -52,6 +54,8 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
             jumps: jumps.collect(),
             phases: PhaseRule::two_phase(),
             scaling,
+            smoothing: 1,
+            files: None,
         },
         latent,
     )

@@ -140,6 +140,7 @@ mod tests {
             weights,
             xi: vec![xi],
             choice: None,
+            training: None,
         }
     }
 

@@ -63,7 +63,7 @@ impl Seeds {
         origin: &Origin,
     ) -> Result<Trained, TrainError> {
         let best = self.best(&task.library, &task.moments.state)?;
-        let mut report = task.report(&best.fitted);
+        let mut report = task.report(&best.fitted)?;
         // A single seed without losses has nothing that the report does not say.
         if best.reports.len() > 1 || best.reports[0].losses.is_some() {
             (report.seeds, report.support_overlap) = (best.reports, best.overlap);
@@ -179,6 +179,7 @@ mod tests {
             weights: DMatrix::identity(2, 2),
             xi: vec![DMatrix::from_element(7, 2, coefficient)],
             choice: None,
+            training: None,
         };
         Ok((report, fitted))
     }

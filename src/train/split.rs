@@ -5,23 +5,11 @@ use std::str::FromStr;
 
 use super::error::TrainError;
 use super::random::Random;
-use crate::recording::Recording;
 
 /// Shares of the jumps for training, validation and test, such as 14, 3 and 3: any unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Split {
     shares: [usize; 3],
-}
-
-/// The sets of a [`Split`], each with one recording a jump in the order they came.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SplitJumps {
-    /// What the model is fitted to.
-    pub training: Vec<Recording>,
-    /// What chooses between candidates.
-    pub validation: Vec<Recording>,
-    /// What nothing sees before the end.
-    pub test: Vec<Recording>,
 }
 
 impl FromStr for Split {
@@ -57,32 +45,22 @@ impl fmt::Display for Split {
 }
 
 impl Split {
-    /// Draws the sets: a jump (a segment of a recording) goes into one of them as a whole, by a random order that
-    /// depends on nothing but `seed` and the number of jumps.
+    /// Draws the sets: for training, validation and test the numbers of its jumps, rising. A jump (a segment of a
+    /// recording) goes into one of them as a whole, by a random order that depends on nothing but `seed` and the number
+    /// of jumps.
     ///
     /// # Errors
     /// [`TrainError::Split`] if there are fewer jumps than sets.
-    pub fn of(&self, recordings: &[Recording], seed: u64) -> Result<SplitJumps, TrainError> {
-        let jumps: Vec<Recording> = recordings.iter().flat_map(single_jumps).collect();
-        let counts = self.counts(jumps.len())?;
-        let order = shuffled(jumps.len(), seed);
-        let mut set = vec![0; jumps.len()];
-        for (place, jump) in order.into_iter().enumerate() {
-            set[jump] = match place {
-                place if place < counts[0] => 0,
-                place if place < counts[0] + counts[1] => 1,
-                _ => 2,
-            };
-        }
-        let [mut training, mut validation, mut test] = [const { Vec::new() }; 3];
-        for (jump, set) in jumps.into_iter().zip(set) {
-            [&mut training, &mut validation, &mut test][set].push(jump);
-        }
-        Ok(SplitJumps {
-            training,
-            validation,
-            test,
-        })
+    pub fn of(&self, jumps: usize, seed: u64) -> Result<[Vec<usize>; 3], TrainError> {
+        let counts = self.counts(jumps)?;
+        let order = shuffled(jumps, seed);
+        let (training, rest) = order.split_at(counts[0]);
+        let (validation, test) = rest.split_at(counts[1]);
+        Ok([training, validation, test].map(|set| {
+            let mut set = set.to_vec();
+            set.sort_unstable();
+            set
+        }))
     }
 
     /// Jumps a set: in proportion, the largest remainders rounded up, at least one where the share is not 0.
@@ -120,15 +98,6 @@ impl Split {
     }
 }
 
-/// A recording for each of its segments.
-fn single_jumps(recording: &Recording) -> impl Iterator<Item = Recording> + '_ {
-    recording.segments.iter().map(|segment| Recording {
-        path: recording.path.clone(),
-        segments: vec![segment.clone()],
-        ignored_columns: recording.ignored_columns.clone(),
-    })
-}
-
 /// The numbers below `count` in a random order (Fisher and Yates).
 fn shuffled(count: usize, seed: u64) -> Vec<usize> {
     let mut random = Random::new(seed);
@@ -141,56 +110,22 @@ fn shuffled(count: usize, seed: u64) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
-
-    use nalgebra::DMatrix;
-
     use super::*;
-    use crate::recording::Segment;
-
-    fn recording(name: &str, jumps: usize) -> Recording {
-        let path = PathBuf::from(name);
-        let segment = |jump: usize| Segment {
-            path: path.clone(),
-            first_row: 2 + 2 * jump,
-            row_stride: 1.0,
-            time_s: vec![0.0, 0.002],
-            x: DMatrix::zeros(18, 2),
-            dx: DMatrix::zeros(18, 2),
-            ddx: DMatrix::zeros(18, 2),
-            torque_nm: DMatrix::zeros(12, 2),
-            feet: vec![[true; 4]; 2],
-            body_wrench: None,
-        };
-        Recording {
-            path: path.clone(),
-            segments: (0..jumps).map(segment).collect(),
-            ignored_columns: Vec::new(),
-        }
-    }
 
     fn split(text: &str) -> Split {
         text.parse().expect("shares")
     }
 
-    fn places(set: &[Recording]) -> Vec<(PathBuf, usize)> {
-        let place = |jump: &Recording| (jump.path.clone(), jump.segments[0].first_row);
-        set.iter().map(place).collect()
-    }
-
     #[test]
     fn split_takes_every_jump_into_one_set_and_depends_on_the_seed_alone() {
-        let recordings = [recording("a.csv", 13), recording("b.csv", 7)];
-        let sets = split("14,3,3").of(&recordings, 5).expect("enough jumps");
-        let found = [&sets.training, &sets.validation, &sets.test].map(|set| places(set));
-        assert_eq!(found.each_ref().map(Vec::len), [14, 3, 3]);
-        assert!(found.iter().all(|set| set.is_sorted()));
-        let mut all = found.concat();
-        all.sort();
-        all.dedup();
-        assert_eq!(all.len(), 20);
-        assert_eq!(sets, split("14,3,3").of(&recordings, 5).expect("enough"));
-        assert_ne!(sets, split("14,3,3").of(&recordings, 6).expect("enough"));
+        let sets = split("14,3,3").of(20, 5).expect("enough jumps");
+        assert_eq!(sets.each_ref().map(Vec::len), [14, 3, 3]);
+        assert!(sets.iter().all(|set| set.is_sorted()));
+        let mut all = sets.concat();
+        all.sort_unstable();
+        assert_eq!(all, (0..20).collect::<Vec<_>>());
+        assert_eq!(sets, split("14,3,3").of(20, 5).expect("enough"));
+        assert_ne!(sets, split("14,3,3").of(20, 6).expect("enough"));
     }
 
     #[test]

@@ -19,20 +19,6 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Moments of samples in columns.
-    pub fn new(x: &DMatrix<f64>, u: &DMatrix<f64>) -> Self {
-        let n = x.ncols().max(1) as f64;
-        let mean = x.column_mean();
-        let mut centred = x.clone();
-        centred
-            .column_iter_mut()
-            .for_each(|mut column| column -= &mean);
-        Self {
-            state: &centred * centred.transpose() / n,
-            input: u * u.transpose() / n,
-        }
-    }
-
     /// Coordinates that the encoder may look at: they move (standard deviation of at least `least_std`, scaled), or
     /// they are actuated (at least `least_share` of the input's energy).
     ///
@@ -267,12 +253,22 @@ fn leading(symmetric: DMatrix<f64>, count: usize) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::train::dataset::centred;
 
     fn moments() -> Moments {
         let mut random = Random::new(3);
         let x = random.matrix(6, 3, 1.0) * random.matrix(3, 400, 1.0) + random.matrix(6, 400, 0.01);
         let u = random.matrix(6, 400, 1.0);
-        Moments::new(&x, &u)
+        of_samples(&x, &u)
+    }
+
+    fn of_samples(x: &DMatrix<f64>, u: &DMatrix<f64>) -> Moments {
+        let n = x.ncols() as f64;
+        let deviations = centred(x.clone(), &x.column_mean());
+        Moments {
+            state: &deviations * deviations.transpose() / n,
+            input: u * u.transpose() / n,
+        }
     }
 
     fn options(lift_weight: f64) -> SubspaceOptions {
@@ -356,6 +352,6 @@ mod tests {
     fn resting_coordinate_is_active_only_if_it_is_actuated() {
         let x = DMatrix::from_fn(3, 50, |i, j| if i == 0 { (j as f64).sin() } else { 0.0 });
         let u = DMatrix::from_fn(3, 50, |i, _| if i == 1 { 2.0 } else { 0.0 });
-        assert_eq!(Moments::new(&x, &u).active_coordinates(0.1, 0.01), [0, 1]);
+        assert_eq!(of_samples(&x, &u).active_coordinates(0.1, 0.01), [0, 1]);
     }
 }

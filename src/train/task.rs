@@ -31,7 +31,7 @@ impl<'a> Task<'a> {
         options: &'a TrainOptions,
     ) -> Result<Self, TrainError> {
         let sets = DataSets::new(recordings, robot, options)?;
-        let moments = sets.moments();
+        let moments = sets.training.moments();
         let least_std = options.encoder.least_std * options.scaling.state;
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
         if options.latent_dim == 0 || options.latent_dim > active.len() {

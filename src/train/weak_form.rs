@@ -21,26 +21,36 @@ pub fn check_terms(
     latent: &[Latent],
     features: &Features,
 ) -> Result<(), TrainError> {
+    let bad = |value: &f64| value.is_nan() || value.abs() > LARGEST;
+    let mut values = FeatureValues::default();
     for (phase, pattern) in dataset.phases.patterns.iter().enumerate() {
-        let (variables, _) = Latent::regression_samples(dataset, latent, phase);
-        let theta = features.evaluate(&variables, &mut FeatureValues::default());
-        for (term, column) in theta.column_iter().enumerate() {
-            let bad = |value: &f64| value.is_nan() || value.abs() > LARGEST;
-            let Some((row, found)) = column.iter().enumerate().find(|(_, value)| bad(value)) else {
-                continue;
-            };
-            let (jump, sample) = Latent::place_of_row(dataset, phase, row)
-                .expect("invariant: a row of the regression is a sample of the phase");
-            return Err(TrainError::TermValue {
-                path: jump.path.clone(),
-                term: features.text(term).to_owned(),
-                phase: pattern.name.clone(),
-                sample,
-                time_s: jump.time_s[sample],
-                found: *found,
-                limit: LARGEST,
+        let mut first: Option<(usize, usize, f64)> = None; // term, row, value
+        let mut above = 0;
+        for (variables, _) in Latent::regression_blocks(dataset, latent, phase) {
+            let theta = features.evaluate(&variables, &mut values);
+            let terms = first.map_or(theta.ncols(), |(term, _, _)| term);
+            let found = (0..terms).find_map(|term| {
+                let (row, value) = (theta.column(term).iter().copied().enumerate())
+                    .find(|(_, value)| bad(value))?;
+                Some((term, above + row, value))
             });
+            first = found.or(first);
+            above += variables.nrows();
         }
+        let Some((term, row, found)) = first else {
+            continue;
+        };
+        let (jump, sample) = Latent::place_of_row(dataset, phase, row)
+            .expect("invariant: a row of the regression is a sample of the phase");
+        return Err(TrainError::TermValue {
+            path: jump.path.clone(),
+            term: features.text(term).to_owned(),
+            phase: pattern.name.clone(),
+            sample,
+            time_s: jump.time_s[sample],
+            found,
+            limit: LARGEST,
+        });
     }
     Ok(())
 }
@@ -58,14 +68,20 @@ pub fn windowed_samples(
     phase: usize,
     window: usize,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
-    if window == 0 {
-        let (variables, target) = Latent::regression_samples(dataset, latent, phase);
-        return (
-            features.evaluate(&variables, &mut FeatureValues::default()),
-            target,
-        );
-    }
     let (p, d) = (features.library_dim(), features.latent_dim());
+    if window == 0 {
+        let n = dataset.samples(Some(phase));
+        let (mut theta, mut targets) = (DMatrix::zeros(n, p), DMatrix::zeros(n, d));
+        let (mut at, mut values) = (0, FeatureValues::default());
+        for (variables, target) in Latent::regression_blocks(dataset, latent, phase) {
+            let count = variables.nrows();
+            let block = features.evaluate(&variables, &mut values);
+            theta.rows_mut(at, count).copy_from(&block);
+            targets.rows_mut(at, count).copy_from(&target);
+            at += count;
+        }
+        return (theta, targets);
+    }
     let (mut theta_rows, mut target_rows) = (Vec::new(), Vec::new());
     for (jump, samples) in dataset.jumps.iter().zip(latent) {
         for (_, range) in jump

@@ -14,8 +14,9 @@ use romc::import::{
     Format, ImportOptions, LibraryChoice, LibraryOrder, import_from_bytes, parse_standard,
 };
 use romc::model::{ReducedModel, Scaling};
-use romc::recording::check::{CheckOptions, check, without};
-use romc::recording::preprocess::{PreprocessOptions, prepare};
+use romc::recording::PhaseRule;
+use romc::recording::check::{check, without};
+use romc::recording::preprocess::prepare;
 use romc::recording::write::{Notation, WriteOptions, write_to};
 use romc::recording::{self, Recording, Segment};
 use romc::robot::Robot;
@@ -110,7 +111,7 @@ pub fn recording(bytes: &[u8]) {
         same_when_written(&found, notation);
     }
     let go1 = Robot::by_name("go1").expect("go1 is registered");
-    let findings = check(&found, go1, &CheckOptions::default());
+    let findings = check(&found, go1);
     for finding in &findings {
         assert!(!finding.to_string().is_empty());
     }
@@ -122,7 +123,7 @@ pub fn recording(bytes: &[u8]) {
             assert_eq!(input.shape(), (18, segment.len()));
         }
     }
-    if let Ok(phases) = prepare(&found, &PreprocessOptions::default()) {
+    if let Ok(phases) = prepare(&found, &PhaseRule::two_phase().with_min_samples(5), 100) {
         assert!(phases.iter().all(|phase| phase.samples.len() % 100 == 0));
     }
 }

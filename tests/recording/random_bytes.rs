@@ -2,8 +2,9 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use romc::recording::check::{CheckOptions, check, without};
-use romc::recording::preprocess::{PreprocessOptions, prepare};
+use romc::recording::PhaseRule;
+use romc::recording::check::{check, without};
+use romc::recording::preprocess::prepare;
 use romc::recording::{Recording, read_from_bytes};
 use romc::robot::Robot;
 
@@ -16,7 +17,7 @@ fn exercise(bytes: &[u8]) {
     };
     require_finite(&recording);
     let go1 = Robot::by_name("go1").expect("go1 is registered");
-    let findings = check(&recording, go1, &CheckOptions::default());
+    let findings = check(&recording, go1);
     for finding in &findings {
         assert!(!finding.to_string().is_empty());
     }
@@ -28,7 +29,7 @@ fn exercise(bytes: &[u8]) {
             assert_eq!(input.shape(), (18, segment.len()));
         }
     }
-    if let Ok(phases) = prepare(&recording, &PreprocessOptions::default()) {
+    if let Ok(phases) = prepare(&recording, &PhaseRule::two_phase().with_min_samples(5), 100) {
         assert!(phases.iter().all(|phase| phase.samples.len() % 100 == 0));
     }
 }

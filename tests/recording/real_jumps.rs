@@ -4,8 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use romc::recording::check::{CheckOptions, Implausible, check, without};
-use romc::recording::preprocess::{PreprocessOptions, prepare};
+use romc::recording::PhaseRule;
+use romc::recording::check::{Implausible, check, without};
+use romc::recording::preprocess::prepare;
 use romc::recording::{self, PhaseRule, Recording, Stance};
 use romc::robot::Robot;
 
@@ -94,7 +95,7 @@ fn own_jumps_are_plausible_also_with_sensor_noise() {
 
 fn require_plausible(path: &Path, robot: &Robot) {
     let jump = recording::read(path).unwrap();
-    let found = check(&jump, robot, &CheckOptions::default());
+    let found = check(&jump, robot);
     let text: Vec<String> = found.iter().map(ToString::to_string).collect();
     assert!(found.is_empty(), "{}: {text:#?}", path.display());
 }
@@ -125,7 +126,7 @@ fn asynchronous_jumps_leave_the_ground_front_feet_first() {
 fn own_jumps_are_prepared_in_batches_of_100() {
     for path in own_jumps() {
         let jump = recording::read(&path).unwrap();
-        let phases = prepare(&jump, &PreprocessOptions::default()).unwrap();
+        let phases = prepare(&jump, &PhaseRule::two_phase().with_min_samples(5), 100).unwrap();
         assert_eq!(phases.len(), 3);
         for phase in &phases {
             let span = phase.span.range.len();
@@ -160,7 +161,7 @@ fn hardware_jump_recorded_accelerations_are_differences() {
 #[test]
 fn hardware_jump_clipped_rate_and_lost_packets_are_found() {
     let Some(jump) = hardware_jump() else { return };
-    let found = check(&jump, go1(), &CheckOptions::default());
+    let found = check(&jump, go1());
     let clipped: Vec<_> = found
         .iter()
         .filter(|finding| finding.kind == Implausible::Clipped)

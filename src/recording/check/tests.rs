@@ -41,7 +41,7 @@ fn smooth(n: usize) -> Recording {
 }
 
 fn findings(recording: &Recording) -> Vec<Finding> {
-    check(recording, go1(), &CheckOptions::default())
+    check(recording, go1())
 }
 
 #[test]

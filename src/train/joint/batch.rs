@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::recording::preprocess::{PreprocessOptions, prepare};
-use crate::recording::{PhaseRule, Recording};
+use crate::recording::preprocess::prepare;
+use crate::recording::{PhaseRule, Source};
 use crate::robot::Robot;
 use crate::train::dataset::Scaling;
 use crate::train::error::TrainError;
@@ -79,18 +79,13 @@ pub struct BatchOptions<'a> {
 /// # Errors
 /// [`TrainError::Recording`] for what cannot be resampled or turned into inputs.
 pub fn batches(
-    recordings: &[Recording],
+    recordings: &Source<'_>,
     robot: &Robot,
     options: &BatchOptions<'_>,
 ) -> Result<Vec<Batch>, TrainError> {
-    let preprocess = PreprocessOptions {
-        rule: options.phases.clone(),
-        batch: Some(options.rows),
-        ..PreprocessOptions::default()
-    };
     let mut out = Vec::new();
-    for recording in recordings {
-        for part in prepare(recording, &preprocess)? {
+    recordings.for_each(|recording| {
+        for part in prepare(recording, options.phases, options.rows)? {
             let samples = &part.samples;
             let u = rows(&samples.input(robot)?, &options.scaling.input);
             let x = rows(&samples.x, &options.scaling.state);
@@ -103,7 +98,8 @@ pub fn batches(
                 out.push(Batch::new(part.span.phase, blocks, samples.mean_step_s()));
             }
         }
-    }
+        Ok::<_, TrainError>(())
+    })?;
     Ok(out)
 }
 

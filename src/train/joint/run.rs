@@ -42,7 +42,7 @@ pub fn joint(
     origin: &Origin,
     watch: &mut Watch<'_>,
 ) -> Result<Trained, TrainError> {
-    let task = Task::new(recordings, robot, options)?;
+    let task = Task::new(recordings.clone(), robot, options)?;
     let scaling = options.scaling.factors();
     let batch_options = BatchOptions {
         phases: &options.phases,
@@ -50,14 +50,14 @@ pub fn joint(
         rows: options.joint.batch_rows,
         smoothing: options.regression.smoothing,
     };
-    let training = batches(recordings.training, robot, &batch_options)?;
+    let training = batches(&recordings.training, robot, &batch_options)?;
     let trainer = Trainer {
         task: &task,
         batches: &training,
     };
     let runs = trainer.run_seeds(watch);
 
-    let validation = batches(recordings.validation, robot, &batch_options)?;
+    let validation = batches(&recordings.validation, robot, &batch_options)?;
     let judged = if validation.is_empty() {
         &training
     } else {
@@ -312,7 +312,7 @@ impl Trainer<'_> {
             }
         };
         let seed = (run.seed, score);
-        let report = self.task.seed_report(&fitted, seed, Some(run.losses));
+        let report = self.task.seed_report(&fitted, seed, Some(run.losses))?;
         Ok((report, fitted))
     }
 
@@ -331,7 +331,7 @@ impl Trainer<'_> {
                 }
                 false => self.networks().starting_encoder(seed)?,
             };
-            let latent = Latent::of(&self.task.sets.training, &encoder);
+            let latent = Latent::of(&self.task.sets.training, &encoder)?;
             check_terms(&self.task.sets.training, &latent, &self.task.features)
         };
         terms_at_start().err().unwrap_or(error)
@@ -386,5 +386,6 @@ fn published(run: &LinearMaps) -> Result<Fitted, TrainError> {
         decoder: AffineMap::new("decoder", decoder.transpose(), decoder_bias.clone())?.into(),
         xi: run.xi.clone(),
         choice: None,
+        training: None,
     })
 }

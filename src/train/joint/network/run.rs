@@ -182,6 +182,7 @@ impl NetworkTask<'_> {
                 encoder,
                 xi: parameters.xi.clone(),
                 choice: None,
+                training: None,
             });
         }
         let basis = self.basis(&encoder, &x);
