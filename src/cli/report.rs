@@ -207,7 +207,7 @@ fn options(
             ),
             card(
                 "torque R² of the plain lift, contact",
-                optional(assessment.lift.torque_r2_contact()),
+                optional(assessment.lift.torque_r2().contact),
             ),
             card("L_mod (29)", optional(assessment.combined_loss())),
         ],

@@ -91,9 +91,10 @@ pub fn figures_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String
     let lift = &assessment.lift;
     let _ = writeln!(
         text,
-        "plain lift of exactly projected inputs: torque R^2 {} in contact, {} in flight; inconsistency {}",
-        cell(lift.torque_r2_contact()),
-        cell(lift.torque_r2_flight()),
+        "plain lift of exactly projected inputs: torque R^2 {} in contact, {} in flight, {} over all samples; inconsistency {}",
+        cell(lift.torque_r2().contact),
+        cell(lift.torque_r2().flight),
+        cell(lift.torque_r2_all()),
         cell(lift.inconsistency())
     );
     for remark in remarks(model, assessment) {
@@ -262,8 +263,9 @@ pub fn figures_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Value 
         "combined_loss": assessment.combined_loss(),
         "lift": {
             "torque_r2": {
-                "contact": assessment.lift.torque_r2_contact(),
-                "flight": assessment.lift.torque_r2_flight(),
+                "contact": assessment.lift.torque_r2().contact,
+                "flight": assessment.lift.torque_r2().flight,
+                "all": assessment.lift.torque_r2_all(),
             },
             "inconsistency": assessment.lift.inconsistency(),
         },

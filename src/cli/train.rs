@@ -151,15 +151,26 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
     row("decoder mean square", "scaled", &|set| {
         Some(set.decoder_mse)
     });
-    row("torque R^2 of the plain lift", "", &|set| {
+    row("torque R^2 of the plain lift, all samples", "", &|set| {
         Some(set.torque_r2)
     });
-    row("body x after 0.1 s", "m", &|set| Some(set.prediction_x_m));
-    row("body z after 0.1 s", "m", &|set| Some(set.prediction_z_m));
-    row("body x, whole jump", "m", &|set| set.rollout_x_m);
-    row("body z, whole jump", "m", &|set| set.rollout_z_m);
+    row("body x, fixed steps over 0.1 s", "m", &|set| {
+        Some(set.prediction_x_m)
+    });
+    row("body z, fixed steps over 0.1 s", "m", &|set| {
+        Some(set.prediction_z_m)
+    });
+    row("body x, fixed steps, whole jump", "m", &|set| {
+        set.rollout_x_m
+    });
+    row("body z, fixed steps, whole jump", "m", &|set| {
+        set.rollout_z_m
+    });
     for (phase, terms) in report.active_terms.iter().enumerate() {
-        let name = format!("ddz R^2 in {} ({} terms)", terms.phase, terms.active);
+        let name = format!(
+            "smoothed ddz R^2 in {} ({} terms)",
+            terms.phase, terms.active
+        );
         row(&name, "", &|set| set.ddz_r2.get(phase).copied());
     }
     if let Some(overlap) = report.support_overlap {

@@ -19,7 +19,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use super::control::{Comparison, Summary, Tally};
+use super::control::{Summary, Tally};
+use super::torque::{Comparison, exceeds, is_plausible};
 use crate::mpc::{
     Command, ControlError, Controller, Lift, Measurement, MpcError, ReferenceSamples, Source,
     StanceState, Status, foot_forces, upright,
@@ -301,17 +302,6 @@ fn held_torque(segment: &Segment, sample: usize, step_s: f64) -> Option<[f64; JO
         }
     }
     mean.iter().all(|torque| torque.is_finite()).then_some(mean)
-}
-
-fn is_plausible(robot: &Robot, torque_nm: &[f64; JOINT_DIM]) -> bool {
-    !exceeds(torque_nm, robot.torque_limit_nm(), 2.0)
-}
-
-fn exceeds(torque_nm: &[f64; JOINT_DIM], limits: &[f64; JOINT_DIM], factor: f64) -> bool {
-    torque_nm
-        .iter()
-        .zip(limits)
-        .any(|(torque, limit)| torque.is_nan() || torque.abs() > factor * limit)
 }
 
 fn stance(controller: &Controller, segment: &Segment, sample: usize) -> Option<StanceState> {

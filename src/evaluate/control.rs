@@ -1,16 +1,7 @@
 //! What a run comes to: counts, times and the agreement of torques.
 
+use super::torque::{ByContact, Comparison};
 use crate::mpc::{Command, Status};
-use crate::robot::{ContactFlags, JOINT_DIM};
-
-/// A figure for steps with and without ground contact; none where there were too few steps.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ByContact {
-    /// At least one foot on the ground.
-    pub contact: Option<f64>,
-    /// No foot on the ground.
-    pub flight: Option<f64>,
-}
 
 /// Times of steps, µs.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -55,80 +46,6 @@ pub struct Summary {
     pub inconsistency: Option<f64>,
     /// Steps left out of the comparison of torques: the recording's are no torques of the robot.
     pub implausible: usize,
-}
-
-/// Running sums of a comparison of torques, contact and flight apart.
-#[derive(Debug, Clone, Default)]
-pub struct Comparison {
-    contact: Sums,
-    flight: Sums,
-}
-
-#[derive(Debug, Clone)]
-struct Sums {
-    count: usize,
-    error: f64,
-    sum: [f64; JOINT_DIM],
-    square: f64,
-}
-
-impl Default for Sums {
-    fn default() -> Self {
-        Self {
-            count: 0,
-            error: 0.0,
-            sum: [0.0; JOINT_DIM],
-            square: 0.0,
-        }
-    }
-}
-
-impl Sums {
-    fn r2(&self) -> Option<f64> {
-        let explained =
-            self.sum.iter().map(|sum| sum * sum).sum::<f64>() / self.count.max(1) as f64;
-        let variance = self.square - explained;
-        (self.count > 1 && variance > 0.0).then(|| 1.0 - self.error / variance)
-    }
-}
-
-impl Comparison {
-    /// Adds one step.
-    pub fn add(
-        &mut self,
-        feet: ContactFlags,
-        commanded: &[f64; JOINT_DIM],
-        recorded: &[f64; JOINT_DIM],
-    ) {
-        let sums = if feet.contains(&true) {
-            &mut self.contact
-        } else {
-            &mut self.flight
-        };
-        sums.count += 1;
-        for joint in 0..JOINT_DIM {
-            sums.error += (commanded[joint] - recorded[joint]).powi(2);
-            sums.sum[joint] += recorded[joint];
-            sums.square += recorded[joint].powi(2);
-        }
-    }
-
-    /// Coefficient of determination over all twelve joints jointly,
-    /// `R² = 1 − Σ_k Σ_j (τ_kj − τ̂_kj)² / Σ_k Σ_j (τ̂_kj − mean_j)²`
-    /// with `τ` commanded, `τ̂` recorded and `mean_j` the recorded mean of joint `j`, over the steps
-    /// `k` in contact or in flight.
-    pub fn r2(&self) -> ByContact {
-        ByContact {
-            contact: self.contact.r2(),
-            flight: self.flight.r2(),
-        }
-    }
-
-    /// Root mean square of the difference over all steps and joints, N m.
-    pub fn rms(&self) -> Option<f64> {
-        let count = (self.contact.count + self.flight.count) * JOINT_DIM;
-        (count > 0).then(|| ((self.contact.error + self.flight.error) / count as f64).sqrt())
-    }
 }
 
 /// Everything that a summary is made of.
@@ -215,32 +132,6 @@ fn step_times(sorted_us: &[f64]) -> StepTimes {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn r2_is_one_for_equal_torques_and_zero_for_the_mean() {
-        let recorded = [[1.0; JOINT_DIM], [3.0; JOINT_DIM]];
-        let mut equal = Comparison::default();
-        let mut mean = Comparison::default();
-        for torque in &recorded {
-            equal.add([true; 4], torque, torque);
-            mean.add([false; 4], &[2.0; JOINT_DIM], torque);
-        }
-        assert_eq!(
-            equal.r2(),
-            ByContact {
-                contact: Some(1.0),
-                flight: None
-            }
-        );
-        assert_eq!(
-            mean.r2(),
-            ByContact {
-                contact: None,
-                flight: Some(0.0)
-            }
-        );
-        assert_eq!(mean.rms(), Some(1.0));
-    }
 
     #[test]
     fn step_times_are_ranks_of_the_sorted_list() {

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::metrics::FitSums;
+use super::torque::{ByContact, Comparison, is_plausible};
 use crate::model::ReducedModel;
 use crate::recording::Segment;
 use crate::robot::{JOINT_DIM, Robot};
@@ -10,27 +10,13 @@ use crate::sim::SimError;
 
 /// Lifted force and moment, in N and N m together, below which their inconsistency means nothing.
 const SMALL_FORCE_N: f64 = 1.0;
-/// Recorded torques beyond this multiple of the robot's limits are no torques of the robot.
-const IMPLAUSIBLE: f64 = 2.0;
-
 /// Torques of exactly projected and lifted inputs against the recorded ones.
 ///
 /// Per sample `u_lat = pinv(W_e^T) s_u u`, `u_lift = W_e^T u_lat / s_u`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct LiftSums {
-    contact: Vec<FitSums>,
-    flight: Vec<FitSums>,
+    torque: Comparison,
     inconsistency: (f64, usize),
-}
-
-impl Default for LiftSums {
-    fn default() -> Self {
-        Self {
-            contact: vec![FitSums::default(); JOINT_DIM],
-            flight: vec![FitSums::default(); JOINT_DIM],
-            inconsistency: (0.0, 0),
-        }
-    }
 }
 
 impl LiftSums {
@@ -41,27 +27,19 @@ impl LiftSums {
     /// be computed.
     pub fn add(&mut self, model: &ReducedModel, segment: &Segment) -> Result<(), SimError> {
         let robot = model.robot()?;
-        let limits = robot.torque_limit_nm();
         let input = segment.input(robot)?;
         for sample in 0..segment.len() {
             let torque = segment.torque(sample);
-            let mut pairs = torque.iter().zip(limits);
-            if pairs.any(|(torque, limit)| torque.abs() > IMPLAUSIBLE * limit) {
+            if !is_plausible(robot, &torque) {
                 continue;
             }
             let x = segment.x.column(sample).into_owned();
             let u_lat = model.project_input_at(&x, &input.column(sample).into_owned())?;
             let lifted = model.lift_input_at(&x, &u_lat)?;
-            let down = segment.feet[sample].contains(&true);
-            let sums = if down {
-                &mut self.contact
-            } else {
-                &mut self.flight
-            };
-            for (joint, sums) in sums.iter_mut().enumerate() {
-                sums.add(torque[joint], lifted[joint]);
-            }
-            if down {
+            let feet = segment.feet[sample];
+            let of_joints = std::array::from_fn(|joint| lifted[joint]);
+            self.torque.add(feet, &of_joints, &torque);
+            if feet.contains(&true) {
                 self.add_inconsistency(robot, segment, sample, &lifted);
             }
         }
@@ -88,14 +66,14 @@ impl LiftSums {
         }
     }
 
-    /// Coefficient of determination of the torques over all joints jointly, with a foot down.
-    pub fn torque_r2_contact(&self) -> Option<f64> {
-        jointly(&self.contact)
+    /// Coefficients of determination of the torques over all joints jointly, see [`Comparison::r2`].
+    pub fn torque_r2(&self) -> ByContact {
+        self.torque.r2()
     }
 
-    /// The same without a foot down.
-    pub fn torque_r2_flight(&self) -> Option<f64> {
-        jointly(&self.flight)
+    /// The same over all samples, see [`Comparison::r2_all`].
+    pub fn torque_r2_all(&self) -> Option<f64> {
+        self.torque.r2_all()
     }
 
     /// Mean of `|F_lift - G tau_lift| / |F_lift|` over samples with a foot down: how far the lifted
@@ -104,14 +82,6 @@ impl LiftSums {
         let (sum, count) = self.inconsistency;
         (count > 0).then(|| sum / count as f64)
     }
-}
-
-fn jointly(joints: &[FitSums]) -> Option<f64> {
-    let mut total = FitSums::default();
-    joints
-        .iter()
-        .for_each(|sums| total.merge_keeping_means(sums));
-    total.fit().and_then(|fit| fit.r2)
 }
 
 /// The published weight of complexity in the combined loss (29).
@@ -152,8 +122,8 @@ mod tests {
             }
             sums
         });
-        assert!(six.torque_r2_contact() > two.torque_r2_contact());
-        assert!(six.torque_r2_contact().expect("contact") > 0.9);
+        assert!(six.torque_r2().contact > two.torque_r2().contact);
+        assert!(six.torque_r2().contact.expect("contact") > 0.9);
         assert!(six.inconsistency().expect("contact") < 1.0);
     }
 }

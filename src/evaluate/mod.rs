@@ -15,14 +15,16 @@ mod error;
 mod lift;
 mod linearised;
 mod metrics;
+mod torque;
 
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
 pub use aslip::{Aslip, AslipRollout, AslipSums};
 pub use assessment::{Assessment, SegmentRun};
 pub use baseline::{Baseline, Template, fit_aslip};
-pub use control::{ByContact, Comparison, StepTimes, Summary};
+pub use control::{StepTimes, Summary};
 pub use coordinates::{CoordinateSums, PointwiseSums};
 pub use error::EvaluateError;
 pub use lift::{LAMBDA, LiftSums, combined_loss};
 pub use linearised::{LinearisedPhase, RANK_THRESHOLD, linearise_phases};
 pub use metrics::{Fit, FitSums};
+pub use torque::{ByContact, Comparison, is_plausible};

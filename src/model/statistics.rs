@@ -27,21 +27,22 @@ pub struct LatentInputStatistics {
 }
 
 impl InputStatistics {
-    /// Mean and covariance of samples, `input_dim x n`, SI; all zero without a sample.
-    pub fn of_samples(u: &DMatrix<f64>) -> Self {
-        if u.ncols() == 0 {
-            let n = u.nrows();
-            return Self {
-                mean: DVector::zeros(n),
-                covariance: DMatrix::zeros(n, n),
-            };
+    /// Mean and covariance of `n` samples of `input_dim` inputs in the columns of blocks, SI; all zero without a sample.
+    pub fn of_blocks<I>(input_dim: usize, n: usize, blocks: impl Fn() -> I) -> Self
+    where
+        I: Iterator<Item = DMatrix<f64>>,
+    {
+        let mut mean = DVector::zeros(input_dim);
+        for block in blocks() {
+            let columns = block.column_iter();
+            columns.for_each(|column| mean.axpy(1.0 / n as f64, &column, 1.0));
         }
-        let mean: DVector<f64> = u.column_mean();
-        let mut deviations = u.clone();
-        for mut column in deviations.column_iter_mut() {
-            column -= &mean;
+        let mut squares = DMatrix::zeros(input_dim, input_dim);
+        for mut block in blocks() {
+            (block.column_iter_mut()).for_each(|mut column| column -= &mean);
+            squares.gemm(1.0, &block, &block.transpose(), 1.0);
         }
-        let covariance = &deviations * deviations.transpose() / u.ncols() as f64;
+        let covariance = squares / n.max(1) as f64;
         let covariance = (&covariance + covariance.transpose()) * 0.5;
         Self { mean, covariance }
     }

@@ -11,6 +11,9 @@ use super::error::RecordingError;
 use super::segment::Segment;
 use crate::robot::{ContactFlags, FeetRule};
 
+/// Fewest samples of a span: fewer are chatter of contact and join the span before them.
+pub const CHATTER_SAMPLES: usize = 5;
+
 /// A phase and its feet.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PhasePattern {

@@ -13,16 +13,6 @@ pub enum SimError {
     /// The recording cannot be turned into inputs.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// No phase of the model covers a recorded foot pattern.
-    #[error(
-        "{segment}, row {row}: no phase of `{model}` covers the foot pattern {found:?} (fr fl rr rl)"
-    )]
-    NoPhase {
-        model: String,
-        segment: String,
-        row: usize,
-        found: [bool; 4],
-    },
     /// The integrator refused the problem.
     #[error("integrator: {message}")]
     Solver { message: String },

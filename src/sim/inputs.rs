@@ -1,6 +1,6 @@
 //! What the recorded inputs look like in each phase of a model.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::error::SimError;
 use super::latent::phases;
@@ -12,7 +12,7 @@ use crate::recording::Segment;
 ///
 /// # Errors
 /// [`SimError::Model`] for a model without robot, [`SimError::Recording`] if the body wrench cannot
-/// be computed, [`SimError::NoPhase`] with the row whose feet no phase covers.
+/// be computed, and if no feet of a segment are in a phase of the model.
 pub fn input_statistics(
     model: &ReducedModel,
     segments: &[&Segment],
@@ -25,8 +25,10 @@ pub fn input_statistics(
             of_phases[phase].push(input.column(sample).into_owned());
         }
     }
-    let statistics = of_phases.iter().map(|samples| {
-        (!samples.is_empty()).then(|| InputStatistics::of_samples(&DMatrix::from_columns(samples)))
+    let statistics = of_phases.iter().map(|samples: &Vec<DVector<f64>>| {
+        let (first, n) = (samples.first()?, samples.len());
+        let block = || std::iter::once(DMatrix::from_columns(samples));
+        Some(InputStatistics::of_blocks(first.len(), n, block))
     });
     Ok(statistics.collect())
 }

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::error::SimError;
 use crate::model::ReducedModel;
-use crate::recording::Segment;
+use crate::recording::phases::{CHATTER_SAMPLES, PhasePattern};
+use crate::recording::{PhaseRule, Segment};
 
 /// Latent samples of one recorded segment; every matrix is `latent_dim x n`, a column a sample.
 ///
@@ -22,7 +23,7 @@ pub struct LatentSegment {
     pub ddz: DMatrix<f64>,
     /// Latent inputs `u_lat = pinv(W_e^T) (s_u u)` (equation 13).
     pub u_lat: DMatrix<f64>,
-    /// Index of the phase that the recorded feet select, a sample.
+    /// Index of the phase of every sample, by spans of the recorded feet.
     pub phase: Vec<usize>,
 }
 
@@ -31,7 +32,7 @@ impl LatentSegment {
     ///
     /// # Errors
     /// [`SimError::Model`] for a latent-only model, [`SimError::Recording`] if the body wrench cannot
-    /// be computed, [`SimError::NoPhase`] with the row whose feet no phase covers.
+    /// be computed or no feet of the segment are in a phase of the model.
     pub fn encode(model: &ReducedModel, segment: &Segment) -> Result<Self, SimError> {
         let input = segment.input(model.robot()?)?;
         let samples = |map: &dyn Fn(usize) -> Result<DVector<f64>, SimError>| {
@@ -86,19 +87,21 @@ impl LatentSegment {
     }
 }
 
-/// The phase that the feet of each sample select.
+/// The phase of each sample by the spans of the model's phases ([`PhaseRule::spans`]): samples in transition, and
+/// contact chatter, belong to a neighbouring span, as in training.
 pub(super) fn phases(model: &ReducedModel, segment: &Segment) -> Result<Vec<usize>, SimError> {
-    segment
-        .feet
-        .iter()
-        .enumerate()
-        .map(|(sample, &feet)| {
-            model.phase_for(feet).ok_or_else(|| SimError::NoPhase {
-                model: model.name().to_owned(),
-                segment: segment.path.display().to_string(),
-                row: segment.row(sample),
-                found: feet,
-            })
-        })
-        .collect()
+    let mut phases = vec![0; segment.len()];
+    for span in phase_rule(model).spans(segment)? {
+        phases[span.range].fill(span.phase);
+    }
+    Ok(phases)
+}
+
+/// The rule by which training and evaluation assign samples to the phases of a model.
+pub fn phase_rule(model: &ReducedModel) -> PhaseRule {
+    let patterns = model.phases().iter().map(|phase| PhasePattern {
+        name: phase.name.clone(),
+        feet: phase.feet.clone(),
+    });
+    PhaseRule::new(patterns.collect()).with_min_samples(CHATTER_SAMPLES)
 }

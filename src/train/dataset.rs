@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use super::error::TrainError;
 use super::smooth::moving_average;
 use super::subspace::Moments;
+use crate::evaluate::is_plausible;
 use crate::model::InputStatistics;
 use crate::recording::{PhaseRule, RecordingError, RecordingFiles, Segment, Source};
 use crate::robot::{FeetRule, JOINT_DIM, Robot, STATE_DIM};
@@ -92,6 +93,8 @@ pub struct Jump {
     pub phase: Vec<usize>,
     /// Maximal runs of one phase.
     pub spans: Vec<(usize, Range<usize>)>,
+    /// Samples whose recorded torques are no torques of the robot, see [`is_plausible`].
+    pub implausible: Vec<usize>,
 }
 
 /// Derivatives of the states of one jump, scaled units.
@@ -263,6 +266,15 @@ impl Dataset {
         })
     }
 
+    /// Jump and sample of every sample whose torques can be the robot's.
+    pub fn torque_samples(&self) -> impl Iterator<Item = (usize, usize)> {
+        let jumps = self.jumps.iter().enumerate();
+        jumps.flat_map(|(index, jump)| {
+            let kept = (0..jump.len()).filter(|sample| !jump.implausible.contains(sample));
+            kept.map(move |sample| (index, sample))
+        })
+    }
+
     /// Mean of one quantity over the samples of one phase or of all.
     pub fn mean(&self, quantity: Quantity, phase: Option<usize>) -> DVector<f64> {
         mean(self.blocks(quantity, phase), self.samples(phase))
@@ -303,14 +315,7 @@ impl Dataset {
                 u
             })
         };
-        let n = self.samples(Some(phase));
-        let mean = mean(blocks(), n);
-        let squares = sum_of_squares(blocks().map(|u| centred(u, &mean)));
-        let covariance = squares / n.max(1) as f64;
-        InputStatistics {
-            mean,
-            covariance: (&covariance + covariance.transpose()) * 0.5,
-        }
+        InputStatistics::of_blocks(STATE_DIM, self.samples(Some(phase)), blocks)
     }
 
     /// Number of samples of one phase or of all.
@@ -376,6 +381,9 @@ impl Dataset {
             },
             phase,
             spans,
+            implausible: (0..n)
+                .filter(|&sample| !is_plausible(robot, &segment.torque(sample)))
+                .collect(),
         })
     }
 

@@ -3,15 +3,15 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::dataset::{Dataset, Quantity, Scaling};
+use super::dataset::{Dataset, Jump, Scaling};
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
 use super::latent::{Latent, lift_samples, map_samples};
 use super::rollout::{Candidate, Window, predict, restarted, whole};
 use crate::model::{ReducedModel, StateMap};
-use crate::recording::phases::PhasePattern;
-use crate::recording::{PhaseRule, Source};
+use crate::recording::Source;
 use crate::robot::JOINT_DIM;
+use crate::sim::phase_rule;
 
 /// Row of body x in the state; y and z follow.
 pub(super) const BODY_X: usize = JOINT_DIM;
@@ -27,15 +27,16 @@ const SMOOTHING: usize = 11;
 pub struct SetMetrics {
     /// Mean square of `x - decode(encode(x))` over samples and coordinates, scaled units.
     pub decoder_mse: f64,
-    /// Coefficient of determination of `ddz` a phase, over all latent coordinates together.
+    /// Coefficient of determination of the smoothed `ddz` in each phase, over all latent coordinates together.
     pub ddz_r2: Vec<f64>,
-    /// Coefficient of determination of the 12 joint torques of `W_e^T pinv(W_e^T) u` (`J^T pinv(J^T) u`) against the recorded ones.
+    /// Coefficient of determination of the 12 joint torques of `W_e^T pinv(W_e^T) u` (`J^T pinv(J^T) u`) against the
+    /// recorded ones over all plausible samples, as [`LiftSums::torque_r2_all`](crate::evaluate::LiftSums::torque_r2_all).
     pub torque_r2: f64,
-    /// Root mean square error of body x over predictions of 0.1 s.
+    /// Root mean square error of body x over predictions of 0.1 s with fixed steps.
     pub prediction_x_m: f64,
     /// The same of body z.
     pub prediction_z_m: f64,
-    /// Root mean square error of body x over rollouts of whole jumps; `None` when one diverges.
+    /// Root mean square error of body x over rollouts of whole jumps with fixed steps; `None` when one diverges.
     pub rollout_x_m: Option<f64>,
     /// The same of body z.
     pub rollout_z_m: Option<f64>,
@@ -64,12 +65,13 @@ pub fn assess<'a>(
         state: model.state_factors()?,
         input: model.input_factors()?,
     };
-    let patterns = model.phases().iter().map(|phase| PhasePattern {
-        name: phase.name.clone(),
-        feet: phase.feet.clone(),
-    });
-    let phases = PhaseRule::new(patterns.collect());
-    let dataset = Dataset::new(recordings, model.robot()?, &phases, &scaling, SMOOTHING)?;
+    let dataset = Dataset::new(
+        recordings,
+        model.robot()?,
+        &phase_rule(model),
+        &scaling,
+        SMOOTHING,
+    )?;
     let features = Features::new(model.library());
     let xi: Vec<_> = model
         .phases()
@@ -171,16 +173,24 @@ fn ddz_r2(candidate: Candidate<'_>, dataset: &Dataset, latent: &[Latent], phase:
     sums.r2()
 }
 
+/// Of the samples whose torques can be the robot's, see [`is_plausible`].
 fn torque_r2(encoder: &StateMap, dataset: &Dataset, latent: &[Latent]) -> f64 {
-    let mean = dataset
-        .mean(Quantity::U, None)
-        .rows(0, JOINT_DIM)
-        .into_owned();
+    let n = dataset.torque_samples().count();
+    let mut mean = DVector::zeros(JOINT_DIM);
+    for (jump, sample) in dataset.torque_samples() {
+        let torque = dataset.jumps[jump].u.column(sample);
+        mean.axpy(1.0 / n as f64, &torque.rows(0, JOINT_DIM), 1.0);
+    }
     let mut sums = Determination::about(mean);
-    for (jump, samples) in dataset.jumps.iter().zip(latent) {
-        let lifted = lift_samples(encoder, &jump.x, &samples.u_lat);
-        let torques = |u: &DMatrix<f64>| u.rows(0, JOINT_DIM).into_owned();
-        sums.add(&torques(&lifted), &torques(&jump.u));
+    let mut lifted: Option<(usize, DMatrix<f64>)> = None;
+    for (jump, sample) in dataset.torque_samples() {
+        let Jump { x, u, .. } = &dataset.jumps[jump];
+        if lifted.as_ref().is_none_or(|(of, _)| *of != jump) {
+            lifted = Some((jump, lift_samples(encoder, x, &latent[jump].u_lat)));
+        }
+        let (_, lift) = lifted.as_ref().expect("just set");
+        let torques = |u: &DMatrix<f64>| u.view((0, sample), (JOINT_DIM, 1)).into_owned();
+        sums.add(&torques(lift), &torques(u));
     }
     sums.r2()
 }

@@ -10,6 +10,7 @@ use super::metrics::{BODY_X, BODY_Z};
 use super::sparse::Pruning;
 use crate::model::{Activation, Library, MAX_LAYER_WIDTH, MAX_LAYERS, StandardLibrary};
 use crate::recording::PhaseRule;
+use crate::recording::phases::CHATTER_SAMPLES;
 use crate::robot::STATE_DIM;
 
 /// Candidate terms to choose from.
@@ -178,7 +179,7 @@ impl TrainOptions {
                 trigonometric: false,
                 inputs: true,
             }),
-            phases: PhaseRule::two_phase().with_min_samples(5),
+            phases: PhaseRule::two_phase().with_min_samples(CHATTER_SAMPLES),
             seed: 1,
             n_seeds: 1,
             scaling: ScaleOptions::default(),

@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::dataset::Dataset;
 use super::features::{FeatureValues, Features};
 use super::latent::Latent;
+use crate::sim::{Restart, restart_windows};
 
 /// Latent dynamics under trial: `ddz = Xi_phase^T theta(z, dz, u_lat)`.
 #[derive(Clone, Copy, Debug)]
@@ -26,21 +27,17 @@ pub struct Window {
     pub steps: usize,
 }
 
-/// Windows of `duration_s` one behind the other over every jump (the last one may be shorter).
+/// The windows between restarts every `duration_s` of every jump ([`restart_windows`]), each up to the sample that the
+/// next one starts from.
 pub fn restarted(dataset: &Dataset, duration_s: f64) -> Vec<Window> {
     let mut windows = Vec::new();
     for (jump, samples) in dataset.jumps.iter().enumerate() {
-        let mut start = 0;
-        while start + 1 < samples.len() {
-            let stop = samples.time_s[start] + duration_s - 1e-9;
-            let steps = samples.time_s[start + 1..]
-                .iter()
-                .take_while(|time| **time < stop)
-                .count()
-                + 1;
-            let steps = steps.min(samples.len() - 1 - start);
-            windows.push(Window { jump, start, steps });
-            start += steps;
+        for window in restart_windows(&samples.time_s, Restart::Every(duration_s)) {
+            let (start, last) = (window.start, window.end.min(samples.len() - 1));
+            if last > start {
+                let steps = last - start;
+                windows.push(Window { jump, start, steps });
+            }
         }
     }
     windows

@@ -1,0 +1,123 @@
+//! Agreement of torques with recorded ones: the one coefficient of determination that every command prints.
+
+use super::metrics::FitSums;
+use crate::robot::{ContactFlags, JOINT_DIM, Robot};
+
+/// Recorded torques beyond this multiple of the robot's limits are no torques of the robot.
+const IMPLAUSIBLE: f64 = 2.0;
+
+/// Whether recorded torques can be the robot's: none beyond twice its limit. Samples with others count in no figure of
+/// torques.
+pub fn is_plausible(robot: &Robot, torque_nm: &[f64; JOINT_DIM]) -> bool {
+    !exceeds(torque_nm, robot.torque_limit_nm(), IMPLAUSIBLE)
+}
+
+/// Whether a torque is not a number or beyond `factor` times its limit.
+pub(super) fn exceeds(
+    torque_nm: &[f64; JOINT_DIM],
+    limits: &[f64; JOINT_DIM],
+    factor: f64,
+) -> bool {
+    let mut pairs = torque_nm.iter().zip(limits);
+    pairs.any(|(torque, limit)| torque.is_nan() || torque.abs() > factor * limit)
+}
+
+/// A figure for samples with and without ground contact; none where there were too few.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ByContact {
+    /// At least one foot on the ground.
+    pub contact: Option<f64>,
+    /// No foot on the ground.
+    pub flight: Option<f64>,
+}
+
+type JointSums = [FitSums; JOINT_DIM];
+
+/// Running sums of a comparison of torques, contact and flight apart and together.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Comparison {
+    contact: JointSums,
+    flight: JointSums,
+    all: JointSums,
+}
+
+impl Comparison {
+    /// Adds one sample.
+    pub fn add(
+        &mut self,
+        feet: ContactFlags,
+        predicted: &[f64; JOINT_DIM],
+        recorded: &[f64; JOINT_DIM],
+    ) {
+        let of_phase = match feet.contains(&true) {
+            true => &mut self.contact,
+            false => &mut self.flight,
+        };
+        for sums in [of_phase, &mut self.all] {
+            for ((sums, recorded), predicted) in sums.iter_mut().zip(recorded).zip(predicted) {
+                sums.add(*recorded, *predicted);
+            }
+        }
+    }
+
+    /// Coefficient of determination over all twelve joints jointly,
+    /// `R² = 1 − Σ_k Σ_j (τ_kj − τ̂_kj)² / Σ_k Σ_j (τ̂_kj − mean_j)²`
+    /// with `τ` predicted, `τ̂` recorded and `mean_j` the recorded mean of joint `j`, over the samples
+    /// `k` in contact or in flight.
+    pub fn r2(&self) -> ByContact {
+        ByContact {
+            contact: jointly(&self.contact).fit().and_then(|fit| fit.r2),
+            flight: jointly(&self.flight).fit().and_then(|fit| fit.r2),
+        }
+    }
+
+    /// The same over all samples, with the mean over all samples.
+    pub fn r2_all(&self) -> Option<f64> {
+        jointly(&self.all).fit().and_then(|fit| fit.r2)
+    }
+
+    /// Root mean square of the difference over all samples and joints, N m.
+    pub fn rms(&self) -> Option<f64> {
+        jointly(&self.all).fit().map(|fit| fit.rms)
+    }
+}
+
+fn jointly(joints: &JointSums) -> FitSums {
+    let mut total = FitSums::default();
+    joints
+        .iter()
+        .for_each(|sums| total.merge_keeping_means(sums));
+    total
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn r2_is_one_for_equal_torques_and_zero_for_the_mean() {
+        let recorded = [[1.0; JOINT_DIM], [3.0; JOINT_DIM]];
+        let mut equal = Comparison::default();
+        let mut mean = Comparison::default();
+        for torque in &recorded {
+            equal.add([true; 4], torque, torque);
+            mean.add([false; 4], &[2.0; JOINT_DIM], torque);
+        }
+        let r2 = |contact, flight| ByContact { contact, flight };
+        assert_eq!(equal.r2(), r2(Some(1.0), None));
+        assert_eq!(mean.r2(), r2(None, Some(0.0)));
+        assert_eq!((mean.r2_all(), mean.rms()), (Some(0.0), Some(1.0)));
+    }
+
+    #[test]
+    fn torques_beyond_twice_the_limit_are_not_the_robots() {
+        let go1 = Robot::by_name("go1").expect("known");
+        let mut torque = *go1.torque_limit_nm();
+        torque[3] *= 1.9;
+        assert!(is_plausible(go1, &torque));
+        torque[3] *= 1.1;
+        assert!(!is_plausible(go1, &torque));
+        torque[3] = f64::NAN;
+        assert!(!is_plausible(go1, &torque));
+    }
+}
