@@ -86,7 +86,6 @@ pub(super) fn conditioning(settings: &TrainSettings) -> Result<ConditionOptions,
             Some(AccelerationSource::Recorded) | None => Accelerations::Recorded,
         },
         smoothing: filter.map(|filter| (filter, rows)),
-        ..ConditionOptions::default()
     })
 }
 

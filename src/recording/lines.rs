@@ -94,10 +94,15 @@ pub(super) fn split_cells<E>(
     delimiter: char,
     mut visit: impl FnMut(&str) -> Result<(), E>,
 ) -> Result<(), E> {
-    if !line.contains('"') {
-        return line
-            .split(delimiter)
-            .try_for_each(|cell| visit(cell.trim()));
+    if count(line, '"') == 0 && delimiter.is_ascii() {
+        let mut start = 0;
+        for (end, byte) in line.bytes().enumerate() {
+            if byte == delimiter as u8 {
+                visit(trimmed(&line[start..end]))?;
+                start = end + 1;
+            }
+        }
+        return visit(trimmed(&line[start..]));
     }
     let mut quoted = false;
     let separates = |c: char| {
@@ -109,6 +114,20 @@ pub(super) fn split_cells<E>(
         let bare = cell.strip_prefix('"').and_then(|c| c.strip_suffix('"'));
         visit(bare.unwrap_or(cell).trim())
     })
+}
+
+/// How often an ASCII character is in a line.
+pub(super) fn count(line: &str, character: char) -> usize {
+    let wanted = character as u8;
+    line.bytes().filter(|byte| *byte == wanted).count()
+}
+
+/// A cell without white space around it; most have none.
+fn trimmed(cell: &str) -> &str {
+    match cell.as_bytes() {
+        [first, .., last] if first.is_ascii_graphic() && last.is_ascii_graphic() => cell,
+        _ => cell.trim(),
+    }
 }
 
 #[cfg(test)]

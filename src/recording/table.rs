@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use super::columns::{Column, Layout};
 use super::csv::delimiter_error;
 use super::error::{RecordingError, shortened};
-use super::lines::split_cells;
+use super::lines::{count, split_cells};
 use super::number::{DecimalMark, NumberReader};
 use super::preprocess::differences;
 use super::segment::Segment;
@@ -138,8 +138,8 @@ impl<'a> Table<'a> {
     }
 
     fn count_cells(&self, line: &str) -> usize {
-        if !line.contains('"') {
-            return 1 + line.matches(self.delimiter).count();
+        if count(line, '"') == 0 {
+            return 1 + count(line, self.delimiter);
         }
         let mut count = 0;
         let counted: Result<(), std::convert::Infallible> =

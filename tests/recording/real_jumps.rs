@@ -4,7 +4,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use romc::recording::PhaseRule;
 use romc::recording::check::{Implausible, check, without};
 use romc::recording::preprocess::prepare;
 use romc::recording::{self, PhaseRule, Recording, Stance};
