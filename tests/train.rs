@@ -397,7 +397,7 @@ fn joint_training_of_networks_lowers_the_loss_and_gives_a_model_that_simulates()
         let latent = LatentSegment::encode(&read, &training[0].segments[0]).expect("encodes");
         let options = IntegrationOptions::default();
         let predicted = rollout(&compiled, &latent, Restart::Every(0.1), &options);
-        assert_eq!(predicted.expect("integrates").diverged_at_s(), None);
+        assert_eq!(predicted.diverged_at_s(), None);
     }
 }
 

@@ -23,7 +23,4 @@ pub enum SimError {
         row: usize,
         found: [bool; 4],
     },
-    /// The integrator refused the problem.
-    #[error("integrator: {message}")]
-    Solver { message: String },
 }
