@@ -9,6 +9,7 @@ mod lifts;
 #[path = "mpc/nonlinear.rs"]
 mod nonlinear;
 #[path = "mpc/qp.rs"]
+mod outside;
 mod qp;
 #[path = "mpc/random.rs"]
 mod random;
