@@ -8,8 +8,8 @@ mod failures;
 mod lifts;
 #[path = "mpc/nonlinear.rs"]
 mod nonlinear;
-#[path = "mpc/qp.rs"]
 mod outside;
+#[path = "mpc/qp.rs"]
 mod qp;
 #[path = "mpc/random.rs"]
 mod random;

@@ -7,10 +7,10 @@
 mod bad_files;
 #[path = "recording/formats.rs"]
 mod formats;
-#[path = "recording/real_jumps.rs"]
 mod outside;
 #[path = "recording/random_bytes.rs"]
 mod random_bytes;
+#[path = "recording/real_jumps.rs"]
 mod real_jumps;
 #[path = "recording/sheet.rs"]
 mod sheet;

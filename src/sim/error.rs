@@ -1,5 +1,7 @@
 //! What can go wrong in a rollout.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use crate::model::ModelError;
 use crate::recording::RecordingError;
 
