@@ -1,5 +1,7 @@
 //! One error for the whole library: each stage's own, told apart by variant.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use std::io;
 use std::path::PathBuf;
 

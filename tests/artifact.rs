@@ -792,7 +792,12 @@ fn statistics_of_an_unknown_or_repeated_phase_are_refused() {
     let (statistics, contact) = ("\"input_statistics\":{", "\"contact\":{\"mean\":[]},");
     let doubled = text.replace(statistics, &format!("{statistics}{contact}"));
     assert_ne!(doubled, text);
-    assert!(artifact::read_from_bytes("f", doubled.as_bytes()).is_err());
+    match artifact::read_from_bytes("f", doubled.as_bytes()) {
+        Err(ArtifactError::Syntax { message, .. }) => {
+            assert!(message.contains("duplicate key \"contact\""), "{message}");
+        }
+        other => panic!("{other:?}"),
+    }
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! The command line from outside: exit codes, JSON, files that appear whole, errors that name the place.
 
+mod outside;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -85,14 +87,24 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 
 const MODEL: &str = "models/go1-d4.json";
 const JUMP: &str = "examples/recordings/go1/test_01.csv.gz";
-const COMMANDS: [&str; 8] = [
-    "demo", "inspect", "train", "study", "import", "check", "compile", "simulate", "mpc",
-];
+
+/// The commands that `romc --help` lists, `help` aside.
+fn commands() -> Vec<String> {
+    let help = done(&["--help"]);
+    let listed = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let names = listed.map_while(|line| line.split_whitespace().next());
+    let names: Vec<_> = names
+        .filter(|name| *name != "help")
+        .map(str::to_owned)
+        .collect();
+    assert!(names.len() >= 11, "{help}");
+    names
+}
 
 #[test]
 fn help_of_every_command_shows_an_example_that_starts_with_it() {
-    for command in COMMANDS {
-        let help = done(&[command, "--help"]);
+    for command in commands() {
+        let help = done(&[command.as_str(), "--help"]);
         assert!(help.contains("--json"), "{command}");
         assert!(
             help.contains("Example") && help.contains(&format!("\n  romc {command}")),
@@ -939,14 +951,10 @@ fn bad_models_end_with_one_and_name_tensor_and_expectation() {
 
 #[test]
 fn hardware_jump_trains_simulates_and_gives_torques_inside_the_limits() {
-    let recording = "../shared/data/go1_hardware_jump.csv";
-    if !Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join(recording)
-        .exists()
-    {
-        println!("skipped: no hardware recording beside the checkout");
+    let Some(recording) = outside::hardware_jump() else {
         return;
-    }
+    };
+    let recording = recording.to_str().expect("a path of characters");
     let folder = folder();
     let model = path(&folder, "hardware.json");
     done(&["train", recording, "--latent-dim", "4", "--output", &model]);

@@ -8,6 +8,7 @@ mod failures;
 mod lifts;
 #[path = "mpc/nonlinear.rs"]
 mod nonlinear;
+mod outside;
 #[path = "mpc/qp.rs"]
 mod qp;
 #[path = "mpc/random.rs"]

@@ -7,6 +7,7 @@
 mod bad_files;
 #[path = "recording/formats.rs"]
 mod formats;
+mod outside;
 #[path = "recording/random_bytes.rs"]
 mod random_bytes;
 #[path = "recording/real_jumps.rs"]

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, Rotation3, Vector2, Vector3};
 use super::metrics::FitSums;
 use crate::recording::{RecordingError, Segment};
 use crate::robot::{JOINT_DIM, Leg, Robot};
-use crate::sim::{IntegrationOptions, Restart, SimError, integrate, restart_windows};
+use crate::sim::{IntegrationOptions, OdeSystem, Restart, SimError, integrate, restart_windows};
 
 /// Constants of the pendulum.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,7 +54,7 @@ impl Aslip {
     /// frame, and switches between contact and flight as recorded.
     ///
     /// # Errors
-    /// [`SimError::Recording`] if a leg in contact is singular, [`SimError::Solver`].
+    /// [`SimError::Recording`] if a leg in contact is singular.
     pub fn rollout(
         &self,
         robot: &Robot,
@@ -65,7 +65,7 @@ impl Aslip {
         let mut position_m = vec![None; segment.len()];
         let windows = restart_windows(&segment.time_s, restart);
         for window in &windows {
-            self.roll_window(segment, &stances, window.clone(), &mut position_m)?;
+            self.roll_window(segment, &stances, window.clone(), &mut position_m);
         }
         Ok(AslipRollout {
             windows,
@@ -79,7 +79,7 @@ impl Aslip {
         stances: &[Option<Stance>],
         window: Range<usize>,
         position_m: &mut [Option<Vector2<f64>>],
-    ) -> Result<(), SimError> {
+    ) {
         let (x, z) = (BODY_X, BODY_Z);
         let start = window.start;
         let mut state = [
@@ -95,59 +95,69 @@ impl Aslip {
             let same = (first..window.end).take_while(|&k| stances[k].is_some() == down);
             let end = first + same.count();
             let times = &segment.time_s[first..(end + 1).min(window.end)];
-            let states = self.integrate_span(&stances[first..end], times, &state)?;
+            let mut span = PendulumSpan {
+                pendulum: self,
+                stances: &stances[first..end],
+                times,
+            };
+            let states = integrate(&mut span, &state, times, &IntegrationOptions::default()).states;
             for column in 1..states.ncols() {
                 let reached = Vector2::new(states[(0, column)], states[(1, column)]);
                 position_m[first + column] = Some(reached);
             }
             if states.ncols() < times.len() {
-                return Ok(());
+                return;
             }
             state.copy_from_slice(states.column(states.ncols() - 1).as_slice());
             first = end;
         }
-        Ok(())
     }
+}
 
-    /// States `[x, z, dx, dz]` at `times`, all within one contact or flight.
-    fn integrate_span(
-        &self,
-        stances: &[Option<Stance>],
-        times: &[f64],
-        initial: &[f64; 4],
-    ) -> Result<DMatrix<f64>, SimError> {
-        let stance_at = |time: f64| {
-            let after = times[..stances.len()].partition_point(|&t| t <= time);
-            let left = after.saturating_sub(1);
-            let right = after.min(stances.len() - 1);
-            let (from, to) = (stances[left]?, stances[right]?);
-            let step = times[right] - times[left];
-            let share = if step > 0.0 {
-                (time - times[left]) / step
-            } else {
-                0.0
-            };
-            Some(Stance {
-                foot_m: from.foot_m,
-                force_n: from.force_n.lerp(&to.force_n, share),
-            })
-        };
-        let spring = if stances[0].is_some() {
-            self.stiffness_n_m / self.mass_kg
+/// `y = [x, z, dx, dz]` of the pendulum within one contact or flight; `stances` of its samples.
+struct PendulumSpan<'a> {
+    pendulum: &'a Aslip,
+    stances: &'a [Option<Stance>],
+    times: &'a [f64],
+}
+
+impl PendulumSpan<'_> {
+    /// The stance with the force interpolated between samples, held after the last.
+    fn stance_at(&self, time_s: f64) -> Option<Stance> {
+        let n = self.stances.len();
+        let after = self.times[..n].partition_point(|&t| t <= time_s);
+        let (left, right) = (after.saturating_sub(1), after.min(n - 1));
+        let (from, to) = (self.stances[left]?, self.stances[right]?);
+        let step = self.times[right] - self.times[left];
+        let share = if step > 0.0 {
+            (time_s - self.times[left]) / step
         } else {
             0.0
         };
-        let integration = integrate(
-            |time, y, dy| {
-                let acceleration = self.acceleration(Vector2::new(y[0], y[1]), stance_at(time));
-                dy.copy_from_slice(&[y[2], y[3], acceleration.x, acceleration.y]);
-            },
-            |_time, _y, v, jv| jv.copy_from_slice(&[v[2], v[3], -spring * v[0], -spring * v[1]]),
-            initial,
-            times,
-            &IntegrationOptions::default(),
-        )?;
-        Ok(integration.states)
+        Some(Stance {
+            foot_m: from.foot_m,
+            force_n: from.force_n.lerp(&to.force_n, share),
+        })
+    }
+}
+
+impl OdeSystem for PendulumSpan<'_> {
+    fn rate(&mut self, time_s: f64, y: &[f64], dy: &mut [f64]) {
+        let position = Vector2::new(y[0], y[1]);
+        let acceleration = self.pendulum.acceleration(position, self.stance_at(time_s));
+        dy.copy_from_slice(&[y[2], y[3], acceleration.x, acceleration.y]);
+    }
+
+    fn jacobian(&mut self, _time_s: f64, _y: &[f64], jacobian: &mut DMatrix<f64>) {
+        jacobian.fill(0.0);
+        let spring = match self.stances[0] {
+            Some(_) => self.pendulum.stiffness_n_m / self.pendulum.mass_kg,
+            None => 0.0,
+        };
+        for axis in 0..2 {
+            jacobian[(axis, 2 + axis)] = 1.0;
+            jacobian[(2 + axis, axis)] = -spring;
+        }
     }
 }
 

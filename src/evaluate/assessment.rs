@@ -107,8 +107,8 @@ impl<'a> Assessment<'a> {
         let restart = Restart::Every(self.restart_every_s);
         let latent = LatentSegment::encode(model, segment)?;
         let options = IntegrationOptions::default();
-        let full = rollout(compiled, &latent, Restart::Never, &options)?;
-        let restarted = rollout(compiled, &latent, restart, &options)?;
+        let full = rollout(compiled, &latent, Restart::Never, &options);
+        let restarted = rollout(compiled, &latent, restart, &options);
         self.full.add_rollout(model, segment, &latent, &full)?;
         (self.restarted).add_rollout(model, segment, &latent, &restarted)?;
         self.pointwise.add(model, segment, &latent)?;

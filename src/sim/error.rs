@@ -1,5 +1,7 @@
 //! What can go wrong in a rollout.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use crate::model::ModelError;
 use crate::recording::RecordingError;
 
@@ -13,7 +15,4 @@ pub enum SimError {
     /// The recording cannot be turned into inputs.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// The integrator refused the problem.
-    #[error("integrator: {message}")]
-    Solver { message: String },
 }

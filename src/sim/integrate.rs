@@ -1,15 +1,22 @@
-//! Adaptive integration of `dy/dt = f(t, y)`: an explicit Runge-Kutta pair first, and where its steps
-//! become too many (a stiff problem), backward differentiation formulas from the same start.
+//! Adaptive integration of `dy/dt = f(t, y)` by extrapolation: Gragg's explicit midpoint rule first,
+//! and where that needs too many evaluations (a stiff problem), the linearly implicit Euler rule
+//! from the same start. The paper uses LSODA, which switches in the same spirit.
 //!
-//! Only this file names diffsol. The paper uses LSODA, which switches in the same spirit.
+//! A step of length `H` is computed with `n_0 < n_1 < ...` substeps, and the results are extrapolated to
+//! infinitely many (Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*, II.9, and
+//! II, IV.9): order `2j + 2` or `j + 1` after `j + 1` results, as many as the tolerance asks for. Steps
+//! end at every requested time, so that an input with a kink there is integrated exactly.
 
-use diffsol::{
-    DiffsolError, NalgebraLU, NalgebraMat, NalgebraVec, OdeBuilder, OdeEquations, OdeSolverMethod,
-    OdeSolverStopReason,
-};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
-use super::error::SimError;
+/// A system of ordinary differential equations `dy/dt = f(t, y)`; only asked at finite states.
+pub trait OdeSystem {
+    /// Writes `f(t, y)`.
+    fn rate(&mut self, time_s: f64, y: &[f64], dy: &mut [f64]);
+
+    /// Writes `df/dy`, `state_dim x state_dim`.
+    fn jacobian(&mut self, time_s: f64, y: &[f64], jacobian: &mut DMatrix<f64>);
+}
 
 /// How exactly to integrate, and when to give up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,8 +27,8 @@ pub struct IntegrationOptions {
     pub absolute_tolerance: f64,
     /// A state component beyond this magnitude counts as divergence.
     pub divergence_bound: f64,
-    /// Steps of the explicit method per requested time before the problem counts as stiff.
-    pub explicit_steps_per_time: usize,
+    /// Evaluations of `f` per requested time before the problem counts as stiff.
+    pub explicit_evaluations_per_time: usize,
 }
 
 impl Default for IntegrationOptions {
@@ -30,7 +37,7 @@ impl Default for IntegrationOptions {
             relative_tolerance: 1e-11,
             absolute_tolerance: 1e-13,
             divergence_bound: 1e6,
-            explicit_steps_per_time: 50,
+            explicit_evaluations_per_time: 350,
         }
     }
 }
@@ -49,142 +56,301 @@ pub struct Integration {
 /// The family of the integration method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum IntegrationMethod {
-    /// Tsitouras' explicit 5(4) pair.
+    /// Extrapolated explicit midpoint rule.
     Explicit,
-    /// Variable-order backward differentiation formulas.
-    BackwardDifferentiation,
+    /// Extrapolated linearly implicit Euler rule.
+    Implicit,
 }
 
-/// How a stepper ended.
-enum End {
-    Reached,
-    /// The state left the divergence bound, or no step was small enough (a finite-time blow-up).
-    Diverged(f64),
-    OverBudget,
-}
-
-/// States of `dy/dt = f(t, y)` at `times`, from `initial` at `times[0]`.
+/// States of `system` at `times`, from `initial` at `times[0]`.
 ///
-/// `rhs(t, y, dy)` writes `f`; `jacobian_times(t, y, v, jv)` writes `df/dy v`. Both are only called
-/// with finite states.
-///
-/// # Errors
-/// [`SimError::Solver`] if the problem cannot be set up.
-pub fn integrate<F, J>(
-    rhs: F,
-    jacobian_times: J,
+/// A step shorter than 1e-13 of the whole time counts as divergence: a finite-time blow-up.
+pub fn integrate(
+    system: &mut impl OdeSystem,
     initial: &[f64],
     times: &[f64],
     options: &IntegrationOptions,
-) -> Result<Integration, SimError>
-where
-    F: Fn(f64, &[f64], &mut [f64]),
-    J: Fn(f64, &[f64], &[f64], &mut [f64]),
-{
-    let (Some(&start), Some(&end)) = (times.first(), times.last()) else {
-        return Ok(Integration {
-            states: DMatrix::zeros(initial.len(), 0),
-            diverged_at_s: None,
-            method: IntegrationMethod::Explicit,
-        });
-    };
-    let mut columns = vec![initial.to_vec()];
-    let mut method = IntegrationMethod::Explicit;
-    let mut diverged_at_s = None;
-    if end > start {
-        let problem = OdeBuilder::<NalgebraMat<f64>>::new()
-            .t0(start)
-            .rtol(options.relative_tolerance)
-            .atol([options.absolute_tolerance])
-            .rhs_implicit(
-                |y: &[f64], _p: &[f64], t: f64, dy: &mut [f64]| rhs(t, y, dy),
-                |y: &[f64], _p: &[f64], t: f64, v: &[f64], jv: &mut [f64]| {
-                    jacobian_times(t, y, v, jv)
-                },
-            )
-            .init(
-                |_p: &[f64], _t: f64, y: &mut [f64]| y.copy_from_slice(initial),
-                initial.len(),
-            )
-            .build()
-            .map_err(solver_error)?;
-        let budget = options.explicit_steps_per_time * times.len();
-        let explicit = problem.tsit45().map_err(solver_error)?;
-        let mut stepper_end = advance(explicit, times, budget, options, &mut columns);
-        if !matches!(stepper_end, End::Reached) {
-            method = IntegrationMethod::BackwardDifferentiation;
-            columns.truncate(1);
-            let implicit = problem.bdf::<NalgebraLU<f64>>().map_err(solver_error)?;
-            stepper_end = advance(implicit, times, usize::MAX, options, &mut columns);
-        }
-        if let End::Diverged(time_s) = stepper_end {
-            diverged_at_s = Some(time_s);
-        }
-    }
-    let reached = columns.len();
-    Ok(Integration {
-        states: DMatrix::from_iterator(initial.len(), reached, columns.into_iter().flatten()),
-        diverged_at_s,
-        method,
-    })
-}
-
-fn solver_error(error: DiffsolError) -> SimError {
-    SimError::Solver {
-        message: error.to_string(),
-    }
-}
-
-/// Steps `solver` through `times`, one column for each; `columns` holds the first already.
-fn advance<'a, E, S>(
-    mut solver: S,
-    times: &[f64],
-    budget: usize,
-    options: &IntegrationOptions,
-    columns: &mut Vec<Vec<f64>>,
-) -> End
-where
-    E: OdeEquations<T = f64, V = NalgebraVec<f64>> + 'a,
-    S: OdeSolverMethod<'a, E>,
-{
-    let end = times[times.len() - 1];
-    if solver.set_stop_time(end).is_err() {
-        return End::Diverged(times[0]);
-    }
-    for _ in 0..budget {
-        let Ok(reason) = solver.step() else {
-            return End::Diverged(solver.state().t);
+) -> Integration {
+    let mut run = |method, budget| {
+        let mut stepper = Stepper {
+            system,
+            method,
+            options,
+            shortest: 1e-13 * (times.last().unwrap_or(&0.0) - times.first().unwrap_or(&0.0)),
+            evaluations: 0,
+            goal: 4,
+            budget,
         };
-        let now = solver.state().t;
-        if !within_bound(solver.state().y.batch_as_slice(0), options.divergence_bound) {
-            return End::Diverged(now);
-        }
-        let stopped = matches!(reason, OdeSolverStopReason::TstopReached);
-        while let Some(&time) = times.get(columns.len()) {
-            if time > now && !(stopped && columns.len() + 1 == times.len()) {
-                break;
-            }
-            let Ok(state) = solver.interpolate(time.min(now)) else {
-                return End::Diverged(now);
-            };
-            columns.push(state.batch_as_slice(0).to_vec());
-        }
-        if stopped {
-            return End::Reached;
-        }
+        stepper.advance(initial, times)
+    };
+    let budget = options.explicit_evaluations_per_time * times.len();
+    let explicit = run(IntegrationMethod::Explicit, budget);
+    if explicit.states.ncols() == times.len() {
+        return explicit;
     }
-    End::OverBudget
+    run(IntegrationMethod::Implicit, usize::MAX)
 }
 
-fn within_bound(state: &[f64], bound: f64) -> bool {
-    state
+/// Results of one step that are extrapolated at most. More would amplify the rounding errors of the
+/// linearly implicit rule to the default tolerance.
+const MOST_RESULTS: usize = 8;
+
+struct Stepper<'a, S> {
+    system: &'a mut S,
+    method: IntegrationMethod,
+    options: &'a IntegrationOptions,
+    shortest: f64,
+    evaluations: usize,
+    /// Index of the table at which the next step is expected to meet the tolerance.
+    goal: usize,
+    budget: usize,
+}
+
+/// A step that was tried: its end if it met the tolerance, and the length to try next.
+struct Trial {
+    end: Option<DVector<f64>>,
+    next: f64,
+}
+
+/// The cheapest way on: evaluations for the length just tried, a length, and an index of the table at
+/// which its error is expected to meet the tolerance.
+struct Plan {
+    work: f64,
+    length: f64,
+    goal: usize,
+}
+
+impl Plan {
+    /// Takes the length at which entry `j` should meet the tolerance, if that costs less per length;
+    /// its `error` grows with the power `order` of the length, and took `spent` evaluations at `h`.
+    fn consider(&mut self, j: usize, error: f64, order: usize, spent: f64, h: f64) {
+        let factor = 0.9 * (0.5 / error.max(1e-300)).powf(1.0 / order as f64);
+        let factor = factor.clamp(0.02, 4.0);
+        if spent / factor < self.work {
+            *self = Self {
+                work: spent / factor,
+                length: factor * h,
+                goal: j,
+            };
+        }
+    }
+}
+
+impl<S: OdeSystem> Stepper<'_, S> {
+    fn advance(&mut self, initial: &[f64], times: &[f64]) -> Integration {
+        let mut y = DVector::from_column_slice(initial);
+        let mut columns = Vec::with_capacity(times.len());
+        let mut diverged_at_s = None;
+        let mut length = f64::INFINITY;
+        let mut time = times.first().copied().unwrap_or_default();
+        'times: for &target in times {
+            while time < target {
+                let left = target - time;
+                let h = if left < 1.1 * length {
+                    left
+                } else {
+                    length.min(0.5 * left)
+                };
+                if h < self.shortest || self.evaluations > self.budget {
+                    diverged_at_s = Some(time);
+                    break 'times;
+                }
+                let trial = self.step(time, &y, h);
+                // a step that a requested time cut short says little about the next
+                let cut = trial.end.is_some() && h < length && length.is_finite();
+                length = if cut {
+                    trial.next.max(length)
+                } else {
+                    trial.next
+                };
+                let Some(end) = trial.end else { continue };
+                y = end;
+                time = if h == left { target } else { time + h };
+                if y.amax() > self.options.divergence_bound {
+                    diverged_at_s = Some(time);
+                    break 'times;
+                }
+            }
+            columns.push(y.clone());
+        }
+        let states = DMatrix::from_iterator(
+            initial.len(),
+            columns.len(),
+            columns.iter().flatten().copied(),
+        );
+        Integration {
+            states,
+            diverged_at_s,
+            method: self.method,
+        }
+    }
+
+    /// One step of length `h`: results with ever more substeps, until two neighbours in the
+    /// extrapolation table agree to the tolerance or one result more than expected was not enough.
+    fn step(&mut self, time: f64, y: &DVector<f64>, h: f64) -> Trial {
+        let begun = self.evaluations;
+        let mut rate = DVector::zeros(y.len());
+        self.rate(time, y, &mut rate);
+        let mut jacobian = DMatrix::zeros(0, 0);
+        if self.method == IntegrationMethod::Implicit {
+            jacobian = DMatrix::zeros(y.len(), y.len());
+            self.system.jacobian(time, y.as_slice(), &mut jacobian);
+        }
+        let mut table = Vec::new();
+        let mut plan = Plan {
+            work: f64::INFINITY,
+            length: 0.25 * h,
+            goal: 1,
+        };
+        for j in 0..MOST_RESULTS.min(self.goal + 2) {
+            let (result, order, next_substeps) = match self.method {
+                IntegrationMethod::Explicit => {
+                    let result = self.midpoint(time, y, &rate, h, 2 * (j + 1));
+                    (result, 2 * j + 1, 2 * (j + 2))
+                }
+                IntegrationMethod::Implicit => {
+                    let result = self.linearly_implicit(time, y, &jacobian, h, j + 1);
+                    (result, j + 1, j + 2)
+                }
+            };
+            let Some(result) = result else { break };
+            let correction = self.extrapolate(&mut table, result);
+            if j == 0 {
+                continue;
+            }
+            let error = self.relative_size(&correction, y, &table[j]);
+            let spent = (self.evaluations - begun) as f64;
+            plan.consider(j, error, order, spent, h);
+            if error <= 1.0 {
+                if plan.goal == j && j + 1 < MOST_RESULTS {
+                    // one result more may pay: try it at the length at which it costs as much
+                    plan.length *= 1.0 + next_substeps as f64 / spent;
+                    plan.goal += 1;
+                }
+                self.goal = plan.goal;
+                return Trial {
+                    end: table.pop(),
+                    next: plan.length,
+                };
+            }
+        }
+        self.goal = plan.goal;
+        Trial {
+            end: None,
+            next: plan.length.min(0.5 * h),
+        }
+    }
+
+    /// Gragg's rule with `n` substeps, `n` even: errors in even powers of their length.
+    fn midpoint(
+        &mut self,
+        time: f64,
+        y: &DVector<f64>,
+        rate: &DVector<f64>,
+        step: f64,
+        n: usize,
+    ) -> Option<DVector<f64>> {
+        let h = step / n as f64;
+        let (mut last, mut current, mut f) = (y.clone(), y + rate * h, rate.clone());
+        for m in 1..n {
+            self.rate(time + m as f64 * h, &current, &mut f)?;
+            last.axpy(2.0 * h, &f, 1.0);
+            std::mem::swap(&mut last, &mut current);
+        }
+        self.rate(time + step, &current, &mut f)?;
+        finite((last + current + f * h) * 0.5)
+    }
+
+    /// `n` substeps of `(I - h J) (y_m+1 - y_m) = h f(t_m+1, y_m)`.
+    fn linearly_implicit(
+        &mut self,
+        time: f64,
+        y: &DVector<f64>,
+        jacobian: &DMatrix<f64>,
+        step: f64,
+        n: usize,
+    ) -> Option<DVector<f64>> {
+        let h = step / n as f64;
+        let factors = (DMatrix::identity(y.len(), y.len()) - jacobian * h).lu();
+        let (mut current, mut f) = (y.clone(), y.clone());
+        for m in 1..=n {
+            self.rate(time + m as f64 * h, &current, &mut f)?;
+            f *= h;
+            if !factors.solve_mut(&mut f) {
+                return None;
+            }
+            current += &f;
+        }
+        finite(current)
+    }
+
+    /// `f(t, y)`, unless `y` is not finite.
+    fn rate(&mut self, time: f64, y: &DVector<f64>, f: &mut DVector<f64>) -> Option<()> {
+        self.evaluations += 1;
+        let defined = y.iter().all(|value| value.is_finite());
+        defined.then(|| self.system.rate(time, y.as_slice(), f.as_mut_slice()))
+    }
+
+    /// Adds a row to the extrapolation table, of which only the last row is kept; returns the
+    /// difference of its last two entries.
+    fn extrapolate(&self, row: &mut Vec<DVector<f64>>, result: DVector<f64>) -> DVector<f64> {
+        let n = (row.len() + 1) as f64;
+        let mut entry = result;
+        let mut correction = DVector::zeros(entry.len());
+        for (k, above) in row.iter_mut().enumerate() {
+            let ratio = n / (n - (k + 1) as f64);
+            let power = match self.method {
+                IntegrationMethod::Explicit => ratio * ratio,
+                IntegrationMethod::Implicit => ratio,
+            };
+            correction = (&entry - &*above) / (power - 1.0);
+            let next = &entry + &correction;
+            *above = std::mem::replace(&mut entry, next);
+        }
+        row.push(entry);
+        correction
+    }
+
+    /// Largest component of `error` in units of its tolerance.
+    fn relative_size(&self, error: &DVector<f64>, from: &DVector<f64>, to: &DVector<f64>) -> f64 {
+        let tolerance = |a: f64, b: f64| {
+            self.options.absolute_tolerance + self.options.relative_tolerance * a.abs().max(b.abs())
+        };
+        let values = error.iter().zip(from).zip(to);
+        values.fold(0.0, |largest: f64, ((error, &a), &b)| {
+            largest.max(error.abs() / tolerance(a, b))
+        })
+    }
+}
+
+fn finite(values: DVector<f64>) -> Option<DVector<f64>> {
+    values
         .iter()
-        .all(|value| value.is_finite() && value.abs() <= bound)
+        .all(|value| value.is_finite())
+        .then_some(values)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// One equation in one unknown, or more, as two functions.
+    struct Case<F, J>(F, J);
+
+    impl<F, J> OdeSystem for Case<F, J>
+    where
+        F: Fn(f64, &[f64], &mut [f64]),
+        J: Fn(f64, &[f64], &mut DMatrix<f64>),
+    {
+        fn rate(&mut self, time_s: f64, y: &[f64], dy: &mut [f64]) {
+            assert!(y.iter().all(|value| value.is_finite()), "asked at {y:?}");
+            (self.0)(time_s, y, dy);
+        }
+
+        fn jacobian(&mut self, time_s: f64, y: &[f64], jacobian: &mut DMatrix<f64>) {
+            (self.1)(time_s, y, jacobian);
+        }
+    }
 
     fn times(count: usize, end: f64) -> Vec<f64> {
         (0..count)
@@ -192,62 +358,133 @@ mod tests {
             .collect()
     }
 
+    fn oscillator() -> impl OdeSystem {
+        Case(
+            |_t, y: &[f64], dy: &mut [f64]| dy.copy_from_slice(&[y[1], -y[0]]),
+            |_t, _y: &[f64], jacobian: &mut DMatrix<f64>| {
+                jacobian.copy_from_slice(&[0.0, -1.0, 1.0, 0.0])
+            },
+        )
+    }
+
     #[test]
     fn integrate_of_an_oscillator_follows_the_cosine() {
-        let times = times(200, 10.0);
-        let result = integrate(
-            |_t, y, dy| {
-                dy[0] = y[1];
-                dy[1] = -y[0];
-            },
-            |_t, _y, v, jv| {
-                jv[0] = v[1];
-                jv[1] = -v[0];
-            },
-            &[1.0, 0.0],
-            &times,
-            &IntegrationOptions::default(),
-        )
-        .expect("solvable");
-        assert_eq!(result.method, IntegrationMethod::Explicit);
-        assert_eq!(result.states.ncols(), times.len());
-        for (column, &time) in result.states.column_iter().zip(&times) {
-            assert!((column[0] - time.cos()).abs() < 1e-6, "at {time}");
+        let options = IntegrationOptions::default();
+        for (count, bound) in [(200, 1e-10), (2, 1e-10)] {
+            let times = times(count, 10.0);
+            let result = integrate(&mut oscillator(), &[1.0, 0.0], &times, &options);
+            assert_eq!(result.method, IntegrationMethod::Explicit);
+            assert_eq!(result.states.ncols(), times.len());
+            for (column, &time) in result.states.column_iter().zip(&times) {
+                let error = (column[0] - time.cos())
+                    .abs()
+                    .max((column[1] + time.sin()).abs());
+                assert!(error < bound, "at {time}: {error:e}");
+            }
         }
     }
 
     #[test]
-    fn integrate_of_a_stiff_problem_falls_back_to_bdf() {
-        let rate = 1e7;
-        let times = times(11, 1.0);
-        let result = integrate(
-            |t, y, dy| dy[0] = -rate * (y[0] - t.cos()),
-            |_t, _y, v, jv| jv[0] = -rate * v[0],
-            &[1.0],
-            &times,
-            &IntegrationOptions::default(),
-        )
-        .expect("solvable");
-        assert_eq!(result.method, IntegrationMethod::BackwardDifferentiation);
-        assert_eq!(result.diverged_at_s, None);
-        assert!((result.states[(0, 10)] - 1f64.cos()).abs() < 1e-6);
+    fn implicit_method_of_an_oscillator_follows_the_cosine() {
+        let options = IntegrationOptions {
+            explicit_evaluations_per_time: 0,
+            ..Default::default()
+        };
+        let times = times(21, 10.0);
+        let result = integrate(&mut oscillator(), &[1.0, 0.0], &times, &options);
+        assert_eq!(result.method, IntegrationMethod::Implicit);
+        for (column, &time) in result.states.column_iter().zip(&times) {
+            assert!(
+                (column[0] - time.cos()).abs() < 1e-9,
+                "at {time}: {:e}",
+                column[0] - time.cos()
+            );
+        }
     }
 
     #[test]
-    fn integrate_of_a_finite_time_blow_up_tells_when_it_diverged() {
+    fn integrate_of_a_stiff_problem_falls_back_to_the_implicit_method() {
+        let rate = 1e7;
+        let times = times(11, 1.0);
+        let mut system = Case(
+            |t: f64, y: &[f64], dy: &mut [f64]| dy[0] = -rate * (y[0] - t.cos()),
+            |_t, _y: &[f64], jacobian: &mut DMatrix<f64>| jacobian[(0, 0)] = -rate,
+        );
+        let result = integrate(&mut system, &[1.0], &times, &IntegrationOptions::default());
+        assert_eq!(result.method, IntegrationMethod::Implicit);
+        assert_eq!(result.diverged_at_s, None);
+        // y = (rate^2 cos t + rate sin t) / (rate^2 + 1) after the transient
+        let expected = 1f64.cos() + 1f64.sin() / rate;
+        let error = (result.states[(0, 10)] - expected).abs();
+        assert!(error < 1e-11, "{error:e}");
+    }
+
+    #[test]
+    fn integrate_of_van_der_pol_in_its_stiff_regime_reproduces_the_reference() {
+        // reference at t = 2: the test set for initial value problem solvers (Mazzia, Magherini)
+        let epsilon = 1e-6;
+        let mut system = Case(
+            |_t, y: &[f64], dy: &mut [f64]| {
+                dy.copy_from_slice(&[y[1], ((1.0 - y[0] * y[0]) * y[1] - y[0]) / epsilon]);
+            },
+            |_t, y: &[f64], jacobian: &mut DMatrix<f64>| {
+                let below = [
+                    (-2.0 * y[0] * y[1] - 1.0) / epsilon,
+                    (1.0 - y[0] * y[0]) / epsilon,
+                ];
+                jacobian.copy_from_slice(&[0.0, below[0], 1.0, below[1]]);
+            },
+        );
+        let options = IntegrationOptions {
+            divergence_bound: 1e8,
+            ..Default::default()
+        };
+        let result = integrate(&mut system, &[2.0, 0.0], &times(3, 2.0), &options);
+        assert_eq!(result.method, IntegrationMethod::Implicit);
+        let end = result.states.column(2);
+        assert!(
+            (end[0] - 0.170_616_773_217_048_5e1).abs() < 1e-8,
+            "{}",
+            end[0]
+        );
+        assert!(
+            (end[1] + 0.892_809_701_024_797_5).abs() < 1e-7,
+            "{}",
+            end[1]
+        );
+    }
+
+    #[test]
+    fn integrate_of_a_finite_time_blow_up_reports_when_it_diverged() {
         // dy/dt = y^2 from 1 has its pole at t = 1
         let times = times(21, 2.0);
-        let result = integrate(
-            |_t, y, dy| dy[0] = y[0] * y[0],
-            |_t, y, v, jv| jv[0] = 2.0 * y[0] * v[0],
-            &[1.0],
-            &times,
-            &IntegrationOptions::default(),
-        )
-        .expect("set up");
+        let mut system = Case(
+            |_t, y: &[f64], dy: &mut [f64]| dy[0] = y[0] * y[0],
+            |_t, y: &[f64], jacobian: &mut DMatrix<f64>| jacobian[(0, 0)] = 2.0 * y[0],
+        );
+        let result = integrate(&mut system, &[1.0], &times, &IntegrationOptions::default());
         let time = result.diverged_at_s.expect("a pole");
         assert!((0.99..=1.01).contains(&time), "{time}");
         assert_eq!(result.states.ncols(), 10, "times 0 to 0.9");
-        assert!(result.states.iter().all(|value| value.is_finite()));
+        for (column, &time) in result.states.column_iter().zip(&times) {
+            assert!((column[0] * (1.0 - time) - 1.0).abs() < 1e-9, "at {time}");
+        }
+    }
+
+    #[test]
+    fn integrate_of_a_rate_that_is_not_a_number_ends_where_it_begins_to_be_none() {
+        let mut system = Case(
+            |t: f64, _y: &[f64], dy: &mut [f64]| dy[0] = (0.55 - t).sqrt(),
+            |_t, _y: &[f64], jacobian: &mut DMatrix<f64>| jacobian[(0, 0)] = 0.0,
+        );
+        let result = integrate(
+            &mut system,
+            &[0.0],
+            &times(11, 1.0),
+            &IntegrationOptions::default(),
+        );
+        let time = result.diverged_at_s.expect("no rate beyond");
+        assert!((0.549..=0.5501).contains(&time), "{time}");
+        assert_eq!(result.states.ncols(), 6);
     }
 }

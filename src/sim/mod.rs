@@ -11,6 +11,6 @@ mod rollout;
 
 pub use error::SimError;
 pub use inputs::input_statistics;
-pub use integrate::{Integration, IntegrationMethod, IntegrationOptions, integrate};
+pub use integrate::{Integration, IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
 pub use latent::{LatentSegment, phase_rule};
 pub use rollout::{Restart, Rollout, Window, restart_windows, rollout};

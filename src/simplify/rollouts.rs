@@ -88,7 +88,7 @@ impl RolloutBasis<'_> {
             let mut sums = CoordinateSums::new(model)?;
             let (mut outside, mut predicted) = (0usize, 0usize);
             for (&segment, &latent) in self.segments.iter().zip(&self.latent) {
-                let run = rollout(&compiled, latent, restart, &IntegrationOptions::default())?;
+                let run = rollout(&compiled, latent, restart, &IntegrationOptions::default());
                 sums.add_rollout(model, segment, latent, &run)?;
                 outside += self.outside(latent, &run);
                 predicted += run.predictions().count();

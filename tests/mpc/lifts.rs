@@ -226,6 +226,9 @@ fn stretched_leg_is_a_failure_in_contact_only() {
         Err(LiftFailure::SingularLeg)
     );
     stretched.feet[1] = false;
-    assert!(lift.lift(&plant, &[0.1; D], &stretched).is_ok());
+    let found = lift
+        .lift(&plant, &[0.1; D], &stretched)
+        .expect("the stretched leg carries nothing");
+    assert!(found.iter().all(|torque| torque.is_finite()), "{found:?}");
     assert_eq!(STAND[..12], FOOTING.joints_rad);
 }

@@ -7,6 +7,7 @@ use romc::evaluate::{ReferenceInput, along_recording, lift_comparison};
 use romc::mpc::{Controller, Lift, MpcSettings, Source};
 use romc::recording::{Recording, Segment};
 
+use crate::outside;
 use crate::synthetic::{Equations, Trajectory, model, trajectory};
 
 fn recording(trajectory: &Trajectory) -> Recording {
@@ -123,12 +124,10 @@ fn lift_comparison_of_inputs_in_the_encoders_range_is_exact() {
 
 #[test]
 fn hardware_jump_gets_torques_within_the_limits_with_either_lift() {
-    let path = Path::new("../shared/data/go1_hardware_jump.csv");
-    if !path.exists() {
-        eprintln!("no hardware jump here");
+    let Some(path) = outside::hardware_jump() else {
         return;
-    }
-    let recording = romc::recording::read(path).expect("the file is sound");
+    };
+    let recording = romc::recording::read(&path).expect("the file is sound");
     for lift in [Lift::Transpose, Lift::Consistent] {
         let settings = MpcSettings {
             lift,
@@ -163,10 +162,7 @@ fn go1_recordings() -> Vec<Recording> {
         .filter(|path| path.extension().is_some_and(|extension| extension == "gz"))
         .collect();
     paths.sort();
-    let hardware = root.join("../shared/data/go1_hardware_jump.csv");
-    if hardware.exists() {
-        paths.push(hardware);
-    }
+    paths.extend(outside::hardware_jump());
     paths
         .iter()
         .map(|path| romc::recording::read(path).expect("a sound recording"))

@@ -481,5 +481,6 @@ fn stretched_knee_in_contact_names_row_leg_and_angles() {
     // The same posture in the air carries no force.
     let mut sheet = Sheet::landing();
     sheet.set(3, "rl.kn Position", "0");
-    assert!(sheet.read().unwrap().segments[0].input(go1).is_ok());
+    let input = |sheet: &Sheet| sheet.read().unwrap().segments[0].input(go1).unwrap();
+    assert_eq!(input(&sheet), input(&Sheet::landing()));
 }

@@ -9,6 +9,8 @@ use romc::recording::preprocess::prepare;
 use romc::recording::{self, PhaseRule, Recording, Stance};
 use romc::robot::Robot;
 
+use crate::outside;
+
 fn go1() -> &'static Robot {
     Robot::by_name("go1").unwrap()
 }
@@ -39,12 +41,7 @@ fn jumps_in(name: &str, least: usize) -> Vec<PathBuf> {
 
 /// The hardware jump, which is not part of the repository.
 fn hardware_jump() -> Option<Recording> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/go1_hardware_jump.csv");
-    if !path.exists() {
-        eprintln!("skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(recording::read(&path).unwrap())
+    outside::hardware_jump().map(|path| recording::read(&path).unwrap())
 }
 
 #[test]
@@ -146,7 +143,10 @@ fn hardware_jump_is_read_and_divided() {
     let spans = PhaseRule::two_phase().spans(segment).unwrap();
     let ranges: Vec<_> = spans.iter().map(|span| span.range.clone()).collect();
     assert_eq!(ranges, [0..256, 256..378, 378..800]);
-    assert!(segment.input(go1()).is_ok());
+    let input = segment.input(go1()).unwrap();
+    assert_eq!(input.shape(), (18, 800));
+    assert_eq!(input.rows(0, 12), segment.torque_nm);
+    assert!(input.iter().all(|value| value.is_finite()));
 }
 
 #[test]

@@ -1,0 +1,283 @@
+//! The rooms of `src` import only what the table of ARCHITECTURE.md allows, and only from rows above
+//! their own.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A row of the table: which rooms a room may import.
+struct Row {
+    room: String,
+    may_import: BTreeSet<String>,
+}
+
+/// Rows of the table whose header has the columns `room` and `may import`.
+fn table(text: &str) -> Vec<Row> {
+    let cells = |line: &str| -> Vec<String> {
+        (line
+            .trim_matches('|')
+            .split('|')
+            .map(|cell| cell.trim().to_owned()))
+        .collect()
+    };
+    let mut lines = text.lines().filter(|line| line.starts_with('|'));
+    let header = lines.find_map(|line| {
+        let cells = cells(line);
+        let column = |name: &str| cells.iter().position(|cell| cell == name);
+        Some((column("room")?, column("may import")?))
+    });
+    let (room, may_import) = header.expect("a table with the columns `room` and `may import`");
+    let mut rows: Vec<Row> = Vec::new();
+    for line in lines.skip(1) {
+        let cells = cells(line);
+        let names = |cell: &str| -> Vec<String> {
+            cell.split('`')
+                .skip(1)
+                .step_by(2)
+                .map(str::to_owned)
+                .collect()
+        };
+        let may_import = match cells[may_import].as_str() {
+            "all" => rows
+                .iter()
+                .map(|row| row.room.clone())
+                .chain(["Error".to_owned()])
+                .collect(),
+            "nothing" => BTreeSet::new(),
+            cell => names(cell).into_iter().collect(),
+        };
+        let room = names(&cells[room]).remove(0);
+        rows.push(Row { room, may_import });
+    }
+    rows
+}
+
+/// The lines of a source file outside comments and `#[cfg(test)]` items, and the modules that are
+/// declared for tests alone. Relies on rustfmt: an item ends at the indentation at which it began.
+fn product_code(text: &str) -> (String, Vec<String>) {
+    let (mut code, mut test_modules) = (String::new(), Vec::new());
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        if line.trim_start().starts_with("#[cfg(test)]") {
+            let item = lines.find(|line| !line.trim_start().starts_with("#["));
+            let item = item.expect("an item follows its attribute");
+            let indentation = &item[..item.len() - item.trim_start().len()];
+            if let Some(name) = item
+                .trim()
+                .strip_prefix("mod ")
+                .and_then(|rest| rest.strip_suffix(';'))
+            {
+                test_modules.push(name.to_owned());
+            }
+            let ends = |line: &str| line.ends_with(';') || line.ends_with('}');
+            if !ends(item) {
+                lines.find(|line| {
+                    let at_start = line.strip_prefix(indentation);
+                    at_start.is_some_and(|rest| !rest.starts_with([' ', ')']) && ends(rest))
+                });
+            }
+            continue;
+        }
+        code.push_str(line.split("//").next().unwrap_or_default());
+        code.push('\n');
+    }
+    (code, test_modules)
+}
+
+/// First names after `crate::`, of plain paths and of `crate::{a::b, c}`.
+fn imported_rooms(code: &str) -> BTreeSet<String> {
+    let name = |text: &str| -> String {
+        text.chars()
+            .take_while(|c| c.is_alphanumeric() || *c == '_')
+            .collect()
+    };
+    let mut rooms = BTreeSet::new();
+    for (at, found) in code.match_indices("crate::") {
+        let before = code[..at].chars().next_back();
+        if before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == '$') {
+            continue;
+        }
+        let path = &code[at + found.len()..];
+        let Some(group) = path.strip_prefix('{') else {
+            rooms.insert(name(path));
+            continue;
+        };
+        let (mut depth, mut item) = (0, String::new());
+        for c in group.chars() {
+            match c {
+                ',' | '}' if depth == 0 => {
+                    rooms.insert(name(item.trim()));
+                    item.clear();
+                    if c == '}' {
+                        break;
+                    }
+                    continue;
+                }
+                '{' => depth += 1,
+                '}' => depth -= 1,
+                _ => {}
+            }
+            item.push(c);
+        }
+    }
+    rooms.remove("");
+    rooms
+}
+
+/// Longest chain of `super::` in a file.
+fn supers(code: &str) -> usize {
+    let chains = code
+        .match_indices("super::")
+        .filter(|(at, _)| !code[..*at].ends_with("super::"));
+    let length =
+        |text: &str| (text.len() - text.trim_start_matches("super::").len()) / "super::".len();
+    chains.map(|(at, _)| length(&code[at..])).max().unwrap_or(0)
+}
+
+/// Visits the source files below a folder, except those declared for tests alone.
+fn visit(folder: &Path, depth: usize, file: &mut impl FnMut(&Path, &str, usize)) {
+    let entries = fs::read_dir(folder).expect("a readable folder");
+    let mut paths: Vec<PathBuf> = entries
+        .map(|entry| entry.expect("an entry").path())
+        .collect();
+    paths.sort();
+    let sources: Vec<_> = (paths.iter())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "rs"))
+        .map(|path| (path, product_code(&fs::read_to_string(path).expect("text"))))
+        .collect();
+    let test_modules: BTreeSet<&str> = sources
+        .iter()
+        .flat_map(|(_, (_, names))| names)
+        .map(String::as_str)
+        .collect();
+    let is_test = |path: &Path| {
+        path.file_stem()
+            .and_then(|stem| stem.to_str())
+            .is_some_and(|stem| test_modules.contains(stem))
+    };
+    for (path, (code, _)) in &sources {
+        let module_depth = if path.ends_with("mod.rs") {
+            depth
+        } else {
+            depth + 1
+        };
+        if !is_test(path) {
+            file(path, code, module_depth);
+        }
+    }
+    for path in paths.iter().filter(|path| path.is_dir() && !is_test(path)) {
+        visit(path, depth + 1, file);
+    }
+}
+
+#[test]
+fn rooms_import_only_what_the_table_of_architecture_allows() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let map = fs::read_to_string(root.join("ARCHITECTURE.md")).expect("ARCHITECTURE.md");
+    let rows = table(&map);
+    let mut faults = Vec::new();
+    let mut imports: BTreeMap<&str, BTreeSet<String>> = BTreeMap::new();
+    for row in &rows {
+        let folder = root.join("src").join(&row.room);
+        if !folder.is_dir() {
+            faults.push(format!(
+                "the table has `{}`, src has no such folder",
+                row.room
+            ));
+            continue;
+        }
+        let used = imports.entry(&row.room).or_default();
+        visit(&folder, 1, &mut |path, code, depth| {
+            let path = path.strip_prefix(root).expect("below the root").display();
+            for room in imported_rooms(code) {
+                if room != row.room && !row.may_import.contains(&room) {
+                    faults.push(format!(
+                        "{path} imports `{room}`, which `{}` may not",
+                        row.room
+                    ));
+                }
+                used.insert(room);
+            }
+            if supers(code) >= depth {
+                faults.push(format!("{path} leaves its room by `super::`"));
+            }
+        });
+    }
+    for entry in fs::read_dir(root.join("src")).expect("src") {
+        let path = entry.expect("an entry").path();
+        let name = path
+            .file_name()
+            .and_then(|name| name.to_str())
+            .expect("a name");
+        if path.is_dir() && rows.iter().all(|row| row.room != name) {
+            faults.push(format!("src has `{name}`, the table has no such room"));
+        }
+    }
+    let mut above = BTreeSet::from(["Error".to_owned()]);
+    for row in &rows {
+        for room in row.may_import.difference(&above) {
+            faults.push(format!(
+                "`{}` may import `{room}`, which is not above it",
+                row.room
+            ));
+        }
+        let used = &imports.get(row.room.as_str()).cloned().unwrap_or_default();
+        if row.room != "cli" {
+            for room in row.may_import.difference(used) {
+                faults.push(format!("`{}` may import `{room}`, but does not", row.room));
+            }
+        }
+        above.insert(row.room.clone());
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn imported_rooms_reads_paths_and_groups_but_not_comments_or_tests() {
+    let text = "\
+//! Docs name [`crate::cli`].
+use crate::model::{Library, Phase};
+use crate::{lower::{self, dynamics}, sim, symbolic::ExprPool};
+#[cfg(test)]
+mod fixtures;
+fn f() -> crate::Error {
+    mycrate::g() // crate::report
+}
+
+#[cfg(test)]
+fn only_for_tests(
+    a: usize,
+) -> crate::study::Plan {
+    let x = 1;
+    crate::train::run(x)
+}
+
+pub use crate::ir::Program;
+
+#[cfg(test)]
+mod tests {
+    use crate::mpc::Plant;
+}
+";
+    let (code, test_modules) = product_code(text);
+    assert_eq!(test_modules, ["fixtures"]);
+    let rooms: Vec<_> = imported_rooms(&code).into_iter().collect();
+    assert_eq!(rooms, ["Error", "ir", "lower", "model", "sim", "symbolic"]);
+    assert_eq!(supers("use super::super::model::X; use super::y;"), 2);
+}
+
+#[test]
+fn table_reads_its_columns_by_name() {
+    let text = "\
+| room | holds | may import |
+|---|---|---|
+| `model` | x | nothing |
+| `lower` | programs | `model`, `ir`'s types |
+| `cli` | all | all |
+";
+    let rows = table(text);
+    let names = |row: &Row| row.may_import.iter().cloned().collect::<Vec<_>>();
+    assert_eq!(rows[0].may_import.len(), 0);
+    assert_eq!(names(&rows[1]), ["ir", "model"]);
+    assert_eq!(names(&rows[2]), ["Error", "lower", "model"]);
+}

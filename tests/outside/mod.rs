@@ -1,0 +1,21 @@
+//! Recordings beside the checkout, which only some machines have.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// The jump recorded on a Go1; where there is none, prints that the calling test is skipped.
+pub fn hardware_jump() -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/go1_hardware_jump.csv");
+    if path.exists() {
+        return Some(path);
+    }
+    let thread = std::thread::current();
+    let test = thread.name().unwrap_or("a test");
+    // not by eprintln!, which the test harness captures
+    let _ = writeln!(
+        std::io::stderr(),
+        "skipped: {test}: {} does not exist",
+        path.display()
+    );
+    None
+}
