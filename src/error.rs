@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use crate::artifact::ArtifactError;
 use crate::codegen::CodegenError;
 use crate::deploy::EmitError;
+use crate::equations::PhysicalError;
 use crate::evaluate::EvaluateError;
 use crate::files::FolderError;
 use crate::import::ImportError;
@@ -51,6 +52,8 @@ pub enum Error {
     Lower(#[from] LowerError),
     #[error(transparent)]
     Sim(#[from] SimError),
+    #[error(transparent)]
+    Physical(#[from] PhysicalError),
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
     #[error(transparent)]
@@ -101,6 +104,7 @@ impl Error {
             | Self::Sim(_)
             | Self::Study(_)
             | Self::Evaluate(_)
+            | Self::Physical(_)
             | Self::Mpc(_)
             | Self::Config { .. }
             | Self::Exists(_)

@@ -165,7 +165,12 @@ pub fn emit(
         digest,
         ..EmitOptions::default()
     };
-    Ok(deploy::emit(&Equations::of(model), targets, &options)?)
+    let scaled = Equations::of(model);
+    let equations = match code.units {
+        UnitsChoice::Si | UnitsChoice::Scaled => scaled,
+        UnitsChoice::Physical => scaled.in_physical_units()?,
+    };
+    Ok(deploy::emit(&equations, targets, &options)?)
 }
 
 /// Writes files into a folder; the path of each, with its size in bytes.
@@ -210,7 +215,7 @@ impl From<PrecisionChoice> for Precision {
 impl From<UnitsChoice> for Units {
     fn from(choice: UnitsChoice) -> Self {
         match choice {
-            UnitsChoice::Si => Self::Si,
+            UnitsChoice::Si | UnitsChoice::Physical => Self::Si,
             UnitsChoice::Scaled => Self::Scaled,
         }
     }

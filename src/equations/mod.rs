@@ -29,6 +29,10 @@
 //! # }
 //! ```
 
+mod physical;
 mod system;
+mod unit;
 
+pub use physical::{LatentUnits, PhysicalError};
 pub use system::{Equations, PhaseEquations, Summand};
+pub use unit::Unit;

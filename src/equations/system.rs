@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use nalgebra::DMatrix;
 
+use super::physical::LatentUnits;
 use crate::model::{
     CandidateTerm, FeetRule, LatentVariable, ModelError, Phase, ReducedModel, TermId,
 };
@@ -37,6 +38,7 @@ pub struct Equations<'a> {
     pool: ExprPool,
     terms: Vec<CandidateTerm>,
     phases: Vec<PhaseEquations>,
+    latent_units: Option<LatentUnits>,
 }
 
 impl<'a> Equations<'a> {
@@ -59,7 +61,41 @@ impl<'a> Equations<'a> {
             terms: model.library().terms().to_vec(),
             phases: phases.collect(),
             model: Cow::Borrowed(model),
+            latent_units: None,
         }
+    }
+
+    /// Equations over a pool that may hold more than the model's library; terms are distinct.
+    pub(super) fn from_parts(
+        model: Cow<'a, ReducedModel>,
+        pool: ExprPool,
+        terms: Vec<CandidateTerm>,
+        phases: Vec<PhaseEquations>,
+        latent_units: Option<LatentUnits>,
+    ) -> Self {
+        Self {
+            model,
+            pool,
+            terms,
+            phases,
+            latent_units,
+        }
+    }
+
+    /// The same equations with a model of their own.
+    pub fn into_owned(self) -> Equations<'static> {
+        Equations {
+            model: Cow::Owned(self.model.into_owned()),
+            pool: self.pool,
+            terms: self.terms,
+            phases: self.phases,
+            latent_units: self.latent_units,
+        }
+    }
+
+    /// Units of latent coordinates and inputs, if they are physical; none where they are scaled.
+    pub fn latent_units(&self) -> Option<&LatentUnits> {
+        self.latent_units.as_ref()
     }
 
     /// The model with maps, names and scale factors; its Xi may be that of equal, longer equations.

@@ -87,6 +87,11 @@ pub struct CandidateTerm {
 }
 
 impl CandidateTerm {
+    /// The term with this expression, written as `text`.
+    pub(crate) fn new(text: String, expr: ExprId) -> Self {
+        Self { text, expr }
+    }
+
     /// The term as the model file writes it.
     pub fn text(&self) -> &str {
         &self.text
