@@ -9,6 +9,7 @@ use crate::artifact::ArtifactError;
 use crate::check::CheckError;
 use crate::codegen::CodegenError;
 use crate::deploy::EmitError;
+use crate::equations::PhysicalError;
 use crate::evaluate::EvaluateError;
 use crate::files::FolderError;
 use crate::import::{ImportError, NameError};
@@ -58,6 +59,8 @@ pub enum Error {
     Lower(#[from] LowerError),
     #[error(transparent)]
     Sim(#[from] SimError),
+    #[error(transparent)]
+    Physical(#[from] PhysicalError),
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
     #[error(transparent)]
@@ -109,6 +112,7 @@ impl Error {
             | Self::Sim(_)
             | Self::Study(_)
             | Self::Evaluate(_)
+            | Self::Physical(_)
             | Self::Mpc(_)
             | Self::Config { .. }
             | Self::Exists(_)

@@ -174,7 +174,12 @@ pub fn emit(
         digest,
         ..EmitOptions::default()
     };
-    Ok(deploy::emit(model_equations, targets, &options)?)
+    Ok(match code.units {
+        UnitsChoice::Si | UnitsChoice::Scaled => deploy::emit(model_equations, targets, &options)?,
+        UnitsChoice::Physical => {
+            deploy::emit(&model_equations.in_physical_units()?, targets, &options)?
+        }
+    })
 }
 
 /// Writes files into a folder; the path of each, with its size in bytes.
@@ -216,7 +221,7 @@ impl From<PrecisionChoice> for Precision {
 impl From<UnitsChoice> for Units {
     fn from(choice: UnitsChoice) -> Self {
         match choice {
-            UnitsChoice::Si => Self::Si,
+            UnitsChoice::Si | UnitsChoice::Physical => Self::Si,
             UnitsChoice::Scaled => Self::Scaled,
         }
     }

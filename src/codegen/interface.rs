@@ -3,10 +3,10 @@
 use super::code::Role;
 use super::precision::{Precision, stated_bounds};
 use super::units::Units;
-use crate::equations::Equations;
+use crate::equations::{Equations, LatentUnits, Unit};
 use crate::ir::{Program, Slot, Statement, Unary};
 use crate::lower::{self, JacobianPattern, LowerError, LowerOptions};
-use crate::model::{CoordinateNames, ModelError, ReducedModel, StateMap};
+use crate::model::{CandidateTerm, CoordinateNames, ModelError, ReducedModel, StateMap};
 
 /// Longest equation that documentation spells out, in terms.
 const MOST_TERMS: usize = 40;
@@ -59,6 +59,8 @@ pub struct ModelInterface {
     pub name: String,
     /// Units of robot coordinates at the interface.
     pub units: Units,
+    /// Whether latent quantities are in physical units instead of the model's scaled ones.
+    pub is_physical: bool,
     /// Number of latent coordinates.
     pub latent_dim: usize,
     /// Number of robot coordinates, if the model speaks of any.
@@ -105,14 +107,15 @@ impl ModelInterface {
             identifier: model.identifier().to_string(),
             name: model.name().to_owned(),
             units,
+            is_physical: system.latent_units().is_some(),
             latent_dim: model.latent_dim(),
             state_dim: model.state_dim(),
             maps: match units {
                 Units::Si => input_entry(model)?
                     .into_iter()
-                    .chain(map_entries(model, units)?)
+                    .chain(map_entries(model, units, system.latent_units())?)
                     .collect(),
-                Units::Scaled => map_entries(model, units)?,
+                Units::Scaled => map_entries(model, units, None)?,
             },
             phases,
         })
@@ -126,6 +129,17 @@ impl ModelInterface {
         for entry in self.maps.iter_mut().chain(of_phases) {
             let bounds = stated_bounds(entry);
             entry.docs.push(bounds);
+        }
+    }
+
+    /// The units of latent and robot quantities.
+    pub(super) fn units_in_words(&self) -> String {
+        let robot = self.units.of_robot();
+        match self.is_physical {
+            true => format!(
+                "metres, radians, newtons and seconds as each function states, robot coordinates in {robot}"
+            ),
+            false => format!("the model's scaled units, robot coordinates in {robot}"),
         }
     }
 
@@ -165,7 +179,11 @@ fn input_entry(model: &ReducedModel) -> Result<Option<FunctionSpec>, LowerError>
     Ok(Some(entry(program.name().to_owned(), program, docs)))
 }
 
-fn map_entries(model: &ReducedModel, units: Units) -> Result<Vec<FunctionSpec>, LowerError> {
+fn map_entries(
+    model: &ReducedModel,
+    units: Units,
+    latent: Option<&LatentUnits>,
+) -> Result<Vec<FunctionSpec>, LowerError> {
     let (state, input) = match units {
         Units::Si => (model.state(), model.input()),
         // Their units are those of SI values.
@@ -179,47 +197,61 @@ fn map_entries(model: &ReducedModel, units: Units) -> Result<Vec<FunctionSpec>, 
         curved_encoder: is_nonlinear(model.encoder_map()),
         curved_decoder: is_nonlinear(model.decoder_map()),
     };
+    let positions = in_units("z", latent.map(|units| &units.position));
+    let velocities = match latent {
+        None => "(scaled)",
+        Some(_) => "(in the units of z per second)",
+    };
+    let inputs = in_units("u_lat", latent.map(|units| &units.input));
+    let project = || match latent {
+        None => lower::project_input(model),
+        Some(units) => lower::linear_map("project_input", ("u", "u_lat"), &units.project),
+    };
+    let lift = || match latent {
+        None => lower::lift_input(model),
+        Some(units) => lower::linear_map("lift_input", ("u_lat", "u"), &units.lift),
+    };
     let (at_x, at_z) = equations.points();
     let candidates = [
         (
             lower::encode(model),
             equations.encode(),
             format!(
-                "x: {n}. z: latent coordinates (scaled).{}",
+                "x: {n}. z: latent coordinates {positions}.{}",
                 elements("x", state)
             ),
         ),
         (
             lower::encode_velocity(model),
             equations.encode_velocity(),
-            format!("{at_x}dx: velocities of the {n}. dz: latent velocities (scaled)."),
+            format!("{at_x}dx: velocities of the {n}. dz: latent velocities {velocities}."),
         ),
         (
             lower::decode(model),
             equations.decode(),
             format!(
-                "z: latent coordinates (scaled). x: {n}.{}",
+                "z: latent coordinates {positions}. x: {n}.{}",
                 elements("x", state)
             ),
         ),
         (
             lower::decode_velocity(model),
             equations.decode_velocity(),
-            format!("{at_z}dz: latent velocities (scaled). dx: velocities of the {n}."),
+            format!("{at_z}dz: latent velocities {velocities}. dx: velocities of the {n}."),
         ),
         (
-            lower::project_input(model),
+            project(),
             equations.project_input(),
             format!(
-                "{at_x}u: generalised inputs in {unit}. u_lat: latent inputs (scaled).{}",
+                "{at_x}u: generalised inputs in {unit}. u_lat: latent inputs {inputs}.{}",
                 elements("u", input)
             ),
         ),
         (
-            lower::lift_input(model),
+            lift(),
             equations.lift_input(),
             format!(
-                "{at_x}u_lat: latent inputs (scaled). u: generalised inputs in {unit}.{}",
+                "{at_x}u_lat: latent inputs {inputs}. u: generalised inputs in {unit}.{}",
                 elements("u", input)
             ),
         ),
@@ -228,9 +260,10 @@ fn map_entries(model: &ReducedModel, units: Units) -> Result<Vec<FunctionSpec>, 
     for (program, title, text) in candidates {
         match program {
             Ok(program) => {
-                let title = match units {
-                    Units::Si => title.to_owned(),
-                    Units::Scaled => without_factors(title),
+                let title = match (latent, units) {
+                    (None, Units::Si) => title.to_owned(),
+                    (Some(_), _) => in_matrices(title),
+                    (None, Units::Scaled) => without_factors(title),
                 };
                 let docs = vec![title, text, shapes(&program)];
                 entries.push(entry(program.name().to_owned(), program, docs));
@@ -240,6 +273,22 @@ fn map_entries(model: &ReducedModel, units: Units) -> Result<Vec<FunctionSpec>, 
         }
     }
     Ok(entries)
+}
+
+/// "(scaled)", or the units of each element.
+fn in_units(array: &str, units: Option<&Vec<Unit>>) -> String {
+    let Some(units) = units else {
+        return "(scaled)".to_owned();
+    };
+    let elements = (units.iter().enumerate()).map(|(k, unit)| format!("{array}[{k}] {unit}"));
+    format!("({})", elements.collect::<Vec<_>>().join(", "))
+}
+
+/// An equation of the maps between physical values, the scale factors folded into the matrices.
+fn in_matrices(title: &str) -> String {
+    without_factors(title)
+        .replace("pinv(W_e^T) u", "P u")
+        .replace("W_e^T u_lat", "L u_lat")
 }
 
 /// An equation of the maps between scaled values.
@@ -332,7 +381,11 @@ fn phase_entries(
 
     let program = lower::dynamics(system, phase, options)?;
     let mut docs = vec![format!(
-        "Latent accelerations of phase `{name}`: ddz = Xi^T Theta(z, dz, u_lat), scaled units."
+        "Latent accelerations of phase `{name}`: ddz = Xi^T Theta(z, dz, u_lat), {}.",
+        match system.latent_units() {
+            None => "scaled units",
+            Some(_) => "in the units of z per s^2",
+        }
     )];
     docs.extend(equations);
     docs.push(shapes(&program));
@@ -460,6 +513,18 @@ fn equations(system: &Equations<'_>, phase: usize) -> Result<Vec<String>, LowerE
             right = format!("a sum of {} terms", terms.len());
         }
         lines.push(format!("ddz{} = {right}", row + 1));
+        if let Some(units) = system.latent_units().filter(|_| terms.len() <= MOST_TERMS) {
+            let of =
+                |term: &CandidateTerm| units.acceleration(row) / units.of_term(system, term.expr());
+            let each = terms
+                .iter()
+                .map(|(_, term)| format!("{} {}", term.text(), of(term)));
+            let each = each.collect::<Vec<_>>().join(", ");
+            lines.push(format!(
+                "Units of the coefficients of ddz{}: {each}.",
+                row + 1
+            ));
+        }
     }
     Ok(lines)
 }

@@ -32,7 +32,11 @@
 //! ```
 
 mod exact;
+mod physical;
 mod system;
+mod unit;
 
 pub use exact::ExactStep;
+pub use physical::{LatentUnits, PhysicalError};
 pub use system::{EquationForm, Equations, PhaseEquations, Summand};
+pub use unit::Unit;

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use nalgebra::DMatrix;
 
 use super::exact::ExactStep;
+use super::physical::LatentUnits;
 use crate::model::{
     CandidateTerm, FeetRule, LatentVariable, Library, ModelError, Phase, ReducedModel, TermId,
 };
@@ -49,6 +50,7 @@ pub struct Equations<'a> {
     pub(super) terms: Vec<CandidateTerm>,
     pub(super) phases: Vec<PhaseEquations>,
     pub(super) steps: Vec<ExactStep>,
+    pub(super) latent_units: Option<LatentUnits>,
 }
 
 impl<'a> Equations<'a> {
@@ -80,6 +82,7 @@ impl<'a> Equations<'a> {
             phases: phases.collect(),
             model: Cow::Borrowed(model),
             steps: Vec::new(),
+            latent_units: None,
         }
     }
 
@@ -108,6 +111,42 @@ impl<'a> Equations<'a> {
         let builder = self.model.clone().into_owned().into_builder();
         let builder = builder.library(Library::from_terms(self.latent_dim(), &texts)?);
         Ok(Cow::Owned(builder.phases(phases.collect()).build()?))
+    }
+
+    /// The same equations over a converted model, pool and terms.
+    pub(super) fn converted(
+        &self,
+        model: ReducedModel,
+        pool: ExprPool,
+        terms: Vec<CandidateTerm>,
+        phases: Vec<PhaseEquations>,
+        units: LatentUnits,
+    ) -> Equations<'static> {
+        Equations {
+            model: Cow::Owned(model),
+            pool,
+            terms,
+            phases,
+            steps: self.steps.clone(),
+            latent_units: Some(units),
+        }
+    }
+
+    /// The same equations with a model of their own.
+    pub fn into_owned(self) -> Equations<'static> {
+        Equations {
+            model: Cow::Owned(self.model.into_owned()),
+            pool: self.pool,
+            terms: self.terms,
+            phases: self.phases,
+            steps: self.steps,
+            latent_units: self.latent_units,
+        }
+    }
+
+    /// Units of latent coordinates and inputs, if they are physical; none where they are scaled.
+    pub fn latent_units(&self) -> Option<&LatentUnits> {
+        self.latent_units.as_ref()
     }
 
     /// The model with maps, names and scale factors; its Xi may be that of equal, longer equations.

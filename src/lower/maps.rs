@@ -106,6 +106,18 @@ pub fn lift_input(model: &ReducedModel) -> Result<Program, LowerError> {
     affine("lift_input", ("u_lat", "u"), &weights, None)
 }
 
+/// `output = weights input` by name, for input maps in other units than the model's.
+///
+/// # Errors
+/// [`LowerError::Program`] if a weight is not finite.
+pub fn linear_map(
+    name: &str,
+    slots: (&str, &str),
+    weights: &DMatrix<f64>,
+) -> Result<Program, LowerError> {
+    affine(name, slots, weights, None)
+}
+
 fn encoder_weights(model: &ReducedModel) -> Result<DMatrix<f64>, LowerError> {
     let factors = model.state_factors()?;
     let encoder = model.encoder()?.weights();

@@ -25,6 +25,8 @@ pub use compiled::CompiledModel;
 pub use cost::{Form, LowerOptions};
 pub use dynamics::{JacobianPattern, dynamics, dynamics_jacobian};
 pub use error::LowerError;
-pub use maps::{decode, decode_velocity, encode, encode_velocity, lift_input, project_input};
+pub use maps::{
+    decode, decode_velocity, encode, encode_velocity, lift_input, linear_map, project_input,
+};
 pub use step::rk4_step;
 pub use wrench::generalised_input;

@@ -1,6 +1,6 @@
 //! A model's latent dynamics as equations to print, and what rounding did to them.
 
-use crate::equations::{Equations, PhaseEquations};
+use crate::equations::{Equations, PhaseEquations, Unit};
 
 use super::decimal::{Decimal, Rounding};
 use super::expression::{UnknownSymbol, expression};
@@ -31,6 +31,8 @@ pub struct Equation {
 pub struct CoefficientTable {
     /// Column heads: the acceleration, with the phase it belongs to.
     pub columns: Vec<(String, Symbol)>,
+    /// Unit of each column's acceleration, for equations in physical units.
+    pub units: Option<Vec<Unit>>,
     /// One row a candidate term, in library order.
     pub rows: Vec<CoefficientRow>,
 }
@@ -40,6 +42,8 @@ pub struct CoefficientTable {
 pub struct CoefficientRow {
     /// The term.
     pub term: Signed,
+    /// Unit of the term, for equations in physical units; that of a coefficient is the column's over this.
+    pub unit: Option<Unit>,
     /// The printed coefficient, or nothing where the term is not active.
     pub coefficients: Vec<Option<Decimal>>,
 }
@@ -149,6 +153,7 @@ impl Layout<'_> {
             .enumerate()
             .map(|(row, term)| CoefficientRow {
                 term: term.clone(),
+                unit: self.unit_of_term(row),
                 coefficients: xi
                     .iter()
                     .flat_map(|xi| outputs.clone().map(move |output| xi[(row, output)]))
@@ -160,7 +165,20 @@ impl Layout<'_> {
             })
             .filter(|row| row.coefficients.iter().any(Option::is_some))
             .collect();
-        CoefficientTable { columns, rows }
+        let units = self.system.latent_units().map(|units| {
+            let of_phase = phases.iter().flat_map(|_| outputs.clone());
+            of_phase.map(|output| units.acceleration(output)).collect()
+        });
+        CoefficientTable {
+            columns,
+            units,
+            rows,
+        }
+    }
+
+    fn unit_of_term(&self, row: usize) -> Option<Unit> {
+        let units = self.system.latent_units()?;
+        Some(units.of_term(self.system, self.system.terms()[row].expr()))
     }
 }
 

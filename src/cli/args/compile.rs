@@ -54,7 +54,7 @@ pub enum PrecisionChoice {
     F32,
 }
 
-/// Units of robot coordinates at the interface of generated code.
+/// Units of coordinates and inputs in equations and generated code.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum UnitsChoice {
     /// rad, m, N m, N
@@ -62,6 +62,9 @@ pub enum UnitsChoice {
     Si,
     /// Scaled as the model was learned: the model file's factors times SI values
     Scaled,
+    /// SI units, and latent coordinates and inputs in m, rad, N, N m too: equations and code without
+    /// scale factors, every coefficient with a unit
+    Physical,
 }
 
 /// What computes sines and cosines in generated code.
@@ -90,7 +93,7 @@ pub struct CodeArguments {
     /// Floating-point numbers of C and Rust
     #[arg(long, value_enum, default_value = "f64")]
     pub precision: PrecisionChoice,
-    /// Units of robot coordinates and inputs that functions take and give
+    /// Units of coordinates and inputs in equations and functions
     #[arg(long, value_enum, default_value = "si")]
     pub units: UnitsChoice,
     /// What computes sines and cosines in C and Rust

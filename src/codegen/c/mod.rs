@@ -26,7 +26,7 @@ struct Header<'a> {
     model: &'a str,
     upper: String,
     is_single: bool,
-    units: &'static str,
+    units: String,
     latent_dim: usize,
     state_dim: Option<usize>,
     maps: Vec<String>,
@@ -141,7 +141,7 @@ pub fn emit(
         model: &entries.name,
         upper: dialect.upper(),
         is_single: precision == Precision::Single,
-        units: entries.units.of_robot(),
+        units: entries.units_in_words(),
         latent_dim: entries.latent_dim,
         state_dim: entries.state_dim,
         maps: functions

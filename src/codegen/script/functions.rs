@@ -110,7 +110,7 @@ pub struct ModelText<F> {
     /// Name of the first phase's accelerations, for an example of a call.
     pub example: String,
     /// Units of robot coordinates.
-    pub units: &'static str,
+    pub units: String,
     /// Number of latent coordinates.
     pub latent_dim: usize,
     /// Number of robot coordinates.
@@ -150,7 +150,7 @@ impl<F> Script<'_, F> {
         Ok(ModelText {
             name: entries.name.clone(),
             example: first.map_or(String::new(), |phase| phase.dynamics.name.clone()),
-            units: entries.units.of_robot(),
+            units: entries.units_in_words(),
             latent_dim: entries.latent_dim,
             state_dim: entries.state_dim,
             tables: functions

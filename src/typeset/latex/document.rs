@@ -43,14 +43,14 @@ pub fn emit(
         systems: phases(model, &typeset.systems, "", options),
     };
     let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?
-        .map(|robot| robot_equations(model, &robot, &header));
+        .map(|robot| robot_equations(model, &robot, system.latent_units().is_some(), &header));
     let coefficients = Table {
         header: header.short("Needs booktabs and, for more than 40 terms, longtable."),
         blocks: table::blocks(&typeset.table, model.name(), options.numbers),
     };
     let nomenclature = Nomenclature {
         header: header.short("A table as wide as the line; needs amsmath."),
-        entries: nomenclature::entries(model, &options.symbols, options.numbers),
+        entries: nomenclature::entries(system, &options.symbols, options.numbers),
     };
     let preview = Preview {
         header: header.short("A document of its own; the files beside it are for \\input."),
@@ -204,6 +204,7 @@ fn phases(
 fn robot_equations(
     model: &ReducedModel,
     robot: &RobotTypeset,
+    is_physical: bool,
     header: &Header<'_>,
 ) -> EquationsFile {
     let label = format!("eq:{}-robot:encoder", label(model.name()));
@@ -224,7 +225,13 @@ fn robot_equations(
         label,
     }];
     systems.extend(phases(model, &robot.systems, "-robot", header.options));
-    let note = "Robot coordinates q in SI units (rad, m); z, u as in the latent equations, scaled.";
+    let latent = match is_physical {
+        true => "",
+        false => ", scaled",
+    };
+    let note = format!(
+        "Robot coordinates q in SI units (rad, m); z, u as in the latent equations{latent}."
+    );
     EquationsFile {
         header: format!("{}\n% {note}", header.equations(&robot.rounding)),
         systems,

@@ -44,5 +44,5 @@ mod table;
 pub use document::emit;
 pub use escape::{CommentText, TexText, label};
 pub use lines::tex_cases;
-pub use math::{NumberStyle, TexMath, TexNumber, TexSymbol, TexTerms};
+pub use math::{NumberStyle, TexMath, TexNumber, TexSymbol, TexTerms, TexUnit};
 pub use options::{Form, LatexOptions};

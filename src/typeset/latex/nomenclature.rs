@@ -1,10 +1,11 @@
 //! What each symbol of the equations means.
 
+use crate::equations::{Equations, LatentUnits};
 use crate::model::{Activation, ReducedModel, ScaleFactors, StateMap};
 use crate::typeset::{Decimal, Quantity, Rounding, SymbolTable, Variable};
 
 use super::escape::TexText;
-use super::math::{NumberStyle, TexNumber, TexSymbol};
+use super::math::{NumberStyle, TexNumber, TexSymbol, TexUnit};
 
 /// How many of an encoder row's weights are named.
 const STRONGEST: usize = 3;
@@ -19,12 +20,16 @@ pub(super) struct Entry {
     pub meaning: String,
 }
 
-/// The list of symbols for `model`.
+/// The list of symbols of the equations.
 pub(super) fn entries(
-    model: &ReducedModel,
+    system: &Equations<'_>,
     symbols: &SymbolTable,
     numbers: NumberStyle,
 ) -> Vec<Entry> {
+    let model = system.model();
+    if let Some(units) = system.latent_units() {
+        return physical_entries(model, units, symbols, numbers);
+    }
     let dim = model.latent_dim();
     let has_layers = model.encoder_map().is_ok();
     let mut list: Vec<Entry> = (1..=dim)
@@ -56,6 +61,47 @@ pub(super) fn entries(
         list.push(layers(encoder));
         list.extend(scale_factors(model, numbers));
     }
+    list
+}
+
+/// The list of symbols of equations in physical units.
+fn physical_entries(
+    model: &ReducedModel,
+    units: &LatentUnits,
+    symbols: &SymbolTable,
+    numbers: NumberStyle,
+) -> Vec<Entry> {
+    let indices = || 1..=model.latent_dim();
+    let mut list: Vec<Entry> = indices()
+        .map(|index| Entry {
+            symbol: symbol(symbols, Quantity::Position, index),
+            meaning: format!(
+                "${}$; {}",
+                TexUnit(units.position[index - 1]),
+                coordinate(model, index - 1, numbers)
+            ),
+        })
+        .collect();
+    list.push(Entry {
+        symbol: range(symbols, Quantity::Velocity, model.latent_dim()),
+        meaning: r"their derivatives by time, $\dot{\mathbf{z}} = \mathbf{W}_e \dot{\mathbf{x}}$, per second".to_owned(),
+    });
+    list.extend(indices().map(|index| Entry {
+        symbol: symbol(symbols, Quantity::Input, index),
+        meaning: format!(
+            "${}$; the input that does work along latent coordinate {index}",
+            TexUnit(units.input[index - 1])
+        ),
+    }));
+    list.push(Entry {
+        symbol: r"$\mathbf{x}$, $\mathbf{u}$".to_owned(),
+        meaning: r"robot state and generalised input in SI units; $\mathbf{u} = \mathbf{L}\,\mathbf{u}_{\mathrm{lat}}$ with the constant matrix $\mathbf{L}$ of the generated code".to_owned(),
+    });
+    list.push(Entry {
+        symbol: r"$\mathbf{W}_e$, $\mathbf{b}_e$".to_owned(),
+        meaning: r"encoder in these units, $\mathbf{z} = \mathbf{W}_e \mathbf{x} + \mathbf{b}_e$"
+            .to_owned(),
+    });
     list
 }
 

@@ -3,7 +3,7 @@
 use crate::typeset::{CoefficientRow, CoefficientTable, Decimal};
 
 use super::escape::{TexText, label};
-use super::math::{NumberStyle, TexMath, TexNumber, TexSymbol};
+use super::math::{NumberStyle, TexMath, TexNumber, TexSymbol, TexUnit};
 
 /// Most columns of numbers side by side.
 const WIDEST: usize = 8;
@@ -66,7 +66,14 @@ pub(super) fn blocks(
                 String::new()
             };
             layout.block(
-                format!("Coefficients of \\texttt{{{}}}{part}", TexText(model_name)),
+                format!(
+                    "Coefficients of \\texttt{{{}}}{part}{}",
+                    TexText(model_name),
+                    match table.units {
+                        Some(_) => ". The unit of a coefficient is that of its column over that of its term",
+                        None => "",
+                    }
+                ),
                 format!("tab:{}:{}", label(model_name), place + 1),
             )
         })
@@ -144,7 +151,19 @@ impl Layout<'_> {
                 NumberStyle::Siunitx => format!(" & {{${symbol}$}}"),
             });
         }
-        heads + r" \\"
+        heads.push_str(r" \\");
+        if let Some(units) = &self.table.units {
+            heads.push('\n');
+            for &column in self.columns {
+                let unit = TexUnit(units[column]);
+                heads.push_str(&match self.numbers {
+                    NumberStyle::Plain => format!(" & ${unit}$"),
+                    NumberStyle::Siunitx => format!(" & {{${unit}$}}"),
+                });
+            }
+            heads.push_str(r" \\");
+        }
+        heads
     }
 
     fn row(&self, row: &CoefficientRow, widths: &[ColumnWidth]) -> String {
@@ -154,6 +173,9 @@ impl Layout<'_> {
             numbers: self.numbers,
         };
         let mut text = format!("${math}$");
+        if let Some(unit) = row.unit {
+            text.push_str(&format!(r"\quad${}$", TexUnit(unit)));
+        }
         for (&column, width) in self.columns.iter().zip(widths) {
             text.push_str(" & ");
             if let Some(number) = &row.coefficients[column] {

@@ -5,7 +5,9 @@ use askama::Template;
 use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::typeset::TypesetError;
-use crate::typeset::latex::{LatexOptions, NumberStyle, TexMath, TexNumber, TexSymbol, tex_cases};
+use crate::typeset::latex::{
+    LatexOptions, NumberStyle, TexMath, TexNumber, TexSymbol, TexUnit, tex_cases,
+};
 use crate::typeset::{CoefficientRow, Rounding, SymbolTable, Typeset, words};
 
 use super::escape::MarkdownText;
@@ -72,7 +74,12 @@ pub fn emit(
         rounding: MarkdownText(&words::rounding(options.rounding, &typeset.rounding)).to_string(),
         heads: columns
             .iter()
-            .map(|(phase, symbol)| format!("$`{}`$ {}", TexSymbol(symbol), MarkdownText(phase)))
+            .enumerate()
+            .map(|(column, (phase, symbol))| {
+                let unit = typeset.table.units.as_ref().map(|units| units[column]);
+                let unit = unit.map_or(String::new(), |unit| format!(", $`{}`$", TexUnit(unit)));
+                format!("$`{}`$ {}{unit}", TexSymbol(symbol), MarkdownText(phase))
+            })
             .collect(),
         rows: typeset.table.rows.iter().map(row).collect(),
     };
@@ -106,7 +113,8 @@ struct PhaseView {
 fn row(row: &CoefficientRow) -> String {
     let numbers = NumberStyle::Plain;
     let math = &row.term.clone().into_math();
-    let mut text = format!("| $`{}`$ |", TexMath { math, numbers });
+    let unit = (row.unit).map_or(String::new(), |unit| format!(", $`{}`$", TexUnit(unit)));
+    let mut text = format!("| $`{}`${unit} |", TexMath { math, numbers });
     for cell in &row.coefficients {
         match cell {
             Some(number) => text.push_str(&format!(" $`{}`$ |", TexNumber { number, numbers })),

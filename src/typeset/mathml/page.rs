@@ -2,7 +2,7 @@
 
 use askama::Template;
 
-use crate::equations::Equations;
+use crate::equations::{Equations, Unit};
 use crate::files::EmittedFile;
 use crate::typeset::TypesetError;
 use crate::typeset::latex::{LatexOptions, tex_cases};
@@ -158,14 +158,22 @@ fn heads(typeset: &Typeset) -> Vec<String> {
     let columns = &typeset.table.columns;
     columns
         .iter()
-        .map(|(phase, symbol)| {
+        .enumerate()
+        .map(|(column, (phase, symbol))| {
+            let unit = typeset.table.units.as_ref().map(|units| units[column]);
             format!(
-                "<math>{}</math><br><small>{}</small>",
+                "<math>{}</math><br><small>{}{}</small>",
                 MathmlSymbol(symbol),
-                HtmlText(phase)
+                HtmlText(phase),
+                after_comma(unit)
             )
         })
         .collect()
+}
+
+/// A unit behind a name, if there is one.
+fn after_comma(unit: Option<Unit>) -> String {
+    unit.map_or(String::new(), |unit| format!(", {unit}"))
 }
 
 fn rows(typeset: &Typeset) -> Vec<RowView> {
@@ -174,7 +182,12 @@ fn rows(typeset: &Typeset) -> Vec<RowView> {
         .rows
         .iter()
         .map(|row| RowView {
-            term: format!("<math>{}</math>", Mathml(&row.term.clone().into_math())),
+            term: format!(
+                "<math>{}</math><small>{}</small>",
+                Mathml(&row.term.clone().into_math()),
+                after_comma(row.unit)
+            )
+            .replace("<small></small>", ""),
             cells: row
                 .coefficients
                 .iter()

@@ -1,0 +1,319 @@
+//! Equations in metres, radians and newtons.
+//!
+//! A latent coordinate is `z_i = W_e,i (s_x x) + b_e,i`. Where one unit rules its row, that is where the
+//! weights in SI units `w_ij = W_e,ij s_x,j` of that unit have more than half of the row's sum of squares, it
+//! becomes a length or an angle `Z_i = z_i / sigma_i` with `sigma_i = +- sum_j |w_ij|` over the coordinates of
+//! the ruling unit: a weighted mean of these, the weights adding up to one, the largest positive. Its input
+//! becomes a force or a moment, `U_i = u_i / upsilon_i` with `1 / upsilon_i = +- sum_j |W_e,ij| / s_u,j` over the
+//! inputs of the unit that does work along it, so that the shares of `u = W_e^T u_lat / s_u` in that unit add up to one.
+//! Rows that no unit rules keep pure numbers: `sigma_i = sqrt(sum_j w_ij^2)`, and inputs alike.
+//!
+//! Substituted, `dd Z_i = 1/sigma_i sum_k xi_ki theta_k(sigma Z, sigma dZ, upsilon U)`, numeric factors taken out of
+//! every term and into its coefficient.
+
+use std::collections::HashMap;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::system::{Equations, PhaseEquations, Summand};
+use super::unit::Unit;
+use crate::model::{
+    AffineMap, CandidateTerm, CoordinateNames, LatentVariable, ModelError, ReducedModel,
+    ScaleFactors, Scaling,
+};
+use crate::symbolic::{ExprId, ExprPool, Node, SymbolId};
+
+/// Share of a row's sum of squares from which its unit rules it.
+const RULES: f64 = 0.5;
+
+/// Why equations cannot be in physical units.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PhysicalError {
+    /// The model lacks a part, or has nonlinear maps.
+    #[error(
+        "physical units need an affine encoder and decoder, scale factors, and names and units of state and input"
+    )]
+    Maps(#[from] ModelError),
+    /// State or input have no units.
+    #[error(
+        "model `{model}`: physical units need `{part}` with names and units, which the model does not have"
+    )]
+    NoUnits {
+        /// Name of the model.
+        model: String,
+        /// Key of the model file.
+        part: &'static str,
+    },
+    /// A row of the encoder has no weight, or a coefficient overflows.
+    #[error("model `{model}`: {place} has no finite value in physical units")]
+    NotFinite {
+        /// Name of the model.
+        model: String,
+        /// Row or coefficient.
+        place: String,
+    },
+}
+
+/// Units of latent coordinates and inputs, and the input maps in them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LatentUnits {
+    /// Unit of each latent coordinate: m, rad or 1.
+    pub position: Vec<Unit>,
+    /// Unit of each latent input: N, N m or 1.
+    pub input: Vec<Unit>,
+    /// `latent_dim x input_dim`: generalised inputs in SI units to latent inputs.
+    pub project: DMatrix<f64>,
+    /// `input_dim x latent_dim`: latent inputs to generalised inputs in SI units.
+    pub lift: DMatrix<f64>,
+}
+
+impl LatentUnits {
+    /// The unit of a variable of the equations.
+    pub fn of(&self, variable: LatentVariable) -> Unit {
+        match variable {
+            LatentVariable::Z(i) => self.position[i],
+            LatentVariable::Dz(i) => self.position[i].per_second(),
+            LatentVariable::U(i) => self.input[i],
+        }
+    }
+
+    /// The unit of a latent acceleration.
+    pub fn acceleration(&self, output: usize) -> Unit {
+        self.position[output].per_second().per_second()
+    }
+
+    /// The unit of a term: that of a product of powers of variables; anything else counts as a pure number,
+    /// whose inner numbers carry the units.
+    pub fn of_term(&self, equations: &Equations<'_>, term: ExprId) -> Unit {
+        let variables: HashMap<SymbolId, LatentVariable> = LatentVariable::all(self.position.len())
+            .map(|variable| (equations.symbol(variable), variable))
+            .collect();
+        let pool = equations.pool();
+        let factors = pool.factors_of(term).iter().map(|&factor| {
+            let (base, exponent) = match pool.node(factor) {
+                Node::Power(base, exponent) => (*base, pool.as_number(*exponent)?.as_integer()?),
+                _ => (factor, 1),
+            };
+            let variable = variables.get(&pool.as_symbol(base)?)?;
+            Some(self.of(*variable).power(i8::try_from(exponent).ok()?))
+        });
+        let product: Option<Unit> = factors
+            .into_iter()
+            .try_fold(Unit::default(), |unit, factor| Some(unit * factor?));
+        product.unwrap_or_default()
+    }
+}
+
+/// Scales of one latent coordinate and its input.
+struct Scale {
+    position: (f64, Unit),
+    input: (f64, Unit),
+}
+
+impl Equations<'_> {
+    /// The same equations in metres, radians, seconds, newtons and newton metres, with the model's maps.
+    ///
+    /// Equations without robot coordinates, such as published ones, come back as they are.
+    ///
+    /// # Errors
+    /// [`PhysicalError`] for nonlinear maps, missing units, or values beyond floats.
+    pub fn in_physical_units(&self) -> Result<Equations<'static>, PhysicalError> {
+        let model = self.model();
+        if model.encoder_map().is_err() && model.decoder_map().is_err() {
+            return Ok(self.clone().into_owned());
+        }
+        let scales = scales(model)?;
+        let (terms, factors, pool) = self.substituted(&scales);
+        let mut phases = Vec::with_capacity(self.phases().len());
+        for phase in self.phases() {
+            let ddz = (phase.ddz.iter().enumerate()).map(|(output, equation)| {
+                let summands = equation.iter().map(|summand| {
+                    let factor = factors[summand.term] / scales[output].position.0;
+                    let coefficient = summand.coefficient * factor;
+                    let place = || {
+                        format!(
+                            "phase {}, ddz{}: the coefficient of {}",
+                            phase.name,
+                            output + 1,
+                            terms[summand.term].text()
+                        )
+                    };
+                    finite(coefficient, model, place).map(|coefficient| Summand {
+                        coefficient,
+                        term: summand.term,
+                    })
+                });
+                summands.collect::<Result<Vec<_>, _>>()
+            });
+            phases.push(PhaseEquations {
+                name: phase.name.clone(),
+                feet: phase.feet.clone(),
+                ddz: ddz.collect::<Result<_, _>>()?,
+            });
+        }
+        let units = units(model, &scales)?;
+        Ok(self.converted(in_metres(model, &scales)?, pool, terms, phases, units))
+    }
+
+    /// Terms of scaled variables, and the numeric factor that went out of each.
+    fn substituted(&self, scales: &[Scale]) -> (Vec<CandidateTerm>, Vec<f64>, ExprPool) {
+        let mut pool = self.pool().clone();
+        let replacements: Vec<(SymbolId, ExprId)> = LatentVariable::all(scales.len())
+            .map(|variable| {
+                let factor = match variable {
+                    LatentVariable::Z(i) | LatentVariable::Dz(i) => scales[i].position.0,
+                    LatentVariable::U(i) => scales[i].input.0,
+                };
+                let symbol = self.symbol(variable);
+                let (number, expr) = (pool.number(factor), pool.symbol_expr(symbol));
+                (symbol, pool.mul(number, expr))
+            })
+            .collect();
+        let exprs: Vec<ExprId> = self.terms().iter().map(|term| term.expr()).collect();
+        let scaled = pool.substitute_all(&exprs, &replacements);
+        let split = scaled
+            .into_iter()
+            .map(|expr| match pool.terms_of(expr).as_slice() {
+                [(number, rest)] => (number.to_f64(), *rest),
+                _ => (1.0, expr),
+            });
+        let (factors, exprs): (Vec<f64>, Vec<ExprId>) = split.unzip();
+        let terms =
+            (exprs.iter().zip(self.terms())).map(|(&expr, term)| match expr == term.expr() {
+                true => term.clone(),
+                false => CandidateTerm::new(pool.display(expr).to_string(), expr),
+            });
+        (terms.collect(), factors, pool)
+    }
+}
+
+fn finite(
+    value: f64,
+    model: &ReducedModel,
+    place: impl FnOnce() -> String,
+) -> Result<f64, PhysicalError> {
+    match value.is_finite() {
+        true => Ok(value),
+        false => Err(PhysicalError::NotFinite {
+            model: model.name().to_owned(),
+            place: place(),
+        }),
+    }
+}
+
+fn scales(model: &ReducedModel) -> Result<Vec<Scale>, PhysicalError> {
+    let missing = |part| PhysicalError::NoUnits {
+        model: model.name().to_owned(),
+        part,
+    };
+    let state = model.state().ok_or_else(|| missing("state"))?;
+    let input = model.input().ok_or_else(|| missing("input"))?;
+    let (weights, s_x, s_u) = (
+        model.encoder()?.weights(),
+        model.state_factors()?,
+        model.input_factors()?,
+    );
+    let scale = |row: usize| {
+        let weights = weights.row(row).transpose();
+        let unit = ruling_unit(&weights.component_mul(&s_x), state);
+        let forces = weights.component_div(&s_u);
+        let position = scale_of(&weights.component_mul(&s_x), state, unit);
+        let sign = position.signum();
+        let dual = unit.and_then(Unit::dual);
+        let strength = scale_of(&forces, input, dual).abs();
+        let place = |what: &str| format!("`encoder.weights`[{row}]: {what}");
+        Ok(Scale {
+            position: (
+                finite(position, model, || place("the latent coordinate"))?,
+                unit.unwrap_or_default(),
+            ),
+            input: (
+                finite(sign / strength, model, || place("the latent input"))?,
+                dual.unwrap_or_default(),
+            ),
+        })
+    };
+    (0..model.latent_dim()).map(scale).collect()
+}
+
+/// The unit of more than half of the sum of squares.
+fn ruling_unit(weights: &DVector<f64>, names: &CoordinateNames) -> Option<Unit> {
+    let units = names.units.iter().map(|name| Unit::from_name(name));
+    let mut shares: Vec<(Unit, f64)> = Vec::new();
+    for (unit, weight) in units.zip(weights.iter()) {
+        let unit = unit?;
+        match shares.iter_mut().find(|(known, _)| *known == unit) {
+            Some((_, share)) => *share += weight * weight,
+            None => shares.push((unit, weight * weight)),
+        }
+    }
+    let rules = |&(_, share): &(Unit, f64)| share > RULES * weights.norm_squared();
+    shares.into_iter().find(rules).map(|(unit, _)| unit)
+}
+
+/// Sum of the absolute weights of a unit, with the sign of the largest; without a unit, or where it has no
+/// weight, the norm of all.
+fn scale_of(weights: &DVector<f64>, names: &CoordinateNames, unit: Option<Unit>) -> f64 {
+    let of_unit = (weights.iter().zip(&names.units))
+        .filter(|(_, name)| unit.is_some() && Unit::from_name(name) == unit)
+        .map(|(&weight, _)| weight);
+    let largest = of_unit.clone().fold(0.0, |largest: f64, weight| {
+        match weight.abs() > largest.abs() {
+            true => weight,
+            false => largest,
+        }
+    });
+    let sum: f64 = of_unit.map(f64::abs).sum();
+    match sum > 0.0 {
+        true => sum.copysign(largest),
+        false => weights.norm(),
+    }
+}
+
+fn units(model: &ReducedModel, scales: &[Scale]) -> Result<LatentUnits, PhysicalError> {
+    let (encoder, s_u) = (model.encoder()?.weights(), model.input_factors()?);
+    let projection = model.input_projection()?;
+    let (d, n) = encoder.shape();
+    Ok(LatentUnits {
+        position: scales.iter().map(|scale| scale.position.1).collect(),
+        input: scales.iter().map(|scale| scale.input.1).collect(),
+        project: DMatrix::from_fn(d, n, |row, col| {
+            projection[(row, col)] * s_u[col] / scales[row].input.0
+        }),
+        lift: DMatrix::from_fn(n, d, |row, col| {
+            encoder[(col, row)] * scales[col].input.0 / s_u[row]
+        }),
+    })
+}
+
+/// The model with SI values on both sides of encoder and decoder.
+fn in_metres(model: &ReducedModel, scales: &[Scale]) -> Result<ReducedModel, PhysicalError> {
+    let s_x = model.state_factors()?;
+    let sigma = |row: usize| scales[row].position.0;
+    let (encoder, decoder) = (model.encoder()?, model.decoder()?);
+    let weights = encoder.weights();
+    let weights = DMatrix::from_fn(weights.nrows(), weights.ncols(), |row, col| {
+        weights[(row, col)] * s_x[col] / sigma(row)
+    });
+    let bias = DVector::from_fn(encoder.output_dim(), |row, _| {
+        encoder.bias()[row] / sigma(row)
+    });
+    let encoder = AffineMap::new("encoder", weights, bias)?;
+    let weights = decoder.weights();
+    let weights = DMatrix::from_fn(weights.nrows(), weights.ncols(), |row, col| {
+        weights[(row, col)] * sigma(col) / s_x[row]
+    });
+    let decoder = AffineMap::new("decoder", weights, decoder.bias().component_div(&s_x))?;
+    let input = model.scaling()?.input.clone();
+    let scaling = Scaling {
+        state: ScaleFactors::Uniform(1.0),
+        input,
+    };
+    Ok(model
+        .clone()
+        .into_builder()
+        .encoder(encoder)
+        .decoder(decoder)
+        .scaling(scaling)
+        .build()?)
+}

@@ -1,0 +1,147 @@
+//! Physical units as products of powers of metre, radian, kilogram and second.
+
+use std::fmt;
+use std::ops::{Div, Mul};
+
+/// A unit: exponents of m, rad, kg and s. The default is the unit 1.
+///
+/// Radians are kept apart from 1, so that angles and lengths can be told from pure numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Unit {
+    exponents: [i8; 4],
+}
+
+const SYMBOLS: [&str; 4] = ["m", "rad", "kg", "s"];
+const METRE: Unit = Unit::new(1, 0, 0, 0);
+const RADIAN: Unit = Unit::new(0, 1, 0, 0);
+const SECOND: Unit = Unit::new(0, 0, 0, 1);
+const NEWTON: Unit = Unit::new(1, 0, 1, -2);
+const NEWTON_METRE: Unit = Unit::new(2, 0, 1, -2);
+
+impl Unit {
+    const fn new(metre: i8, radian: i8, kilogram: i8, second: i8) -> Self {
+        Self {
+            exponents: [metre, radian, kilogram, second],
+        }
+    }
+
+    /// The unit of a position or generalised force that a model file names, if it is one of
+    /// `m`, `rad`, `N`, `N m`.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "m" => Some(METRE),
+            "rad" => Some(RADIAN),
+            "N" => Some(NEWTON),
+            "N m" => Some(NEWTON_METRE),
+            _ => None,
+        }
+    }
+
+    /// The unit of the generalised force that does work along a position: N for m, N m for rad.
+    pub fn dual(self) -> Option<Self> {
+        match self {
+            METRE => Some(NEWTON),
+            RADIAN => Some(NEWTON_METRE),
+            _ => None,
+        }
+    }
+
+    /// The unit of the derivative by time.
+    pub fn per_second(self) -> Self {
+        self / SECOND
+    }
+
+    /// The unit of a power.
+    pub fn power(self, exponent: i8) -> Self {
+        Self {
+            exponents: self.exponents.map(|e| e.saturating_mul(exponent)),
+        }
+    }
+
+    /// Numerator and denominator as lists of symbol and positive power.
+    pub fn fraction(self) -> [Vec<(&'static str, i8)>; 2] {
+        match self {
+            NEWTON => return [vec![("N", 1)], Vec::new()],
+            NEWTON_METRE => return [vec![("N", 1), ("m", 1)], Vec::new()],
+            _ => {}
+        }
+        [1, -1].map(|sign| {
+            let order = [2, 0, 1, 3].map(|at| (SYMBOLS[at], self.exponents[at] * sign));
+            order.into_iter().filter(|&(_, power)| power > 0).collect()
+        })
+    }
+}
+
+impl Mul for Unit {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        let mut exponents = self.exponents;
+        for (own, other) in exponents.iter_mut().zip(other.exponents) {
+            *own = own.saturating_add(other);
+        }
+        Self { exponents }
+    }
+}
+
+impl Div for Unit {
+    type Output = Self;
+
+    fn div(self, other: Self) -> Self {
+        self * other.power(-1)
+    }
+}
+
+/// `1`, `m/s^2`, `1/kg`, `rad/(kg m^2)`.
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let product = |factors: &[(&str, i8)]| {
+            let factors = factors.iter().map(|&(symbol, power)| match power {
+                1 => symbol.to_owned(),
+                _ => format!("{symbol}^{power}"),
+            });
+            factors.collect::<Vec<_>>().join(" ")
+        };
+        let [above, below] = self.fraction();
+        match above.is_empty() {
+            true => f.write_str("1")?,
+            false => f.write_str(&product(&above))?,
+        }
+        match below.len() {
+            0 => Ok(()),
+            1 => write!(f, "/{}", product(&below)),
+            _ => write!(f, "/({})", product(&below)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gain_of_a_force_on_an_acceleration_is_one_over_a_mass() {
+        let acceleration = METRE.per_second().per_second();
+        assert_eq!(acceleration.to_string(), "m/s^2");
+        assert_eq!((acceleration / NEWTON).to_string(), "1/kg");
+        let turning = RADIAN.per_second().per_second();
+        assert_eq!((turning / NEWTON_METRE).to_string(), "rad/(kg m^2)");
+        assert_eq!((acceleration / RADIAN).to_string(), "m/(rad s^2)");
+        assert_eq!((acceleration / acceleration).to_string(), "1");
+    }
+
+    #[test]
+    fn names_of_model_files_have_duals() {
+        for (name, dual) in [("m", "N"), ("rad", "N m")] {
+            let unit = Unit::from_name(name).expect("known");
+            assert_eq!(unit.to_string(), name);
+            assert_eq!(
+                unit.dual().map(|unit| unit.to_string()).as_deref(),
+                Some(dual)
+            );
+            assert_eq!(unit.dual(), Unit::from_name(dual));
+        }
+        assert_eq!(Unit::from_name("deg"), None);
+        assert_eq!(NEWTON.dual(), None);
+    }
+}
