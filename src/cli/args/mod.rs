@@ -3,7 +3,10 @@
 //! The command line enters; [`Arguments`] leaves, with everything checked that needs no file. Read
 //! `command.rs` first; each other file holds the commands of one family.
 
-#![allow(missing_docs, reason = "a variant's help is in the structure of its arguments")]
+#![allow(
+    missing_docs,
+    reason = "a variant's help is in the structure of its arguments"
+)]
 
 mod check;
 mod command;
