@@ -11,7 +11,7 @@ use crate::codegen::CodegenError;
 use crate::deploy::EmitError;
 use crate::equations::PhysicalError;
 use crate::evaluate::EvaluateError;
-use crate::files::FolderError;
+use crate::files::{FolderError, Place};
 use crate::import::{ImportError, NameError};
 use crate::lower::LowerError;
 use crate::model::ModelError;
@@ -94,7 +94,7 @@ impl Error {
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Robot(error) => matches!(error, RobotError::UnknownRobot { .. }),
-            Self::Import(error) => matches!(**error, ImportError::Option { .. }),
+            Self::Import(error) => matches!(error.place, Place::Option(_)),
             Self::Train(error) => matches!(error, TrainError::Option { .. }),
             Self::Simplify(error) => {
                 matches!(error, SimplifyError::NoSamples | SimplifyError::Margin)

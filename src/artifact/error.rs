@@ -1,41 +1,34 @@
-//! What can be wrong with a model file.
+//! Faults of model files.
 
 use std::error::Error as _;
 use std::io;
-use std::path::PathBuf;
 
 use thiserror::Error;
 
 use super::manifest::SCHEMA;
+use crate::files::{Located, Place};
 use crate::model::ModelError;
+
+/// A fault and its place in a model file.
+pub type ArtifactError = Located<ArtifactFault>;
 
 /// Why a model file could not be read or written.
 #[derive(Debug, Error)]
-pub enum ArtifactError {
+pub enum ArtifactFault {
     /// The file system refused.
-    #[error("{}: cannot {action} the model file", path.display())]
+    #[error("cannot {action} the model file")]
     Io {
-        /// The file.
-        path: PathBuf,
-        /// What was tried.
+        /// `read` or `write`.
         action: &'static str,
         /// The system's answer.
-        #[source]
         source: io::Error,
     },
-    /// The file is larger than any model can be.
-    #[error("{file}: found more than {max} bytes, which no model file needs")]
-    TooLarge {
-        /// The file.
-        file: String,
-        /// The bound.
-        max: u64,
-    },
+    /// The file is larger than this bound in bytes, and so than any model.
+    #[error("found more than {0} bytes, which no model file needs")]
+    TooLarge(u64),
     /// The file is no JSON, or a value has the wrong type, or a key is unknown, missing or double.
-    #[error("{file}: at `{place}`, line {line}, column {column}: {message}")]
+    #[error("at `{place}`, line {line}, column {column}: {message}")]
     Syntax {
-        /// The file.
-        file: String,
         /// Path inside the file, such as `encoder.weights[3][2]`.
         place: String,
         /// Line, from 1.
@@ -46,42 +39,34 @@ pub enum ArtifactError {
         message: String,
     },
     /// The file follows another schema.
-    #[error("{file}: `schema`: found {found}, expected \"{SCHEMA}\"")]
-    Schema {
-        /// The file.
-        file: String,
-        /// What it says.
-        found: String,
-    },
+    #[error("`schema`: found {0}, expected \"{SCHEMA}\"")]
+    Schema(String),
     /// A row of a matrix has the wrong length.
-    #[error("{file}: `{tensor}`[{row}]: found {found} numbers, expected {expected}")]
+    #[error("found {found} numbers, expected {expected}")]
     RowLength {
-        /// The file.
-        file: String,
-        /// Path of the matrix.
-        tensor: String,
-        /// Row, from 0.
-        row: usize,
         /// Its length.
         found: usize,
-        /// The length of the other rows, or which the model asks for.
+        /// The length of the other rows, or the one that the model needs.
         expected: usize,
     },
     /// The parts do not make a model.
-    #[error("{file}: not a usable model")]
-    Model {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        #[source]
-        source: Box<ModelError>,
-    },
+    #[error("not a usable model")]
+    Model(#[source] Box<ModelError>),
     /// There is a different file of that name.
-    #[error("{}: a file of this name is there already", path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("a file of this name is there already")]
+    Exists,
+}
+
+impl ArtifactFault {
+    /// The fault of a file as a whole.
+    pub(super) fn of(self, file: &str) -> ArtifactError {
+        Located::new(file, Place::Whole, self)
+    }
+}
+
+/// Parts that do not make a model.
+pub(super) fn refused(file: &str, source: impl Into<ModelError>) -> ArtifactError {
+    ArtifactFault::Model(Box::new(source.into())).of(file)
 }
 
 /// The error and all its causes in one line.

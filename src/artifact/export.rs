@@ -1,16 +1,12 @@
 //! From a model to the file's grammar.
 
 use super::manifest::{
-    FactorsEntry, FeetEntry, LayerEntry, LibraryEntry, Manifest, MapEntry, Pairs, PhaseEntry,
-    SCHEMA, ScalingEntry, SignalsEntry, StandardEntry, StatisticsEntry,
+    LayerEntry, LibraryEntry, Manifest, MapEntry, Pairs, PhaseEntry, SCHEMA, StatisticsEntry,
 };
 use super::matrices::to_rows;
-use crate::model::{
-    CoordinateNames, FeetRule, InputStatistics, Library, LibrarySource, Phase, ReducedModel,
-    ScaleFactors, Scaling, StateMap,
-};
+use crate::model::{InputStatistics, Library, LibrarySource, Phase, ReducedModel, StateMap};
 
-/// All that a model file says about the model.
+/// The content of the model file.
 pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
     let statistics = model
         .phases()
@@ -24,9 +20,9 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
         schema: SCHEMA.to_owned(),
         name: model.name().to_owned(),
         description: model.description().to_owned(),
-        state: model.state().map(signals_entry),
-        input: model.input().map(signals_entry),
-        scaling: model.scaling().ok().map(scaling_entry),
+        state: model.state().cloned(),
+        input: model.input().cloned(),
+        scaling: model.scaling().ok().cloned(),
         encoder: model.encoder_map().ok().map(map_entry),
         decoder: model.decoder_map().ok().map(map_entry),
         latent_dim: model.latent_dim(),
@@ -36,29 +32,6 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
         robot: model.robot().ok().map(|robot| robot.name().to_owned()),
         sample_time_s: model.sample_time_s().ok(),
         provenance: model.provenance().clone(),
-    }
-}
-
-fn signals_entry(signals: &CoordinateNames) -> SignalsEntry {
-    SignalsEntry {
-        names: signals.names.clone(),
-        units: signals.units.clone(),
-    }
-}
-
-fn scaling_entry(scaling: &Scaling) -> ScalingEntry {
-    ScalingEntry {
-        state: factors_entry(&scaling.state),
-        input: factors_entry(&scaling.input),
-    }
-}
-
-fn factors_entry(factors: &ScaleFactors) -> FactorsEntry {
-    match factors {
-        ScaleFactors::Uniform(factor) => FactorsEntry::Uniform(*factor),
-        ScaleFactors::PerCoordinate(factors) => {
-            FactorsEntry::PerCoordinate(factors.as_slice().to_vec())
-        }
     }
 }
 
@@ -85,22 +58,14 @@ fn library_entry(library: &Library) -> LibraryEntry {
             let texts = library.terms().iter().map(|term| term.text().to_owned());
             LibraryEntry::Terms(texts.collect())
         }
-        LibrarySource::Standard(standard) => LibraryEntry::Standard(StandardEntry {
-            degree: standard.degree,
-            trigonometric: standard.trigonometric,
-            inputs: standard.inputs,
-        }),
+        LibrarySource::Standard(standard) => LibraryEntry::Standard(standard),
     }
 }
 
 fn phase_entry(phase: &Phase) -> PhaseEntry {
     PhaseEntry {
         name: phase.name.clone(),
-        feet: match &phase.feet {
-            FeetRule::Any => FeetEntry::Any,
-            FeetRule::None => FeetEntry::None,
-            FeetRule::Patterns(patterns) => FeetEntry::Patterns(patterns.clone()),
-        },
+        feet: phase.feet.clone(),
         xi: to_rows(&phase.xi),
     }
 }

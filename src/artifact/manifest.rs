@@ -6,13 +6,13 @@
 use std::fmt;
 use std::marker::PhantomData;
 
+use nalgebra::DVector;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
-use crate::model::Activation;
-use crate::robot::ContactFlags;
+use crate::model::{Activation, CoordinateNames, FeetRule, ScaleFactors, Scaling, StandardLibrary};
 
 /// Name and version of the format.
 pub const SCHEMA: &str = "romc-model/1";
@@ -29,11 +29,11 @@ pub(super) struct Manifest {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub description: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub state: Option<SignalsEntry>,
+    pub state: Option<CoordinateNames>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub input: Option<SignalsEntry>,
+    pub input: Option<CoordinateNames>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub scaling: Option<ScalingEntry>,
+    pub scaling: Option<Scaling>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub encoder: Option<MapEntry>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -55,20 +55,6 @@ pub(super) struct Manifest {
 #[derive(Deserialize)]
 pub(super) struct SchemaProbe {
     pub schema: Option<Value>,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SignalsEntry {
-    pub names: Vec<String>,
-    pub units: Vec<String>,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ScalingEntry {
-    pub state: FactorsEntry,
-    pub input: FactorsEntry,
 }
 
 /// An encoder or decoder: one affine map, or a chain of layers with activations.
@@ -139,7 +125,7 @@ impl TryFrom<MapFields> for MapEntry {
 #[serde(deny_unknown_fields)]
 pub(super) struct PhaseEntry {
     pub name: String,
-    pub feet: FeetEntry,
+    pub feet: FeetRule,
     pub xi: Rows,
 }
 
@@ -150,73 +136,47 @@ pub(super) struct StatisticsEntry {
     pub covariance: Rows,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct StandardEntry {
-    pub degree: u32,
-    pub trigonometric: bool,
-    pub inputs: bool,
-}
-
-/// A number for all coordinates, or one number a coordinate.
-pub(super) enum FactorsEntry {
-    Uniform(f64),
-    PerCoordinate(Vec<f64>),
-}
-
 /// A list of terms, or the shorthand.
+#[derive(Serialize)]
+#[serde(untagged)]
 pub(super) enum LibraryEntry {
     Terms(Vec<String>),
-    Standard(StandardEntry),
+    Standard(StandardLibrary),
 }
 
-/// `"any"`, `"none"`, or a list of patterns of four flags (0 or 1) in the order fr, fl, rr, rl.
-pub(super) enum FeetEntry {
-    Any,
-    None,
-    Patterns(Vec<ContactFlags>),
-}
-
-impl Serialize for FactorsEntry {
+/// A number for all coordinates, or one number per coordinate.
+impl Serialize for ScaleFactors {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
-            FactorsEntry::Uniform(factor) => factor.serialize(serializer),
-            FactorsEntry::PerCoordinate(factors) => factors.serialize(serializer),
+            ScaleFactors::Uniform(factor) => factor.serialize(serializer),
+            ScaleFactors::PerCoordinate(factors) => factors.as_slice().serialize(serializer),
         }
     }
 }
 
-impl<'de> Deserialize<'de> for FactorsEntry {
+impl<'de> Deserialize<'de> for ScaleFactors {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Factors;
         impl<'de> Visitor<'de> for Factors {
-            type Value = FactorsEntry;
+            type Value = ScaleFactors;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("a number or a list of numbers")
             }
-            fn visit_f64<E>(self, value: f64) -> Result<FactorsEntry, E> {
-                Ok(FactorsEntry::Uniform(value))
+            fn visit_f64<E>(self, value: f64) -> Result<ScaleFactors, E> {
+                Ok(ScaleFactors::Uniform(value))
             }
-            fn visit_u64<E>(self, value: u64) -> Result<FactorsEntry, E> {
-                Ok(FactorsEntry::Uniform(value as f64))
+            fn visit_u64<E>(self, value: u64) -> Result<ScaleFactors, E> {
+                Ok(ScaleFactors::Uniform(value as f64))
             }
-            fn visit_i64<E>(self, value: i64) -> Result<FactorsEntry, E> {
-                Ok(FactorsEntry::Uniform(value as f64))
+            fn visit_i64<E>(self, value: i64) -> Result<ScaleFactors, E> {
+                Ok(ScaleFactors::Uniform(value as f64))
             }
-            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<FactorsEntry, A::Error> {
-                Vec::deserialize(SeqAccessDeserializer::new(seq)).map(FactorsEntry::PerCoordinate)
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<ScaleFactors, A::Error> {
+                let factors = Vec::deserialize(SeqAccessDeserializer::new(seq))?;
+                Ok(ScaleFactors::PerCoordinate(DVector::from_vec(factors)))
             }
         }
         deserializer.deserialize_any(Factors)
-    }
-}
-
-impl Serialize for LibraryEntry {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            LibraryEntry::Terms(terms) => terms.serialize(serializer),
-            LibraryEntry::Standard(standard) => standard.serialize(serializer),
-        }
     }
 }
 
@@ -232,7 +192,7 @@ impl<'de> Deserialize<'de> for LibraryEntry {
                 Vec::deserialize(SeqAccessDeserializer::new(seq)).map(LibraryEntry::Terms)
             }
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<LibraryEntry, A::Error> {
-                StandardEntry::deserialize(MapAccessDeserializer::new(map))
+                StandardLibrary::deserialize(MapAccessDeserializer::new(map))
                     .map(LibraryEntry::Standard)
             }
         }
@@ -240,37 +200,38 @@ impl<'de> Deserialize<'de> for LibraryEntry {
     }
 }
 
-impl Serialize for FeetEntry {
+/// `"any"`, `"none"`, or a list of patterns of four flags (0 or 1) in the order fr, fl, rr, rl.
+impl Serialize for FeetRule {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
-            FeetEntry::Any => "any".serialize(serializer),
-            FeetEntry::None => "none".serialize(serializer),
-            FeetEntry::Patterns(patterns) => {
+            FeetRule::Any => "any".serialize(serializer),
+            FeetRule::None => "none".serialize(serializer),
+            FeetRule::Patterns(patterns) => {
                 serializer.collect_seq(patterns.iter().map(|feet| feet.map(u8::from)))
             }
         }
     }
 }
 
-impl<'de> Deserialize<'de> for FeetEntry {
+impl<'de> Deserialize<'de> for FeetRule {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Feet;
         impl<'de> Visitor<'de> for Feet {
-            type Value = FeetEntry;
+            type Value = FeetRule;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("\"any\", \"none\" or a list of patterns such as [1, 1, 0, 0]")
             }
-            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<FeetEntry, E> {
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<FeetRule, E> {
                 match text {
-                    "any" => Ok(FeetEntry::Any),
-                    "none" => Ok(FeetEntry::None),
+                    "any" => Ok(FeetRule::Any),
+                    "none" => Ok(FeetRule::None),
                     _ => Err(E::invalid_value(serde::de::Unexpected::Str(text), &self)),
                 }
             }
-            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<FeetEntry, A::Error> {
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<FeetRule, A::Error> {
                 let rows: Vec<[Flag; 4]> = Vec::deserialize(SeqAccessDeserializer::new(seq))?;
                 let patterns = rows.into_iter().map(|row| row.map(|flag| flag.0));
-                Ok(FeetEntry::Patterns(patterns.collect()))
+                Ok(FeetRule::Patterns(patterns.collect()))
             }
         }
         deserializer.deserialize_any(Feet)
@@ -320,7 +281,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Pairs<T> {
         impl<'de, T: Deserialize<'de>> Visitor<'de> for Object<T> {
             type Value = Pairs<T>;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("an object with one entry a phase")
+                f.write_str("an object with one entry per phase")
             }
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Pairs<T>, A::Error> {
                 let mut pairs: Vec<(String, T)> = Vec::new();

@@ -2,8 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::error::ArtifactError;
+use super::error::{ArtifactError, ArtifactFault};
 use super::manifest::Rows;
+use crate::files::{Located, Place};
 
 /// The matrix with these rows; every row must have `expected` numbers, or as many as the first.
 pub(super) fn from_rows(
@@ -15,13 +16,10 @@ pub(super) fn from_rows(
     let expected = expected.or(rows.first().map(Vec::len)).unwrap_or(0);
     for (row, numbers) in rows.iter().enumerate() {
         if numbers.len() != expected {
-            return Err(ArtifactError::RowLength {
-                file: file.to_owned(),
-                tensor: tensor.to_owned(),
-                row,
-                found: numbers.len(),
-                expected,
-            });
+            let found = numbers.len();
+            let place = Place::Entry(format!("`{tensor}`[{row}]").into());
+            let fault = ArtifactFault::RowLength { found, expected };
+            return Err(Located::new(file, place, fault));
         }
     }
     Ok(DMatrix::from_row_iterator(

@@ -38,7 +38,7 @@ mod read;
 mod write;
 
 pub use digest::{Digest, digest};
-pub use error::{ArtifactError, describe};
+pub use error::{ArtifactError, ArtifactFault, describe};
 pub use manifest::SCHEMA;
 pub use read::{MAX_FILE_BYTES, read, read_from_bytes};
 pub use write::{check_place, to_text, write, write_with};

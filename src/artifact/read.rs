@@ -7,15 +7,14 @@ use std::path::Path;
 use nalgebra::DVector;
 use serde_json::Value;
 
-use super::error::ArtifactError;
+use super::error::{ArtifactError, ArtifactFault, refused};
 use super::manifest::{
-    FactorsEntry, FeetEntry, LibraryEntry, Manifest, MapEntry, PhaseEntry, Rows, SCHEMA,
-    SchemaProbe, SignalsEntry, StatisticsEntry,
+    LibraryEntry, Manifest, MapEntry, PhaseEntry, Rows, SCHEMA, SchemaProbe, StatisticsEntry,
 };
 use super::matrices::from_rows;
 use crate::model::{
-    Activation, AffineMap, CoordinateNames, FeetRule, InputStatistics, Layer, Library, ModelError,
-    Phase, ReducedModel, ScaleFactors, Scaling, StandardLibrary, StateMap,
+    Activation, AffineMap, InputStatistics, Layer, Library, ModelError, Phase, ReducedModel,
+    StateMap,
 };
 use crate::robot::{Robot, STATE_DIM};
 
@@ -25,20 +24,18 @@ pub const MAX_FILE_BYTES: u64 = 32 << 20;
 /// Reads and checks a model file.
 ///
 /// # Errors
-/// [`ArtifactError`], except [`ArtifactError::Exists`].
+/// [`ArtifactError`], of any kind but [`ArtifactFault::Exists`].
 pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
-    let io_error = |source| ArtifactError::Io {
-        path: path.to_owned(),
-        action: "read",
-        source,
-    };
-    let file = File::open(path).map_err(io_error)?;
+    let name = path.display().to_string();
     let mut bytes = Vec::new();
-    // One byte more than allowed tells a file that is too large from one that just fits.
-    file.take(MAX_FILE_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(io_error)?;
-    read_from_bytes(&path.display().to_string(), &bytes)
+    // One byte more than allowed distinguishes a file that is too large from one that just fits.
+    File::open(path)
+        .and_then(|file| file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|source| {
+            let action = "read";
+            ArtifactFault::Io { action, source }.of(&name)
+        })?;
+    read_from_bytes(&name, &bytes)
 }
 
 /// Reads and checks a model file that is in memory; `file` names it in errors.
@@ -47,10 +44,7 @@ pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
 /// As [`read`]. Never panics, whatever the bytes are.
 pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, ArtifactError> {
     if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(ArtifactError::TooLarge {
-            file: file.to_owned(),
-            max: MAX_FILE_BYTES,
-        });
+        return Err(ArtifactFault::TooLarge(MAX_FILE_BYTES).of(file));
     }
     check_schema(file, bytes)?;
     let manifest: Manifest = parse(file, bytes)?;
@@ -61,12 +55,14 @@ fn parse<'de, T: serde::Deserialize<'de>>(
     file: &str,
     bytes: &'de [u8],
 ) -> Result<T, ArtifactError> {
-    let syntax = |place: String, error: &serde_json::Error| ArtifactError::Syntax {
-        file: file.to_owned(),
-        place,
-        line: error.line(),
-        column: error.column(),
-        message: message_without_position(error),
+    let syntax = |place: String, error: &serde_json::Error| {
+        let fault = ArtifactFault::Syntax {
+            place,
+            line: error.line(),
+            column: error.column(),
+            message: message_without_position(error),
+        };
+        fault.of(file)
     };
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
     let value = serde_path_to_error::deserialize(&mut deserializer)
@@ -77,7 +73,7 @@ fn parse<'de, T: serde::Deserialize<'de>>(
     Ok(value)
 }
 
-/// serde_json ends its messages with line and column, which [`ArtifactError::Syntax`] tells anyway.
+/// serde_json ends its messages with line and column, which [`ArtifactFault::Syntax`] has anyway.
 fn message_without_position(error: &serde_json::Error) -> String {
     let message = error.to_string();
     match message.rfind(" at line ") {
@@ -86,18 +82,17 @@ fn message_without_position(error: &serde_json::Error) -> String {
     }
 }
 
-/// Looks at the schema first, so that a file of a later version is not told that its keys are
-/// unknown.
+/// Looks at the schema first: for a file of a later version it is the fault, not unknown keys.
 fn check_schema(file: &str, bytes: &[u8]) -> Result<(), ArtifactError> {
     if bytes.trim_ascii_start().first() == Some(&b'[') {
         // serde would take an array for an object whose keys are left out.
-        return Err(ArtifactError::Syntax {
-            file: file.to_owned(),
+        let fault = ArtifactFault::Syntax {
             place: ".".to_owned(),
             line: 1,
             column: 1,
             message: "found an array, expected an object".to_owned(),
-        });
+        };
+        return Err(fault.of(file));
     }
     let Ok(probe) = parse::<SchemaProbe>(file, bytes) else {
         // No JSON at all: reading the whole grammar meets the same fault, and knows its place.
@@ -108,41 +103,35 @@ fn check_schema(file: &str, bytes: &[u8]) -> Result<(), ArtifactError> {
         Some(other) => other.to_string().chars().take(80).collect(),
         None => "none".to_owned(),
     };
-    Err(ArtifactError::Schema {
-        file: file.to_owned(),
-        found,
-    })
+    Err(ArtifactFault::Schema(found).of(file))
 }
 
 fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactError> {
-    let refused = |source: ModelError| ArtifactError::Model {
-        file: file.to_owned(),
-        source: Box::new(source),
-    };
     let latent_dim = manifest.latent_dim;
-    let library = library_of(manifest.library, latent_dim).map_err(refused)?;
+    let library = match manifest.library {
+        LibraryEntry::Terms(texts) => Library::from_terms(latent_dim, &texts),
+        LibraryEntry::Standard(standard) => Library::standard(latent_dim, standard),
+    };
+    let library = library.map_err(|source| refused(file, source))?;
     let mut builder = ReducedModel::builder(manifest.name, library)
         .description(manifest.description)
         .provenance(manifest.provenance);
     let robot = manifest.robot.as_deref().map(Robot::by_name).transpose();
-    let robot = robot.map_err(|error| refused(error.into()))?;
+    let robot = robot.map_err(|source| refused(file, source))?;
     let known_dim = robot
         .map(|_| STATE_DIM)
         .or(manifest.state.as_ref().map(|state| state.names.len()));
     if let Some(robot) = robot {
         builder = builder.robot(robot);
     }
-    if let Some(entry) = manifest.state {
-        builder = builder.state(signals_of(entry));
+    if let Some(state) = manifest.state {
+        builder = builder.state(state);
     }
-    if let Some(entry) = manifest.input {
-        builder = builder.input(signals_of(entry));
+    if let Some(input) = manifest.input {
+        builder = builder.input(input);
     }
-    if let Some(entry) = manifest.scaling {
-        builder = builder.scaling(Scaling {
-            state: factors_of(entry.state),
-            input: factors_of(entry.input),
-        });
+    if let Some(scaling) = manifest.scaling {
+        builder = builder.scaling(scaling);
     }
     if let Some(entry) = &manifest.encoder {
         builder = builder.encoder(map_of(file, "encoder", entry, known_dim)?);
@@ -160,37 +149,7 @@ fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactErro
     if let Some(sample_time_s) = manifest.sample_time_s {
         builder = builder.sample_time_s(sample_time_s);
     }
-    builder.build().map_err(refused)
-}
-
-fn library_of(entry: LibraryEntry, latent_dim: usize) -> Result<Library, ModelError> {
-    Ok(match entry {
-        LibraryEntry::Terms(texts) => Library::from_terms(latent_dim, &texts)?,
-        LibraryEntry::Standard(standard) => Library::standard(
-            latent_dim,
-            StandardLibrary {
-                degree: standard.degree,
-                trigonometric: standard.trigonometric,
-                inputs: standard.inputs,
-            },
-        )?,
-    })
-}
-
-fn signals_of(entry: SignalsEntry) -> CoordinateNames {
-    CoordinateNames {
-        names: entry.names,
-        units: entry.units,
-    }
-}
-
-fn factors_of(entry: FactorsEntry) -> ScaleFactors {
-    match entry {
-        FactorsEntry::Uniform(factor) => ScaleFactors::Uniform(factor),
-        FactorsEntry::PerCoordinate(factors) => {
-            ScaleFactors::PerCoordinate(DVector::from_vec(factors))
-        }
-    }
+    builder.build().map_err(|source| refused(file, source))
 }
 
 /// An encoder or decoder; a chain of one linear layer is the affine map.
@@ -200,10 +159,7 @@ fn map_of(
     entry: &MapEntry,
     columns: Option<usize>,
 ) -> Result<StateMap, ArtifactError> {
-    let refused = |source: ModelError| ArtifactError::Model {
-        file: file.to_owned(),
-        source: Box::new(source),
-    };
+    let refused = |source: ModelError| refused(file, source);
     let entries = match entry {
         MapEntry::Affine { weights, bias } => {
             return affine_of(file, tensor, (weights, bias), columns).map(StateMap::from);
@@ -233,10 +189,7 @@ fn affine_of(
 ) -> Result<AffineMap, ArtifactError> {
     let weights = from_rows(file, &format!("{tensor}.weights"), weights, columns)?;
     let bias = DVector::from_column_slice(bias);
-    AffineMap::new(tensor, weights, bias).map_err(|source| ArtifactError::Model {
-        file: file.to_owned(),
-        source: Box::new(source),
-    })
+    AffineMap::new(tensor, weights, bias).map_err(|source| refused(file, source))
 }
 
 fn phase_of(
@@ -249,11 +202,7 @@ fn phase_of(
     Ok(Phase {
         xi: from_rows(file, &tensor, &entry.xi, Some(latent_dim))?,
         name: entry.name,
-        feet: match entry.feet {
-            FeetEntry::Any => FeetRule::Any,
-            FeetEntry::None => FeetRule::None,
-            FeetEntry::Patterns(patterns) => FeetRule::Patterns(patterns),
-        },
+        feet: entry.feet,
     })
 }
 

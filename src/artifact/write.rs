@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use super::error::ArtifactError;
+use super::error::{ArtifactError, ArtifactFault};
 use super::export::manifest_of;
 use super::print::print;
 use crate::files::{Overwrite, write_whole};
@@ -20,15 +20,15 @@ pub fn to_text(model: &ReducedModel) -> String {
 /// Writes a model file; refuses to replace a different one.
 ///
 /// # Errors
-/// [`ArtifactError::Exists`], [`ArtifactError::Io`].
+/// [`ArtifactFault::Exists`], [`ArtifactFault::Io`].
 pub fn write(path: &Path, model: &ReducedModel) -> Result<(), ArtifactError> {
     write_with(path, model, Overwrite::Refuse)
 }
 
-/// Tells whether [`write_with`] would refuse.
+/// Checks whether [`write_with`] would refuse.
 ///
 /// # Errors
-/// [`ArtifactError::Exists`] if a different file is there and `overwrite` refuses.
+/// [`ArtifactFault::Exists`] if a different file is there and `overwrite` refuses.
 pub fn check_place(
     path: &Path,
     model: &ReducedModel,
@@ -41,17 +41,15 @@ fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<(), Artif
     let same = || fs::read(path).is_ok_and(|bytes| bytes == text.as_bytes());
     match overwrite.allows(path) || same() {
         true => Ok(()),
-        false => Err(ArtifactError::Exists {
-            path: path.to_owned(),
-        }),
+        false => Err(ArtifactFault::Exists.of(&path.display().to_string())),
     }
 }
 
 /// Writes a model file: into a new file beside `path`, which is then renamed.
 ///
 /// # Errors
-/// [`ArtifactError::Exists`] if a different file is there and `overwrite` refuses,
-/// [`ArtifactError::Io`].
+/// [`ArtifactFault::Exists`] if a different file is there and `overwrite` refuses,
+/// [`ArtifactFault::Io`].
 pub fn write_with(
     path: &Path,
     model: &ReducedModel,
@@ -59,9 +57,8 @@ pub fn write_with(
 ) -> Result<(), ArtifactError> {
     let text = to_text(model);
     check_text(path, &text, overwrite)?;
-    write_whole(path, |out| out.write_all(text.as_bytes())).map_err(|source| ArtifactError::Io {
-        path: path.to_owned(),
-        action: "write",
-        source,
+    write_whole(path, |out| out.write_all(text.as_bytes())).map_err(|source| {
+        let action = "write";
+        ArtifactFault::Io { action, source }.of(&path.display().to_string())
     })
 }

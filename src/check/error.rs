@@ -1,5 +1,7 @@
 //! Why two files could not be compared.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use std::io;
 use std::path::PathBuf;
 

@@ -7,12 +7,12 @@ use nalgebra::DVector;
 use serde_json::json;
 
 use super::Answer;
-use super::args::{ImportArguments, LibraryArgument, StoredWeights, StoredXi, TermOrder};
+use super::args::{ImportArguments, LibraryArgument};
 use super::output::{Table, check_output, read_recordings};
 use crate::files::Overwrite;
 use crate::import::{
     Chosen, ImportError, ImportOptions, ImportReport, LibraryChoice, LibraryOrder, SymbolNames,
-    WeightVectors, XiLayout, import, read_terms,
+    import, read_terms,
 };
 use crate::model::{ReducedModel, ScaleFactors, Scaling};
 use crate::robot::Robot;
@@ -95,17 +95,11 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
             .clone()
             .unwrap_or_else(|| stem(&arguments.output)),
         description: arguments.description.clone(),
-        format: arguments.format.map(Into::into),
+        format: arguments.format,
         mapping: arguments.map.clone(),
-        weights: arguments.weights.map(|stored| match stored {
-            StoredWeights::Row => WeightVectors::Row,
-            StoredWeights::Column => WeightVectors::Column,
-        }),
+        weights: arguments.weights,
         activation: arguments.activation,
-        xi_layout: arguments.xi_layout.map(|stored| match stored {
-            StoredXi::TermsByLatent => XiLayout::TermsByLatent,
-            StoredXi::LatentByTerms => XiLayout::LatentByTerms,
-        }),
+        xi_layout: arguments.xi_layout,
         symbols: SymbolNames::parse(&arguments.symbols)?,
         library: library(arguments)?,
         latent_dim: arguments.latent_dim,
@@ -124,10 +118,7 @@ fn stem(path: &Path) -> String {
 }
 
 fn library(arguments: &ImportArguments) -> Result<Option<LibraryChoice>, Error> {
-    let order = match arguments.library_order {
-        TermOrder::Author => LibraryOrder::Author,
-        TermOrder::Paper => LibraryOrder::Paper,
-    };
+    let order = arguments.library_order;
     Ok(match &arguments.library {
         None => None,
         Some(LibraryArgument::Shorthand(standard)) => {
@@ -135,12 +126,9 @@ fn library(arguments: &ImportArguments) -> Result<Option<LibraryChoice>, Error> 
         }
         Some(LibraryArgument::File(path)) => {
             if order == LibraryOrder::Paper {
-                return Err(ImportError::Option {
-                    option: "--library-order",
-                    found: "paper, with a file of terms".to_owned(),
-                    expected: "a library of the form degree=N,...".to_owned(),
-                }
-                .into());
+                let found = "paper, with a file of terms";
+                let expected = "a library of the form degree=N,...";
+                return Err(ImportError::option("--library-order", found, expected).into());
             }
             Some(LibraryChoice::Terms(read_terms(path)?))
         }

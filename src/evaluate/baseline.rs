@@ -70,7 +70,7 @@ impl Baseline {
     /// The pendulum with the published constants, and with those that `segments` fit best.
     ///
     /// # Errors
-    /// [`RecordingError::Wrench`] if a leg in contact is singular.
+    /// [`RecordingFault::Wrench`](crate::recording::RecordingFault::Wrench) if a leg in contact is singular.
     pub fn all(robot: &Robot, segments: &[&Segment]) -> Result<Vec<Self>, RecordingError> {
         let published = Template::Aslip(Aslip::PUBLISHED);
         let mut baselines = vec![Self::new("ASLIP, published constants", published)];
@@ -108,7 +108,7 @@ impl Baseline {
 /// nothing about a mass.
 ///
 /// # Errors
-/// [`RecordingError::Wrench`] if a leg in contact is singular.
+/// [`RecordingFault::Wrench`](crate::recording::RecordingFault::Wrench) if a leg in contact is singular.
 pub fn fit_aslip(robot: &Robot, segments: &[&Segment]) -> Result<Option<Aslip>, RecordingError> {
     let published = Aslip::PUBLISHED;
     let (mut rows, mut right) = (Vec::new(), Vec::new());

@@ -1,12 +1,15 @@
 //! Files that appear whole or not at all, and the folders that hold emitted files.
 //!
 //! Imports nothing; every stage that writes goes through here: [`write_whole`] replaces one file in one
-//! step, [`write_files`] puts [`EmittedFile`]s into a folder and lists them there as made by romc.
+//! step, [`write_files`] puts [`EmittedFile`]s into a folder and lists them there as made by romc. Stages that
+//! read state the place of a fault with [`Located`].
 
 mod emitted;
 mod folder;
+mod located;
 mod whole;
 
 pub use emitted::EmittedFile;
 pub use folder::{FolderError, check_folder, write_files};
+pub use located::{Located, Place};
 pub use whole::{Overwrite, write_whole};

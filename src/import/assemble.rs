@@ -1,20 +1,18 @@
 //! From assigned tensors to the parts of a model.
 
-mod layers;
+mod maps;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::assign::{Assigned, Assignment, assign};
 use super::error::{ImportError, shape_text};
-use super::layout::{self, Known, Subject};
 use super::library;
-use super::options::{ImportOptions, LibraryChoice, feet_text};
-use super::report::{Layout, Note, UnusedTensor, UsedTensor};
-use super::role::{Part, Role};
+use super::options::{ImportOptions, LibraryChoice, XiLayout};
+use super::report::{Layout, Note, ReadEquation, UnusedTensor, UsedTensor};
+use super::role::Role;
 use super::tensors::{Array, Element, TensorFile};
-use crate::model::{
-    AffineMap, InputStatistics, Library, ModelError, Phase, ScaleFactors, Scaling, StateMap,
-};
+use crate::files::Place;
+use crate::model::{InputStatistics, Library, Phase, ScaleFactors, Scaling, StateMap};
 use crate::robot::STATE_DIM;
 
 /// The parts of a model that a file has.
@@ -28,12 +26,22 @@ pub(super) struct Parts {
     pub(super) statistics: Vec<(String, InputStatistics)>,
 }
 
-/// What is said about the tensors of a file.
+/// The decisions about a file.
 #[derive(Debug, Default)]
 pub(super) struct ImportNotes {
     pub(super) used: Vec<UsedTensor>,
     pub(super) unused: Vec<UnusedTensor>,
+    pub(super) equations: Vec<ReadEquation>,
     pub(super) notes: Vec<Note>,
+}
+
+/// Dimensions as far as they are known before a tensor is looked at.
+#[derive(Clone, Copy, Debug, Default)]
+struct Known {
+    /// `d`.
+    latent: Option<usize>,
+    /// `n`.
+    state: Option<usize>,
 }
 
 /// Makes the parts of a model out of a file of tensors.
@@ -50,86 +58,86 @@ pub(super) fn parts(
             latent: options.latent_dim,
             state: options.robot.map(|_| STATE_DIM),
         },
-        news: ImportNotes::default(),
+        notes: ImportNotes::default(),
     };
-    let parts = assembly.parts()?;
-    let mut news = assembly.news;
-    news.unused = (assignment.unused.iter())
-        .map(|info| UnusedTensor {
-            tensor: info.name.clone(),
-            shape: info.shape.clone(),
-        })
-        .collect();
-    Ok((parts, news))
+    let (encoder, decoder) = assembly.maps()?;
+    let (library, phases) = assembly.coefficients()?;
+    let statistics = assembly.statistics()?;
+    let parts = Parts {
+        library,
+        phases,
+        encoder,
+        decoder,
+        scaling: assembly.scaling()?,
+        statistics,
+    };
+    let mut notes = assembly.notes;
+    let unused = assignment.unused.iter().map(|info| UnusedTensor {
+        tensor: info.name.clone(),
+        shape: info.shape.clone(),
+    });
+    notes.unused = unused.collect();
+    Ok((parts, notes))
 }
 
 struct Assembly<'a, 'f> {
-    tensors: &'f TensorFile<'f>,
+    tensors: &'a TensorFile<'f>,
     options: &'a ImportOptions,
-    assignment: &'a Assignment<'f>,
+    assignment: &'a Assignment<'a>,
     known: Known,
-    news: ImportNotes,
+    notes: ImportNotes,
 }
 
-impl<'f> Assembly<'_, 'f> {
-    fn parts(&mut self) -> Result<Parts, ImportError> {
-        let encoder = self.map(Part::Encoder)?;
-        let decoder = self.map(Part::Decoder)?;
-        self.check_activation(&[&encoder, &decoder])?;
-        let weights: Vec<Layout> = (self.news.used.iter())
-            .filter(|used| used.role.ends_with(".weight"))
-            .map(|used| used.layout)
-            .collect();
-        if weights.contains(&Layout::Row) && weights.contains(&Layout::Column) {
-            self.news.notes.push(Note::MixedWeights);
-        }
-        let (library, phases) = self.coefficients()?;
-        let statistics = self.statistics()?;
-        let scaling = self.scaling()?;
-        Ok(Parts {
-            library,
-            phases,
-            encoder,
-            decoder,
-            scaling,
-            statistics,
-        })
+impl<'a> Assembly<'a, '_> {
+    fn find(&self, role: &Role) -> Option<&'a Assigned<'a>> {
+        let mut used = self.assignment.used.iter();
+        used.find(|assigned| assigned.role == *role)
     }
 
-    /// Complains about an activation that there is no place for.
-    fn check_activation(&self, maps: &[&Option<StateMap>]) -> Result<(), ImportError> {
-        let is_deep = |map: &&Option<StateMap>| map.as_ref().is_some_and(|m| m.layers().len() > 1);
-        match self.options.activation {
-            Some(activation) if !maps.iter().any(is_deep) => Err(ImportError::Option {
-                option: "--activation",
-                found: format!("{activation}, but no map with several layers"),
-                expected: "tensors of layers, such as encoder.0.weight and encoder.2.weight"
-                    .to_owned(),
-            }),
-            _ => Ok(()),
-        }
+    /// A tensor that is something else than expected.
+    fn refused(
+        &self,
+        assigned: &Assigned<'_>,
+        found: impl Into<Box<str>>,
+        expected: impl Into<Box<str>>,
+    ) -> ImportError {
+        ImportError::at(self.tensors.file(), assigned.place(&[]), found, expected)
     }
 
-    fn find(&self, role: &Role) -> Option<Assigned<'f>> {
-        self.assignment.find(role).cloned()
+    fn wrong_shape(&self, assigned: &Assigned<'_>, expected: String) -> ImportError {
+        self.refused(assigned, shape_text(&assigned.info.shape), expected)
+    }
+
+    /// The only way of storing a tensor that fits; a single number is stored the same in all ways.
+    fn only_way<T: Copy>(
+        &self,
+        assigned: &Assigned<'_>,
+        fitting: &[(Layout, T)],
+        expected: impl FnOnce() -> String,
+        option: &str,
+    ) -> Result<(Layout, T), ImportError> {
+        match fitting {
+            [only] => Ok(*only),
+            [] => Err(self.wrong_shape(assigned, expected())),
+            [(_, first), ..] if assigned.info.shape == [1, 1] => Ok((Layout::Plain, *first)),
+            _ => {
+                let shape = shape_text(&assigned.info.shape);
+                let found = format!("{shape}, a square matrix, whose shape fits both ways");
+                Err(self.refused(assigned, found, option))
+            }
+        }
     }
 
     /// Reads a tensor for its role.
-    fn read(&self, assigned: &Assigned<'f>) -> Result<Array, ImportError> {
+    fn read(&self, assigned: &Assigned<'_>) -> Result<Array, ImportError> {
         if assigned.info.element == Element::Bool && !matches!(assigned.role, Role::Mask(_)) {
-            return Err(ImportError::Element {
-                file: self.tensors.file().to_owned(),
-                tensor: assigned.info.name.clone(),
-                role: assigned.role.to_string(),
-                found: assigned.info.element.name().to_owned(),
-                expected: "f32 or f64",
-            });
+            return Err(self.refused(assigned, "numbers of type bool", "f32 or f64"));
         }
-        self.tensors.read(assigned.info, &assigned.role.to_string())
+        (self.tensors).read(assigned.info, |index| assigned.place(index))
     }
 
-    fn tell(&mut self, assigned: &Assigned<'f>, layout: Layout) {
-        self.news.used.push(UsedTensor {
+    fn note_used(&mut self, assigned: &Assigned<'_>, layout: Layout) {
+        self.notes.used.push(UsedTensor {
             role: assigned.role.to_string(),
             tensor: assigned.info.name.clone(),
             shape: assigned.info.shape.clone(),
@@ -139,211 +147,140 @@ impl<'f> Assembly<'_, 'f> {
         });
     }
 
-    fn model_error(&self, source: ModelError) -> ImportError {
-        ImportError::Model {
-            file: self.tensors.file().to_owned(),
-            source: Box::new(source),
-        }
-    }
-
-    /// Encoder or decoder, if the file has its weights.
-    fn map(&mut self, part: Part) -> Result<Option<StateMap>, ImportError> {
-        let tensors = self.layers_of(part);
-        if !tensors.is_empty() {
-            let Some(activation) = self.options.activation else {
-                let found: Vec<String> = tensors.iter().map(|a| a.info.describe()).collect();
-                return Err(ImportError::Layers {
-                    file: self.tensors.file().to_owned(),
-                    part: part.name(),
-                    found: found.join(", "),
-                });
-            };
-            return self.network(part, &tensors, activation).map(Some);
-        }
-        let bias = self.find(&Role::Bias(part));
-        let Some(weights) = self.find(&Role::Weights(part)) else {
-            if bias.is_some() {
-                return Err(ImportError::Missing {
-                    file: self.tensors.file().to_owned(),
-                    role: Role::Weights(part).to_string(),
-                    available: self.tensors.listing(),
-                });
-            }
-            self.news.notes.push(Note::NoMap { part: part.name() });
-            return Ok(None);
-        };
-        let role = weights.role.to_string();
-        let subject = Subject {
-            file: self.tensors.file(),
-            info: weights.info,
-            role: &role,
-        };
-        let found = layout::weights(subject, part, self.options.weights, self.known)?;
-        let (latent, state) = found.dims;
-        self.known = Known {
-            latent: Some(latent),
-            state: Some(state),
-        };
-        let stored = self.read(&weights)?.matrix(found.stored.0, found.stored.1);
-        let matrix = match found.layout {
-            Layout::Row => stored.transpose(),
-            _ => stored,
-        };
-        self.tell(&weights, found.layout);
-        let bias = match bias {
-            Some(bias) => self.list(&bias, matrix.nrows())?,
-            None => {
-                self.news.notes.push(Note::ZeroBias { part: part.name() });
-                DVector::zeros(matrix.nrows())
-            }
-        };
-        let map = AffineMap::new(part.name(), matrix, bias);
-        map.map(|map| Some(map.into()))
-            .map_err(|source| self.model_error(source))
-    }
-
-    /// A tensor that is a list of `length` numbers.
+    /// A tensor that is a list of `length` numbers; a matrix of one row or column is one.
     fn list(
         &mut self,
-        assigned: &Assigned<'f>,
+        assigned: &Assigned<'_>,
         length: usize,
     ) -> Result<DVector<f64>, ImportError> {
-        let role = assigned.role.to_string();
-        let subject = Subject {
-            file: self.tensors.file(),
-            info: assigned.info,
-            role: &role,
+        let is_list = match assigned.info.shape[..] {
+            [] => length == 1,
+            [found] | [1, found] | [found, 1] => found == length,
+            _ => false,
         };
-        layout::check_list(subject, length)?;
+        if !is_list {
+            return Err(self.wrong_shape(assigned, format!("{length} numbers")));
+        }
         let values = self.read(assigned)?.values;
-        self.tell(assigned, Layout::Plain);
+        self.note_used(assigned, Layout::Plain);
         Ok(DVector::from_vec(values))
     }
 
     /// Library and phases.
     fn coefficients(&mut self) -> Result<(Library, Vec<Phase>), ImportError> {
-        let first = &self.assignment.phases[0].name;
-        let first = self
-            .find(&Role::Xi(first.clone()))
-            .expect("every phase was assigned coefficients");
-        let choice = match &self.options.library {
-            Some(choice) => choice.clone(),
-            None => return Err(self.no_library(&first)),
-        };
+        let first = Role::Xi(self.assignment.phases[0].name.clone());
+        let first = (self.find(&first)).expect("every phase was assigned coefficients");
+        let options = self.options;
+        let choice = (options.library.as_ref()).ok_or_else(|| self.no_library(first))?;
         let mut phases = Vec::new();
         for rule in &self.assignment.phases {
-            let xi = self.xi(&rule.name, &choice)?;
-            if self.options.phases.is_empty() {
-                self.news.notes.push(Note::UsualFeet {
-                    phase: rule.name.clone(),
-                    feet: feet_text(&rule.feet),
-                });
-            }
+            let xi = self.xi(&rule.name, choice)?;
+            self.notes
+                .notes
+                .extend(options.usual_feet(&rule.name, &rule.feet));
             phases.push(Phase {
                 name: rule.name.clone(),
                 feet: rule.feet.clone(),
                 xi,
             });
         }
-        let latent_dim = self.known.latent.expect("coefficients tell the dimension");
-        let library = library::build(&choice, latent_dim)
-            .map_err(|source| self.model_error(source.into()))?;
-        let mut moved = false;
+        let latent_dim = phases[0].xi.ncols();
+        let library = library::build(choice, latent_dim)
+            .map_err(|source| ImportError::model(self.tensors.file(), source))?;
+        let mut has_moved = false;
         for phase in &mut phases {
-            let xi = std::mem::replace(&mut phase.xi, DMatrix::zeros(0, 0));
-            let (xi, has_moved) = library::reorder(&choice, latent_dim, xi);
-            phase.xi = xi;
-            moved |= has_moved;
+            let xi = std::mem::take(&mut phase.xi);
+            (phase.xi, has_moved) = library::reorder(choice, latent_dim, xi);
         }
-        if moved {
-            self.news.notes.push(Note::PaperOrder);
+        if has_moved {
+            self.notes.notes.push(Note::PaperOrder);
         }
         Ok((library, phases))
     }
 
     /// Coefficients of a phase in the file's order of terms, `library_dim x latent_dim`.
     fn xi(&mut self, phase: &str, choice: &LibraryChoice) -> Result<DMatrix<f64>, ImportError> {
-        let assigned = self
-            .find(&Role::Xi(phase.to_owned()))
-            .expect("every phase was assigned coefficients");
-        let (xi, layout) = self.terms_by_latent(&assigned, choice)?;
+        let assigned = self.find(&Role::Xi(phase.to_owned()));
+        let assigned = assigned.expect("every phase was assigned coefficients");
+        let (xi, layout) = self.terms_by_latent(assigned, choice)?;
         self.known.latent = Some(xi.ncols());
-        self.tell(&assigned, layout);
+        self.note_used(assigned, layout);
         let Some(assigned) = self.find(&Role::Mask(phase.to_owned())) else {
             return Ok(xi);
         };
-        let (mask, layout) = self.terms_by_latent(&assigned, choice)?;
+        let (mask, layout) = self.terms_by_latent(assigned, choice)?;
         if let Some(position) = mask.iter().position(|&flag| flag != 0.0 && flag != 1.0) {
             let (row, column) = mask.vector_to_matrix_index(position);
-            return Err(ImportError::Value {
-                file: self.tensors.file().to_owned(),
-                tensor: assigned.info.name.clone(),
-                role: assigned.role.to_string(),
-                index: match layout {
-                    Layout::LatentByTerms => [column, row].into(),
-                    _ => [row, column].into(),
-                },
-                found: mask[(row, column)],
-                expected: "0 or 1",
-            });
+            let place = match layout {
+                Layout::LatentByTerms => assigned.place(&[column, row]),
+                _ => assigned.place(&[row, column]),
+            };
+            let found = mask[position].to_string();
+            return Err(ImportError::at(self.tensors.file(), place, found, "0 or 1"));
         }
-        self.tell(&assigned, layout);
-        let off = |value: &f64, flag: &f64| *flag == 0.0 && *value != 0.0;
-        let count = xi.iter().zip(&mask).filter(|(v, f)| off(v, f)).count();
-        self.news.notes.push(Note::Masked {
+        self.note_used(assigned, layout);
+        let off = |(value, flag): &(&f64, &f64)| **flag == 0.0 && **value != 0.0;
+        self.notes.notes.push(Note::Masked {
             phase: phase.to_owned(),
-            count,
+            count: xi.iter().zip(&mask).filter(off).count(),
         });
         Ok(xi.zip_map(&mask, |value, flag| if flag == 0.0 { 0.0 } else { value }))
     }
 
-    /// A tensor of one number a term and latent coordinate.
+    /// A tensor of one number per term and latent coordinate.
     fn terms_by_latent(
         &self,
-        assigned: &Assigned<'f>,
+        assigned: &Assigned<'_>,
         choice: &LibraryChoice,
     ) -> Result<(DMatrix<f64>, Layout), ImportError> {
-        let role = assigned.role.to_string();
-        let subject = Subject {
-            file: self.tensors.file(),
-            info: assigned.info,
-            role: &role,
+        let (by_terms, by_latent) = (Layout::TermsByLatent, Layout::LatentByTerms);
+        let ways = match (&assigned.info.shape[..], self.options.xi_layout) {
+            (&[length], _) => vec![(Layout::Plain, (length, 1))],
+            (&[rows, columns], Some(XiLayout::TermsByLatent)) => vec![(by_terms, (rows, columns))],
+            (&[rows, columns], Some(XiLayout::LatentByTerms)) => vec![(by_latent, (columns, rows))],
+            (&[rows, columns], None) => {
+                vec![(by_terms, (rows, columns)), (by_latent, (columns, rows))]
+            }
+            _ => Vec::new(),
         };
-        let latent = self.known.latent;
-        let found = layout::xi(
-            subject,
-            self.options.xi_layout,
-            latent,
-            |latent_dim| library::dim(choice, latent_dim),
-            || self.expected_xi(choice),
-        )?;
-        let stored = self.read(assigned)?.matrix(found.stored.0, found.stored.1);
-        let matrix = match found.layout {
-            Layout::LatentByTerms => stored.transpose(),
-            _ => stored,
+        let fits = |(_, (terms, latent)): &(Layout, (usize, usize))| {
+            *latent > 0
+                && self.known.latent.is_none_or(|known| known == *latent)
+                && library::dim(choice, *latent) == Some(*terms)
         };
-        Ok((matrix, found.layout))
+        let fitting: Vec<_> = ways.into_iter().filter(fits).collect();
+        let option = "--xi-layout terms-by-latent (one row per term) or --xi-layout latent-by-terms \
+                      (one row per latent coordinate)";
+        let expected = || self.expected_xi(choice);
+        let (layout, (terms, latent)) = self.only_way(assigned, &fitting, expected, option)?;
+        let array = self.read(assigned)?;
+        let matrix = match layout {
+            Layout::LatentByTerms => array.matrix((latent, terms)).transpose(),
+            _ => array.matrix((terms, latent)),
+        };
+        Ok((matrix, layout))
     }
 
     fn expected_xi(&self, choice: &LibraryChoice) -> String {
-        let source = library::describe(choice);
         let latent = self.known.latent.map_or("d".to_owned(), |d| d.to_string());
         let terms = match (choice, self.known.latent) {
-            (LibraryChoice::Terms(terms), _) => terms.len().to_string(),
-            (LibraryChoice::Standard(..), None) => "terms".to_owned(),
-            (LibraryChoice::Standard(..), Some(latent)) => library::dim(choice, latent)
-                .map_or_else(|| "terms".to_owned(), |count| count.to_string()),
+            (LibraryChoice::Terms(terms), _) => Some(terms.len()),
+            (LibraryChoice::Standard(..), latent) => latent.and_then(|d| library::dim(choice, d)),
         };
+        let terms = terms.map_or("terms".to_owned(), |count| count.to_string());
+        let source = library::describe(choice);
         format!("{terms} x {latent} or {latent} x {terms} (library: {source})")
     }
 
-    fn no_library(&self, first: &Assigned<'f>) -> ImportError {
+    fn no_library(&self, first: &Assigned<'_>) -> ImportError {
         let shape = &first.info.shape;
         let latent = self.known.latent.or(shape.iter().copied().min());
         let suggestions = match (latent, shape.as_slice()) {
-            (Some(latent), &[rows, columns]) if latent == rows || latent == columns => {
-                let terms = if latent == columns { rows } else { columns };
-                library::standards_with(terms, latent)
+            (Some(latent), &[rows, columns]) if latent == columns => {
+                library::standards_with(rows, latent)
+            }
+            (Some(latent), &[rows, columns]) if latent == rows => {
+                library::standards_with(columns, latent)
             }
             _ => Vec::new(),
         };
@@ -351,15 +288,24 @@ impl<'f> Assembly<'_, 'f> {
             "--library degree=N[,trigonometric][,inputs] or --library FILE with the list of terms"
                 .to_owned();
         if !suggestions.is_empty() {
-            expected.push_str(&format!(
-                "; for this shape perhaps --library {}",
-                suggestions.join(" or ")
-            ));
+            expected += "; for this shape perhaps --library ";
+            expected += &suggestions.join(" or ");
         }
-        ImportError::NoLibrary {
-            file: self.tensors.file().to_owned(),
-            found: format!("`{}` ({})", first.info.name, shape_text(shape)),
-            expected,
+        let found = format!("no candidate terms for {}", first.info.describe());
+        ImportError::at(self.tensors.file(), Place::Whole, found, expected)
+    }
+
+    /// Both tensors of a pair, or none.
+    fn pair(
+        &self,
+        a: &Role,
+        b: &Role,
+    ) -> Result<Option<(&'a Assigned<'a>, &'a Assigned<'a>)>, ImportError> {
+        match (self.find(a), self.find(b)) {
+            (None, None) => Ok(None),
+            (Some(a), Some(b)) => Ok(Some((a, b))),
+            (Some(_), None) => Err(self.tensors.missing(b)),
+            (None, Some(_)) => Err(self.tensors.missing(a)),
         }
     }
 
@@ -368,74 +314,40 @@ impl<'f> Assembly<'_, 'f> {
         for rule in &self.assignment.phases {
             let mean = Role::InputMean(rule.name.clone());
             let covariance = Role::InputCovariance(rule.name.clone());
-            let (mean, covariance) = match (self.find(&mean), self.find(&covariance)) {
-                (None, None) => continue,
-                (Some(mean), Some(covariance)) => (mean, covariance),
-                (Some(_), None) => return Err(self.missing(&covariance)),
-                (None, Some(_)) => return Err(self.missing(&mean)),
+            let Some((mean, covariance)) = self.pair(&mean, &covariance)? else {
+                continue;
             };
-            let dim = match (self.known.state, &mean.info.shape[..]) {
-                (Some(dim), _) => dim,
-                (None, shape) => shape.first().copied().unwrap_or(0),
-            };
-            let mean = self.list(&mean, dim)?;
-            let role = covariance.role.to_string();
-            let subject = Subject {
-                file: self.tensors.file(),
-                info: covariance.info,
-                role: &role,
-            };
+            let length = mean.info.shape.first().copied();
+            let dim = self.known.state.or(length).unwrap_or(0);
+            let mean = self.list(mean, dim)?;
             if covariance.info.shape != [dim, dim] {
-                return Err(subject.shape_error(format!("{dim} x {dim}")));
+                return Err(self.wrong_shape(covariance, format!("{dim} x {dim}")));
             }
-            let covariance_matrix = self.read(&covariance)?.matrix(dim, dim);
-            self.tell(&covariance, Layout::Plain);
-            let statistics = InputStatistics {
-                mean,
-                covariance: covariance_matrix,
-            };
-            all.push((rule.name.clone(), statistics));
+            let matrix = self.read(covariance)?.matrix((dim, dim));
+            self.note_used(covariance, Layout::Plain);
+            let covariance = matrix;
+            all.push((rule.name.clone(), InputStatistics { mean, covariance }));
         }
         Ok(all)
     }
 
-    fn missing(&self, role: &Role) -> ImportError {
-        ImportError::Missing {
-            file: self.tensors.file().to_owned(),
-            role: role.to_string(),
-            available: self.tensors.listing(),
-        }
-    }
-
     /// Scale factors from tensors, or as given.
     fn scaling(&mut self) -> Result<Option<Scaling>, ImportError> {
-        let (state, input) = match (
-            self.find(&Role::StateScaling),
-            self.find(&Role::InputScaling),
-        ) {
-            (None, None) => return Ok(self.options.scaling.clone()),
-            (Some(state), Some(input)) => (state, input),
-            (Some(_), None) => return Err(self.missing(&Role::InputScaling)),
-            (None, Some(_)) => return Err(self.missing(&Role::StateScaling)),
+        let Some((state, input)) = self.pair(&Role::StateScaling, &Role::InputScaling)? else {
+            return Ok(self.options.scaling.clone());
         };
         if self.options.scaling.is_some() {
-            return Err(ImportError::Option {
-                option: "--scaling",
-                found: "factors here and in tensors".to_owned(),
-                expected: "one of the two".to_owned(),
-            });
+            let found = "factors here and in tensors";
+            return Err(ImportError::option("--scaling", found, "one of the two"));
         }
-        Ok(Some(Scaling {
-            state: self.factors(&state)?,
-            input: self.factors(&input)?,
-        }))
+        let (state, input) = (self.factors(state)?, self.factors(input)?);
+        Ok(Some(Scaling { state, input }))
     }
 
-    fn factors(&mut self, assigned: &Assigned<'f>) -> Result<ScaleFactors, ImportError> {
+    fn factors(&mut self, assigned: &Assigned<'_>) -> Result<ScaleFactors, ImportError> {
         let count: usize = assigned.info.shape.iter().product();
         if count == 1 {
-            let factors = self.list(assigned, 1)?;
-            return Ok(ScaleFactors::Uniform(factors[0]));
+            return Ok(ScaleFactors::Uniform(self.list(assigned, 1)?[0]));
         }
         let dim = self.known.state.unwrap_or(count);
         Ok(ScaleFactors::PerCoordinate(self.list(assigned, dim)?))

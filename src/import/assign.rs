@@ -1,11 +1,12 @@
-//! Decides which tensor is used as what: first as mapped, then by usual names.
+//! The use of each tensor: as mapped, else by its name.
 
 use super::error::ImportError;
-use super::names::{self, Guess};
-use super::options::{ImportOptions, PhaseRule};
+use super::names;
+use super::options::{ImportOptions, PhaseRule, no_feet};
 use super::report::Chosen;
 use super::role::{Part, Role};
 use super::tensors::{TensorFile, TensorInfo};
+use crate::files::Place;
 
 /// A tensor and its use.
 #[derive(Clone, Debug)]
@@ -15,126 +16,101 @@ pub(super) struct Assigned<'f> {
     pub(super) chosen: Chosen,
 }
 
+impl Assigned<'_> {
+    /// The tensor as the place of a fault, or the number of it at an index of the file.
+    pub(super) fn place(&self, index: &[usize]) -> Place {
+        let (name, role) = (&self.info.name, &self.role);
+        Place::Entry(match index {
+            [] => format!("`{name}` as {role}").into(),
+            _ => format!("`{name}`{index:?} as {role}").into(),
+        })
+    }
+}
+
 /// All decisions about a file.
-#[derive(Debug)]
 pub(super) struct Assignment<'f> {
     pub(super) phases: Vec<PhaseRule>,
     pub(super) used: Vec<Assigned<'f>>,
     pub(super) unused: Vec<&'f TensorInfo>,
 }
 
-impl<'f> Assignment<'f> {
-    /// The tensor of a role, if there is one.
-    pub(super) fn find(&self, role: &Role) -> Option<&Assigned<'f>> {
-        self.used.iter().find(|assigned| assigned.role == *role)
-    }
-}
+/// A tensor whose name suggests a use.
+type Suggestion<'f> = (Role, &'f TensorInfo);
 
 /// Decides for the whole file.
-///
-/// # Errors
-/// [`ImportError::NoTensor`], [`ImportError::Missing`], [`ImportError::Candidates`],
-/// [`ImportError::Layers`], [`ImportError::NoFeet`], [`ImportError::Option`].
 pub(super) fn assign<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
 ) -> Result<Assignment<'f>, ImportError> {
     let mut used = mapped(tensors, options)?;
-    let guesses: Vec<(Guess, &TensorInfo)> = (tensors.infos().iter())
-        .filter(|info| used.iter().all(|assigned| assigned.info.name != info.name))
-        .filter_map(|info| Some((names::guess(&info.name)?, info)))
+    let free = |info: &&TensorInfo| used.iter().all(|a| a.info.name != info.name);
+    let suggested: Vec<Suggestion<'_>> = (tensors.infos().iter().filter(free))
+        .filter_map(|info| Some((named(&info.name)?, info)))
         .collect();
-    let phases = phases(tensors, options, &used, &guesses)?;
+    let phases = phases(tensors, options, &used, &suggested)?;
     check_mapped_phases(options, &phases)?;
-
-    let mut guessed = Vec::new();
     if options.activation.is_some() {
         for part in [Part::Encoder, Part::Decoder] {
-            guessed.extend(layers(part, &used, &guesses));
+            let layers = layers(part, &used, &suggested);
+            used.extend(layers);
         }
     }
-    let has_layers = |part: Part, lists: [&[Assigned<'_>]; 2]| {
-        lists
-            .into_iter()
-            .flatten()
-            .any(|assigned| matches!(assigned.role, Role::LayerWeights(found, _) if found == part))
-    };
-    for role in roles(&phases) {
-        let layered = match role {
-            Role::Weights(part) | Role::Bias(part) => has_layers(part, [&used, &guessed]),
-            _ => false,
-        };
-        if layered {
-            continue;
-        }
-        if used.iter().any(|assigned| assigned.role == role) {
-            continue;
-        }
-        if let Some(info) = only_candidate(tensors, &role, &phases, &guesses)? {
-            guessed.push(Assigned {
-                role,
-                info,
-                chosen: Chosen::Guessed,
+    for role in roles(options, &phases) {
+        let is_given = used
+            .iter()
+            .any(|assigned| match (&role, assigned.role.layer()) {
+                (Role::Weights(part) | Role::Bias(part), Some((layered, _))) => layered == *part,
+                _ => assigned.role == role,
             });
+        if !is_given && let Some(info) = only_candidate(tensors, &role, &phases, &suggested)? {
+            let chosen = Chosen::Guessed;
+            used.push(Assigned { role, info, chosen });
         }
     }
-    used.extend(guessed);
     used.sort_by(|a, b| a.role.cmp(&b.role));
     for phase in &phases {
         let role = Role::Xi(phase.name.clone());
         if used.iter().all(|assigned| assigned.role != role) {
-            return Err(missing(tensors, &role));
+            return Err(tensors.missing(&role));
         }
     }
-    let is_used = |info: &TensorInfo| used.iter().any(|assigned| assigned.info.name == info.name);
-    let unused = (tensors.infos().iter())
-        .filter(|info| !is_used(info))
-        .collect();
+    let is_unused = |info: &&TensorInfo| used.iter().all(|a| a.info.name != info.name);
     Ok(Assignment {
         phases,
+        unused: tensors.infos().iter().filter(is_unused).collect(),
         used,
-        unused,
     })
 }
 
-fn missing(tensors: &TensorFile<'_>, role: &Role) -> ImportError {
-    ImportError::Missing {
-        file: tensors.file().to_owned(),
-        role: role.to_string(),
-        available: tensors.listing(),
-    }
+/// The use that a name suggests: one of the usual names, or exactly that of a part.
+fn named(name: &str) -> Option<Role> {
+    names::role_of(name).or_else(|| name.parse().ok())
 }
 
-/// What `--map` says.
+/// The tensors of `--map`.
 fn mapped<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
 ) -> Result<Vec<Assigned<'f>>, ImportError> {
     let mut used: Vec<Assigned<'f>> = Vec::new();
     for mapping in &options.mapping {
-        if let Some(earlier) = used.iter().find(|assigned| assigned.role == mapping.role) {
-            return Err(ImportError::Option {
-                option: "--map",
-                found: format!(
-                    "both `{}` and `{}` for {}",
-                    earlier.info.name, mapping.tensor, mapping.role
-                ),
-                expected: "one tensor".to_owned(),
-            });
+        let (role, tensor) = (&mapping.role, &mapping.tensor);
+        if let Some(earlier) = used.iter().find(|assigned| assigned.role == *role) {
+            let found = format!("both `{}` and `{tensor}` for {role}", earlier.info.name);
+            return Err(ImportError::option("--map", found, "one tensor"));
         }
-        let info = tensors
-            .find(&mapping.tensor)
-            .ok_or_else(|| ImportError::NoTensor {
-                file: tensors.file().to_owned(),
-                role: mapping.role.to_string(),
-                tensor: mapping.tensor.clone(),
-                available: tensors.listing(),
-            })?;
-        used.push(Assigned {
-            role: mapping.role.clone(),
-            info,
-            chosen: Chosen::Mapped,
-        });
+        let Some(info) = tensors.infos().iter().find(|info| info.name == *tensor) else {
+            let found = format!("no tensor `{tensor}` for {role}");
+            let expected = format!("one of {}", tensors.listing());
+            return Err(ImportError::at(
+                tensors.file(),
+                Place::Whole,
+                found,
+                expected,
+            ));
+        };
+        let (role, chosen) = (role.clone(), Chosen::Mapped);
+        used.push(Assigned { role, info, chosen });
     }
     Ok(used)
 }
@@ -144,78 +120,70 @@ fn phases(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
     used: &[Assigned<'_>],
-    guesses: &[(Guess, &TensorInfo)],
+    suggested: &[Suggestion<'_>],
 ) -> Result<Vec<PhaseRule>, ImportError> {
     if !options.phases.is_empty() {
         return Ok(options.phases.clone());
     }
-    let mut found: Vec<(String, &TensorInfo)> = (used.iter())
-        .filter_map(|assigned| match &assigned.role {
-            Role::Xi(phase) => Some((phase.clone(), assigned.info)),
-            _ => None,
-        })
-        .collect();
-    for (guess, info) in guesses {
-        match guess {
-            // A name without a phase fits none while there are no phases to choose from.
-            Guess::Xi(words) if words.is_empty() => {}
-            Guess::Xi(words) if !found.iter().any(|(name, _)| names::name_phase(words, name)) => {
-                found.push((words.join("_"), info));
+    let mapped = used.iter().map(|assigned| (&assigned.role, assigned.info));
+    let by_name = suggested.iter().map(|(role, info)| (role, *info));
+    let (mut found, mut unnamed) = (Vec::<(&String, &TensorInfo)>::new(), None);
+    for (role, info) in mapped.chain(by_name) {
+        match role {
+            Role::Xi(phase) if phase.is_empty() => unnamed = unnamed.or(Some(info)),
+            Role::Xi(phase)
+                if !found
+                    .iter()
+                    .any(|(name, _)| names::is_same_phase(phase, name)) =>
+            {
+                found.push((phase, info));
             }
             _ => {}
         }
     }
     // The rule `any` takes every pattern with a foot down, so the order of these two is free.
-    found.sort_by_key(|(name, _)| name.clone());
-    let mut phases = Vec::new();
-    for (name, info) in found {
-        match options.feet_of(&name) {
-            Some(feet) => phases.push(PhaseRule { name, feet }),
-            None => {
-                return Err(ImportError::NoFeet {
-                    file: tensors.file().to_owned(),
-                    phase: name,
-                    found: format!("the coefficients {}", info.describe()),
-                });
-            }
+    found.sort_by_key(|(name, _)| *name);
+    let coefficients = |info: &TensorInfo| format!("the coefficients {}", info.describe());
+    match (found.is_empty(), unnamed) {
+        (true, Some(info)) => {
+            let found = coefficients(info) + ", perhaps";
+            return Err(no_feet(tensors.file(), "contact", &found));
         }
+        (true, None) => return Err(tensors.missing(&Role::Xi("PHASE".to_owned()))),
+        (false, _) => {}
     }
-    if phases.is_empty() {
-        let unnamed = guesses
-            .iter()
-            .find(|(guess, _)| matches!(guess, Guess::Xi(_)));
-        return Err(match unnamed {
-            Some((_, info)) => ImportError::NoFeet {
-                file: tensors.file().to_owned(),
-                phase: "contact".to_owned(),
-                found: format!("the coefficients {}, perhaps", info.describe()),
-            },
-            None => missing(tensors, &Role::Xi("PHASE".to_owned())),
-        });
-    }
-    Ok(phases)
+    let rules = found.into_iter().map(|(name, info)| {
+        let feet = options.feet_of(name);
+        let feet = feet.ok_or_else(|| no_feet(tensors.file(), name, &coefficients(info)))?;
+        let name = name.clone();
+        Ok(PhaseRule { name, feet })
+    });
+    rules.collect()
 }
 
-/// Complains about `--map` for a phase that is not there.
+/// Refuses `--map` for a phase that is not there.
 fn check_mapped_phases(options: &ImportOptions, phases: &[PhaseRule]) -> Result<(), ImportError> {
-    for mapping in &options.mapping {
-        let Some(phase) = mapping.role.phase() else {
-            continue;
-        };
-        if phases.iter().all(|rule| rule.name != phase) {
+    let is_strange = |role: &&Role| {
+        (role.phase()).is_some_and(|phase| phases.iter().all(|rule| rule.name != phase))
+    };
+    match options
+        .mapping
+        .iter()
+        .map(|mapping| &mapping.role)
+        .find(is_strange)
+    {
+        None => Ok(()),
+        Some(role) => {
             let names: Vec<&str> = phases.iter().map(|rule| rule.name.as_str()).collect();
-            return Err(ImportError::Option {
-                option: "--map",
-                found: format!("{} for a phase that no --phase names", mapping.role),
-                expected: format!("one of the phases {}", names.join(", ")),
-            });
+            let found = format!("{role} for a phase that no --phase names");
+            let expected = format!("one of the phases {}", names.join(", "));
+            Err(ImportError::option("--map", found, expected))
         }
     }
-    Ok(())
 }
 
-/// Everything that a model with these phases can be made of.
-fn roles(phases: &[PhaseRule]) -> Vec<Role> {
+/// Every part that a model with these phases can have; `--scaling` takes the place of tensors.
+fn roles(options: &ImportOptions, phases: &[PhaseRule]) -> Vec<Role> {
     let mut roles = Vec::new();
     for part in [Part::Encoder, Part::Decoder] {
         roles.extend([Role::Weights(part), Role::Bias(part)]);
@@ -223,6 +191,9 @@ fn roles(phases: &[PhaseRule]) -> Vec<Role> {
     for PhaseRule { name, .. } in phases {
         let of_phase = [Role::Xi, Role::Mask, Role::InputMean, Role::InputCovariance];
         roles.extend(of_phase.map(|role| role(name.clone())));
+    }
+    if options.scaling.is_none() {
+        roles.extend([Role::StateScaling, Role::InputScaling]);
     }
     roles
 }
@@ -232,41 +203,39 @@ fn roles(phases: &[PhaseRule]) -> Vec<Role> {
 fn layers<'f>(
     part: Part,
     used: &[Assigned<'f>],
-    guesses: &[(Guess, &'f TensorInfo)],
+    suggested: &[Suggestion<'f>],
 ) -> Vec<Assigned<'f>> {
-    let is_mapped = used.iter().any(|assigned| match assigned.role {
+    let is_mapped = |assigned: &Assigned<'_>| match assigned.role {
         Role::Weights(found) | Role::LayerWeights(found, _) => found == part,
         _ => false,
-    });
-    let of = |wanted: Guess| -> Vec<(Vec<u64>, &'f TensorInfo)> {
-        let fitting = guesses.iter().filter(|(guess, _)| *guess == wanted);
+    };
+    let of = |wanted: Role| {
+        let fitting = suggested.iter().filter(|(role, _)| *role == wanted);
         let mut list: Vec<_> = fitting
-            .map(|&(_, info)| (names::numbers(&info.name), info))
+            .map(|&(_, info)| (names::layer_of(&info.name), info))
             .collect();
-        list.sort_by(|a, b| a.0.cmp(&b.0));
+        list.sort_by(|((_, a), _), ((_, b), _)| a.cmp(b));
         list
     };
-    let weights = of(Guess::Weights(part));
-    let one_network = |pair: &[(Vec<u64>, &TensorInfo)]| {
-        pair[0].0 != pair[1].0 && names::are_layers(&pair[0].1.name, &pair[1].1.name)
+    let (weights, biases) = (of(Role::Weights(part)), of(Role::Bias(part)));
+    let is_network = |pair: &[_]| match pair {
+        [((a, i), _), ((b, j), _)] => a == b && i != j,
+        _ => false,
     };
-    if is_mapped || weights.len() < 2 || !weights.windows(2).all(one_network) {
-        return Vec::new();
+    let mut layers = Vec::new();
+    if used.iter().any(is_mapped) || weights.len() < 2 || !weights.windows(2).all(is_network) {
+        return layers;
     }
-    let biases = of(Guess::Bias(part));
-    let mut list = Vec::new();
-    for (layer, (numbers, info)) in weights.iter().enumerate() {
-        let assigned = |role, info| Assigned {
-            role,
-            info,
-            chosen: Chosen::Guessed,
-        };
-        list.push(assigned(Role::LayerWeights(part, layer), *info));
-        if let Some((_, bias)) = biases.iter().find(|(found, _)| found == numbers) {
-            list.push(assigned(Role::LayerBias(part, layer), *bias));
+    let chosen = Chosen::Guessed;
+    for (number, ((_, numbers), info)) in weights.into_iter().enumerate() {
+        let role = Role::LayerWeights(part, number);
+        layers.push(Assigned { role, info, chosen });
+        if let Some((_, info)) = biases.iter().find(|((_, found), _)| *found == numbers) {
+            let role = Role::LayerBias(part, number);
+            layers.push(Assigned { role, info, chosen });
         }
     }
-    list
+    layers
 }
 
 /// The one tensor whose name suggests a role.
@@ -274,46 +243,45 @@ fn only_candidate<'f>(
     tensors: &TensorFile<'_>,
     role: &Role,
     phases: &[PhaseRule],
-    guesses: &[(Guess, &'f TensorInfo)],
+    suggested: &[Suggestion<'f>],
 ) -> Result<Option<&'f TensorInfo>, ImportError> {
-    let names_phase = |words: &[String], phase: &str| {
-        names::name_phase(words, phase) || (words.is_empty() && phases.len() == 1)
-    };
-    let fits = |guess: &Guess| match (guess, role) {
-        (Guess::Weights(found), Role::Weights(part)) => found == part,
-        (Guess::Bias(found), Role::Bias(part)) => found == part,
-        (Guess::Xi(words), Role::Xi(phase))
-        | (Guess::Mask(words), Role::Mask(phase))
-        | (Guess::InputMean(words), Role::InputMean(phase))
-        | (Guess::InputCovariance(words), Role::InputCovariance(phase)) => {
-            names_phase(words, phase)
+    let fits = |found: &Role| match (found.phase(), role.phase()) {
+        (Some(found_phase), Some(phase)) => {
+            std::mem::discriminant(found) == std::mem::discriminant(role)
+                && (names::is_same_phase(found_phase, phase)
+                    || (found_phase.is_empty() && phases.len() == 1))
         }
-        _ => false,
+        _ => found == role,
     };
-    let candidates: Vec<&'f TensorInfo> = (guesses.iter())
-        .filter(|(guess, _)| fits(guess))
+    let candidates: Vec<&'f TensorInfo> = (suggested.iter())
+        .filter(|(found, info)| fits(found) || info.name == role.to_string())
         .map(|&(_, info)| info)
         .collect();
-    match candidates.as_slice() {
-        [] => Ok(None),
-        [only] => Ok(Some(only)),
-        [first, second, ..] => {
-            let texts: Vec<String> = candidates.iter().map(|info| info.describe()).collect();
-            let found = texts.join(", ");
-            let file = tensors.file().to_owned();
-            let layers = names::are_layers(&first.name, &second.name);
-            Err(match role {
-                Role::Weights(part) | Role::Bias(part) if layers => ImportError::Layers {
-                    file,
-                    part: part.name(),
-                    found,
-                },
-                _ => ImportError::Candidates {
-                    file,
-                    role: role.to_string(),
-                    found,
-                },
-            })
+    let [first, second, ..] = candidates[..] else {
+        return Ok(candidates.first().copied());
+    };
+    let texts: Vec<String> = candidates.iter().map(|info| info.describe()).collect();
+    let are_layers = names::layer_of(&first.name).0 == names::layer_of(&second.name).0;
+    Err(match role {
+        Role::Weights(part) | Role::Bias(part) if are_layers => {
+            deeper(tensors.file(), *part, &texts)
         }
-    }
+        _ => {
+            let found = format!("{} for {role}", texts.join(", "));
+            let expected = format!("one: name it with --map {role}=TENSOR");
+            ImportError::at(tensors.file(), Place::Whole, found, expected)
+        }
+    })
+}
+
+/// Layers without `--activation`.
+pub(super) fn deeper(file: &str, part: Part, layers: &[String]) -> ImportError {
+    let found = format!(
+        "{}, the layers of a deeper {}",
+        layers.join(", "),
+        part.name()
+    );
+    let expected = "one linear layer, or --activation elu, tanh or sigmoid to say what is between \
+                    them";
+    ImportError::at(file, Place::Whole, found, expected)
 }

@@ -1,4 +1,4 @@
-//! Reads equations of the latent accelerations as text.
+//! Equations of the latent accelerations as text.
 //!
 //! ```text
 //! # A comment.
@@ -13,9 +13,10 @@
 //! Each section is a phase; each phase has `ddz1` to `ddzd`. A text without sections is one phase,
 //! which `--phase` names. A line without `=` continues the equation before it.
 
-use super::error::ImportError;
+use super::error::{ImportError, ImportFault};
+use crate::files::{Located, Place};
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
-use crate::symbolic::{ExprId, ExprPool, ParseError};
+use crate::symbolic::{ExprId, ExprPool, ParseErrorKind};
 
 /// Largest text.
 pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
@@ -55,8 +56,7 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Sections, ImportError> {
         sections: Vec::new(),
     };
     for (index, line) in text.lines().enumerate() {
-        let line_without_comment = line.split('#').next().unwrap_or("");
-        reader.line(index + 1, line_without_comment)?;
+        reader.line(index + 1, line.split('#').next().unwrap_or(""))?;
     }
     let expected = "equations such as `ddz1 = 0.5*z1 + u1`";
     complete(file, reader.sections, text.lines().count(), expected)
@@ -67,36 +67,22 @@ pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Result<&'b str, Import
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
         let line = before.matches('\n').count() + 1;
-        let column = before
-            .rsplit('\n')
-            .next()
-            .map_or(0, |last| last.chars().count())
-            + 1;
-        refused(
-            file,
-            line,
-            column,
-            "bytes that are no text",
-            "equations in UTF-8",
-        )
+        let last = before.rsplit('\n').next().unwrap_or("");
+        let (column, found) = (last.chars().count() + 1, "bytes that are no text");
+        refused(file, line, column, found, "equations in UTF-8")
     })?;
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }
 
+/// A fault at a line and column.
 pub(super) fn refused(
     file: &str,
     line: usize,
     column: usize,
-    found: impl Into<String>,
-    expected: impl Into<String>,
+    found: impl Into<Box<str>>,
+    expected: impl Into<Box<str>>,
 ) -> ImportError {
-    ImportError::Text {
-        file: file.to_owned(),
-        line,
-        column,
-        found: found.into(),
-        expected: expected.into(),
-    }
+    ImportError::at(file, Place::Character(line, column), found, expected)
 }
 
 /// The start of a text in quotes, for messages.
@@ -122,48 +108,39 @@ impl Reader<'_> {
         }
         if let Some((left, right)) = content.split_once('=') {
             let start = column + left.chars().count() + 1;
-            return self.equation(number, column, left.trim(), start, right);
+            return self.equation((number, column), left.trim(), start, right);
         }
-        let open = self
-            .sections
-            .last_mut()
-            .and_then(|section| section.equations.last_mut());
-        match open {
+        let open = self.sections.last_mut();
+        match open.and_then(|section| section.equations.last_mut()) {
             Some(equation) => {
                 equation.pieces.push((number, column, content.to_owned()));
                 Ok(())
             }
-            None => Err(refused(
-                self.file,
-                number,
-                column,
-                quote(content),
-                "a phase such as `[contact]` or an equation such as `ddz1 = 0.5*z1 + u1`",
-            )),
+            None => {
+                let expected = "a phase such as `[contact]` or an equation such as \
+                                `ddz1 = 0.5*z1 + u1`";
+                Err(refused(self.file, number, column, quote(content), expected))
+            }
         }
     }
 
     fn header(&mut self, number: usize, column: usize, content: &str) -> Result<(), ImportError> {
-        let name = content
-            .strip_prefix('[')
-            .and_then(|rest| rest.strip_suffix(']'));
-        let name = name.map(str::trim).filter(|name| !name.is_empty());
-        let Some(name) = name else {
+        let refused = |found, expected: &str| refused(self.file, number, column, found, expected);
+        let name = (content.strip_prefix('[')).and_then(|rest| rest.strip_suffix(']'));
+        let Some(name) = name.map(str::trim).filter(|name| !name.is_empty()) else {
             let expected = "the name of a phase in brackets, such as `[contact]`";
-            return Err(refused(self.file, number, column, quote(content), expected));
+            return Err(refused(quote(content), expected));
         };
-        let twice = |section: &Section| section.phase.as_deref() == Some(name);
-        if let Some(earlier) = self.sections.iter().find(|section| twice(section)) {
-            let found = format!("`[{name}]` again, as in line {}", earlier.line);
-            return Err(refused(self.file, number, column, found, "each phase once"));
-        }
-        if let Some(first) = self
-            .sections
-            .first()
-            .filter(|section| section.phase.is_none())
-        {
-            let expected = "the name of its phase in brackets before the first equation";
-            return Err(refused(self.file, first.line, 1, "an equation", expected));
+        for section in &self.sections {
+            if section.phase.is_none() {
+                let expected = "the name of its phase in brackets before the first equation";
+                let place = Place::Character(section.line, 1);
+                return Err(ImportError::at(self.file, place, "an equation", expected));
+            }
+            if section.phase.as_deref() == Some(name) {
+                let found = format!("`[{name}]` again, as in line {}", section.line);
+                return Err(refused(found, "each phase once"));
+            }
         }
         self.sections.push(Section {
             phase: Some(name.to_owned()),
@@ -175,47 +152,34 @@ impl Reader<'_> {
 
     fn equation(
         &mut self,
-        number: usize,
-        column: usize,
+        (line, column): (usize, usize),
         left: &str,
         start: usize,
         right: &str,
     ) -> Result<(), ImportError> {
-        let output = (left.strip_prefix('d'))
-            .and_then(|name| LatentVariable::from_name(name, MAX_LATENT_DIM))
-            .and_then(|variable| match variable {
-                LatentVariable::Dz(index) => Some(index),
-                LatentVariable::Z(_) | LatentVariable::U(_) => None,
-            });
-        let Some(output) = output else {
+        let refused = |found, expected: &str| refused(self.file, line, column, found, expected);
+        let variable = (left.strip_prefix('d'))
+            .and_then(|name| LatentVariable::from_name(name, MAX_LATENT_DIM));
+        let Some(LatentVariable::Dz(output)) = variable else {
             let expected = format!("the left side `ddz1` to `ddz{MAX_LATENT_DIM}`");
-            return Err(refused(self.file, number, column, quote(left), expected));
+            return Err(refused(quote(left), &expected));
         };
         if self.sections.is_empty() {
             self.sections.push(Section {
                 phase: None,
-                line: number,
+                line,
                 equations: Vec::new(),
             });
         }
-        let section = self
-            .sections
-            .last_mut()
-            .expect("one was just made if there was none");
-        if let Some(earlier) = section
-            .equations
-            .iter()
-            .find(|other| other.output == output)
-        {
+        let section = self.sections.last_mut();
+        let section = section.expect("one was just made if there was none");
+        let mut earlier = section.equations.iter();
+        if let Some(earlier) = earlier.find(|other| other.output == output) {
             let found = format!("`{left}` again, as in line {}", earlier.line);
-            let expected = "each left side once a phase";
-            return Err(refused(self.file, number, column, found, expected));
+            return Err(refused(found, "each left side once per phase"));
         }
-        section.equations.push(Equation {
-            output,
-            line: number,
-            pieces: vec![(number, start, right.to_owned())],
-        });
+        let pieces = vec![(line, start, right.to_owned())];
+        section.equations.push(Equation::new(output, line, pieces));
         Ok(())
     }
 }
@@ -240,11 +204,8 @@ pub(super) fn complete(
     let latent_dim = last + 1;
     for section in &mut sections {
         section.equations.sort_by_key(|equation| equation.output);
-        let missing = |output: &usize| {
-            let mut equations = section.equations.iter();
-            !equations.any(|equation| equation.output == *output)
-        };
-        if let Some(output) = (0..latent_dim).find(missing) {
+        let has = |output| section.equations.iter().any(|e| e.output == output);
+        if let Some(output) = (0..latent_dim).find(|&output| !has(output)) {
             let phase = match &section.phase {
                 Some(phase) => format!("phase `[{phase}]`"),
                 None => "equations".to_owned(),
@@ -278,8 +239,23 @@ impl Equation {
         pool: &mut ExprPool,
     ) -> Result<ExprId, ImportError> {
         let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
-        pool.parse(&self.text(), &known)
-            .map_err(|error| self.parse_error(file, latent_dim, error))
+        pool.parse(&self.text(), &known).map_err(|error| {
+            let (line, column) = self.place(error.position);
+            match (error.kind, latent_dim) {
+                (ParseErrorKind::UnknownName(name), 1) => {
+                    refused(file, line, column, quote(&name), "z1, dz1 or u1")
+                }
+                (ParseErrorKind::UnknownName(name), d) => {
+                    let expected = format!("z1 to z{d}, dz1 to dz{d} or u1 to u{d}");
+                    refused(file, line, column, quote(&name), expected)
+                }
+                (kind, _) => Located::new(
+                    file,
+                    Place::Character(line, column),
+                    ImportFault::Syntax(kind),
+                ),
+            }
+        })
     }
 
     /// The right side in the grammar of candidate terms.
@@ -305,107 +281,43 @@ impl Equation {
         }
         place
     }
-
-    fn parse_error(&self, file: &str, latent_dim: usize, error: ParseError) -> ImportError {
-        let (position, found, expected) = match error {
-            ParseError::Character { position, found } => (
-                position,
-                format!("`{}`", found.escape_debug()),
-                "numbers, names, functions and + - * / ^ ( )".to_owned(),
-            ),
-            ParseError::Number { position, found } => {
-                (position, quote(&found), "a finite number".to_owned())
-            }
-            ParseError::Unexpected {
-                position,
-                found,
-                expected,
-            } => (position, found, expected.to_owned()),
-            ParseError::UnknownName { position, found } => (
-                position,
-                quote(&found),
-                match latent_dim {
-                    1 => "z1, dz1 or u1".to_owned(),
-                    d => format!("z1 to z{d}, dz1 to dz{d} or u1 to u{d}"),
-                },
-            ),
-            ParseError::UnknownFunction { position, found } => (
-                position,
-                quote(&found),
-                "sin, cos, tan, tanh, exp, log, sqrt, abs or sign".to_owned(),
-            ),
-            ParseError::TooLong { found, limit } => (
-                1,
-                format!("an equation of {found} bytes"),
-                format!("at most {limit}"),
-            ),
-            ParseError::TooDeep { position, limit } => (
-                position,
-                "too many open parentheses and exponents".to_owned(),
-                format!("at most {limit}"),
-            ),
-            ParseError::Exponent {
-                position,
-                found,
-                limit,
-            } => (
-                position,
-                format!("the exponent {found}"),
-                format!("at most {limit}"),
-            ),
-        };
-        let (line, column) = self.place(position);
-        refused(file, line, column, found, expected)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn refusal(text: &str) -> (usize, usize, String, String) {
-        let parsed = read("eq.txt", text.as_bytes()).and_then(|sections| {
+    fn refusal(text: &[u8]) -> String {
+        let parsed = read("eq", text).and_then(|sections| {
             let mut pool = ExprPool::new();
-            for section in &sections.sections {
-                for equation in &section.equations {
-                    equation.parse("eq.txt", sections.latent_dim, &mut pool)?;
-                }
-            }
-            Ok(())
+            let mut equations = sections.sections.iter().flat_map(|s| &s.equations);
+            equations.try_for_each(|e| e.parse("eq", sections.latent_dim, &mut pool).map(|_| ()))
         });
-        match parsed.expect_err(text) {
-            ImportError::Text {
-                line,
-                column,
-                found,
-                expected,
-                ..
-            } => (line, column, found, expected),
-            other => panic!("{other}"),
-        }
+        let error = parsed.expect_err("a fault").to_string();
+        error
+            .split(", expected ")
+            .next()
+            .expect("what was found")
+            .to_owned()
     }
 
     #[test]
     fn sections_and_continued_lines_are_read() {
         let text = "# made by hand\r\n[contact]\r\nddz2 = z1\nddz1 = 1 -\n   dz2 # more\n[ flight ]\n\
                     ddz1 = 0\nddz2=u1\n";
-        let sections = read("eq.txt", text.as_bytes()).expect("two phases");
-        assert_eq!(sections.latent_dim, 2);
-        let names: Vec<_> = sections
-            .sections
-            .iter()
-            .map(|s| s.phase.as_deref())
-            .collect();
+        let read = read("eq.txt", text.as_bytes()).expect("two phases");
+        assert_eq!(read.latent_dim, 2);
+        let names: Vec<_> = read.sections.iter().map(|s| s.phase.as_deref()).collect();
         assert_eq!(names, [Some("contact"), Some("flight")]);
         let mut pool = ExprPool::new();
-        let first = &sections.sections[0].equations[0];
+        let first = &read.sections[0].equations[0];
         assert_eq!((first.output, first.line), (0, 4));
         let expr = first.parse("eq.txt", 2, &mut pool).expect("an expression");
         assert_eq!(pool.display(expr).to_string(), "1 - dz2");
     }
 
     #[test]
-    fn faults_are_told_with_line_and_column() {
+    fn faults_are_reported_with_line_and_column() {
         for (text, line, column, found) in [
             ("", 1, 1, "the end of the text"),
             ("z1 + 2", 1, 1, "`z1 + 2`"),
@@ -426,25 +338,10 @@ mod tests {
             ("[a]\nddz1 = 1\n[b]\n", 3, 1, "phase `[b]` without ddz1"),
             ("ddz1 = z1^2000", 1, 15, "the exponent 2000"),
         ] {
-            let (at_line, at_column, what, _) = refusal(text);
-            assert_eq!(
-                (at_line, at_column, what.as_str()),
-                (line, column, found),
-                "{text}"
-            );
+            let expected = format!("eq:{line}:{column}: found {found}");
+            assert_eq!(refusal(text.as_bytes()), expected, "{text}");
         }
-        let bytes = b"ddz1 = 1\nddz2 = \xff";
-        let error = read("eq.txt", bytes).expect_err("no UTF-8");
-        assert!(
-            matches!(
-                error,
-                ImportError::Text {
-                    line: 2,
-                    column: 8,
-                    ..
-                }
-            ),
-            "{error}"
-        );
+        let found = refusal(b"ddz1 = 1\nddz2 = \xff");
+        assert_eq!(found, "eq:2:8: found bytes that are no text");
     }
 }

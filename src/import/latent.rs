@@ -4,16 +4,16 @@ use std::collections::HashMap;
 
 use nalgebra::DMatrix;
 
-use super::equations::{Equation, Section, Sections};
+use super::equations::{Equation, Section, Sections, refused};
 use super::error::ImportError;
 use super::library;
-use super::options::{ImportOptions, feet_text};
+use super::options::{ImportOptions, PhaseRule, no_feet};
 use super::report::{Note, ReadEquation};
 use super::terms::{self, Coefficients};
-use crate::model::{FeetRule, Library, ModelError, Phase};
+use crate::model::{Library, Phase};
 use crate::symbolic::{ExprId, ExprPool};
 
-/// What the equations of a file make.
+/// The model parts that the equations of a file make.
 #[derive(Debug)]
 pub(super) struct Latent {
     pub(super) library: Library,
@@ -31,33 +31,25 @@ pub(super) fn latent(
     options: &ImportOptions,
 ) -> Result<Latent, ImportError> {
     let latent_dim = sections.latent_dim;
-    if let Some(expected) = options
-        .latent_dim
-        .filter(|&expected| expected != latent_dim)
-    {
-        return Err(ImportError::Option {
-            option: "--latent-dim",
-            found: expected.to_string(),
-            expected: format!("{latent_dim}, as the equations have"),
-        });
-    }
-    check_options(options)?;
+    check_options(latent_dim, options)?;
     let ordered = phases_in_order(file, sections, options)?;
-    let given = given_library(file, latent_dim, options)?;
-    let pool_of = |library: &Library| library.pool().clone();
+    let given = (options.library.as_ref())
+        .map(|choice| library::build(choice, latent_dim))
+        .transpose()
+        .map_err(|source| ImportError::model(file, source))?;
     let mut separation = Separation {
         file,
         latent_dim,
-        pool: given.as_ref().map_or_else(ExprPool::default, pool_of),
+        pool: (given.as_ref()).map_or_else(ExprPool::default, |library| library.pool().clone()),
         given: given.as_ref().map(rows_of).unwrap_or_default(),
     };
-    let mut separated = Vec::new();
-    for ordered in &ordered {
-        let equations = ordered.section.equations.iter();
-        let columns: Result<Vec<Coefficients>, ImportError> = equations
-            .map(|equation| separation.equation(equation))
-            .collect();
-        separated.push(columns?);
+    let mut separated: Vec<Vec<Coefficients>> = Vec::new();
+    for (_, section) in &ordered {
+        let columns = section
+            .equations
+            .iter()
+            .map(|equation| separation.equation(equation));
+        separated.push(columns.collect::<Result<_, _>>()?);
     }
     let (library, rows) = match given {
         Some(library) => (library, separation.given),
@@ -69,8 +61,11 @@ pub(super) fn latent(
         equations: Vec::new(),
         notes: Vec::new(),
     };
-    for (ordered, columns) in ordered.iter().zip(&separated) {
-        found.add(ordered, columns, &rows, options);
+    for ((rule, section), columns) in ordered.into_iter().zip(&separated) {
+        found
+            .notes
+            .extend(options.usual_feet(&rule.name, &rule.feet));
+        found.add(rule, section, columns, &rows);
     }
     Ok(found)
 }
@@ -78,10 +73,10 @@ pub(super) fn latent(
 impl Latent {
     fn add(
         &mut self,
-        ordered: &Ordered<'_>,
+        rule: PhaseRule,
+        section: &Section,
         columns: &[Coefficients],
         rows: &HashMap<ExprId, Row>,
-        options: &ImportOptions,
     ) {
         let mut xi = DMatrix::zeros(self.library.len(), self.library.latent_dim());
         for (column, coefficients) in columns.iter().enumerate() {
@@ -92,25 +87,15 @@ impl Latent {
                     factor => coefficient.to_f64() / factor,
                 };
             }
-            let equation = &ordered.section.equations[column];
             self.equations.push(ReadEquation {
-                phase: ordered.name.clone(),
+                phase: rule.name.clone(),
                 output: format!("ddz{}", column + 1),
-                line: equation.line,
+                line: section.equations[column].line,
                 terms: coefficients.len(),
             });
         }
-        if options.phases.is_empty() {
-            self.notes.push(Note::UsualFeet {
-                phase: ordered.name.clone(),
-                feet: feet_text(&ordered.feet),
-            });
-        }
-        self.phases.push(Phase {
-            name: ordered.name.clone(),
-            feet: ordered.feet.clone(),
-            xi,
-        });
+        let PhaseRule { name, feet } = rule;
+        self.phases.push(Phase { name, feet, xi });
     }
 }
 
@@ -121,38 +106,40 @@ struct Row {
     factor: f64,
 }
 
-/// A section with the phase that it is.
-struct Ordered<'s> {
-    name: String,
-    feet: FeetRule,
-    section: &'s Section,
+/// Refuses options that only tensors can follow, and another dimension.
+fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), ImportError> {
+    match options.latent_dim {
+        Some(expected) if expected != latent_dim => {
+            let found = format!("{latent_dim}, as the equations have");
+            return Err(ImportError::option(
+                "--latent-dim",
+                expected.to_string(),
+                found,
+            ));
+        }
+        _ => {}
+    }
+    let given = [
+        ("--map", !options.mapping.is_empty()),
+        ("--weights", options.weights.is_some()),
+        ("--xi-layout", options.xi_layout.is_some()),
+    ];
+    match given.iter().find(|(_, is_given)| *is_given) {
+        None => Ok(()),
+        Some((option, _)) => Err(ImportError::option(
+            option,
+            "a file of equations",
+            "a file of tensors",
+        )),
+    }
 }
 
-/// Options that only tensors can follow.
-fn check_options(options: &ImportOptions) -> Result<(), ImportError> {
-    let refused = |option| ImportError::Option {
-        option,
-        found: "a file of equations".to_owned(),
-        expected: "a file of tensors".to_owned(),
-    };
-    if !options.mapping.is_empty() {
-        return Err(refused("--map"));
-    }
-    if options.weights.is_some() {
-        return Err(refused("--weights"));
-    }
-    if options.xi_layout.is_some() {
-        return Err(refused("--xi-layout"));
-    }
-    Ok(())
-}
-
-/// The sections in the order of `--phase`, or of the file.
+/// The sections with their phases, in the order of `--phase` or of the file.
 fn phases_in_order<'s>(
     file: &str,
     sections: &'s Sections,
     options: &ImportOptions,
-) -> Result<Vec<Ordered<'s>>, ImportError> {
+) -> Result<Vec<(PhaseRule, &'s Section)>, ImportError> {
     let mut ordered = Vec::new();
     let by_order = options.phases.len() == sections.sections.len();
     for (place, section) in sections.sections.iter().enumerate() {
@@ -160,72 +147,34 @@ fn phases_in_order<'s>(
             Some(name) => name.clone(),
             None if by_order => options.phases[place].name.clone(),
             None => {
-                return Err(ImportError::Text {
-                    file: file.to_owned(),
-                    line: section.line,
-                    column: 1,
-                    found: "equations of no phase".to_owned(),
-                    expected:
-                        "a phase such as `[contact]` before them (LaTeX: `% Phase contact`, or a \
-                               label that ends in its name), or one --phase NAME=FEET for each"
-                            .to_owned(),
-                });
+                let found = "equations of no phase";
+                let expected = "a phase such as `[contact]` before them (LaTeX: `% Phase contact`, \
+                                or a label that ends in its name), or one --phase NAME=FEET for each";
+                return Err(refused(file, section.line, 1, found, expected));
             }
         };
-        let feet = options.feet_of(&name).ok_or_else(|| ImportError::NoFeet {
-            file: file.to_owned(),
-            phase: name.clone(),
-            found: format!("equations (line {})", section.line),
-        })?;
-        ordered.push(Ordered {
-            name,
-            feet,
-            section,
-        });
+        let feet = options
+            .feet_of(&name)
+            .ok_or_else(|| no_feet(file, &name, &format!("equations (line {})", section.line)))?;
+        ordered.push((PhaseRule { name, feet }, section));
     }
-    for rule in &options.phases {
-        if ordered.iter().all(|ordered| ordered.name != rule.name) {
-            return Err(ImportError::Option {
-                option: "--phase",
-                found: format!("{}, which {file} has no equations for", rule.name),
-                expected: format!("`[{}]` in the file", rule.name),
-            });
+    for PhaseRule { name, .. } in &options.phases {
+        if ordered.iter().all(|(rule, _)| rule.name != *name) {
+            let found = format!("{name}, which {file} has no equations for");
+            let expected = format!("`[{name}]` in the file");
+            return Err(ImportError::option("--phase", found, expected));
         }
     }
     let rank = |name: &str| options.phases.iter().position(|rule| rule.name == name);
-    ordered.sort_by_key(|ordered| rank(&ordered.name));
+    ordered.sort_by_key(|(rule, _)| rank(&rule.name));
     Ok(ordered)
-}
-
-fn model_error(file: &str, source: ModelError) -> ImportError {
-    ImportError::Model {
-        file: file.to_owned(),
-        source: Box::new(source),
-    }
-}
-
-fn given_library(
-    file: &str,
-    latent_dim: usize,
-    options: &ImportOptions,
-) -> Result<Option<Library>, ImportError> {
-    let library = options
-        .library
-        .as_ref()
-        .map(|choice| library::build(choice, latent_dim));
-    library
-        .transpose()
-        .map_err(|source| model_error(file, source.into()))
 }
 
 fn rows_of(library: &Library) -> HashMap<ExprId, Row> {
     let rows = library.terms().iter().enumerate().map(|(index, term)| {
         let (factor, rest) = library.pool().split(term.expr());
-        let row = Row {
-            index,
-            factor: factor.to_f64(),
-        };
-        (rest, row)
+        let factor = factor.to_f64();
+        (rest, Row { index, factor })
     });
     rows.collect()
 }
@@ -240,39 +189,32 @@ struct Separation<'f> {
 
 impl Separation<'_> {
     fn equation(&mut self, equation: &Equation) -> Result<Coefficients, ImportError> {
-        let refused = |found: String, expected: &str| ImportError::Text {
-            file: self.file.to_owned(),
-            line: equation.line,
-            column: 1,
-            found,
-            expected: expected.to_owned(),
-        };
+        let (line, output) = (equation.line, equation.output + 1);
         let expr = equation.parse(self.file, self.latent_dim, &mut self.pool)?;
         let is_term = |expr| self.given.contains_key(&expr);
         let coefficients = terms::coefficients(&self.pool, expr, &is_term).ok_or_else(|| {
-            refused(
-                format!(
-                    "a coefficient of ddz{} beyond the range of numbers",
-                    equation.output + 1
-                ),
-                "finite coefficients",
-            )
+            let found = format!("a coefficient of ddz{output} beyond the range of numbers");
+            refused(self.file, line, 1, found, "finite coefficients")
         })?;
-        if !self.given.is_empty() {
-            let mut strange: Vec<ExprId> = (coefficients.keys().copied())
-                .filter(|term| !self.given.contains_key(term))
-                .collect();
-            terms::sort(&self.pool, self.latent_dim, &mut strange);
-            if let Some(&term) = strange.first() {
+        let mut strange: Vec<ExprId> = (coefficients.keys().copied())
+            .filter(|&term| !self.given.is_empty() && !is_term(term))
+            .collect();
+        terms::sort(&self.pool, self.latent_dim, &mut strange);
+        match strange.first() {
+            None => Ok(coefficients),
+            Some(&term) => {
                 let term = self.pool.display(term).to_string();
                 let short: String = term.chars().take(80).collect();
-                return Err(refused(
-                    format!("the term `{short}` in ddz{}", equation.output + 1),
+                let found = format!("the term `{short}` in ddz{output}");
+                Err(refused(
+                    self.file,
+                    line,
+                    1,
+                    found,
                     "the terms of --library only",
-                ));
+                ))
             }
         }
-        Ok(coefficients)
     }
 }
 
@@ -289,12 +231,11 @@ fn union(
     found.sort_unstable();
     found.dedup();
     terms::sort(pool, latent_dim, &mut found);
-    let texts: Vec<String> = found
-        .iter()
+    let texts: Vec<String> = (found.iter())
         .map(|&term| pool.display(term).to_string())
         .collect();
     let library = Library::from_terms(latent_dim, &texts)
-        .map_err(|source| model_error(file, source.into()))?;
+        .map_err(|source| ImportError::model(file, source))?;
     let row = |(index, &term): (usize, &ExprId)| (term, Row { index, factor: 1.0 });
     Ok((library, found.iter().enumerate().map(row).collect()))
 }

@@ -1,12 +1,14 @@
 //! The candidate terms of imported coefficients, and the order in which a file has them.
 
-use std::fs;
 use std::path::Path;
+use std::{fs, io};
 
 use nalgebra::DMatrix;
+use serde_json::Value;
 
 use super::error::ImportError;
 use super::options::{LibraryChoice, LibraryOrder, standard_text};
+use crate::files::{Located, Place};
 use crate::model::{Library, LibraryError, StandardLibrary};
 
 /// Largest file with a list of terms.
@@ -55,7 +57,7 @@ pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String
     texts
 }
 
-/// Puts the rows of Xi from the file's order into the model file's; the flag says whether any moved.
+/// Puts the rows of Xi from the file's order into the model file's; the flag is set if rows moved.
 pub(super) fn reorder(
     choice: &LibraryChoice,
     latent_dim: usize,
@@ -83,23 +85,15 @@ pub(super) fn reorder(
 }
 
 /// Reads a list of terms: a JSON list of texts, a JSON object with such a list under `library`, or
-/// one term a line (`#` starts a comment).
+/// one term per line (`#` starts a comment).
 ///
 /// # Errors
-/// [`ImportError::Io`], [`ImportError::TooLarge`], [`ImportError::Text`].
+/// [`ImportError`] with line and column.
 pub fn read_terms(path: &Path) -> Result<Vec<String>, ImportError> {
-    let io = |source| ImportError::Io {
-        path: path.to_owned(),
-        source,
-    };
     let file = path.display().to_string();
+    let io = |source: io::Error| Located::new(&file, Place::Whole, source);
     if fs::metadata(path).map_err(io)?.len() > MAX_TERMS_BYTES {
-        return Err(ImportError::TooLarge {
-            file,
-            what: "the file".to_owned(),
-            max: MAX_TERMS_BYTES,
-            unit: "bytes",
-        });
+        return Err(ImportError::too_large(&file, MAX_TERMS_BYTES, "bytes"));
     }
     let bytes = fs::read(path).map_err(io)?;
     parse_terms(&file, &String::from_utf8_lossy(&bytes))
@@ -107,62 +101,43 @@ pub fn read_terms(path: &Path) -> Result<Vec<String>, ImportError> {
 
 fn parse_terms(file: &str, text: &str) -> Result<Vec<String>, ImportError> {
     let text = text.trim_start_matches('\u{feff}');
-    let refused = |line, column, found: String, expected: &str| ImportError::Text {
-        file: file.to_owned(),
-        line,
-        column,
-        found,
-        expected: expected.to_owned(),
+    let refused = |line, column, found: &str, expected: &str| {
+        ImportError::at(file, Place::Character(line, column), found, expected)
     };
     if !text.trim_start().starts_with(['[', '{']) {
-        let lines = text
-            .lines()
-            .map(|line| line.split('#').next().unwrap_or(""));
-        let terms: Vec<String> = lines
-            .map(|line| line.trim().to_owned())
-            .filter(|line| !line.is_empty())
+        let lines = (text.lines()).map(|line| line.split('#').next().unwrap_or("").trim());
+        let terms: Vec<String> = (lines.filter(|line| !line.is_empty()))
+            .map(str::to_owned)
             .collect();
-        return if terms.is_empty() {
-            Err(refused(1, 1, "no term".to_owned(), "one term a line"))
-        } else {
-            Ok(terms)
+        return match terms.is_empty() {
+            true => Err(refused(1, 1, "no term", "one term per line")),
+            false => Ok(terms),
         };
     }
-    let value: serde_json::Value = serde_json::from_str(text).map_err(|error| {
-        refused(
-            error.line(),
-            error.column(),
-            "no JSON".to_owned(),
-            "a list of terms such as [\"1\", \"z1\", \"sin(z1)\"]",
-        )
+    let value: Value = serde_json::from_str(text).map_err(|error| {
+        let expected = "a list of terms such as [\"1\", \"z1\", \"sin(z1)\"]";
+        refused(error.line(), error.column(), "no JSON", expected)
     })?;
     let list = value.get("library").unwrap_or(&value);
     let expected = "a list of terms, or an object with such a list under `library`";
     let list = (list.as_array()).ok_or_else(|| refused(1, 1, kind_of(list), expected))?;
     let texts = list.iter().enumerate().map(|(index, term)| {
-        let found = || {
-            refused(
-                1,
-                1,
-                format!("{} at [{index}]", kind_of(term)),
-                "a term as text",
-            )
-        };
-        term.as_str().map(str::to_owned).ok_or_else(found)
+        let found = || format!("{} at [{index}]", kind_of(term));
+        let text = term.as_str().map(str::to_owned);
+        text.ok_or_else(|| refused(1, 1, &found(), "a term as text"))
     });
     texts.collect()
 }
 
-fn kind_of(value: &serde_json::Value) -> String {
+fn kind_of(value: &Value) -> &'static str {
     match value {
-        serde_json::Value::Null => "null",
-        serde_json::Value::Bool(_) => "true or false",
-        serde_json::Value::Number(_) => "a number",
-        serde_json::Value::String(_) => "a text",
-        serde_json::Value::Array(_) => "a list",
-        serde_json::Value::Object(_) => "an object",
+        Value::Null => "null",
+        Value::Bool(_) => "true or false",
+        Value::Number(_) => "a number",
+        Value::String(_) => "a text",
+        Value::Array(_) => "a list",
+        Value::Object(_) => "an object",
     }
-    .to_owned()
 }
 
 #[cfg(test)]
@@ -208,10 +183,8 @@ mod tests {
             assert_eq!(parse_terms("terms", text).expect(text), expected);
         }
         for text in ["", "# only a comment", "[1]", "{}", "[\"1\",", "[[\"1\"]]"] {
-            assert!(
-                matches!(parse_terms("terms", text), Err(ImportError::Text { .. })),
-                "{text}"
-            );
+            let error = parse_terms("terms", text).expect_err(text);
+            assert!(matches!(error.place, Place::Character(..)), "{error}");
         }
     }
 

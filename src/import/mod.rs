@@ -2,10 +2,10 @@
 //!
 //! What enters: a file, and in [`ImportOptions`] what tensors do not carry (the candidate terms,
 //! when each phase holds, the scale factors). What leaves: a model checked like any other, and an
-//! [`ImportReport`] that tells which tensor was taken for what and how it was turned, or an
-//! [`ImportError`] that names file, tensor, what was found and what was expected.
-//! Read `run.rs` first; `assign.rs` decides which tensor is what, `layout.rs` how it is stored,
-//! `latent.rs` takes equations apart.
+//! [`ImportReport`] of the tensors used, their parts and how they were stored, or an
+//! [`ImportError`] that names file, place, what was found and what was expected.
+//! Read `run.rs` first; `assign.rs` decides the use of each tensor, `assemble.rs` turns them into
+//! parts of a model, `latent.rs` takes equations apart.
 //!
 //! ```
 //! use romc::import::{Format, ImportOptions, import_from_bytes};
@@ -32,10 +32,8 @@ mod equations;
 mod error;
 mod latent;
 mod latex;
-mod layout;
 mod library;
 mod names;
-mod npy;
 mod npz;
 mod options;
 mod report;
@@ -46,7 +44,7 @@ mod systems;
 mod tensors;
 mod terms;
 
-pub use error::ImportError;
+pub use error::{ImportError, ImportFault};
 pub use latex::{NameError, SymbolNames};
 pub use library::read_terms;
 pub use options::{

@@ -1,138 +1,101 @@
-//! Guesses what a tensor is from its name.
+//! Parts of a model by the names of their tensors.
 //!
-//! A name is cut into words at punctuation, at capital letters and around numbers:
-//! `net.enc.0.weight` is `net enc 0 weight`, `W_e` is `w e`, `xiContact` is `xi contact`.
+//! A name is cut into words at punctuation, at capital letters and around numbers: `net.enc.0.weight`
+//! is `net enc 0 weight`, `W_e` is `w e`, `xiContact` is `xi contact`.
 
-use super::role::Part;
+use super::role::{Part, Role};
 
-const ENCODER: [&str; 3] = ["encoder", "enc", "encode"];
-const DECODER: [&str; 3] = ["decoder", "dec", "decode"];
-const WEIGHTS: [&str; 4] = ["weight", "weights", "kernel", "w"];
-const BIAS: [&str; 3] = ["bias", "biases", "b"];
-const XI: [&str; 8] = [
-    "xi",
-    "sindy",
-    "coefficient",
-    "coefficients",
-    "coef",
-    "coefs",
-    "coeff",
-    "coeffs",
-];
-const MASK: [&str; 2] = ["mask", "masks"];
-/// Words of an optimiser's state: such a tensor is no weight.
-const OTHER: [&str; 7] = [
-    "adam",
-    "optimizer",
-    "optimiser",
-    "momentum",
-    "grad",
-    "exp",
-    "avg",
-];
-/// Words that say nothing about a phase.
-const GENERIC: [&str; 14] = [
-    "model",
-    "module",
-    "net",
-    "network",
-    "layer",
-    "weight",
-    "weights",
-    "kernel",
-    "param",
-    "params",
-    "parameter",
-    "parameters",
-    "learned",
-    "values",
+/// The words of the documented names, each with its usual spellings; then the words of an
+/// optimiser's state, and those that say nothing about a phase.
+const SPELLINGS: [(&str, &str); 9] = [
+    ("encoder", "encoder enc encode"),
+    ("decoder", "decoder dec decode"),
+    ("weight", "weight weights kernel w"),
+    ("bias", "bias biases b"),
+    (
+        "xi",
+        "xi sindy coefficient coefficients coef coefs coeff coeffs",
+    ),
+    ("mask", "mask masks"),
+    ("covariance", "covariance cov"),
+    (
+        "optimiser",
+        "adam optimizer optimiser momentum grad exp avg",
+    ),
+    (
+        "",
+        "model module net network layer param params parameter parameters learned values",
+    ),
 ];
 
-/// What a name suggests.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Guess {
-    Weights(Part),
-    Bias(Part),
-    /// Coefficients; the words that name the phase, possibly none.
-    Xi(Vec<String>),
-    Mask(Vec<String>),
-    InputMean(Vec<String>),
-    InputCovariance(Vec<String>),
-}
-
-/// What the name of a tensor suggests, if anything.
-pub(super) fn guess(name: &str) -> Option<Guess> {
-    let words = words(name.strip_suffix(":0").unwrap_or(name));
-    let has = |list: &[&str]| words.iter().any(|word| list.contains(&word.as_str()));
-    let texts: Vec<&str> = words.iter().map(String::as_str).collect();
-    match texts.as_slice() {
-        ["w", "e"] | ["we"] => return Some(Guess::Weights(Part::Encoder)),
-        ["w", "d"] | ["wd"] => return Some(Guess::Weights(Part::Decoder)),
-        ["b", "e"] | ["be"] => return Some(Guess::Bias(Part::Encoder)),
-        ["b", "d"] | ["bd"] => return Some(Guess::Bias(Part::Decoder)),
-        ["input", "mean", phase @ ..] => return Some(Guess::InputMean(phase_words(phase))),
-        ["input", "covariance" | "cov", phase @ ..] => {
-            return Some(Guess::InputCovariance(phase_words(phase)));
-        }
+/// The part that a name stands for; the phase is empty if the name has none.
+pub(super) fn role_of(name: &str) -> Option<Role> {
+    let words = words(name);
+    let known = |word: &str| {
+        SPELLINGS
+            .iter()
+            .find(|(_, list)| list.split(' ').any(|w| w == word))
+    };
+    let texts = words.iter().map(String::as_str);
+    let texts: Vec<&str> = texts
+        .map(|word| known(word).map_or(word, |(word, _)| word))
+        .collect();
+    let phase = |rest: &[&str]| {
+        let kept = rest
+            .iter()
+            .filter(|word| !["", "weight", "xi", "mask"].contains(word));
+        kept.copied().collect::<Vec<_>>().join("_")
+    };
+    match texts[..] {
+        ["weight", "e"] | ["we"] => return Some(Role::Weights(Part::Encoder)),
+        ["weight", "d"] | ["wd"] => return Some(Role::Weights(Part::Decoder)),
+        ["bias", "e"] | ["be"] => return Some(Role::Bias(Part::Encoder)),
+        ["bias", "d"] | ["bd"] => return Some(Role::Bias(Part::Decoder)),
+        ["scaling", "state"] => return Some(Role::StateScaling),
+        ["scaling", "input"] => return Some(Role::InputScaling),
+        ["input", "mean", ref rest @ ..] => return Some(Role::InputMean(phase(rest))),
+        ["input", "covariance", ref rest @ ..] => return Some(Role::InputCovariance(phase(rest))),
         _ => {}
     }
-    if has(&OTHER) {
-        return None;
-    }
-    let part = match (has(&ENCODER), has(&DECODER)) {
-        (true, false) => Some(Part::Encoder),
-        (false, true) => Some(Part::Decoder),
+    let has = |word| texts.contains(&word);
+    let part = match (has("encoder"), has("decoder")) {
+        _ if has("optimiser") => return None,
         // `autoencoder.decoder.weight` has one of them; a name with both says nothing.
         (true, true) => return None,
+        (true, false) => Some(Part::Encoder),
+        (false, true) => Some(Part::Decoder),
         (false, false) => None,
     };
-    if let Some(part) = part {
-        return match (has(&WEIGHTS), has(&BIAS), has(&MASK)) {
-            (true, false, false) => Some(Guess::Weights(part)),
-            (false, true, false) => Some(Guess::Bias(part)),
-            _ => None,
-        };
-    }
-    let rest: Vec<&str> = (texts.iter().copied())
-        .filter(|word| !XI.contains(word) && !MASK.contains(word))
-        .collect();
-    match (has(&XI), has(&MASK)) {
-        (_, true) => Some(Guess::Mask(phase_words(&rest))),
-        (true, false) if !has(&BIAS) => Some(Guess::Xi(phase_words(&rest))),
-        _ => None,
+    match (part, has("weight"), has("bias"), has("mask")) {
+        (Some(part), true, false, false) => Some(Role::Weights(part)),
+        (Some(part), false, true, false) => Some(Role::Bias(part)),
+        (Some(_), ..) => None,
+        (None, _, _, true) => Some(Role::Mask(phase(&texts))),
+        (None, _, false, false) if has("xi") => Some(Role::Xi(phase(&texts))),
+        (None, ..) => None,
     }
 }
 
-/// Whether two names differ in their numbers at most: layers of one network.
-pub(super) fn are_layers(first: &str, second: &str) -> bool {
-    let without_numbers = |name: &str| -> Vec<String> {
-        let mut words = words(name);
-        words.retain(|word| !word.starts_with(|c: char| c.is_ascii_digit()));
-        words
-    };
-    without_numbers(first) == without_numbers(second)
+/// The layer that a name stands for: its words without numbers, and the numbers.
+pub(super) fn layer_of(name: &str) -> (Vec<String>, Vec<u64>) {
+    let (numbers, rest): (Vec<String>, Vec<String>) =
+        (words(name).into_iter()).partition(|word| word.starts_with(|c: char| c.is_ascii_digit()));
+    (
+        rest,
+        numbers.iter().filter_map(|n| n.parse().ok()).collect(),
+    )
 }
 
-/// The numbers in a name, which tell the layer: `encoder.2.weight` has `[2]`.
-pub(super) fn numbers(name: &str) -> Vec<u64> {
-    let words = words(name.strip_suffix(":0").unwrap_or(name));
-    words.iter().filter_map(|word| word.parse().ok()).collect()
+/// Whether two texts name one phase: `rear stance`, `rear_stance` and `RearStance` do.
+pub(super) fn is_same_phase(a: &str, b: &str) -> bool {
+    words(a).concat() == words(b).concat()
 }
 
-/// Whether these words name this phase: `rear stance` names `rear_stance` and `RearStance`.
-pub(super) fn name_phase(found: &[String], phase: &str) -> bool {
-    found.concat() == words(phase).concat()
-}
-
-fn phase_words(found: &[&str]) -> Vec<String> {
-    let kept = found.iter().filter(|word| !GENERIC.contains(word));
-    kept.map(|&word| word.to_owned()).collect()
-}
-
-/// The lower-case words of a name, numbers apart.
+/// The lower-case words of a name, numbers apart, without TensorFlow's `:0`.
 fn words(name: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut last = ' ';
+    let name = name.strip_suffix(":0").unwrap_or(name);
     for c in name.chars().filter(|c| !c.is_control()) {
         if c.is_alphanumeric() {
             let starts = !last.is_alphanumeric()
@@ -153,58 +116,41 @@ fn words(name: &str) -> Vec<String> {
 mod tests {
     use super::*;
 
-    fn phase(words: &[&str]) -> Vec<String> {
-        words.iter().map(|&word| word.to_owned()).collect()
-    }
-
     #[test]
-    fn usual_names_of_weights_and_biases_are_known() {
-        let encoder = Some(Guess::Weights(Part::Encoder));
-        for name in [
-            "encoder.weight",
-            "encoder.0.weight",
-            "module.encoder.linear.weight",
-            "net.enc.0.weight",
-            "encoder/kernel:0",
-            "encoder_weights",
-            "W_e",
-            "We",
-            "W_enc",
-            "autoencoder.encoder.weight",
+    fn names_of_the_help_text_and_their_usual_spellings_are_known() {
+        let phase = |text: &str| text.to_owned();
+        for (role, names) in [
+            (
+                Role::Weights(Part::Encoder),
+                "encoder.weight encoder.0.weight module.encoder.linear.weight net.enc.0.weight \
+                 encoder/kernel:0 encoder_weights W_e We W_enc autoencoder.encoder.weight",
+            ),
+            (
+                Role::Bias(Part::Decoder),
+                "decoder.bias decoder.0.bias b_d dec/bias:0 b_dec",
+            ),
+            (Role::StateScaling, "scaling.state scaling_state"),
+            (Role::InputScaling, "scaling.input"),
+            (
+                Role::Xi(phase("contact")),
+                "xi.contact xi_contact xiContact xi.contact.weight coefs_contact",
+            ),
+            (Role::Xi(phase("")), "Xi model.sindy_coefficients"),
+            (Role::Xi(phase("rear_stance")), "coefs_rear_stance"),
+            (
+                Role::Mask(phase("contact")),
+                "mask.contact coefficient_mask_contact",
+            ),
+            (Role::InputMean(phase("flight")), "input_mean.flight"),
+            (
+                Role::InputCovariance(phase("flight")),
+                "input_covariance.flight input_cov_flight",
+            ),
         ] {
-            assert_eq!(guess(name), encoder, "{name}");
+            for name in names.split(' ') {
+                assert_eq!(role_of(name).as_ref(), Some(&role), "{name}");
+            }
         }
-        let decoder = Some(Guess::Bias(Part::Decoder));
-        for name in [
-            "decoder.bias",
-            "decoder.0.bias",
-            "b_d",
-            "dec/bias:0",
-            "b_dec",
-        ] {
-            assert_eq!(guess(name), decoder, "{name}");
-        }
-    }
-
-    #[test]
-    fn usual_names_of_coefficients_tell_their_phase() {
-        for (name, expected) in [
-            ("xi_contact", phase(&["contact"])),
-            ("Xi", phase(&[])),
-            ("model.sindy_coefficients.flight", phase(&["flight"])),
-            ("coefs_rear_stance", phase(&["rear", "stance"])),
-            ("xi.contact.weight", phase(&["contact"])),
-        ] {
-            assert_eq!(guess(name), Some(Guess::Xi(expected)), "{name}");
-        }
-        assert_eq!(
-            guess("coefficient_mask_contact"),
-            Some(Guess::Mask(phase(&["contact"])))
-        );
-        assert_eq!(
-            guess("input_covariance.flight"),
-            Some(Guess::InputCovariance(phase(&["flight"])))
-        );
     }
 
     #[test]
@@ -218,21 +164,27 @@ mod tests {
             "sindy.bias",
             "linear.weight",
         ] {
-            assert_eq!(guess(name), None, "{name}");
+            assert_eq!(role_of(name), None, "{name}");
         }
     }
 
     #[test]
     fn layers_differ_in_numbers_only() {
-        assert!(are_layers("encoder.0.weight", "encoder.2.weight"));
-        assert!(are_layers("enc.fc1.weight", "enc.fc12.weight"));
-        assert!(!are_layers("encoder.weight", "model.encoder.weight"));
+        assert_eq!(
+            layer_of("encoder.0.weight").0,
+            layer_of("encoder.2.weight").0
+        );
+        assert_eq!(layer_of("enc.fc1.weight").0, layer_of("enc.fc12.weight").0);
+        assert_eq!(layer_of("enc.fc12.weight").1, [12]);
+        assert_ne!(
+            layer_of("encoder.weight").0,
+            layer_of("model.encoder.weight").0
+        );
     }
 
     #[test]
     fn phases_are_recognised_in_any_spelling() {
-        assert!(name_phase(&phase(&["rear", "stance"]), "rear_stance"));
-        assert!(name_phase(&phase(&["rear", "stance"]), "RearStance"));
-        assert!(!name_phase(&phase(&["rear"]), "rear_stance"));
+        assert!(is_same_phase("rear_stance", "RearStance"));
+        assert!(!is_same_phase("rear", "rear_stance"));
     }
 }

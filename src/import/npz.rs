@@ -1,123 +1,241 @@
 //! NumPy's `.npz`: a zip file of `.npy` arrays.
 //!
 //! Only headers are read until an array is asked for, and then no more bytes are unpacked than its
-//! header announces: a small file cannot fill the memory.
+//! header announces: a small file cannot fill the memory. An array is `\x93NUMPY`, two bytes of the
+//! version (1 to 3), the length of the rest (2 or 4 bytes, little endian), and a Python dictionary:
+//! `{'descr': '<f8', 'fortran_order': False, 'shape': (18, 4), }`.
 
-use std::io::{Cursor, Read};
+use std::borrow::Cow;
+use std::fmt::Display;
+use std::io::{self, Cursor, Read};
 
 use zip::ZipArchive;
-use zip::result::ZipError;
 
-use super::error::ImportError;
-use super::npy::{self, HeaderError};
-use super::tensors::{Place, TensorInfo};
+use super::error::{ImportError, ImportFault};
+use super::tensors::{Element, TensorFile, TensorInfo};
+use crate::files::{Located, Place};
+
+/// Most members of a file.
+const MAX_MEMBERS: usize = 10_000;
+const MAGIC: &[u8; 6] = b"\x93NUMPY";
+const MAX_HEADER_BYTES: usize = 1 << 16;
+const MAX_RANK: usize = 32;
 
 type Archive<'b> = ZipArchive<Cursor<&'b [u8]>>;
 
-/// Most members that a file may have.
-const MAX_MEMBERS: usize = 10_000;
-
-/// Describes all arrays.
-pub(super) fn infos(file: &str, bytes: &[u8]) -> Result<Vec<TensorInfo>, ImportError> {
-    let mut archive = open(file, bytes)?;
+/// Opens a file; only the headers of its arrays are read.
+pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, ImportError> {
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, e))?;
     if archive.len() > MAX_MEMBERS {
-        return Err(ImportError::TooLarge {
-            file: file.to_owned(),
-            what: "the file".to_owned(),
-            max: MAX_MEMBERS as u64,
-            unit: "arrays",
-        });
+        return Err(ImportError::too_large(file, MAX_MEMBERS as u64, "arrays"));
     }
     let mut infos = Vec::new();
-    for index in 0..archive.len() {
-        infos.extend(info(file, &mut archive, index)?);
+    for member in 0..archive.len() {
+        infos.extend(describe(file, &mut archive, member)?);
     }
-    Ok(infos)
+    let name = file.to_owned();
+    let read = move |info: &TensorInfo, length| numbers(&name, bytes, info, length).map(Cow::from);
+    TensorFile::new(file, infos, Box::new(read))
 }
 
-/// The bytes of an array's numbers.
-pub(super) fn data(
-    file: &str,
-    bytes: &[u8],
-    info: &TensorInfo,
-    index: usize,
-    header: usize,
-    length: usize,
-) -> Result<Vec<u8>, ImportError> {
-    let damaged = |found: String| ImportError::Array {
-        file: file.to_owned(),
-        tensor: info.name.clone(),
-        found,
-        expected: "as many bytes as its shape and type need",
-    };
-    let mut archive = open(file, bytes)?;
-    let member = archive
-        .by_index(index)
-        .map_err(|error| damaged(error.to_string()))?;
-    let mut unpacked = Vec::new();
-    // One byte more than needed tells an array that is too long; it also reaches the end of the
-    // member, where the checksum is compared.
-    member
-        .take((header + length + 1) as u64)
-        .read_to_end(&mut unpacked)
-        .map_err(|error| damaged(error.to_string()))?;
-    if unpacked.len() != header + length {
-        let found = match unpacked.len().checked_sub(header) {
-            Some(found) if found <= length => format!("{found} bytes"),
-            Some(_) => format!("more than {length} bytes"),
-            None => "no bytes".to_owned(),
-        };
-        return Err(damaged(found));
-    }
-    unpacked.drain(..header);
-    Ok(unpacked)
-}
-
-fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<Archive<'b>, ImportError> {
-    ZipArchive::new(Cursor::new(bytes)).map_err(|error| ImportError::Container {
-        file: file.to_owned(),
-        format: "npz",
-        found: error.to_string(),
-    })
+fn damaged(file: &str, error: impl Display) -> ImportError {
+    let (format, found) = ("npz", error.to_string());
+    Located::new(file, Place::Whole, ImportFault::Container { format, found })
 }
 
 /// Describes a member; `None` for one that is no array.
-fn info(
+fn describe(
     file: &str,
     archive: &mut Archive<'_>,
-    index: usize,
+    member: usize,
 ) -> Result<Option<TensorInfo>, ImportError> {
-    let container = |error: ZipError| ImportError::Container {
-        file: file.to_owned(),
-        format: "npz",
-        found: error.to_string(),
-    };
-    let mut member = archive.by_index(index).map_err(container)?;
-    let name = member.name().map_err(container)?.into_owned();
-    let Some(name) = name.strip_suffix(".npy").map(str::to_owned) else {
+    let mut entry = archive.by_index(member).map_err(|e| damaged(file, e))?;
+    let name = entry.name().map_err(|e| damaged(file, e))?.into_owned();
+    let Some(name) = name.strip_suffix(".npy") else {
         return Ok(None);
     };
-    let header = npy::read_header(&mut member).map_err(|error| {
-        let (found, expected) = match error {
-            HeaderError::Read(error) => (error.to_string(), "a readable .npy array"),
-            HeaderError::Content { found, expected } => (found, expected),
-        };
-        ImportError::Array {
-            file: file.to_owned(),
-            tensor: name.clone(),
-            found,
-            expected,
+    match read_header(&mut entry) {
+        Ok(header) => Ok(Some(TensorInfo {
+            name: name.to_owned(),
+            member,
+            ..header
+        })),
+        Err((found, expected)) => {
+            let place = Place::Entry(format!("`{name}`").into());
+            Err(ImportError::at(file, place, found, expected))
         }
-    })?;
-    Ok(Some(TensorInfo {
-        name,
-        shape: header.shape,
-        element: header.element,
-        order: header.order,
-        endian: header.endian,
-        place: Place::Member {
-            index,
-            header: header.length,
-        },
-    }))
+    }
+}
+
+/// The bytes of an array's numbers.
+fn numbers(
+    file: &str,
+    bytes: &[u8],
+    info: &TensorInfo,
+    length: usize,
+) -> Result<Vec<u8>, ImportError> {
+    let refused = |found: String| {
+        let place = Place::Entry(format!("`{}`", info.name).into());
+        let expected = "as many bytes as its shape and type need";
+        ImportError::at(file, place, found, expected)
+    };
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, e))?;
+    let member = (archive.by_index(info.member)).map_err(|error| refused(error.to_string()))?;
+    let mut unpacked = Vec::new();
+    // One byte more than needed reveals an array that is too long; it also reaches the end of the
+    // member, where the checksum is compared.
+    (member.take((info.start + length + 1) as u64))
+        .read_to_end(&mut unpacked)
+        .map_err(|error| refused(error.to_string()))?;
+    match unpacked.len().checked_sub(info.start) {
+        Some(found) if found == length => Ok(unpacked.split_off(info.start)),
+        Some(found) if found < length => Err(refused(format!("{found} bytes"))),
+        Some(_) => Err(refused(format!("more than {length} bytes"))),
+        None => Err(refused("no bytes".to_owned())),
+    }
+}
+
+/// The description in an array's header, without name and member; else what was found and expected.
+fn read_header(reader: &mut impl Read) -> Result<TensorInfo, (String, &'static str)> {
+    let io = |error: io::Error| (error.to_string(), "a readable .npy array");
+    let mut fixed = [0; 8];
+    reader.read_exact(&mut fixed).map_err(io)?;
+    if !fixed.starts_with(MAGIC) {
+        let found = "another kind of file".to_owned();
+        return Err((found, "an array that starts with \\x93NUMPY"));
+    }
+    let length_bytes = match fixed[6] {
+        1 => 2,
+        2 | 3 => 4,
+        version => return Err((format!("version {version}"), "version 1, 2 or 3")),
+    };
+    let mut length = [0; 4];
+    reader.read_exact(&mut length[..length_bytes]).map_err(io)?;
+    let length = u32::from_le_bytes(length) as usize;
+    if length > MAX_HEADER_BYTES {
+        return Err((format!("a header of {length} bytes"), "at most 65536 bytes"));
+    }
+    let mut text = vec![0; length];
+    reader.read_exact(&mut text).map_err(io)?;
+    let text = String::from_utf8_lossy(&text);
+    let start = fixed.len() + length_bytes + length;
+    let found = || "a header that cannot be read".to_owned();
+    parse_header(&text, start).ok_or_else(|| (found(), "descr, fortran_order and shape"))
+}
+
+fn parse_header(text: &str, start: usize) -> Option<TensorInfo> {
+    let value = |key: &str| {
+        let after = ["'", "\""].iter().find_map(|quote| {
+            let (_, after) = text.split_once(&format!("{quote}{key}{quote}"))?;
+            Some(after)
+        })?;
+        Some(after.trim_start().strip_prefix(':')?.trim_start())
+    };
+    let (element, is_big_endian) = parse_element(value("descr")?)?;
+    let is_column_major = match value("fortran_order")? {
+        order if order.starts_with("True") => true,
+        order if order.starts_with("False") => false,
+        _ => return None,
+    };
+    Some(TensorInfo {
+        name: String::new(),
+        shape: parse_shape(value("shape")?)?,
+        element,
+        is_column_major,
+        is_big_endian,
+        member: 0,
+        start,
+    })
+}
+
+/// `'<f8'` and its relatives, with the flag of big-endian numbers.
+fn parse_element(text: &str) -> Option<(Element, bool)> {
+    if text.starts_with('[') {
+        return Some((Element::Other("a structure".to_owned()), false));
+    }
+    let quote = text.chars().next().filter(|c| matches!(c, '\'' | '"'))?;
+    let (descr, _) = text[1..].split_once(quote)?;
+    let element = match descr.trim_start_matches(['<', '>', '|', '=']) {
+        "f4" => Element::F32,
+        "f8" => Element::F64,
+        "b1" | "?" => Element::Bool,
+        _ => Element::Other(format!("{:?}", descr.chars().take(40).collect::<String>())),
+    };
+    Some((element, descr.starts_with('>')))
+}
+
+/// `(18, 4)`, `(4,)` or `()`; Python 2 wrote `(18L, 4L)`.
+fn parse_shape(text: &str) -> Option<Vec<usize>> {
+    let (inside, _) = text.strip_prefix('(')?.split_once(')')?;
+    let inside = inside.trim().strip_suffix(',').unwrap_or(inside.trim());
+    if inside.is_empty() {
+        return Some(Vec::new());
+    }
+    let dims = inside.split(',').map(|dim| {
+        let dim = dim.trim().trim_end_matches('L');
+        let is_number = dim.starts_with(|c: char| c.is_ascii_digit());
+        is_number.then(|| dim.parse().ok()).flatten()
+    });
+    let dims: Vec<usize> = dims.collect::<Option<_>>()?;
+    (dims.len() <= MAX_RANK).then_some(dims)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header(version: u8, dictionary: &str) -> Result<TensorInfo, (String, &'static str)> {
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend([version, 0]);
+        match version {
+            1 => bytes.extend((dictionary.len() as u16).to_le_bytes()),
+            _ => bytes.extend((dictionary.len() as u32).to_le_bytes()),
+        }
+        bytes.extend(dictionary.as_bytes());
+        read_header(&mut bytes.as_slice())
+    }
+
+    #[test]
+    fn header_of_numpy_is_read() {
+        let text = "{'descr': '<f8', 'fortran_order': False, 'shape': (18, 4), }          \n";
+        let read = header(1, text).expect("as NumPy writes it");
+        assert_eq!((read.element, read.is_column_major), (Element::F64, false));
+        assert_eq!((read.shape, read.start), (vec![18, 4], 10 + 71));
+        let read = header(2, "{'shape': (5L,), 'fortran_order': True, 'descr': '>f4'}")
+            .expect("keys in another order");
+        assert_eq!((read.shape, read.element), (vec![5], Element::F32));
+        assert!(read.is_big_endian && read.is_column_major);
+    }
+
+    #[test]
+    fn header_of_other_types_names_them() {
+        for (descr, expected) in [
+            ("'<i8'", "\"<i8\""),
+            ("'|O'", "\"|O\""),
+            ("[('a', '<f8'), ('b', '<f4', (2,))]", "a structure"),
+        ] {
+            let text = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': ()}}");
+            let read = header(1, &text).expect("a header all the same");
+            assert_eq!(read.element, Element::Other(expected.to_owned()));
+            assert!(read.shape.is_empty());
+        }
+    }
+
+    #[test]
+    fn header_without_all_entries_is_refused() {
+        for text in [
+            "",
+            "{}",
+            "{'descr': '<f8', 'shape': (1,)}",
+            "{'descr': '<f8', 'fortran_order': 0, 'shape': (1,)}",
+            "{'descr': '<f8', 'fortran_order': False, 'shape': (1,,)}",
+            "{'descr': '<f8', 'fortran_order': False, 'shape': (-1,)}",
+            "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999999,)}",
+            "{'descr': f8, 'fortran_order': False, 'shape': (1,)}",
+        ] {
+            let (found, _) = header(1, text).expect_err(text);
+            assert_eq!(found, "a header that cannot be read");
+        }
+        assert_eq!(header(9, "{}").expect_err("no such version").0, "version 9");
+    }
 }

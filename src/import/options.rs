@@ -1,39 +1,40 @@
-//! What the user says about a foreign file: everything that tensors do not carry.
+//! Options of an import: everything that tensors do not carry.
 
 use std::path::Path;
 use std::str::FromStr;
 
+use clap::ValueEnum;
 use serde::Serialize;
 
 use super::error::ImportError;
 use super::latex::SymbolNames;
+use super::report::Note;
 use super::role::Mapping;
+use crate::files::Place;
 use crate::model::{Activation, FeetRule, Scaling, StandardLibrary};
-use crate::robot::{ContactFlags, FOOT_DIM, Robot};
+use crate::robot::{ContactFlags, Robot};
 
 /// The kinds of files that can be imported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Format {
-    /// Tensors in a safetensors file, such as a PyTorch state dict.
+    /// Tensors in a safetensors file, such as a PyTorch state dict
     Safetensors,
-    /// NumPy arrays in an `.npz` file.
+    /// NumPy arrays
     Npz,
-    /// Equations of the latent accelerations as text.
+    /// Equations as text: `[contact]`, then `ddz1 = 0.36 - 0.16*dz1 + u1` and so on
     Equations,
-    /// The same as LaTeX, in a `.tex` or Markdown file.
+    /// Equations as LaTeX, in a .tex or Markdown file
     Latex,
 }
 
 impl Format {
-    /// The kind that a file's ending tells.
+    /// The kind of a file by its ending.
     ///
     /// # Errors
-    /// [`ImportError::UnknownFormat`], which says how to convert files of known other kinds.
+    /// [`ImportError`], which states how to convert files of known other kinds.
     pub fn of_path(path: &Path) -> Result<Self, ImportError> {
-        let ending = path
-            .extension()
-            .map(|ending| ending.to_string_lossy().to_lowercase());
+        let ending = (path.extension()).map(|ending| ending.to_string_lossy().to_lowercase());
         let expected = match ending.as_deref() {
             Some("safetensors") => return Ok(Format::Safetensors),
             Some("npz") => return Ok(Format::Npz),
@@ -59,14 +60,12 @@ impl Format {
                  --format to say what it is"
             }
         };
-        Err(ImportError::UnknownFormat {
-            file: path.display().to_string(),
-            found: match ending {
-                Some(ending) => format!("the ending `.{ending}`"),
-                None => "no ending".to_owned(),
-            },
-            expected,
-        })
+        let found = match ending {
+            Some(ending) => format!("the ending `.{ending}`"),
+            None => "no ending".to_owned(),
+        };
+        let file = path.display().to_string();
+        Err(ImportError::at(&file, Place::Whole, found, expected))
     }
 
     /// Name for messages.
@@ -81,20 +80,20 @@ impl Format {
 }
 
 /// How a file stores the weights of a map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum WeightVectors {
-    /// For row vectors, `z = x W` (TensorFlow, Keras): transposed on import.
+    /// For `z = x W` (TensorFlow, Keras)
     Row,
-    /// For column vectors, `z = W x` (`torch.nn.Linear`): as in the model file.
+    /// For `z = W x` (torch.nn.Linear), as in the model file
     Column,
 }
 
 /// How a file stores coefficients.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum XiLayout {
-    /// One row a candidate term, as in the model file.
+    /// One row per candidate term, as in the model file
     TermsByLatent,
-    /// One row a latent coordinate (PySINDy): transposed on import.
+    /// One row per latent coordinate (PySINDy)
     LatentByTerms,
 }
 
@@ -108,26 +107,24 @@ pub enum LibraryChoice {
 }
 
 /// In which order a file has the terms of the standard library.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum LibraryOrder {
-    /// As in the published arrays: sin z, sin dz, cos z, cos dz.
+    /// sin z, sin dz, cos z, cos dz: the published arrays
     #[default]
     Author,
-    /// As appendix B of the paper lists them: sin z, cos z, sin dz, cos dz.
+    /// sin z, cos z, sin dz, cos dz: appendix B of the paper
     Paper,
 }
 
 /// Reads `degree=2,trigonometric,inputs`.
 ///
 /// # Errors
-/// [`ImportError::Option`].
+/// [`ImportError`] of the option.
 pub fn parse_standard(text: &str) -> Result<StandardLibrary, ImportError> {
-    let refused = |part: &str| ImportError::Option {
-        option: "--library",
-        found: format!("{part:?}"),
-        expected: "degree=N, then trigonometric and inputs if the library has them, separated by \
-                   commas; or a file with the list of terms"
-            .to_owned(),
+    let refused = |part: &str| {
+        let expected = "degree=N, then trigonometric and inputs if the library has them, separated \
+                        by commas; or a file with the list of terms";
+        ImportError::option("--library", format!("{part:?}"), expected)
     };
     let mut degree = None;
     let (mut trigonometric, mut inputs) = (false, false);
@@ -173,12 +170,10 @@ impl FromStr for PhaseRule {
     type Err = ImportError;
 
     fn from_str(text: &str) -> Result<Self, ImportError> {
-        let refused = || ImportError::Option {
-            option: "--phase",
-            found: format!("{text:?}"),
-            expected: "NAME=any, NAME=none, or NAME= and foot patterns in the order fr fl rr rl, \
-                       such as rear=0011,0001"
-                .to_owned(),
+        let refused = || {
+            let expected = "NAME=any, NAME=none, or NAME= and foot patterns in the order fr fl rr \
+                            rl, such as rear=0011,0001";
+            ImportError::option("--phase", format!("{text:?}"), expected)
         };
         let (name, feet) = text.split_once('=').ok_or_else(refused)?;
         let feet = match feet.trim() {
@@ -199,15 +194,13 @@ impl FromStr for PhaseRule {
 }
 
 fn parse_pattern(text: &str) -> Option<ContactFlags> {
-    let flags: Option<Vec<bool>> = (text.chars())
-        .map(|c| match c {
-            '0' => Some(false),
-            '1' => Some(true),
-            _ => None,
-        })
-        .collect();
-    let flags: [bool; FOOT_DIM] = flags?.try_into().ok()?;
-    Some(flags)
+    let flags = text.chars().map(|c| match c {
+        '0' => Some(false),
+        '1' => Some(true),
+        _ => None,
+    });
+    let flags: Vec<bool> = flags.collect::<Option<_>>()?;
+    flags.try_into().ok()
 }
 
 /// A foot rule as [`PhaseRule`] reads it.
@@ -223,28 +216,28 @@ pub(super) fn feet_text(feet: &FeetRule) -> String {
     }
 }
 
-/// Everything that is said about a file; only the name is always needed.
+/// Options of an import; only the name is always needed.
 #[derive(Clone, Debug, Default)]
 pub struct ImportOptions {
     /// Name of the model.
     pub name: String,
     /// Free text about it.
     pub description: String,
-    /// The kind of file, if its ending does not tell.
+    /// The kind of file, if its ending is none of the known ones.
     pub format: Option<Format>,
     /// Tensors by name; those not mentioned are found by their usual names.
     pub mapping: Vec<Mapping>,
-    /// How weights are stored, if their shape does not tell or is to be checked.
+    /// How weights are stored: needed for square ones, checked for others.
     pub weights: Option<WeightVectors>,
     /// What is between the layers of an encoder or decoder that has several.
     pub activation: Option<Activation>,
-    /// How coefficients are stored, if their shape does not tell or is to be checked.
+    /// How coefficients are stored: needed if their shape fits both ways, else checked.
     pub xi_layout: Option<XiLayout>,
     /// How LaTeX writes the variables.
     pub symbols: SymbolNames,
     /// The candidate terms; equations bring their own.
     pub library: Option<LibraryChoice>,
-    /// Number of latent coordinates, if shapes do not tell or is to be checked.
+    /// Number of latent coordinates: needed if shapes leave it open, else checked.
     pub latent_dim: Option<usize>,
     /// The phases in the order in which they are tried; `contact` and `flight` are known.
     pub phases: Vec<PhaseRule>,
@@ -259,15 +252,37 @@ pub struct ImportOptions {
 impl ImportOptions {
     /// The rule of a phase: as given, or for `contact` and `flight` as usual.
     pub(super) fn feet_of(&self, phase: &str) -> Option<FeetRule> {
-        let given = self.phases.iter().find(|rule| rule.name == phase);
-        match (given, phase) {
-            (Some(rule), _) => Some(rule.feet.clone()),
-            (None, _) if !self.phases.is_empty() => None,
-            (None, "contact") => Some(FeetRule::Any),
-            (None, "flight") => Some(FeetRule::None),
-            (None, _) => None,
+        match phase {
+            _ if !self.phases.is_empty() => {
+                let given = self.phases.iter().find(|rule| rule.name == phase);
+                given.map(|rule| rule.feet.clone())
+            }
+            "contact" => Some(FeetRule::Any),
+            "flight" => Some(FeetRule::None),
+            _ => None,
         }
     }
+
+    /// The note that a phase got the usual rule, unless the rules were given.
+    pub(super) fn usual_feet(&self, phase: &str, feet: &FeetRule) -> Option<Note> {
+        self.phases.is_empty().then(|| Note::UsualFeet {
+            phase: phase.to_owned(),
+            feet: feet_text(feet),
+        })
+    }
+}
+
+/// A phase without a rule; `found` is what belongs to it.
+pub(super) fn no_feet(file: &str, phase: &str, found: &str) -> ImportError {
+    let expected = format!(
+        "--phase {phase}=FEET (any, none, or patterns such as 0011 in the order fr fl rr rl)"
+    );
+    ImportError::at(
+        file,
+        Place::Whole,
+        format!("{found} of phase `{phase}`"),
+        expected,
+    )
 }
 
 #[cfg(test)]
@@ -291,13 +306,7 @@ mod tests {
                 );
             }
         }
-        for text in [
-            "",
-            "inputs",
-            "degree=1,degree=2",
-            "degree=-1",
-            "degree=1,cosines",
-        ] {
+        for text in "|inputs|degree=1,degree=2|degree=-1|degree=1,cosines".split('|') {
             assert!(parse_standard(text).is_err(), "{text}");
         }
     }
@@ -308,15 +317,7 @@ mod tests {
         assert_eq!(feet_text(&rear.feet), "0011,0001");
         let contact: PhaseRule = "contact=any".parse().expect("a rule");
         assert_eq!(contact.feet, FeetRule::Any);
-        for text in [
-            "",
-            "contact",
-            "=any",
-            "rear=",
-            "rear=001",
-            "rear=00112",
-            "rear=002x",
-        ] {
+        for text in "|contact|=any|rear=|rear=001|rear=00112|rear=002x".split('|') {
             assert!(text.parse::<PhaseRule>().is_err(), "{text}");
         }
     }

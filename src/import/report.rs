@@ -1,4 +1,4 @@
-//! What an import did: which tensors it took for what, how it turned them, what it left.
+//! The decisions of an import: the use of each tensor, how it was stored, tensors left unused.
 
 use std::fmt;
 
@@ -25,7 +25,7 @@ pub struct ImportReport {
     pub unused: Vec<UnusedTensor>,
     /// Equations that became part of the model.
     pub equations: Vec<ReadEquation>,
-    /// What else the user should know.
+    /// Further decisions.
     pub notes: Vec<Note>,
 }
 
@@ -36,11 +36,11 @@ pub struct UsedTensor {
     pub role: String,
     /// Its name in the file.
     pub tensor: String,
-    /// Its shape in the file.
+    /// Dimensions in the file.
     pub shape: Vec<usize>,
     /// Type of its numbers.
     pub element: String,
-    /// Who said so.
+    /// Who decided this.
     pub chosen: Chosen,
     /// How it was stored.
     pub layout: Layout,
@@ -64,9 +64,9 @@ pub enum Layout {
     Column,
     /// Weights for row vectors.
     Row,
-    /// Coefficients, one row a term.
+    /// Coefficients, one row per term.
     TermsByLatent,
-    /// Coefficients, one row a latent coordinate.
+    /// Coefficients, one row per latent coordinate.
     LatentByTerms,
     /// A list of numbers, or a matrix that is the same both ways.
     Plain,
@@ -77,19 +77,19 @@ impl fmt::Display for Layout {
         f.write_str(match self {
             Layout::Column => "column vectors (W x), as in the model file",
             Layout::Row => "row vectors (x W), transposed",
-            Layout::TermsByLatent => "a row a term, as in the model file",
-            Layout::LatentByTerms => "a row a latent coordinate, transposed",
+            Layout::TermsByLatent => "one row per term, as in the model file",
+            Layout::LatentByTerms => "one row per latent coordinate, transposed",
             Layout::Plain => "as stored",
         })
     }
 }
 
-/// A tensor that the model has no use for.
+/// A tensor that is no part of the model.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct UnusedTensor {
     /// Its name in the file.
     pub tensor: String,
-    /// Its shape in the file.
+    /// Dimensions in the file.
     pub shape: Vec<usize>,
 }
 
@@ -150,12 +150,15 @@ impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Note::UsualFeet { phase, feet } => {
-                write!(f, "phase {phase} holds for feet `{feet}`, as its name says")
+                write!(
+                    f,
+                    "phase {phase} holds for feet `{feet}`, the usual rule of its name"
+                )
             }
             Note::ZeroBias { part } => write!(f, "the {part} has no bias: zero"),
             Note::Layers { part, layers } => write!(f, "the {part} has layers {layers}"),
             Note::NoMap { part: "encoder" } => {
-                f.write_str("no encoder: the model says nothing about a robot's coordinates")
+                f.write_str("no encoder: the model has latent coordinates only")
             }
             Note::NoMap { part } => write!(f, "no {part}: latent states cannot be mapped back"),
             Note::MixedWeights => f.write_str(

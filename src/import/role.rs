@@ -1,4 +1,4 @@
-//! What a tensor is used as.
+//! Parts of a model that a tensor can be.
 
 use std::fmt;
 use std::str::FromStr;
@@ -31,7 +31,7 @@ pub enum Role {
     Weights(Part),
     /// `b_e` or `b_d`.
     Bias(Part),
-    /// Weights of one of several layers; the number tells their order.
+    /// Weights of one of several layers, in the order of their numbers.
     LayerWeights(Part, usize),
     /// Bias of one of several layers.
     LayerBias(Part, usize),
@@ -43,15 +43,15 @@ pub enum Role {
     InputMean(String),
     /// Covariance of the training inputs of a phase, SI units.
     InputCovariance(String),
-    /// `s_x`, one factor a robot coordinate.
+    /// `s_x`, one factor per robot coordinate.
     StateScaling,
-    /// `s_u`, one factor an input coordinate.
+    /// `s_u`, one factor per input coordinate.
     InputScaling,
 }
 
 const EXPECTED: &str = "encoder.weight, encoder.bias, decoder.weight, decoder.bias (of a layer \
-                        encoder.0.weight and so on), xi.PHASE, mask.PHASE, input_mean.PHASE, input_covariance.PHASE, scaling.state or \
-                        scaling.input";
+                        encoder.0.weight and so on), xi.PHASE, mask.PHASE, input_mean.PHASE, \
+                        input_covariance.PHASE, scaling.state or scaling.input";
 
 impl fmt::Display for Role {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -74,43 +74,35 @@ impl FromStr for Role {
     type Err = ImportError;
 
     fn from_str(text: &str) -> Result<Self, ImportError> {
-        let unknown = || ImportError::Option {
-            option: "--map",
-            found: format!("the part {text:?}"),
-            expected: EXPECTED.to_owned(),
-        };
-        let (head, tail) = text.split_once('.').ok_or_else(unknown)?;
-        let phase = tail.to_owned();
-        match (head, tail) {
-            (_, "") => Err(unknown()),
-            ("encoder", "weight" | "weights") => Ok(Role::Weights(Part::Encoder)),
-            ("encoder", "bias") => Ok(Role::Bias(Part::Encoder)),
-            ("decoder", "weight" | "weights") => Ok(Role::Weights(Part::Decoder)),
-            ("decoder", "bias") => Ok(Role::Bias(Part::Decoder)),
-            ("encoder" | "decoder", _) => layer_role(head, tail).ok_or_else(unknown),
-            ("scaling", "state") => Ok(Role::StateScaling),
-            ("scaling", "input") => Ok(Role::InputScaling),
-            ("xi", _) => Ok(Role::Xi(phase)),
-            ("mask", _) => Ok(Role::Mask(phase)),
-            ("input_mean", _) => Ok(Role::InputMean(phase)),
-            ("input_covariance", _) => Ok(Role::InputCovariance(phase)),
-            _ => Err(unknown()),
-        }
+        read_role(text)
+            .ok_or_else(|| ImportError::option("--map", format!("the part {text:?}"), EXPECTED))
     }
 }
 
-/// `0.weight` of an encoder or decoder.
-fn layer_role(head: &str, tail: &str) -> Option<Role> {
+fn read_role(text: &str) -> Option<Role> {
+    let (head, tail) = text.split_once('.').filter(|(_, tail)| !tail.is_empty())?;
     let part = match head {
         "encoder" => Part::Encoder,
-        _ => Part::Decoder,
+        "decoder" => Part::Decoder,
+        "scaling" if tail == "state" => return Some(Role::StateScaling),
+        "scaling" if tail == "input" => return Some(Role::InputScaling),
+        "xi" => return Some(Role::Xi(tail.to_owned())),
+        "mask" => return Some(Role::Mask(tail.to_owned())),
+        "input_mean" => return Some(Role::InputMean(tail.to_owned())),
+        "input_covariance" => return Some(Role::InputCovariance(tail.to_owned())),
+        _ => return None,
     };
-    let (number, tensor) = tail.split_once('.')?;
-    let number = number.parse().ok()?;
-    match tensor {
-        "weight" | "weights" => Some(Role::LayerWeights(part, number)),
-        "bias" => Some(Role::LayerBias(part, number)),
-        _ => None,
+    match tail.split_once('.') {
+        None => match tail {
+            "weight" | "weights" => Some(Role::Weights(part)),
+            "bias" => Some(Role::Bias(part)),
+            _ => None,
+        },
+        Some((layer, tensor)) => match tensor {
+            "weight" | "weights" => Some(Role::LayerWeights(part, layer.parse().ok()?)),
+            "bias" => Some(Role::LayerBias(part, layer.parse().ok()?)),
+            _ => None,
+        },
     }
 }
 
@@ -128,6 +120,14 @@ impl Role {
             | Role::LayerBias(..)
             | Role::StateScaling
             | Role::InputScaling => None,
+        }
+    }
+
+    /// The layer's number and the map that it belongs to, of weights of one of several layers.
+    pub(super) fn layer(&self) -> Option<(Part, usize)> {
+        match self {
+            Role::LayerWeights(part, number) => Some((*part, *number)),
+            _ => None,
         }
     }
 }
@@ -150,11 +150,11 @@ impl FromStr for Mapping {
                 role: role.trim().parse()?,
                 tensor: tensor.to_owned(),
             }),
-            _ => Err(ImportError::Option {
-                option: "--map",
-                found: format!("{text:?}"),
-                expected: "PART=TENSOR, such as encoder.weight=net.enc.0.weight".to_owned(),
-            }),
+            _ => Err(ImportError::option(
+                "--map",
+                format!("{text:?}"),
+                "PART=TENSOR, such as encoder.weight=net.enc.0.weight",
+            )),
         }
     }
 }
@@ -194,16 +194,8 @@ mod tests {
             "encoder=W",
             "xi.=W",
         ] {
-            assert!(
-                matches!(
-                    text.parse::<Mapping>(),
-                    Err(ImportError::Option {
-                        option: "--map",
-                        ..
-                    })
-                ),
-                "{text}"
-            );
+            let error = text.parse::<Mapping>().expect_err(text);
+            assert!(error.to_string().starts_with("--map: found "), "{error}");
         }
     }
 

@@ -8,15 +8,15 @@ use serde_json::{Map, Value, json};
 use sha2::{Digest as _, Sha256};
 
 use super::assemble::{self, ImportNotes, Parts};
-use super::equations;
+use super::equations::{self, Sections};
 use super::error::ImportError;
 use super::latent;
 use super::latex;
 use super::npz;
 use super::options::{Format, ImportOptions};
-use super::report::{ImportReport, ReadEquation};
+use super::report::ImportReport;
 use super::safetensors;
-use super::tensors::{TensorFile, short_name};
+use crate::files::{Located, Place};
 use crate::model::{CoordinateNames, ReducedModel, StateMap};
 use crate::robot::Robot;
 
@@ -28,29 +28,26 @@ const MAX_FILE_BYTES: u64 = 256 << 20;
 pub struct Imported {
     /// The model, checked like any other.
     pub model: ReducedModel,
-    /// What became of each tensor or equation.
+    /// The use of each tensor or equation.
     pub report: ImportReport,
 }
 
 /// Imports a model trained elsewhere.
 ///
 /// # Errors
-/// [`ImportError`]; every variant says what was found and what was expected.
+/// [`ImportError`] with the place, what was found and what was expected.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportError> {
     let format = match options.format {
         Some(format) => format,
         None => Format::of_path(path)?,
     };
-    let io = |source| ImportError::Io {
-        path: path.to_owned(),
-        source,
-    };
+    let file = path.display().to_string();
     let mut bytes = Vec::new();
-    // One byte more than allowed tells a file that is too large from one that just fits.
+    // One byte more than allowed distinguishes a file that is too large from one that just fits.
     File::open(path)
         .and_then(|file| file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(io)?;
-    import_from_bytes(&path.display().to_string(), format, &bytes, options)
+        .map_err(|source| Located::new(&file, Place::Whole, source))?;
+    import_from_bytes(&file, format, &bytes, options)
 }
 
 /// Imports a model from a file in memory; `file` names it in errors.
@@ -68,24 +65,11 @@ pub fn import_from_bytes(
         Format::Safetensors | Format::Npz => MAX_FILE_BYTES,
     };
     if bytes.len() as u64 > max {
-        return Err(ImportError::TooLarge {
-            file: file.to_owned(),
-            what: "the file".to_owned(),
-            max,
-            unit: "bytes",
-        });
+        return Err(ImportError::too_large(file, max, "bytes"));
     }
-    let (parts, news, equations) = match format {
-        Format::Safetensors => {
-            let infos = safetensors::infos(file, bytes)?;
-            let (parts, news) = assemble::parts(&TensorFile::new(file, bytes, infos)?, options)?;
-            (parts, news, Vec::new())
-        }
-        Format::Npz => {
-            let infos = npz::infos(file, bytes)?;
-            let (parts, news) = assemble::parts(&TensorFile::new(file, bytes, infos)?, options)?;
-            (parts, news, Vec::new())
-        }
+    let (parts, notes) = match format {
+        Format::Safetensors => assemble::parts(&safetensors::open(file, bytes)?, options)?,
+        Format::Npz => assemble::parts(&npz::open(file, bytes)?, options)?,
         Format::Equations => of_equations(file, &equations::read(file, bytes)?, options)?,
         Format::Latex => {
             let usual = ["contact", "flight"].map(str::to_owned).into_iter();
@@ -96,19 +80,29 @@ pub fn import_from_bytes(
             of_equations(file, &sections, options)?
         }
     };
-    let origin = Origin {
-        file,
+    let provenance = provenance(file, format, bytes, &notes);
+    let state_dim = (parts.encoder.as_ref().map(StateMap::input_dim))
+        .or(parts.decoder.as_ref().map(StateMap::output_dim));
+    let model = build(file, parts, provenance, options)?;
+    let report = ImportReport {
+        file: file.to_owned(),
         format,
-        bytes,
+        latent_dim: model.latent_dim(),
+        state_dim,
+        library_dim: model.library().len(),
+        used: notes.used,
+        unused: notes.unused,
+        equations: notes.equations,
+        notes: notes.notes,
     };
-    finish(&origin, parts, news, equations, options)
+    Ok(Imported { model, report })
 }
 
 fn of_equations(
     file: &str,
-    sections: &equations::Sections,
+    sections: &Sections,
     options: &ImportOptions,
-) -> Result<(Parts, ImportNotes, Vec<ReadEquation>), ImportError> {
+) -> Result<(Parts, ImportNotes), ImportError> {
     let found = latent::latent(file, sections, options)?;
     let parts = Parts {
         library: found.library,
@@ -118,64 +112,60 @@ fn of_equations(
         scaling: options.scaling.clone(),
         statistics: Vec::new(),
     };
-    let news = ImportNotes {
+    let notes = ImportNotes {
+        equations: found.equations,
         notes: found.notes,
         ..ImportNotes::default()
     };
-    Ok((parts, news, found.equations))
+    Ok((parts, notes))
 }
 
-struct Origin<'o> {
-    file: &'o str,
-    format: Format,
-    bytes: &'o [u8],
-}
-
-impl Origin<'_> {
-    /// What the model file keeps of it: no folders, no time.
-    fn provenance(&self, news: &ImportNotes) -> Map<String, Value> {
-        let mut entries = Map::new();
-        entries.insert("imported_from".to_owned(), json!(short_name(self.file)));
-        entries.insert("format".to_owned(), json!(self.format));
-        let digest = Sha256::digest(self.bytes);
-        let digest: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
-        entries.insert("sha256".to_owned(), json!(digest));
-        entries.insert("romc".to_owned(), json!(env!("CARGO_PKG_VERSION")));
-        if !news.used.is_empty() {
-            let tensors = news.used.iter().map(|used| {
-                let value = json!({ "tensor": used.tensor, "layout": used.layout });
-                (used.role.clone(), value)
-            });
-            entries.insert("tensors".to_owned(), Value::Object(tensors.collect()));
-        }
-        entries
+/// The origin as the model file keeps it: no folders, no time.
+fn provenance(file: &str, format: Format, bytes: &[u8], notes: &ImportNotes) -> Map<String, Value> {
+    let name = Path::new(file).file_name();
+    let name = name.map_or_else(
+        || file.to_owned(),
+        |name| name.to_string_lossy().into_owned(),
+    );
+    let digest = Sha256::digest(bytes);
+    let digest: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+    let mut entries = Map::new();
+    entries.insert("imported_from".to_owned(), json!(name));
+    entries.insert("format".to_owned(), json!(format));
+    entries.insert("sha256".to_owned(), json!(digest));
+    entries.insert("romc".to_owned(), json!(env!("CARGO_PKG_VERSION")));
+    if !notes.used.is_empty() {
+        let tensors = notes.used.iter().map(|used| {
+            let value = json!({ "tensor": used.tensor, "layout": used.layout });
+            (used.role.clone(), value)
+        });
+        entries.insert("tensors".to_owned(), Value::Object(tensors.collect()));
     }
+    entries
 }
 
 /// Hands the parts to the builder that checks every model.
-fn finish(
-    origin: &Origin<'_>,
+fn build(
+    file: &str,
     parts: Parts,
-    news: ImportNotes,
-    equations: Vec<ReadEquation>,
+    provenance: Map<String, Value>,
     options: &ImportOptions,
-) -> Result<Imported, ImportError> {
-    let has_map = parts.encoder.is_some() || parts.decoder.is_some();
-    if has_map && parts.scaling.is_none() {
-        return Err(ImportError::NoScaling {
-            file: origin.file.to_owned(),
-            part: match parts.encoder {
-                Some(_) => "encoder",
-                None => "decoder",
-            },
-        });
+) -> Result<ReducedModel, ImportError> {
+    let map = match (&parts.encoder, &parts.decoder) {
+        (Some(_), _) => Some("an encoder"),
+        (None, Some(_)) => Some("a decoder"),
+        (None, None) => None,
+    };
+    if let (Some(map), None) = (map, &parts.scaling) {
+        let expected = "--scaling FACTOR (scaled value = factor times SI value: 0.1 for the \
+                        published models, 1 for SI units)";
+        let found = format!("{map} without scale factors");
+        return Err(ImportError::at(file, Place::Whole, found, expected));
     }
-    let state_dim = (parts.encoder.as_ref().map(StateMap::input_dim))
-        .or(parts.decoder.as_ref().map(StateMap::output_dim));
     let mut builder = ReducedModel::builder(options.name.clone(), parts.library)
         .description(options.description.clone())
         .phases(parts.phases)
-        .provenance(origin.provenance(&news));
+        .provenance(provenance);
     if let Some(encoder) = parts.encoder {
         builder = builder.encoder(encoder);
     }
@@ -190,41 +180,20 @@ fn finish(
     }
     if let Some(robot) = options.robot {
         builder = builder.robot(robot);
-        if has_map {
-            builder = builder.state(state_signals()).input(input_signals());
+        if map.is_some() {
+            builder = builder
+                .state(CoordinateNames {
+                    names: Robot::state_names().to_vec(),
+                    units: Robot::state_units().to_vec(),
+                })
+                .input(CoordinateNames {
+                    names: Robot::input_names().to_vec(),
+                    units: Robot::input_units().to_vec(),
+                });
         }
     }
     if let Some(sample_time_s) = options.sample_time_s {
         builder = builder.sample_time_s(sample_time_s);
     }
-    let model = builder.build().map_err(|source| ImportError::Model {
-        file: origin.file.to_owned(),
-        source: Box::new(source),
-    })?;
-    let report = ImportReport {
-        file: origin.file.to_owned(),
-        format: origin.format,
-        latent_dim: model.latent_dim(),
-        state_dim,
-        library_dim: model.library().len(),
-        used: news.used,
-        unused: news.unused,
-        equations,
-        notes: news.notes,
-    };
-    Ok(Imported { model, report })
-}
-
-fn state_signals() -> CoordinateNames {
-    CoordinateNames {
-        names: Robot::state_names().to_vec(),
-        units: Robot::state_units().to_vec(),
-    }
-}
-
-fn input_signals() -> CoordinateNames {
-    CoordinateNames {
-        names: Robot::input_names().to_vec(),
-        units: Robot::input_units().to_vec(),
-    }
+    (builder.build()).map_err(|source| ImportError::model(file, source))
 }

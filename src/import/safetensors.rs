@@ -1,45 +1,38 @@
-//! Descriptions of the tensors of a safetensors file.
+//! Safetensors files, such as PyTorch state dicts.
+
+use std::borrow::Cow;
 
 use safetensors::{Dtype, SafeTensors};
 
-use super::error::ImportError;
-use super::tensors::{Element, Endian, Order, Place, TensorInfo};
+use super::error::{ImportError, ImportFault};
+use super::tensors::{Element, TensorFile, TensorInfo};
+use crate::files::{Located, Place};
 
 /// Bytes before the header: its length.
 const LENGTH_BYTES: usize = 8;
 
-/// Describes all tensors; offsets and lengths have been checked against the file.
-pub(super) fn infos(file: &str, bytes: &[u8]) -> Result<Vec<TensorInfo>, ImportError> {
-    let (header, metadata) =
-        SafeTensors::read_metadata(bytes).map_err(|error| ImportError::Container {
-            file: file.to_owned(),
-            format: "safetensors",
-            found: error.to_string(),
-        })?;
-    let described = metadata
-        .tensors()
-        .into_iter()
-        .map(|(name, info)| TensorInfo {
-            name,
-            shape: info.shape.clone(),
-            element: element(info.dtype),
-            order: Order::Last,
-            endian: Endian::Little,
-            place: Place::Bytes {
-                start: LENGTH_BYTES + header + info.data_offsets.0,
-            },
-        });
-    Ok(described.collect())
-}
-
-fn element(dtype: Dtype) -> Element {
-    if dtype == Dtype::F32 {
-        Element::F32
-    } else if dtype == Dtype::F64 {
-        Element::F64
-    } else if dtype == Dtype::BOOL {
-        Element::Bool
-    } else {
-        Element::Other(dtype.to_string())
-    }
+/// Opens a file; offsets and lengths of its tensors are checked against the file.
+pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, ImportError> {
+    let (header, metadata) = SafeTensors::read_metadata(bytes).map_err(|error| {
+        let found = error.to_string();
+        let format = "safetensors";
+        Located::new(file, Place::Whole, ImportFault::Container { format, found })
+    })?;
+    let tensors = metadata.tensors().into_iter();
+    let infos = tensors.map(|(name, info)| TensorInfo {
+        name,
+        shape: info.shape.clone(),
+        element: match info.dtype {
+            Dtype::F32 => Element::F32,
+            Dtype::F64 => Element::F64,
+            Dtype::BOOL => Element::Bool,
+            other => Element::Other(other.to_string()),
+        },
+        is_column_major: false,
+        is_big_endian: false,
+        member: 0,
+        start: LENGTH_BYTES + header + info.data_offsets.0,
+    });
+    let read = |info: &TensorInfo, length| Ok(Cow::from(&bytes[info.start..info.start + length]));
+    TensorFile::new(file, infos.collect(), Box::new(read))
 }

@@ -38,12 +38,7 @@ pub fn read_equations(
     known: &[String],
 ) -> Result<ReadEquations, ImportError> {
     if bytes.len() as u64 > MAX_TEXT_BYTES {
-        return Err(ImportError::TooLarge {
-            file: file.to_owned(),
-            what: "the file".to_owned(),
-            max: MAX_TEXT_BYTES,
-            unit: "bytes",
-        });
+        return Err(ImportError::too_large(file, MAX_TEXT_BYTES, "bytes"));
     }
     let read = match format {
         Format::Latex => latex::read(file, bytes, symbols, known)?,

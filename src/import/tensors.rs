@@ -1,14 +1,14 @@
 //! Named arrays of numbers in a foreign file, whatever its container.
 
-use std::path::Path;
+use std::borrow::Cow;
 
 use nalgebra::DMatrix;
 
-use super::error::{ImportError, shape_text};
-use super::npz;
+use super::error::{ImportError, ImportFault, shape_text};
+use crate::files::{Located, Place};
 
 /// Largest tensor that is read: the coefficients of the largest library fit twice.
-pub(super) const MAX_ELEMENTS: usize = 4 << 20;
+const MAX_ELEMENTS: usize = 4 << 20;
 
 /// Type of the numbers of a tensor.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,39 +41,19 @@ impl Element {
     }
 }
 
-/// Which index runs fastest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Order {
-    /// The last (C).
-    Last,
-    /// The first (Fortran).
-    First,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Endian {
-    Little,
-    Big,
-}
-
-/// Where the numbers of a tensor are.
-#[derive(Clone, Debug)]
-pub(super) enum Place {
-    /// At this byte of the file.
-    Bytes { start: usize },
-    /// In this member of the zip file, after this many bytes of header.
-    Member { index: usize, header: usize },
-}
-
-/// What a file says about one tensor.
+/// The description of one tensor.
 #[derive(Clone, Debug)]
 pub(super) struct TensorInfo {
     pub(super) name: String,
     pub(super) shape: Vec<usize>,
     pub(super) element: Element,
-    pub(super) order: Order,
-    pub(super) endian: Endian,
-    pub(super) place: Place,
+    /// The first index runs fastest (Fortran), not the last (C).
+    pub(super) is_column_major: bool,
+    pub(super) is_big_endian: bool,
+    /// Member of a zip file; 0 in other containers.
+    pub(super) member: usize,
+    /// First byte of the numbers in the member or file.
+    pub(super) start: usize,
 }
 
 impl TensorInfo {
@@ -83,71 +63,65 @@ impl TensorInfo {
     }
 }
 
-/// The numbers of a tensor of one or two indices.
+/// The numbers of a tensor.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Array {
     pub(super) shape: Vec<usize>,
-    pub(super) order: Order,
+    pub(super) is_column_major: bool,
     pub(super) values: Vec<f64>,
 }
 
 impl Array {
     /// The array as a matrix of `rows x columns`, laid out as its indices say.
-    pub(super) fn matrix(&self, rows: usize, columns: usize) -> DMatrix<f64> {
-        match self.order {
-            Order::Last => DMatrix::from_row_slice(rows, columns, &self.values),
-            Order::First => DMatrix::from_column_slice(rows, columns, &self.values),
+    pub(super) fn matrix(&self, (rows, columns): (usize, usize)) -> DMatrix<f64> {
+        match self.is_column_major {
+            false => DMatrix::from_row_slice(rows, columns, &self.values),
+            true => DMatrix::from_column_slice(rows, columns, &self.values),
         }
     }
 
     /// The index of the number at a position of `values`.
-    pub(super) fn index_of(&self, position: usize) -> Vec<usize> {
+    fn index_of(&self, position: usize) -> Vec<usize> {
         let mut rest = position;
-        let mut take = |dim: &usize| {
-            let index = rest % dim;
-            rest /= dim;
-            index
-        };
-        match self.order {
-            Order::First => self.shape.iter().map(take).collect(),
-            Order::Last => {
-                let mut index: Vec<usize> = self.shape.iter().rev().map(&mut take).collect();
-                index.reverse();
-                index
-            }
+        let mut index = vec![0; self.shape.len()];
+        for step in 0..index.len() {
+            let axis = match self.is_column_major {
+                true => step,
+                false => index.len() - 1 - step,
+            };
+            index[axis] = rest % self.shape[axis];
+            rest /= self.shape[axis];
         }
+        index
     }
 }
 
-/// A file of tensors: their descriptions, and the bytes to read them from.
-#[derive(Debug)]
+/// Hands out the bytes of a tensor's numbers, as many as its shape and type need.
+pub(super) type ByteReader<'b> =
+    dyn Fn(&TensorInfo, usize) -> Result<Cow<'b, [u8]>, ImportError> + 'b;
+
+/// A file of tensors: their descriptions, and the container's reader.
 pub(super) struct TensorFile<'b> {
     file: String,
-    bytes: &'b [u8],
     infos: Vec<TensorInfo>,
+    bytes: Box<ByteReader<'b>>,
 }
 
 impl<'b> TensorFile<'b> {
-    /// The tensors that a container's reader has described; numbers are read one tensor at a time.
+    /// The tensors that a container describes; numbers are read one tensor at a time.
     pub(super) fn new(
         file: &str,
-        bytes: &'b [u8],
         mut infos: Vec<TensorInfo>,
+        bytes: Box<ByteReader<'b>>,
     ) -> Result<TensorFile<'b>, ImportError> {
         infos.sort_by(|a, b| a.name.cmp(&b.name));
         if let Some(pair) = infos.windows(2).find(|pair| pair[0].name == pair[1].name) {
-            return Err(ImportError::Array {
-                file: file.to_owned(),
-                tensor: pair[0].name.clone(),
-                found: "two tensors of this name".to_owned(),
-                expected: "different names",
-            });
+            let place = Place::Entry(format!("`{}`", pair[0].name).into());
+            let found = "two tensors of this name";
+            return Err(ImportError::at(file, place, found, "different names"));
         }
-        Ok(TensorFile {
-            file: file.to_owned(),
-            bytes,
-            infos,
-        })
+        let file = file.to_owned();
+        Ok(TensorFile { file, infos, bytes })
     }
 
     pub(super) fn file(&self) -> &str {
@@ -159,117 +133,74 @@ impl<'b> TensorFile<'b> {
         &self.infos
     }
 
-    pub(super) fn find(&self, name: &str) -> Option<&TensorInfo> {
-        self.infos.iter().find(|info| info.name == name)
-    }
-
     /// All tensors in words, for messages.
     pub(super) fn listing(&self) -> String {
         const MOST: usize = 24;
-        let mut texts: Vec<String> = self
-            .infos
-            .iter()
-            .take(MOST)
-            .map(TensorInfo::describe)
-            .collect();
+        let shown = self.infos.iter().take(MOST).map(TensorInfo::describe);
+        let mut texts: Vec<String> = shown.collect();
         match self.infos.len().saturating_sub(MOST) {
-            0 if texts.is_empty() => "no tensors at all".to_owned(),
-            0 => texts.join(", "),
-            more => {
-                texts.push(format!("{more} more"));
-                texts.join(", ")
-            }
+            0 if texts.is_empty() => return "no tensors at all".to_owned(),
+            0 => {}
+            more => texts.push(format!("{more} more")),
         }
+        texts.join(", ")
     }
 
-    /// The numbers of a tensor for one use, which names them in errors.
-    pub(super) fn read(&self, info: &TensorInfo, role: &str) -> Result<Array, ImportError> {
-        let (size, count) = self.check(info, role)?;
-        let length = size * count;
-        let member;
-        let bytes = match info.place {
-            Place::Bytes { start } => &self.bytes[start..start + length],
-            Place::Member { index, header } => {
-                member = npz::data(&self.file, self.bytes, info, index, header, length)?;
-                &member
-            }
+    /// A file without a tensor for a use.
+    pub(super) fn missing(&self, role: &dyn std::fmt::Display) -> ImportError {
+        let found = format!("no tensor for {role} among {}", self.listing());
+        let expected = format!("--map {role}=TENSOR to name one");
+        ImportError::at(&self.file, Place::Whole, found, expected)
+    }
+
+    /// The numbers of a tensor for one use, which `place` names in errors; all are finite.
+    pub(super) fn read(
+        &self,
+        info: &TensorInfo,
+        place: impl Fn(&[usize]) -> Place,
+    ) -> Result<Array, ImportError> {
+        let Some(size) = info.element.size() else {
+            let found = format!("numbers of type {}", info.element.name());
+            return Err(ImportError::at(&self.file, place(&[]), found, "f32 or f64"));
         };
-        let values = bytes
-            .chunks_exact(size)
-            .map(|number| decode(&info.element, info.endian, number))
-            .collect();
+        let count = (info.shape.iter()).try_fold(1usize, |count, &dim| count.checked_mul(dim));
+        let Some(count) = count.filter(|&count| count <= MAX_ELEMENTS) else {
+            let (max, unit) = (MAX_ELEMENTS as u64, "numbers");
+            let fault = ImportFault::TooLarge { max, unit };
+            return Err(Located::new(&self.file, place(&[]), fault));
+        };
+        let bytes = (self.bytes)(info, size * count)?;
+        let numbers = bytes.chunks_exact(size);
         let array = Array {
             shape: info.shape.clone(),
-            order: info.order,
-            values,
+            is_column_major: info.is_column_major,
+            values: numbers.map(|number| decode(info, number)).collect(),
         };
-        self.check_finite(&array, info, role)?;
-        Ok(array)
-    }
-
-    fn check(&self, info: &TensorInfo, role: &str) -> Result<(usize, usize), ImportError> {
-        let size = info.element.size().ok_or_else(|| ImportError::Element {
-            file: self.file.clone(),
-            tensor: info.name.clone(),
-            role: role.to_owned(),
-            found: info.element.name().to_owned(),
-            expected: "f32 or f64",
-        })?;
-        let count = (info.shape.iter()).try_fold(1usize, |count, &dim| count.checked_mul(dim));
-        match count.filter(|&count| count <= MAX_ELEMENTS) {
-            Some(count) => Ok((size, count)),
-            None => Err(ImportError::TooLarge {
-                file: self.file.clone(),
-                what: info.describe(),
-                max: MAX_ELEMENTS as u64,
-                unit: "numbers",
-            }),
-        }
-    }
-
-    fn check_finite(
-        &self,
-        array: &Array,
-        info: &TensorInfo,
-        role: &str,
-    ) -> Result<(), ImportError> {
         match array.values.iter().position(|value| !value.is_finite()) {
-            None => Ok(()),
-            Some(position) => Err(ImportError::Value {
-                file: self.file.clone(),
-                tensor: info.name.clone(),
-                role: role.to_owned(),
-                index: array.index_of(position).into(),
-                found: array.values[position],
-                expected: "a finite number",
-            }),
+            None => Ok(array),
+            Some(position) => Err(ImportError::at(
+                &self.file,
+                place(&array.index_of(position)),
+                array.values[position].to_string(),
+                "a finite number",
+            )),
         }
     }
 }
 
 /// One number from its bytes, as many as its type has.
-fn decode(element: &Element, endian: Endian, number: &[u8]) -> f64 {
-    let fits = "a chunk is as long as its element";
-    match (element, endian) {
-        (Element::F32, Endian::Little) => {
-            f64::from(f32::from_le_bytes(number.try_into().expect(fits)))
-        }
-        (Element::F32, Endian::Big) => {
-            f64::from(f32::from_be_bytes(number.try_into().expect(fits)))
-        }
-        (Element::F64, Endian::Little) => f64::from_le_bytes(number.try_into().expect(fits)),
-        (Element::F64, Endian::Big) => f64::from_be_bytes(number.try_into().expect(fits)),
-        (Element::Bool | Element::Other(_), _) => f64::from(u8::from(number[0] != 0)),
+fn decode(info: &TensorInfo, number: &[u8]) -> f64 {
+    let mut little = [0; 8];
+    let little = &mut little[..number.len()];
+    little.copy_from_slice(number);
+    if info.is_big_endian {
+        little.reverse();
     }
-}
-
-/// A file's name without its folders, for what is kept in the model.
-pub(super) fn short_name(file: &str) -> String {
-    let name = Path::new(file).file_name();
-    name.map_or_else(
-        || file.to_owned(),
-        |name| name.to_string_lossy().into_owned(),
-    )
+    match *little {
+        [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
+        [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
+        _ => f64::from(u8::from(little != [0])),
+    }
 }
 
 #[cfg(test)]
@@ -278,39 +209,41 @@ mod tests {
 
     #[test]
     fn array_index_follows_its_order() {
-        let array = |order| Array {
-            shape: vec![2, 3],
-            order,
-            values: (0..6).map(f64::from).collect(),
-        };
-        for order in [Order::Last, Order::First] {
-            let array = array(order);
-            let matrix = array.matrix(2, 3);
+        for is_column_major in [false, true] {
+            let array = Array {
+                shape: vec![2, 3],
+                is_column_major,
+                values: (0..6).map(f64::from).collect(),
+            };
+            let matrix = array.matrix((2, 3));
             for position in 0..6 {
                 let index = array.index_of(position);
                 assert_eq!(matrix[(index[0], index[1])], array.values[position]);
             }
+            let expected = if is_column_major { [0, 2] } else { [1, 1] };
+            assert_eq!(array.index_of(4), expected);
         }
-        assert_eq!(array(Order::Last).index_of(4), [1, 1]);
-        assert_eq!(array(Order::First).index_of(4), [0, 2]);
     }
 
     #[test]
     fn numbers_decode_from_either_byte_order() {
-        let value = -0.1f64;
+        let info = |is_big_endian| TensorInfo {
+            name: "x".to_owned(),
+            shape: vec![1],
+            element: Element::F64,
+            is_column_major: false,
+            is_big_endian,
+            member: 0,
+            start: 0,
+        };
+        let (value, single) = (-0.1f64, 0.3f32);
+        assert_eq!(decode(&info(false), &value.to_le_bytes()), value);
+        assert_eq!(decode(&info(true), &value.to_be_bytes()), value);
         assert_eq!(
-            decode(&Element::F64, Endian::Little, &value.to_le_bytes()),
-            value
-        );
-        assert_eq!(
-            decode(&Element::F64, Endian::Big, &value.to_be_bytes()),
-            value
-        );
-        let single = 0.3f32;
-        assert_eq!(
-            decode(&Element::F32, Endian::Big, &single.to_be_bytes()),
+            decode(&info(true), &single.to_be_bytes()),
             f64::from(single)
         );
-        assert_eq!(decode(&Element::Bool, Endian::Little, &[1]), 1.0);
+        assert_eq!(decode(&info(false), &[1]), 1.0);
+        assert_eq!(decode(&info(false), &[0]), 0.0);
     }
 }

@@ -216,9 +216,11 @@ impl ModelBuilder {
 
     fn check_phase_names(&self) -> Result<Vec<Identifier>, ModelError> {
         if !(1..=MAX_PHASES).contains(&self.phases.len()) {
-            return Err(ModelError::PhaseCount {
+            return Err(ModelError::Count {
+                part: "phases".to_owned(),
                 found: self.phases.len(),
-                max: MAX_PHASES,
+                unit: "phases",
+                expected: format!("1 to {MAX_PHASES}"),
             });
         }
         let mut first_use = HashMap::new();
@@ -316,10 +318,11 @@ impl ModelBuilder {
             return Ok(None);
         };
         if !(latent_dim..=MAX_STATE_DIM).contains(&dim) {
-            return Err(ModelError::StateDim {
+            return Err(ModelError::Count {
+                part: "state".to_owned(),
                 found: dim,
-                min: latent_dim,
-                max: MAX_STATE_DIM,
+                unit: "robot coordinates",
+                expected: format!("{latent_dim} (one per latent coordinate) to {MAX_STATE_DIM}"),
             });
         }
         if let Some(encoder) = &self.encoder {
@@ -427,10 +430,11 @@ fn check_widths(encoder: &StateMap, latent_dim: usize) -> Result<(), ModelError>
     let widths = encoder.layers().iter().map(|layer| layer.map.output_dim());
     match widths.enumerate().find(|&(_, width)| width < latent_dim) {
         None => Ok(()),
-        Some((layer, found)) => Err(ModelError::NarrowLayer {
-            layer,
+        Some((layer, found)) => Err(ModelError::Count {
+            part: format!("encoder.layers[{layer}]"),
             found,
-            expected: latent_dim,
+            unit: "units",
+            expected: format!("at least {latent_dim}, one per latent coordinate"),
         }),
     }
 }

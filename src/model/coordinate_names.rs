@@ -1,5 +1,7 @@
 //! Names and units of the coordinates of state and input.
 
+use serde::{Deserialize, Serialize};
+
 use super::error::{ModelError, SignalPart, check_shape};
 
 const MAX_TEXT_LEN: usize = 64;
@@ -8,11 +10,12 @@ const MAX_TEXT_LEN: usize = 64;
 ///
 /// They reach comments and tables of generated files, so [`ReducedModel`](super::ReducedModel)
 /// accepts only characters which mean nothing in C, Rust and CSV.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct CoordinateNames {
-    /// One name a coordinate, such as `fr.hx`.
+    /// One name per coordinate, such as `fr.hx`.
     pub names: Vec<String>,
-    /// One unit a coordinate, such as `N m`.
+    /// One unit per coordinate, such as `N m`.
     pub units: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! What can be wrong with a model, and with a question put to it.
+//! Faults of models, and of calls of their functions.
 
 use std::fmt;
 
@@ -19,7 +19,7 @@ impl fmt::Display for Dimensions {
     }
 }
 
-/// Which text of a signal a complaint is about.
+/// One of the two texts of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SignalPart {
     /// The coordinate's name, such as `fr.hx`.
@@ -66,13 +66,17 @@ pub enum ModelError {
         /// What both become.
         identifier: String,
     },
-    /// The model has no phase, or too many.
-    #[error("`phases`: found {found} phases, expected 1 to {max}")]
-    PhaseCount {
+    /// There are too few or too many phases, layers, units of a layer, or robot coordinates.
+    #[error("`{part}`: found {found} {unit}, expected {expected}")]
+    Count {
+        /// Path of the part in the model file.
+        part: String,
         /// How many there are.
         found: usize,
+        /// The things counted.
+        unit: &'static str,
         /// How many there may be.
-        max: usize,
+        expected: String,
     },
     /// The foot rule of a phase can never be the first that matches.
     #[error(
@@ -91,16 +95,6 @@ pub enum ModelError {
         phase: usize,
         /// Index of the second occurrence.
         index: usize,
-    },
-    /// There are fewer robot coordinates than latent ones, or more than can be handled.
-    #[error("found {found} robot coordinates, expected {min} (one a latent coordinate) to {max}")]
-    StateDim {
-        /// Coordinates of the state, as robot, names or maps have it.
-        found: usize,
-        /// Number of latent coordinates.
-        min: usize,
-        /// Largest number accepted.
-        max: usize,
     },
     /// A tensor has the wrong number of rows or columns.
     #[error("`{tensor}`: found {found}, expected {expected} (rows x columns)")]
@@ -181,7 +175,7 @@ pub enum ModelError {
         /// Smallest eigenvalue that counts as rounding.
         bound: f64,
     },
-    /// Statistics for a phase which the model has not, or has twice.
+    /// Statistics for a phase which the model does not have, or has twice.
     #[error("`input_statistics`: {name:?} is not the name of one phase, or is there twice")]
     StatisticsPhase {
         /// The name.
@@ -261,7 +255,7 @@ pub enum ModelError {
         max: usize,
     },
     /// A part of the file makes sense only with another.
-    #[error("`{part}` needs `{needs}`, which the model has not")]
+    #[error("`{part}` needs `{needs}`, which the model does not have")]
     Incomplete {
         /// What is there.
         part: &'static str,
@@ -288,7 +282,7 @@ pub enum ModelError {
         /// What needs it to be linear.
         purpose: &'static str,
     },
-    /// The Jacobian of a nonlinear encoder has not full row rank at a state.
+    /// The Jacobian of a nonlinear encoder does not have full row rank at a state.
     #[error(
         "encoder at this state: found singular values of its Jacobian from {smallest:e} to {largest:e}, expected full row rank {expected} (smallest above {tolerance:e} times the largest)"
     )]
@@ -302,38 +296,6 @@ pub enum ModelError {
         /// Relative tolerance.
         tolerance: f64,
     },
-    /// A map has no layer, or too many.
-    #[error("`{tensor}.layers`: found {found} layers, expected 1 to {max}")]
-    LayerCount {
-        /// `encoder` or `decoder`.
-        tensor: String,
-        /// How many there are.
-        found: usize,
-        /// How many there may be.
-        max: usize,
-    },
-    /// A layer has too many units.
-    #[error("`{tensor}`: found {found} units, expected at most {max}")]
-    LayerWidth {
-        /// Path of the tensor in the model file.
-        tensor: String,
-        /// Its rows.
-        found: usize,
-        /// How many there may be.
-        max: usize,
-    },
-    /// A hidden layer of the encoder has fewer units than there are latent coordinates.
-    #[error(
-        "`encoder.layers[{layer}]`: found {found} units, expected at least {expected}, one a latent coordinate"
-    )]
-    NarrowLayer {
-        /// Index of the layer.
-        layer: usize,
-        /// Its units.
-        found: usize,
-        /// Number of latent coordinates.
-        expected: usize,
-    },
     /// An activation is not known.
     #[error("found the activation {found:?}, expected one of {expected}")]
     UnknownActivation {
@@ -345,7 +307,7 @@ pub enum ModelError {
     /// A vector has the wrong length.
     #[error("{what}: found {found} entries, expected {expected}")]
     Dimension {
-        /// Which vector.
+        /// The vector.
         what: &'static str,
         /// Its length.
         found: usize,
@@ -363,7 +325,7 @@ pub enum ModelError {
 }
 
 impl ModelError {
-    /// Complains unless a vector has the length asked for.
+    /// Refuses a vector of another length than expected.
     pub(super) fn check_dimension(
         what: &'static str,
         found: usize,
@@ -381,7 +343,7 @@ impl ModelError {
     }
 }
 
-/// Complains unless a tensor has the shape asked for.
+/// Refuses a tensor of another shape than expected.
 pub(super) fn check_shape(
     tensor: &str,
     found: (usize, usize),
@@ -397,7 +359,7 @@ pub(super) fn check_shape(
     })
 }
 
-/// Complains at the first entry which is infinite or not a number.
+/// Refuses the first entry that is infinite or not a number.
 pub(super) fn check_finite<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
     tensor: &str,
     values: &Matrix<f64, R, C, S>,

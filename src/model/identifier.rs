@@ -93,20 +93,20 @@ impl Identifier {
             return Err(IdentifierError::Reserved { identifier });
         }
         let lower = identifier.to_ascii_lowercase();
-        for (language, words) in KEYWORDS {
-            if words.contains(&lower.as_str()) {
-                return Err(IdentifierError::Keyword {
-                    identifier,
-                    language,
-                });
-            }
+        let listed = |lists: &[(&'static str, &str)]| {
+            let mut lists = lists.iter();
+            lists.find_map(|(name, words)| {
+                words.split(' ').any(|word| word == lower).then_some(*name)
+            })
+        };
+        match (listed(&KEYWORDS), listed(&TAKEN)) {
+            (Some(language), _) => Err(IdentifierError::Keyword {
+                identifier,
+                language,
+            }),
+            (None, Some(owner)) => Err(IdentifierError::Taken { identifier, owner }),
+            (None, None) => Ok(Self(identifier)),
         }
-        for (owner, words) in TAKEN {
-            if words.contains(&lower.as_str()) {
-                return Err(IdentifierError::Taken { identifier, owner });
-            }
-        }
-        Ok(Self(identifier))
     }
 
     /// The identifier as text.
@@ -132,223 +132,51 @@ impl AsRef<str> for Identifier {
     }
 }
 
-/// Keywords, lower case (`_Bool` and its like cannot begin a name anyway).
-const KEYWORDS: [(&str, &[&str]); 3] = [
+/// Keywords by language, lower case (`_Bool` and its like cannot begin a name anyway).
+const KEYWORDS: [(&str, &str); 3] = [
     (
         "C",
-        &[
-            "auto",
-            "break",
-            "case",
-            "char",
-            "const",
-            "continue",
-            "default",
-            "do",
-            "double",
-            "else",
-            "enum",
-            "extern",
-            "float",
-            "for",
-            "goto",
-            "if",
-            "inline",
-            "int",
-            "long",
-            "register",
-            "restrict",
-            "return",
-            "short",
-            "signed",
-            "sizeof",
-            "static",
-            "struct",
-            "switch",
-            "typedef",
-            "union",
-            "unsigned",
-            "void",
-            "volatile",
-            "while",
-            "asm",
-            "fortran",
-            "typeof",
-            "constexpr",
-            "nullptr",
-            "bool",
-            "true",
-            "false",
-            "alignas",
-            "alignof",
-            "static_assert",
-            "thread_local",
-            "typeof_unqual",
-        ],
+        "auto break case char const continue default do double else enum extern float for goto \
+         if inline int long register restrict return short signed sizeof static struct switch \
+         typedef union unsigned void volatile while asm fortran typeof constexpr nullptr bool \
+         true false alignas alignof static_assert thread_local typeof_unqual",
     ),
     (
         "C++",
-        &[
-            "and",
-            "and_eq",
-            "bitand",
-            "bitor",
-            "catch",
-            "char8_t",
-            "char16_t",
-            "char32_t",
-            "class",
-            "co_await",
-            "co_return",
-            "co_yield",
-            "compl",
-            "concept",
-            "consteval",
-            "constinit",
-            "const_cast",
-            "decltype",
-            "delete",
-            "dynamic_cast",
-            "explicit",
-            "export",
-            "friend",
-            "mutable",
-            "namespace",
-            "new",
-            "noexcept",
-            "not",
-            "not_eq",
-            "operator",
-            "or",
-            "or_eq",
-            "private",
-            "protected",
-            "public",
-            "reinterpret_cast",
-            "requires",
-            "static_cast",
-            "template",
-            "this",
-            "throw",
-            "try",
-            "typeid",
-            "typename",
-            "using",
-            "virtual",
-            "wchar_t",
-            "xor",
-            "xor_eq",
-            "import",
-            "module",
-        ],
+        "and and_eq bitand bitor catch char8_t char16_t char32_t class co_await co_return \
+         co_yield compl concept consteval constinit const_cast decltype delete dynamic_cast \
+         explicit export friend mutable namespace new noexcept not not_eq operator or or_eq \
+         private protected public reinterpret_cast requires static_cast template this throw try \
+         typeid typename using virtual wchar_t xor xor_eq import module",
     ),
     (
         "Rust",
-        &[
-            "abstract",
-            "as",
-            "async",
-            "await",
-            "become",
-            "box",
-            "crate",
-            "dyn",
-            "final",
-            "fn",
-            "gen",
-            "impl",
-            "in",
-            "let",
-            "loop",
-            "macro",
-            "match",
-            "mod",
-            "move",
-            "mut",
-            "override",
-            "priv",
-            "pub",
-            "ref",
-            "self",
-            "super",
-            "trait",
-            "type",
-            "unsafe",
-            "unsized",
-            "use",
-            "virtual",
-            "where",
-            "yield",
-            "raw",
-            "safe",
-            "macro_rules",
-        ],
+        "abstract as async await become box crate dyn final fn gen impl in let loop macro match \
+         mod move mut override priv pub ref self super trait type unsafe unsized use virtual \
+         where yield raw safe macro_rules",
     ),
 ];
 
 /// Names of files, crates and devices that a generated file must not shadow, lower case.
-const TAKEN: [(&str, &[&str]); 4] = [
+const TAKEN: [(&str, &str); 4] = [
     (
         "a standard C header",
-        &[
-            "assert",
-            "complex",
-            "ctype",
-            "errno",
-            "fenv",
-            "inttypes",
-            "iso646",
-            "limits",
-            "locale",
-            "math",
-            "setjmp",
-            "signal",
-            "stdalign",
-            "stdarg",
-            "stdatomic",
-            "stdbit",
-            "stdbool",
-            "stdckdint",
-            "stddef",
-            "stdint",
-            "stdio",
-            "stdlib",
-            "stdnoreturn",
-            "string",
-            "tgmath",
-            "threads",
-            "time",
-            "uchar",
-            "wchar",
-            "wctype",
-        ],
+        "assert complex ctype errno fenv inttypes iso646 limits locale math setjmp signal \
+         stdalign stdarg stdatomic stdbit stdbool stdckdint stddef stdint stdio stdlib \
+         stdnoreturn string tgmath threads time uchar wchar wctype",
     ),
     (
         "a standard function or macro of C",
-        &[
-            "main", "null", "eof", "errno", "sin", "cos", "tan", "tanh", "exp", "log", "sqrt",
-            "abs", "fabs", "pow", "isfinite", "isnan", "system",
-        ],
+        "main null eof errno sin cos tan tanh exp log sqrt abs fabs pow isfinite isnan system",
     ),
     (
         "a crate that generated Rust builds on",
-        &[
-            "std",
-            "core",
-            "alloc",
-            "proc_macro",
-            "test",
-            "libm",
-            "clarabel",
-            "romc",
-        ],
+        "std core alloc proc_macro test libm clarabel romc",
     ),
     (
         "a device file of Windows",
-        &[
-            "con", "prn", "aux", "nul", "com1", "com2", "com3", "com4", "com5", "com6", "com7",
-            "com8", "com9", "lpt1", "lpt2", "lpt3", "lpt4", "lpt5", "lpt6", "lpt7", "lpt8", "lpt9",
-        ],
+        "con prn aux nul com1 com2 com3 com4 com5 com6 com7 com8 com9 lpt1 lpt2 lpt3 lpt4 lpt5 \
+         lpt6 lpt7 lpt8 lpt9",
     ),
 ];
 

@@ -1,6 +1,7 @@
 //! Scale factors between SI units and the units in which a model was trained.
 
 use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
 
 use super::error::{ModelError, check_shape};
 
@@ -9,12 +10,12 @@ use super::error::{ModelError, check_shape};
 pub enum ScaleFactors {
     /// One factor for all coordinates.
     Uniform(f64),
-    /// One factor a coordinate.
+    /// One factor per coordinate.
     PerCoordinate(DVector<f64>),
 }
 
 impl ScaleFactors {
-    /// One factor a coordinate, whichever way they are stored.
+    /// One factor per coordinate, whichever way they are stored.
     pub fn expand(&self, dim: usize) -> DVector<f64> {
         match self {
             ScaleFactors::Uniform(factor) => DVector::from_element(dim, *factor),
@@ -51,7 +52,8 @@ impl ScaleFactors {
 /// Scale factors of state and input.
 ///
 /// The paper trains on all quantities times 0.1 (its "normalisation 1/10"): factor 0.1.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Scaling {
     /// `s_x`, for `x`, `dx`, `ddx`.
     pub state: ScaleFactors,

@@ -1,5 +1,7 @@
 //! The standard library of candidate terms, in the order of the published arrays.
 
+use serde::{Deserialize, Serialize};
+
 use super::library::LibraryError;
 use super::library::MAX_LIBRARY_DIM;
 
@@ -19,7 +21,8 @@ pub const MAX_DEGREE: u32 = 8;
 /// assert_eq!(texts, ["1", "z1", "dz1", "z1^2", "z1*dz1", "dz1^2", "u1"]);
 /// # Ok::<(), romc::model::LibraryError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct StandardLibrary {
     /// Highest degree of the monomials: 0 is the constant alone, 1 adds z and dz.
     pub degree: u32,

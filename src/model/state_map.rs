@@ -46,24 +46,26 @@ impl StateMap {
     /// The chain of these layers, the first applied first; `tensor` names it in errors.
     ///
     /// # Errors
-    /// [`ModelError::LayerCount`] unless there are 1 to [`MAX_LAYERS`]; [`ModelError::Shape`] if a
-    /// layer does not take what the layer before it gives; [`ModelError::LayerWidth`] if one has
-    /// more than [`MAX_LAYER_WIDTH`] units.
+    /// [`ModelError::Count`] unless there are 1 to [`MAX_LAYERS`], each of at most
+    /// [`MAX_LAYER_WIDTH`] units; [`ModelError::Shape`] if a layer does not take the outputs of the
+    /// layer before it.
     pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self, ModelError> {
         if !(1..=MAX_LAYERS).contains(&layers.len()) {
-            return Err(ModelError::LayerCount {
-                tensor: tensor.to_owned(),
+            return Err(ModelError::Count {
+                part: format!("{tensor}.layers"),
                 found: layers.len(),
-                max: MAX_LAYERS,
+                unit: "layers",
+                expected: format!("1 to {MAX_LAYERS}"),
             });
         }
         for (index, layer) in layers.iter().enumerate() {
             let (rows, columns) = layer.map.weights().shape();
             if rows > MAX_LAYER_WIDTH {
-                return Err(ModelError::LayerWidth {
-                    tensor: format!("{tensor}.layers[{index}].weights"),
+                return Err(ModelError::Count {
+                    part: format!("{tensor}.layers[{index}].weights"),
                     found: rows,
-                    max: MAX_LAYER_WIDTH,
+                    unit: "units",
+                    expected: format!("at most {MAX_LAYER_WIDTH}"),
                 });
             }
             let expected = match index {
@@ -317,9 +319,16 @@ mod tests {
         let found = StateMap::new("encoder", Vec::new());
         assert!(matches!(
             found,
-            Err(ModelError::LayerCount { found: 0, .. })
+            Err(ModelError::Count {
+                found: 0,
+                unit: "layers",
+                ..
+            })
         ));
         let found = StateMap::new("encoder", vec![layer(MAX_LAYER_WIDTH + 1, 2)]);
-        assert!(matches!(found, Err(ModelError::LayerWidth { .. })));
+        assert!(matches!(
+            found,
+            Err(ModelError::Count { unit: "units", .. })
+        ));
     }
 }

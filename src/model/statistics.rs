@@ -1,4 +1,4 @@
-//! What the inputs of the training recordings looked like.
+//! Statistics of the inputs of the training recordings.
 
 use nalgebra::{DMatrix, DVector};
 

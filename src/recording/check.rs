@@ -10,7 +10,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::columns::Column;
-use super::error::RecordingError;
+use super::error::{RecordingError, RecordingFault};
 use super::segment::{Recording, Segment};
 use crate::robot::{JOINT_DIM, Robot, STATE_DIM};
 
@@ -141,7 +141,7 @@ pub fn check(recording: &Recording, robot: &Robot) -> Vec<Finding> {
 /// a single sample goes too.
 ///
 /// # Errors
-/// [`RecordingError::TooShort`] if nothing remains.
+/// [`RecordingFault::TooShort`] if nothing remains.
 pub fn without(
     recording: &Recording,
     findings: &[Finding],
@@ -163,12 +163,9 @@ pub fn without(
         }
     }
     if segments.is_empty() {
-        return Err(RecordingError::TooShort {
-            path: recording.path.clone(),
-            row: recording.segments.first().map_or(1, |s| s.first_row),
-            found: 0,
-            expected: 2,
-        });
+        let row = recording.segments.first().map_or(1, |s| s.first_row);
+        let (found, expected) = (0, 2);
+        return Err(RecordingFault::TooShort { found, expected }.at(&recording.path, row));
     }
     let out = Recording {
         path: recording.path.clone(),

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::error::RecordingError;
+use super::error::{RecordingError, RecordingFault};
 use crate::robot::{BODY_DIM, FOOT_DIM, JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM};
 
-/// What a column holds; indices follow the state, the wrench and the feet.
+/// The quantity in a column; indices follow the state, the wrench and the feet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Column {
     /// `Time`, in s.
@@ -75,10 +75,10 @@ fn body(i: usize, quantity: &str) -> String {
     format!("Body {part} {quantity} {}", ["x", "y", "z"][i % 3])
 }
 
-/// Which column of a file holds what.
+/// The quantities in the columns of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
-    /// One entry a column of the file; `None` is not read.
+    /// One entry per column of the file; `None` is not read.
     pub columns: Vec<Option<Column>>,
     /// The header's cells.
     pub names: Vec<String>,
@@ -94,7 +94,7 @@ impl Layout {
     /// Accelerations and forces may be absent, but only all of them.
     ///
     /// # Errors
-    /// [`RecordingError::MissingColumns`], [`RecordingError::DuplicateColumn`].
+    /// [`RecordingFault::MissingColumns`], [`RecordingFault::DuplicateColumn`].
     pub fn from_header(path: &Path, names: Vec<String>) -> Result<Layout, RecordingError> {
         let known: Vec<(String, Column)> = Column::all()
             .into_iter()
@@ -107,12 +107,9 @@ impl Layout {
             if let Some(found) = column
                 && let Some(first) = columns.iter().position(|c| *c == Some(found))
             {
-                return Err(RecordingError::DuplicateColumn {
-                    path: path.to_owned(),
-                    column: found.name(),
-                    first: first + 1,
-                    second: columns.len() + 1,
-                });
+                let (first, second) = (first + 1, columns.len() + 1);
+                let fault = RecordingFault::DuplicateColumn { first, second };
+                return Err(fault.in_cell(path, 1, &found.name()));
             }
             columns.push(column);
         }
@@ -128,11 +125,8 @@ impl Layout {
             .map(Column::name)
             .collect();
         if !missing.is_empty() {
-            return Err(RecordingError::MissingColumns {
-                path: path.to_owned(),
-                columns: missing,
-                found: names,
-            });
+            let (columns, found) = (missing, names);
+            return Err(RecordingFault::MissingColumns { columns, found }.at(path, 1));
         }
         Ok(Layout {
             columns,
@@ -208,7 +202,7 @@ mod tests {
     fn from_header_some_forces_lists_the_others() {
         let names = header(|c| !c.is_force() || *c == Column::Force(2));
         let error = Layout::from_header(Path::new("a.csv"), names).unwrap_err();
-        let RecordingError::MissingColumns { columns, .. } = &error else {
+        let RecordingFault::MissingColumns { columns, .. } = &error.kind else {
             panic!("{error:?}");
         };
         assert_eq!(columns.len(), 5);

@@ -1,10 +1,10 @@
-//! What happens to recordings before anything learns from them: implausible samples are found and,
+//! Recordings made ready for training: implausible samples are found and,
 //! when asked, left out; accelerations are recomputed and rows smoothed, when asked.
 
 use nalgebra::DMatrix;
 
 use super::check::{Finding, check, without};
-use super::error::RecordingError;
+use super::error::{RecordingError, RecordingFault};
 use super::preprocess::differences;
 use super::segment::{Recording, Segment};
 use super::smoothing::SavitzkyGolay;
@@ -67,7 +67,7 @@ pub struct Conditioned {
 /// Checks a recording and applies the steps in the order of [`ConditionOptions`].
 ///
 /// # Errors
-/// [`RecordingError::TooShort`] if nothing long enough remains, or a segment is shorter than the filter.
+/// [`RecordingFault::TooShort`] if nothing long enough remains, or a segment is shorter than the filter.
 pub fn condition(
     recording: Recording,
     robot: &Robot,
@@ -116,12 +116,9 @@ fn smooth(
     rows: SmoothedRows,
 ) -> Result<(), RecordingError> {
     let smooth = |m: &DMatrix<f64>| {
-        filter.smooth(m).ok_or_else(|| RecordingError::TooShort {
-            path: segment.path.clone(),
-            row: segment.row(0),
-            found: segment.len(),
-            expected: filter.window(),
-        })
+        let (found, expected) = (segment.len(), filter.window());
+        let too_short = || RecordingFault::TooShort { found, expected };
+        (filter.smooth(m)).ok_or_else(|| too_short().at(&segment.path, segment.row(0)))
     };
     let ddx = smooth(&segment.ddx)?;
     if rows == SmoothedRows::All {
@@ -140,12 +137,8 @@ fn long_enough(mut recording: Recording, least: usize) -> Result<Recording, Reco
     let (row, found) = longest.map_or((1, 0), |part| (part.first_row, part.len()));
     recording.segments.retain(|segment| segment.len() >= least);
     if recording.segments.is_empty() {
-        return Err(RecordingError::TooShort {
-            path: recording.path,
-            row,
-            found,
-            expected: least,
-        });
+        let expected = least;
+        return Err(RecordingFault::TooShort { found, expected }.at(&recording.path, row));
     }
     Ok(recording)
 }
@@ -228,15 +221,8 @@ mod tests {
             ..options
         };
         let error = condition(recording(), go1(), &options).expect_err("nothing remains");
-        assert!(matches!(
-            error,
-            RecordingError::TooShort {
-                row: 73,
-                found: 129,
-                expected: 150,
-                ..
-            }
-        ));
+        let expected = "row 73: found 129 consecutive samples, expected at least 150";
+        assert!(error.to_string().ends_with(expected), "{error}");
     }
 
     #[test]
@@ -274,13 +260,7 @@ mod tests {
             ..ConditionOptions::default()
         };
         let error = condition(short, go1(), &options).expect_err("five samples");
-        assert!(matches!(
-            error,
-            RecordingError::TooShort {
-                found: 5,
-                expected: 11,
-                ..
-            }
-        ));
+        let expected = "found 5 consecutive samples, expected at least 11";
+        assert!(error.to_string().ends_with(expected), "{error}");
     }
 }

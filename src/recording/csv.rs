@@ -11,7 +11,7 @@ use std::path::Path;
 use flate2::bufread::MultiGzDecoder;
 
 use super::columns::Layout;
-use super::error::{RecordingError, shortened};
+use super::error::{RecordingError, RecordingFault};
 use super::lines::{Lines, split_cells};
 use super::segment::Recording;
 use super::table::Table;
@@ -24,14 +24,8 @@ const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 /// [`RecordingError`], which names file, row and column.
 pub fn read(path: &Path) -> Result<Recording, RecordingError> {
     let file = File::open(path).map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => RecordingError::Missing {
-            path: path.to_owned(),
-        },
-        _ => RecordingError::Io {
-            path: path.to_owned(),
-            action: "open",
-            source,
-        },
+        io::ErrorKind::NotFound => RecordingFault::Missing.of(path),
+        _ => RecordingFault::io("open", source).of(path),
     })?;
     read_from(path, file)
 }
@@ -53,11 +47,7 @@ pub fn read_from(path: &Path, mut source: impl Read) -> Result<Recording, Record
     (&mut source)
         .take(2)
         .read_to_end(&mut start)
-        .map_err(|source| RecordingError::Io {
-            path: path.to_owned(),
-            action: "read",
-            source,
-        })?;
+        .map_err(|source| RecordingFault::io("read", source).of(path))?;
     let compressed = start == GZIP_MAGIC;
     let source = BufReader::new(io::Cursor::new(start).chain(source));
     if compressed {
@@ -98,23 +88,25 @@ fn read_header<R: BufRead>(
     lines: &mut Lines<'_, R>,
 ) -> Result<(char, Layout), RecordingError> {
     let (row, line) = match lines.next_row()? {
-        None => return Err(empty(path)),
+        None => return Err(RecordingFault::Empty.of(path)),
         Some(found) => found,
     };
     if line.trim().is_empty() {
         while let Some((row, line)) = lines.next_row()? {
             if !line.trim().is_empty() {
-                return Err(delimiter_error(path, row - 1, "", "`;` or `,` in a header"));
+                return Err(
+                    RecordingFault::delimiter("", "`;` or `,` in a header").at(path, row - 1)
+                );
             }
         }
-        return Err(empty(path));
+        return Err(RecordingFault::Empty.of(path));
     }
     let delimiter = if line.contains(';') {
         ';'
     } else if line.contains(',') {
         ','
     } else {
-        return Err(delimiter_error(path, row, line, "`;` or `,`"));
+        return Err(RecordingFault::delimiter(line, "`;` or `,`").at(path, row));
     };
     let mut names = Vec::new();
     split_cells::<RecordingError>(line, delimiter, |cell| {
@@ -122,24 +114,4 @@ fn read_header<R: BufRead>(
         Ok(())
     })?;
     Ok((delimiter, Layout::from_header(path, names)?))
-}
-
-fn empty(path: &Path) -> RecordingError {
-    RecordingError::Empty {
-        path: path.to_owned(),
-    }
-}
-
-pub(super) fn delimiter_error(
-    path: &Path,
-    row: usize,
-    line: &str,
-    expected: &'static str,
-) -> RecordingError {
-    RecordingError::Delimiter {
-        path: path.to_owned(),
-        row,
-        found: shortened(line),
-        expected,
-    }
 }

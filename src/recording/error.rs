@@ -1,227 +1,144 @@
-//! What can go wrong between a file and a segment ready for training.
+//! Faults between a file and a segment ready for training.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::Path;
 
 use thiserror::Error;
 
+use crate::files::{Located, Place};
 use crate::robot::RobotError;
 
-/// Faults of recordings. Rows are lines of the file: 1 is the header.
+/// A fault and its place: the file, a row (1 is the header) or a cell.
+pub type RecordingError = Located<RecordingFault>;
+
+/// What is wrong at a place.
 #[derive(Debug, Error)]
-pub enum RecordingError {
+pub enum RecordingFault {
     /// A file has other samples than when it was read before.
-    #[error("{path}: changed while its samples were in use, expected the same samples again")]
-    Changed { path: PathBuf },
+    #[error("changed while its samples were in use, expected the same samples again")]
+    Changed,
     /// The file does not exist.
-    #[error("{}: no such file", path.display())]
-    Missing {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("no such file")]
+    Missing,
     /// The file cannot be opened, read or written.
-    #[error("{}: cannot {action}", path.display())]
+    #[error("cannot {action}")]
     Io {
-        /// The file.
-        path: PathBuf,
         /// `open`, `read` or `write`.
         action: &'static str,
         /// The system's reason.
         source: io::Error,
     },
     /// The gzip stream is damaged or ends early.
-    #[error("{}: row {row}: damaged gzip stream", path.display())]
-    Gzip {
-        /// The file.
-        path: PathBuf,
-        /// The row that could not be unpacked.
-        row: usize,
-        /// The decoder's reason.
-        source: io::Error,
-    },
+    #[error("damaged gzip stream")]
+    Gzip(#[source] io::Error),
     /// The file holds nothing but blank lines.
-    #[error("{}: empty file, expected a header and at least two samples", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file ends after its header.
-    #[error("{}: header of {columns} columns but no sample", path.display())]
-    HeaderOnly {
-        /// The file.
-        path: PathBuf,
-        /// Columns in the header.
-        columns: usize,
-    },
+    #[error("empty file, expected a header and at least two samples")]
+    Empty,
+    /// The file ends after its header of this many columns.
+    #[error("header of {0} columns but no sample")]
+    HeaderOnly(usize),
     /// A row is not separated as its header is, or the header not at all.
-    #[error("{}: row {row}: found `{found}`, expected cells separated by {expected}", path.display())]
+    #[error("found `{found}`, expected cells separated by {expected}")]
     Delimiter {
-        /// The file.
-        path: PathBuf,
-        /// The row.
-        row: usize,
         /// The start of the line.
         found: String,
         /// The separators expected.
         expected: &'static str,
     },
     /// Columns that the format requires are absent.
-    #[error("{}: row 1: missing {}; the header starts with {}", path.display(), listed(columns, 8), listed(found, 3))]
+    #[error(
+        "missing {}; the header starts with {}",
+        listed(columns, 8),
+        listed(found, 3)
+    )]
     MissingColumns {
-        /// The file.
-        path: PathBuf,
         /// Their names, in the order of the format.
         columns: Vec<String>,
         /// The names found.
         found: Vec<String>,
     },
     /// Two columns have the same name.
-    #[error("{}: row 1: column `{column}` occurs twice, as number {first} and {second}", path.display())]
+    #[error("occurs twice, as number {first} and {second}")]
     DuplicateColumn {
-        /// The file.
-        path: PathBuf,
-        /// The name.
-        column: String,
         /// Its first place, counted from 1.
         first: usize,
         /// Its second place.
         second: usize,
     },
-    /// A row has fewer cells than the header, or more.
-    #[error("{}: row {row}, column `{column}`: found {found} cells, expected {expected}{hint}", path.display())]
+    /// A row has fewer cells than the header, or more; the place is the first column without a
+    /// cell, or the last column.
+    #[error("found {found} cells, expected {expected}{hint}")]
     RowLength {
-        /// The file.
-        path: PathBuf,
-        /// The row.
-        row: usize,
-        /// First column without a cell, or the last column when there are more.
-        column: String,
         /// Cells found.
         found: usize,
         /// Columns of the header.
         expected: usize,
-        /// What may be the reason, or nothing.
+        /// A likely reason, or nothing.
         hint: &'static str,
     },
-    /// A cell is not a number.
-    #[error("{}: row {row}, column `{column}`: found `{found}`, expected {expected}", path.display())]
+    /// A cell is not a finite number.
+    #[error("found `{found}`, expected {expected}")]
     Number {
-        /// The file.
-        path: PathBuf,
-        /// The row.
-        row: usize,
-        /// The column's name.
-        column: String,
         /// The cell's text, cut after 40 characters.
         found: String,
-        /// What a number looks like in this file.
+        /// The notation of numbers in this file.
         expected: &'static str,
     },
-    /// Samples are too far apart to show a jump.
-    #[error("{}: row {row}, column `Time`: found a sample every {found} s on average, expected at most {expected} s; is `Time` in milliseconds?", path.display())]
+    /// A contact flag is neither 0 nor 1.
+    #[error("found {0}, expected contact 0 or 1 (a force? compare it with a threshold first)")]
+    Contact(f64),
+    /// Samples are too far apart to show a jump; means in s.
+    #[error(
+        "found a sample every {found} s on average, expected at most {expected} s; is `Time` in milliseconds?"
+    )]
     Sampling {
-        /// The file.
-        path: PathBuf,
-        /// First row of the segment.
-        row: usize,
-        /// Mean distance between samples, in s.
+        /// Mean distance between samples.
         found: f64,
-        /// Largest distance accepted, in s.
+        /// Largest distance accepted.
         expected: f64,
     },
-    /// A cell is NaN, infinite, or too large for a double.
-    #[error("{}: row {row}, column `{column}`: found `{found}`, expected a finite number", path.display())]
-    NotFinite {
-        /// The file.
-        path: PathBuf,
-        /// The row.
-        row: usize,
-        /// The column's name.
-        column: String,
-        /// The cell's text.
-        found: String,
-    },
-    /// A contact flag is neither 0 nor 1.
-    #[error("{}: row {row}, column `{column}`: found {found}, expected contact 0 or 1 (a force? compare it with a threshold first)", path.display())]
-    Contact {
-        /// The file.
-        path: PathBuf,
-        /// The row.
-        row: usize,
-        /// The foot's column.
-        column: String,
-        /// The value.
-        found: f64,
-    },
     /// Time stands still, or steps back by less than a new segment would.
-    #[error("{}: row {row}, column `Time`: found {found} s after {previous} s, expected a later time or a new segment", path.display())]
+    #[error("found {found} s after {previous} s, expected a later time or a new segment")]
     Time {
-        /// The file.
-        path: PathBuf,
-        /// The row.
-        row: usize,
-        /// Its time.
+        /// The row's time.
         found: f64,
         /// The time of the row before.
         previous: f64,
     },
-    /// A stretch of samples is too short for what is asked of it.
-    #[error("{}: row {row}: found {found} consecutive samples, expected at least {expected}", path.display())]
+    /// A stretch of samples, which begins at the row, is too short for what is asked of it.
+    #[error("found {found} consecutive samples, expected at least {expected}")]
     TooShort {
-        /// The file.
-        path: PathBuf,
-        /// Its first row.
-        row: usize,
         /// Samples found.
         found: usize,
         /// Samples needed.
         expected: usize,
     },
     /// The text is not UTF-8.
-    #[error("{}: row {row}, byte {byte}: found 0x{found:02x}, expected UTF-8 text", path.display())]
+    #[error("found 0x{found:02x} as byte {byte}, expected UTF-8 text")]
     Encoding {
-        /// The file.
-        path: PathBuf,
-        /// The row.
-        row: usize,
         /// Byte in the line, counted from 1.
         byte: usize,
         /// The byte.
         found: u8,
     },
-    /// A line is longer than any recording's.
-    #[error("{}: row {row}: found a line of more than {limit} bytes, expected a recording", path.display())]
-    LineTooLong {
-        /// The file.
-        path: PathBuf,
-        /// The row.
-        row: usize,
-        /// The longest line accepted.
-        limit: usize,
-    },
-    /// The file has more samples than are read.
-    #[error("{}: row {row}: found more than {limit} samples, expected shorter recordings", path.display())]
-    TooManyRows {
-        /// The file.
-        path: PathBuf,
-        /// The first row beyond.
-        row: usize,
-        /// The most samples accepted.
-        limit: usize,
-    },
+    /// A line is longer than this many bytes, and so no recording's.
+    #[error("found a line of more than {0} bytes, expected a recording")]
+    LineTooLong(usize),
+    /// The file has more samples than this, which is the most that are read.
+    #[error("found more than {0} samples, expected shorter recordings")]
+    TooManyRows(usize),
     /// No pattern of a phase rule matches any sample.
-    #[error("{}: row {row}: feet {feet:?} (fr, fl, rr, rl) match none of the phases {}", path.display(), listed(phases, 8))]
+    #[error(
+        "feet {feet:?} (fr, fl, rr, rl) match none of the phases {}",
+        listed(phases, 8)
+    )]
     NoPhase {
-        /// The file.
-        path: PathBuf,
-        /// The first row.
-        row: usize,
-        /// Its contact flags.
+        /// The first row's contact flags.
         feet: [bool; 4],
         /// Names of the rule's phases.
         phases: Vec<String>,
     },
-    /// A smoothing window and polynomial order that do not fit together.
+    /// A smoothing window and polynomial order that do not fit together; no file's fault.
     #[error("smoothing window {window} with order {order}: expected an odd window above the order")]
     Smoothing {
         /// Samples of the window.
@@ -229,22 +146,45 @@ pub enum RecordingError {
         /// Degree of the polynomial.
         order: usize,
     },
-    /// A batch of zero rows was asked for.
-    #[error("found a batch of {found} rows, expected at least 2")]
-    Batch {
-        /// The batch asked for.
-        found: usize,
-    },
+    /// A batch of this many rows was asked for; no file's fault.
+    #[error("found a batch of {0} rows, expected at least 2")]
+    Batch(usize),
     /// The robot's kinematics refuse a sample.
-    #[error("{}: row {row}: no body wrench", path.display())]
-    Wrench {
-        /// The file.
-        path: PathBuf,
-        /// The row.
-        row: usize,
-        /// Which leg, where, and why.
-        source: RobotError,
-    },
+    #[error("no body wrench")]
+    Wrench(#[source] Box<RobotError>),
+}
+
+impl RecordingFault {
+    pub(super) fn io(action: &'static str, source: io::Error) -> Self {
+        RecordingFault::Io { action, source }
+    }
+
+    /// A line that is not separated as expected.
+    pub(super) fn delimiter(line: &str, expected: &'static str) -> Self {
+        let found = shortened(line);
+        RecordingFault::Delimiter { found, expected }
+    }
+
+    /// The fault of a file as a whole.
+    pub(super) fn of(self, path: &Path) -> RecordingError {
+        Located::new(&path.display().to_string(), Place::Whole, self)
+    }
+
+    /// The fault at a row.
+    pub(super) fn at(self, path: &Path, row: usize) -> RecordingError {
+        Located::new(&path.display().to_string(), Place::Row(row), self)
+    }
+
+    /// The fault in a cell.
+    pub(super) fn in_cell(self, path: &Path, row: usize, column: &str) -> RecordingError {
+        let place = Place::Cell(row, column.into());
+        Located::new(&path.display().to_string(), place, self)
+    }
+
+    /// The fault of an argument, in no file.
+    pub(super) fn of_argument(self) -> RecordingError {
+        Located::new("", Place::Whole, self)
+    }
 }
 
 /// `a`, `b` and 3 more.

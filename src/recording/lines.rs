@@ -3,7 +3,7 @@
 use std::io::{BufRead, Read};
 use std::path::Path;
 
-use super::error::RecordingError;
+use super::error::{RecordingError, RecordingFault};
 
 /// Longest line accepted, in bytes: some thirty times a row of 71 columns.
 pub(super) const MAX_LINE_BYTES: usize = 1 << 16;
@@ -47,11 +47,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
             }
         }
         if self.buffer.len() > MAX_LINE_BYTES {
-            return Err(RecordingError::LineTooLong {
-                path: self.path.to_owned(),
-                row: self.row,
-                limit: MAX_LINE_BYTES,
-            });
+            return Err(RecordingFault::LineTooLong(MAX_LINE_BYTES).at(self.path, self.row));
         }
         let bytes = match self.buffer.strip_prefix(b"\xef\xbb\xbf") {
             Some(rest) if self.row == 1 => rest,
@@ -59,29 +55,18 @@ impl<'a, R: BufRead> Lines<'a, R> {
         };
         match std::str::from_utf8(bytes) {
             Ok(text) => Ok(Some((self.row, text))),
-            Err(error) => Err(RecordingError::Encoding {
-                path: self.path.to_owned(),
-                row: self.row,
-                byte: error.valid_up_to() + 1,
-                found: bytes[error.valid_up_to()],
-            }),
+            Err(error) => {
+                let found = bytes[error.valid_up_to()];
+                let byte = error.valid_up_to() + 1;
+                Err(RecordingFault::Encoding { byte, found }.at(self.path, self.row))
+            }
         }
     }
 
     fn read_error(&self, source: std::io::Error) -> RecordingError {
-        let path = self.path.to_owned();
-        if self.compressed {
-            RecordingError::Gzip {
-                path,
-                row: self.row,
-                source,
-            }
-        } else {
-            RecordingError::Io {
-                path,
-                action: "read",
-                source,
-            }
+        match self.compressed {
+            true => RecordingFault::Gzip(source).at(self.path, self.row),
+            false => RecordingFault::io("read", source).of(self.path),
         }
     }
 }
@@ -171,9 +156,8 @@ mod tests {
         assert!(lines.next_row().unwrap().is_some());
         text.insert(0, b'1');
         let mut lines = Lines::new(Path::new("t"), &text[..], false);
-        assert!(matches!(
-            lines.next_row(),
-            Err(RecordingError::LineTooLong { row: 1, .. })
-        ));
+        let error = lines.next_row().unwrap_err();
+        assert!(matches!(error.kind, RecordingFault::LineTooLong(_)));
+        assert_eq!(error.place.row(), Some(1));
     }
 }

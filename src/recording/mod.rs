@@ -52,7 +52,7 @@ pub use self::write::{WriteOptions, write, write_with};
 pub use condition::{
     Accelerations, ConditionOptions, Conditioned, ImplausibleSamples, SmoothedRows, condition,
 };
-pub use error::RecordingError;
+pub use error::{RecordingError, RecordingFault};
 pub use files::{RecordingFile, RecordingFiles, Source};
 pub use phases::{PhaseRule, PhaseSpan, Stance};
 pub use segment::{Recording, Segment};

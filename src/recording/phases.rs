@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::error::RecordingError;
+use super::error::{RecordingError, RecordingFault};
 use super::segment::Segment;
 use crate::robot::{ContactFlags, FeetRule};
 
@@ -108,19 +108,18 @@ impl PhaseRule {
     /// a tie the one before it.
     ///
     /// # Errors
-    /// [`RecordingError::NoPhase`] if no sample matches any pattern.
+    /// [`RecordingFault::NoPhase`] if no sample matches any pattern.
     pub fn spans(&self, segment: &Segment) -> Result<Vec<PhaseSpan>, RecordingError> {
         let feet = &segment.feet;
         let mut phases: Vec<Option<usize>> = feet.iter().map(|f| self.phase_of(*f)).collect();
         let Some(first_known) = phases.iter().position(Option::is_some) else {
             return match feet.first() {
                 None => Ok(Vec::new()),
-                Some(first) => Err(RecordingError::NoPhase {
-                    path: segment.path.clone(),
-                    row: segment.row(0),
-                    feet: *first,
-                    phases: self.names(),
-                }),
+                Some(&feet) => {
+                    let phases = self.names();
+                    let fault = RecordingFault::NoPhase { feet, phases };
+                    Err(fault.at(&segment.path, segment.row(0)))
+                }
             };
         };
         assign_transitional(&mut phases, feet, first_known);
@@ -327,7 +326,8 @@ mod tests {
         let rule = PhaseRule::new(vec![pattern("flight", FeetRule::None)]);
         let error = rule.spans(&segment(&[(3, [1, 1, 0, 0])])).unwrap_err();
         let text = error.to_string();
-        assert!(matches!(error, RecordingError::NoPhase { row: 2, .. }));
+        assert!(matches!(error.kind, RecordingFault::NoPhase { .. }));
+        assert_eq!(error.place.row(), Some(2));
         assert!(text.contains("none of the phases `flight`"), "{text}");
     }
 

@@ -5,7 +5,7 @@
 
 use nalgebra::DMatrix;
 
-use super::error::RecordingError;
+use super::error::{RecordingError, RecordingFault};
 use super::phases::{PhaseRule, PhaseSpan};
 use super::segment::{Recording, Segment};
 
@@ -23,8 +23,8 @@ pub struct PhaseData {
 /// The phases of every segment of a recording, each resampled to a multiple of `batch` rows.
 ///
 /// # Errors
-/// [`RecordingError::TooShort`] for a span of one sample, [`RecordingError::NoPhase`],
-/// [`RecordingError::Batch`].
+/// [`RecordingFault::TooShort`] for a span of one sample, [`RecordingFault::NoPhase`],
+/// [`RecordingFault::Batch`].
 pub fn prepare(
     recording: &Recording,
     rule: &PhaseRule,
@@ -47,10 +47,10 @@ pub fn prepare(
 /// The smallest multiple of `batch` that holds `samples`.
 ///
 /// # Errors
-/// [`RecordingError::Batch`] for a batch below 2.
+/// [`RecordingFault::Batch`] for a batch below 2.
 fn batch_rows(samples: usize, batch: usize) -> Result<usize, RecordingError> {
     if batch < 2 {
-        return Err(RecordingError::Batch { found: batch });
+        return Err(RecordingFault::Batch(batch).of_argument());
     }
     Ok(samples.div_ceil(batch).max(1) * batch)
 }
@@ -87,16 +87,13 @@ pub fn differences(time_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
 /// Contact flags are those of the nearest sample.
 ///
 /// # Errors
-/// [`RecordingError::TooShort`] if it has one sample or `rows` is below 2.
+/// [`RecordingFault::TooShort`] if it has one sample or `rows` is below 2.
 fn resampled(segment: &Segment, rows: usize) -> Result<Segment, RecordingError> {
     let n = segment.len();
     if n < 2 || rows < 2 {
-        return Err(RecordingError::TooShort {
-            path: segment.path.clone(),
-            row: segment.row(0),
-            found: n.min(rows),
-            expected: 2,
-        });
+        let (found, expected) = (n.min(rows), 2);
+        let fault = RecordingFault::TooShort { found, expected };
+        return Err(fault.at(&segment.path, segment.row(0)));
     }
     let places = places(&segment.time_s, rows);
     let along = |m: &DMatrix<f64>| interpolate(m, &places);
@@ -218,15 +215,8 @@ mod tests {
     fn resampled_single_sample_is_an_error_with_its_row() {
         let one = sample_segment(5).slice(3..4);
         let error = resampled(&one, 100).unwrap_err();
-        assert!(matches!(
-            error,
-            RecordingError::TooShort {
-                row: 5,
-                found: 1,
-                expected: 2,
-                ..
-            }
-        ));
+        let expected = "row 5: found 1 consecutive samples, expected at least 2";
+        assert!(error.to_string().ends_with(expected), "{error}");
     }
 
     #[test]
@@ -263,9 +253,10 @@ mod tests {
         assert_eq!(batch_rows(118, 100).unwrap(), 200);
         assert_eq!(batch_rows(100, 100).unwrap(), 100);
         assert_eq!(batch_rows(1, 100).unwrap(), 100);
-        assert!(matches!(
-            batch_rows(5, 1),
-            Err(RecordingError::Batch { found: 1 })
-        ));
+        let error = batch_rows(5, 1).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "found a batch of 1 rows, expected at least 2"
+        );
     }
 }

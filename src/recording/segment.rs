@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use nalgebra::DMatrix;
 
-use super::error::RecordingError;
+use super::error::{RecordingError, RecordingFault};
 use crate::robot::{BODY_DIM, ContactFlags, JOINT_DIM, Robot, STATE_DIM};
 
 /// What a file holds.
@@ -100,7 +100,7 @@ impl Segment {
     /// torques and contact (equation 22).
     ///
     /// # Errors
-    /// [`RecordingError::Wrench`] with the row at which a leg in contact is singular.
+    /// [`RecordingFault::Wrench`] with the row at which a leg in contact is singular.
     pub fn wrench(&self, robot: &Robot) -> Result<DMatrix<f64>, RecordingError> {
         if let Some(recorded) = &self.body_wrench {
             return Ok(recorded.clone());
@@ -113,10 +113,8 @@ impl Segment {
                     &self.torque(sample),
                     self.feet[sample],
                 )
-                .map_err(|source| RecordingError::Wrench {
-                    path: self.path.clone(),
-                    row: self.row(sample),
-                    source,
+                .map_err(|e| {
+                    RecordingFault::Wrench(Box::new(e)).at(&self.path, self.row(sample))
                 })?;
             out.column_mut(sample).copy_from(&wrench);
         }
@@ -215,11 +213,11 @@ pub(super) mod tests {
         segment.x[(5, 3)] = 0.0;
         let go1 = Robot::by_name("go1").unwrap();
         let error = segment.input(go1).unwrap_err();
-        let RecordingError::Wrench { row, source, .. } = &error else {
+        let RecordingFault::Wrench(source) = &error.kind else {
             panic!("{error:?}");
         };
-        assert_eq!(*row, 5);
-        assert!(matches!(source, RobotError::SingularLeg { .. }));
+        assert_eq!(error.place.row(), Some(5));
+        assert!(matches!(**source, RobotError::SingularLeg { .. }));
         segment.feet[3][1] = false;
         assert!(segment.input(go1).is_ok());
     }

@@ -5,8 +5,7 @@ use std::path::Path;
 use nalgebra::DMatrix;
 
 use super::columns::{Column, Layout};
-use super::csv::delimiter_error;
-use super::error::{RecordingError, shortened};
+use super::error::{RecordingError, RecordingFault, shortened};
 use super::lines::{count, split_cells};
 use super::number::{DecimalMark, NumberReader};
 use super::preprocess::differences;
@@ -77,11 +76,7 @@ impl<'a> Table<'a> {
 
     pub fn push(&mut self, row: usize, line: &str) -> Result<(), RecordingError> {
         if self.rows == MAX_ROWS {
-            return Err(RecordingError::TooManyRows {
-                path: self.path.to_owned(),
-                row,
-                limit: MAX_ROWS,
-            });
+            return Err(RecordingFault::TooManyRows(MAX_ROWS).at(self.path, row));
         }
         self.rows += 1;
         let sample = self.parse(row, line)?;
@@ -112,7 +107,7 @@ impl<'a> Table<'a> {
             let other = if self.delimiter == ';' { ',' } else { ';' };
             if found == 1 && line.contains(other) {
                 let expected = if self.delimiter == ';' { "`;`" } else { "`,`" };
-                return Err(delimiter_error(self.path, row, line, expected));
+                return Err(RecordingFault::delimiter(line, expected).at(self.path, row));
             }
             return Err(self.length_error(row, found));
         }
@@ -154,44 +149,28 @@ impl<'a> Table<'a> {
     }
 
     fn number(&mut self, row: usize, place: usize, cell: &str) -> Result<f64, RecordingError> {
-        let (path, column) = (|| self.path.to_owned(), || self.layout.names[place].clone());
-        match self.numbers.parse(cell) {
-            Some(value) if value.is_finite() => Ok(value),
-            Some(_) => Err(RecordingError::NotFinite {
-                path: path(),
-                row,
-                column: column(),
-                found: shortened(cell),
-            }),
-            None => Err(RecordingError::Number {
-                path: path(),
-                row,
-                column: column(),
-                found: shortened(cell),
-                expected: self.numbers.expected(),
-            }),
-        }
+        let expected = match self.numbers.parse(cell) {
+            Some(value) if value.is_finite() => return Ok(value),
+            Some(_) => "a finite number",
+            None => self.numbers.expected(),
+        };
+        let found = shortened(cell);
+        let fault = RecordingFault::Number { found, expected };
+        Err(fault.in_cell(self.path, row, &self.layout.names[place]))
     }
 
     fn flag(&self, row: usize, place: usize, value: f64) -> Result<bool, RecordingError> {
         if value == 0.0 || value == 1.0 {
             return Ok(value == 1.0);
         }
-        Err(RecordingError::Contact {
-            path: self.path.to_owned(),
-            row,
-            column: self.layout.names[place].clone(),
-            found: value,
-        })
+        let column = &self.layout.names[place];
+        Err(RecordingFault::Contact(value).in_cell(self.path, row, column))
     }
 
     pub fn length_error(&self, row: usize, found: usize) -> RecordingError {
         let names = &self.layout.names;
-        let column = names.get(found).or(names.last()).cloned();
-        RecordingError::RowLength {
-            path: self.path.to_owned(),
-            row,
-            column: column.unwrap_or_default(),
+        let column = names.get(found).or(names.last()).map_or("", String::as_str);
+        let fault = RecordingFault::RowLength {
             found,
             expected: names.len(),
             hint: match self.delimiter {
@@ -200,7 +179,8 @@ impl<'a> Table<'a> {
                 }
                 _ => "",
             },
-        }
+        };
+        fault.in_cell(self.path, row, column)
     }
 
     /// Whether a time belongs to a new segment: it jumps back by more than a
@@ -223,33 +203,23 @@ impl<'a> Table<'a> {
         if jumps_back {
             return Ok(true);
         }
-        Err(RecordingError::Time {
-            path: self.path.to_owned(),
-            row,
-            found: time_s,
-            previous: last,
-        })
+        let (found, previous) = (time_s, last);
+        Err(RecordingFault::Time { found, previous }.in_cell(self.path, row, "Time"))
     }
 
     fn close(&mut self) -> Result<(), RecordingError> {
         let open = std::mem::take(&mut self.open);
         let n = open.time_s.len();
         if n < 2 {
-            return Err(RecordingError::TooShort {
-                path: self.path.to_owned(),
-                row: open.first_row,
-                found: n,
-                expected: 2,
-            });
+            let (found, expected) = (n, 2);
+            let fault = RecordingFault::TooShort { found, expected };
+            return Err(fault.at(self.path, open.first_row));
         }
         let step_s = (open.time_s[n - 1] - open.time_s[0]) / (n - 1) as f64;
         if step_s > LARGEST_STEP_S {
-            return Err(RecordingError::Sampling {
-                path: self.path.to_owned(),
-                row: open.first_row,
-                found: step_s,
-                expected: LARGEST_STEP_S,
-            });
+            let (found, expected) = (step_s, LARGEST_STEP_S);
+            let fault = RecordingFault::Sampling { found, expected };
+            return Err(fault.in_cell(self.path, open.first_row, "Time"));
         }
         let dx = DMatrix::from_column_slice(STATE_DIM, n, &open.dx);
         let ddx = if self.layout.has_acceleration {
@@ -278,21 +248,20 @@ impl<'a> Table<'a> {
     fn require_finite(&self, open: &Open, ddx: &DMatrix<f64>) -> Result<(), RecordingError> {
         match ddx.iter().position(|value| !value.is_finite()) {
             None => Ok(()),
-            Some(place) => Err(RecordingError::NotFinite {
-                path: self.path.to_owned(),
-                row: open.first_row + place / STATE_DIM,
-                column: Column::Acceleration(place % STATE_DIM).name(),
-                found: format!("{} from differences", ddx[place]),
-            }),
+            Some(place) => {
+                let found = format!("{} from differences", ddx[place]);
+                let expected = "a finite number";
+                let row = open.first_row + place / STATE_DIM;
+                let column = Column::Acceleration(place % STATE_DIM).name();
+                let fault = RecordingFault::Number { found, expected };
+                Err(fault.in_cell(self.path, row, &column))
+            }
         }
     }
 
     pub fn finish(mut self) -> Result<Vec<Segment>, RecordingError> {
         if self.open.time_s.is_empty() {
-            return Err(RecordingError::HeaderOnly {
-                path: self.path.to_owned(),
-                columns: self.layout.names.len(),
-            });
+            return Err(RecordingFault::HeaderOnly(self.layout.names.len()).of(self.path));
         }
         self.close()?;
         Ok(self.segments)

@@ -1,7 +1,7 @@
 //! Splits the text of a term into tokens.
 
 use super::number::Number;
-use super::parse::ParseError;
+use super::parse::{ParseError, ParseErrorKind, short};
 
 /// A token and where it starts.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,12 +43,7 @@ pub(super) fn tokenize(text: &str) -> Result<Vec<Token<'_>>, ParseError> {
             '0'..='9' | '.' => number_length(rest),
             'a'..='z' | 'A'..='Z' | '_' => name_length(rest),
             '+' | '-' | '*' | '/' | '^' | '(' | ')' => 1,
-            _ => {
-                return Err(ParseError::Character {
-                    position,
-                    found: first,
-                });
-            }
+            _ => return Err(ParseErrorKind::Character(first).at(position)),
         };
         let (token, after) = rest.split_at(length);
         tokens.push(Token {
@@ -78,10 +73,8 @@ fn kind_of(first: char, token: &str, position: usize) -> Result<TokenKind<'_>, P
         '(' => TokenKind::Open,
         ')' => TokenKind::Close,
         '0'..='9' | '.' => {
-            TokenKind::Number(read_number(token).ok_or_else(|| ParseError::Number {
-                position,
-                found: token.to_owned(),
-            })?)
+            let refused = || ParseErrorKind::Number(short(token)).at(position);
+            TokenKind::Number(read_number(token).ok_or_else(refused)?)
         }
         _ => TokenKind::Name(token),
     })
@@ -196,10 +189,7 @@ mod tests {
         for text in ["1e999", "."] {
             assert_eq!(
                 tokenize(text),
-                Err(ParseError::Number {
-                    position: 1,
-                    found: text.to_owned()
-                })
+                Err(ParseErrorKind::Number(text.to_owned()).at(1))
             );
         }
     }
@@ -209,12 +199,6 @@ mod tests {
         let tokens = tokenize("a  + 12").expect("known characters");
         let positions: Vec<usize> = tokens.iter().map(|token| token.position).collect();
         assert_eq!(positions, [1, 4, 6, 8]);
-        assert_eq!(
-            tokenize("x é"),
-            Err(ParseError::Character {
-                position: 3,
-                found: 'é'
-            })
-        );
+        assert_eq!(tokenize("x é"), Err(ParseErrorKind::Character('é').at(3)));
     }
 }

@@ -73,7 +73,7 @@ pub use interval::Interval;
 pub use jacobian::MatrixEntry;
 pub use node::{ExprId, Function, Node, Parity, SymbolId};
 pub use number::Number;
-pub use parse::{ParseError, ParseLimits};
+pub use parse::{ParseError, ParseErrorKind, ParseLimits};
 pub use poly::Polynomial;
 pub use pool::ExprPool;
 pub use shorten::{Shortened, Shortener};

@@ -38,55 +38,41 @@ impl Default for ParseLimits {
     }
 }
 
-/// Why a text is not a term. Positions count characters from 1.
+/// Why a text is not a term, and where.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ParseError {
+#[error("character {position}: {kind}")]
+pub struct ParseError {
+    /// Character of the text, counted from 1.
+    pub position: usize,
+    /// What is there and what could be; texts are cut after 40 characters.
+    pub kind: ParseErrorKind,
+}
+
+/// The fault at a place of a text.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ParseErrorKind {
     /// A character that the grammar does not have.
-    #[error("character {position}: {found:?} does not belong in an expression")]
-    Character {
-        /// Where.
-        position: usize,
-        /// The character.
-        found: char,
-    },
+    #[error("found `{}`, expected numbers, names, functions and + - * / ^ ( )", .0.escape_debug())]
+    Character(char),
     /// A number that cannot be read or is too large for a float.
-    #[error("character {position}: `{found}` is not a finite number")]
-    Number {
-        /// Where it starts.
-        position: usize,
-        /// Its text.
-        found: String,
-    },
-    /// A token in the wrong place.
-    #[error("character {position}: found {found}, expected {expected}")]
+    #[error("found `{0}`, expected a finite number")]
+    Number(String),
+    /// A token in quotes, or `end of text`, in the wrong place.
+    #[error("found {found}, expected {expected}")]
     Unexpected {
-        /// Where it starts.
-        position: usize,
-        /// The token in quotes, or `end of text`.
+        /// The token.
         found: String,
         /// What could stand there.
         expected: &'static str,
     },
     /// A variable that is not allowed here.
-    #[error("character {position}: unknown name `{found}`")]
-    UnknownName {
-        /// Where it starts.
-        position: usize,
-        /// The name.
-        found: String,
-    },
+    #[error("found the unknown name `{0}`")]
+    UnknownName(String),
     /// A call of something that is not a function.
-    #[error(
-        "character {position}: unknown function `{found}`, expected sin, cos, tan, tanh, exp, log, sqrt, abs or sign"
-    )]
-    UnknownFunction {
-        /// Where its name starts.
-        position: usize,
-        /// The name.
-        found: String,
-    },
+    #[error("found `{0}`, expected sin, cos, tan, tanh, exp, log, sqrt, abs or sign")]
+    UnknownFunction(String),
     /// The text is longer than allowed.
-    #[error("the text has {found} bytes, at most {limit} are allowed")]
+    #[error("found a text of {found} bytes, expected at most {limit}")]
     TooLong {
         /// Length in bytes.
         found: usize,
@@ -94,23 +80,30 @@ pub enum ParseError {
         limit: usize,
     },
     /// Too many open parentheses and exponents.
-    #[error("character {position}: nested more than {limit} deep")]
-    TooDeep {
-        /// Where the limit was passed.
-        position: usize,
-        /// The limit.
-        limit: usize,
-    },
+    #[error("found too many open parentheses and exponents, expected at most {0}")]
+    TooDeep(usize),
     /// A constant exponent is larger than allowed.
-    #[error("character {position}: exponent {found} is beyond {limit}")]
+    #[error("found the exponent {found}, expected at most {limit}")]
     Exponent {
-        /// Where the power ends.
-        position: usize,
         /// The exponent.
         found: String,
         /// The limit on its magnitude.
         limit: u32,
     },
+}
+
+impl ParseErrorKind {
+    pub(super) fn at(self, position: usize) -> ParseError {
+        ParseError {
+            position,
+            kind: self,
+        }
+    }
+}
+
+/// The start of a token, for messages.
+pub(super) fn short(token: &str) -> String {
+    token.chars().take(40).collect()
 }
 
 impl ExprPool {
@@ -164,10 +157,8 @@ impl ExprPool {
         limits: ParseLimits,
     ) -> Result<ExprId, ParseError> {
         if text.len() > limits.length {
-            return Err(ParseError::TooLong {
-                found: text.len(),
-                limit: limits.length,
-            });
+            let (found, limit) = (text.len(), limits.length);
+            return Err(ParseErrorKind::TooLong { found, limit }.at(1));
         }
         let tokens = tokenize(text)?;
         let mut parser = Parser {
@@ -273,15 +264,11 @@ impl Parser<'_> {
                         self.open(Opener::Call(function), token).map(|()| None)
                     }
                     Some(_) => Err(unexpected(&tokens[*next], "`(` after a function")),
-                    None if called => Err(ParseError::UnknownFunction {
-                        position: token.position,
-                        found: name.to_owned(),
-                    }),
+                    None if called => {
+                        Err(ParseErrorKind::UnknownFunction(short(name)).at(token.position))
+                    }
                     None if (self.allowed)(name) => Ok(Some(self.pool.symbol(name))),
-                    None => Err(ParseError::UnknownName {
-                        position: token.position,
-                        found: name.to_owned(),
-                    }),
+                    None => Err(ParseErrorKind::UnknownName(short(name)).at(token.position)),
                 }
             }
             TokenKind::Times
@@ -346,10 +333,7 @@ impl Parser<'_> {
     fn deepen(&mut self, token: &Token) -> Result<(), ParseError> {
         self.depth += 1;
         if self.depth > self.limits.depth {
-            return Err(ParseError::TooDeep {
-                position: token.position,
-                limit: self.limits.depth,
-            });
+            return Err(ParseErrorKind::TooDeep(self.limits.depth).at(token.position));
         }
         Ok(())
     }
@@ -404,11 +388,8 @@ impl Parser<'_> {
         let limit = self.limits.exponent;
         let too_large = |found: super::Number| {
             if found.to_f64().abs() > f64::from(limit) {
-                return Err(ParseError::Exponent {
-                    position: token.position,
-                    found: found.to_string(),
-                    limit,
-                });
+                let found = found.to_string();
+                return Err(ParseErrorKind::Exponent { found, limit }.at(token.position));
             }
             Ok(())
         };
@@ -439,13 +420,9 @@ impl Parser<'_> {
 fn unexpected(token: &Token, expected: &'static str) -> ParseError {
     let found = match token.kind {
         TokenKind::End => "end of text".to_owned(),
-        _ => format!("`{}`", token.text),
+        _ => format!("`{}`", short(token.text)),
     };
-    ParseError::Unexpected {
-        position: token.position,
-        found,
-        expected,
-    }
+    ParseErrorKind::Unexpected { found, expected }.at(token.position)
 }
 
 #[cfg(test)]

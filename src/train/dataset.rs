@@ -10,8 +10,11 @@ use super::error::TrainError;
 use super::smooth::moving_average;
 use super::subspace::Moments;
 use crate::evaluate::is_plausible;
+use crate::files::Place;
 use crate::model::InputStatistics;
-use crate::recording::{PhaseRule, RecordingError, RecordingFiles, Segment, Source};
+use crate::recording::{
+    PhaseRule, RecordingError, RecordingFault, RecordingFiles, Segment, Source,
+};
 use crate::robot::{FeetRule, JOINT_DIM, Robot, STATE_DIM};
 
 /// Fewest samples of a segment, and of a phase over all segments.
@@ -205,8 +208,9 @@ impl Dataset {
         files.for_each(|recording| {
             for segment in &recording.segments {
                 let jump = jumps.next().filter(|jump| jump.time_s == segment.time_s);
-                let changed = || RecordingError::Changed {
-                    path: recording.path.clone(),
+                let changed = || {
+                    let file = recording.path.display().to_string();
+                    RecordingError::new(&file, Place::Whole, RecordingFault::Changed)
                 };
                 let jump = jump.ok_or_else(changed)?;
                 take(jump, &self.rates(segment, &jump.spans));

@@ -314,6 +314,42 @@ fn import_takes_scale_factors_from_tensors() {
     let bytes = npz(&stored, CompressionMethod::Stored);
     let imported = import_from_bytes("m.npz", Format::Npz, &bytes, &options).expect("factors");
     assert_same(&imported, &original, NAMES);
+
+    // Tensors named as the parts need no option; factors that are given take their place.
+    for tensor in &mut stored {
+        match tensor.name.as_str() {
+            "s_x" => tensor.name = "scaling.state".to_owned(),
+            "s_u" => tensor.name = "scaling.input".to_owned(),
+            _ => {}
+        }
+    }
+    options.mapping.clear();
+    let bytes = npz(&stored, CompressionMethod::Stored);
+    let run = |options: &ImportOptions| {
+        import_from_bytes("m.npz", Format::Npz, &bytes, options).expect("factors")
+    };
+    assert_same(&run(&options), &original, NAMES);
+    options.scaling = Some(romc::model::Scaling::uniform(0.5));
+    let given = run(&options);
+    assert_eq!(given.model.scaling().ok(), options.scaling.as_ref());
+    assert_eq!(given.report.unused.len(), 2);
+}
+
+#[test]
+fn import_finds_tensors_named_exactly_as_a_part_whatever_the_phase_is_called() {
+    let original = model("models/paper-2d.json");
+    let mut options = options_of(&original);
+    for (rule, name) in options.phases.iter_mut().zip(["net", "exp"]) {
+        rule.name = name.to_owned();
+    }
+    let stored: Vec<Stored> = (original.phases().iter().zip(&options.phases))
+        .map(|(phase, rule)| plain(&format!("xi.{}", rule.name), &phase.xi))
+        .collect();
+    let bytes = safetensors(&stored);
+    let imported = import_from_bytes("m", Format::Safetensors, &bytes, &options).expect("parts");
+    for (phase, original) in imported.model.phases().iter().zip(original.phases()) {
+        assert_eq!(phase.xi, original.xi);
+    }
 }
 
 #[test]

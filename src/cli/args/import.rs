@@ -2,63 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::command::OutputArguments;
 use super::number::{at_least_one, positive_seconds};
-use crate::import::{Format, ImportError, Mapping, PhaseRule, parse_standard};
+use crate::import::{
+    Format, ImportError, LibraryOrder, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
+};
 use crate::model::{Activation, StandardLibrary};
-
-/// Kinds of files that can be imported.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum StoredFormat {
-    /// Tensors in a safetensors file, such as a PyTorch state dict
-    Safetensors,
-    /// NumPy arrays
-    Npz,
-    /// Equations as text: `[contact]`, then `ddz1 = 0.36 - 0.16*dz1 + u1` and so on
-    Equations,
-    /// Equations as LaTeX, in a .tex or Markdown file
-    Latex,
-}
-
-impl From<StoredFormat> for Format {
-    fn from(stored: StoredFormat) -> Format {
-        match stored {
-            StoredFormat::Safetensors => Format::Safetensors,
-            StoredFormat::Npz => Format::Npz,
-            StoredFormat::Equations => Format::Equations,
-            StoredFormat::Latex => Format::Latex,
-        }
-    }
-}
-
-/// How a file stores weights.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum StoredWeights {
-    /// For `z = x W` (TensorFlow, Keras)
-    Row,
-    /// For `z = W x` (torch.nn.Linear)
-    Column,
-}
-
-/// How a file stores coefficients.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum StoredXi {
-    /// A row a candidate term
-    TermsByLatent,
-    /// A row a latent coordinate (PySINDy)
-    LatentByTerms,
-}
-
-/// In which order a file has the sines and cosines of the shorthand.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum TermOrder {
-    /// sin z, sin dz, cos z, cos dz: the published arrays
-    Author,
-    /// sin z, cos z, sin dz, cos dz: appendix B of the paper
-    Paper,
-}
 
 /// The candidate terms of an imported model.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -80,11 +31,11 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
 /// `romc import`
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Tensors are found by usual names (encoder.weight, encoder.0.bias, W_e, xi_contact, ...); --map\n\
-                  names the others. Parts: encoder.weight, encoder.bias, decoder.weight, decoder.bias,\n\
-                  xi.PHASE, mask.PHASE, input_mean.PHASE, input_covariance.PHASE, scaling.state,\n\
-                  scaling.input. Statistics are of u in SI units: 18 numbers and 18 x 18. What was taken\n\
-                  for what, and turned how, is printed.\n\n\
+    after_help = "Tensors are found by the names of the parts, encoder.weight, encoder.bias, decoder.weight,\n\
+                  decoder.bias, xi.PHASE, mask.PHASE, input_mean.PHASE, input_covariance.PHASE, scaling.state,\n\
+                  scaling.input, or usual spellings of them (net.encoder.0.weight, encoder/kernel:0, W_e,\n\
+                  xi_contact, ...); --map names the others. Statistics are of u in SI units: 18 numbers and\n\
+                  18 x 18. The part and layout of each tensor are printed.\n\n\
                   Examples:\n  \
                   romc import net.safetensors --library degree=1,trigonometric,inputs --scaling 0.1 \\\n      \
                   --map xi.contact=Xi_c --map xi.flight=Xi_f --robot go1 --output my-model.json\n  \
@@ -98,21 +49,21 @@ pub struct ImportArguments {
     /// The model file to write
     #[arg(long, value_name = "MODEL.json")]
     pub output: PathBuf,
-    /// Kind of file, if its ending does not tell
+    /// Kind of file, unless its ending is .safetensors, .npz or .txt
     #[arg(long, value_enum)]
-    pub format: Option<StoredFormat>,
+    pub format: Option<Format>,
     /// Take a tensor for a part of the model; can be repeated
     #[arg(long, value_name = "PART=TENSOR")]
     pub map: Vec<Mapping>,
-    /// How weights are stored, if their shape does not tell
+    /// How weights are stored: needed for square ones only
     #[arg(long, value_enum)]
-    pub weights: Option<StoredWeights>,
+    pub weights: Option<WeightVectors>,
     /// What is between the layers of an encoder or decoder that has several: elu, tanh, sigmoid
     #[arg(long, value_name = "NAME")]
     pub activation: Option<Activation>,
-    /// How coefficients are stored, if their shape does not tell
+    /// How coefficients are stored: needed if their shape fits both ways
     #[arg(long, value_enum)]
-    pub xi_layout: Option<StoredXi>,
+    pub xi_layout: Option<XiLayout>,
     /// Another name that LaTeX has for a variable, such as z1=x or u2=F_z; can be repeated
     #[arg(long, value_name = "VARIABLE=NAME")]
     pub symbols: Vec<String>,
@@ -121,8 +72,8 @@ pub struct ImportArguments {
     pub library: Option<LibraryArgument>,
     /// Order of the sines and cosines of degree=N,trigonometric
     #[arg(long, value_enum, default_value = "author")]
-    pub library_order: TermOrder,
-    /// Number of latent coordinates d, if shapes do not tell
+    pub library_order: LibraryOrder,
+    /// Number of latent coordinates d: needed if shapes leave it open
     #[arg(long, value_name = "D", value_parser = at_least_one)]
     pub latent_dim: Option<usize>,
     /// When a phase holds: any, none, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be
@@ -146,8 +97,8 @@ pub struct ImportArguments {
     /// Sampling period of the training recordings
     #[arg(long, value_name = "SECONDS", value_parser = positive_seconds)]
     pub sample_time: Option<f64>,
-    /// Recordings whose inputs say what is usual in each phase: mean and covariance weigh the
-    /// controller's inputs. Needs --robot
+    /// Recordings to compute the input statistics of each phase from; the controller weighs inputs by
+    /// them. Needs --robot
     #[arg(long, value_name = "RECORDING", num_args = 1.., requires = "robot")]
     pub inputs_from: Vec<PathBuf>,
     /// Name of the model; the output file's stem unless given

@@ -23,9 +23,7 @@ pub use compile::{
     CodeArguments, CompileArguments, EquationArguments, FormChoice, PrecisionChoice,
     SimplifyArguments, SinCosChoice, UnitsChoice,
 };
-pub use import::{
-    ImportArguments, LibraryArgument, StoredFormat, StoredWeights, StoredXi, TermOrder,
-};
+pub use import::{ImportArguments, LibraryArgument};
 pub use manual::{CompletionsArguments, ManualArguments};
 pub use run::{
     DemoArguments, InspectArguments, LiftChoice, MpcArguments, ReferenceInput, ReportArguments,

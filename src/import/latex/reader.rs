@@ -83,7 +83,7 @@ impl<'a> Reader<'a> {
     /// A reader of one display's tokens.
     ///
     /// # Errors
-    /// [`ImportError::Text`] for braces without partner.
+    /// [`ImportError`] for braces without partner.
     pub(super) fn new(file: &'a str, names: &'a SymbolNames, tokens: &[Token]) -> Read<Self> {
         let tokens = with_split_digits(tokens);
         let mut closing = vec![0; tokens.len()];

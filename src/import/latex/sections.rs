@@ -17,7 +17,7 @@ const LAYOUTS: &str = "equation align gather multline eqnarray flalign alignat d
 /// heading in Markdown) goes before that of a label.
 ///
 /// # Errors
-/// [`ImportError::Text`] with the place, what was found and what was expected.
+/// [`ImportError`] with the place, what was found and what was expected.
 pub(in crate::import) fn read(
     file: &str,
     bytes: &[u8],

@@ -1,0 +1,203 @@
+//! Encoder and decoder from the tensors of their layers; a linear map is a single layer.
+
+use nalgebra::DVector;
+
+use super::super::assign::{Assigned, deeper};
+use super::super::error::ImportError;
+use super::super::options::WeightVectors;
+use super::super::report::{Layout, Note};
+use super::super::role::{Part, Role};
+use super::{Assembly, Known};
+use crate::model::{Activation, AffineMap, Layer, StateMap};
+
+/// Weights and bias of a layer.
+type Tensors<'a> = (&'a Assigned<'a>, Option<&'a Assigned<'a>>);
+
+impl<'a> Assembly<'a, '_> {
+    /// Encoder and decoder, as far as the file has their weights.
+    pub(super) fn maps(&mut self) -> Result<(Option<StateMap>, Option<StateMap>), ImportError> {
+        let maps = (self.map(Part::Encoder)?, self.map(Part::Decoder)?);
+        let is_deep = |map: &StateMap| map.layers().len() > 1;
+        match self.options.activation {
+            Some(activation) if !maps.0.iter().chain(&maps.1).any(is_deep) => {
+                let found = format!("{activation}, but no map with several layers");
+                let expected = "tensors of layers, such as encoder.0.weight and encoder.2.weight";
+                return Err(ImportError::option("--activation", found, expected));
+            }
+            _ => {}
+        }
+        let has = |layout| {
+            let mut used = self.notes.used.iter();
+            used.any(|used| used.layout == layout && used.role.ends_with(".weight"))
+        };
+        if has(Layout::Row) && has(Layout::Column) {
+            self.notes.notes.push(Note::MixedWeights);
+        }
+        Ok(maps)
+    }
+
+    /// The tensors of a map's layers, the first applied first.
+    fn layers(&self, part: Part) -> Result<Vec<Tensors<'a>>, ImportError> {
+        let mut layers: Vec<Tensors<'a>> = Vec::new();
+        // Sorted by role, and so by number.
+        for assigned in &self.assignment.used {
+            match assigned.role.layer() {
+                Some((found, number)) if found == part => {
+                    layers.push((assigned, self.find(&Role::LayerBias(part, number))));
+                }
+                _ => {}
+            }
+        }
+        if !layers.is_empty() && self.options.activation.is_none() {
+            let texts: Vec<String> = layers.iter().map(|(a, _)| a.info.describe()).collect();
+            return Err(deeper(self.tensors.file(), part, &texts));
+        }
+        if layers.is_empty() {
+            let weights = Role::Weights(part);
+            match (self.find(&weights), self.find(&Role::Bias(part))) {
+                (Some(weights), bias) => layers.push((weights, bias)),
+                (None, Some(_)) => return Err(self.tensors.missing(&weights)),
+                (None, None) => {}
+            }
+        }
+        Ok(layers)
+    }
+
+    /// Encoder or decoder: the activation after each layer but the last.
+    fn map(&mut self, part: Part) -> Result<Option<StateMap>, ImportError> {
+        let tensors = self.layers(part)?;
+        let part_name = part.name();
+        let Some(((first, _), last)) = tensors.first().zip(tensors.len().checked_sub(1)) else {
+            self.notes.notes.push(Note::NoMap { part: part_name });
+            return Ok(None);
+        };
+        let is_deep = first.role.layer().is_some();
+        let layout = self.orientation(part, &tensors)?;
+        let mut layers = Vec::with_capacity(tensors.len());
+        for (place, &(assigned, bias)) in tensors.iter().enumerate() {
+            let shape = shape_of(part, assigned).expect("the orientation is of matrices");
+            let stored = self.read(assigned)?.matrix(shape);
+            let matrix = match layout {
+                Layout::Row => stored.transpose(),
+                _ => stored,
+            };
+            self.note_used(assigned, layout);
+            let bias = match bias {
+                Some(bias) => self.list(bias, matrix.nrows())?,
+                None => {
+                    self.notes.notes.push(Note::ZeroBias { part: part_name });
+                    DVector::zeros(matrix.nrows())
+                }
+            };
+            let name = match is_deep {
+                true => format!("{part_name}.layers[{place}]"),
+                false => part_name.to_owned(),
+            };
+            let map = AffineMap::new(&name, matrix, bias);
+            let map = map.map_err(|source| ImportError::model(self.tensors.file(), source))?;
+            let activation = match self.options.activation {
+                Some(activation) if place < last => activation,
+                _ => Activation::Linear,
+            };
+            layers.push(Layer { map, activation });
+        }
+        let map = StateMap::new(part_name, layers)
+            .map_err(|source| ImportError::model(self.tensors.file(), source))?;
+        if is_deep {
+            let (part, layers) = (part_name, map.summary());
+            self.notes.notes.push(Note::Layers { part, layers });
+        }
+        Ok(Some(map))
+    }
+
+    /// How the weights are stored: the way in which each layer takes what the one before gives,
+    /// and `d <= n` coordinates leave an encoder. Every shape but a square decides.
+    fn orientation(&mut self, part: Part, layers: &[Tensors<'_>]) -> Result<Layout, ImportError> {
+        let first = layers[0].0;
+        let shapes = layers.iter().map(|(assigned, _)| shape_of(part, assigned));
+        let shapes: Vec<(usize, usize)> = shapes.collect::<Option<_>>().unwrap_or_default();
+        let ways = match (self.options.weights, first.info.shape.len()) {
+            (_, 1) => &[Layout::Plain][..],
+            (Some(WeightVectors::Column), _) => &[Layout::Column],
+            (Some(WeightVectors::Row), _) => &[Layout::Row],
+            (None, _) => &[Layout::Column, Layout::Row],
+        };
+        let fitting = ways.iter().filter_map(|&layout| {
+            let known = ends(part, &shapes, layout, self.known)?;
+            Some((layout, known))
+        });
+        let fitting: Vec<(Layout, Known)> = fitting.collect();
+        let expected = || match layers {
+            [_] => self.expected_weights(part),
+            _ => {
+                let ends = match part {
+                    Part::Encoder => "n to d",
+                    Part::Decoder => "d to n",
+                };
+                let found: Vec<String> = layers.iter().map(|(a, _)| a.info.describe()).collect();
+                let found = found.join(", ");
+                format!(
+                    "layers from {ends}, each taking the outputs of the one before, among {found}"
+                )
+            }
+        };
+        let option = "--weights column for z = W x (torch.nn.Linear) or --weights row for z = x W \
+                      (TensorFlow)";
+        let (layout, known) = self.only_way(first, &fitting, expected, option)?;
+        self.known = known;
+        Ok(layout)
+    }
+
+    fn expected_weights(&self, part: Part) -> String {
+        let Known { latent, state } = self.known;
+        let d = latent.map_or("d".to_owned(), |d| d.to_string());
+        let n = state.map_or("n".to_owned(), |n| n.to_string());
+        let (column, row) = match part {
+            Part::Encoder => (format!("{d} x {n}"), format!("{n} x {d}")),
+            Part::Decoder => (format!("{n} x {d}"), format!("{d} x {n}")),
+        };
+        let bound = match (latent, state) {
+            (Some(_), Some(_)) => "",
+            _ => ", with d at most n",
+        };
+        match self.options.weights {
+            Some(WeightVectors::Column) => format!("{column} (--weights column){bound}"),
+            Some(WeightVectors::Row) => format!("{row} (--weights row){bound}"),
+            None => format!("{column} (column vectors) or {row} (row vectors){bound}"),
+        }
+    }
+}
+
+/// Rows and columns as stored; a list is the only row of an encoder or the only column of a decoder.
+fn shape_of(part: Part, assigned: &Assigned<'_>) -> Option<(usize, usize)> {
+    match (&assigned.info.shape[..], part) {
+        (&[rows, columns], _) => Some((rows, columns)),
+        (&[length], Part::Encoder) => Some((1, length)),
+        (&[length], Part::Decoder) => Some((length, 1)),
+        _ => None,
+    }
+}
+
+/// Latent and state dimension if the layers, stored in this way, are a chain that fits.
+fn ends(part: Part, shapes: &[(usize, usize)], layout: Layout, known: Known) -> Option<Known> {
+    // Numbers of inputs and outputs.
+    let widths = shapes.iter().map(|&(rows, columns)| match layout {
+        Layout::Row => (rows, columns),
+        _ => (columns, rows),
+    });
+    let widths: Vec<(usize, usize)> = widths.collect();
+    let is_chain = widths.windows(2).all(|pair| pair[0].1 == pair[1].0);
+    let (first, last) = (widths.first()?.0, widths.last()?.1);
+    let (latent, state) = match part {
+        Part::Encoder => (last, first),
+        Part::Decoder => (first, last),
+    };
+    let fits = is_chain
+        && (1..=state).contains(&latent)
+        && known.latent.is_none_or(|known| known == latent)
+        && known.state.is_none_or(|known| known == state);
+    fits.then_some(Known {
+        latent: Some(latent),
+        state: Some(state),
+    })
+}
