@@ -11,13 +11,12 @@ use super::args::{
     UnitsChoice,
 };
 use super::output::{Table, check_output};
-use super::simplification;
+use super::simplification::{self, exact_json, exact_words};
 use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::{self, EmitOptions, Target};
-use crate::equations::Equations;
+use crate::equations::{EquationForm, Equations, PhaseEquations};
 use crate::files::EmittedFile;
 use crate::files::Overwrite;
-use crate::model::ReducedModel;
 use crate::typeset::latex::{Form, LatexOptions, NumberStyle};
 use crate::typeset::markdown::MarkdownOptions;
 use crate::typeset::mathml::MathmlOptions;
@@ -36,11 +35,18 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         check_output(save_model, Overwrite::Replace)?;
     }
     let read = artifact::read(&arguments.model)?;
-    let simplified = simplification::run(&read, &arguments.simplification)?;
+    let form = match arguments.equations.as_learned {
+        true => EquationForm::AsLearned,
+        false => EquationForm::Simplified,
+    };
+    let exact = Equations::in_form(&read, form);
+    let simplified = simplification::run(&exact, &arguments.simplification)?;
     let model = simplified.as_ref().map_or(&read, |outcome| &outcome.model);
+    let approximate = simplified.as_ref().map(|_| Equations::in_form(model, form));
+    let equations = approximate.as_ref().unwrap_or(&exact);
     let unless_given = (simplified.as_ref()).map_or(Rounding::default(), |s| s.rounding());
     let mut files = emit(
-        model,
+        equations,
         &arguments.emit,
         &arguments.code,
         &arguments.equations,
@@ -63,13 +69,14 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     }
     let (summary, certificate) = told.map_or((String::new(), Value::Null), |(_, s, c)| (s, c));
     Ok(Answer {
-        text: summary + &text(arguments, model, &written),
+        text: exact_words(&exact) + &summary + &text(arguments, equations, &written),
         json: json!({
             "command": "compile",
             "model": arguments.model.display().to_string(),
             "name": model.name(),
             "digest": artifact::digest(model).to_string(),
             "targets": arguments.emit.iter().map(|target| target.name()).collect::<Vec<_>>(),
+            "exact": exact.steps().iter().map(exact_json).collect::<Vec<_>>(),
             "simplification": certificate,
             "saved_model": save_model.map(|path| path.display().to_string()),
             "files": written.iter().map(|(path, bytes)| file_json(path, *bytes)).collect::<Vec<_>>(),
@@ -80,9 +87,10 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
 /// What was written, in words.
 fn text(
     arguments: &CompileArguments,
-    model: &ReducedModel,
+    equations: &Equations<'_>,
     written: &[(PathBuf, usize)],
 ) -> String {
+    let model = equations.model();
     let mut table = Table::new(["file", "bytes"]);
     for (path, bytes) in written {
         table.row([path.display().to_string(), bytes.to_string()]);
@@ -91,7 +99,7 @@ fn text(
         "model `{}`: {} latent coordinates, {}\n\n{table}",
         model.name(),
         model.latent_dim(),
-        phases_in_words(model)
+        phases_in_words(equations)
     );
     if let Some(path) = &arguments.simplification.save_model {
         let _ = writeln!(text, "simplified model: {}", path.display());
@@ -123,12 +131,13 @@ fn rounding(equations: &EquationArguments, unless_given: Rounding) -> Rounding {
 /// [`Error::Emit`] if the model cannot be lowered or typeset, [`Error::Rename`] for a new name that
 /// cannot be used.
 pub fn emit(
-    model: &ReducedModel,
+    model_equations: &Equations<'_>,
     targets: &[Target],
     code: &CodeArguments,
     equations: &EquationArguments,
     unless_given: Rounding,
 ) -> Result<Vec<EmittedFile>, Error> {
+    let model = model_equations.model();
     let digest = Some(artifact::digest(model).short());
     let symbols = SymbolTable::parse(&equations.rename, model.latent_dim())?;
     let rounding = rounding(equations, unless_given);
@@ -165,7 +174,7 @@ pub fn emit(
         digest,
         ..EmitOptions::default()
     };
-    Ok(deploy::emit(&Equations::of(model), targets, &options)?)
+    Ok(deploy::emit(model_equations, targets, &options)?)
 }
 
 /// Writes files into a folder; the path of each, with its size in bytes.
@@ -182,13 +191,11 @@ pub fn write(
     Ok(paths.into_iter().zip(sizes).collect())
 }
 
-fn phases_in_words(model: &ReducedModel) -> String {
-    let phase = |phase: &crate::model::Phase| {
+fn phases_in_words(equations: &Equations<'_>) -> String {
+    let phase = |phase: &PhaseEquations| {
         format!("{} active terms in {}", phase.active_count(), phase.name)
     };
-    model
-        .phases()
-        .iter()
+    (equations.phases().iter())
         .map(phase)
         .collect::<Vec<_>>()
         .join(", ")

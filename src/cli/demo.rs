@@ -14,7 +14,9 @@ use super::mpc::NamedRun;
 use super::output::{Table, significant, spinner};
 use super::{compile, mpc as mpc_command, report, simulate};
 use crate::deploy::Target;
+use crate::equations::Equations;
 use crate::evaluate::Assessment;
+use crate::equations::Equations;
 use crate::evaluate::ReferenceInput;
 use crate::files::EmittedFile;
 use crate::files::Overwrite;
@@ -66,7 +68,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     progress.set_message("compiling equations and code");
     let targets = [Target::Latex, Target::C, Target::Rust];
     let mut files = compile::emit(
-        &model,
+        &Equations::of(&model),
         &targets,
         &CodeArguments::default(),
         &EquationArguments::default(),

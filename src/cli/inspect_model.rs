@@ -7,8 +7,10 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::output::{Table, significant};
+use super::simplification::{exact_json, exact_words};
 use crate::Error;
 use crate::artifact;
+use crate::equations::Equations;
 use crate::model::{FeetRule, Phase, ReducedModel, StateMap};
 use crate::robot::Robot;
 
@@ -23,6 +25,7 @@ const DOMINANT: usize = 4;
 /// [`Error::Artifact`] if the digest cannot be computed.
 pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     let dominant = dominant_coordinates(model);
+    let equations = Equations::of(model);
     let mut text = format!(
         "{}: model `{}`, {} latent coordinates, {} candidate terms\n",
         path.display(),
@@ -43,6 +46,7 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
         ]);
     }
     let _ = writeln!(text, "\n{phases}");
+    text.push_str(&exact_words(&equations));
     for phase in model.phases() {
         text.push_str(&pattern(model, phase));
     }
@@ -73,6 +77,7 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
             "library_dim": model.library().len(),
             "library": model.library().terms().iter().map(|term| term.text()).collect::<Vec<_>>(),
             "phases": model.phases().iter().map(phase_json).collect::<Vec<_>>(),
+            "exact": equations.steps().iter().map(exact_json).collect::<Vec<_>>(),
             "dominant_coordinates": dominant,
             "encoder": model.encoder_map().ok().map(StateMap::summary),
             "decoder": model.decoder_map().ok().map(StateMap::summary),

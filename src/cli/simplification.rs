@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use super::args::SimplifyArguments;
 use super::output::{Table, read_recordings, significant, spinner};
+use crate::equations::{Equations, ExactStep};
 use crate::evaluate::Assessment;
 use crate::files::EmittedFile;
 use crate::model::ReducedModel;
@@ -124,7 +125,11 @@ pub struct Outcome {
 ///
 /// # Errors
 /// Whatever reading, simplifying or simulating refuses.
-pub fn run(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Option<Outcome>, Error> {
+pub fn run(
+    equations: &Equations<'_>,
+    arguments: &SimplifyArguments,
+) -> Result<Option<Outcome>, Error> {
+    let model = equations.model();
     if arguments.domain.is_empty() {
         return Ok(None);
     }
@@ -134,7 +139,7 @@ pub fn run(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Option
     let Simplified {
         model: simplified,
         certificate,
-    } = simplify(model, &basis.domain, basis.samples.as_ref(), tolerance)?;
+    } = simplify(equations, &basis.domain, basis.samples.as_ref(), tolerance)?;
     progress.set_message("rolling out");
     let rollouts = basis.rollouts(model, &simplified)?;
     progress.finish_and_clear();
@@ -199,6 +204,7 @@ impl Outcome {
             &printed,
         );
         let mut value = certificate_json(&self.certificate);
+        value["exact"] = (self.certificate.exact.iter()).map(exact_json).collect();
         value["file"] = json!(name);
         value["domain_files"] = json!(self.domain_files);
         value["margin"] = json!(self.margin);
@@ -264,6 +270,28 @@ fn comment_marks(path: &Path) -> Option<[&'static str; 2]> {
         "md" | "html" => Some(["<!-- ", " -->"]),
         _ => None,
     }
+}
+
+/// What exact simplification did, one line for each step; nothing if it did nothing.
+pub fn exact_words(equations: &Equations<'_>) -> String {
+    let lines: String = (equations.steps().iter())
+        .map(|step| format!("  {step}\n"))
+        .collect();
+    match lines.as_str() {
+        "" => lines,
+        _ => format!("simplified exactly:\n{lines}\n"),
+    }
+}
+
+/// One step of exact simplification.
+pub fn exact_json(step: &ExactStep) -> Value {
+    json!({
+        "phase": step.phase,
+        "equation": format!("ddz{}", step.output + 1),
+        "terms": { "before": step.before.len(), "after": step.after.len() },
+        "before": ExactStep::sum_words(&step.before),
+        "after": ExactStep::sum_words(&step.after),
+    })
 }
 
 /// A tolerance with its unit.
@@ -378,7 +406,8 @@ pub fn ladder(
     let rms = |sums, name| assessment.fit(sums, name).map(|fit| fit.rms);
     let full = names.map(|name| rms(&assessment.full, name));
     let restarted = names.map(|name| rms(&assessment.restarted, name));
-    let none = simplify(model, &domain, Some(&samples), Tolerance::Absolute(0.0))?.certificate;
+    let equations = &Equations::of(model);
+    let none = simplify(equations, &domain, Some(&samples), Tolerance::Absolute(0.0))?.certificate;
     table.row(ladder_row(
         "none",
         &none,
@@ -393,14 +422,14 @@ pub fn ladder(
     });
     for share in LADDER {
         let tolerance = Tolerance::ShareOfRms(share);
-        let made = simplify(model, &domain, Some(&samples), tolerance)?;
+        let made = simplify(equations, &domain, Some(&samples), tolerance)?;
         let errors = basis.errors(&made.model)?;
         let of = |place: Option<usize>, kind: usize| errors.rms.get(place?)?[kind];
         let [x, z] = places;
         let body = [of(x, 0), of(z, 0), of(x, 1), of(z, 1)];
         table.row(ladder_row(&tolerance.to_string(), &made.certificate, body));
     }
-    let certificate = simplify(model, &domain, Some(&samples), chosen)?.certificate;
+    let certificate = simplify(equations, &domain, Some(&samples), chosen)?.certificate;
     Ok(Ladder {
         tolerances: table,
         equations: equation_table(&certificate),

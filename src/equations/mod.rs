@@ -2,8 +2,10 @@
 //!
 //! A [`ReducedModel`](crate::model::ReducedModel) enters, [`Equations`] leave: for each phase the
 //! accelerations as sums of coefficients times expressions over named variables, in library order,
-//! in one pool. Equations in LaTeX, Markdown and MathML, programs, scripts, certificates and
-//! reports are made from them; nothing else reads Xi to print or emit. Read `system.rs` first.
+//! in one pool, in their shortest form unless asked
+//! otherwise. Equations in LaTeX, Markdown and MathML, programs, scripts, certificates and
+//! reports are made from them; nothing else reads Xi to print or emit. Read `system.rs` first, then
+//! `exact.rs`.
 //!
 //! ```
 //! use nalgebra::DMatrix;
@@ -29,6 +31,8 @@
 //! # }
 //! ```
 
+mod exact;
 mod system;
 
-pub use system::{Equations, PhaseEquations, Summand};
+pub use exact::ExactStep;
+pub use system::{EquationForm, Equations, PhaseEquations, Summand};

@@ -4,8 +4,9 @@ use std::borrow::Cow;
 
 use nalgebra::DMatrix;
 
+use super::exact::ExactStep;
 use crate::model::{
-    CandidateTerm, FeetRule, LatentVariable, ModelError, Phase, ReducedModel, TermId,
+    CandidateTerm, FeetRule, LatentVariable, Library, ModelError, Phase, ReducedModel, TermId,
 };
 use crate::symbolic::{ExprId, ExprPool, SymbolId};
 
@@ -16,6 +17,16 @@ pub struct Summand {
     pub coefficient: f64,
     /// Index into [`Equations::terms`].
     pub term: usize,
+}
+
+/// Which form of the equations is printed and emitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EquationForm {
+    /// The shortest equal form that is found.
+    #[default]
+    Simplified,
+    /// Coefficients times candidate terms as the model file has them.
+    AsLearned,
 }
 
 /// The accelerations of one phase.
@@ -34,15 +45,24 @@ pub struct PhaseEquations {
 #[derive(Clone)]
 pub struct Equations<'a> {
     model: Cow<'a, ReducedModel>,
-    pool: ExprPool,
-    terms: Vec<CandidateTerm>,
-    phases: Vec<PhaseEquations>,
+    pub(super) pool: ExprPool,
+    pub(super) terms: Vec<CandidateTerm>,
+    pub(super) phases: Vec<PhaseEquations>,
+    pub(super) steps: Vec<ExactStep>,
 }
 
 impl<'a> Equations<'a> {
-    /// The equations of a model as they are printed and emitted.
+    /// The equations of a model as they are printed and emitted unless asked otherwise: simplified.
     pub fn of(model: &'a ReducedModel) -> Self {
-        Self::as_learned(model)
+        Self::in_form(model, EquationForm::Simplified)
+    }
+
+    /// The equations of a model in one of the forms.
+    pub fn in_form(model: &'a ReducedModel, form: EquationForm) -> Self {
+        match form {
+            EquationForm::Simplified => Self::as_learned(model).simplified(),
+            EquationForm::AsLearned => Self::as_learned(model),
+        }
     }
 
     /// Coefficients times candidate terms exactly as the model has them.
@@ -59,7 +79,35 @@ impl<'a> Equations<'a> {
             terms: model.library().terms().to_vec(),
             phases: phases.collect(),
             model: Cow::Borrowed(model),
+            steps: Vec::new(),
         }
+    }
+
+    /// What exact simplification did, in the order of phases and equations.
+    pub fn steps(&self) -> &[ExactStep] {
+        &self.steps
+    }
+
+    /// A model whose Xi and library are these equations: the one they were made from if nothing
+    /// was simplified.
+    ///
+    /// # Errors
+    /// [`ModelError::Library`] if new terms make the library too large.
+    pub fn to_model(&self) -> Result<Cow<'_, ReducedModel>, ModelError> {
+        if self.steps.is_empty() {
+            return Ok(Cow::Borrowed(&self.model));
+        }
+        let texts: Vec<String> = (self.terms.iter())
+            .map(|term| term.text().to_owned())
+            .collect();
+        let phases = self.model.phases().iter().enumerate();
+        let phases = phases.map(|(index, phase)| Phase {
+            xi: self.coefficients(index),
+            ..phase.clone()
+        });
+        let builder = self.model.clone().into_owned().into_builder();
+        let builder = builder.library(Library::from_terms(self.latent_dim(), &texts)?);
+        Ok(Cow::Owned(builder.phases(phases.collect()).build()?))
     }
 
     /// The model with maps, names and scale factors; its Xi may be that of equal, longer equations.

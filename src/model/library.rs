@@ -87,6 +87,11 @@ pub struct CandidateTerm {
 }
 
 impl CandidateTerm {
+    /// A term of a pool with its text in the syntax of the model file.
+    pub(crate) fn new(text: String, expr: ExprId) -> Self {
+        Self { text, expr }
+    }
+
     /// The term as the model file writes it.
     pub fn text(&self) -> &str {
         &self.text
@@ -152,7 +157,7 @@ pub enum LibraryError {
         #[source]
         source: Box<ParseError>,
     },
-    /// A term equals an earlier one.
+    /// A term equals an earlier one, which a library to be trained on must not have.
     #[error("`library`[{second}]: {text:?} equals [{first}] {earlier:?}")]
     Duplicate {
         /// Index of the earlier term.
@@ -197,7 +202,8 @@ impl Library {
     /// The library with these terms, in the expression syntax of the model file.
     ///
     /// # Errors
-    /// Each variant of [`LibraryError`] except [`LibraryError::Degree`].
+    /// Each variant of [`LibraryError`] except [`LibraryError::Degree`] and
+    /// [`LibraryError::Duplicate`].
     pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self, LibraryError> {
         Self::build(latent_dim, texts.to_vec(), LibrarySource::Terms)
     }
@@ -229,7 +235,6 @@ impl Library {
             .map(|variable| pool.symbol_id(&variable.to_string()))
             .collect();
         let zero = pool.number(0.0);
-        let mut first_use = std::collections::HashMap::new();
         let mut terms: Vec<CandidateTerm> = Vec::with_capacity(texts.len());
         for (index, text) in texts.into_iter().enumerate() {
             let expr = parse_term(&mut pool, latent_dim, index, &text)?;
@@ -238,14 +243,6 @@ impl Library {
             }
             if !constants_are_finite(&pool, expr) {
                 return Err(LibraryError::NotFinite { index, text });
-            }
-            if let Some(first) = first_use.insert(expr, index) {
-                return Err(LibraryError::Duplicate {
-                    first,
-                    second: index,
-                    text,
-                    earlier: terms[first].text.clone(),
-                });
             }
             terms.push(CandidateTerm { text, expr });
         }
@@ -259,6 +256,26 @@ impl Library {
             terms,
             tape,
         })
+    }
+
+    /// Refuses a library in which a term equals an earlier one under another spelling: its
+    /// coefficients cannot be learned.
+    ///
+    /// # Errors
+    /// [`LibraryError::Duplicate`] for the first such term.
+    pub fn check_distinct(&self) -> Result<(), LibraryError> {
+        let mut first_use = std::collections::HashMap::new();
+        for (second, term) in self.terms.iter().enumerate() {
+            if let Some(first) = first_use.insert(term.expr, second) {
+                return Err(LibraryError::Duplicate {
+                    first,
+                    second,
+                    text: term.text.clone(),
+                    earlier: self.terms[first].text.clone(),
+                });
+            }
+        }
+        Ok(())
     }
 
     /// Number of latent coordinates, `d`.
@@ -482,8 +499,10 @@ mod tests {
     }
 
     #[test]
-    fn library_with_terms_equal_after_canonicalisation_is_refused() {
-        let error = Library::from_terms(2, &terms(&["1", "z1*z2", "u1", "z2*z1"])).unwrap_err();
+    fn library_with_equal_terms_is_accepted_but_not_distinct() {
+        let library = Library::from_terms(2, &terms(&["1", "z1*z2", "u1", "z2*z1"])).unwrap();
+        assert_eq!(library.len(), 4);
+        let error = library.check_distinct().unwrap_err();
         assert!(matches!(
             error,
             LibraryError::Duplicate {

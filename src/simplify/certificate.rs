@@ -2,6 +2,7 @@
 
 use super::measure::Measured;
 use super::tolerance::Tolerance;
+use crate::equations::ExactStep;
 use crate::model::LatentVariable;
 use crate::symbolic::Interval;
 
@@ -113,7 +114,9 @@ pub struct PhaseCertificate {
 pub struct Certificate {
     /// What was asked for.
     pub tolerance: Tolerance,
-    /// One entry a phase.
+    /// What exact simplification did before: equal as real functions, without any error.
+    pub exact: Vec<ExactStep>,
+    /// One entry a phase; differences are those to the exactly simplified equations.
     pub phases: Vec<PhaseCertificate>,
 }
 

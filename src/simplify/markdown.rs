@@ -8,6 +8,7 @@ use super::printing::PrintedEquation;
 use super::rollouts::RolloutEffect;
 use super::tolerance::Tolerance;
 use crate::artifact;
+use crate::equations::ExactStep;
 use crate::model::ReducedModel;
 use crate::symbolic::Interval;
 
@@ -70,6 +71,11 @@ pub fn markdown(
     for text in lost_words(certificate) {
         let _ = writeln!(page, "\n{}.", code(&text));
     }
+    if !certificate.exact.is_empty() {
+        page += "\n## Exact steps\n\n";
+        page += EXACT;
+        page += &exact_steps(&certificate.exact);
+    }
     page += "\n## Each change\n\n";
     page += &changes(certificate);
     if let Some(effect) = rollouts {
@@ -96,6 +102,21 @@ the domain: it can never be larger. Nothing is stated about points outside the d
 per second squared. The rounding of emitted code comes on top of both models alike: about 1e-16 of its largest summand
 in double precision; in single precision each function states its bound.
 ";
+
+const EXACT: &str = "\
+Terms that are together equal to shorter ones, for all arguments. Their coefficients were added or multiplied and
+rounded once; the bounds below are those of the changes made after these steps.
+
+";
+
+fn exact_steps(steps: &[ExactStep]) -> String {
+    let mut table = row(&["step", "as learned", "simplified"]) + "|---|---|---|\n";
+    for step in steps {
+        let [before, after] = [&step.before, &step.after].map(|side| ExactStep::sum_words(side));
+        table += &row(&[&code(&step.to_string()), &code(&before), &code(&after)]);
+    }
+    table
+}
 
 fn summary(certificate: &Certificate) -> String {
     let ((before, after), (slow, fast)) = (certificate.terms(), certificate.operations());

@@ -9,6 +9,7 @@
 //! ```
 //! use nalgebra::DMatrix;
 //! use romc::model::{FeetRule, Library, Phase, ReducedModel};
+//! use romc::equations::Equations;
 //! use romc::simplify::{Domain, Tolerance, simplify};
 //! use romc::symbolic::Interval;
 //!
@@ -24,7 +25,7 @@
 //!     .build()?;
 //! let small = Interval::new(-0.1, 0.1);
 //! let domain = Domain::new(&model, vec![Some(vec![small, small, small])])?;
-//! let simplified = simplify(&model, &domain, None, Tolerance::Absolute(1e-3))?;
+//! let simplified = simplify(&Equations::of(&model), &domain, None, Tolerance::Absolute(1e-3))?;
 //! let left = simplified.model.active_terms(0, 0)?;
 //! let left: Vec<_> = left.iter().map(|(xi, term)| (*xi, term.text())).collect();
 //! assert_eq!(left, [(-9.794, "z1"), (2.0, "u1")]);

@@ -33,7 +33,8 @@ pub struct Simplified {
     pub certificate: Certificate,
 }
 
-/// Simplifies each equation of each phase as far as `tolerance` allows over `domain`.
+/// Simplifies each equation of each phase as far as `tolerance` allows over `domain`. What exact
+/// simplification did to the equations before is part of the result.
 ///
 /// `samples` are needed for a tolerance that is a share, and give the measured errors. A zero
 /// tolerance changes nothing.
@@ -43,7 +44,7 @@ pub struct Simplified {
 /// internal errors [`SimplifyError::Uncertified`] and [`SimplifyError::Contradiction`] if the final
 /// evaluation refutes the result.
 pub fn simplify(
-    model: &ReducedModel,
+    equations: &Equations<'_>,
     domain: &Domain,
     samples: Option<&Samples>,
     tolerance: Tolerance,
@@ -51,6 +52,8 @@ pub fn simplify(
     if samples.is_none() && !tolerance.is_zero() && matches!(tolerance, Tolerance::ShareOfRms(_)) {
         return Err(SimplifyError::NoSamples);
     }
+    let original = equations.model();
+    let model = &*equations.to_model()?;
     let n_phases = model.phases().len();
     if let Some(found) = samples.map(|s| s.phases.len()).filter(|&n| n != n_phases) {
         return Err(SimplifyError::PhaseCount {
@@ -67,21 +70,28 @@ pub fn simplify(
         xi.push(of_phase);
         phases.push(certificate);
     }
-    let mut certificate = Certificate { tolerance, phases };
+    let exact = equations.steps().to_vec();
+    let mut certificate = Certificate {
+        tolerance,
+        exact,
+        phases,
+    };
     let mut simplified = model.clone();
     if certificate.n_changes() > 0 {
         simplified = workspace.finish(model, &xi)?;
-        let mut provenance = model.provenance().clone();
+    }
+    if certificate.n_changes() > 0 || !certificate.exact.is_empty() {
+        let mut provenance = original.provenance().clone();
         provenance.insert(
             "simplification".to_owned(),
-            provenance_of(model, &certificate),
+            provenance_of(original, &certificate),
         );
         simplified = simplified.into_builder().provenance(provenance).build()?;
     }
-    let (old, new) = (Equations::of(model), Equations::of(&simplified));
+    let (learned, new) = (Equations::as_learned(original), Equations::of(&simplified));
     for (phase, certificate) in certificate.phases.iter_mut().enumerate() {
-        certificate.operations = (operations(&old, phase)?, operations(&new, phase)?);
-        let (before, after) = (variables(&old, phase), variables(&new, phase));
+        certificate.operations = (operations(equations, phase)?, operations(&new, phase)?);
+        let (before, after) = (variables(&learned, phase), variables(&new, phase));
         certificate.lost = before.into_iter().filter(|v| !after.contains(v)).collect();
     }
     Ok(Simplified {
@@ -106,6 +116,9 @@ fn provenance_of(model: &ReducedModel, certificate: &Certificate) -> Value {
         "simplified_from": artifact::digest(model).to_string(),
         "ddz_bounds": bounds,
     });
+    if !certificate.exact.is_empty() {
+        entry["exact"] = (certificate.exact.iter()).map(ToString::to_string).collect();
+    }
     // the bounds are those to the model before, not to one that was simplified into it
     if let Some(earlier) = model.provenance().get("simplification") {
         entry["earlier"] = earlier.clone();

@@ -1,79 +1,146 @@
-//! What computing an expression costs, as simplification sees it.
+//! How long an expression is to a reader.
+//!
+//! | counts | |
+//! |---|---|
+//! | 4 | a term that is added, with its sign; 2 inside the argument of a function |
+//! | 3 | the name of a function |
+//! | 2 | a pair of parentheses, a whole number before a term inside a sum or argument |
+//! | 1 | a symbol, a power, a fraction bar, a digit of a coefficient (at most three) |
+//!
+//! A shared part counts as often as it is written.
 
 use std::collections::HashMap;
 
 use super::intern::BuildIdHasher;
-use super::node::{ExprId, Function, Node};
+use super::node::{ExprId, Node};
 use super::number::Number;
 use super::pool::ExprPool;
 
-/// Costs found so far.
+/// Of an added term, and of one inside a function's argument.
+const TERM: u64 = 4;
+const INNER_TERM: u64 = 2;
+const FUNCTION: u64 = 3;
+const PARENTHESES: u64 = 2;
+/// Digits that a reader sees of a coefficient.
+const MOST_DIGITS: usize = 3;
+
+/// Lengths found so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Costs {
     known: HashMap<ExprId, u64, BuildIdHasher>,
 }
 
 impl Costs {
-    /// The cost of `expr`, see [`ExprPool::cost`].
+    /// The length of `expr`, see [`ExprPool::cost`].
     pub(super) fn of(&mut self, pool: &ExprPool, expr: ExprId) -> u64 {
+        let terms = pool.terms_of(expr);
+        let terms = terms
+            .into_iter()
+            .map(|(number, rest)| (number.to_f64(), rest));
+        self.of_terms(pool, terms)
+    }
+
+    /// The length of `sum coefficient * expr`, each term written after its coefficient.
+    pub(super) fn of_terms(
+        &mut self,
+        pool: &ExprPool,
+        terms: impl IntoIterator<Item = (f64, ExprId)>,
+    ) -> u64 {
+        let lengths = terms.into_iter().map(|(coefficient, expr)| {
+            let body = match expr {
+                ExprId::ONE => 0,
+                _ => self.of_factor(pool, expr),
+            };
+            TERM.saturating_add(digits(coefficient))
+                .saturating_add(body)
+        });
+        lengths.fold(0, u64::saturating_add)
+    }
+
+    fn of_factor(&mut self, pool: &ExprPool, expr: ExprId) -> u64 {
         for node in pool.reachable_where(&[expr], |node| !self.known.contains_key(&node)) {
-            let cost = pool.cost_of_node(node, |operand| self.known[&operand]);
-            self.known.insert(node, cost);
+            let length = pool.length_of_node(node, |operand| self.known[&operand]);
+            self.known.insert(node, length);
         }
-        self.known[&expr]
+        pool.as_factor(expr, self.known[&expr])
     }
 }
 
 impl ExprPool {
-    /// What computing `expr` costs, by counting operations of the tree (shared parts as often as
-    /// they are used): 2 an addition or multiplication, more a division, most a function call,
-    /// 1 a number or symbol. Saturates.
+    /// How long `expr` is to a reader, in characters weighed by what they cost to take in;
+    /// see the module's table. Saturates.
     pub fn cost(&self, expr: ExprId) -> u64 {
         Costs::default().of(self, expr)
     }
 
-    fn cost_of_node(&self, expr: ExprId, cost_of: impl Fn(ExprId) -> u64) -> u64 {
+    /// The length of a node without what its surroundings add to a sum.
+    fn length_of_node(&self, expr: ExprId, length_of: impl Fn(ExprId) -> u64) -> u64 {
+        let factor = |operand: ExprId| self.as_factor(operand, length_of(operand));
         match self.node(expr) {
-            Node::Number(_) | Node::Symbol(_) => 1,
-            Node::Sum(operands) | Node::Product(operands) => operands
-                .iter()
-                // A sign costs nothing: it makes an addition a subtraction.
-                .filter(|operand| self.as_number(**operand) != Some(Number::MINUS_ONE))
-                .map(|operand| cost_of(*operand).saturating_add(2))
-                .fold(0, u64::saturating_add)
-                .saturating_sub(2),
-            Node::Power(base, exponent) => {
-                match self.as_number(*exponent).and_then(Number::as_integer) {
-                    Some(integer) => {
-                        let products = u64::from(integer.unsigned_abs().ilog2()) + 1;
-                        let division = if integer < 0 { 6 } else { 0 };
-                        cost_of(*base).saturating_add(products + division)
-                    }
-                    None => cost_of(*base)
-                        .saturating_add(cost_of(*exponent))
-                        .saturating_add(40),
-                }
+            Node::Number(number) => length_of_number(*number),
+            Node::Symbol(_) => 1,
+            Node::Sum(terms) => {
+                (terms.iter().map(|term| length_of(*term))).fold(0, u64::saturating_add)
             }
-            Node::Apply(function, argument) => {
-                let call = match function {
-                    Function::Abs | Function::Sign => 2,
-                    Function::Sqrt => 6,
-                    Function::Sin
-                    | Function::Cos
-                    | Function::Tan
-                    | Function::Tanh
-                    | Function::Exp
-                    | Function::Log => 20,
+            Node::Product(factors) => {
+                (factors.iter().map(|operand| factor(*operand))).fold(0, u64::saturating_add)
+            }
+            Node::Power(base, exponent) => {
+                let exponent = match self.as_number(*exponent).and_then(Number::as_integer) {
+                    Some(integer) => {
+                        u64::from(integer.unsigned_abs() != 1) + u64::from(integer < 0)
+                    }
+                    None => FUNCTION + length_of(*exponent),
                 };
-                cost_of(*argument).saturating_add(call)
+                factor(*base).saturating_add(exponent)
+            }
+            Node::Apply(_, argument) => {
+                let connectors = INNER_TERM * (self.n_terms(*argument) - 1);
+                length_of(*argument).saturating_add(FUNCTION + connectors)
             }
         }
     }
+
+    /// What an operand of a product or power adds: sums stand in parentheses.
+    fn as_factor(&self, expr: ExprId, length: u64) -> u64 {
+        match self.n_terms(expr) {
+            1 => length,
+            n => length.saturating_add(TERM * (n - 1) + PARENTHESES),
+        }
+    }
+
+    fn n_terms(&self, expr: ExprId) -> u64 {
+        match self.node(expr) {
+            Node::Sum(terms) => terms.len() as u64,
+            Node::Number(_)
+            | Node::Symbol(_)
+            | Node::Product(_)
+            | Node::Power(..)
+            | Node::Apply(..) => 1,
+        }
+    }
+}
+
+fn length_of_number(number: Number) -> u64 {
+    match number.abs().as_rational() {
+        Some((1, 1)) => 0,
+        Some((_, 1) | (1, _)) => 2,
+        _ => 3,
+    }
+}
+
+/// Decimal digits of a coefficient as far as a reader sees them.
+fn digits(coefficient: f64) -> u64 {
+    let text = format!("{:e}", coefficient.abs());
+    let mantissa = text.split('e').next().unwrap_or_default();
+    let digits = mantissa.bytes().filter(u8::is_ascii_digit).count();
+    digits.min(MOST_DIGITS) as u64
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::symbolic::Function;
 
     fn cost(text: &str) -> u64 {
         let mut pool = ExprPool::new();
@@ -82,13 +149,15 @@ mod tests {
     }
 
     #[test]
-    fn cost_counts_operations() {
-        assert_eq!(cost("x"), 1);
-        assert_eq!(cost("x + y"), 4);
-        assert_eq!(cost("x - y"), 4);
-        assert_eq!(cost("x*(y + z)"), cost("x*y + x*z") - 3);
-        assert!(cost("x/y") > cost("x*y"));
+    fn cost_agrees_with_a_reader() {
+        assert_eq!(cost("x"), 6);
+        assert_eq!(cost("x + y"), cost("x - y"));
+        assert!(cost("x*y + x*z") < cost("x*(y + z)"));
+        assert!(cost("x*y") < cost("x/y"));
         assert!(cost("sin(2*x)") < cost("2*sin(x)*cos(x)"));
+        assert!(cost("sin(x + y)") < cost("sin(x)*cos(y) + cos(x)*sin(y)"));
+        assert!(cost("0.123*x") == cost("0.123456789*x"));
+        assert!(cost("2 + sin(x)^2") < cost("3*sin(x)^2 + 2*cos(x)^2"));
     }
 
     #[test]
@@ -100,6 +169,6 @@ mod tests {
             let cosine = pool.apply(Function::Cos, expr);
             expr = pool.add(sine, cosine);
         }
-        assert_eq!(pool.cost(expr), u64::MAX - 2);
+        assert_eq!(pool.cost(expr), u64::MAX);
     }
 }

@@ -13,7 +13,7 @@
 //! | `eval`, `interval`, `rounding`, `interval_eval`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `jacobian`, `substitute` | derivatives and substitution |
 //! | `expand`, `collect`, `horner`, `poly`, `rational`, `trig`, `rules` | rewriting, each way when asked |
-//! | `simplify`, `cost`, `region` | choosing the cheapest of equal forms |
+//! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
 //!
 //! No algorithm recurses on the machine's stack, and none iterates a hash map towards a result.
@@ -61,6 +61,7 @@ mod rational;
 mod region;
 mod rounding;
 mod rules;
+mod shorten;
 mod simplify;
 mod substitute;
 mod trig;
@@ -75,4 +76,5 @@ pub use number::Number;
 pub use parse::{ParseError, ParseLimits};
 pub use poly::Polynomial;
 pub use pool::ExprPool;
+pub use shorten::{Shortened, Shortener};
 pub use simplify::SimplifyLimits;

@@ -5,7 +5,7 @@
 //!
 //! | normal form | |
 //! |---|---|
-//! | `exp(a)*exp(b)`, `exp(a)^n` | `exp(a + b)`, `exp(n*a)` |
+//! | `exp(a)*exp(b)`, `exp(a)^n`, `exp(n*log(a))` | `exp(a + b)`, `exp(n*a)`, `a^n` |
 //! | `log(a^n)`, `log(exp(a)*b)` | `n*log(a)` (`n*log(abs(a))` for even `n`), `a + log(b)` |
 //! | `n*log(a) + m*log(b)` | `log(a^n*b^m)` for small integers `n`, `m` up to a common factor |
 //! | `abs(a*b)`, `abs(a)^2`, `abs(a)*sign(a)` | `abs(a)*abs(b)`, `a^2`, `a` |
@@ -30,6 +30,7 @@ impl ExprPool {
     pub(super) fn normal_rules(&mut self, expr: ExprId) -> ExprId {
         match *self.node(expr) {
             Node::Apply(Function::Log, argument) => self.split_log(argument).unwrap_or(expr),
+            Node::Apply(Function::Exp, argument) => self.split_exp(argument).unwrap_or(expr),
             Node::Apply(Function::Abs, argument) => self.split_abs(argument).unwrap_or(expr),
             Node::Product(_) | Node::Power(..) => {
                 let expr = self.merge_exponentials(expr);
@@ -54,6 +55,27 @@ impl ExprPool {
             | Node::Power(..)
             | Node::Apply(..) => expr,
         }
+    }
+
+    /// `exp(n*log(a) + b) = a^n*exp(b)`.
+    fn split_exp(&mut self, argument: ExprId) -> Option<ExprId> {
+        let mut powers = Vec::new();
+        let mut left = Vec::new();
+        for (number, rest) in self.terms_of(argument) {
+            match self.as_log_term(rest) {
+                Some((cofactor, base)) => {
+                    let exponent = self.scale(number, cofactor);
+                    powers.push(self.pow(base, exponent));
+                }
+                None => left.push((number, rest)),
+            }
+        }
+        if powers.is_empty() {
+            return None;
+        }
+        let left = self.sum_of_terms(left);
+        powers.push(self.apply(Function::Exp, left));
+        Some(self.product(&powers))
     }
 
     fn split_log(&mut self, argument: ExprId) -> Option<ExprId> {
@@ -290,7 +312,7 @@ impl ExprPool {
     }
 
     /// A term with exactly one logarithm, as cofactor and argument.
-    fn as_log_term(&mut self, rest: ExprId) -> Option<(ExprId, ExprId)> {
+    pub(super) fn as_log_term(&mut self, rest: ExprId) -> Option<(ExprId, ExprId)> {
         let mut cofactors = Vec::new();
         let mut found = None;
         for factor in self.factors_of(rest).to_vec() {

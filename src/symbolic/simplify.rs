@@ -1,10 +1,10 @@
-//! Simplification: the cheapest of several equal forms.
+//! Simplification: the shortest of several equal forms.
 //!
 //! A region (see `region.rs`) is brought to a normal form, in which equal expressions tend to
 //! coincide: multiplied out, angles expanded, sines reduced to cosines, exponentials and
 //! logarithms merged, over a common denominator. From it a few shorter forms are derived: with
-//! sines for cosines, with angles combined, with common factors taken out. The one with the least
-//! [`cost`](ExprPool::cost) replaces the region, if it is cheaper than what was there.
+//! sines for cosines angle by angle, with angles combined. The one with the least
+//! [`cost`](ExprPool::cost) replaces the region, if it is shorter than what was there.
 //!
 //! **Termination.** Every accepted step lowers the cost, a natural number. The work of one step
 //! is bounded by the number of nodes and by budgets of term products ([`SimplifyLimits`]); what
@@ -21,6 +21,9 @@ use super::cost::Costs;
 use super::expand::ExpandLimits;
 use super::node::{ExprId, Function, Node};
 use super::pool::ExprPool;
+
+/// Most angles whose squares are tried both as sines and as cosines.
+const MAX_CHOICES: usize = 4;
 
 /// How much one simplification may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +47,7 @@ impl Default for SimplifyLimits {
 }
 
 impl ExprPool {
-    /// An equal expression that costs no more, and usually less.
+    /// An equal expression that is shorter, or `expr` itself.
     pub fn simplify(&mut self, expr: ExprId) -> ExprId {
         self.simplify_within(expr, SimplifyLimits::default())
     }
@@ -109,34 +112,56 @@ impl ExprPool {
     }
 
     /// Forms equal to `region`, in a fixed order.
-    fn forms(&mut self, region: ExprId, limits: SimplifyLimits, budget: &mut usize) -> Vec<ExprId> {
+    pub(super) fn forms(
+        &mut self,
+        region: ExprId,
+        limits: SimplifyLimits,
+        budget: &mut usize,
+    ) -> Vec<ExprId> {
         let normal = self.normal_form(region, limits, budget);
-        let mut plain = vec![region, normal];
+        let mut plain = vec![normal];
         if self.has_waves(normal) {
-            let sines = self.cosines_to_sines(normal);
-            plain.push(self.expand_region(sines, limits, budget));
+            plain.extend(self.with_sines(normal, limits, budget));
             plain.push(self.combine_angles(normal));
         }
-        let expanded = self.expand_region(region, limits, budget);
-        plain.push(expanded);
+        plain.push(self.expand_region(region, limits, budget));
+        plain.push(region);
         let mut forms = Vec::new();
         for form in plain {
-            let factored = self.rewrite_region(form, ExprPool::factor_sum);
-            for form in [form, factored] {
+            let compact = self.rewrite_region(form, ExprPool::compact_rules);
+            let merged = self.rewrite_region(compact, ExprPool::normal_rules);
+            for form in [form, compact, merged] {
                 if !forms.contains(&form) {
                     forms.push(form);
-                    let compact = self.rewrite_region(form, ExprPool::compact_rules);
-                    forms.push(compact);
-                    let merged = self.rewrite_region(compact, ExprPool::normal_rules);
-                    forms.push(merged);
                 }
             }
         }
         forms
     }
 
+    /// The forms that have sines instead of cosines of some of the angles with squares.
+    fn with_sines(
+        &mut self,
+        normal: ExprId,
+        limits: SimplifyLimits,
+        budget: &mut usize,
+    ) -> Vec<ExprId> {
+        let angles = self.squared_angles(normal);
+        let n_choices = 1_usize << angles.len().min(MAX_CHOICES);
+        let mut forms = Vec::new();
+        for choice in 1..n_choices {
+            let is_chosen = |angle: ExprId| {
+                let place = angles.iter().position(|known| *known == angle);
+                place.is_none_or(|place| choice >> place.min(MAX_CHOICES - 1) & 1 == 1)
+            };
+            let sines = self.reduce_powers(normal, Function::Cos, Function::Sin, is_chosen);
+            forms.push(self.expand_region(sines, limits, budget));
+        }
+        forms
+    }
+
     /// The normal form of one region, after a bounded number of rounds.
-    fn normal_form(
+    pub(super) fn normal_form(
         &mut self,
         region: ExprId,
         limits: SimplifyLimits,
@@ -159,7 +184,7 @@ impl ExprPool {
         form
     }
 
-    fn expand_region(
+    pub(super) fn expand_region(
         &mut self,
         region: ExprId,
         limits: SimplifyLimits,
@@ -171,7 +196,7 @@ impl ExprPool {
     }
 
     /// Whether sines, cosines or tangents are among the atoms of a region.
-    fn has_waves(&self, region: ExprId) -> bool {
+    pub(super) fn has_waves(&self, region: ExprId) -> bool {
         self.atoms_of(region).into_iter().any(|atom| {
             matches!(
                 self.node(atom),
@@ -199,7 +224,11 @@ mod tests {
             ("sin(x)^2 + cos(x)^2", "1"),
             ("2*sin(x)*cos(x)", "sin(2*x)"),
             ("cos(x)^2 - sin(x)^2", "cos(2*x)"),
-            ("x*y + x*z", "x*(y + z)"),
+            ("exp(2*log(x))", "x^2"),
+            ("2 - sin(x)^2 - cos(y)^2", "sin(y)^2 + cos(x)^2"),
+            ("1 + tan(x)^2", "1/cos(x)^2"),
+            ("tan(x)*cos(x)", "sin(x)"),
+            ("log(exp(x)*exp(y))", "x + y"),
             ("(x + y)^2 - x^2 - y^2", "2*x*y"),
             ("x/(x + y) + y/(x + y)", "1"),
             ("sin(x)/cos(x)", "tan(x)"),
@@ -218,7 +247,7 @@ mod tests {
         for text in [
             "0.36 - 0.16*dz1 - 0.91*dz2 - 0.75*sin(dz1)",
             "(x + y)^5",
-            "0.3*(0.7*x + y)",
+            "x*y + x*z",
             "sin(x) + cos(x)",
             "0.3*sin(x)^2",
             "sqrt(x^2 + y^2)",

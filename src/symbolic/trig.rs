@@ -30,6 +30,12 @@ impl ExprPool {
     /// `expr` with sines, cosines and tangents of sums and of exact multiples of a common angle
     /// written with those of the single angles. Results are not multiplied out further.
     pub fn expand_angles(&mut self, expr: ExprId) -> ExprId {
+        self.expand_angles_like(expr, ExprId::ZERO)
+    }
+
+    /// As [`expand_angles`](ExprPool::expand_angles), with multiples of the units that `other` and
+    /// `expr` have in common.
+    pub(super) fn expand_angles_like(&mut self, expr: ExprId, other: ExprId) -> ExprId {
         let expr = self.rewrite_region(expr, |pool, node| match *pool.node(node) {
             Node::Apply(Function::Tan, argument) => {
                 let sine = pool.apply(Function::Sin, argument);
@@ -39,13 +45,8 @@ impl ExprPool {
             _ => node,
         });
         let mut units = Units::new();
-        for atom in self.atoms_of(expr) {
-            if let Node::Apply(Function::Sin | Function::Cos, argument) = *self.node(atom) {
-                for (coefficient, rest) in self.terms_of(argument) {
-                    note_unit(&mut units, coefficient, rest);
-                }
-            }
-        }
+        self.note_units(expr, &mut units);
+        self.note_units(other, &mut units);
         self.rewrite_region(expr, |pool, node| match *pool.node(node) {
             Node::Apply(Function::Sin, argument) => match pool.sine_and_cosine(argument, &units) {
                 Some((sine, _)) => sine,
@@ -57,6 +58,17 @@ impl ExprPool {
             },
             _ => node,
         })
+    }
+
+    /// Adds the angles of the sines and cosines of a region to the units.
+    fn note_units(&self, expr: ExprId, units: &mut Units) {
+        for atom in self.atoms_of(expr) {
+            if let Node::Apply(Function::Sin | Function::Cos, argument) = *self.node(atom) {
+                for (coefficient, rest) in self.terms_of(argument) {
+                    note_unit(units, coefficient, rest);
+                }
+            }
+        }
     }
 
     /// Sine and cosine of a sum of multiples of units; `None` if there are too many.
@@ -113,15 +125,38 @@ impl ExprPool {
     /// `expr` with every power of a sine reduced to the first by `sin(x)^2 = 1 - cos(x)^2`, also
     /// in denominators (`1/sin(x) = sin(x)/(1 - cos(x)^2)`). Not multiplied out.
     pub fn sines_to_cosines(&mut self, expr: ExprId) -> ExprId {
-        self.reduce_powers(expr, Function::Sin, Function::Cos)
+        self.reduce_powers(expr, Function::Sin, Function::Cos, |_| true)
     }
 
     /// As [`sines_to_cosines`](ExprPool::sines_to_cosines) with the functions exchanged.
     pub fn cosines_to_sines(&mut self, expr: ExprId) -> ExprId {
-        self.reduce_powers(expr, Function::Cos, Function::Sin)
+        self.reduce_powers(expr, Function::Cos, Function::Sin, |_| true)
     }
 
-    fn reduce_powers(&mut self, expr: ExprId, from: Function, to: Function) -> ExprId {
+    /// The arguments of which a sine or cosine occurs to another power than the first.
+    pub(super) fn squared_angles(&self, expr: ExprId) -> Vec<ExprId> {
+        let mut angles = Vec::new();
+        for (_, rest) in self.terms_of(expr) {
+            for factor in self.factors_of(rest) {
+                if let Some((Function::Sin | Function::Cos, angle, power)) =
+                    self.function_power(*factor)
+                    && power != 1
+                    && !angles.contains(&angle)
+                {
+                    angles.push(angle);
+                }
+            }
+        }
+        angles
+    }
+
+    pub(super) fn reduce_powers(
+        &mut self,
+        expr: ExprId,
+        from: Function,
+        to: Function,
+        is_chosen: impl Fn(ExprId) -> bool,
+    ) -> ExprId {
         self.rewrite_region(expr, |pool, node| {
             // Single factors of products were visited before the product.
             if matches!(pool.node(node), Node::Product(_) | Node::Sum(_)) {
@@ -130,7 +165,7 @@ impl ExprPool {
             let Some((function, argument, exponent)) = pool.function_power(node) else {
                 return node;
             };
-            if function != from || (0..2).contains(&exponent) {
+            if function != from || (0..2).contains(&exponent) || !is_chosen(argument) {
                 return node;
             }
             let other_square = pool.apply_power(to, argument, 2);

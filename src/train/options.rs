@@ -231,7 +231,9 @@ impl TrainOptions {
             LibraryChoice::Standard(standard) => Library::standard(self.latent_dim, *standard),
             LibraryChoice::Terms(terms) => Library::from_terms(self.latent_dim, terms),
         };
-        library.map_err(|error| TrainError::Model(error.into()))
+        let library = library.map_err(ModelError::from)?;
+        library.check_distinct().map_err(ModelError::from)?;
+        Ok(library)
     }
 
     /// Complains about settings outside their range.

@@ -120,6 +120,10 @@ pub struct EquationArguments {
     /// Write numbers in LaTeX with siunitx's \\num
     #[arg(long)]
     pub siunitx: bool,
+    /// Keep coefficients times terms as the model file has them; without it, equations are printed and
+    /// emitted in their simplest equal form
+    #[arg(long)]
+    pub as_learned: bool,
 }
 
 /// How far equations may be simplified.

@@ -1,0 +1,185 @@
+//! Exact simplification: each acceleration in its shortest form, equal as a real function.
+//!
+//! The algebra finds the form ([`Shortener`]); here the new terms get their places among the old:
+//! each stands where the first term that it replaces stood.
+
+use std::collections::HashMap;
+use std::fmt;
+
+use super::system::{Equations, Summand};
+use crate::model::{CandidateTerm, MAX_TERM_LEN};
+use crate::symbolic::{ExprId, Shortened, Shortener};
+
+/// Terms of one equation that a shorter form took the place of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExactStep {
+    /// The phase's name.
+    pub phase: String,
+    /// Index of the latent coordinate.
+    pub output: usize,
+    /// Coefficients and terms as learned.
+    pub before: Vec<(f64, String)>,
+    /// What they are together; nothing if they cancel.
+    pub after: Vec<(f64, String)>,
+}
+
+impl fmt::Display for ExactStep {
+    /// `contact, ddz1: 3 terms became 1`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, ddz{}: ", self.phase, self.output + 1)?;
+        match (self.before.len(), self.after.len()) {
+            (1, 0) => f.write_str("1 term is zero"),
+            (before, 0) => write!(f, "{before} terms cancelled"),
+            (1, 1) => f.write_str("1 term became shorter"),
+            (before, after) if before == after => write!(f, "{before} terms became shorter"),
+            (1, after) => write!(f, "1 term became {after} shorter ones"),
+            (before, after) => write!(f, "{before} terms became {after}"),
+        }
+    }
+}
+
+impl ExactStep {
+    /// `0.5*sin(z1) + 1.0*z1` for either side; `0` for no term.
+    pub fn sum_words(side: &[(f64, String)]) -> String {
+        let words = side.iter().map(|(coefficient, text)| match text.as_str() {
+            "1" => format!("{coefficient:?}"),
+            text if text.contains(['+', '-']) => format!("{coefficient:?}*({text})"),
+            text => format!("{coefficient:?}*{text}"),
+        });
+        match side {
+            [] => "0".to_owned(),
+            _ => words.collect::<Vec<_>>().join(" + "),
+        }
+    }
+}
+
+/// Place of a term: the term as learned that it follows or is, then its number among new ones.
+type Place = (usize, usize);
+
+impl Equations<'_> {
+    /// The equations in their shortest form; what is shortest already keeps its bits.
+    #[must_use]
+    pub fn simplified(mut self) -> Self {
+        let mut new = NewTerms::default();
+        let mut pool = std::mem::take(&mut self.pool);
+        let mut shortener = Shortener::new(&mut pool);
+        let mut steps = Vec::new();
+        let mut changed: Vec<(usize, usize, Vec<(Place, f64)>)> = Vec::new();
+        for (number, phase) in self.phases.iter().enumerate() {
+            for (output, equation) in phase.ddz.iter().enumerate() {
+                let summands: Vec<(f64, ExprId)> = (equation.iter())
+                    .map(|summand| (summand.coefficient, self.terms[summand.term].expr()))
+                    .collect();
+                let mut kept: Vec<Option<(Place, f64)>> = (equation.iter())
+                    .map(|summand| Some(((summand.term, 0), summand.coefficient)))
+                    .collect();
+                let mut added = Vec::new();
+                for Shortened { replaced, by } in shortener.shorten(&summands) {
+                    let first = equation[replaced[0]].term;
+                    let Some(after) = new.placed(shortener.pool(), &self.terms, first, &by) else {
+                        continue;
+                    };
+                    let named = |&position: &usize| {
+                        let Summand { coefficient, term } = equation[position];
+                        (coefficient, self.terms[term].text().to_owned())
+                    };
+                    steps.push(ExactStep {
+                        phase: phase.name.clone(),
+                        output,
+                        before: replaced.iter().map(named).collect(),
+                        after: after.iter().map(|(_, c, text)| (*c, text.clone())).collect(),
+                    });
+                    replaced.iter().for_each(|&position| kept[position] = None);
+                    added.extend(after.into_iter().map(|(place, c, _)| (place, c)));
+                }
+                if kept.iter().any(Option::is_none) {
+                    added.extend(kept.into_iter().flatten());
+                    changed.push((number, output, added));
+                }
+            }
+        }
+        self.pool = pool;
+        if !changed.is_empty() {
+            self.replace(changed, new);
+        }
+        self.steps.extend(steps);
+        self
+    }
+
+    /// Puts the new terms among the old and the changed equations in the place of theirs.
+    fn replace(&mut self, changed: Vec<(usize, usize, Vec<(Place, f64)>)>, new: NewTerms) {
+        let old = self.terms.drain(..).enumerate();
+        let mut all: Vec<(Place, CandidateTerm)> = (old)
+            .map(|(index, term)| ((index, 0), term))
+            .chain(new.terms)
+            .collect();
+        all.sort_by_key(|(place, _)| *place);
+        let index: HashMap<Place, usize> = (all.iter().enumerate())
+            .map(|(index, (place, _))| (*place, index))
+            .collect();
+        self.terms = all.into_iter().map(|(_, term)| term).collect();
+        for phase in &mut self.phases {
+            for summand in phase.ddz.iter_mut().flatten() {
+                summand.term = index[&(summand.term, 0)];
+            }
+        }
+        for (phase, output, summands) in changed {
+            let mut equation: Vec<Summand> = (summands.into_iter())
+                .map(|(place, coefficient)| Summand {
+                    coefficient,
+                    term: index[&place],
+                })
+                .collect();
+            equation.sort_by_key(|summand| summand.term);
+            equation.dedup_by(|later, first| {
+                let is_same = later.term == first.term;
+                first.coefficient += if is_same { later.coefficient } else { 0.0 };
+                is_same
+            });
+            equation.retain(|summand| summand.coefficient != 0.0);
+            self.phases[phase].ddz[output] = equation;
+        }
+    }
+}
+
+/// Terms that simplification brought in.
+#[derive(Default)]
+struct NewTerms {
+    terms: Vec<(Place, CandidateTerm)>,
+    /// Places of all terms by expression, made at the first need.
+    known: HashMap<ExprId, Place>,
+}
+
+impl NewTerms {
+    /// Places, coefficients and texts of new summands, after the term `first`; nothing if one has no
+    /// text that a model file could hold.
+    fn placed(
+        &mut self,
+        pool: &crate::symbolic::ExprPool,
+        old: &[CandidateTerm],
+        first: usize,
+        summands: &[(f64, ExprId)],
+    ) -> Option<Vec<(Place, f64, String)>> {
+        if self.known.is_empty() {
+            for (index, term) in old.iter().enumerate() {
+                self.known.entry(term.expr()).or_insert((index, 0));
+            }
+        }
+        let texts: Vec<String> = (summands.iter())
+            .map(|&(_, expr)| pool.display(expr).to_string())
+            .collect();
+        if texts.iter().any(|text| text.len() > MAX_TERM_LEN) {
+            return None;
+        }
+        let placed = summands.iter().zip(texts).map(|(&(coefficient, expr), text)| {
+            let next = (first, self.terms.len() + 1);
+            let place = *self.known.entry(expr).or_insert(next);
+            if place == next {
+                let term = CandidateTerm::new(text.clone(), expr);
+                self.terms.push((place, term));
+            }
+            (place, coefficient, text)
+        });
+        Some(placed.collect())
+    }
+}
