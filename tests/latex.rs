@@ -151,7 +151,7 @@ fn one_term(term: &str, coefficient: f64) -> String {
         rounding: Rounding::Exact,
         ..LatexOptions::default()
     };
-    let files = latex::emit(&Equations::of(&model), &options).unwrap();
+    let files = latex::emit(&Equations::as_learned(&model), &options).unwrap();
     let line = files[0]
         .contents
         .lines()
@@ -208,7 +208,7 @@ fn every_shipped_model_prints_each_active_term_once() {
             form: Form::Cases,
             ..LatexOptions::default()
         };
-        let files = latex::emit(&Equations::of(&model), &options).unwrap();
+        let files = latex::emit(&Equations::as_learned(&model), &options).unwrap();
         let systems = normal_form(&files[0].contents);
         assert_eq!(systems.len(), model.phases().len(), "{}", path.display());
         for (system, phase) in systems.iter().zip(model.phases()) {
@@ -317,7 +317,7 @@ fn coefficient_of_one_is_left_out_only_when_it_is_exactly_one() {
             ..LatexOptions::default()
         };
         let text = equations(
-            &latex::emit(&Equations::of(&model), &options).unwrap(),
+            &latex::emit(&Equations::as_learned(&model), &options).unwrap(),
             "one.tex",
         );
         let expected = format!("\\ddot{{z}}_1 = {expected}\n");
@@ -338,7 +338,7 @@ fn hostile_description_reaches_the_document_only_escaped() {
         })
         .build()
         .unwrap();
-    let files = latex::emit(&Equations::of(&model), &LatexOptions::default()).unwrap();
+    let files = latex::emit(&Equations::as_learned(&model), &LatexOptions::default()).unwrap();
     let text = equations(&files, "m-preview.tex");
     assert!(
         text.contains(r"100\% \textbackslash{}input\{/etc/passwd\} \$x\$"),
@@ -351,7 +351,7 @@ fn hostile_description_reaches_the_document_only_escaped() {
 #[test]
 fn shipped_models_compile_to_pdf() {
     for (path, model) in shipped_models() {
-        let files = latex::emit(&Equations::of(&model), &LatexOptions::default()).unwrap();
+        let files = latex::emit(&Equations::as_learned(&model), &LatexOptions::default()).unwrap();
         println!("{}", path.display());
         typeset(&files, model.identifier().as_str());
     }
@@ -373,7 +373,7 @@ fn every_kind_of_term_compiles_to_pdf_in_each_form() {
             ..LatexOptions::default()
         };
         typeset(
-            &latex::emit(&Equations::of(&model), &options).unwrap(),
+            &latex::emit(&Equations::as_learned(&model), &options).unwrap(),
             "every_kind",
         );
     }
@@ -386,7 +386,7 @@ fn equations_of_width_22_fit_a_column_of_a_two_column_paper() {
             width_em: 22.0,
             ..LatexOptions::default()
         };
-        let mut files = latex::emit(&Equations::of(&model), &options).unwrap();
+        let mut files = latex::emit(&Equations::as_learned(&model), &options).unwrap();
         let stem = model.identifier();
         // Columns of 252 pt as in IEEE conference papers.
         let paper = format!(
@@ -405,8 +405,8 @@ fn equations_of_width_22_fit_a_column_of_a_two_column_paper() {
 fn emission_is_identical_from_run_to_run() {
     let options = LatexOptions::default();
     assert_eq!(
-        latex::emit(&Equations::of(&every_kind()), &options).unwrap(),
-        latex::emit(&Equations::of(&every_kind()), &options).unwrap()
+        latex::emit(&Equations::as_learned(&every_kind()), &options).unwrap(),
+        latex::emit(&Equations::as_learned(&every_kind()), &options).unwrap()
     );
 }
 

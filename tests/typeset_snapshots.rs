@@ -56,7 +56,7 @@ fn latex_of_a_model_with_robot_is_stable() {
 #[test]
 fn latex_of_every_function_is_stable() {
     let model = model("tests/fixtures/models/every-function.json");
-    let files = latex::emit(&Equations::of(&model), &LatexOptions::default()).unwrap();
+    let files = latex::emit(&Equations::as_learned(&model), &LatexOptions::default()).unwrap();
     insta::assert_snapshot!(
         "latex__every_function.tex",
         without_version(&files[0].contents)
@@ -69,8 +69,11 @@ fn markdown_is_stable() {
         "models/paper-2d.json",
         "tests/fixtures/models/every-function.json",
     ] {
-        let files =
-            markdown::emit(&Equations::of(&model(name)), &MarkdownOptions::default()).unwrap();
+        let files = markdown::emit(
+            &Equations::as_learned(&model(name)),
+            &MarkdownOptions::default(),
+        )
+        .unwrap();
         let name = format!("markdown__{}", files[0].path);
         insta::assert_snapshot!(name, without_version(&files[0].contents));
     }
@@ -82,7 +85,11 @@ fn mathml_is_stable() {
         "models/paper-2d.json",
         "tests/fixtures/models/every-function.json",
     ] {
-        let files = mathml::emit(&Equations::of(&model(name)), &MathmlOptions::default()).unwrap();
+        let files = mathml::emit(
+            &Equations::as_learned(&model(name)),
+            &MathmlOptions::default(),
+        )
+        .unwrap();
         let name = format!("mathml__{}", files[0].path);
         insta::assert_snapshot!(name, without_version(&files[0].contents));
     }

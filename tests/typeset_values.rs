@@ -146,7 +146,8 @@ fn assert_close(equation: &Equation, values: &Values, expected: f64, tolerance: 
 fn printed_equations_in_full_have_the_value_of_the_model() {
     for model in models() {
         let symbols = SymbolTable::default();
-        let typeset = Typeset::new(&Equations::of(&model), &symbols, Rounding::Exact).unwrap();
+        let typeset =
+            Typeset::new(&Equations::as_learned(&model), &symbols, Rounding::Exact).unwrap();
         for seed in 0..5 {
             let dim = model.latent_dim();
             let at = |offset: f64| point(dim, f64::from(seed) + offset);
@@ -166,7 +167,12 @@ fn printed_equations_in_full_have_the_value_of_the_model() {
 fn rounded_equations_stay_within_the_stated_relative_error() {
     for model in models() {
         let symbols = SymbolTable::default();
-        let typeset = Typeset::new(&Equations::of(&model), &symbols, Rounding::default()).unwrap();
+        let typeset = Typeset::new(
+            &Equations::as_learned(&model),
+            &symbols,
+            Rounding::default(),
+        )
+        .unwrap();
         assert!(typeset.rounding.dropped.is_empty());
         assert!(typeset.rounding.largest_relative <= 0.05);
         let dim = model.latent_dim();
@@ -188,7 +194,8 @@ fn robot_equations_in_full_are_the_decoded_accelerations() {
     let mut with_robot = 0;
     for model in models() {
         let symbols = SymbolTable::default();
-        let robot = RobotTypeset::new(&Equations::of(&model), &symbols, Rounding::Exact).unwrap();
+        let robot =
+            RobotTypeset::new(&Equations::as_learned(&model), &symbols, Rounding::Exact).unwrap();
         let Some(robot) = robot else { continue };
         with_robot += 1;
         let dim = model.latent_dim();

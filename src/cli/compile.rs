@@ -192,9 +192,8 @@ pub fn write(
 }
 
 fn phases_in_words(equations: &Equations<'_>) -> String {
-    let phase = |phase: &PhaseEquations| {
-        format!("{} active terms in {}", phase.active_count(), phase.name)
-    };
+    let phase =
+        |phase: &PhaseEquations| format!("{} active terms in {}", phase.active_count(), phase.name);
     (equations.phases().iter())
         .map(phase)
         .collect::<Vec<_>>()

@@ -16,7 +16,6 @@ use super::{compile, mpc as mpc_command, report, simulate};
 use crate::deploy::Target;
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
-use crate::equations::Equations;
 use crate::evaluate::ReferenceInput;
 use crate::files::EmittedFile;
 use crate::files::Overwrite;

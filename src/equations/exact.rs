@@ -87,7 +87,10 @@ impl Equations<'_> {
                         phase: phase.name.clone(),
                         output,
                         before: replaced.iter().map(named).collect(),
-                        after: after.iter().map(|(_, c, text)| (*c, text.clone())).collect(),
+                        after: after
+                            .iter()
+                            .map(|(_, c, text)| (*c, text.clone()))
+                            .collect(),
                     });
                     replaced.iter().for_each(|&position| kept[position] = None);
                     added.extend(after.into_iter().map(|(place, c, _)| (place, c)));
@@ -171,15 +174,18 @@ impl NewTerms {
         if texts.iter().any(|text| text.len() > MAX_TERM_LEN) {
             return None;
         }
-        let placed = summands.iter().zip(texts).map(|(&(coefficient, expr), text)| {
-            let next = (first, self.terms.len() + 1);
-            let place = *self.known.entry(expr).or_insert(next);
-            if place == next {
-                let term = CandidateTerm::new(text.clone(), expr);
-                self.terms.push((place, term));
-            }
-            (place, coefficient, text)
-        });
+        let placed = summands
+            .iter()
+            .zip(texts)
+            .map(|(&(coefficient, expr), text)| {
+                let next = (first, self.terms.len() + 1);
+                let place = *self.known.entry(expr).or_insert(next);
+                if place == next {
+                    let term = CandidateTerm::new(text.clone(), expr);
+                    self.terms.push((place, term));
+                }
+                (place, coefficient, text)
+            });
         Some(placed.collect())
     }
 }

@@ -117,7 +117,9 @@ fn provenance_of(model: &ReducedModel, certificate: &Certificate) -> Value {
         "ddz_bounds": bounds,
     });
     if !certificate.exact.is_empty() {
-        entry["exact"] = (certificate.exact.iter()).map(ToString::to_string).collect();
+        entry["exact"] = (certificate.exact.iter())
+            .map(ToString::to_string)
+            .collect();
     }
     // the bounds are those to the model before, not to one that was simplified into it
     if let Some(earlier) = model.provenance().get("simplification") {

@@ -119,8 +119,13 @@ fn no_point_of_a_random_box_is_off_by_more_than_certified() {
         let model = random.model();
         let domain = random.domain(&model);
         let tolerance = 10f64.powf(random.between(-3.0, 0.5));
-        let made =
-            simplify(&Equations::of(&model), &domain, None, Tolerance::Absolute(tolerance)).expect("certified");
+        let made = simplify(
+            &Equations::of(&model),
+            &domain,
+            None,
+            Tolerance::Absolute(tolerance),
+        )
+        .expect("certified");
         for (phase, certificate) in made.certificate.phases.iter().enumerate() {
             let ranges = domain
                 .phase(phase)
@@ -215,7 +220,9 @@ fn simplification_is_deterministic_and_zero_tolerance_changes_nothing() {
         let mut random = Random::new(seed);
         let model = random.model();
         let domain = random.domain(&model);
-        let run = |tolerance| simplify(&Equations::of(&model), &domain, None, tolerance).expect("certified");
+        let run = |tolerance| {
+            simplify(&Equations::of(&model), &domain, None, tolerance).expect("certified")
+        };
         let tolerance = Tolerance::Absolute(0.05);
         assert_eq!(run(tolerance), run(tolerance));
         for zero in [Tolerance::Absolute(0.0), Tolerance::ShareOfRms(0.0)] {
@@ -246,7 +253,13 @@ fn simplified(terms: &[(&str, f64)], ranges: [(f64, f64); 3], tolerance: f64) ->
     let model = single(terms);
     let ranges = ranges.map(|(lo, hi)| Interval::new(lo, hi)).to_vec();
     let domain = Domain::new(&model, vec![Some(ranges)]).expect("a box");
-    simplify(&Equations::of(&model), &domain, None, Tolerance::Absolute(tolerance)).expect("certified")
+    simplify(
+        &Equations::of(&model),
+        &domain,
+        None,
+        Tolerance::Absolute(tolerance),
+    )
+    .expect("certified")
 }
 
 fn left(made: &Simplified) -> Vec<(String, f64)> {
@@ -282,7 +295,13 @@ fn model_simplified_twice_keeps_the_first_bounds_in_its_provenance() {
     let once = simplified(&[("z1", 1.234), ("u1", 2.0)], [UNIT; 3], 0.01).model;
     let domain = Domain::new(&once, vec![Some(vec![Interval::new(-1.0, 1.0); 3])]);
     let domain = domain.expect("a box");
-    let twice = simplify(&Equations::of(&once), &domain, None, Tolerance::Absolute(0.1)).expect("certified");
+    let twice = simplify(
+        &Equations::of(&once),
+        &domain,
+        None,
+        Tolerance::Absolute(0.1),
+    )
+    .expect("certified");
     assert_eq!(left(&twice)[0], ("z1".to_owned(), 1.2));
     let first = &once.provenance()["simplification"];
     assert_eq!(first["earlier"], serde_json::Value::Null);
@@ -375,8 +394,13 @@ fn domain_around_samples_has_their_extremes_and_margin() {
     let ranges = domain.phase(0).expect("samples");
     assert_eq!((ranges[0].lo(), ranges[0].hi()), (0.8, 3.2));
     assert_eq!((ranges[1].lo(), ranges[1].hi()), (0.0, 0.0));
-    let made =
-        simplify(&Equations::of(&model), &domain, Some(&samples), Tolerance::ShareOfRms(0.01)).expect("certified");
+    let made = simplify(
+        &Equations::of(&model),
+        &domain,
+        Some(&samples),
+        Tolerance::ShareOfRms(0.01),
+    )
+    .expect("certified");
     let equation = &made.certificate.phases[0].equations[0];
     assert_eq!(equation.rms, Some((14.0f64 / 3.0).sqrt()));
     let wrong = Domain::around(&model, &Samples { phases: Vec::new() }, 0.1);
@@ -390,7 +414,12 @@ fn domain_around_samples_has_their_extremes_and_margin() {
     let infinite = Interval::new(0.0, f64::INFINITY);
     let wrong = Domain::new(&model, vec![Some(vec![infinite; 3])]);
     assert!(matches!(wrong, Err(SimplifyError::Range { .. })));
-    let refused = simplify(&Equations::of(&model), &domain, None, Tolerance::ShareOfRms(0.01));
+    let refused = simplify(
+        &Equations::of(&model),
+        &domain,
+        None,
+        Tolerance::ShareOfRms(0.01),
+    );
     assert!(matches!(refused, Err(SimplifyError::NoSamples)));
 }
 

@@ -234,13 +234,27 @@ impl<'a> Shortener<'a> {
         };
         let normal = self.normal(expr, waves);
         let limits = SimplifyLimits::default();
-        let expanded = self.pool.expand_region(normal, limits, &mut limits.expand.products.clone());
+        let expanded = self
+            .pool
+            .expand_region(normal, limits, &mut limits.expand.products.clone());
         let mut monomials = rests(self.pool, expanded);
         if let Some((cofactor, _)) = self.pool.as_log_term(self.pool.split(expr).1) {
             // Terms with logarithms meet in a term that no model has.
             let minus_one = self.pool.constant(Number::MINUS_ONE);
             let common = self.pool.apply(Function::Log, minus_one);
             monomials.push(self.pool.product(&[cofactor, common]));
+        }
+        for factor in self.pool.factors_of(expr).to_vec() {
+            // Terms with the same denominator can be added.
+            if let Node::Power(base, exponent) = *self.pool.node(factor)
+                && let Node::Sum(_) = self.pool.node(base)
+                && self
+                    .pool
+                    .as_number(exponent)
+                    .is_some_and(Number::is_negative)
+            {
+                monomials.push(self.pool.powi(base, -1));
+            }
         }
         monomials.extend(rests(self.pool, normal));
         if self.pool.has_waves(normal) {
@@ -308,7 +322,9 @@ impl<'a> Shortener<'a> {
         }
         let n_terms = self.all_terms(&scaled);
         for candidate in candidates {
-            if candidate.len() > old.len() && self.all_terms(&candidate) >= n_terms {
+            // Only a term whose sums become fewer may be written as several.
+            let is_resolved = old.len() == 1 && self.all_terms(&candidate) < n_terms;
+            if candidate.len() > old.len() && !is_resolved {
                 continue;
             }
             let length = self.length(unit, &candidate);
@@ -571,7 +587,9 @@ fn in_f64(number: Number, unit: Number) -> f64 {
         Some((numerator, denominator)) if !unit.is_exact() => {
             numerator as f64 * unit.to_f64() / denominator as f64
         }
-        _ => number.checked_mul(unit).map_or(f64::INFINITY, Number::to_f64),
+        _ => number
+            .checked_mul(unit)
+            .map_or(f64::INFINITY, Number::to_f64),
     }
 }
 
@@ -687,7 +705,7 @@ mod tests {
             &[(0.1, "x"), (0.2, "x*y"), (0.3, "(x + 1)^2")],
             &[(1.0, "x*y"), (1.0, "x*z")],
             &[(0.37, "sin(x)*cos(y)"), (0.21, "sin(z)*cos(x)")],
-            &[(1.0, "x/3")],
+            &[(1.0, "1/3*x")],
             &[(1.0, "exp(x)"), (1.0, "tanh(y)"), (0.5, "sqrt(x^2 + y^2)")],
         ] {
             let texts: Vec<String> = sum.iter().map(|(c, t)| format!("{c} {t}")).collect();

@@ -231,8 +231,10 @@ impl TrainOptions {
             LibraryChoice::Standard(standard) => Library::standard(self.latent_dim, *standard),
             LibraryChoice::Terms(terms) => Library::from_terms(self.latent_dim, terms),
         };
-        let library = library.map_err(ModelError::from)?;
-        library.check_distinct().map_err(ModelError::from)?;
+        let library = library.map_err(crate::model::ModelError::from)?;
+        library
+            .check_distinct()
+            .map_err(crate::model::ModelError::from)?;
         Ok(library)
     }
 

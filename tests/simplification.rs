@@ -1,0 +1,339 @@
+//! Exact simplification: a table of sums with their simplest forms, and random models.
+
+use std::fs;
+use std::path::Path;
+
+use nalgebra::DMatrix;
+use romc::deploy::{EmitOptions, Target, emit};
+use romc::equations::{Equations, PhaseEquations};
+use romc::ir::Interpreter;
+use romc::lower::{self, LowerOptions};
+use romc::model::{FeetRule, Library, LibrarySource, Phase, ReducedModel, StandardLibrary};
+use romc::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId};
+use romc::typeset::Rounding;
+use romc::typeset::latex::LatexOptions;
+
+const LATENT_DIM: usize = 2;
+
+/// Numbers of a fixed sequence.
+struct Random(u64);
+
+impl Random {
+    /// From 0 up to 1.
+    fn unit(&mut self) -> f64 {
+        self.0 = (self.0)
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.unit() * n as f64) as usize
+    }
+}
+
+/// A model whose first acceleration is the sum, and whose second is zero.
+fn model_of(sum: &[(f64, String)]) -> ReducedModel {
+    let texts: Vec<String> = sum.iter().map(|(_, text)| text.clone()).collect();
+    let library = Library::from_terms(LATENT_DIM, &texts).expect("terms parse");
+    let coefficients = sum.iter().map(|&(coefficient, _)| coefficient);
+    let column = nalgebra::DVector::from_iterator(sum.len(), coefficients);
+    let mut xi = DMatrix::zeros(sum.len(), LATENT_DIM);
+    xi.set_column(0, &column);
+    ReducedModel::builder("sum", library)
+        .phase(Phase {
+            name: "contact".into(),
+            feet: FeetRule::Any,
+            xi,
+        })
+        .build()
+        .expect("a model")
+}
+
+/// `0.5 z1 ; -2 sin(z1)` as coefficients and terms.
+fn parsed(text: &str) -> Vec<(f64, String)> {
+    let summands = text
+        .split(';')
+        .map(str::trim)
+        .filter(|part| !part.is_empty());
+    summands
+        .map(|summand| {
+            let (coefficient, term) = summand.split_once(' ').expect("coefficient and term");
+            (
+                coefficient.parse().expect("a number"),
+                term.trim().to_owned(),
+            )
+        })
+        .collect()
+}
+
+fn printed(equations: &Equations<'_>) -> String {
+    let terms = equations.phases()[0].summands(equations, 0);
+    let terms: Vec<String> = terms
+        .map(|(c, term)| format!("{c} {}", term.text()))
+        .collect();
+    terms.join(" ; ")
+}
+
+/// The right side of `ddz1` in the emitted LaTeX.
+fn latex(equations: &Equations<'_>) -> String {
+    let options = EmitOptions {
+        latex: LatexOptions {
+            rounding: Rounding::Exact,
+            width_em: 1000.0,
+            ..LatexOptions::default()
+        },
+        ..EmitOptions::default()
+    };
+    let files = emit(equations, &[Target::Latex, Target::C], &options).expect("emits");
+    let tex = files
+        .iter()
+        .find(|file| file.path == "sum.tex")
+        .expect("equations");
+    let line = (tex.contents.lines())
+        .find_map(|line| line.trim().strip_prefix(r"\ddot{z}_1 "))
+        .expect("the first equation");
+    let right = line.trim_start_matches(['&', '=', ' ']);
+    right
+        .trim_end_matches([',', '\\'])
+        .trim_end_matches(r" \\")
+        .trim()
+        .to_owned()
+}
+
+/// Values of `ddz1` at a point, by the program that code is emitted from.
+fn value(equations: &Equations<'_>, point: &[f64]) -> f64 {
+    let program = lower::dynamics(equations, 0, &LowerOptions::default()).expect("lowers");
+    let mut ddz = vec![0.0; LATENT_DIM];
+    let inputs = [&point[..2], &point[2..4], &point[4..]];
+    Interpreter::new(&program).run(&inputs, &mut [&mut ddz]);
+    ddz[0]
+}
+
+/// A bound of |coefficient * term|, summed over the terms: 4 units in the last place of it are what
+/// rounding may change. Sums inside terms count by the sizes of their parts.
+fn size(equations: &Equations<'_>, point: &[f64]) -> f64 {
+    let pool = equations.pool();
+    let value_of = |symbol: SymbolId| point[symbol.index()];
+    let terms = equations.phases()[0].summands(equations, 0);
+    terms
+        .map(|(c, term)| c.abs() * size_of(pool, term.expr(), &value_of))
+        .sum()
+}
+
+fn size_of(pool: &ExprPool, expr: ExprId, value_of: &dyn Fn(SymbolId) -> f64) -> f64 {
+    let value = pool.evaluate(expr, value_of).abs();
+    let part = |expr: ExprId| size_of(pool, expr, value_of);
+    match pool.node(expr) {
+        Node::Number(_) | Node::Symbol(_) => value,
+        Node::Sum(terms) => terms.iter().map(|term| part(*term)).sum(),
+        Node::Product(factors) => factors.iter().map(|factor| part(*factor)).product(),
+        Node::Power(base, exponent) => {
+            let exponent = pool.as_number(*exponent).map_or(1.0, Number::to_f64);
+            let base_value = pool.evaluate(*base, value_of).abs();
+            let relative = part(*base) / base_value;
+            value * relative.powf(exponent.abs()) * exponent.abs().max(1.0)
+        }
+        Node::Apply(function, argument) => match function {
+            Function::Sin | Function::Cos | Function::Tanh => 1.0 + part(*argument),
+            Function::Tan => value + part(*argument) * (1.0 + value * value),
+            Function::Exp => value * (1.0 + part(*argument)),
+            Function::Log => {
+                let inner = pool.evaluate(*argument, value_of).abs();
+                value + part(*argument) / inner
+            }
+            Function::Sqrt | Function::Abs | Function::Sign => {
+                let inner = pool.evaluate(*argument, value_of).abs();
+                value * part(*argument) / inner
+            }
+        },
+    }
+}
+
+/// Compares both equations at points where the first has a value.
+fn check_values(name: &str, learned: &Equations<'_>, simplified: &Equations<'_>, positive: bool) {
+    let mut random = Random(7);
+    let mut n_compared = 0;
+    for _ in 0..40 {
+        let point: Vec<f64> = (0..3 * LATENT_DIM)
+            .map(|_| match positive {
+                true => 0.2 + 1.2 * random.unit(),
+                false => 3.0 * random.unit() - 1.5,
+            })
+            .collect();
+        let (expected, found) = (value(learned, &point), value(simplified, &point));
+        if !expected.is_finite() {
+            continue;
+        }
+        n_compared += 1;
+        let allowed = 4.0 * f64::EPSILON * (size(learned, &point) + size(simplified, &point));
+        assert!(
+            (found - expected).abs() <= allowed,
+            "{name} at {point:?}: {found}, as learned {expected}, allowed {allowed:e}"
+        );
+    }
+    assert!(n_compared >= 10, "{name}: {n_compared} points");
+}
+
+#[test]
+fn cases_of_the_table_come_out_simplest() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/simplification/cases.txt");
+    let table = fs::read_to_string(path).expect("the table is checked in");
+    let (mut n_cases, mut wrong) = (0, Vec::new());
+    for line in table
+        .lines()
+        .filter(|line| !line.starts_with('#') && !line.is_empty())
+    {
+        let columns: Vec<&str> = line.split(" |").map(str::trim).collect();
+        let [name, sum, simplest, in_latex] = columns[..] else {
+            panic!("{line}: expected four columns");
+        };
+        n_cases += 1;
+        let model = model_of(&parsed(sum));
+        let (learned, simplified) = (Equations::as_learned(&model), Equations::of(&model));
+        let found = printed(&simplified);
+        if found != simplest {
+            wrong.push(format!("{name}: {found}, expected {simplest}"));
+        }
+        let found = latex(&simplified);
+        if found != in_latex {
+            wrong.push(format!("{name}: {found}, expected {in_latex}"));
+        }
+        assert_eq!(
+            simplified.steps().is_empty(),
+            name.starts_with("short-"),
+            "{name}"
+        );
+        check_values(name, &learned, &simplified, true);
+        check_values(
+            name,
+            &learned,
+            &simplified,
+            sum.contains("log") || sum.contains("sqrt"),
+        );
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(n_cases >= 30, "{n_cases} cases");
+}
+
+#[test]
+fn steps_state_how_many_terms_became_how_many() {
+    let model = model_of(&parsed(
+        "1 (z1 + 1)^2 ; -1 z1^2 ; -2 z1 ; 1 sin(-z2) ; 1 sin(z2)",
+    ));
+    let equations = Equations::of(&model);
+    let steps: Vec<String> = equations.steps().iter().map(ToString::to_string).collect();
+    assert_eq!(
+        steps,
+        [
+            "contact, ddz1: 3 terms became 1",
+            "contact, ddz1: 2 terms cancelled"
+        ]
+    );
+    let kept = equations.to_model().expect("a model");
+    assert_eq!(printed(&Equations::as_learned(&kept)), "1 1");
+}
+
+/// Terms of all families, in which equal and related ones are frequent.
+fn random_sum(random: &mut Random) -> Vec<(f64, String)> {
+    const ARGUMENTS: [&str; 8] = ["z1", "z2", "dz1", "u1", "-z1", "z1 + z2", "2*z1", "z1 - z2"];
+    const FORMS: [&str; 22] = [
+        "A",
+        "B",
+        "1",
+        "sin(A)",
+        "cos(A)",
+        "sin(A)^2",
+        "cos(A)^2",
+        "sin(A)*cos(B)",
+        "cos(A)*sin(B)",
+        "sin(A)*sin(B)",
+        "cos(A)*cos(B)",
+        "(A)*(B)",
+        "(A)^2",
+        "(A + 1)^2",
+        "((A) + (B))^2",
+        "(A)/2",
+        "tanh(A)",
+        "exp(A)*exp(B)",
+        "exp(A)",
+        "log(exp(A))",
+        "abs(A)",
+        "(A)*sin(B)^2",
+    ];
+    const COEFFICIENTS: [f64; 7] = [1.0, -1.0, 2.0, 0.5, 0.1, -0.3, 3.0];
+    let n_terms = 2 + random.below(9);
+    let learned = random.unit();
+    let mut sum: Vec<(f64, String)> = Vec::new();
+    while sum.len() < n_terms {
+        let [a, b] = [0, 1].map(|_| ARGUMENTS[random.below(ARGUMENTS.len())]);
+        let text = FORMS[random.below(FORMS.len())]
+            .replace('A', a)
+            .replace('B', b);
+        let coefficient = match random.below(3) {
+            0 => random.unit() - 0.5,
+            1 => learned,
+            _ => COEFFICIENTS[random.below(COEFFICIENTS.len())],
+        };
+        let one = Library::from_terms(LATENT_DIM, std::slice::from_ref(&text));
+        if one.is_ok() {
+            sum.push((coefficient, text));
+        }
+    }
+    sum
+}
+
+#[test]
+fn random_models_keep_their_values_and_never_get_longer() {
+    let mut random = Random(20_261_122);
+    let mut n_simplified = 0;
+    for number in 0..200 {
+        let sum = random_sum(&mut random);
+        let model = model_of(&sum);
+        let (learned, simplified) = (Equations::as_learned(&model), Equations::of(&model));
+        let name = format!("model {number}, {}", printed(&learned));
+        let count =
+            |equations: &Equations<'_>| PhaseEquations::active_count(&equations.phases()[0]);
+        assert!(
+            count(&simplified) <= count(&learned),
+            "{name}: {}",
+            printed(&simplified)
+        );
+        n_simplified += usize::from(!simplified.steps().is_empty());
+        check_values(&name, &learned, &simplified, false);
+        let again = simplified.to_model().expect("a model");
+        let again = Equations::of(&again);
+        assert_eq!(
+            printed(&again),
+            printed(&simplified),
+            "{name}: simplified twice"
+        );
+    }
+    assert!((50..200).contains(&n_simplified), "{n_simplified}");
+}
+
+#[test]
+fn large_models_of_plain_terms_keep_every_bit() {
+    let standard = StandardLibrary {
+        degree: 3,
+        trigonometric: true,
+        inputs: true,
+    };
+    let library = Library::standard(8, standard).expect("a library");
+    assert!(matches!(library.source(), LibrarySource::Standard(_)));
+    let mut random = Random(3);
+    let xi = DMatrix::from_fn(library.len(), 8, |_, _| random.unit() - 0.5);
+    let n_coefficients = xi.len();
+    let model = ReducedModel::builder("large", library)
+        .phase(Phase {
+            name: "contact".into(),
+            feet: FeetRule::Any,
+            xi,
+        })
+        .build()
+        .expect("a model");
+    let equations = Equations::of(&model);
+    assert!(equations.steps().is_empty());
+    let counts = equations.phases().iter().map(PhaseEquations::active_count);
+    assert_eq!(counts.sum::<usize>(), n_coefficients);
+}
