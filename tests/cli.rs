@@ -85,7 +85,7 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 
 const MODEL: &str = "models/go1-d4.json";
 const JUMP: &str = "examples/recordings/go1/test_01.csv.gz";
-const COMMANDS: [&str; 8] = [
+const COMMANDS: [&str; 9] = [
     "demo", "inspect", "train", "study", "import", "check", "compile", "simulate", "mpc",
 ];
 
