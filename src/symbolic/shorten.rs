@@ -244,17 +244,9 @@ impl<'a> Shortener<'a> {
             let common = self.pool.apply(Function::Log, minus_one);
             monomials.push(self.pool.product(&[cofactor, common]));
         }
-        for factor in self.pool.factors_of(expr).to_vec() {
-            // Terms with the same denominator can be added.
-            if let Node::Power(base, exponent) = *self.pool.node(factor)
-                && let Node::Sum(_) = self.pool.node(base)
-                && self
-                    .pool
-                    .as_number(exponent)
-                    .is_some_and(Number::is_negative)
-            {
-                monomials.push(self.pool.powi(base, -1));
-            }
+        // Terms with the same denominator can be added.
+        for base in self.denominators(expr) {
+            monomials.push(self.pool.powi(base, -1));
         }
         monomials.extend(rests(self.pool, normal));
         if self.pool.has_waves(normal) {
@@ -265,6 +257,18 @@ impl<'a> Shortener<'a> {
         monomials.push(self.pool.split(expr).1);
         self.monomials.insert((expr, waves), monomials.clone());
         monomials
+    }
+
+    /// The sums in the denominator of a term.
+    fn denominators(&self, expr: ExprId) -> Vec<ExprId> {
+        let base = |factor: &ExprId| match *self.pool.node(*factor) {
+            Node::Power(base, exponent) if matches!(self.pool.node(base), Node::Sum(_)) => {
+                let exponent = self.pool.as_number(exponent)?;
+                exponent.is_negative().then_some(base)
+            }
+            _ => None,
+        };
+        self.pool.factors_of(expr).iter().filter_map(base).collect()
     }
 
     /// The normal form of a term, with its angles in the units of all.
@@ -322,8 +326,10 @@ impl<'a> Shortener<'a> {
         }
         let n_terms = self.all_terms(&scaled);
         for candidate in candidates {
-            // Only a term whose sums become fewer may be written as several.
-            let is_resolved = old.len() == 1 && self.all_terms(&candidate) < n_terms;
+            // Only a fraction whose sums become fewer may be written as several terms.
+            let is_resolved = old.len() == 1
+                && self.all_terms(&candidate) < n_terms
+                && !self.denominators(old[0].1).is_empty();
             if candidate.len() > old.len() && !is_resolved {
                 continue;
             }
