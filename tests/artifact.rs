@@ -1076,11 +1076,10 @@ fn latent_only_model_says_what_it_lacks() {
     let z = nalgebra::DVector::zeros(2);
     for error in [
         model.encode(&x).unwrap_err(),
-        model.encode_velocity(&x).unwrap_err(),
+        model.tangent(&x).unwrap_err(),
+        model.encoder_jacobian(&x).unwrap_err(),
         model.decode(&z).unwrap_err(),
-        model.decode_velocity(&z).unwrap_err(),
-        model.project_input(&x).unwrap_err(),
-        model.lift_input(&z).unwrap_err(),
+        model.decoder_jacobian(&z).unwrap_err(),
         model.robot().unwrap_err(),
         model.sample_time_s().unwrap_err(),
         model.input_statistics(0).unwrap_err(),

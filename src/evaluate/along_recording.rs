@@ -153,8 +153,11 @@ pub fn lift_comparison(
             if !is_plausible(controller.plant().robot(), &recorded) {
                 continue;
             }
-            controller.stand_at(segment.x.column(sample).as_slice());
-            controller.local_plant().project(u, &mut u_lat);
+            let x = segment.x.column(sample);
+            controller.stand_at(x.as_slice());
+            controller
+                .local_plant()
+                .project(x.as_slice(), u, &mut u_lat);
             let Some(stance) = stance(controller, segment, sample) else {
                 continue;
             };

@@ -34,8 +34,8 @@ impl LiftSums {
                 continue;
             }
             let x = segment.x.column(sample).into_owned();
-            let u_lat = model.project_input_at(&x, &input.column(sample).into_owned())?;
-            let lifted = model.lift_input_at(&x, &u_lat)?;
+            let tangent = model.tangent(&x)?;
+            let lifted = tangent.lift * (tangent.project * input.column(sample));
             let feet = segment.feet[sample];
             let of_joints = std::array::from_fn(|joint| lifted[joint]);
             self.torque.add(feet, &of_joints, &torque);

@@ -4,24 +4,25 @@
 //! Jacobian at a state, which is then the first input: `x` of the encoder's maps, `z` of the
 //! decoder's.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::error::LowerError;
 use super::network;
 use super::sums::{Term, linear_combination};
 use crate::ir::{Program, ProgramBuilder};
-use crate::model::ReducedModel;
+use crate::model::{AffineMap, ReducedModel};
 
 /// `z = W_e (s_x x) + b_e`: input `x` (SI units), output `z`.
 ///
 /// # Errors
 /// [`LowerError::Model`] if the model has no encoder or scaling.
 pub fn encode(model: &ReducedModel) -> Result<Program, LowerError> {
-    if model.encoder_map()?.as_affine().is_none() {
+    let Some(encoder) = model.encoder_map()?.as_affine() else {
         return network::encode(model);
-    }
-    let bias = model.encoder()?.bias().as_slice();
-    affine("encode", ("x", "z"), &encoder_weights(model)?, Some(bias))
+    };
+    let weights = model.encoder_jacobian(&anywhere(encoder))?;
+    let bias = encoder.bias().as_slice();
+    affine("encode", ("x", "z"), &weights, Some(bias))
 }
 
 /// `dz = W_e (s_x dx)`: input `dx` (SI units), output `dz`; velocities take no bias.
@@ -29,15 +30,11 @@ pub fn encode(model: &ReducedModel) -> Result<Program, LowerError> {
 /// # Errors
 /// As [`encode`].
 pub fn encode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
-    if model.encoder_map()?.as_affine().is_none() {
+    let Some(encoder) = model.encoder_map()?.as_affine() else {
         return network::encode_velocity(model);
-    }
-    affine(
-        "encode_velocity",
-        ("dx", "dz"),
-        &encoder_weights(model)?,
-        None,
-    )
+    };
+    let weights = model.encoder_jacobian(&anywhere(encoder))?;
+    affine("encode_velocity", ("dx", "dz"), &weights, None)
 }
 
 /// `x = (W_d z + b_d) / s_x`: input `z`, output `x` (SI units).
@@ -45,17 +42,12 @@ pub fn encode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
 /// # Errors
 /// [`LowerError::Model`] if the model has no decoder or scaling.
 pub fn decode(model: &ReducedModel) -> Result<Program, LowerError> {
-    if model.decoder_map()?.as_affine().is_none() {
+    let Some(decoder) = model.decoder_map()?.as_affine() else {
         return network::decode(model);
-    }
-    let factors = model.state_factors()?;
-    let bias = model.decoder()?.bias().component_div(&factors);
-    affine(
-        "decode",
-        ("z", "x"),
-        &decoder_weights(model)?,
-        Some(bias.as_slice()),
-    )
+    };
+    let weights = model.decoder_jacobian(&anywhere(decoder))?;
+    let bias = decoder.bias().component_div(&model.state_factors()?);
+    affine("decode", ("z", "x"), &weights, Some(bias.as_slice()))
 }
 
 /// `dx = (W_d dz) / s_x`: input `dz`, output `dx` (SI units); velocities take no bias.
@@ -63,15 +55,11 @@ pub fn decode(model: &ReducedModel) -> Result<Program, LowerError> {
 /// # Errors
 /// As [`decode`].
 pub fn decode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
-    if model.decoder_map()?.as_affine().is_none() {
+    let Some(decoder) = model.decoder_map()?.as_affine() else {
         return network::decode_velocity(model);
-    }
-    affine(
-        "decode_velocity",
-        ("dz", "dx"),
-        &decoder_weights(model)?,
-        None,
-    )
+    };
+    let weights = model.decoder_jacobian(&anywhere(decoder))?;
+    affine("decode_velocity", ("dz", "dx"), &weights, None)
 }
 
 /// `u_lat = pinv(W_e^T) (s_u u)`: input `u` (SI units), output `u_lat`.
@@ -79,14 +67,10 @@ pub fn decode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
 /// # Errors
 /// As [`encode`].
 pub fn project_input(model: &ReducedModel) -> Result<Program, LowerError> {
-    if model.encoder_map()?.as_affine().is_none() {
+    let Some(encoder) = model.encoder_map()?.as_affine() else {
         return network::project_input(model);
-    }
-    let factors = model.input_factors()?;
-    let projection = model.input_projection()?;
-    let weights = DMatrix::from_fn(projection.nrows(), projection.ncols(), |row, col| {
-        projection[(row, col)] * factors[col]
-    });
+    };
+    let weights = model.tangent(&anywhere(encoder))?.project;
     affine("project_input", ("u", "u_lat"), &weights, None)
 }
 
@@ -95,14 +79,10 @@ pub fn project_input(model: &ReducedModel) -> Result<Program, LowerError> {
 /// # Errors
 /// As [`encode`].
 pub fn lift_input(model: &ReducedModel) -> Result<Program, LowerError> {
-    if model.encoder_map()?.as_affine().is_none() {
+    let Some(encoder) = model.encoder_map()?.as_affine() else {
         return network::lift_input(model);
-    }
-    let factors = model.input_factors()?;
-    let encoder = model.encoder()?.weights();
-    let weights = DMatrix::from_fn(encoder.ncols(), encoder.nrows(), |row, col| {
-        encoder[(col, row)] / factors[row]
-    });
+    };
+    let weights = model.tangent(&anywhere(encoder))?.lift;
     affine("lift_input", ("u_lat", "u"), &weights, None)
 }
 
@@ -118,24 +98,9 @@ pub fn linear_map(
     affine(name, slots, weights, None)
 }
 
-fn encoder_weights(model: &ReducedModel) -> Result<DMatrix<f64>, LowerError> {
-    let factors = model.state_factors()?;
-    let encoder = model.encoder()?.weights();
-    Ok(DMatrix::from_fn(
-        encoder.nrows(),
-        encoder.ncols(),
-        |row, col| encoder[(row, col)] * factors[col],
-    ))
-}
-
-fn decoder_weights(model: &ReducedModel) -> Result<DMatrix<f64>, LowerError> {
-    let factors = model.state_factors()?;
-    let decoder = model.decoder()?.weights();
-    Ok(DMatrix::from_fn(
-        decoder.nrows(),
-        decoder.ncols(),
-        |row, col| decoder[(row, col)] / factors[row],
-    ))
+/// A point of a linear map, whose Jacobian is the same at all.
+fn anywhere(map: &AffineMap) -> DVector<f64> {
+    DVector::zeros(map.input_dim())
 }
 
 /// `output = weights input + bias`.

@@ -278,6 +278,11 @@ impl Library {
         Ok(())
     }
 
+    /// The terms as steps of one pass over their subexpressions.
+    pub(crate) fn tape(&self) -> &Tape {
+        &self.tape
+    }
+
     /// Number of latent coordinates, `d`.
     pub fn latent_dim(&self) -> usize {
         self.latent_dim
@@ -351,7 +356,7 @@ impl Library {
         ModelError::check_dimension("latent velocity dz", dz.len(), d)?;
         ModelError::check_dimension("latent input u_lat", u_lat.len(), d)?;
         let variables: Vec<f64> = z.iter().chain(dz).chain(u_lat).copied().collect();
-        let mut values = vec![0.0; self.tape.step_count()];
+        let mut values = vec![0.0; self.tape.steps.len()];
         let mut theta = DVector::zeros(self.len());
         self.tape.run(&variables, &mut values, theta.as_mut_slice());
         Ok(theta)
@@ -375,7 +380,7 @@ impl Library {
         check_shape("dz", dz.shape(), expected)?;
         check_shape("u_lat", u_lat.shape(), expected)?;
         let mut variables = vec![0.0; 3 * self.latent_dim];
-        let mut values = vec![0.0; self.tape.step_count()];
+        let mut values = vec![0.0; self.tape.steps.len()];
         let mut theta = vec![0.0; self.len()];
         let mut all = DMatrix::zeros(z.ncols(), self.len());
         for point in 0..z.ncols() {

@@ -1,23 +1,18 @@
 //! The maps of a model between robot and latent coordinates.
 //!
-//! For a linear model those of `rom.rs`. In general, with the encoder `E`, the decoder `D`, their
-//! Jacobians `J_E` at `s_x x` and `J_D` at `z`:
+//! With the encoder `E` and the decoder `D`, their Jacobians `J_E` at `s_x x` and `J_D` at `z`:
 //!
-//! - `z = E(s_x x)`, `dz = J_E (s_x dx)`, `ddz = J_E (s_x ddx) + dJ_E/dt (s_x dx)`;
-//! - `x = D(z) / s_x`, `dx = J_D dz / s_x`, `ddx = (J_D ddz + dJ_D/dt dz) / s_x`;
-//! - `u_lat = pinv(J_E^T) (s_u u)` (project), `u = (J_E^T u_lat) / s_u` (lift).
+//! - `z = E(s_x x)`, `ddz = J_E (s_x ddx) + dJ_E/dt (s_x dx)`;
+//! - `x = D(z) / s_x`, `ddx = (J_D ddz + dJ_D/dt dz) / s_x`.
 //!
-//! Functions whose name ends in `_at` take the state at which `J` is meant; a linear map ignores it.
-//! Those without are for linear models and refuse others with [`ModelError::Nonlinear`].
+//! Velocities and inputs: [`ReducedModel::tangent`].
 
 use nalgebra::{DMatrix, DVector};
 
 use super::affine::AffineMap;
 use super::error::ModelError;
-use super::projection::pinv_of_jacobian;
 use super::rom::ReducedModel;
 use super::state_map::StateMap;
-use super::statistics::LatentInputStatistics;
 
 impl ReducedModel {
     /// Whether encoder and decoder, as far as the model has them, are single affine maps.
@@ -97,96 +92,12 @@ impl ReducedModel {
         builder.build()
     }
 
-    /// The encoder's Jacobian in SI units, `d z / d x = J_E diag(s_x)`, `latent_dim x state_dim`.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::encode`].
-    pub fn encoder_jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
-        let jacobian = self.encoder_map()?.jacobian(&self.scaled_state(x)?)?;
-        Ok(jacobian * DMatrix::from_diagonal(&self.state_factors()?))
-    }
-
-    /// The decoder's Jacobian in SI units, `d x / d z = J_D / s_x`, `state_dim x latent_dim`.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::decode`].
-    pub fn decoder_jacobian(&self, z: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
-        let jacobian = self.decoder_map()?.jacobian(z)?;
-        let inverse = self.state_factors()?.map(f64::recip);
-        Ok(DMatrix::from_diagonal(&inverse) * jacobian)
-    }
-
-    /// The matrix of [`ReducedModel::project_input_at`]: `pinv(J_E^T) diag(s_u)`,
-    /// `latent_dim x state_dim`.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::project_input_at`].
-    pub fn projection_matrix_at(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
-        let factors = DMatrix::from_diagonal(&self.input_factors()?);
-        if let Some(projection) = &self.input_projection {
-            return Ok(projection * factors);
-        }
-        let jacobian = self.encoder_map()?.jacobian(&self.scaled_state(x)?)?;
-        Ok(pinv_of_jacobian(&jacobian)? * factors)
-    }
-
-    /// The matrix of [`ReducedModel::lift_input_at`]: `J_E^T / s_u`, `state_dim x latent_dim`.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::encode`].
-    pub fn lift_matrix_at(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
-        let jacobian = self.encoder_map()?.jacobian(&self.scaled_state(x)?)?;
-        let inverse = self.input_factors()?.map(f64::recip);
-        Ok(DMatrix::from_diagonal(&inverse) * jacobian.transpose())
-    }
-
-    /// Mean and covariance of `u_lat` in one phase: those of `u` through `pinv(W_e^T) s_u`.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::input_statistics`] and [`ReducedModel::project_input`].
-    pub fn latent_input_statistics(
-        &self,
-        phase: usize,
-    ) -> Result<LatentInputStatistics, ModelError> {
-        let statistics = self.input_statistics(phase)?;
-        let projection = self.input_projection()? * DMatrix::from_diagonal(&self.input_factors()?);
-        Ok(LatentInputStatistics {
-            mean: &projection * &statistics.mean,
-            covariance: &projection * &statistics.covariance * projection.transpose(),
-        })
-    }
-
-    /// As [`ReducedModel::latent_input_statistics`] with the projection at the state `x`.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::input_statistics`] and [`ReducedModel::project_input_at`].
-    pub fn latent_input_statistics_at(
-        &self,
-        phase: usize,
-        x: &DVector<f64>,
-    ) -> Result<LatentInputStatistics, ModelError> {
-        let statistics = self.input_statistics(phase)?;
-        let projection = self.projection_matrix_at(x)?;
-        Ok(LatentInputStatistics {
-            mean: &projection * &statistics.mean,
-            covariance: &projection * &statistics.covariance * projection.transpose(),
-        })
-    }
-
     /// `z = E(s_x x)`, for a linear model `W_e (s_x x) + b_e`; `x` in SI units.
     ///
     /// # Errors
     /// [`ModelError::Missing`] for a latent-only model, [`ModelError::Dimension`].
     pub fn encode(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         self.encoder_map()?.apply(&self.scaled_state(x)?)
-    }
-
-    /// `dz = W_e (s_x dx)`, and the same for accelerations; `dx` in SI units.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::encode`].
-    pub fn encode_velocity(&self, dx: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        self.encoder()?.apply_linear(&self.scaled_state(dx)?)
     }
 
     /// `x = D(z) / s_x`, for a linear model `(W_d z + b_d) / s_x`, SI units.
@@ -198,55 +109,11 @@ impl ReducedModel {
         Ok(scaled.component_div(&self.state_factors()?))
     }
 
-    /// `dx = (W_d dz) / s_x`, SI units, and the same for accelerations.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::decode`].
-    pub fn decode_velocity(&self, dz: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        let scaled = self.decoder()?.apply_linear(dz)?;
-        Ok(scaled.component_div(&self.state_factors()?))
-    }
-
-    /// Projects a generalised input: `u_lat = pinv(W_e^T) (s_u u)`; `u` in SI units.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::encode`].
-    pub fn project_input(&self, u: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        let projection = self.input_projection()?;
-        ModelError::check_dimension("generalised input u", u.len(), projection.ncols())?;
-        Ok(projection * u.component_mul(&self.input_factors()?))
-    }
-
-    /// Lifts a latent input to a generalised input: `u = (W_e^T u_lat) / s_u`, SI units.
-    ///
-    /// From the power balance under `dz = W_e dx`; joint torques (N m) are the leading entries.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::encode`].
-    pub fn lift_input(&self, u_lat: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        let weights = self.encoder()?.weights();
-        ModelError::check_dimension("latent input u_lat", u_lat.len(), weights.nrows())?;
-        Ok(weights.tr_mul(u_lat).component_div(&self.input_factors()?))
-    }
-
-    /// `dz = J_E (s_x dx)` at the state `x`; both in SI units.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::encode`].
-    pub fn encode_velocity_at(
-        &self,
-        x: &DVector<f64>,
-        dx: &DVector<f64>,
-    ) -> Result<DVector<f64>, ModelError> {
-        let (x, dx) = (self.scaled_state(x)?, self.scaled_state(dx)?);
-        self.encoder_map()?.apply_velocity(&x, &dx)
-    }
-
     /// `ddz = J_E (s_x ddx) + dJ_E/dt (s_x dx)` at the state `x`; all in SI units.
     ///
     /// # Errors
     /// As [`ReducedModel::encode`].
-    pub fn encode_acceleration_at(
+    pub fn encode_acceleration(
         &self,
         x: &DVector<f64>,
         dx: &DVector<f64>,
@@ -257,24 +124,11 @@ impl ReducedModel {
         self.encoder_map()?.apply_acceleration(&x, &dx, &ddx)
     }
 
-    /// `dx = J_D dz / s_x` at the latent state `z`, SI units.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::decode`].
-    pub fn decode_velocity_at(
-        &self,
-        z: &DVector<f64>,
-        dz: &DVector<f64>,
-    ) -> Result<DVector<f64>, ModelError> {
-        let scaled = self.decoder_map()?.apply_velocity(z, dz)?;
-        Ok(scaled.component_div(&self.state_factors()?))
-    }
-
     /// `ddx = (J_D ddz + dJ_D/dt dz) / s_x` at the latent state `z`, SI units.
     ///
     /// # Errors
     /// As [`ReducedModel::decode`].
-    pub fn decode_acceleration_at(
+    pub fn decode_acceleration(
         &self,
         z: &DVector<f64>,
         dz: &DVector<f64>,
@@ -284,40 +138,7 @@ impl ReducedModel {
         Ok(scaled.component_div(&self.state_factors()?))
     }
 
-    /// Projects a generalised input at the state `x`: `u_lat = pinv(J_E^T) (s_u u)`, SI units.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::encode`], and [`ModelError::SingularJacobian`].
-    pub fn project_input_at(
-        &self,
-        x: &DVector<f64>,
-        u: &DVector<f64>,
-    ) -> Result<DVector<f64>, ModelError> {
-        if self.input_projection.is_some() {
-            return self.project_input(u);
-        }
-        let projection = self.projection_matrix_at(x)?;
-        ModelError::check_dimension("generalised input u", u.len(), projection.ncols())?;
-        Ok(projection * u)
-    }
-
-    /// Lifts a latent input at the state `x`: `u = (J_E^T u_lat) / s_u`, SI units.
-    ///
-    /// From the power balance under `dz = J_E dx`; joint torques (N m) are the leading entries.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::encode`].
-    pub fn lift_input_at(
-        &self,
-        x: &DVector<f64>,
-        u_lat: &DVector<f64>,
-    ) -> Result<DVector<f64>, ModelError> {
-        ModelError::check_dimension("latent input u_lat", u_lat.len(), self.latent_dim())?;
-        let jacobian = self.encoder_map()?.jacobian(&self.scaled_state(x)?)?;
-        Ok(jacobian.tr_mul(u_lat).component_div(&self.input_factors()?))
-    }
-
-    fn scaled_state(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+    pub(super) fn scaled_state(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         let factors = self.state_factors()?;
         ModelError::check_dimension("robot state", x.len(), factors.len())?;
         Ok(x.component_mul(&factors))

@@ -48,6 +48,7 @@ mod scaling;
 mod standard_library;
 mod state_map;
 mod statistics;
+mod tangent;
 
 #[cfg(test)]
 mod tests;
@@ -58,6 +59,7 @@ pub use affine::AffineMap;
 pub use builder::ModelBuilder;
 pub use coordinate_names::CoordinateNames;
 pub use error::{Dimensions, ModelError, SignalPart};
+pub(crate) use evaluation::{Step, Tape};
 pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN};
 pub use library::{
     CandidateTerm, LatentVariable, Library, LibraryError, LibrarySource, MAX_LATENT_DIM,
@@ -69,4 +71,5 @@ pub use rom::ReducedModel;
 pub use scaling::{ScaleFactors, Scaling};
 pub use standard_library::{MAX_DEGREE, StandardLibrary};
 pub use state_map::{Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};
-pub use statistics::{InputStatistics, LatentInputStatistics};
+pub use statistics::InputStatistics;
+pub use tangent::Tangent;

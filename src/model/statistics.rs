@@ -17,15 +17,6 @@ pub struct InputStatistics {
     pub covariance: DMatrix<f64>,
 }
 
-/// Mean and covariance of the latent input `u_lat` in one phase, scaled units.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LatentInputStatistics {
-    /// `latent_dim`.
-    pub mean: DVector<f64>,
-    /// `latent_dim x latent_dim`, symmetric positive semidefinite.
-    pub covariance: DMatrix<f64>,
-}
-
 impl InputStatistics {
     /// Mean and covariance of `n` samples of `input_dim` inputs in the columns of blocks, SI; all zero without a sample.
     pub fn of_blocks<I>(input_dim: usize, n: usize, blocks: impl Fn() -> I) -> Self
@@ -45,6 +36,14 @@ impl InputStatistics {
         let covariance = squares / n.max(1) as f64;
         let covariance = (&covariance + covariance.transpose()) * 0.5;
         Self { mean, covariance }
+    }
+
+    /// Mean and covariance of the latent input `u_lat = projection u`, scaled units.
+    pub fn projected(&self, projection: &DMatrix<f64>) -> Self {
+        Self {
+            mean: projection * &self.mean,
+            covariance: projection * &self.covariance * projection.transpose(),
+        }
     }
 
     /// Complains unless mean and covariance are those of some distribution over `dim` inputs.

@@ -64,7 +64,7 @@ fn encoder_scales_multiplies_and_adds_bias_to_positions_only() {
     let x = DVector::from_row_slice(&[10.0, -5.0, 2.0]);
     // Scaled: 1, -1, 1.
     assert_close(&example().encode(&x).unwrap(), &[-2.0 + 0.5, 3.5 + 0.25]);
-    assert_close(&example().encode_velocity(&x).unwrap(), &[-2.0, 3.5]);
+    assert_close(&(example().tangent(&x).unwrap().encode * &x), &[-2.0, 3.5]);
 }
 
 #[test]
@@ -76,14 +76,15 @@ fn decoder_adds_bias_before_it_unscales() {
     let expected: Vec<f64> = (0..3).map(|i| (linear[i] + bias[i]) / factors[i]).collect();
     assert_close(&example().decode(&z).unwrap(), &expected);
     let expected: Vec<f64> = (0..3).map(|i| linear[i] / factors[i]).collect();
-    assert_close(&example().decode_velocity(&z).unwrap(), &expected);
+    assert_close(&(example().decoder_jacobian(&z).unwrap() * &z), &expected);
 }
 
 #[test]
 fn lift_is_the_transposed_encoder_in_si_units() {
     let u_lat = DVector::from_row_slice(&[2.0, -1.0]);
     let expected = [1.5 / 0.25, 4.0 / 0.25, -5.0 / 0.25];
-    assert_close(&example().lift_input(&u_lat).unwrap(), &expected);
+    let tangent = example().tangent(&DVector::zeros(3)).unwrap();
+    assert_close(&(tangent.lift * u_lat), &expected);
 }
 
 #[test]
@@ -94,11 +95,10 @@ fn maps_refuse_vectors_of_the_wrong_length() {
     let four = DVector::zeros(4);
     for error in [
         model.encode(&four).unwrap_err(),
-        model.encode_velocity(&two).unwrap_err(),
+        model.tangent(&two).unwrap_err(),
         model.decode(&three).unwrap_err(),
-        model.decode_velocity(&three).unwrap_err(),
-        model.project_input(&two).unwrap_err(),
-        model.lift_input(&three).unwrap_err(),
+        model.encoder_jacobian(&two).unwrap_err(),
+        model.decoder_jacobian(&three).unwrap_err(),
         model.ddz(0, &two, &two, &three).unwrap_err(),
     ] {
         assert!(matches!(error, ModelError::Dimension { .. }), "{error}");
@@ -166,16 +166,15 @@ fn linearised_model_agrees_with_the_nonlinear_one_at_its_state() {
     assert!(linear.is_linear() && !model.is_linear());
     let z = model.encode(&x).unwrap();
     assert_close(&linear.encode(&x).unwrap(), z.as_slice());
-    let expected = model.encode_velocity_at(&x, &v).unwrap();
-    assert_close(&linear.encode_velocity(&v).unwrap(), expected.as_slice());
-    let expected = model.project_input_at(&x, &v).unwrap();
-    assert_close(&linear.project_input(&v).unwrap(), expected.as_slice());
-    let expected = model.lift_input_at(&x, &z).unwrap();
-    assert_close(&linear.lift_input(&z).unwrap(), expected.as_slice());
+    let (expected, found) = (model.tangent(&x).unwrap(), linear.tangent(&v).unwrap());
+    assert!((&found.encode - &expected.encode).amax() < 1e-12);
+    assert!((&found.project - &expected.project).amax() < 1e-12);
+    assert!((&found.lift - &expected.lift).amax() < 1e-12);
+    assert_eq!(model.encoder_jacobian(&x).unwrap(), expected.encode);
     let expected = model.decode(&z).unwrap();
     assert_close(&linear.decode(&z).unwrap(), expected.as_slice());
-    let expected = model.decode_velocity_at(&z, &z).unwrap();
-    assert_close(&linear.decode_velocity(&z).unwrap(), expected.as_slice());
+    let expected = model.decoder_jacobian(&z).unwrap();
+    assert!((linear.decoder_jacobian(&x.rows(0, 2).into()).unwrap() - expected).amax() < 1e-12);
     assert_eq!(example().linearised_at(&x).unwrap(), example());
 }
 
@@ -193,15 +192,16 @@ fn latent_input_statistics_follow_the_projection() {
         .input_statistics("contact", statistics.clone())
         .build()
         .unwrap();
-    let latent = model.latent_input_statistics(0).unwrap();
-    let projected = model.project_input(&mean).unwrap();
+    let project = model.tangent(&mean).unwrap().project;
+    let latent = model.input_statistics(0).unwrap().projected(&project);
+    let projected = &project * &mean;
     assert_close(&latent.mean, projected.as_slice());
     // Independent directions add up: covariance = sum of s_i^2 p_i p_i^T.
     let mut expected = DMatrix::zeros(2, 2);
     for i in 0..n {
         let mut axis = DVector::zeros(n);
         axis[i] = statistics.covariance[(i, i)].sqrt();
-        let p = model.project_input(&axis).unwrap();
+        let p = &project * axis;
         expected += &p * p.transpose();
     }
     assert!((latent.covariance - expected).amax() < 1e-12);
@@ -292,10 +292,10 @@ proptest! {
             state: ScaleFactors::Uniform(0.1),
             input: ScaleFactors::PerCoordinate(DVector::from_vec(factors)),
         };
-        let decoder = encoder.transpose();
-        let model = linear_model(encoder, decoder, scaling).unwrap();
+        let model = linear_model(encoder.clone(), encoder.transpose(), scaling).unwrap();
         let u_lat = DVector::from_vec(u_lat);
-        let again = model.project_input(&model.lift_input(&u_lat).unwrap()).unwrap();
+        let tangent = model.tangent(&DVector::zeros(encoder.ncols())).unwrap();
+        let again = tangent.project * (tangent.lift * &u_lat);
         let error = (&again - &u_lat).amax();
         prop_assert!(error <= 1e-14 * condition * condition.max(100.0) * (1.0 + u_lat.amax()), "{error}");
     }

@@ -8,8 +8,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 
 use super::error::MpcError;
 use super::online::{
-    ControlModel, ControlModelParts, ControlPhase, Controller, LatentDynamics, MpcSettings,
-    NonlinearMaps,
+    ControlModel, ControlModelParts, ControlPhase, Controller, InputMaps, LatentDynamics,
+    MpcSettings, NonlinearMaps,
 };
 use crate::lower::CompiledModel;
 use crate::model::ReducedModel;
@@ -61,7 +61,7 @@ impl ControlModel {
         if !model.is_linear() {
             let stand = model.decode(&DVector::zeros(model.latent_dim()))?;
             let base = Self::new(&model.linearised_at(&stand)?)?;
-            return Ok(base.with_curved(Arc::new(ModelMaps(model.clone()))));
+            return Ok(base.with_nonlinear(Arc::new(ModelMaps(model.clone()))));
         }
         let robot = model.robot()?;
         let (encoder, decoder) = (model.encoder()?, model.decoder()?);
@@ -71,31 +71,17 @@ impl ControlModel {
                 expected: STATE_DIM,
             });
         }
+        let tangent = model.tangent(&DVector::zeros(STATE_DIM))?;
         let state_factors = model.state_factors()?;
-        let input_factors = model.input_factors()?;
-        let scaled_columns = |matrix: &DMatrix<f64>, factors: &DVector<f64>| {
-            DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, col| {
-                matrix[(row, col)] * factors[col]
-            })
-        };
-        let scaled_rows = |matrix: &DMatrix<f64>, factors: &DVector<f64>| {
-            DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, col| {
-                matrix[(row, col)] / factors[row]
-            })
-        };
-        let mut phases = Vec::with_capacity(model.phases().len());
-        for phase in 0..model.phases().len() {
-            phases.push(phase_of(model, phase)?);
-        }
         Ok(Self::from_parts(ControlModelParts {
             robot,
-            encoder: scaled_columns(encoder.weights(), &state_factors),
             encoder_bias: encoder.bias().clone(),
-            decoder: scaled_rows(decoder.weights(), &state_factors),
+            decoder: model.decoder_jacobian(&DVector::zeros(model.latent_dim()))?,
             decoder_bias: decoder.bias().component_div(&state_factors),
-            lift: scaled_rows(&encoder.weights().transpose(), &input_factors),
-            projection: scaled_columns(model.input_projection()?, &input_factors),
-            phases,
+            phases: phases_under(model, &tangent.project)?,
+            encoder: tangent.encode,
+            lift: tangent.lift,
+            projection: tangent.project,
             phase_of_feet: std::array::from_fn(|bits| model.phase_for(pattern(bits))),
         })?)
     }
@@ -130,27 +116,38 @@ impl NonlinearMaps for ModelMaps {
         jacobian.expect(CHECKED)
     }
 
-    fn lift(&self, x: &[f64]) -> DMatrix<f64> {
-        let lift = self.0.lift_matrix_at(&DVector::from_column_slice(x));
-        lift.expect(CHECKED)
-    }
-
-    fn projection(&self, x: &[f64]) -> Option<DMatrix<f64>> {
-        let projection = self.0.projection_matrix_at(&DVector::from_column_slice(x));
-        projection.ok()
+    fn inputs(&self, x: &[f64]) -> Option<InputMaps> {
+        let tangent = self.0.tangent(&DVector::from_column_slice(x)).ok()?;
+        Some(InputMaps {
+            lift: tangent.lift,
+            projection: tangent.project,
+        })
     }
 
     fn phases(&self, x: &[f64]) -> Option<Vec<ControlPhase>> {
-        let model = self.0.linearised_at(&DVector::from_column_slice(x)).ok()?;
-        let phases = (0..model.phases().len()).map(|phase| phase_of(&model, phase));
-        phases.collect::<Result<_, _>>().ok()
+        phases_under(&self.0, &self.inputs(x)?.projection).ok()
     }
 }
 
-fn phase_of(model: &ReducedModel, phase: usize) -> Result<ControlPhase, MpcError> {
+/// The statistics of all phases with latent inputs `projection u`.
+fn phases_under(
+    model: &ReducedModel,
+    projection: &DMatrix<f64>,
+) -> Result<Vec<ControlPhase>, MpcError> {
+    let phases = 0..model.phases().len();
+    phases
+        .map(|phase| phase_under(model, phase, projection))
+        .collect()
+}
+
+fn phase_under(
+    model: &ReducedModel,
+    phase: usize,
+    projection: &DMatrix<f64>,
+) -> Result<ControlPhase, MpcError> {
     let name = model.phases()[phase].name.clone();
-    let latent = model.latent_input_statistics(phase)?;
     let input = model.input_statistics(phase)?;
+    let latent = input.projected(projection);
     let unusable = || MpcError::Statistics {
         phase: name.clone(),
     };

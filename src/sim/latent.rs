@@ -49,9 +49,9 @@ impl LatentSegment {
         Ok(Self {
             time_s: segment.time_s.clone(),
             z: samples(&|k| Ok(model.encode(&x(k))?))?,
-            dz: samples(&|k| Ok(model.encode_velocity_at(&x(k), &dx(k))?))?,
-            ddz: samples(&|k| Ok(model.encode_acceleration_at(&x(k), &dx(k), &ddx(k))?))?,
-            u_lat: samples(&|k| Ok(model.project_input_at(&x(k), &u(k))?))?,
+            dz: samples(&|k| Ok(model.encoder_jacobian(&x(k))? * dx(k)))?,
+            ddz: samples(&|k| Ok(model.encode_acceleration(&x(k), &dx(k), &ddx(k))?))?,
+            u_lat: samples(&|k| Ok(model.tangent(&x(k))?.project * u(k)))?,
             phase: phases(model, segment)?,
         })
     }

@@ -1,39 +1,22 @@
 //! The candidate library over whole batches of samples, forwards and backwards.
 //!
-//! Every term of the library becomes a few steps of one straight-line tape with shared subexpressions; each step is
-//! computed for all samples of a batch before the next one starts, with the vector units of the machine. The reverse sweep turns the gradient with respect
-//! to the terms into the gradient with respect to `z`, `dz` and `u_lat`, exactly.
-
-use std::collections::BTreeMap;
+//! Each step of the library's tape is computed for all samples of a batch before the next one starts, with the vector
+//! units of the machine. The reverse sweep turns the gradient with respect to the terms into the gradient with respect
+//! to `z`, `dz` and `u_lat`, exactly.
 
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::ir::sin_cos::{LIMIT, reduced_sin_cos, sin_cos};
-use crate::model::{LatentVariable, Library};
-use crate::symbolic::{ExprId, Function, Node, SymbolId};
+use crate::model::{Library, Step, Tape};
+use crate::symbolic::Function;
 
-/// A library compiled for batches.
+/// A library over batches.
 #[derive(Clone, Debug)]
 pub struct Features {
-    steps: Vec<Step>,
-    terms: Vec<usize>,  // step of every term
+    tape: Tape,
     texts: Vec<String>, // every term as the model file writes it
     latent_dim: usize,
-}
-
-/// One elementwise operation; operands are earlier steps.
-#[derive(Clone, Debug, PartialEq)]
-enum Step {
-    Number(f64),
-    Variable(usize), // index into [z; dz; u_lat]
-    Sum(Vec<usize>),
-    Product(Vec<usize>),
-    Integer(usize, i32),
-    Power(usize, usize),
-    Sine(usize), // followed by the cosine of the same argument, which is computed with it
-    Cosine(usize),
-    Apply(Function, usize),
 }
 
 /// Values of all steps on one batch, reused between batches.
@@ -44,31 +27,19 @@ pub struct FeatureValues {
 }
 
 impl Features {
-    /// Compiles the terms of `library`.
+    /// Prepares the terms of `library`.
     pub fn new(library: &Library) -> Self {
-        let latent_dim = library.latent_dim();
-        let mut builder = Builder {
-            library,
-            seen: BTreeMap::new(),
-            steps: vec![],
-        };
-        let terms = library
-            .terms()
-            .iter()
-            .map(|term| builder.step(term.expr()))
-            .collect();
         let texts = library.terms().iter().map(|term| term.text().to_owned());
         Self {
-            steps: builder.steps,
-            terms,
+            tape: library.tape().clone(),
             texts: texts.collect(),
-            latent_dim,
+            latent_dim: library.latent_dim(),
         }
     }
 
     /// Number of terms.
     pub fn library_dim(&self) -> usize {
-        self.terms.len()
+        self.tape.terms.len()
     }
 
     /// A term as the model file writes it.
@@ -85,8 +56,8 @@ impl Features {
     /// time of a jump.
     pub fn affine_terms(&self) -> Vec<bool> {
         // 0 constant, 1 affine, 2 anything else
-        let mut degree: Vec<u32> = Vec::with_capacity(self.steps.len());
-        for step in &self.steps {
+        let mut degree: Vec<u32> = Vec::with_capacity(self.tape.steps.len());
+        for step in &self.tape.steps {
             let of = |at: &usize| degree[*at];
             let bent = |inside: u32| if inside == 0 { 0 } else { 2 };
             degree.push(match step {
@@ -102,22 +73,26 @@ impl Features {
                 Step::Power(base, exponent) => bent(of(base).max(of(exponent))),
             });
         }
-        self.terms.iter().map(|&step| degree[step] < 2).collect()
+        self.tape
+            .terms
+            .iter()
+            .map(|&step| degree[step] < 2)
+            .collect()
     }
 
     /// `Theta` (`n x library_dim`) from `variables` (`n x 3 latent_dim`, columns z, dz, u_lat).
     pub fn evaluate(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) -> DMatrix<f64> {
         self.forward(variables, values);
-        let mut theta = DMatrix::zeros(variables.nrows(), self.terms.len());
-        for (mut column, &step) in theta.column_iter_mut().zip(&self.terms) {
+        let mut theta = DMatrix::zeros(variables.nrows(), self.tape.terms.len());
+        for (mut column, &step) in theta.column_iter_mut().zip(&self.tape.terms) {
             column.copy_from_slice(&values.values[step]);
         }
         theta
     }
 
-    /// Values of one term after [`Self::forward`], one a sample.
+    /// Values of one term after [`Self::forward`], one per sample.
     pub fn term<'a>(&self, values: &'a FeatureValues, term: usize) -> &'a [f64] {
-        &values.values[self.terms[term]]
+        &values.values[self.tape.terms[term]]
     }
 
     /// Adds to `gradient` (`n x 3 latent_dim`) what `theta_gradient` (`n x library_dim`) means for the variables.
@@ -129,7 +104,7 @@ impl Features {
         values: &mut FeatureValues,
         gradient: &mut DMatrix<f64>,
     ) {
-        values.adjoints.resize(self.steps.len(), Vec::new());
+        values.adjoints.resize(self.tape.steps.len(), Vec::new());
         for adjoint in &mut values.adjoints {
             adjoint.resize(theta_gradient.nrows(), 0.0);
         }
@@ -144,7 +119,7 @@ impl Features {
     /// Computes every step for all samples; see [`Self::evaluate`] for the shape of `variables`.
     pub fn forward(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) {
         Arch::new().dispatch(Forward {
-            steps: &self.steps,
+            steps: &self.tape.steps,
             variables,
             values: &mut values.values,
         });
@@ -231,12 +206,12 @@ impl WithSimd for Backward<'_> {
             adjoint.fill(0.0);
         }
         let columns = self.theta_gradient.as_slice().chunks_exact(n);
-        for (column, &step) in columns.zip(&self.features.terms) {
+        for (column, &step) in columns.zip(&self.features.tape.terms) {
             add(&mut adjoints[step], column);
         }
-        for (index, step) in self.features.steps.iter().enumerate().rev() {
+        for (index, step) in self.features.tape.steps.iter().enumerate().rev() {
             let (earlier, rest) = adjoints.split_at_mut(index);
-            step.pull_back(values, index, &rest[0], earlier);
+            add_adjoints(step, values, index, &rest[0], earlier);
             if let Step::Variable(column) = *step {
                 add(&mut self.gradient[n * column..n * (column + 1)], &rest[0]);
             }
@@ -281,66 +256,62 @@ fn both(arguments: &[f64], sines: &mut Vec<f64>, cosines: &mut Vec<f64>) {
     }
 }
 
-impl Step {
-    #[inline(always)]
-    /// Adds this step's adjoint, times its derivatives, to the adjoints of its operands.
-    fn pull_back(
-        &self,
-        values: &[Vec<f64>],
-        own: usize,
-        adjoint: &[f64],
-        earlier: &mut [Vec<f64>],
-    ) {
-        match self {
-            Step::Number(_) | Step::Variable(_) => {}
-            Step::Sum(parts) => {
-                for &part in parts {
-                    add(&mut earlier[part], adjoint);
+/// Adds a step's adjoint, times its derivatives, to the adjoints of its operands.
+#[inline(always)]
+fn add_adjoints(
+    step: &Step,
+    values: &[Vec<f64>],
+    own: usize,
+    adjoint: &[f64],
+    earlier: &mut [Vec<f64>],
+) {
+    match step {
+        Step::Number(_) | Step::Variable(_) => {}
+        Step::Sum(parts) => {
+            for &part in parts {
+                add(&mut earlier[part], adjoint);
+            }
+        }
+        Step::Product(parts) => {
+            for (position, &part) in parts.iter().enumerate() {
+                let mut others = parts.clone();
+                others.remove(position);
+                add_times(&mut earlier[part], adjoint, values, &others);
+            }
+        }
+        Step::Integer(base, 2) => {
+            add_times(&mut earlier[*base], adjoint, values, &[*base]);
+            add_times(&mut earlier[*base], adjoint, values, &[*base]);
+        }
+        Step::Integer(base, exponent) => {
+            for (i, a) in adjoint.iter().enumerate() {
+                earlier[*base][i] += a * f64::from(*exponent) * values[*base][i].powi(exponent - 1);
+            }
+        }
+        Step::Power(base, exponent) => {
+            for (i, a) in adjoint.iter().enumerate() {
+                let (b, e) = (values[*base][i], values[*exponent][i]);
+                earlier[*base][i] += a * e * b.powf(e - 1.0);
+                if b > 0.0 {
+                    earlier[*exponent][i] += a * values[own][i] * b.ln();
                 }
             }
-            Step::Product(parts) => {
-                for (position, &part) in parts.iter().enumerate() {
-                    let mut others = parts.clone();
-                    others.remove(position);
-                    add_times(&mut earlier[part], adjoint, values, &others);
-                }
+        }
+        Step::Sine(argument) => {
+            add_times(&mut earlier[*argument], adjoint, values, &[own + 1]);
+        }
+        Step::Cosine(argument) => {
+            for ((e, a), sine) in earlier[*argument]
+                .iter_mut()
+                .zip(adjoint)
+                .zip(&values[own - 1])
+            {
+                *e -= a * sine;
             }
-            Step::Integer(base, 2) => {
-                add_times(&mut earlier[*base], adjoint, values, &[*base]);
-                add_times(&mut earlier[*base], adjoint, values, &[*base]);
-            }
-            Step::Integer(base, exponent) => {
-                for (i, a) in adjoint.iter().enumerate() {
-                    earlier[*base][i] +=
-                        a * f64::from(*exponent) * values[*base][i].powi(exponent - 1);
-                }
-            }
-            Step::Power(base, exponent) => {
-                for (i, a) in adjoint.iter().enumerate() {
-                    let (b, e) = (values[*base][i], values[*exponent][i]);
-                    earlier[*base][i] += a * e * b.powf(e - 1.0);
-                    if b > 0.0 {
-                        earlier[*exponent][i] += a * values[own][i] * b.ln();
-                    }
-                }
-            }
-            Step::Sine(argument) => {
-                add_times(&mut earlier[*argument], adjoint, values, &[own + 1]);
-            }
-            Step::Cosine(argument) => {
-                for ((e, a), sine) in earlier[*argument]
-                    .iter_mut()
-                    .zip(adjoint)
-                    .zip(&values[own - 1])
-                {
-                    *e -= a * sine;
-                }
-            }
-            Step::Apply(function, argument) => {
-                for (i, a) in adjoint.iter().enumerate() {
-                    earlier[*argument][i] +=
-                        a * slope(*function, values[*argument][i], values[own][i]);
-                }
+        }
+        Step::Apply(function, argument) => {
+            for (i, a) in adjoint.iter().enumerate() {
+                earlier[*argument][i] += a * slope(*function, values[*argument][i], values[own][i]);
             }
         }
     }
@@ -384,81 +355,6 @@ fn slope(function: Function, argument: f64, value: f64) -> f64 {
             }
         }
         Function::Sign => 0.0,
-    }
-}
-
-struct Builder<'a> {
-    library: &'a Library,
-    seen: BTreeMap<ExprId, usize>,
-    steps: Vec<Step>,
-}
-
-impl Builder<'_> {
-    fn step(&mut self, expression: ExprId) -> usize {
-        if let Some(&known) = self.seen.get(&expression) {
-            return known;
-        }
-        let step = match self.library.pool().node(expression).clone() {
-            Node::Number(number) => Step::Number(number.to_f64()),
-            Node::Symbol(symbol) => Step::Variable(self.variable(symbol)),
-            Node::Sum(parts) => Step::Sum(parts.iter().map(|&part| self.step(part)).collect()),
-            Node::Product(parts) => {
-                Step::Product(parts.iter().map(|&part| self.step(part)).collect())
-            }
-            Node::Power(base, exponent) => self.power(base, exponent),
-            Node::Apply(Function::Sin | Function::Cos, argument) => {
-                return self.sine_or_cosine(expression, argument);
-            }
-            Node::Apply(function, argument) => Step::Apply(function, self.step(argument)),
-        };
-        self.steps.push(step);
-        self.seen.insert(expression, self.steps.len() - 1);
-        self.steps.len() - 1
-    }
-
-    /// Sine and cosine of one argument stand next to each other, whichever of them the library has.
-    fn sine_or_cosine(&mut self, expression: ExprId, argument: ExprId) -> usize {
-        let argument = self.step(argument);
-        let known = self
-            .steps
-            .iter()
-            .position(|step| *step == Step::Sine(argument));
-        let sine = known.unwrap_or_else(|| {
-            self.steps
-                .extend([Step::Sine(argument), Step::Cosine(argument)]);
-            self.steps.len() - 2
-        });
-        let is_sine = matches!(
-            self.library.pool().node(expression),
-            Node::Apply(Function::Sin, _)
-        );
-        let step = if is_sine { sine } else { sine + 1 };
-        self.seen.insert(expression, step);
-        step
-    }
-
-    fn variable(&self, symbol: SymbolId) -> usize {
-        let d = self.library.latent_dim();
-        match self
-            .library
-            .variable(symbol)
-            .expect("a library holds latent variables only")
-        {
-            LatentVariable::Z(index) => index,
-            LatentVariable::Dz(index) => d + index,
-            LatentVariable::U(index) => 2 * d + index,
-        }
-    }
-
-    fn power(&mut self, base: ExprId, exponent: ExprId) -> Step {
-        let base = self.step(base);
-        if let Node::Number(number) = self.library.pool().node(exponent) {
-            let value = number.to_f64();
-            if value.fract() == 0.0 && value.abs() <= 64.0 {
-                return Step::Integer(base, value as i32);
-            }
-        }
-        Step::Power(base, self.step(exponent))
     }
 }
 

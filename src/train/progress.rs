@@ -1,4 +1,4 @@
-//! News from a running training, and how to end it early.
+//! Progress of a running training, and its cancellation.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -28,7 +28,7 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// Sends news to `listener` and stops soon after `cancel` becomes true.
+    /// Sends progress to `listener` and stops soon after `cancel` becomes true.
     pub fn new(listener: &'a mut dyn FnMut(Progress), cancel: &'a AtomicBool) -> Self {
         Self { listener, cancel }
     }
@@ -48,7 +48,7 @@ impl<'a> Watch<'a> {
         (self.listener)(Progress::Stage { name, steps });
     }
 
-    /// Tells how far the stage is.
+    /// Announces steps done.
     pub fn done(&mut self, steps: usize, text: String) {
         (self.listener)(Progress::Done { steps, text });
     }

@@ -20,11 +20,11 @@ type Place = (f64, usize, usize, usize);
 
 /// Coefficients of all phases with the regressions that can fit them again.
 pub(super) struct Refined<'a> {
-    /// One a phase.
+    /// One per phase.
     pub regressions: &'a [Regression],
     /// Ridge of every fit.
     pub ridge: f64,
-    /// `library_dim x latent_dim` a phase.
+    /// `library_dim x latent_dim` for each phase.
     pub xi: Vec<DMatrix<f64>>,
     /// Score of `xi`.
     pub score: f64,

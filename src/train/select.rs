@@ -34,7 +34,7 @@ pub struct Choice {
 /// Xi of every phase, and the choice that made it.
 #[derive(Clone, Debug)]
 pub struct Selected {
-    /// `library_dim x latent_dim` a phase.
+    /// `library_dim x latent_dim` for each phase.
     pub xi: Vec<DMatrix<f64>>,
     /// The settings chosen.
     pub choice: Choice,
@@ -143,11 +143,11 @@ fn try_all(
         judge,
         options,
     };
-    let curved = affine.contains(&false);
+    let has_nonlinear = affine.contains(&false);
     // The affine terms are still to come where full libraries diverge.
-    let enough = |tried: &[Fitted]| any_stable(tried) || (curved && !tried.is_empty());
+    let enough = |tried: &[Fitted]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
     let mut tried = attempt.fit_all(&vec![true; affine.len()], enough, watch);
-    if curved && !(watch.cancelled() && any_stable(&tried)) {
+    if has_nonlinear && !(watch.cancelled() && any_stable(&tried)) {
         let tame = attempt.fit_all(&affine, any_stable, watch);
         let grown = attempt.grown(&tame, watch);
         tried.extend(tame);

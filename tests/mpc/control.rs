@@ -218,9 +218,8 @@ fn plan_of_a_linear_model_is_a_trajectory_of_its_runge_kutta_steps() {
         let z = model
             .encode(&DVector::from_column_slice(&x))
             .expect("has an encoder");
-        let dz = model
-            .encode_velocity(&DVector::from_column_slice(&dx))
-            .expect("has an encoder");
+        let tangent = model.tangent(&DVector::from_column_slice(&x));
+        let dz = tangent.expect("has an encoder").encode * DVector::from_column_slice(&dx);
         let (mut z, mut dz): ([f64; D], [f64; D]) = (
             std::array::from_fn(|i| z[i]),
             std::array::from_fn(|i| dz[i]),

@@ -76,7 +76,7 @@ fn informed_model() -> ReducedModel {
 
 fn projected(plant: &ControlModel, torque: &[f64; 12]) -> [f64; D] {
     let mut u_lat = [0.0; D];
-    plant.project(with_wrench(torque).as_slice(), &mut u_lat);
+    plant.project(&[0.0; 18], with_wrench(torque).as_slice(), &mut u_lat);
     u_lat
 }
 
@@ -87,7 +87,7 @@ fn projecting_a_lifted_input_returns_it() {
     for _ in 0..50 {
         let u_lat: [f64; D] = std::array::from_fn(|_| random.normal());
         let mut back = [0.0; D];
-        plant.project(&plant.lift(&u_lat), &mut back);
+        plant.project(&[0.0; 18], &plant.lift(&u_lat), &mut back);
         for (found, expected) in back.iter().zip(u_lat) {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }

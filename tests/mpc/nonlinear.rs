@@ -155,9 +155,8 @@ fn torques_are_lifted_at_the_measured_state_and_limited_at_the_reference_of_each
         });
         assert!(command.status.has_plan(), "{sample}: {:?}", command.status);
         let u_lat = DVector::from_column_slice(&command.u_lat);
-        let lifted = model
-            .lift_input_at(&DVector::from_column_slice(&x), &u_lat)
-            .expect("has an encoder");
+        let tangent = model.tangent(&DVector::from_column_slice(&x));
+        let lifted = tangent.expect("has an encoder").lift * u_lat;
         for joint in 0..12 {
             let expected = lifted[joint].clamp(-limits[joint], limits[joint]);
             assert!((command.torque_nm[joint] - expected).abs() < 1e-9);
@@ -166,8 +165,8 @@ fn torques_are_lifted_at_the_measured_state_and_limited_at_the_reference_of_each
             let input = DVector::from_column_slice(controller.plan().input(stage));
             let share = |at: usize| {
                 let (x, _) = trajectory.state(at);
-                let lifted = model.lift_input_at(&DVector::from_column_slice(&x), &input);
-                let lifted = lifted.expect("has an encoder");
+                let tangent = model.tangent(&DVector::from_column_slice(&x));
+                let lifted = tangent.expect("has an encoder").lift * &input;
                 (0..12).fold(0.0, |m: f64, j| m.max(lifted[j].abs() / limits[j]))
             };
             largest = largest.max(share(sample + 5 * stage));

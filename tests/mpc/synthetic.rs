@@ -147,9 +147,8 @@ pub fn decoded(model: &ReducedModel, z: &[f64], dz: &[f64]) -> ([f64; 18], [f64;
     let x = model
         .decode(&DVector::from_column_slice(z))
         .expect("has a decoder");
-    let dx = model
-        .decode_velocity(&DVector::from_column_slice(dz))
-        .expect("has a decoder");
+    let jacobian = model.decoder_jacobian(&DVector::from_column_slice(z));
+    let dx = jacobian.expect("has a decoder") * DVector::from_column_slice(dz);
     (
         std::array::from_fn(|i| x[i]),
         std::array::from_fn(|i| dx[i]),
@@ -159,6 +158,10 @@ pub fn decoded(model: &ReducedModel, z: &[f64], dz: &[f64]) -> ([f64; 18], [f64;
 /// 0.8 s at 2 ms driven by smooth inputs held for 10 ms, in flight from 0.4 s to 0.5 s.
 pub fn trajectory(model: &ReducedModel) -> Trajectory {
     let mut dynamics = CompiledModel::new(model).expect("lowers");
+    let lift = model
+        .tangent(&DVector::zeros(18))
+        .expect("has an encoder")
+        .lift;
     let (mut z, mut dz) = ([0.0; D], [0.0; D]);
     let mut out = Trajectory {
         time_s: Vec::new(),
@@ -177,12 +180,8 @@ pub fn trajectory(model: &ReducedModel) -> Trajectory {
         out.time_s.push(time_s);
         out.x.extend(x);
         out.dx.extend(dx);
-        out.u.extend(
-            model
-                .lift_input(&DVector::from_column_slice(&u_lat))
-                .expect("has an encoder")
-                .iter(),
-        );
+        out.u
+            .extend((&lift * DVector::from_column_slice(&u_lat)).iter());
         out.feet.push(feet);
         let phase = model.phase_for(feet).expect("has both phases");
         dynamics.rk4_step(phase, &mut z, &mut dz, &u_lat, 0.002);

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::error::ControlError;
-use super::nonlinear::NonlinearMaps;
+use super::nonlinear::{InputMaps, NonlinearMaps};
 use crate::robot::{ContactFlags, JOINT_DIM, Robot, STATE_DIM};
 
 /// Maps, limits and input statistics of a model on its robot.
@@ -17,7 +17,7 @@ pub struct ControlModel {
     latent_dim: usize,
     parts: ControlModelParts,
     /// The maps of which the matrices are those at one state, if they are not the same at all.
-    curved: Option<Arc<dyn NonlinearMaps>>,
+    nonlinear: Option<Arc<dyn NonlinearMaps>>,
 }
 
 /// The numbers of a [`ControlModel`], with scale factors multiplied in: SI units on the robot's side.
@@ -71,34 +71,35 @@ impl ControlModel {
         Ok(Self {
             latent_dim: parts.encoder.nrows(),
             parts,
-            curved: None,
+            nonlinear: None,
         })
     }
 
     /// The plant with maps that depend on the state; its matrices are then those at one state.
-    pub fn with_curved(self, maps: Arc<dyn NonlinearMaps>) -> Self {
+    pub fn with_nonlinear(self, maps: Arc<dyn NonlinearMaps>) -> Self {
         Self {
-            curved: Some(maps),
+            nonlinear: Some(maps),
             ..self
         }
     }
 
     /// Whether the maps depend on the state.
     pub fn is_nonlinear(&self) -> bool {
-        self.curved.is_some()
+        self.nonlinear.is_some()
     }
 
     /// The plant of affine maps that touch the encoder at `x` (18, SI units) and the decoder at
     /// `z`; none for a model whose maps are affine anyway, and where the encoder's Jacobian has not
     /// full row rank.
     pub fn tangent_at(&self, x: &[f64], z: &[f64]) -> Option<Self> {
-        let maps = self.curved.as_ref()?;
+        let maps = self.nonlinear.as_ref()?;
         let (encoder, decoder) = (maps.encoder_jacobian(x), maps.decoder_jacobian(z));
         let mut value = vec![0.0; self.latent_dim];
         maps.encode(x, &mut value);
         let encoder_bias = DVector::from_vec(value) - &encoder * DVector::from_column_slice(x);
         let decoded = DVector::from_column_slice(&maps.decode(z));
         let decoder_bias = decoded - &decoder * DVector::from_column_slice(z);
+        let InputMaps { lift, projection } = maps.inputs(x)?;
         Some(Self {
             latent_dim: self.latent_dim,
             parts: ControlModelParts {
@@ -106,18 +107,18 @@ impl ControlModel {
                 encoder_bias,
                 decoder,
                 decoder_bias,
-                lift: maps.lift(x),
-                projection: maps.projection(x)?,
+                lift,
+                projection,
                 ..self.parts.clone()
             },
-            curved: None,
+            nonlinear: None,
         })
     }
 
     /// Takes the statistics of the training inputs as they are projected at `x`, if the maps depend
     /// on the state and have full rank there.
     pub(super) fn take_statistics_at(&mut self, x: &[f64]) {
-        if let Some(phases) = self.curved.as_ref().and_then(|maps| maps.phases(x)) {
+        if let Some(phases) = self.nonlinear.as_ref().and_then(|maps| maps.phases(x)) {
             self.parts.phases = phases;
         }
     }
@@ -154,33 +155,25 @@ impl ControlModel {
 
     /// `z = W_e s_x x + b_e`, or the nonlinear encoder's; `x` in SI units (18), `z` is overwritten.
     pub fn encode(&self, x: &[f64], z: &mut [f64]) {
-        if let Some(maps) = &self.curved {
+        if let Some(maps) = &self.nonlinear {
             return maps.encode(x, z);
         }
         z.copy_from_slice(self.parts.encoder_bias.as_slice());
         add_product(&self.parts.encoder, x, z);
     }
 
-    /// `dz = W_e s_x dx`; `dx` in SI units (18), `dz` is overwritten.
-    pub fn encode_velocity(&self, dx: &[f64], dz: &mut [f64]) {
+    /// `dz = J_E s_x dx` with the encoder's Jacobian at `x`; SI units (18), `dz` is overwritten.
+    pub fn encode_velocity(&self, x: &[f64], dx: &[f64], dz: &mut [f64]) {
         dz.fill(0.0);
-        add_product(&self.parts.encoder, dx, dz);
-    }
-
-    /// The same with the Jacobian at `x` if the encoder is nonlinear.
-    pub fn encode_velocity_at(&self, x: &[f64], dx: &[f64], dz: &mut [f64]) {
-        match &self.curved {
-            None => self.encode_velocity(dx, dz),
-            Some(maps) => {
-                dz.fill(0.0);
-                add_product(&maps.encoder_jacobian(x), dx, dz);
-            }
+        match &self.nonlinear {
+            None => add_product(&self.parts.encoder, dx, dz),
+            Some(maps) => add_product(&maps.encoder_jacobian(x), dx, dz),
         }
     }
 
     /// Joint positions, rad, that the decoder gives for `z`.
     pub fn decode_joints(&self, z: &[f64]) -> [f64; JOINT_DIM] {
-        if let Some(maps) = &self.curved {
+        if let Some(maps) = &self.nonlinear {
             let x = maps.decode(z);
             return std::array::from_fn(|joint| x[joint]);
         }
@@ -189,34 +182,20 @@ impl ControlModel {
         })
     }
 
-    /// Joint velocities, rad/s, that the decoder gives for `dz`.
-    pub fn decode_joint_velocities(&self, dz: &[f64]) -> [f64; JOINT_DIM] {
-        std::array::from_fn(|joint| row_product(&self.parts.decoder, joint, dz))
+    /// Joint velocities, rad/s, for `dz` with the decoder's Jacobian at `z`.
+    pub fn decode_joint_velocities(&self, z: &[f64], dz: &[f64]) -> [f64; JOINT_DIM] {
+        let local = self.nonlinear.as_ref().map(|maps| maps.decoder_jacobian(z));
+        let decoder = local.as_ref().unwrap_or(&self.parts.decoder);
+        std::array::from_fn(|joint| row_product(decoder, joint, dz))
     }
 
-    /// The same with the Jacobian at `z` if the decoder is nonlinear.
-    pub fn decode_joint_velocities_at(&self, z: &[f64], dz: &[f64]) -> [f64; JOINT_DIM] {
-        match &self.curved {
-            None => self.decode_joint_velocities(dz),
-            Some(maps) => {
-                let jacobian = maps.decoder_jacobian(z);
-                std::array::from_fn(|joint| row_product(&jacobian, joint, dz))
-            }
-        }
-    }
-
-    /// `u_lat = pinv(J_Eᵀ) s_u u` with the Jacobian at `x` if the encoder is nonlinear and has full
-    /// row rank there; else as [`ControlModel::project`].
-    pub fn project_at(&self, x: &[f64], u: &[f64], u_lat: &mut [f64]) {
+    /// `u_lat = pinv(J_Eᵀ) s_u u` with the encoder's Jacobian at `x` if it is nonlinear and has full row rank there,
+    /// else with the one of the parts; SI units (18), `u_lat` is overwritten.
+    pub fn project(&self, x: &[f64], u: &[f64], u_lat: &mut [f64]) {
         u_lat.fill(0.0);
-        let local = self.curved.as_ref().and_then(|maps| maps.projection(x));
-        add_product(local.as_ref().unwrap_or(&self.parts.projection), u, u_lat);
-    }
-
-    /// `u_lat = pinv(W_eᵀ) s_u u`; `u` in SI units (18), `u_lat` is overwritten.
-    pub fn project(&self, u: &[f64], u_lat: &mut [f64]) {
-        u_lat.fill(0.0);
-        add_product(&self.parts.projection, u, u_lat);
+        let local = self.nonlinear.as_ref().and_then(|maps| maps.inputs(x));
+        let projection = (local.as_ref()).map_or(&self.parts.projection, |maps| &maps.projection);
+        add_product(projection, u, u_lat);
     }
 
     /// `u = W_eᵀ u_lat / s_u` in SI units: 12 torques, force, moment.

@@ -287,7 +287,7 @@ impl Controller {
         let (z, dz) = self.memory.measured.split_at_mut(self.plant.latent_dim());
         self.plant.encode(measurement.x, z);
         self.plant
-            .encode_velocity_at(measurement.x, measurement.dx, dz);
+            .encode_velocity(measurement.x, measurement.dx, dz);
         let normalised_innovation = self.plan.normalised_innovation(
             measurement.time_s,
             &self.memory.measured,
@@ -405,7 +405,7 @@ impl Controller {
         command.u_lat.copy_from_slice(input);
         command.phase = Some(self.plan.phase());
         command.joint_position_rad = self.plant.clamp_joints(self.plant.decode_joints(z));
-        command.joint_velocity_rad_s = self.plant.decode_joint_velocities_at(z, dz);
+        command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
         let lifted = self.local_plant().lift(input);
         let torque = match (&mut self.consistent, &self.memory.stance) {
             (None, _) => std::array::from_fn(|joint| lifted[joint]),

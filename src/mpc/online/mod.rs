@@ -33,7 +33,7 @@ pub use controller::{Controller, Measurement};
 pub use dynamics::LatentDynamics;
 pub use error::ControlError;
 pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces};
-pub use nonlinear::NonlinearMaps;
+pub use nonlinear::{InputMaps, NonlinearMaps};
 pub use plan::Plan;
 pub use problem::upright;
 pub use qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, SolverProfile};

@@ -7,6 +7,15 @@ use nalgebra::DMatrix;
 use super::control_model::ControlPhase;
 use crate::robot::STATE_DIM;
 
+/// The maps between inputs and latent inputs at one state, in SI units on the robot's side.
+#[derive(Debug, Clone)]
+pub struct InputMaps {
+    /// `J_Eᵀ / s_u`, `18 × latent_dim`.
+    pub lift: DMatrix<f64>,
+    /// `pinv(J_Eᵀ) s_u`, `latent_dim × 18`.
+    pub projection: DMatrix<f64>,
+}
+
 /// A nonlinear encoder and decoder with their Jacobians, in SI units on the robot's side.
 ///
 /// The matrices of a [`ControlModel`](super::ControlModel) are then those at one state, and
@@ -24,13 +33,10 @@ pub trait NonlinearMaps: Debug + Send + Sync {
     /// `J_D / s_x` at `z`, `18 × latent_dim`.
     fn decoder_jacobian(&self, z: &[f64]) -> DMatrix<f64>;
 
-    /// `J_Eᵀ / s_u` at `x`, `18 × latent_dim`.
-    fn lift(&self, x: &[f64]) -> DMatrix<f64>;
-
-    /// `pinv(J_Eᵀ) s_u` at `x`, `latent_dim × 18`; none where the Jacobian does not have full row rank.
-    fn projection(&self, x: &[f64]) -> Option<DMatrix<f64>>;
+    /// Lift and projection at `x`; none where the Jacobian does not have full row rank.
+    fn inputs(&self, x: &[f64]) -> Option<InputMaps>;
 
     /// The phases with the statistics of the training inputs projected at `x`; none as for
-    /// [`NonlinearMaps::projection`].
+    /// [`NonlinearMaps::inputs`].
     fn phases(&self, x: &[f64]) -> Option<Vec<ControlPhase>>;
 }

@@ -66,7 +66,7 @@ impl Reference {
         for (sample, encoded) in state.chunks_exact_mut(2 * d).enumerate() {
             let (z, dz) = encoded.split_at_mut(d);
             plant.encode(row(samples.x, sample), z);
-            plant.encode_velocity_at(row(samples.x, sample), row(samples.dx, sample), dz);
+            plant.encode_velocity(row(samples.x, sample), row(samples.dx, sample), dz);
         }
         let mut reference = Self {
             latent_dim: d,
@@ -250,7 +250,7 @@ fn project_all(plant: &ControlModel, x: &[f64], u: &[f64]) -> Vec<f64> {
     let mut latent = vec![0.0; u.len() / STATE_DIM * d];
     let samples = x.chunks_exact(STATE_DIM).zip(u.chunks_exact(STATE_DIM));
     for ((x, u), latent) in samples.zip(latent.chunks_exact_mut(d)) {
-        plant.project_at(x, u, latent);
+        plant.project(x, u, latent);
     }
     latent
 }

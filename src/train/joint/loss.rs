@@ -1,12 +1,14 @@
-//! The losses (16) to (20) with the lift loss, and their exact gradient.
+//! The losses (16) to (20) with the lift loss and the window (41), and their exact gradient.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::batch::Batch;
-use super::multiply::{Columns, add_product, add_transposed, product_into};
+use super::multiply::{Columns, add_product, add_transposed};
+use super::network::Network;
 use super::parameters::Parameters;
-use super::unroll::{Pulls, Unroll, Window};
+use super::schedule::Schedule;
+use super::unroll::{Adjoints, Unroll, Window};
 use crate::train::features::{FeatureValues, Features};
 
 /// Weights of the terms of the loss (equation 20).
@@ -80,35 +82,86 @@ impl Losses {
     }
 }
 
+/// Parameters and samples at which a loss is evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct At<'a> {
+    /// Maps and coefficients.
+    pub parameters: &'a Parameters,
+    /// Samples of one phase.
+    pub batch: &'a Batch,
+    /// Weights of the losses.
+    pub weights: LossWeights,
+}
+
+/// (16) of one batch as a function of the decoder; overwrites its gradient.
+pub type DecoderLoss<'a> = Box<dyn FnMut(&Network, &mut Network) -> f64 + 'a>;
+/// (17) to (19) of one batch as functions of Xi, with their weighted gradient.
+pub type XiLoss = Box<dyn Fn(&DMatrix<f64>, LossWeights) -> (Losses, DMatrix<f64>)>;
+
+/// Encoder and decoder inside the loss, with the adjoints of both.
+///
+/// One evaluation calls `encode`, `residual`, `decode` and `encode_adjoint` in this order on the same batch.
+pub trait Maps {
+    /// `z`, `dz` and `u_lat` of all samples (9, 11, 13), `n x 3d`.
+    fn encode(&mut self, at: At<'_>) -> DMatrix<f64>;
+
+    /// `predicted - ddz` (12), `n x d`.
+    fn residual(&self, at: At<'_>, predicted: &DMatrix<f64>) -> DMatrix<f64>;
+
+    /// (16) and (18), and the adjoint of `predicted`: `adjoint`, which comes from (17), plus the one from (18).
+    fn decode(
+        &mut self,
+        at: At<'_>,
+        predicted: &DMatrix<f64>,
+        adjoint: &DMatrix<f64>,
+        gradient: &mut Parameters,
+    ) -> (f64, f64, DMatrix<f64>);
+
+    /// The lift loss; adds to the gradient what `onto_ddz` (`n x d`) and `onto_variables` (`n x 3d`), the adjoints of
+    /// `-ddz` and of the variables, mean for the encoder.
+    fn encode_adjoint(
+        &mut self,
+        at: At<'_>,
+        onto_ddz: &DMatrix<f64>,
+        onto_variables: &DMatrix<f64>,
+        gradient: &mut Parameters,
+    ) -> f64;
+
+    /// The loss of the second step, in which the encoder stays.
+    fn decoder_loss<'a>(&'a self, parameters: &Parameters, batch: &'a Batch) -> DecoderLoss<'a>;
+
+    /// The loss of the third step, in which both maps stay; without (41).
+    fn xi_loss(&self, parameters: &Parameters, batch: &Batch, features: &Features) -> XiLoss;
+}
+
 /// The loss over one library, with its scratch space.
 pub struct JointLoss<'a> {
     features: &'a Features,
+    maps: Box<dyn Maps>,
     weights: LossWeights,
+    /// The weights in the present epoch.
+    current: LossWeights,
     unroll: Unroll,
-    coordinate_weights: DVector<f64>,
     values: FeatureValues,
-    variables: DMatrix<f64>, // n x 3d: z, dz, u_lat
-    pulled: DMatrix<f64>,    // their gradient
     gradient: Parameters,
 }
 
 impl<'a> JointLoss<'a> {
-    /// The loss with these weights; `coordinate_weights` (18) weigh the coordinates in (16).
+    /// The loss of parameters of the shape of `parameters`.
     pub fn new(
         features: &'a Features,
+        maps: Box<dyn Maps>,
         weights: LossWeights,
-        coordinate_weights: DVector<f64>,
+        parameters: &Parameters,
     ) -> Self {
-        let (n, d) = (coordinate_weights.len(), features.latent_dim());
         Self {
             features,
+            maps,
             weights,
+            current: weights,
             unroll: Unroll::default(),
-            coordinate_weights,
             values: FeatureValues::default(),
-            variables: DMatrix::zeros(0, 3 * d),
-            pulled: DMatrix::zeros(0, 3 * d),
-            gradient: Parameters::zeros(n, d, features.library_dim()),
+            gradient: parameters.zeros_like(),
         }
     }
 
@@ -117,31 +170,56 @@ impl<'a> JointLoss<'a> {
         Self { unroll, ..self }
     }
 
-    /// Changes the weights, as refinement does when it drops the L1 term.
-    pub fn set_weights(&mut self, weights: LossWeights) {
-        self.weights = weights;
+    /// Takes the weights of an epoch of `schedule`, and returns them.
+    pub(super) fn start_epoch(&mut self, epoch: usize, schedule: &Schedule) -> LossWeights {
+        self.current = schedule.weights_at(epoch, self.weights);
+        self.current
     }
 
-    /// Gradient of the last [`Self::evaluate`].
+    /// The library.
+    pub fn features(&self) -> &'a Features {
+        self.features
+    }
+
+    /// Encoder and decoder.
+    pub fn maps(&self) -> &dyn Maps {
+        &*self.maps
+    }
+
+    /// Whether (41) has a weight.
+    pub fn has_window(&self) -> bool {
+        self.weights.bptt != 0.0
+    }
+
+    /// Gradient of the last [`Self::evaluate`]; of Xi only the phase of that batch has one.
     pub fn gradient(&self) -> &Parameters {
         &self.gradient
     }
 
     /// The losses on a batch; the gradient of their weighted sum is kept in [`Self::gradient`].
     pub fn evaluate(&mut self, parameters: &Parameters, batch: &Batch) -> Losses {
-        self.gradient
-            .blocks_mut()
-            .into_iter()
-            .for_each(|block| block.fill(0.0));
-        let decoder = self.reconstruction(parameters, batch);
-        let projection = InputProjection::new(&parameters.encoder);
-        let lift = self.lift(parameters, batch, &projection);
-        let (ddz, ddx, bptt) = self.dynamics(parameters, batch, &projection);
-        let l1 = {
-            let xi = &parameters.xi;
-            let pull = self.weights.l1 * (1.0 / xi.len() as f64);
-            l1_subgradient(xi, pull, &mut self.gradient.xi)
+        self.gradient.clear();
+        let weights = self.current;
+        let at = At {
+            parameters,
+            batch,
+            weights,
         };
+        let (n, d) = (batch.len(), self.features.latent_dim());
+        let xi = &parameters.xi[batch.phase];
+        let variables = self.maps.encode(at);
+        let theta = self.features.evaluate(&variables, &mut self.values);
+        let mut predicted = DMatrix::zeros(n, d);
+        add_product(&mut predicted, 1.0, &theta, xi);
+        let mut residual = self.maps.residual(at, &predicted);
+        let ddz = residual.norm_squared() / (n * d) as f64;
+        residual *= 2.0 * weights.ddz / (n * d) as f64;
+        let (decoder, ddx, adjoint) =
+            (self.maps).decode(at, &predicted, &residual, &mut self.gradient);
+        let (bptt, onto_variables) = self.library_adjoint(at, &variables, &theta, &adjoint);
+        let lift = (self.maps).encode_adjoint(at, &residual, &onto_variables, &mut self.gradient);
+        let l1_scale = weights.l1 * (1.0 / xi.len() as f64);
+        let l1 = l1_subgradient(xi, l1_scale, &mut self.gradient.xi[batch.phase]);
         Losses {
             decoder,
             ddz,
@@ -152,171 +230,38 @@ impl<'a> JointLoss<'a> {
         }
     }
 
-    /// (16): with `E = [W_e^T; b_e]` and `M = E W_d^T + [0; b_d] - [I; 0]` it is `tr(M^T S M) / 18`, `S` the moment
-    /// of `[x, 1]`. No matrix of samples is formed.
-    fn reconstruction(&mut self, parameters: &Parameters, batch: &Batch) -> f64 {
-        let Parameters {
-            encoder,
-            encoder_bias,
-            decoder,
-            decoder_bias,
-            ..
-        } = parameters;
-        let (n, d) = encoder.shape();
-        let mut extended = DMatrix::zeros(n + 1, d);
-        extended.rows_mut(0, n).copy_from(encoder);
-        extended.row_mut(n).tr_copy_from(encoder_bias);
-        let mut pull = &batch.state_moment * &extended * decoder; // S M
-        pull.ger(1.0, &batch.state_moment.column(n), decoder_bias, 1.0);
-        pull -= batch.state_moment.columns(0, n);
-        for (mut column, weight) in pull.column_iter_mut().zip(self.coordinate_weights.iter()) {
-            column *= weight / n as f64;
-        }
-        let seen = extended.tr_mul(&pull);
-        let loss = decoder.dot(&seen) + pull.row(n).tr_dot(decoder_bias)
-            - (0..n).map(|i| pull[(i, i)]).sum::<f64>();
-        let encoder_pull = &pull * decoder.transpose() * 2.0;
-        self.gradient.encoder += encoder_pull.rows(0, n);
-        self.gradient.encoder_bias += encoder_pull.row(n).transpose();
-        self.gradient.decoder += seen * 2.0;
-        self.gradient.decoder_bias += pull.row(n).transpose() * 2.0;
-        loss
-    }
-
-    /// Share of the input's energy outside the row space: `1 - tr((V^T V)^-1 V^T S V) / tr S`, `V = W_e^T`.
-    fn lift(
+    /// From the adjoint of the predicted `ddz` to those of Xi and `(z, dz, u_lat)`; (41), if it has a weight, is
+    /// evaluated here and adds its own.
+    fn library_adjoint(
         &mut self,
-        parameters: &Parameters,
-        batch: &Batch,
-        projection: &InputProjection,
-    ) -> f64 {
-        let total = batch.input_moment.trace().max(f64::MIN_POSITIVE);
-        let seen = &batch.input_moment * &projection.weights; // S V A^-1
-        let carried = parameters.encoder.tr_mul(&seen);
-        if self.weights.lift != 0.0 {
-            let outside = seen - &projection.weights * &carried;
-            self.gradient.encoder += outside * (-2.0 * self.weights.lift / total);
-        }
-        1.0 - carried.trace() / total
-    }
-
-    /// (17), (18) and (41), backwards through the library, the encoder and the pseudo-inverse.
-    fn dynamics(
-        &mut self,
-        parameters: &Parameters,
-        batch: &Batch,
-        projection: &InputProjection,
-    ) -> (f64, f64, f64) {
-        let (n, d) = (batch.len(), parameters.encoder.ncols());
-        let state_dim = batch.x.ncols();
-        if self.variables.nrows() != n {
-            self.variables = DMatrix::zeros(n, 3 * d);
-            self.pulled = DMatrix::zeros(n, 3 * d);
-        }
-        product_into(
-            &mut self.variables,
-            0,
-            Columns::all(&batch.x),
-            &parameters.encoder,
-        );
-        for (i, bias) in parameters.encoder_bias.iter().enumerate() {
-            self.variables.column_mut(i).add_scalar_mut(*bias);
-        }
-        product_into(
-            &mut self.variables,
-            d,
-            Columns::all(&batch.dx),
-            &parameters.encoder,
-        );
-        product_into(
-            &mut self.variables,
-            2 * d,
-            Columns::all(&batch.u),
-            &projection.weights,
-        );
-        let theta = self.features.evaluate(&self.variables, &mut self.values);
-        let mut predicted = DMatrix::zeros(n, d);
-        add_product(&mut predicted, 1.0, &theta, &parameters.xi);
-
-        let mut latent_miss = predicted.clone();
-        add_product(&mut latent_miss, -1.0, &batch.ddx, &parameters.encoder);
-        let ddz = latent_miss.norm_squared() / (n * d) as f64;
-        latent_miss *= 2.0 * self.weights.ddz / (n * d) as f64;
-        let (ddx_columns, missed) = (Columns::all(&batch.ddx), Columns::all(&latent_miss));
-        add_transposed(&mut self.gradient.encoder, -1.0, ddx_columns, missed);
-
-        // (18) over the moments of predictions and accelerations: no n x 18 matrix is formed.
-        let scale = 2.0 * self.weights.ddx / (n * state_dim) as f64;
-        let (mut shared, mut own) = (DMatrix::zeros(d, state_dim), DMatrix::zeros(d, d));
-        let predictions = Columns::all(&predicted);
-        add_transposed(&mut shared, 1.0, predictions, ddx_columns);
-        add_transposed(&mut own, 1.0, predictions, predictions);
-        let own_decoded = &own * &parameters.decoder;
-        let energy = parameters.decoder.dot(&own_decoded) - 2.0 * parameters.decoder.dot(&shared);
-        let ddx = (energy + batch.ddx_energy) / (n * state_dim) as f64;
-        self.gradient.decoder += (own_decoded - shared) * scale;
-        let mut pull = latent_miss;
-        let transposed = parameters.decoder.transpose();
-        add_product(
-            &mut pull,
-            scale,
-            &predicted,
-            &(&parameters.decoder * &transposed),
-        );
-        add_product(&mut pull, -scale, &batch.ddx, &transposed);
-
-        let pulls = Columns::all(&pull);
-        add_transposed(&mut self.gradient.xi, 1.0, Columns::all(&theta), pulls);
-        let mut theta_pull = DMatrix::zeros(n, theta.ncols());
-        add_product(&mut theta_pull, 1.0, &pull, &parameters.xi.transpose());
-        self.pulled.fill(0.0);
+        at: At<'_>,
+        variables: &DMatrix<f64>,
+        theta: &DMatrix<f64>,
+        adjoint: &DMatrix<f64>,
+    ) -> (f64, DMatrix<f64>) {
+        let xi = &at.parameters.xi[at.batch.phase];
+        let onto_xi = &mut self.gradient.xi[at.batch.phase];
+        add_transposed(onto_xi, 1.0, Columns::all(theta), Columns::all(adjoint));
+        let mut onto_theta = DMatrix::zeros(theta.nrows(), theta.ncols());
+        add_product(&mut onto_theta, 1.0, adjoint, &xi.transpose());
+        let mut onto_variables = DMatrix::zeros(variables.nrows(), variables.ncols());
         self.features
-            .backward(&theta_pull, &mut self.values, &mut self.pulled);
-        let bptt = self.predictions(parameters, batch);
-        self.pull_through_encoder(parameters, batch, projection);
-        (ddz, ddx, bptt)
-    }
-
-    /// (41), if it has a weight.
-    fn predictions(&mut self, parameters: &Parameters, batch: &Batch) -> f64 {
-        if self.weights.bptt == 0.0 {
-            return 0.0;
+            .backward(&onto_theta, &mut self.values, &mut onto_variables);
+        if at.weights.bptt == 0.0 {
+            return (0.0, onto_variables);
         }
         let samples = Window {
-            variables: &self.variables,
-            xi: &parameters.xi,
-            step_s: batch.step_s,
+            variables,
+            xi,
+            step_s: at.batch.step_s,
         };
-        let mut pulls = Pulls {
-            variables: &mut self.pulled,
-            xi: &mut self.gradient.xi,
+        let mut adjoints = Adjoints {
+            variables: &mut onto_variables,
+            xi: onto_xi,
         };
-        (self.unroll).evaluate(self.features, samples, self.weights.bptt, &mut pulls)
-    }
-
-    fn pull_through_encoder(
-        &mut self,
-        parameters: &Parameters,
-        batch: &Batch,
-        projection: &InputProjection,
-    ) {
-        let d = parameters.encoder.ncols();
-        for (samples, start) in [(&batch.x, 0), (&batch.dx, d)] {
-            let pulled = Columns::some(&self.pulled, start, d);
-            add_transposed(
-                &mut self.gradient.encoder,
-                1.0,
-                Columns::all(samples),
-                pulled,
-            );
-        }
-        for (i, column) in self.pulled.columns(0, d).column_iter().enumerate() {
-            self.gradient.encoder_bias[i] += column.sum();
-        }
-        let mut input = DMatrix::zeros(batch.u.ncols(), d);
-        let pulled = Columns::some(&self.pulled, 2 * d, d);
-        add_transposed(&mut input, 1.0, Columns::all(&batch.u), pulled);
-        self.gradient.encoder += projection.pull_back(&parameters.encoder, &input);
+        let weight = at.weights.bptt;
+        let bptt = (self.unroll).evaluate(self.features, samples, weight, &mut adjoints);
+        (bptt, onto_variables)
     }
 }
 
@@ -334,153 +279,164 @@ pub(super) fn l1_subgradient(xi: &DMatrix<f64>, scale: f64, gradient: &mut DMatr
     xi.iter().map(|value| value.abs()).sum::<f64>() / xi.len() as f64
 }
 
-/// `pinv(W_e^T)^T = V (V^T V)^-1` for `V = W_e^T`: latent inputs of samples in rows are `u` times this.
-pub struct InputProjection {
-    weights: DMatrix<f64>,      // 18 x d
-    inverse_gram: DMatrix<f64>, // d x d
-}
-
-impl InputProjection {
-    /// The projection of an encoder; directions that are nearly dependent are damped by `1e-12`.
-    pub fn new(encoder: &DMatrix<f64>) -> Self {
-        let d = encoder.ncols();
-        let gram = encoder.tr_mul(encoder) + DMatrix::identity(d, d) * 1e-12;
-        let inverse_gram = match gram.clone().cholesky() {
-            Some(factor) => factor.inverse(),
-            None => gram
-                .pseudo_inverse(1e-12)
-                .expect("the tolerance is positive"),
-        };
-        Self {
-            weights: encoder * &inverse_gram,
-            inverse_gram,
-        }
-    }
-
-    /// `V (V^T V)^-1`, `18 x d`.
-    pub fn weights(&self) -> &DMatrix<f64> {
-        &self.weights
-    }
-
-    /// Gradient with respect to `V`, given the one with respect to the projection.
-    ///
-    /// From `dQ = dV A^-1 - Q (dV^T V + V^T dV) A^-1`: with `K = G A^-1`, it is `K - V (Q^T K) - V (K^T Q)`.
-    fn pull_back(&self, encoder: &DMatrix<f64>, gradient: &DMatrix<f64>) -> DMatrix<f64> {
-        let k = gradient * &self.inverse_gram;
-        let crossed = self.weights.tr_mul(&k);
-        &k - encoder * (&crossed + crossed.transpose())
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use nalgebra::DVector;
+
     use super::*;
-    use crate::model::{Library, StandardLibrary};
+    use crate::model::{Activation, Library, StandardLibrary};
+    use crate::train::joint::linear::LinearMaps;
+    use crate::train::joint::nonlinear::NonlinearMaps;
+    use crate::train::joint::parameters::Frame;
     use crate::train::random::Random;
 
-    fn batch(random: &mut Random) -> Batch {
+    const WEIGHTS: LossWeights = LossWeights {
+        ddz: 0.7,
+        ddx: 0.4,
+        l1: 0.3,
+        lift: 0.9,
+        bptt: 0.8,
+    };
+
+    /// Library, batch of phase 1 of 2, and moved random parameters with layers of `widths`.
+    fn setup(widths: (&[usize], &[usize]), phi: Activation) -> (Features, Batch, Parameters) {
+        let library = Library::standard(3, StandardLibrary::default()).expect("small library");
+        let features = Features::new(&library);
+        let mut random = Random::new(11);
         let blocks = std::array::from_fn(|_| random.matrix(30, 7, 0.8));
-        Batch::new(0, blocks, 0.002)
+        let shape = (features.library_dim(), 2, 0.1);
+        let mut parameters = Parameters::random(widths, phi, shape, &mut random);
+        let xi = parameters.xi[1].as_mut_slice().iter_mut();
+        xi.for_each(|v| *v += 0.3 * random.signed());
+        let maps = parameters.maps_mut().flatten();
+        maps.for_each(|v| *v += 0.3 * random.signed());
+        (features, Batch::new(1, blocks, 0.002), parameters)
     }
 
-    fn features() -> Features {
-        Features::new(&Library::standard(3, StandardLibrary::default()).expect("small library"))
+    fn linear(coordinate_weights: DVector<f64>) -> Box<dyn Maps> {
+        Box::new(LinearMaps::new(coordinate_weights, vec![true; 7]))
     }
 
-    fn loss(features: &Features) -> JointLoss<'_> {
-        let weights = LossWeights {
-            ddz: 0.7,
-            ddx: 0.4,
-            l1: 0.3,
-            lift: 0.9,
-            bptt: 0.8,
-        };
-        let unroll = Unroll {
+    fn coordinate_weights() -> DVector<f64> {
+        DVector::from_fn(7, |i, _| 1.0 + i as f64)
+    }
+
+    fn loss<'a>(
+        features: &'a Features,
+        maps: Box<dyn Maps>,
+        parameters: &Parameters,
+    ) -> JointLoss<'a> {
+        JointLoss::new(features, maps, WEIGHTS, parameters).with_unroll(Unroll {
             window: 3,
             stride: 2,
             ..Unroll::default()
-        };
-        JointLoss::new(
-            features,
-            weights,
-            DVector::from_fn(7, |i, _| 1.0 + i as f64),
-        )
-        .with_unroll(unroll)
+        })
+    }
+
+    fn all(parameters: &mut Parameters) -> Vec<&mut [f64]> {
+        let maps = (parameters.encoder.blocks_mut()).chain(parameters.decoder.blocks_mut());
+        maps.chain(parameters.xi.iter_mut().map(|xi| xi.as_mut_slice()))
+            .collect()
     }
 
     #[test]
-    fn gradient_agrees_with_finite_differences_in_every_block() {
-        let mut random = Random::new(11);
-        let (features, batch) = (features(), batch(&mut random));
-        let mut loss = loss(&features);
-        let mut parameters = Parameters::random(7, 3, features.library_dim(), 0.0, &mut random);
-        for block in parameters.blocks_mut() {
-            block
-                .iter_mut()
-                .for_each(|value| *value += 0.3 * random.signed());
-        }
-        loss.evaluate(&parameters, &batch);
-        let gradient = loss.gradient().clone();
-        let weights = loss.weights;
-        for block in 0..5 {
-            for entry in 0..parameters.blocks()[block].len() {
-                let mut at = |step: f64| {
-                    let mut moved = parameters.clone();
-                    moved.blocks_mut()[block][entry] += step;
-                    loss.evaluate(&moved, &batch).total(&weights)
-                };
-                let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
-                let exact = gradient.blocks()[block][entry];
-                assert!(
-                    (difference - exact).abs() < 1e-6 * exact.abs().max(1.0),
-                    "{block} {entry}: {difference} {exact}"
-                );
+    fn gradient_agrees_with_finite_differences_for_all_maps() {
+        let mut random = Random::new(13);
+        let spread = DVector::from_fn(7, |_, _| 1.0 + 0.4 * random.signed());
+        let mut factors = spread.map(f64::recip);
+        factors[4] = 0.0;
+        let frame = Frame {
+            mean: DVector::from_fn(7, |_, _| 0.3 * random.signed()),
+            spread,
+            factors,
+            latent: 0.6,
+        };
+        for phi in Activation::ALL {
+            let is_linear = phi == Activation::Linear;
+            let widths: (&[usize], &[usize]) = match is_linear {
+                true => (&[7, 3], &[3, 7]),
+                false => (&[7, 5, 4, 3], &[3, 4, 7]),
+            };
+            let (features, batch, parameters) = setup(widths, phi);
+            let maps = match is_linear {
+                true => linear(coordinate_weights()),
+                false => Box::new(NonlinearMaps::new(coordinate_weights(), frame.clone())),
+            };
+            let mut loss = loss(&features, maps, &parameters);
+            loss.evaluate(&parameters, &batch);
+            let mut gradient = loss.gradient().clone();
+            let masked = gradient.encoder.layers[0].weights.row(4).amax() == 0.0;
+            assert!(gradient.xi[0].amax() == 0.0 && masked != is_linear);
+            let count = all(&mut gradient).len();
+            for block in 0..count {
+                for entry in 0..all(&mut gradient)[block].len() {
+                    let mut at = |step: f64| {
+                        let mut moved = parameters.clone();
+                        all(&mut moved)[block][entry] += step;
+                        loss.evaluate(&moved, &batch).total(&WEIGHTS)
+                    };
+                    let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
+                    let exact = all(&mut gradient)[block][entry];
+                    assert!(
+                        (difference - exact).abs() < 2e-6 * exact.abs().max(1.0),
+                        "{phi} {block} {entry}: {difference} {exact}"
+                    );
+                }
             }
         }
     }
 
     #[test]
-    fn losses_equal_their_definitions() {
-        let mut random = Random::new(12);
-        let (features, batch) = (features(), batch(&mut random));
-        let mut loss = loss(&features);
-        loss.coordinate_weights.fill(1.0);
-        let parameters = Parameters::random(7, 3, features.library_dim(), 0.2, &mut random);
-        let losses = loss.evaluate(&parameters, &batch);
-        let Parameters {
-            encoder,
-            decoder,
-            xi,
-            ..
-        } = &parameters;
-        let projection = encoder
-            .clone()
-            .pseudo_inverse(1e-12)
-            .expect("positive")
-            .transpose();
-        let (z, u_lat) = (&batch.x * encoder, &batch.u * projection);
-        let mut variables = DMatrix::zeros(30, 9);
-        variables.columns_mut(0, 3).copy_from(&z);
-        variables
-            .columns_mut(3, 3)
-            .copy_from(&(&batch.dx * encoder));
+    fn losses_of_linear_maps_equal_their_definitions() {
+        let (features, batch, mut parameters) = setup((&[7, 3], &[3, 7]), Activation::Linear);
+        parameters.xi[1].fill(0.2);
+        for map in [&mut parameters.encoder, &mut parameters.decoder] {
+            map.layers[0].bias.fill(0.0);
+        }
+        let maps = linear(DVector::from_element(7, 1.0));
+        let losses = loss(&features, maps, &parameters).evaluate(&parameters, &batch);
+        let encoder = &parameters.encoder.layers[0].weights;
+        let decoder = &parameters.decoder.layers[0].weights;
+        let inverse = encoder.clone().pseudo_inverse(1e-12).expect("positive");
+        let (z, u_lat) = (&batch.x * encoder, &batch.u * inverse.transpose());
+        let mut variables = z.clone().resize(30, 9, 0.0);
+        (variables.columns_mut(3, 3)).copy_from(&(&batch.dx * encoder));
         variables.columns_mut(6, 3).copy_from(&u_lat);
-        let predicted = features.evaluate(&variables, &mut FeatureValues::default()) * xi;
+        let theta = features.evaluate(&variables, &mut FeatureValues::default());
+        let predicted = theta * &parameters.xi[1];
         let mean_square = |m: DMatrix<f64>| m.norm_squared() / m.len() as f64;
         let close = |found: f64, expected: f64| {
-            assert!(
-                (found - expected).abs() < 1e-9 * expected,
-                "{found} {expected}"
-            )
+            let near = (found - expected).abs() < 1e-9 * expected;
+            assert!(near, "{found} {expected}")
         };
         close(losses.decoder, mean_square(&batch.x - z * decoder));
         close(losses.ddz, mean_square(&batch.ddx * encoder - &predicted));
         close(losses.ddx, mean_square(&batch.ddx - &predicted * decoder));
         close(losses.l1, 0.2);
-        let lifted = u_lat * encoder.transpose();
-        close(
-            losses.lift,
-            (&batch.u - lifted).norm_squared() / batch.u.norm_squared(),
-        );
+        let missed = &batch.u - u_lat * encoder.transpose();
+        close(losses.lift, missed.norm_squared() / batch.u.norm_squared());
+    }
+
+    #[test]
+    fn networks_of_one_linear_layer_have_the_losses_and_the_gradient_of_linear_maps() {
+        let (features, batch, parameters) = setup((&[7, 3], &[3, 7]), Activation::Linear);
+        let plain = Frame::plain(&[true; 7]);
+        let networks = Box::new(NonlinearMaps::new(coordinate_weights(), plain));
+        let mut found = loss(&features, networks, &parameters);
+        let mut expected = loss(&features, linear(coordinate_weights()), &parameters);
+        let losses = found.evaluate(&parameters, &batch);
+        let reference = expected.evaluate(&parameters, &batch);
+        let (a, b) = (losses.total(&WEIGHTS), reference.total(&WEIGHTS));
+        assert!((a - b).abs() < 1e-9 * b && (losses.lift - reference.lift).abs() < 1e-9);
+        let (mut found, mut expected) = (found.gradient().clone(), expected.gradient().clone());
+        for (found, expected) in all(&mut found).into_iter().zip(all(&mut expected)) {
+            let close = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9 * b.abs().max(1.0);
+            assert!(
+                found
+                    .iter()
+                    .zip(expected.iter())
+                    .all(|(a, b)| close((a, b)))
+            );
+        }
     }
 }

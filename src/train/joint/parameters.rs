@@ -1,73 +1,106 @@
-//! What Adam moves: encoder, decoder and Xi.
+//! What Adam moves, and the fixed units around the maps.
 
 use nalgebra::{DMatrix, DVector};
 
+use super::batch::Batch;
+use super::network::Network;
+use crate::model::Activation;
 use crate::train::random::Random;
 
-/// Parameters, or gradients with respect to them; samples are rows, so maps act from the right.
+/// Parameters, or gradients with respect to them; linear maps are networks of one layer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameters {
-    /// `W_e^T`, `18 x d`: `z = x W_e^T + b_e^T`.
-    pub encoder: DMatrix<f64>,
-    /// `b_e`, `d`.
-    pub encoder_bias: DVector<f64>,
-    /// `W_d^T`, `d x 18`.
-    pub decoder: DMatrix<f64>,
-    /// `b_d`, 18.
-    pub decoder_bias: DVector<f64>,
-    /// `library_dim x d`.
-    pub xi: DMatrix<f64>,
+    /// From framed states to latent coordinates.
+    pub encoder: Network,
+    /// From latent coordinates to framed states.
+    pub decoder: Network,
+    /// `library_dim x d` for each phase.
+    pub xi: Vec<DMatrix<f64>>,
 }
 
 impl Parameters {
-    /// All zero, of the given dimensions.
-    pub fn zeros(state_dim: usize, latent_dim: usize, library_dim: usize) -> Self {
-        Self {
-            encoder: DMatrix::zeros(state_dim, latent_dim),
-            encoder_bias: DVector::zeros(latent_dim),
-            decoder: DMatrix::zeros(latent_dim, state_dim),
-            decoder_bias: DVector::zeros(state_dim),
-            xi: DMatrix::zeros(library_dim, latent_dim),
-        }
-    }
-
-    /// A random start: weights uniform within `sqrt(6 / (fan in + fan out))` (Glorot and Bengio 2010), biases 0,
-    /// Xi everywhere `xi`.
+    /// A random start: see [`Network::random`]; Xi everywhere `xi`.
     pub fn random(
-        state_dim: usize,
-        latent_dim: usize,
-        library_dim: usize,
-        xi: f64,
+        (encoder, decoder): (&[usize], &[usize]),
+        activation: Activation,
+        (library_dim, phases, xi): (usize, usize, f64),
         random: &mut Random,
     ) -> Self {
-        let bound = (6.0 / (state_dim + latent_dim) as f64).sqrt();
         Self {
-            encoder: random.matrix(state_dim, latent_dim, bound),
-            decoder: random.matrix(latent_dim, state_dim, bound),
-            xi: DMatrix::from_element(library_dim, latent_dim, xi),
-            ..Self::zeros(state_dim, latent_dim, library_dim)
+            encoder: Network::random(encoder, activation, random),
+            decoder: Network::random(decoder, activation, random),
+            xi: vec![DMatrix::from_element(library_dim, decoder[0], xi); phases],
         }
     }
 
-    /// The five blocks as slices, in a fixed order.
-    pub fn blocks(&self) -> [&[f64]; 5] {
-        [
-            self.encoder.as_slice(),
-            self.encoder_bias.as_slice(),
-            self.decoder.as_slice(),
-            self.decoder_bias.as_slice(),
-            self.xi.as_slice(),
-        ]
+    /// A gradient of zeros.
+    pub fn zeros_like(&self) -> Self {
+        let mut zeros = self.clone();
+        zeros.clear();
+        zeros
     }
 
-    /// The five blocks, to be changed.
-    pub fn blocks_mut(&mut self) -> [&mut [f64]; 5] {
-        [
-            self.encoder.as_mut_slice(),
-            self.encoder_bias.as_mut_slice(),
-            self.decoder.as_mut_slice(),
-            self.decoder_bias.as_mut_slice(),
-            self.xi.as_mut_slice(),
-        ]
+    /// Sets every number to zero.
+    pub fn clear(&mut self) {
+        let maps = self.encoder.blocks_mut().chain(self.decoder.blocks_mut());
+        maps.chain(self.xi.iter_mut().map(|xi| xi.as_mut_slice()))
+            .for_each(|block| block.fill(0.0));
+    }
+
+    /// Weights and biases of encoder and decoder as slices, in a fixed order.
+    pub fn maps(&self) -> impl Iterator<Item = &[f64]> {
+        self.encoder.blocks().chain(self.decoder.blocks())
+    }
+
+    /// The same, to be changed.
+    pub fn maps_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
+        self.encoder.blocks_mut().chain(self.decoder.blocks_mut())
+    }
+}
+
+/// Fixed affine maps around encoder and decoder, so that networks see and give numbers of order one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// State that enters the encoder and leaves the decoder as 0, 18.
+    pub mean: DVector<f64>,
+    /// State for one unit of the decoder's output, 18.
+    pub spread: DVector<f64>,
+    /// Factors before the encoder, 18: the inverse of the spread, 0 for masked coordinates.
+    pub factors: DVector<f64>,
+    /// Latent coordinate for one unit of the encoder's output and of the decoder's input.
+    pub latent: f64,
+}
+
+impl Frame {
+    /// No change of units; `mask` (18) is true for coordinates that the encoder may use.
+    pub fn plain(mask: &[bool]) -> Self {
+        let n = mask.len();
+        Self {
+            mean: DVector::zeros(n),
+            spread: DVector::from_element(n, 1.0),
+            factors: DVector::from_fn(n, |i, _| f64::from(mask[i])),
+            latent: 1.0,
+        }
+    }
+
+    /// `x`, `dx` and `ddx` of a batch, stacked, as the encoder takes them.
+    pub fn enter(&self, batch: &Batch) -> DMatrix<f64> {
+        let n = batch.len();
+        let mut stack = DMatrix::zeros(3 * n, batch.x.ncols());
+        for (index, block) in [&batch.x, &batch.dx, &batch.ddx].into_iter().enumerate() {
+            stack.rows_mut(index * n, n).copy_from(block);
+        }
+        for (i, mut column) in stack.column_iter_mut().enumerate() {
+            column.rows_mut(0, n).add_scalar_mut(-self.mean[i]);
+            column *= self.factors[i];
+        }
+        stack
+    }
+
+    /// The stacked Jacobians of the network as those of the map between `x` and `z`, or a gradient the other way.
+    pub fn scale_jacobian(&self, rows: &mut DMatrix<f64>) {
+        for (mut column, factor) in rows.column_iter_mut().zip(self.factors.iter()) {
+            column *= self.latent * factor;
+        }
     }
 }

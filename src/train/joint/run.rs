@@ -1,23 +1,26 @@
-//! A whole joint training: seeds in parallel, the best kept, figures and model.
+//! A whole joint training: seeds in parallel, the best kept.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::batch::{Batch, BatchOptions, batches};
-use super::loss::{JointLoss, LossWeights, Losses};
-use super::network::run::{NetworkTask, TrainedNetworks};
-use super::parameters::Parameters;
-use super::stages::{train_decoder, train_together, train_xi, train_xi_unrolled};
-use crate::model::{AffineMap, ModelError};
+use super::fold::{self, LatentBasis};
+use super::linear::{LinearMaps, mask_rows};
+use super::loss::{JointLoss, LossWeights, Losses, Maps};
+use super::network::Network;
+use super::nonlinear::NonlinearMaps;
+use super::parameters::{Frame, Parameters};
+use super::stages::{train_decoder, train_together, train_xi};
+use crate::model::{AffineMap, Layer, ModelError, StateMap};
 use crate::robot::{Robot, STATE_DIM};
 use crate::train::assemble::Origin;
 use crate::train::data_sets::Recordings;
 use crate::train::dataset::Quantity;
 use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
-use crate::train::latent::{Latent, least_squares_decoder};
+use crate::train::latent::{Latent, fit_affine, least_squares_decoder, map_samples, mean_jacobian};
 use crate::train::options::{JointOptions, TrainOptions, Transfer};
 use crate::train::progress::Watch;
 use crate::train::random::Random;
@@ -29,9 +32,8 @@ use crate::train::weak_form::check_terms;
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
 ///
 /// Every seed is trained on its own, on as many threads as the options say; the one of least score is kept, and a
-/// seed without a model (no stable dynamics, numbers that are not finite) is left out. A
-/// cancelled training finishes with what the seeds begun have by then. Deterministic for a seed, on any number of
-/// threads.
+/// seed without a model (no stable dynamics, numbers that are not finite) is left out. A cancelled training ends with
+/// the seeds begun by then. Deterministic for a seed, on any number of threads.
 ///
 /// # Errors
 /// [`TrainError`]: options out of range, too few samples, no stable model, cancelled before the first seed.
@@ -54,6 +56,7 @@ pub fn joint(
     let trainer = Trainer {
         task: &task,
         batches: &training,
+        frame: frame(&task),
     };
     let runs = trainer.run_seeds(watch);
 
@@ -73,29 +76,41 @@ pub fn joint(
     seeds.into_model(task, robot, "joint", origin)
 }
 
+/// Units in which the maps see the states: for linear maps and as published those of the samples, else centred and in
+/// standard deviations.
+fn frame(task: &Task<'_>) -> Frame {
+    let mask: Vec<bool> = (0..STATE_DIM).map(|i| task.active.contains(&i)).collect();
+    let plain = Frame::plain(&mask);
+    let options = task.options;
+    if options.joint.maps.is_linear() || options.joint.transfer == Transfer::Published {
+        return plain;
+    }
+    let x = task.sets.training.gather(Quantity::X, None);
+    let least = options.encoder.least_std * options.scaling.state;
+    let spread: DVector<f64> = x
+        .column_variance()
+        .map(|variance| variance.sqrt().max(least).max(1e-6));
+    let energy: f64 = task.active.iter().map(|&i| spread[i] * spread[i]).sum();
+    Frame {
+        mean: x.column_mean(),
+        factors: plain.factors.component_div(&spread),
+        spread,
+        latent: (energy / task.active.len().max(1) as f64).sqrt(),
+    }
+}
+
 /// What all seeds share.
 struct Trainer<'a> {
     task: &'a Task<'a>,
     batches: &'a [Batch],
+    frame: Frame,
 }
 
 /// What one seed has learned.
 struct Run {
     seed: u64,
-    learned: Learned,
-    losses: Losses,
-}
-
-/// Linear and nonlinear maps are trained by code of their own: that of linear ones works on moments of the batches.
-enum Learned {
-    Linear(LinearMaps),
-    Networks(TrainedNetworks),
-}
-
-/// Parameters of linear maps; with the published transfer Xi of every phase.
-struct LinearMaps {
     parameters: Parameters,
-    xi: Vec<DMatrix<f64>>,
+    losses: Losses,
 }
 
 impl Trainer<'_> {
@@ -143,177 +158,225 @@ impl Trainer<'_> {
     }
 
     fn run_seed(&self, seed: u64, cancel: &AtomicBool, news: &Sender<String>) -> Run {
-        let options = &self.task.options.joint;
+        let JointOptions {
+            schedule,
+            unroll,
+            transfer,
+            xi_start,
+            maps,
+            ..
+        } = &self.task.options.joint;
         let weights = LossWeights {
             lift: self.task.options.encoder.lift_weight,
-            ..options.weights
+            ..self.task.options.joint.weights
         };
-        let mut tell = |epoch: usize, losses: &Losses, active: usize| {
+        let mut parameters = self.start(seed);
+        let mut loss = self.loss(weights, &parameters).with_unroll(*unroll);
+        let mut listener = |epoch: usize, losses: &Losses, active: usize| {
             // Nobody listens any more if the training is being dropped; that ends soon by itself.
             let _ = news.send(format!(
                 "seed {seed} epoch {epoch}: loss {:.3e}, decoder {:.3e}, {active} terms",
                 losses.total(&weights),
                 losses.decoder
             ));
+            !cancel.load(Ordering::Relaxed)
         };
-        let (learned, losses) = if options.maps.is_linear() {
-            let (maps, losses) = self.learn_linear(seed, weights, cancel, &mut tell);
-            (Learned::Linear(maps), losses)
-        } else {
-            let (maps, losses) = self.networks().learn(seed, weights, cancel, &mut tell);
-            (Learned::Networks(maps), losses)
+        let all: Vec<&Batch> = self.batches.iter().collect();
+        let of_phase = |phase: usize| all.iter().copied().filter(move |b| b.phase == phase);
+        // The published first step sees contact only. A network says nothing about states that it was not trained on.
+        let first = match maps.is_linear() || *transfer == Transfer::Published {
+            true => of_phase(0).collect(),
+            false => all.clone(),
         };
+        let losses = train_together(&mut parameters, &first, &mut loss, schedule, &mut listener);
+        let mut quiet = |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
+        if *transfer == Transfer::Published {
+            train_decoder(&mut parameters, &all, &loss, schedule, &mut quiet);
+            for phase in 0..parameters.xi.len() {
+                let own: Vec<&Batch> = of_phase(phase).collect();
+                parameters.xi[phase].fill(*xi_start);
+                train_xi(
+                    &mut parameters,
+                    phase,
+                    &own,
+                    &mut loss,
+                    schedule,
+                    &mut quiet,
+                );
+            }
+        }
         Run {
             seed,
-            learned,
+            parameters,
             losses,
         }
     }
 
-    fn networks(&self) -> NetworkTask<'_> {
-        NetworkTask {
-            task: self.task,
-            batches: self.batches,
-        }
-    }
-
-    fn learn_linear(
-        &self,
-        seed: u64,
-        weights: LossWeights,
-        cancel: &AtomicBool,
-        tell: &mut dyn FnMut(usize, &Losses, usize),
-    ) -> (LinearMaps, Losses) {
-        let options = &self.task.options.joint;
-        let contact: Vec<&Batch> = self
-            .batches
-            .iter()
-            .filter(|batch| batch.phase == 0)
-            .collect();
-        let mut parameters = self.start(seed);
+    /// The loss of maps like those of `parameters`.
+    fn loss(&self, weights: LossWeights, parameters: &Parameters) -> JointLoss<'_> {
         let coordinate_weights = self.task.options.encoder.coordinate_weights();
-        let mut loss = JointLoss::new(&self.task.features, weights, coordinate_weights)
-            .with_unroll(options.unroll);
-        let mask: Vec<bool> = (0..STATE_DIM)
-            .map(|i| self.task.active.contains(&i))
-            .collect();
-        let mut listener = |epoch: usize, losses: &Losses, active: usize| {
-            tell(epoch, losses, active);
-            !cancel.load(Ordering::Relaxed)
+        let maps: Box<dyn Maps> = match self.is_linear() {
+            true => Box::new(LinearMaps::new(coordinate_weights, self.mask())),
+            false => Box::new(NonlinearMaps::new(coordinate_weights, self.frame.clone())),
         };
-        let losses = train_together(
-            &mut parameters,
-            &contact,
-            &mut loss,
-            weights,
-            &mask,
-            &options.schedule,
-            &mut listener,
-        );
-        let mut maps = LinearMaps {
-            parameters,
-            xi: Vec::new(),
-        };
-        if options.transfer == Transfer::Published {
-            self.transfer(&mut maps, weights, cancel);
-        }
-        (maps, losses)
+        JointLoss::new(&self.task.features, maps, weights, parameters)
     }
 
-    /// Where a seed starts: random maps, `b_e = 0` as published or `-W_e mean(x)`.
+    fn is_linear(&self) -> bool {
+        self.task.options.joint.maps.is_linear()
+    }
+
+    /// Coordinates that the encoder may use.
+    fn mask(&self) -> Vec<bool> {
+        self.frame
+            .factors
+            .iter()
+            .map(|factor| *factor != 0.0)
+            .collect()
+    }
+
+    /// Where a seed starts: random maps, and for linear ones `b_e = 0` as published or `-W_e mean(x)`.
     fn start(&self, seed: u64) -> Parameters {
         let JointOptions {
-            xi_start, transfer, ..
-        } = self.task.options.joint;
-        let mut random = Random::new(seed);
-        let (d, p) = (
-            self.task.options.latent_dim,
-            self.task.features.library_dim(),
-        );
-        let mut parameters = Parameters::random(STATE_DIM, d, p, xi_start, &mut random);
-        if transfer == Transfer::Chosen {
-            let mean = self
-                .task
-                .sets
-                .training
-                .gather(Quantity::X, Some(0))
-                .column_mean();
-            parameters.encoder_bias = -(parameters.encoder.tr_mul(&mean));
-            parameters.decoder_bias = mean;
+            xi_start,
+            maps,
+            transfer,
+            ..
+        } = &self.task.options.joint;
+        let (d, training) = (self.task.options.latent_dim, &self.task.sets.training);
+        let encoder = [&[STATE_DIM], &maps.encoder_layers[..], &[d]].concat();
+        let decoder = [&[d], &maps.decoder_layers[..], &[STATE_DIM]].concat();
+        let phases = training.phases.patterns.len();
+        let shape = (self.task.features.library_dim(), phases, *xi_start);
+        let widths = (&encoder[..], &decoder[..]);
+        let mut start = Parameters::random(widths, maps.activation, shape, &mut Random::new(seed));
+        if self.is_linear() {
+            let encoder = &mut start.encoder.layers[0];
+            if *transfer == Transfer::Chosen {
+                let mean = training.gather(Quantity::X, Some(0)).column_mean();
+                encoder.bias = -(encoder.weights.tr_mul(&mean));
+                start.decoder.layers[0].bias = mean;
+            }
+            mask_rows(&mut encoder.weights, &self.mask());
         }
-        parameters
+        start
     }
 
-    /// Steps two and three as published.
-    fn transfer(&self, run: &mut LinearMaps, weights: LossWeights, cancel: &AtomicBool) {
-        let schedule = &self.task.options.joint.schedule;
-        let mut listener = |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
-        let all: Vec<&Batch> = self.batches.iter().collect();
-        train_decoder(&mut run.parameters, &all, schedule, &mut listener);
-        for phase in 0..self.task.sets.training.phases.patterns.len() {
-            let own: Vec<&Batch> = self
-                .batches
-                .iter()
-                .filter(|batch| batch.phase == phase)
-                .collect();
-            let start = DMatrix::from_element(
-                self.task.features.library_dim(),
-                self.task.options.latent_dim,
-                self.task.options.joint.xi_start,
-            );
-            let xi = if weights.bptt == 0.0 {
-                train_xi(
-                    &run.parameters,
-                    &own,
-                    &self.task.features,
-                    weights,
-                    schedule,
-                    start,
-                    &mut listener,
-                )
-                .0
-            } else {
-                let coordinate_weights = self.task.options.encoder.coordinate_weights();
-                let mut loss = JointLoss::new(&self.task.features, weights, coordinate_weights)
-                    .with_unroll(self.task.options.joint.unroll);
-                let parameters = Parameters {
-                    xi: start,
-                    ..run.parameters.clone()
-                };
-                train_xi_unrolled(
-                    &parameters,
-                    &own,
-                    &mut loss,
-                    weights,
-                    schedule,
-                    &mut listener,
-                )
-            };
-            run.xi.push(xi);
-        }
-    }
-
-    /// The model numbers of a run, and what it is compared by.
+    /// The model numbers of a run, and its score.
     fn finish(
         &self,
         run: Run,
         judged: &[Batch],
         watch: &mut Watch<'_>,
     ) -> Result<(SeedReport, Fitted), TrainError> {
-        let fitted = match &run.learned {
-            Learned::Linear(maps) => self.finish_linear(maps, watch)?,
-            Learned::Networks(maps) => self.networks().finish(maps, watch)?,
-        };
-        let score = match (self.task.options.joint.transfer, &run.learned) {
-            (Transfer::Chosen, _) => fitted.score(),
-            (Transfer::Published, Learned::Linear(maps)) => self.published_score(maps, judged),
-            (Transfer::Published, Learned::Networks(maps)) => {
-                self.networks().published_score(maps, judged)
+        let (fitted, score) = match self.task.options.joint.transfer {
+            Transfer::Published => {
+                let score = self.published_score(&run.parameters, judged);
+                (self.published(run.parameters)?, score)
+            }
+            Transfer::Chosen => {
+                let maps = match self.is_linear() {
+                    true => self.linear_maps(&run.parameters)?,
+                    false => self.nonlinear_maps(&run.parameters)?,
+                };
+                let fitted = self.task.fit_dynamics(maps, watch)?;
+                let score = fitted.score();
+                (fitted, score)
             }
         };
-        let seed = (run.seed, score);
-        let report = self.task.seed_report(&fitted, seed, Some(run.losses))?;
+        let report = (self.task).seed_report(&fitted, (run.seed, score), Some(run.losses))?;
         Ok((report, fitted))
+    }
+
+    /// Mean combined loss over batches of all phases.
+    fn published_score(&self, parameters: &Parameters, judged: &[Batch]) -> f64 {
+        let weights = self.task.options.joint.weights;
+        let mut loss = self.loss(weights, parameters);
+        let total: f64 = judged
+            .iter()
+            .map(|batch| loss.evaluate(parameters, batch).total(&weights))
+            .sum();
+        total / judged.len().max(1) as f64
+    }
+
+    /// The numbers as Adam left them.
+    fn published(&self, parameters: Parameters) -> Result<Fitted, TrainError> {
+        let plain = LatentBasis::unchanged(self.task.options.latent_dim);
+        let (encoder, decoder) = self.state_maps(&parameters, &plain)?;
+        let x = self.task.sets.training.gather(Quantity::X, None);
+        Ok(Fitted {
+            weights: mean_jacobian(&encoder, &x),
+            encoder,
+            decoder,
+            xi: parameters.xi,
+            choice: None,
+            training: None,
+        })
+    }
+
+    /// Encoder and decoder between scaled states and latent coordinates in `basis`, which linear maps ignore.
+    fn state_maps(
+        &self,
+        parameters: &Parameters,
+        basis: &LatentBasis,
+    ) -> Result<(StateMap, StateMap), TrainError> {
+        let Parameters {
+            encoder, decoder, ..
+        } = parameters;
+        if !self.is_linear() {
+            let encoder = fold::encoder(encoder, &self.frame, basis)?;
+            return Ok((encoder, fold::decoder(decoder, &self.frame, basis)?));
+        }
+        let affine = |tensor, network: &Network| {
+            let layer = &network.layers[0];
+            AffineMap::new(tensor, layer.weights.transpose(), layer.bias.clone())
+        };
+        let encoder = affine("encoder", encoder)?.into();
+        Ok((encoder, affine("decoder", decoder)?.into()))
+    }
+
+    /// The encoder over the learned row space, and its least-squares decoder.
+    fn linear_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
+        let basis = parameters.encoder.layers[0].weights.clone().qr().q();
+        let encoder = self.task.encoder_over(&basis)?.into();
+        let decoder = least_squares_decoder(&self.task.sets.training, &encoder)?.into();
+        Ok((encoder, decoder))
+    }
+
+    /// The learned networks in the canonical latent basis, the decoder's last layer by least squares.
+    fn nonlinear_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
+        let plain = LatentBasis::unchanged(self.task.options.latent_dim);
+        let x = self.task.sets.training.gather(Quantity::X, None);
+        let basis = self.basis(&self.state_maps(parameters, &plain)?.0, &x);
+        let (encoder, decoder) = self.state_maps(parameters, &basis)?;
+        let decoder = with_fitted_last_layer(&decoder, &x, &map_samples(&encoder, &x))?;
+        Ok((encoder, decoder))
+    }
+
+    /// The latent basis in which `J J^T` is the identity in the mean, rotated by varimax of the mean Jacobian, with
+    /// the latents in canonical order and their mean at 0.
+    fn basis(&self, encoder: &StateMap, x: &DMatrix<f64>) -> LatentBasis {
+        let d = self.task.options.latent_dim;
+        let gram = x.column_iter().fold(DMatrix::zeros(d, d), |sum, x| {
+            let jacobian = encoder
+                .jacobian(&x.into_owned())
+                .expect("invariant: the encoder takes the robot's states");
+            sum + &jacobian * jacobian.transpose()
+        }) / x.ncols().max(1) as f64;
+        // A basis without full rank is left as it is; the regression then reports that no model is stable.
+        let white = match gram.cholesky().and_then(|factor| factor.l().try_inverse()) {
+            Some(inverse) => inverse,
+            None => DMatrix::identity(d, d),
+        };
+        let mean = &white * mean_jacobian(encoder, x);
+        let (_, rotation) = self.task.canonical_basis(&mean.transpose());
+        let turn = rotation.transpose() * white;
+        let back = match turn.clone().try_inverse() {
+            Some(back) => back,
+            None => return LatentBasis::unchanged(d),
+        };
+        let shift = -(&turn * map_samples(encoder, x).column_mean());
+        LatentBasis { turn, back, shift }
     }
 
     /// Of a descent that left the finite numbers the term that made it do so, if one has no value where it began.
@@ -321,71 +384,30 @@ impl Trainer<'_> {
         if !matches!(error, TrainError::Model(ModelError::NonFinite { .. })) {
             return error;
         }
+        let training = &self.task.sets.training;
         let terms_at_start = || {
-            let encoder = match self.task.options.joint.maps.is_linear() {
-                true => {
-                    let mut start = self.start(seed);
-                    let masked = (0..STATE_DIM).filter(|i| !self.task.active.contains(i));
-                    masked.for_each(|i| start.encoder.row_mut(i).fill(0.0));
-                    AffineMap::new("encoder", start.encoder.transpose(), start.encoder_bias)?.into()
-                }
-                false => self.networks().starting_encoder(seed)?,
-            };
-            let latent = Latent::of(&self.task.sets.training, &encoder)?;
-            check_terms(&self.task.sets.training, &latent, &self.task.features)
+            let plain = LatentBasis::unchanged(self.task.options.latent_dim);
+            let encoder = self.state_maps(&self.start(seed), &plain)?.0;
+            let latent = Latent::of(training, &encoder)?;
+            check_terms(training, &latent, &self.task.features)
         };
         terms_at_start().err().unwrap_or(error)
     }
-
-    fn finish_linear(
-        &self,
-        maps: &LinearMaps,
-        watch: &mut Watch<'_>,
-    ) -> Result<Fitted, TrainError> {
-        match self.task.options.joint.transfer {
-            Transfer::Published => published(maps),
-            Transfer::Chosen => {
-                let basis = maps.parameters.encoder.clone().qr().q();
-                let encoder = self.task.encoder_over(&basis)?.into();
-                let decoder = least_squares_decoder(&self.task.sets.training, &encoder)?.into();
-                self.task.fit_dynamics((encoder, decoder), watch)
-            }
-        }
-    }
-
-    /// Mean combined loss over batches of all phases.
-    fn published_score(&self, run: &LinearMaps, judged: &[Batch]) -> f64 {
-        let weights = self.task.options.joint.weights;
-        let mut loss = JointLoss::new(
-            &self.task.features,
-            weights,
-            self.task.options.encoder.coordinate_weights(),
-        );
-        let mut parameters = run.parameters.clone();
-        let mut total = 0.0;
-        for batch in judged {
-            parameters.xi.copy_from(&run.xi[batch.phase]);
-            total += loss.evaluate(&parameters, batch).total(&weights);
-        }
-        total / judged.len().max(1) as f64
-    }
 }
 
-/// The numbers as Adam left them.
-fn published(run: &LinearMaps) -> Result<Fitted, TrainError> {
-    let Parameters {
-        encoder,
-        encoder_bias,
-        decoder,
-        decoder_bias,
-        ..
-    } = &run.parameters;
-    Ok(Fitted {
-        weights: encoder.transpose(),
-        encoder: AffineMap::new("encoder", encoder.transpose(), encoder_bias.clone())?.into(),
-        decoder: AffineMap::new("decoder", decoder.transpose(), decoder_bias.clone())?.into(),
-        xi: run.xi.clone(),
-        choice: None,
-        training: None,
-    })
+/// The decoder with its last layer, which is linear, of least square error from `z` to `x` (samples in columns).
+fn with_fitted_last_layer(
+    decoder: &StateMap,
+    x: &DMatrix<f64>,
+    z: &DMatrix<f64>,
+) -> Result<StateMap, TrainError> {
+    let mut layers: Vec<Layer> = decoder.layers().to_vec();
+    let last = layers.pop().expect("invariant: a map has a layer");
+    let hidden = match layers.is_empty() {
+        true => z.clone(),
+        false => map_samples(&StateMap::new("decoder", layers.clone())?, z),
+    };
+    let map: AffineMap = fit_affine(x, &hidden)?;
+    layers.push(Layer { map, ..last });
+    Ok(StateMap::new("decoder", layers)?)
 }

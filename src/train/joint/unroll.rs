@@ -1,6 +1,6 @@
 //! The loss over a window of predictions (appendix D of the paper, equations 40 and 41), and its exact gradient.
 //!
-//! From every sample of a batch the model is integrated over a window and its latent positions are held against the
+//! From every sample of a batch the model is integrated over a window and its latent positions are compared with the
 //! encoded ones. All starts of a batch are integrated together; the reverse sweep goes back through every stage.
 
 use std::ops::Range;
@@ -27,7 +27,7 @@ pub enum Integrator {
 pub struct Unroll {
     /// Steps predicted from every sample.
     pub window: usize,
-    /// Samples a step: 5 at 500 Hz are the published 10 ms.
+    /// Samples per step: 5 at 500 Hz are the published 10 ms.
     pub stride: usize,
     /// Weight of a prediction against the one a step earlier, above 0 and at most 1.
     pub decay: f64,
@@ -63,7 +63,7 @@ impl Integrator {
     }
 }
 
-/// Samples of one batch as the loss sees them.
+/// Samples of one batch.
 #[derive(Clone, Copy, Debug)]
 pub struct Window<'a> {
     /// `n x 3d`: z, dz, u_lat.
@@ -76,7 +76,7 @@ pub struct Window<'a> {
 
 /// Gradients that the loss adds to.
 #[derive(Debug)]
-pub struct Pulls<'a> {
+pub struct Adjoints<'a> {
     /// With respect to the variables, `n x 3d`.
     pub variables: &'a mut DMatrix<f64>,
     /// With respect to the coefficients.
@@ -93,14 +93,14 @@ struct Stage {
 impl Unroll {
     /// Mean over starts, coordinates and (decaying) steps of `(z_pred - z)^2`; 0 for a batch shorter than the window.
     ///
-    /// Adds `weight` times its gradient to `pulls`. Inputs are those recorded at the time of each stage, or the sample
+    /// Adds `weight` times its gradient to `adjoints`. Inputs are those recorded at the time of each stage, or the sample
     /// before it.
     pub fn evaluate(
         &self,
         features: &Features,
         samples: Window<'_>,
         weight: f64,
-        pulls: &mut Pulls<'_>,
+        adjoints: &mut Adjoints<'_>,
     ) -> f64 {
         let d = features.latent_dim();
         let reach = self.window * self.stride;
@@ -115,27 +115,28 @@ impl Unroll {
         let h = samples.step_s * self.stride as f64;
         let scale = 1.0 / (self.window * starts * d) as f64;
         let mut state = samples.variables.view((0, 0), (starts, 2 * d)).into_owned();
-        let (mut steps, mut misses, mut loss) = (Vec::new(), Vec::new(), 0.0);
+        let (mut steps, mut residuals, mut loss) = (Vec::new(), Vec::new(), 0.0);
         for step in 0..self.window {
             steps.push(self.forward(features, samples, step, h, &mut state));
             let target = samples
                 .variables
                 .view(((step + 1) * self.stride, 0), (starts, d));
-            let miss = state.columns(0, d) - target;
-            loss += scale * self.decay.powi(step as i32) * miss.norm_squared();
-            misses.push(miss);
+            let residual = state.columns(0, d) - target;
+            loss += scale * self.decay.powi(step as i32) * residual.norm_squared();
+            residuals.push(residual);
         }
-        let mut pull = DMatrix::zeros(starts, 2 * d);
-        for (step, (mut stages, miss)) in steps.into_iter().zip(misses).enumerate().rev() {
-            let miss = miss * (2.0 * weight * scale * self.decay.powi(step as i32));
-            let mut target = (pulls.variables).view_mut(((step + 1) * self.stride, 0), (starts, d));
-            target -= &miss;
-            let mut position = pull.columns_mut(0, d);
-            position += miss;
-            self.backward(features, samples, (&mut stages, h), &mut pull, pulls);
+        let mut adjoint = DMatrix::zeros(starts, 2 * d);
+        for (step, (mut stages, residual)) in steps.into_iter().zip(residuals).enumerate().rev() {
+            let residual = residual * (2.0 * weight * scale * self.decay.powi(step as i32));
+            let mut target =
+                (adjoints.variables).view_mut(((step + 1) * self.stride, 0), (starts, d));
+            target -= &residual;
+            let mut position = adjoint.columns_mut(0, d);
+            position += residual;
+            self.backward(features, samples, (&mut stages, h), &mut adjoint, adjoints);
         }
-        let mut start = pulls.variables.view_mut((0, 0), (starts, 2 * d));
-        start += pull;
+        let mut start = adjoints.variables.view_mut((0, 0), (starts, 2 * d));
+        start += adjoint;
         loss
     }
 
@@ -180,27 +181,28 @@ impl Unroll {
         features: &Features,
         samples: Window<'_>,
         (stages, h): (&mut [Stage], f64),
-        pull: &mut DMatrix<f64>,
-        pulls: &mut Pulls<'_>,
+        adjoint: &mut DMatrix<f64>,
+        adjoints: &mut Adjoints<'_>,
     ) {
-        let (starts, d) = (pull.nrows(), features.latent_dim());
-        let after = pull.clone();
+        let (starts, d) = (adjoint.nrows(), features.latent_dim());
+        let after = adjoint.clone();
         let mut onto_earlier = DMatrix::zeros(starts, 2 * d);
         let weights = self.integrator.stages();
         for (stage, &(at, share)) in stages.iter_mut().zip(weights).rev() {
             let slope = &after * (h * share) + &onto_earlier;
             let acceleration = slope.columns(d, d);
-            *pulls.xi += stage.theta.tr_mul(&acceleration);
-            let theta_pull = acceleration * samples.xi.transpose();
+            *adjoints.xi += stage.theta.tr_mul(&acceleration);
+            let onto_theta = acceleration * samples.xi.transpose();
             let mut variables = DMatrix::zeros(starts, 3 * d);
-            features.backward(&theta_pull, &mut stage.values, &mut variables);
-            let mut inputs = (pulls.variables).view_mut((stage.inputs.start, 2 * d), (starts, d));
+            features.backward(&onto_theta, &mut stage.values, &mut variables);
+            let mut inputs =
+                (adjoints.variables).view_mut((stage.inputs.start, 2 * d), (starts, d));
             inputs += variables.columns(2 * d, d);
             let mut own = variables.columns(0, 2 * d).into_owned();
             let mut velocity = own.columns_mut(d, d);
             velocity += slope.columns(0, d);
             onto_earlier = &own * (h * at);
-            *pull += own;
+            *adjoint += own;
         }
     }
 }
@@ -241,7 +243,7 @@ mod tests {
             features,
             samples,
             1.0,
-            &mut Pulls {
+            &mut Adjoints {
                 variables: &mut a,
                 xi: &mut b,
             },
@@ -264,11 +266,11 @@ mod tests {
                 xi: &xi,
                 step_s: STEP_S,
             };
-            let mut pulls = Pulls {
+            let mut adjoints = Adjoints {
                 variables: &mut to_variables,
                 xi: &mut to_xi,
             };
-            unroll.evaluate(&features, samples, 0.3, &mut pulls);
+            unroll.evaluate(&features, samples, 0.3, &mut adjoints);
             let agree = |above: f64, below: f64, exact: f64| {
                 let difference = 0.3 * (above - below) / 2e-6;
                 let close = (difference - exact).abs() < 1e-6 * exact.abs().max(0.1);
@@ -333,7 +335,7 @@ mod tests {
                 &features,
                 samples,
                 1.0,
-                &mut Pulls {
+                &mut Adjoints {
                     variables: &mut a,
                     xi: &mut b,
                 },

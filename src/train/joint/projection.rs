@@ -1,20 +1,61 @@
-//! Latent inputs under a Jacobian of its own at every sample, forwards and backwards.
+//! Latent inputs of batches, forwards and backwards: `u_lat = pinv(J^T) u = (J J^T)^-1 J u`.
 //!
-//! `u_lat = pinv(J^T) u = (J J^T)^-1 J u`. The Gram matrices are as small as the latent space and factored one by one.
+//! A linear encoder has one `J = W_e` for all samples, so that the projection is one matrix; a nonlinear one has a
+//! Jacobian at every sample, whose Gram matrices are as small as the latent space and factored one by one. Both damp
+//! directions that are nearly dependent.
 
 use nalgebra::DMatrix;
 
-/// Added to the diagonal of `J J^T`, as for a linear encoder.
+/// Added to the diagonal of `J J^T`.
 const DAMPING: f64 = 1e-12;
 
-/// Latent inputs of a batch.
-#[derive(Clone, Debug)]
+/// `pinv(W_e^T)^T = V (V^T V)^-1` for `V = W_e^T`: latent inputs of samples in rows are `u` times this.
+#[derive(Clone, Debug, Default)]
+pub struct InputProjection {
+    weights: DMatrix<f64>,      // 18 x d
+    inverse_gram: DMatrix<f64>, // d x d
+}
+
+impl InputProjection {
+    /// The projection of an encoder `V`, `18 x d`.
+    pub fn new(encoder: &DMatrix<f64>) -> Self {
+        let d = encoder.ncols();
+        let gram = encoder.tr_mul(encoder) + DMatrix::identity(d, d) * DAMPING;
+        let inverse_gram = match gram.clone().cholesky() {
+            Some(factor) => factor.inverse(),
+            None => gram
+                .pseudo_inverse(1e-12)
+                .expect("the tolerance is positive"),
+        };
+        Self {
+            weights: encoder * &inverse_gram,
+            inverse_gram,
+        }
+    }
+
+    /// `V (V^T V)^-1`, `18 x d`.
+    pub fn weights(&self) -> &DMatrix<f64> {
+        &self.weights
+    }
+
+    /// Adjoint of `V`, given the one of the projection.
+    ///
+    /// From `dQ = dV A^-1 - Q (dV^T V + V^T dV) A^-1`: with `K = G A^-1`, it is `K - V (Q^T K) - V (K^T Q)`.
+    pub fn adjoint(&self, encoder: &DMatrix<f64>, gradient: &DMatrix<f64>) -> DMatrix<f64> {
+        let k = gradient * &self.inverse_gram;
+        let crossed = self.weights.tr_mul(&k);
+        &k - encoder * (&crossed + crossed.transpose())
+    }
+}
+
+/// Latent inputs of a batch under a Jacobian at every sample.
+#[derive(Clone, Debug, Default)]
 pub struct InputProjections {
     /// `n x d`.
     pub u_lat: DMatrix<f64>,
     /// Sum over samples of `(J u) . u_lat`: the energy of the inputs that the latent inputs carry.
     pub carried: f64,
-    factors: Vec<f64>, // Cholesky factors, d x d a sample, row-major
+    factors: Vec<f64>, // Cholesky factors, d x d per sample, row-major
 }
 
 impl InputProjections {
@@ -59,23 +100,23 @@ impl InputProjections {
         }
     }
 
-    /// Gradient with respect to the Jacobians (`(d n) x 18`) of a function whose gradient with respect to `u_lat` is
-    /// `pull` (`n x d`), plus `-lift` times [`Self::carried`].
+    /// Adjoint of the Jacobians (`(d n) x 18`), given the one of `u_lat` (`n x d`), plus `-lift` times the gradient of
+    /// [`Self::carried`].
     ///
-    /// With `w = (J J^T)^-1 pull`, `v = u_lat` and the rest `r = u - J^T v` it is
+    /// With `w = (J J^T)^-1 adjoint`, `v = u_lat` and the rest `r = u - J^T v` it is
     /// `w r^T - v (J^T w)^T - 2 lift v r^T`.
-    pub fn pull_back(
+    pub fn adjoint(
         &self,
         rows: &DMatrix<f64>,
         u: &DMatrix<f64>,
-        pull: &DMatrix<f64>,
+        onto_u_lat: &DMatrix<f64>,
         lift: f64,
     ) -> DMatrix<f64> {
         let (n, d) = self.u_lat.shape();
-        let mut solved = pull.clone();
+        let mut solved = onto_u_lat.clone();
         let mut right = vec![0.0; d];
         for (s, factor) in self.factors.chunks_exact(d * d).enumerate() {
-            (0..d).for_each(|i| right[i] = pull[(s, i)]);
+            (0..d).for_each(|i| right[i] = onto_u_lat[(s, i)]);
             solve(factor, &mut right);
             (0..d).for_each(|i| solved[(s, i)] = right[i]);
         }
@@ -161,17 +202,17 @@ mod tests {
     }
 
     #[test]
-    fn pull_back_agrees_with_finite_differences() {
+    fn adjoint_agrees_with_finite_differences() {
         let mut random = Random::new(9);
         let (rows, u) = (random.matrix(D * N, 7, 1.0), random.matrix(N, 7, 1.0));
-        let (pull, lift) = (random.matrix(N, D, 1.0), 0.7);
-        let exact = InputProjections::new(&rows, &u).pull_back(&rows, &u, &pull, lift);
+        let (onto_u_lat, lift) = (random.matrix(N, D, 1.0), 0.7);
+        let exact = InputProjections::new(&rows, &u).adjoint(&rows, &u, &onto_u_lat, lift);
         for entry in 0..rows.len() {
             let at = |step: f64| {
                 let mut moved = rows.clone();
                 moved[entry] += step;
                 let found = InputProjections::new(&moved, &u);
-                found.u_lat.dot(&pull) - lift * found.carried
+                found.u_lat.dot(&onto_u_lat) - lift * found.carried
             };
             let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
             let close = (difference - exact[entry]).abs() < 1e-6 * exact[entry].abs().max(1.0);

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::layers::Network;
-use super::loss::Frame;
+use super::network::Network;
+use super::parameters::Frame;
 use crate::model::{AffineMap, Layer, ModelError, StateMap};
 
 /// Another basis of the latent space: `z_new = turn z + shift`.
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
     use crate::model::Activation;
     use crate::train::joint::batch::Batch;
-    use crate::train::joint::network::layers::Tape;
+    use crate::train::joint::network::Tape;
     use crate::train::random::Random;
 
     #[test]

@@ -8,8 +8,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::multiply::{Columns, add_product, add_transposed};
 use crate::model::Activation;
-use crate::train::joint::multiply::{Columns, add_product, add_transposed};
 use crate::train::random::Random;
 
 /// One layer: `y -> phi(y W + b)`.
@@ -17,7 +17,7 @@ use crate::train::random::Random;
 pub struct Dense {
     /// `W`, inputs x outputs.
     pub weights: DMatrix<f64>,
-    /// `b`, one an output.
+    /// `b`, one per output.
     pub bias: DVector<f64>,
     /// `phi`.
     pub activation: Activation,
@@ -30,7 +30,7 @@ pub struct Network {
     pub layers: Vec<Dense>,
 }
 
-/// What a forward pass leaves behind for the sweeps back.
+/// Record of a forward pass for the reverse sweeps.
 #[derive(Clone, Debug, Default)]
 pub struct Tape {
     samples: usize,
@@ -44,12 +44,12 @@ struct Recorded {
     derivatives: [DMatrix<f64>; 3], // samples x outputs: phi', phi'', phi'''
 }
 
-/// Jacobians of all samples, with what the way back needs.
-#[derive(Clone, Debug)]
+/// Jacobians of all samples, with the records for the reverse sweep.
+#[derive(Clone, Debug, Default)]
 pub struct Jacobians {
     /// Row `i n + s` is the gradient of output `i` at sample `s`: `(outputs n) x inputs`.
     pub rows: DMatrix<f64>,
-    at_affine: Vec<DMatrix<f64>>, // a layer: derivative of every output with respect to a
+    at_affine: Vec<DMatrix<f64>>, // per layer: derivative of every output with respect to a
     at_output: Vec<DMatrix<f64>>, // the same with respect to phi(a); empty for the last layer
 }
 
@@ -134,36 +134,36 @@ impl Network {
         y
     }
 
-    /// Adds to `gradient` what `pull`, the gradient with respect to the result of [`Self::forward`], means for the
-    /// layers; returns the gradient with respect to what entered.
+    /// Adds to `gradient` the share of the layers, given the adjoint of the result of [`Self::forward`]; returns the
+    /// adjoint of the input.
     ///
-    /// `at_affine` (one matrix a layer, or none) is added to the gradient with respect to `a`; it comes from
-    /// [`Self::pull_back_jacobian`].
+    /// `at_affine` (one matrix per layer, or none) is added to the adjoint of `a`; it comes from
+    /// [`Self::jacobian_adjoint`].
     pub fn backward(
         &self,
         tape: &Tape,
-        pull: DMatrix<f64>,
+        adjoint: DMatrix<f64>,
         at_affine: &[DMatrix<f64>],
         gradient: &mut Network,
     ) -> DMatrix<f64> {
-        let mut pull = pull;
+        let mut adjoint = adjoint;
         for (index, (layer, recorded)) in self.layers.iter().zip(&tape.layers).enumerate().rev() {
             if layer.activation != Activation::Linear {
-                deactivate(recorded, tape.samples, &mut pull);
+                deactivate(recorded, tape.samples, &mut adjoint);
             }
             if let Some(extra) = at_affine.get(index) {
-                let mut values = pull.rows_mut(0, tape.samples);
+                let mut values = adjoint.rows_mut(0, tape.samples);
                 values += extra;
             }
             let own = &mut gradient.layers[index];
-            let (entering, pulled) = (Columns::all(&recorded.entering), Columns::all(&pull));
-            add_transposed(&mut own.weights, 1.0, entering, pulled);
-            for (bias, column) in own.bias.iter_mut().zip(pull.column_iter()) {
+            let (entering, arriving) = (Columns::all(&recorded.entering), Columns::all(&adjoint));
+            add_transposed(&mut own.weights, 1.0, entering, arriving);
+            for (bias, column) in own.bias.iter_mut().zip(adjoint.column_iter()) {
                 *bias += column.rows(0, tape.samples).sum();
             }
-            pull = times(&pull, &layer.weights.transpose());
+            adjoint = times(&adjoint, &layer.weights.transpose());
         }
-        pull
+        adjoint
     }
 
     /// Jacobians at the samples of the last forward pass.
@@ -192,32 +192,32 @@ impl Network {
         }
     }
 
-    /// Adds to `gradient` what `pull`, the gradient with respect to [`Jacobians::rows`], means for the layers.
+    /// Adds to `gradient` the share of the layers, given the adjoint of [`Jacobians::rows`].
     ///
-    /// Returns the gradient with respect to `a` of every layer, which is to be given to [`Self::backward`].
-    pub fn pull_back_jacobian(
+    /// Returns the adjoint of `a` of every layer, to be given to [`Self::backward`].
+    pub fn jacobian_adjoint(
         &self,
         tape: &Tape,
         jacobians: &Jacobians,
-        pull: &DMatrix<f64>,
+        adjoint: &DMatrix<f64>,
         gradient: &mut Network,
     ) -> Vec<DMatrix<f64>> {
         let mut onto_affine = Vec::with_capacity(self.layers.len());
-        let mut pull = pull.clone();
+        let mut adjoint = adjoint.clone();
         for (index, (layer, recorded)) in self.layers.iter().zip(&tape.layers).enumerate() {
             let own = &mut gradient.layers[index].weights;
             let at_affine = &jacobians.at_affine[index];
             // rows = at_affine W^T
-            add_transposed(own, 1.0, Columns::all(&pull), Columns::all(at_affine));
-            pull = times(&pull, &layer.weights);
+            add_transposed(own, 1.0, Columns::all(&adjoint), Columns::all(at_affine));
+            adjoint = times(&adjoint, &layer.weights);
             let [slopes, curvatures, _] = &recorded.derivatives;
             if layer.activation == Activation::Linear {
                 onto_affine.push(DMatrix::zeros(tape.samples, layer.bias.len()));
                 continue;
             }
-            let product = pull.component_mul(&jacobians.at_output[index]);
+            let product = adjoint.component_mul(&jacobians.at_output[index]);
             onto_affine.push(summed(&product, tape.samples).component_mul(curvatures));
-            pull = times_each(&pull, slopes);
+            adjoint = times_each(&adjoint, slopes);
         }
         onto_affine
     }
@@ -281,10 +281,10 @@ fn activate(phi: Activation, affine: &DMatrix<f64>, n: usize) -> (DMatrix<f64>, 
     (leaving, derivatives)
 }
 
-/// The gradient with respect to `phi` of a stack becomes the one with respect to the stack of `a`.
-fn deactivate(recorded: &Recorded, n: usize, pull: &mut DMatrix<f64>) {
+/// The adjoint of `phi` of a stack becomes the one of the stack of `a`.
+fn deactivate(recorded: &Recorded, n: usize, adjoint: &mut DMatrix<f64>) {
     let [slopes, curvatures, thirds] = &recorded.derivatives;
-    for (index, mut column) in pull.column_iter_mut().enumerate() {
+    for (index, mut column) in adjoint.column_iter_mut().enumerate() {
         let at = |matrix: &DMatrix<f64>, s: usize| matrix.as_slice()[n * index + s];
         let column = column.as_mut_slice();
         let (values, rates) = column.split_at_mut(n);
@@ -299,12 +299,12 @@ fn deactivate(recorded: &Recorded, n: usize, pull: &mut DMatrix<f64>) {
         let (da, dda) = rates_of_affine.split_at(n);
         let (first, second) = rates.split_at_mut(n);
         for s in 0..n {
-            let (pull_first, pull_second) = (first[s], second[s]);
+            let (adjoint_first, adjoint_second) = (first[s], second[s]);
             let (slope, curvature) = (at(slopes, s), at(curvatures, s));
-            values[s] += curvature * da[s] * pull_first
-                + (at(thirds, s) * da[s] * da[s] + curvature * dda[s]) * pull_second;
-            first[s] = slope * pull_first + 2.0 * curvature * da[s] * pull_second;
-            second[s] = slope * pull_second;
+            values[s] += curvature * da[s] * adjoint_first
+                + (at(thirds, s) * da[s] * da[s] + curvature * dda[s]) * adjoint_second;
+            first[s] = slope * adjoint_first + 2.0 * curvature * da[s] * adjoint_second;
+            second[s] = slope * adjoint_second;
         }
     }
 }
@@ -321,9 +321,9 @@ mod tests {
         let mut all = Vec::new();
         for phi in Activation::ALL {
             all.push(Network::random(&[5, 6, 4, 2], phi, &mut random));
-            let mut last_curved = Network::random(&[5, 4, 2], phi, &mut random);
-            last_curved.layers[1].activation = phi;
-            all.push(last_curved);
+            let mut last_nonlinear = Network::random(&[5, 4, 2], phi, &mut random);
+            last_nonlinear.layers[1].activation = phi;
+            all.push(last_nonlinear);
         }
         for network in &mut all {
             for layer in &mut network.layers {
@@ -389,7 +389,7 @@ mod tests {
             network.forward(stack.clone(), N, &mut tape);
             let jacobians = network.jacobian(&tape);
             let mut gradient = network.zeros_like();
-            let onto = network.pull_back_jacobian(&tape, &jacobians, &on_jacobian, &mut gradient);
+            let onto = network.jacobian_adjoint(&tape, &jacobians, &on_jacobian, &mut gradient);
             let entering = network.backward(&tape, on_values.clone(), &onto, &mut gradient);
             let h = 1e-6;
             for (block, exact) in gradient.blocks().enumerate() {
@@ -421,15 +421,15 @@ mod tests {
     fn values_alone_have_the_gradient_of_the_whole_stack() {
         let mut random = Random::new(6);
         for network in networks() {
-            let (x, pull) = (random.matrix(N, 5, 1.0), random.matrix(N, 2, 1.0));
+            let (x, adjoint) = (random.matrix(N, 5, 1.0), random.matrix(N, 2, 1.0));
             let mut tape = Tape::default();
             network.forward(x.clone(), N, &mut tape);
             let mut alone = network.zeros_like();
-            network.backward(&tape, pull.clone(), &[], &mut alone);
+            network.backward(&tape, adjoint.clone(), &[], &mut alone);
             let stack = x.insert_rows(N, 2 * N, 0.0);
             network.forward(stack, N, &mut tape);
             let mut whole = network.zeros_like();
-            network.backward(&tape, pull.insert_rows(N, 2 * N, 0.0), &[], &mut whole);
+            network.backward(&tape, adjoint.insert_rows(N, 2 * N, 0.0), &[], &mut whole);
             assert!(
                 alone
                     .blocks()
