@@ -779,7 +779,10 @@ fn statistics_of_an_unknown_or_repeated_phase_are_refused() {
         }
     );
     let text = fixture("robot-degree-2").to_string();
-    let (statistics, contact) = ("\"input_statistics\":{", "\"contact\":{\"mean\":[]},");
+    let (statistics, contact) = (
+        "\"input_statistics\":{",
+        "\"contact\":{\"mean\":[],\"covariance\":[]},",
+    );
     let doubled = text.replace(statistics, &format!("{statistics}{contact}"));
     assert_ne!(doubled, text);
     match artifact::read_from_bytes("f", doubled.as_bytes()).map_err(|error| error.kind) {

@@ -513,7 +513,10 @@ fn equations(system: &Equations<'_>, phase: usize) -> Result<Vec<String>, LowerE
             right = format!("a sum of {} terms", terms.len());
         }
         lines.push(format!("ddz{} = {right}", row + 1));
-        if let Some(units) = system.latent_units().filter(|_| terms.len() <= MOST_TERMS) {
+        if let Some(units) = system
+            .latent_units()
+            .filter(|_| (1..=MOST_TERMS).contains(&terms.len()))
+        {
             let of =
                 |term: &CandidateTerm| units.acceleration(row) / units.of_term(system, term.expr());
             let each = terms

@@ -55,6 +55,8 @@ impl ExactStep {
 
 /// Place of a term: the term as learned that it follows or is, then its number among new ones.
 type Place = (usize, usize);
+/// A changed equation: its phase, its row, its summands by place.
+type Changed = (usize, usize, Vec<(Place, f64)>);
 
 impl Equations<'_> {
     /// The equations in their shortest form; what is shortest already keeps its bits.
@@ -64,7 +66,7 @@ impl Equations<'_> {
         let mut pool = std::mem::take(&mut self.pool);
         let mut shortener = Shortener::new(&mut pool);
         let mut steps = Vec::new();
-        let mut changed: Vec<(usize, usize, Vec<(Place, f64)>)> = Vec::new();
+        let mut changed: Vec<Changed> = Vec::new();
         for (number, phase) in self.phases.iter().enumerate() {
             for (output, equation) in phase.ddz.iter().enumerate() {
                 let summands: Vec<(f64, ExprId)> = (equation.iter())
@@ -110,7 +112,7 @@ impl Equations<'_> {
     }
 
     /// Puts the new terms among the old and the changed equations in the place of theirs.
-    fn replace(&mut self, changed: Vec<(usize, usize, Vec<(Place, f64)>)>, new: NewTerms) {
+    fn replace(&mut self, changed: Vec<Changed>, new: NewTerms) {
         let old = self.terms.drain(..).enumerate();
         let mut all: Vec<(Place, CandidateTerm)> = (old)
             .map(|(index, term)| ((index, 0), term))
@@ -165,7 +167,11 @@ impl NewTerms {
     ) -> Option<Vec<(Place, f64, String)>> {
         if self.known.is_empty() {
             for (index, term) in old.iter().enumerate() {
-                self.known.entry(term.expr()).or_insert((index, 0));
+                let place = self.known.entry(term.expr()).or_insert((index, 0));
+                // Of several spellings the canonical one is printed.
+                if term.text() == pool.display(term.expr()).to_string() {
+                    *place = (index, 0);
+                }
             }
         }
         let texts: Vec<String> = (summands.iter())

@@ -183,7 +183,8 @@ fn changes_of_the_certificate_replayed_give_the_simplified_coefficients() {
         let model = random.model();
         let domain = random.domain(&model);
         let tolerance = Tolerance::Absolute(10f64.powf(random.between(-3.0, 0.0)));
-        let made = simplify(&Equations::of(&model), &domain, None, tolerance).expect("certified");
+        let made =
+            simplify(&Equations::as_learned(&model), &domain, None, tolerance).expect("certified");
         for (phase, certificate) in made.certificate.phases.iter().enumerate() {
             for equation in &certificate.equations {
                 let coefficients =
@@ -221,7 +222,7 @@ fn simplification_is_deterministic_and_zero_tolerance_changes_nothing() {
         let model = random.model();
         let domain = random.domain(&model);
         let run = |tolerance| {
-            simplify(&Equations::of(&model), &domain, None, tolerance).expect("certified")
+            simplify(&Equations::as_learned(&model), &domain, None, tolerance).expect("certified")
         };
         let tolerance = Tolerance::Absolute(0.05);
         assert_eq!(run(tolerance), run(tolerance));

@@ -178,7 +178,8 @@ impl Layout<'_> {
 
     fn unit_of_term(&self, row: usize) -> Option<Unit> {
         let units = self.system.latent_units()?;
-        Some(units.of_term(self.system, self.system.terms()[row].expr()))
+        let unit = units.of_term(self.system, self.system.terms()[row].expr());
+        Some(unit).filter(|unit| *unit != Unit::default())
     }
 }
 

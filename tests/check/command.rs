@@ -35,7 +35,7 @@ fn equal_files_exit_with_0_and_say_how_far_rounding_reaches() {
     assert_eq!(
         text(&output.stdout),
         "A: a.txt\nB: b.tex\n\nphase contact\n  ddz1: proven equal up to the printed digits \
-         (coefficients differ by at most 0.0006000)\n\nA and B say the same: 1 equations proven \
+         (coefficients differ by at most 6.000e-4)\n\nA and B say the same: 1 equations proven \
          equal, 1 of them up to the printed digits\n"
     );
     let output = check(folder.path(), &["a.txt", "b.tex", "--exact", "--json"]);

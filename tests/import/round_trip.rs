@@ -339,7 +339,7 @@ fn import_takes_scale_factors_from_tensors() {
 fn import_finds_tensors_named_exactly_as_a_part_whatever_the_phase_is_called() {
     let original = model("models/paper-2d.json");
     let mut options = options_of(&original);
-    for (rule, name) in options.phases.iter_mut().zip(["net", "exp"]) {
+    for (rule, name) in options.phases.iter_mut().zip(["net", "expo"]) {
         rule.name = name.to_owned();
     }
     let stored: Vec<Stored> = (original.phases().iter().zip(&options.phases))

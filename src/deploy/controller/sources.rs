@@ -16,10 +16,10 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 32] = sources![
+const SOURCES: [(&str, &str); 33] = sources![
     "mpc/online/command.rs",
+    "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
-    "mpc/online/nonlinear.rs",
     "mpc/online/dynamics.rs",
     "mpc/online/error.rs",
     "mpc/online/estimate.rs",
@@ -34,8 +34,8 @@ const SOURCES: [(&str, &str); 32] = sources![
     "mpc/online/lift.rs",
     "mpc/online/linearise.rs",
     "mpc/online/mod.rs",
+    "mpc/online/nonlinear.rs",
     "mpc/online/plan.rs",
-    "mpc/online/control_model.rs",
     "mpc/online/problem.rs",
     "mpc/online/prune.rs",
     "mpc/online/qp.rs",
@@ -44,6 +44,7 @@ const SOURCES: [(&str, &str); 32] = sources![
     "mpc/online/sparse.rs",
     "mpc/online/transcribe.rs",
     "robot/error.rs",
+    "robot/feet.rs",
     "robot/joints.rs",
     "robot/kinematics.rs",
     "robot/mod.rs",

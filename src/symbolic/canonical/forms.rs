@@ -16,7 +16,7 @@ const MAX_REMOVALS: usize = 40;
 /// Largest index of a root.
 pub(super) const MAX_ROOT: i64 = 1_000;
 
-/// Normal forms of the expressions of a pool; see the [module](self).
+/// Normal forms of the expressions of a pool; the documentation of this folder has the method.
 pub struct CanonicalForms<'p> {
     pub(super) pool: &'p ExprPool,
     pub(super) literal: &'p dyn Fn(SymbolId) -> Option<Literal>,
