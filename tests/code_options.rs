@@ -147,3 +147,107 @@ fn scaled_units_take_and_give_what_the_model_was_learned_with() {
         assert!((found - expected).abs() <= 1e-13 * (1.0 + expected.abs()));
     }
 }
+
+/// Robot accelerations of all phases at pseudo-random states and inputs in SI units, by generated C: encode,
+/// project, evaluate and decode.
+fn robot_accelerations(model: &ReducedModel, equations: &Equations<'_>) -> Vec<f64> {
+    let name = model.identifier().as_str();
+    let upper = name.to_uppercase();
+    let files = emit(equations, &[Target::C], &EmitOptions::default()).expect("emits");
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    write(folder.path(), &files);
+    let sources = [&format!("{name}.c"), &format!("{name}_selftest.c")];
+    run_c(folder.path(), &sources.map(String::as_str));
+    let phases: String = (0..model.phases().len())
+        .map(|phase| {
+            let phase = model.phase_identifier(phase).as_str();
+            format!(
+                "{name}_{phase}_dynamics(z, dz, u_lat, ddz);\n{name}_decode_velocity(ddz, ddx);\n\
+                 for (int i = 0; i < N; ++i) printf(\"%.17g\\n\", ddx[i]);\n"
+            )
+        })
+        .collect();
+    let main = format!(
+        "#include <stdint.h>\n#include <stdio.h>\n#include \"{name}.h\"\n\
+         enum {{ N = {upper}_STATE_DIM, D = {upper}_LATENT_DIM }};\n\
+         static uint32_t seed = 1;\n\
+         static double next(double scale) {{\n\
+         seed = seed * 1664525u + 1013904223u;\nreturn scale * ((double)seed / 2147483648.0 - 1.0);\n}}\n\
+         int main(void) {{\ndouble x[N], dx[N], u[N], z[D], dz[D], u_lat[D], ddz[D], ddx[N];\n\
+         for (int k = 0; k < 200; ++k) {{\n\
+         for (int i = 0; i < N; ++i) {{ x[i] = next(1.0); dx[i] = next(5.0); u[i] = next(30.0); }}\n\
+         {name}_encode(x, z);\n{name}_encode_velocity(dx, dz);\n{name}_project_input(u, u_lat);\n\
+         {phases}}}\nreturn 0;\n}}\n"
+    );
+    fs::write(folder.path().join("main.c"), main).expect("written");
+    let printed = run_c(folder.path(), &["main.c", &format!("{name}.c")]);
+    let numbers = printed.lines().map(|line| line.parse().expect("a number"));
+    numbers.collect()
+}
+
+#[test]
+fn physical_units_give_the_accelerations_of_scaled_ones_for_all_shipped_models() {
+    for path in ["go1-d2", "go1-d4", "go1-d6", "go2-async-d4"] {
+        let model = load(&format!("models/{path}.json"));
+        let scaled = Equations::of(&model);
+        let physical = scaled.in_physical_units().expect("has units");
+        let (scaled, physical) = (
+            robot_accelerations(&model, &scaled),
+            robot_accelerations(&model, &physical),
+        );
+        assert_eq!(scaled.len(), physical.len());
+        // A sample's accelerations share the rounding of the sum that all are decoded from.
+        for (scaled, physical) in scaled.chunks(18).zip(physical.chunks(18)) {
+            let largest = scaled.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            assert!(largest > 0.0 && largest.is_finite());
+            for (a, b) in scaled.iter().zip(physical) {
+                assert!((a - b).abs() <= 1e-12 * largest, "{path}: {a:e} and {b:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn physical_units_need_names_of_units_and_leave_latent_models_as_they_are() {
+    let model = load(WITH_SINES);
+    let physical = Equations::of(&model)
+        .in_physical_units()
+        .expect("nothing to convert");
+    assert!(physical.latent_units().is_none());
+    assert_eq!(physical.phases(), Equations::of(&model).phases());
+
+    let model = load(WITH_MAPS);
+    let mut state = model.state().expect("named").clone();
+    state.units[0] = "deg".to_owned();
+    let in_degrees = model.clone().into_builder().state(state).build();
+    let unknown = in_degrees.expect("a model").clone();
+    let equations = Equations::of(&unknown)
+        .in_physical_units()
+        .expect("without a ruling unit");
+    let units = equations.latent_units().expect("physical");
+    assert!(units.position.iter().all(|unit| unit.to_string() == "1"));
+}
+
+#[test]
+fn physical_latex_has_the_units_of_a_mass_and_of_times() {
+    let model = load(WITH_MAPS);
+    let physical = Equations::of(&model)
+        .in_physical_units()
+        .expect("has units");
+    let options = EmitOptions::default();
+    let files = emit(
+        &physical,
+        &[Target::Latex, Target::Markdown, Target::C],
+        &options,
+    )
+    .expect("emits");
+    let file = |name: &str| {
+        let file = files.iter().find(|file| file.path == name);
+        file.expect("emitted").contents.as_str()
+    };
+    assert!(file("go1_d4-table.tex").contains(r"\mathrm{m/s^{2}}"));
+    assert!(file("go1_d4-nomenclature.tex").contains(r"$\mathrm{N}$"));
+    assert!(file("go1_d4.md").contains(r"\mathrm{m/s^{2}}"));
+    assert!(file("go1_d4.h").contains("1/kg"));
+    assert!(!file("go1_d4.h").contains("scaled"));
+}
