@@ -6,22 +6,18 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::args::{
-    CodeArguments, CompileArguments, EquationArguments, FormChoice, PrecisionChoice, SinCosChoice,
-    UnitsChoice,
-};
-use super::output::{Table, check_output};
+use super::args::{CodeArguments, CompileArguments, EquationArguments};
+use super::output::check_output;
 use super::simplification;
-use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::{self, EmitOptions, Target};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
-use crate::typeset::latex::{Form, LatexOptions, NumberStyle};
+use crate::typeset::latex::{LatexOptions, NumberStyle};
 use crate::typeset::markdown::MarkdownOptions;
 use crate::typeset::mathml::MathmlOptions;
-use crate::typeset::{Rounding, SymbolTable};
+use crate::typeset::{Rounding, SymbolTable, Table};
 use crate::{Error, artifact};
 
 /// Compiles a model into a folder.
@@ -46,14 +42,16 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         &arguments.equations,
         unless_given,
     )?;
-    let told = match &simplified {
+    let certificate = match &simplified {
         None => None,
-        Some(outcome) => Some(outcome.told(rounding(&arguments.equations, unless_given))?),
+        Some(outcome) => {
+            Some(outcome.files_and_summary(rounding(&arguments.equations, unless_given))?)
+        }
     };
     if let Some(outcome) = &simplified {
         outcome.comment(&mut files);
     }
-    files.extend(told.iter().map(|(file, _, _)| file.clone()));
+    files.extend(certificate.iter().map(|(file, _, _)| file.clone()));
     if let Some(path) = save_model {
         artifact::check_place(path, model, overwrite)?;
     }
@@ -61,7 +59,8 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     if let Some(path) = save_model {
         artifact::write_with(path, model, overwrite)?;
     }
-    let (summary, certificate) = told.map_or((String::new(), Value::Null), |(_, s, c)| (s, c));
+    let (summary, certificate) =
+        certificate.map_or((String::new(), Value::Null), |(_, s, c)| (s, c));
     Ok(Answer {
         text: summary + &text(arguments, model, &written),
         json: json!({
@@ -77,16 +76,16 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     })
 }
 
-/// What was written, in words.
+/// The model and the written files as text.
 fn text(
     arguments: &CompileArguments,
     model: &ReducedModel,
     written: &[(PathBuf, usize)],
 ) -> String {
-    let mut table = Table::new(["file", "bytes"]);
-    for (path, bytes) in written {
-        table.row([path.display().to_string(), bytes.to_string()]);
-    }
+    let table = Table::of(written)
+        .column("file", "", |(path, _)| path.display().to_string())
+        .column("bytes", "", |(_, bytes)| *bytes)
+        .table();
     let mut text = format!(
         "model `{}`: {} latent coordinates, {}\n\n{table}",
         model.name(),
@@ -117,7 +116,7 @@ fn rounding(equations: &EquationArguments, unless_given: Rounding) -> Rounding {
 }
 
 /// The files of the targets, in memory, with the model's digest in their headers; `unless_given` is
-/// how coefficients are printed where the arguments do not tell.
+/// how coefficients are printed unless the arguments give it.
 ///
 /// # Errors
 /// [`Error::Emit`] if the model cannot be lowered or typeset, [`Error::Rename`] for a new name that
@@ -136,16 +135,16 @@ pub fn emit(
     let markdown = MarkdownOptions::default();
     let mathml = MathmlOptions::default();
     let options = EmitOptions {
-        precision: code.precision.into(),
-        units: code.units.into(),
-        sines: code.sincos.into(),
+        precision: code.precision,
+        units: code.units,
+        sines: code.sincos,
         latex: LatexOptions {
             rounding,
             numbers: match equations.siunitx {
                 true => NumberStyle::Siunitx,
                 false => NumberStyle::Plain,
             },
-            form: equations.form.map_or(Form::Automatic, Form::from),
+            form: equations.form.unwrap_or_default(),
             width_em: equations.width.unwrap_or(latex.width_em),
             symbols: symbols.clone(),
             digest: digest.clone(),
@@ -196,40 +195,4 @@ fn phases_in_words(model: &ReducedModel) -> String {
 
 fn file_json(path: &Path, bytes: usize) -> Value {
     json!({ "path": path.display().to_string(), "bytes": bytes })
-}
-
-impl From<PrecisionChoice> for Precision {
-    fn from(choice: PrecisionChoice) -> Self {
-        match choice {
-            PrecisionChoice::F64 => Self::Double,
-            PrecisionChoice::F32 => Self::Single,
-        }
-    }
-}
-
-impl From<UnitsChoice> for Units {
-    fn from(choice: UnitsChoice) -> Self {
-        match choice {
-            UnitsChoice::Si => Self::Si,
-            UnitsChoice::Scaled => Self::Scaled,
-        }
-    }
-}
-
-impl From<SinCosChoice> for SineCosine {
-    fn from(choice: SinCosChoice) -> Self {
-        match choice {
-            SinCosChoice::Inline => Self::Inline,
-            SinCosChoice::Library => Self::Library,
-        }
-    }
-}
-
-impl From<FormChoice> for Form {
-    fn from(choice: FormChoice) -> Self {
-        match choice {
-            FormChoice::Align => Self::Align,
-            FormChoice::Cases => Self::Cases,
-        }
-    }
 }

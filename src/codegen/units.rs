@@ -4,13 +4,14 @@ use crate::lower::LowerError;
 use crate::model::{ReducedModel, Scaling};
 
 /// Units of `x`, `dx` and `u` at the interface of generated code.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Units {
-    /// SI units; the model's scaling factors are folded into the maps.
+    // SI units; the model's scaling factors are folded into the maps.
+    /// rad, m, N m, N.
     #[default]
     Si,
-    /// Scaled values as the model was learned with: `s_x x`, `s_x dx`, `s_u u`; the maps are the
-    /// encoder's and the decoder's very weights.
+    // `s_x x`, `s_x dx`, `s_u u`; the maps are the encoder's and the decoder's very weights.
+    /// Scaled as the model was learned: the model file's factors times SI values.
     Scaled,
 }
 

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::command::OutputArguments;
 use super::number::{at_least_one, positive_seconds};
 use crate::import::{Format, ImportError, Mapping, PhaseRule, parse_standard};
 use crate::model::{Activation, StandardLibrary};
@@ -45,9 +44,9 @@ pub enum StoredWeights {
 /// How a file stores coefficients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum StoredXi {
-    /// A row a candidate term
+    /// One row per candidate term
     TermsByLatent,
-    /// A row a latent coordinate (PySINDy)
+    /// One row per latent coordinate (PySINDy)
     LatentByTerms,
 }
 
@@ -83,8 +82,8 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
     after_help = "Tensors are found by usual names (encoder.weight, encoder.0.bias, W_e, xi_contact, ...); --map\n\
                   names the others. Parts: encoder.weight, encoder.bias, decoder.weight, decoder.bias,\n\
                   xi.PHASE, mask.PHASE, input_mean.PHASE, input_covariance.PHASE, scaling.state,\n\
-                  scaling.input. Statistics are of u in SI units: 18 numbers and 18 x 18. What was taken\n\
-                  for what, and turned how, is printed.\n\n\
+                  scaling.input. Statistics are of u in SI units: 18 numbers and 18 x 18. The assignment\n\
+                  and every transposition are printed.\n\n\
                   Examples:\n  \
                   romc import net.safetensors --library degree=1,trigonometric,inputs --scaling 0.1 \\\n      \
                   --map xi.contact=Xi_c --map xi.flight=Xi_f --robot go1 --output my-model.json\n  \
@@ -92,25 +91,25 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
                   romc import paper.tex --symbols z1=x --symbols z2=theta --output paper.json"
 )]
 pub struct ImportArguments {
-    /// What to import: .safetensors, .npz, or equations as .txt, .tex or .md
+    /// File to import: .safetensors, .npz, or equations as .txt, .tex or .md
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// The model file to write
     #[arg(long, value_name = "MODEL.json")]
     pub output: PathBuf,
-    /// Kind of file, if its ending does not tell
+    /// Kind of file, if its extension does not identify it
     #[arg(long, value_enum)]
     pub format: Option<StoredFormat>,
     /// Take a tensor for a part of the model; can be repeated
     #[arg(long, value_name = "PART=TENSOR")]
     pub map: Vec<Mapping>,
-    /// How weights are stored, if their shape does not tell
+    /// How weights are stored, if their shape is ambiguous
     #[arg(long, value_enum)]
     pub weights: Option<StoredWeights>,
-    /// What is between the layers of an encoder or decoder that has several: elu, tanh, sigmoid
-    #[arg(long, value_name = "NAME")]
+    /// Activation between the layers of an encoder or decoder: elu, tanh, sigmoid
+    #[arg(long, value_name = "NAME", value_parser = str::parse::<Activation>)]
     pub activation: Option<Activation>,
-    /// How coefficients are stored, if their shape does not tell
+    /// How coefficients are stored, if their shape is ambiguous
     #[arg(long, value_enum)]
     pub xi_layout: Option<StoredXi>,
     /// Another name that LaTeX has for a variable, such as z1=x or u2=F_z; can be repeated
@@ -122,7 +121,7 @@ pub struct ImportArguments {
     /// Order of the sines and cosines of degree=N,trigonometric
     #[arg(long, value_enum, default_value = "author")]
     pub library_order: TermOrder,
-    /// Number of latent coordinates d, if shapes do not tell
+    /// Number of latent coordinates d, if the shapes do not determine it
     #[arg(long, value_name = "D", value_parser = at_least_one)]
     pub latent_dim: Option<usize>,
     /// When a phase holds: any, none, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be
@@ -146,8 +145,8 @@ pub struct ImportArguments {
     /// Sampling period of the training recordings
     #[arg(long, value_name = "SECONDS", value_parser = positive_seconds)]
     pub sample_time: Option<f64>,
-    /// Recordings whose inputs say what is usual in each phase: mean and covariance weigh the
-    /// controller's inputs. Needs --robot
+    /// Recordings that give the mean and covariance of the inputs in each phase, by which the
+    /// controller weighs inputs. Needs --robot
     #[arg(long, value_name = "RECORDING", num_args = 1.., requires = "robot")]
     pub inputs_from: Vec<PathBuf>,
     /// Name of the model; the output file's stem unless given
@@ -164,6 +163,4 @@ pub struct ImportArguments {
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
 }
