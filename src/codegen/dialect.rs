@@ -1,6 +1,6 @@
 //! What targets spell differently.
 
-use super::code::{Argument, ConstTable, Function, Index, Infix, MathFunction, Parameter};
+use super::code::{Argument, ConstTable, Function, Index, Infix, MathFunction, Parameter, Span};
 use super::literal::Literal;
 use super::printer::subscript;
 
@@ -23,6 +23,18 @@ pub trait LaneDialect {
 
     /// The total of all lanes.
     fn total(&self, sums: &str) -> String;
+}
+
+/// Spelling of sparse products: four neighbours of an array side by side.
+pub trait FourDialect {
+    /// Four sums from `at` on become the row of a table.
+    fn start(&self, sums: &str, at: usize, row: &str) -> String;
+
+    /// The row of a table times a weight is added to four sums from `at` on.
+    fn add(&self, sums: &str, at: usize, row: &str, weight: &str) -> String;
+
+    /// Lines before and after a part of the terms that is compiled by itself.
+    fn part(&self, sums: (&str, usize), weights: &Span) -> Option<[Vec<String>; 2]>;
 }
 
 /// Spelling of a target language. The printer owns precedence and parentheses, the
@@ -74,6 +86,11 @@ pub trait Dialect {
     /// How lanes run side by side, in a language in which they do; in others loops take column
     /// after column.
     fn lanes(&self) -> Option<&dyn LaneDialect> {
+        None
+    }
+
+    /// How four sums run side by side; in other languages loops take one after the other.
+    fn fours(&self) -> Option<&dyn FourDialect> {
         None
     }
 

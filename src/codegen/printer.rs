@@ -2,6 +2,8 @@
 
 use super::code::{Argument, ConstTable, Expr, Function, Index, Infix, Stmt};
 use super::dialect::{Dialect, LaneDialect};
+use super::fours::Fours;
+use crate::ir::QUAD;
 
 /// Longest line before an expression is broken, in characters.
 const WIDTH: usize = 100;
@@ -140,6 +142,7 @@ impl<'a> Printer<'a> {
                     Some(_) => self.block(&row.in_lanes(), depth, text),
                     None => self.block(&row.in_columns(), depth, text),
                 },
+                Stmt::Fours(fours) => self.fours(fours, depth, text),
                 Stmt::DeclareLanes(sums) => {
                     let declare = self.lane_dialect().declare(&sums.to_string());
                     self.line(&declare, depth, text);
@@ -162,6 +165,38 @@ impl<'a> Printer<'a> {
                     let call = self.dialect.call(Some(&callee.to_string()), arguments);
                     self.line(&call, depth, text);
                 }
+            }
+        }
+    }
+
+    fn fours(&self, fours: &Fours, depth: usize, text: &mut String) {
+        let starts = || (0..).step_by(QUAD).zip(&fours.starts);
+        let Some(dialect) = self.dialect.fours() else {
+            let starts = starts().map(|(at, &row)| fours.start_in_loop(at, row));
+            let terms = fours.parts.iter().flatten();
+            let terms = terms.map(|&four| fours.term_in_loop(four));
+            return self.block(&starts.chain(terms).collect::<Vec<_>>(), depth, text);
+        };
+        let sums = fours.sums.0.to_string();
+        let row = |row: usize| format!("{}[{row}]", fours.table);
+        for (at, &start) in starts() {
+            self.line(&dialect.start(&sums, at, &row(start)), depth, text);
+        }
+        for part in &fours.parts {
+            let [head, tail] = dialect
+                .part((&sums, fours.sums.1), &fours.weights)
+                .unwrap_or_default();
+            let inside = depth + head.len().min(2);
+            for (k, line) in head.iter().enumerate() {
+                self.line(line, depth + k.min(1), text);
+            }
+            for four in part {
+                let weight = self.expression(&fours.weight(four.weight));
+                let line = dialect.add(&sums, four.at, &row(four.entry), &weight);
+                self.line(&line, inside, text);
+            }
+            for (k, line) in tail.iter().enumerate() {
+                self.line(line, depth + usize::from(k + 1 < tail.len()), text);
             }
         }
     }

@@ -72,6 +72,7 @@ pub fn translate_lanes(program: &Program, names: Names, lane: Ident) -> Option<V
                 Unary::Sign | Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log => false,
             },
             Statement::Accumulate { .. }
+            | Statement::SparseProduct { .. }
             | Statement::Constants { .. }
             | Statement::Separable { .. }
             | Statement::Call { .. } => false,
@@ -155,6 +156,9 @@ impl Translator<'_> {
             }
             Statement::SinCos { arguments } => self.sin_cos(first, arguments),
             Statement::Accumulate { table, sections } => self.accumulate(first, *table, sections),
+            Statement::SparseProduct { table, weights } => {
+                self.sparse_product(first, *table, weights);
+            }
             Statement::Constants { table } => self.constants(first, *table),
             Statement::Separable {
                 start,

@@ -1,6 +1,7 @@
 //! Array statements as loops.
 
 use super::code::{Argument, Expr, Index, Infix, Span, Stmt};
+use super::fours::Fours;
 use super::ident::Ident;
 use super::lanes::{Row, Run};
 use super::translate::Translator;
@@ -93,6 +94,22 @@ impl Translator<'_> {
             }
             row += w.len;
         }
+    }
+
+    /// Four columns at a time, in a local array of their own.
+    pub(super) fn sparse_product(&mut self, first: usize, table: TableId, weights: &[ValueId]) {
+        let table = &self.program.tables()[table.index()];
+        let (distinct, starts, parts) = Fours::terms(table);
+        let weights = self.whole_span(weights);
+        let sums = self.local_home(first, table.cols(), "y");
+        self.body.push(Stmt::Fours(Box::new(Fours {
+            sums: (sums.array, table.cols()),
+            weights,
+            table: self.names.tables.name_in_lanes(&distinct),
+            starts,
+            parts,
+            lane: self.names.locals.mint("l"),
+        })));
     }
 
     /// A constant table, copied to where its entries belong.

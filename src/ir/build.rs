@@ -110,6 +110,16 @@ impl ProgramBuilder {
         self.push_array(statement, cols)
     }
 
+    /// Matrix-vector accumulation with few nonzeros, see [`Statement::SparseProduct`].
+    pub fn sparse_product(&mut self, table: TableId, weights: &[ValueId]) -> Vec<ValueId> {
+        let cols = self.program.tables[table.index()].cols;
+        let statement = Statement::SparseProduct {
+            table,
+            weights: weights.to_vec(),
+        };
+        self.push_array(statement, cols)
+    }
+
     /// All entries of a constant table, row-major.
     pub fn constants(&mut self, table: TableId) -> Vec<ValueId> {
         let n = self.program.tables[table.index()].entries.len();

@@ -2,7 +2,7 @@
 //! control run.
 
 use super::program::{
-    Binary, Group, LANES, Program, Slopes, Slot, Statement, Table, Unary, ValueId,
+    Binary, Group, LANES, Program, QUAD, Slopes, Slot, Statement, Table, Unary, ValueId,
 };
 use super::real::Real;
 
@@ -54,9 +54,19 @@ enum Step<T> {
     Square(usize, usize),
     SinCos(Box<[usize]>, usize),
     Accumulate(usize, Box<[Box<[usize]>]>, usize),
+    SparseProduct(usize, Box<[QuadStep]>, usize),
     Constants(usize, usize),
     Separable(Box<SeparableStep<T>>, usize),
     Call(usize, Box<[usize]>, usize),
+}
+
+/// Neighbouring columns of a table's row times a weight.
+#[derive(Clone, Copy, Debug)]
+struct QuadStep {
+    row: usize,
+    col: usize,
+    /// Position in the values.
+    weight: usize,
 }
 
 /// Sums of functions of one variable each; positions in the values.
@@ -123,6 +133,16 @@ impl<T: Real> Interpreter<T> {
                 Statement::Accumulate { table, sections } => {
                     let sections = sections.iter().map(|section| positions(section)).collect();
                     steps.push(Step::Accumulate(table.index(), sections, first));
+                }
+                Statement::SparseProduct { table, weights } => {
+                    let entries = &program.tables()[table.index()];
+                    let of_row = |(row, weight): (usize, &ValueId)| {
+                        let weight = weight.index();
+                        let step = move |col| QuadStep { row, col, weight };
+                        entries.quads(row).map(step)
+                    };
+                    let quads = (1..).zip(weights).flat_map(of_row).collect();
+                    steps.push(Step::SparseProduct(table.index(), quads, first));
                 }
                 Statement::Constants { table } => {
                     steps.push(Step::Constants(table.index(), first));
@@ -202,6 +222,17 @@ impl<T: Real> Interpreter<T> {
                 }
                 Step::Accumulate(table, sections, first) => {
                     accumulate(&self.tables[*table], sections, *first, values);
+                }
+                Step::SparseProduct(table, quads, first) => {
+                    let table = &self.tables[*table];
+                    values[*first..*first + table.cols].copy_from_slice(table.row(0));
+                    for &QuadStep { row, col, weight } in &**quads {
+                        let weight = values[weight];
+                        let y = &mut values[*first + col..*first + col + QUAD];
+                        for (y, t) in y.iter_mut().zip(&table.row(row)[col..]) {
+                            *y = *y + *t * weight;
+                        }
+                    }
                 }
                 Step::Constants(table, first) => {
                     let entries = &self.tables[*table].entries;

@@ -6,6 +6,9 @@ use std::ops::Range;
 /// registers hold.
 pub const LANES: usize = 8;
 
+/// Neighbouring columns that [`Statement::SparseProduct`] adds side by side.
+pub const QUAD: usize = 4;
+
 /// A named, contiguous array of scalars that enters or leaves a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Slot {
@@ -72,6 +75,13 @@ impl Table {
     /// One row, `cols` entries.
     pub fn row(&self, row: usize) -> &[f64] {
         &self.entries[row * self.cols..(row + 1) * self.cols]
+    }
+
+    /// First columns of the groups of [`QUAD`] entries of a row that are not all zeros.
+    pub fn quads(&self, row: usize) -> impl Iterator<Item = usize> + '_ {
+        let groups = self.row(row).chunks(QUAD).enumerate();
+        let filled = groups.filter(|(_, group)| group.iter().any(|&entry| entry != 0.0));
+        filled.map(|(group, _)| QUAD * group)
     }
 
     /// All entries, row-major.
@@ -181,6 +191,16 @@ pub enum Statement {
         /// One weight a row after the first, in sections.
         sections: Vec<Vec<ValueId>>,
     },
+    /// Matrix-vector accumulation `y_j = t_0j + sum_i t_(i+1)j w_i` with a table that is mostly zeros.
+    ///
+    /// Association: one row after the other, `y_j += t_ij w_i` for the groups of [`QUAD`] neighbouring
+    /// columns of the row that are not all zeros. Defines `cols` values.
+    SparseProduct {
+        /// Table with one row more than there are weights and a multiple of [`QUAD`] columns.
+        table: TableId,
+        /// One weight per row after the first.
+        weights: Vec<ValueId>,
+    },
     /// The entries of a constant table, row-major: defines `rows x cols` values.
     Constants {
         /// The table.
@@ -226,6 +246,7 @@ impl Statement {
             Self::Binary(_, a, b) => vec![*a, *b],
             Self::SinCos { arguments } | Self::Call { arguments, .. } => arguments.clone(),
             Self::Accumulate { sections, .. } => sections.concat(),
+            Self::SparseProduct { weights, .. } => weights.clone(),
             Self::Separable {
                 start,
                 base,
@@ -256,6 +277,7 @@ impl Statement {
             | Self::Binary(..)
             | Self::SinCos { .. }
             | Self::Accumulate { .. }
+            | Self::SparseProduct { .. }
             | Self::Constants { .. }
             | Self::Call { .. } => Vec::new(),
         }
@@ -378,6 +400,7 @@ impl Program {
             | Statement::Input { .. }
             | Statement::Binary(..)
             | Statement::Accumulate { .. }
+            | Statement::SparseProduct { .. }
             | Statement::Constants { .. }
             | Statement::Separable { .. }
             | Statement::Call { .. } => false,

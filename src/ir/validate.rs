@@ -1,6 +1,6 @@
 //! What every program promises, checked once when it is built.
 
-use super::program::{LANES, Program, Slopes, Statement, TableId, ValueId};
+use super::program::{LANES, Program, QUAD, Slopes, Statement, TableId, ValueId};
 
 /// Why a program is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -176,6 +176,11 @@ fn check_shape(program: &Program, position: usize, statement: &Statement) -> Res
             finite(&table(id).entries)?;
             let n_weights: usize = sections.iter().map(Vec::len).sum();
             count(n_weights + 1, table(id).rows)
+        }
+        Statement::SparseProduct { table: id, weights } => {
+            finite(&table(id).entries)?;
+            count(weights.len() + 1, table(id).rows)?;
+            count(table(id).cols, table(id).cols.next_multiple_of(QUAD))
         }
         Statement::Constants { table: id } => finite(&table(id).entries),
         Statement::Separable {

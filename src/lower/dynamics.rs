@@ -7,9 +7,10 @@ use super::cost::LowerOptions;
 use super::dense::{self, DenseJacobian};
 use super::error::LowerError;
 use super::expression::ExpressionLowering;
+use super::gradient::Gradient;
 use super::nested::{Demand, Nested, Shared};
 use crate::equations::Equations;
-use crate::ir::{Program, ProgramBuilder, ValueId};
+use crate::ir::{Binary, Program, ProgramBuilder, ValueId};
 use crate::model::LatentVariable;
 use crate::symbolic::{ExprId, ExprPool, SymbolId};
 
@@ -93,7 +94,10 @@ pub fn dynamics_jacobian(
             }
         }
     }
-    let (mut builder, ddz, jacobian) = if options.uses_tables(&equations) {
+    let gradient = Gradient::new(options, &pool, &equations, &columns(system));
+    let (mut builder, ddz, jacobian) = if let Some(gradient) = gradient {
+        polynomial_jacobian(system, &mut pool, &gradient, &pattern)
+    } else if options.uses_tables(&equations) {
         dense_jacobian(system, &mut pool, &equations, &pattern)
     } else {
         let sums = nested_jacobian(system, &mut pool, &equations, entries, &pattern);
@@ -136,6 +140,46 @@ fn nested_jacobian(
     sums
 }
 
+/// Accelerations and the entries of the pattern, polynomials by sparse products, the rest nested.
+fn polynomial_jacobian(
+    system: &Equations<'_>,
+    pool: &mut ExprPool,
+    gradient: &Gradient,
+    pattern: &JacobianPattern,
+) -> (ProgramBuilder, Vec<ValueId>, Vec<ValueId>) {
+    let columns = columns(system);
+    let places = || pattern.rows.iter().zip(&pattern.cols);
+    let derivative =
+        |(&row, &col): (&usize, &usize)| gradient.rest[row].derivative(pool, columns[col]);
+    let entries: Vec<Combination> = places().map(derivative).collect();
+    let rest = gradient.rest.iter().chain(&entries);
+    let is_zero: Vec<bool> = rest.map(Combination::is_zero).collect();
+    let sums = nested_jacobian(system, pool, &gradient.rest, entries, pattern);
+    let weights = gradient.expressions(pool);
+    let mut lowering = start(system, pool, "dynamics_jacobian");
+    let rest = values(&mut lowering, &sums);
+    let (polynomials, slopes) = gradient.lower(&mut lowering, &weights);
+    let slopes = places().map(|(&row, &col)| slopes.get(&(row, columns[col])).copied());
+    let parts = polynomials.into_iter().chain(slopes).zip(rest).zip(is_zero);
+    let builder = &mut lowering.builder;
+    let mut ddz: Vec<ValueId> = parts
+        .map(|((part, rest), is_zero)| match part {
+            Some(part) if is_zero => part,
+            Some(part) => builder.binary(Binary::Add, part, rest),
+            None => rest,
+        })
+        .collect();
+    let jacobian = ddz.split_off(gradient.rest.len());
+    (lowering.builder, ddz, jacobian)
+}
+
+/// The variables in the order of the Jacobian's columns.
+fn columns(system: &Equations<'_>) -> Vec<SymbolId> {
+    LatentVariable::all(system.latent_dim())
+        .map(|variable| system.symbol(variable))
+        .collect()
+}
+
 /// Accelerations and the entries of the pattern by tables.
 fn dense_jacobian(
     system: &Equations<'_>,
@@ -143,9 +187,7 @@ fn dense_jacobian(
     equations: &[Combination],
     pattern: &JacobianPattern,
 ) -> (ProgramBuilder, Vec<ValueId>, Vec<ValueId>) {
-    let columns: Vec<SymbolId> = LatentVariable::all(system.latent_dim())
-        .map(|variable| system.symbol(variable))
-        .collect();
+    let columns = columns(system);
     let dense = DenseJacobian::new(pool, equations, &columns);
     let mut lowering = start(system, pool, "dynamics_jacobian");
     let mut roots = expressions(equations);

@@ -1,7 +1,7 @@
 //! How C99 spells statements.
 
 use crate::codegen::code::{Argument, ConstTable, Function, MathFunction, Parameter, Role, Span};
-use crate::codegen::dialect::{Dialect, LaneDialect};
+use crate::codegen::dialect::{Dialect, FourDialect, LaneDialect};
 use crate::codegen::line_wrapping::{braced, comment_lines};
 use crate::codegen::literal::Literal;
 use crate::codegen::precision::Precision;
@@ -220,6 +220,10 @@ impl Dialect for CDialect {
         Some(self)
     }
 
+    fn fours(&self) -> Option<&dyn FourDialect> {
+        Some(self)
+    }
+
     fn table_base(&self, prefix: &str) -> String {
         format!("{prefix}table")
     }
@@ -266,6 +270,20 @@ impl Dialect for CDialect {
     fn docs(&self, _lines: &[String]) -> String {
         // The header has the documentation.
         String::new()
+    }
+}
+
+impl FourDialect for CDialect {
+    fn start(&self, sums: &str, at: usize, row: &str) -> String {
+        format!("{}_START_FOUR({sums}[{at}], {row});", self.upper())
+    }
+
+    fn add(&self, sums: &str, at: usize, row: &str, weight: &str) -> String {
+        format!("{}_ADD_FOUR({sums}[{at}], {row}, {weight});", self.upper())
+    }
+
+    fn part(&self, _sums: (&str, usize), _weights: &Span) -> Option<[Vec<String>; 2]> {
+        None
     }
 }
 

@@ -1,7 +1,7 @@
 //! How Rust spells statements.
 
 use crate::codegen::code::{Argument, ConstTable, Function, MathFunction, Parameter, Role, Span};
-use crate::codegen::dialect::Dialect;
+use crate::codegen::dialect::{Dialect, FourDialect};
 use crate::codegen::line_wrapping::{braced, comment_lines};
 use crate::codegen::literal::Literal;
 use crate::codegen::precision::Precision;
@@ -162,6 +162,10 @@ impl Dialect for RustDialect {
         ]
     }
 
+    fn fours(&self) -> Option<&dyn FourDialect> {
+        Some(self)
+    }
+
     fn table_base(&self, _prefix: &str) -> String {
         "TABLE".to_owned()
     }
@@ -206,6 +210,31 @@ impl Dialect for RustDialect {
 
     fn docs(&self, lines: &[String]) -> String {
         documentation(lines)
+    }
+}
+
+impl FourDialect for RustDialect {
+    fn start(&self, sums: &str, at: usize, row: &str) -> String {
+        format!("start_four(&mut {sums}, {at}, &{row});")
+    }
+
+    fn add(&self, sums: &str, at: usize, row: &str, weight: &str) -> String {
+        format!("add_four({sums}, {at}, &{row}, {weight});")
+    }
+
+    fn part(&self, (sums, n_sums): (&str, usize), weights: &Span) -> Option<[Vec<String>; 2]> {
+        let (real, array, n_weights) = (self.real(), &weights.array, weights.of);
+        let by = if weights.is_parameter { "" } else { "&" };
+        let head =
+            format!("fn part({sums}: &mut [{real}; {n_sums}], {array}: &[{real}; {n_weights}]) {{");
+        Some([
+            vec!["{".to_owned(), "#[inline(never)]".to_owned(), head],
+            vec![
+                "}".to_owned(),
+                format!("part(&mut {sums}, {by}{array});"),
+                "}".to_owned(),
+            ],
+        ])
     }
 }
 
