@@ -39,7 +39,7 @@ impl Place {
 /// #[error("found `x`, expected a number")]
 /// struct NoNumber;
 ///
-/// let error = Located::new("jump.csv", Place::Cell(3, "Time".into()), NoNumber);
+/// let error: Located<NoNumber> = Located::new("jump.csv", Place::Cell(3, "Time".into()), NoNumber);
 /// assert_eq!(error.to_string(), "jump.csv: row 3, column `Time`: found `x`, expected a number");
 /// ```
 #[derive(Debug)]
