@@ -20,6 +20,7 @@
 //! # Ok::<(), romc::robot::RobotError>(())
 //! ```
 
+pub mod actuators;
 pub mod feet;
 pub mod joints;
 pub mod kinematics;
@@ -28,6 +29,7 @@ pub mod wrench;
 
 mod error;
 
+pub use actuators::Actuators;
 pub use error::RobotError;
 pub use feet::FeetRule;
 pub use joints::{
