@@ -385,19 +385,11 @@ proptest! {
     fn rewritings_preserve_value(tree in tree(), point in point()) {
         let mut pool = ExprPool::new();
         let expr = tree.build(&mut pool);
-        let symbols = [pool.symbol_id("x"), pool.symbol_id("y")];
-        let collected = pool.collect(expr, &symbols);
-        same_value(&pool, expr, collected, &point)?;
         for rewrite in [
-            ExprPool::expand,
-            ExprPool::horner,
-            ExprPool::factor_common,
-            ExprPool::together,
             ExprPool::expand_angles,
             ExprPool::combine_angles,
             ExprPool::sines_to_cosines,
             ExprPool::cosines_to_sines,
-            ExprPool::amplitude_phase,
         ] {
             let result = rewrite(&mut pool, expr);
             same_value(&pool, expr, result, &point)?;

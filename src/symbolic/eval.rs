@@ -1,7 +1,5 @@
 //! Numeric values.
 
-use std::collections::HashMap;
-
 use super::node::{ExprId, Node, SymbolId};
 use super::number::Number;
 use super::pool::ExprPool;
@@ -39,30 +37,6 @@ impl ExprPool {
             }
             Node::Apply(function, argument) => function.evaluate(child(*argument)),
         })
-    }
-
-    /// `expr` with parts that have no symbol replaced by their values as floats: `sin(2)*x`
-    /// becomes `0.9092974268256817*x`. Parts without a finite value stay.
-    ///
-    /// The mathematical library of the machine decides about last digits; constructors leave such
-    /// constants symbolic for that reason.
-    pub fn fold_constants(&mut self, expr: ExprId) -> ExprId {
-        let mut folded = HashMap::new();
-        for node in self.reachable(&[expr]) {
-            let rebuilt = self.rebuild(node, |child| folded[&child]);
-            let is_call = matches!(self.node(rebuilt), Node::Apply(..) | Node::Power(..));
-            let value = if is_call && self.is_constant(rebuilt) {
-                Number::from_f64(self.evaluate(rebuilt, &|_| f64::NAN))
-            } else {
-                None
-            };
-            let result = match value {
-                Some(number) => self.constant(number),
-                None => rebuilt,
-            };
-            folded.insert(node, result);
-        }
-        folded[&expr]
     }
 
     /// Computes something for every expression that `roots` are made of, operands first, and
@@ -131,23 +105,6 @@ mod tests {
         assert_eq!(at_two("1/0"), f64::INFINITY);
         assert!(at_two("sqrt(1 - x)").is_nan());
         assert_eq!(at_two("log(0)"), f64::NEG_INFINITY);
-    }
-
-    #[test]
-    fn fold_constants_leaves_symbols_and_undefined_parts() {
-        let folded = |text: &str| {
-            let mut pool = ExprPool::new();
-            let expr = pool.parse(text, &|_| true).expect("test text parses");
-            let folded = pool.fold_constants(expr);
-            pool.display(folded).to_string()
-        };
-        assert_eq!(
-            folded("sin(x) + 3*sqrt(2)"),
-            format!("{:?} + sin(x)", 3.0 * 2f64.sqrt())
-        );
-        assert_eq!(folded("exp(tan(1))*x"), format!("{:?}*x", 1f64.tan().exp()));
-        assert_eq!(folded("log(0) + sqrt(-1)*x"), "log(0) + sqrt(-1)*x");
-        assert_eq!(folded("x/3"), "1/3*x");
     }
 
     #[test]

@@ -1,62 +1,24 @@
 //! Multiplying out, within a budget.
 
-use std::collections::HashMap;
-
-use super::intern::BuildIdHasher;
 use super::node::{ExprId, Node};
 use super::number::Number;
 use super::pool::ExprPool;
 
-/// How much work an expansion may do. What would exceed it stays a product or power.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ExpandLimits {
-    /// Most terms of one expanded sum.
-    pub terms: usize,
-    /// Most products of two terms in one call.
-    pub products: usize,
-}
-
-impl Default for ExpandLimits {
-    fn default() -> ExpandLimits {
-        ExpandLimits {
-            terms: 10_000,
-            products: 1_000_000,
-        }
-    }
-}
+/// Most terms of one expanded sum; what would have more stays a product or power.
+pub(super) const MAX_TERMS: usize = 2_000;
+/// Most products of two terms in the rewriting of one expression.
+pub(super) const MAX_PRODUCTS: usize = 100_000;
 
 /// A sum taken apart: `coefficient * rest` each.
 pub(super) type Terms = Vec<(Number, ExprId)>;
 
 impl ExprPool {
-    /// `expr` with products and integer powers of sums multiplied out, also inside functions.
-    ///
-    /// Never fails: parts whose expansion exceeds the default [`ExpandLimits`] are left as they
-    /// are. The order of work is that of the pool, so the result is the same on every run.
-    pub fn expand(&mut self, expr: ExprId) -> ExprId {
-        self.expand_within(expr, ExpandLimits::default())
-    }
-
-    /// As [`expand`](ExprPool::expand), within given limits.
-    pub fn expand_within(&mut self, expr: ExprId, limits: ExpandLimits) -> ExprId {
-        let mut budget = limits.products;
-        self.expand_spending(expr, limits.terms, &mut budget)
-    }
-
-    /// Expands, taking products from a budget that several calls share.
-    pub(super) fn expand_spending(
-        &mut self,
-        expr: ExprId,
-        max_terms: usize,
-        budget: &mut usize,
-    ) -> ExprId {
-        let mut expanded: HashMap<ExprId, ExprId, BuildIdHasher> = HashMap::default();
-        for node in self.reachable(&[expr]) {
-            let rebuilt = self.rebuild(node, |child| expanded[&child]);
-            let result = self.expand_node(rebuilt, max_terms, budget);
-            expanded.insert(node, result);
-        }
-        expanded[&expr]
+    /// A region (see `region.rs`) with products and integer powers of sums multiplied out, as far
+    /// as the budget of products goes.
+    pub(super) fn expand_region(&mut self, region: ExprId, budget: &mut usize) -> ExprId {
+        self.rewrite_region(region, |pool, node| {
+            pool.expand_node(node, MAX_TERMS, budget)
+        })
     }
 
     /// Multiplies out one product or power whose operands are expanded.
@@ -145,7 +107,7 @@ mod tests {
     fn expanded(text: &str) -> String {
         let mut pool = ExprPool::new();
         let expr = pool.parse(text, &|_| true).expect("test text parses");
-        let expanded = pool.expand(expr);
+        let expanded = pool.expand_region(expr, &mut MAX_PRODUCTS.clone());
         pool.display(expanded).to_string()
     }
 
@@ -156,7 +118,6 @@ mod tests {
         assert_eq!(expanded("0.5*(x + y)"), "0.5*x + 0.5*y");
         assert_eq!(expanded("x*(y + 1/x)"), "1 + x*y");
         assert_eq!(expanded("(sqrt(x) + 1)*(sqrt(x) - 1)"), "-1 + x");
-        assert_eq!(expanded("sin((x + 1)^2 - x^2)"), "sin(1 + 2*x)");
         assert_eq!(
             expanded("((x + 1)^2 + 1)^2"),
             "4 + 8*x + 8*x^2 + 4*x^3 + x^4"
@@ -180,11 +141,7 @@ mod tests {
         let expr = pool
             .parse("(x + y)^2 + (x + y)^3", &|_| true)
             .expect("parses");
-        let limits = ExpandLimits {
-            terms: 3,
-            products: 100,
-        };
-        let expanded = pool.expand_within(expr, limits);
+        let expanded = pool.rewrite_region(expr, |pool, node| pool.expand_node(node, 3, &mut 100));
         assert_eq!(
             pool.display(expanded).to_string(),
             "x^2 + 2*x*y + y^2 + (x + y)^3"

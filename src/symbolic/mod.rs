@@ -11,8 +11,8 @@
 //! | `build`, `power` | canonical constructors |
 //! | `lexer`, `parse`, `display` | the grammar of candidate terms, both ways |
 //! | `eval`, `interval`, `rounding`, `interval_eval`, `bounds` | values, and bounds over boxes |
-//! | `diff`, `jacobian`, `substitute` | derivatives and substitution |
-//! | `expand`, `collect`, `horner`, `poly`, `rational`, `trig`, `rules` | rewriting, each way when asked |
+//! | `diff`, `substitute` | derivatives and substitution |
+//! | `expand`, `rational`, `trig`, `rules` | rewriting, each way when asked |
 //! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
 //!
@@ -38,23 +38,19 @@
 mod bounds;
 mod build;
 mod canonical;
-mod collect;
 mod cost;
 mod diff;
 mod display;
 mod eval;
 mod expand;
-mod horner;
 mod intern;
 mod interval;
 mod interval_eval;
-mod jacobian;
 mod lexer;
 mod node;
 mod number;
 mod order;
 mod parse;
-mod poly;
 mod pool;
 mod power;
 mod rational;
@@ -68,13 +64,9 @@ mod trig;
 
 pub use canonical::{CanonicalForm, CanonicalForms, Coefficient, Literal, Rational};
 pub use display::Display;
-pub use expand::ExpandLimits;
 pub use interval::Interval;
-pub use jacobian::MatrixEntry;
 pub use node::{ExprId, Function, Node, Parity, SymbolId};
 pub use number::Number;
 pub use parse::{ParseError, ParseErrorKind, ParseLimits};
-pub use poly::Polynomial;
 pub use pool::ExprPool;
 pub use shorten::{Shortened, Shortener};
-pub use simplify::SimplifyLimits;

@@ -130,11 +130,6 @@ impl ExprPool {
         &self.symbols[symbol.index()].name
     }
 
-    /// The number of variables.
-    pub fn symbol_count(&self) -> usize {
-        self.symbols.len()
-    }
-
     pub(super) fn symbol_key(&self, symbol: SymbolId) -> &SymbolKey {
         &self.symbols[symbol.index()].key
     }

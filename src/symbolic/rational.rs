@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::expand::Terms;
+use super::expand::{MAX_TERMS, Terms};
 use super::node::{ExprId, Node};
 use super::number::Number;
+use super::order::Exponent;
 use super::pool::ExprPool;
 
 /// Most steps of one polynomial division.
@@ -21,18 +22,8 @@ impl ExprPool {
     /// `x/(x + y) + y/(x + y)` becomes `1`, `(x^2 - 1)/(x - 1)` becomes `1 + x`.
     ///
     /// Nothing changes unless a sum or a function occurs in a denominator, or if there are too
-    /// many different ones.
-    pub fn together(&mut self, expr: ExprId) -> ExprId {
-        self.together_spending(expr, 10_000, &mut 100_000)
-    }
-
-    /// As [`together`](ExprPool::together), with limits as in expansions.
-    pub(super) fn together_spending(
-        &mut self,
-        expr: ExprId,
-        max_terms: usize,
-        budget: &mut usize,
-    ) -> ExprId {
+    /// many different ones. Numerators that would exceed `budget` products stay products.
+    pub(super) fn together(&mut self, expr: ExprId, budget: &mut usize) -> ExprId {
         let terms = self.terms_of(expr);
         let mut denominators: Vec<(ExprId, Number)> = Vec::new();
         for (_, rest) in &terms {
@@ -58,7 +49,7 @@ impl ExprPool {
             factors.push(rest);
             let numerator = self.product(&factors);
             let numerator = self.scale(coefficient, numerator);
-            numerators.push(self.expand_node(numerator, max_terms, budget));
+            numerators.push(self.expand_node(numerator, MAX_TERMS, budget));
         }
         let numerator = self.sum(&numerators);
         self.cancel(numerator, &denominators)
@@ -70,6 +61,20 @@ impl ExprPool {
             .into_iter()
             .filter(|(_, exponent)| exponent.is_negative() && exponent.as_integer().is_some())
             .map(|(base, exponent)| (base, -exponent))
+            .collect()
+    }
+
+    /// The factors of a term as powers with constant exponents.
+    fn numeric_powers(&self, rest: ExprId) -> Vec<(ExprId, Number)> {
+        self.factors_of(rest)
+            .iter()
+            .filter_map(|factor| match self.base_and_exponent(*factor) {
+                (base, Exponent::Number(number)) if self.as_number(base).is_none() => {
+                    Some((base, number))
+                }
+                (_, Exponent::Number(_)) => None,
+                (_, Exponent::Expr(_)) => Some((*factor, Number::ONE)),
+            })
             .collect()
     }
 
@@ -94,7 +99,7 @@ impl ExprPool {
 
     /// `dividend / divisor` if both are sums of products with exact coefficients and positive
     /// integer powers, and the division leaves no remainder.
-    pub fn divide_exactly(&mut self, dividend: ExprId, divisor: ExprId) -> Option<ExprId> {
+    fn divide_exactly(&mut self, dividend: ExprId, divisor: ExprId) -> Option<ExprId> {
         let (dividend, divisor) = (self.terms_of(dividend), self.terms_of(divisor));
         let mut bases: Vec<ExprId> = Vec::new();
         for (_, rest) in dividend.iter().chain(&divisor) {
@@ -175,7 +180,7 @@ mod tests {
     fn together(text: &str) -> String {
         let mut pool = ExprPool::new();
         let expr = pool.parse(text, &|_| true).expect("test text parses");
-        let result = pool.together(expr);
+        let result = pool.together(expr, &mut 100_000);
         pool.display(result).to_string()
     }
 

@@ -6,7 +6,6 @@
 //! | [`sines_to_cosines`](ExprPool::sines_to_cosines) | `sin(x)^2` into `1 - cos(x)^2` |
 //! | [`cosines_to_sines`](ExprPool::cosines_to_sines) | `cos(x)^2` into `1 - sin(x)^2` |
 //! | [`combine_angles`](ExprPool::combine_angles) | products into sums: `2*sin(x)*cos(x)` into `sin(2*x)` |
-//! | [`amplitude_phase`](ExprPool::amplitude_phase) | `a*sin(x) + b*cos(x)` into `c*sin(x + p)` |
 //!
 //! All work on the outermost level (sums, products and integer powers), not inside arguments.
 
@@ -238,54 +237,6 @@ impl ExprPool {
         let others = self.product(&others);
         self.expanded_product(others, sum)
     }
-
-    /// `expr` with pairs of terms `a*sin(x)*r + b*cos(x)*r`, where `a` and `b` are numbers,
-    /// written as `c*sin(x + p)*r` with `c = sqrt(a^2 + b^2)` and `p = atan2(b, a)`.
-    ///
-    /// Both are rounded floats, unlike other rewritings: ask for it where one sine less is worth
-    /// a relative error of about 2e-16.
-    pub fn amplitude_phase(&mut self, expr: ExprId) -> ExprId {
-        let mut terms = self.terms_of(expr);
-        let mut index = 0;
-        while index < terms.len() {
-            if let Some((partner, merged)) = self.merge_waves(&terms, index) {
-                terms[index] = self.split(merged);
-                terms.remove(partner);
-                // The next term has moved here already if the partner came earlier.
-                index += usize::from(partner > index);
-            } else {
-                index += 1;
-            }
-        }
-        self.sum_of_terms(terms)
-    }
-
-    /// The cosine term that belongs to the sine term at `index`, and what both are together.
-    fn merge_waves(&mut self, terms: &[(Number, ExprId)], index: usize) -> Option<(usize, ExprId)> {
-        let (sine_weight, rest) = terms[index];
-        let factors = self.factors_of(rest).to_vec();
-        for (place, factor) in factors.iter().enumerate() {
-            let Node::Apply(Function::Sin, argument) = *self.node(*factor) else {
-                continue;
-            };
-            let mut with_cosine = factors.clone();
-            with_cosine[place] = self.apply(Function::Cos, argument);
-            let partner_rest = self.product(&with_cosine);
-            let Some(partner) = terms.iter().position(|(_, rest)| *rest == partner_rest) else {
-                continue;
-            };
-            let (a, b) = (sine_weight.to_f64(), terms[partner].0.to_f64());
-            let amplitude = Number::from_f64((a * a + b * b).sqrt())?;
-            let phase = Number::from_f64(b.atan2(a))?;
-            let phase = self.constant(phase);
-            let angle = self.add(argument, phase);
-            let mut merged = factors.clone();
-            merged[place] = self.apply(Function::Sin, angle);
-            let merged = self.product(&merged);
-            return Some((partner, self.scale(amplitude, merged)));
-        }
-        None
-    }
 }
 
 /// Notes that multiples of `rest` occur with this coefficient: the unit is the largest exact
@@ -372,21 +323,5 @@ mod tests {
             "1/2*z*cos(x - y) - 1/2*z*cos(x + y)"
         );
         assert_eq!(combine("sin(x) + y"), "y + sin(x)");
-    }
-
-    #[test]
-    fn amplitude_phase_merges_a_sine_and_a_cosine() {
-        let mut pool = ExprPool::new();
-        let expr = pool
-            .parse("1 + 3*y*sin(x) + 4*y*cos(x) + cos(z)", &|_| true)
-            .expect("test text parses");
-        let merged = pool.amplitude_phase(expr);
-        assert_eq!(
-            pool.display(merged).to_string(),
-            "1 + cos(z) + 5*y*sin(0.9272952180016122 + x)"
-        );
-        let difference = pool.sub(expr, merged);
-        let value = pool.evaluate(difference, &|symbol| 0.3 + symbol.index() as f64);
-        assert!(value.abs() < 1e-14);
     }
 }

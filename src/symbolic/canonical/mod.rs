@@ -10,8 +10,8 @@
 //! add up through all operations, and arguments of functions that agree within them count as equal.
 //!
 //! Two expressions with the same form have the same value wherever both are defined. Different
-//! forms prove a difference only where no atoms depend on each other (`sqrt(1 + x)` and
-//! `sqrt(x + x^2)` do), so a difference should be confirmed at a point.
+//! forms prove a difference only where no atoms depend on each other (`sqrt(1 + x)`, `sqrt(2 + x)`
+//! and `sqrt(2 + 3*x + x^2)` do), so a difference should be confirmed at a point.
 //!
 //! ```
 //! use romc::symbolic::{CanonicalForms, ExprPool};

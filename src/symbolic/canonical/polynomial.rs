@@ -146,6 +146,15 @@ impl CanonicalForm {
         }
     }
 
+    /// The atom that the form is, if it is nothing else.
+    pub(super) fn as_atom(&self) -> Option<u32> {
+        let (coefficient, monomial) = self.as_term()?;
+        match monomial.powers[..] {
+            [(atom, 1)] if coefficient.is_one() && monomial.exponent.is_empty() => Some(atom),
+            _ => None,
+        }
+    }
+
     /// Coefficient and monomial if there is one term.
     pub(super) fn as_term(&self) -> Option<(&Coefficient, &Monomial)> {
         let mut terms = self.terms.iter();

@@ -88,6 +88,20 @@ impl CanonicalForms<'_> {
                     let one = CanonicalForm::constant(Coefficient::integer(1));
                     return Some(Some((with_power(rest), one)));
                 }
+                Atom::Sign(base) => {
+                    let shared = base.as_atom().filter(|base| monomial.power_of(*base) != 0);
+                    if let Some(shared) = shared {
+                        // x sign(x) = |x|, x sign(x)^2 = x.
+                        let rest = monomial.without(atom);
+                        return Some(Some(match power {
+                            2 => (rest, CanonicalForm::constant(Coefficient::integer(1))),
+                            _ => (
+                                rest.times(&Monomial::atom(shared, -1)),
+                                self.atom(Atom::Abs(base)),
+                            ),
+                        }));
+                    }
+                }
                 _ => {}
             }
         }

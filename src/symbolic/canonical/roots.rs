@@ -17,6 +17,17 @@ impl CanonicalForms<'_> {
         let scale = form.leading()?.size();
         let inverse = Coefficient::real(scale.recip(), 0.0);
         let Some((coefficient, monomial)) = form.as_term() else {
+            let shared = self.shared_powers(&form);
+            if !shared.powers.is_empty() {
+                // sqrt(x + x^2) = sqrt(x) sqrt(1 + x) where x is positive.
+                let inverse = CanonicalForm::term(Coefficient::integer(1), shared.reciprocal());
+                let rest = self.product(&form, &inverse)?;
+                let mut split = self.split(&rest)?;
+                for &(atom, power) in &shared.powers {
+                    split.factors.push((self.magnitude_of(atom)?, power));
+                }
+                return Some(split);
+            }
             let factors = vec![(form.scaled(&inverse), 1)];
             return Some(Split {
                 scale,
@@ -27,12 +38,9 @@ impl CanonicalForms<'_> {
         let mut factors = Vec::new();
         let mut rest = Monomial::default();
         for &(atom, power) in &monomial.powers {
-            let base = CanonicalForm::term(Coefficient::integer(1), Monomial::atom(atom, 1));
-            match &self.atoms[atom as usize] {
-                Atom::Root(..) | Atom::Abs(_) => factors.push((base, power)),
-                _ if self.positive.contains(&atom) => factors.push((base, power)),
-                _ if power % 2 == 0 => factors.push((self.abs(&base)?, power)),
-                _ => rest = rest.times(&Monomial::atom(atom, power)),
+            match self.is_positive(atom) || power % 2 == 0 {
+                true => factors.push((self.magnitude_of(atom)?, power)),
+                false => rest = rest.times(&Monomial::atom(atom, power)),
             }
         }
         let sign = coefficient.times(&inverse);
@@ -56,6 +64,44 @@ impl CanonicalForms<'_> {
             factors,
             exponent,
         })
+    }
+
+    /// Whether an atom is nowhere negative where the given expressions have values.
+    fn is_positive(&self, atom: u32) -> bool {
+        matches!(self.atoms[atom as usize], Atom::Root(..) | Atom::Abs(_))
+            || self.positive.contains(&atom)
+    }
+
+    /// The magnitude of an atom: itself if it is positive.
+    fn magnitude_of(&mut self, atom: u32) -> Option<CanonicalForm> {
+        let base = CanonicalForm::term(Coefficient::integer(1), Monomial::atom(atom, 1));
+        match self.is_positive(atom) {
+            true => Some(base),
+            false => self.abs(&base),
+        }
+    }
+
+    /// The powers that all terms of a sum have in common and that are not negative: those of
+    /// positive atoms, and even ones.
+    fn shared_powers(&self, form: &CanonicalForm) -> Monomial {
+        let smaller = |a: i32, b: i32| match a.signum() == b.signum() {
+            true => a.signum() * a.abs().min(b.abs()),
+            false => 0,
+        };
+        let mut powers =
+            (form.terms.keys().next()).map_or(Vec::new(), |first| first.powers.clone());
+        for (atom, power) in &mut powers {
+            let others = form.terms.keys().map(|monomial| monomial.power_of(*atom));
+            *power = others.fold(*power, smaller);
+            if !self.is_positive(*atom) {
+                *power -= *power % 2;
+            }
+        }
+        powers.retain(|(_, power)| *power != 0);
+        Monomial {
+            powers,
+            exponent: Vec::new(),
+        }
     }
 
     pub(super) fn log(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
@@ -101,18 +147,8 @@ impl CanonicalForms<'_> {
 
     /// What stands under a root, with its index; anything else with 1.
     pub(super) fn radicand(&self, base: CanonicalForm) -> (CanonicalForm, u32) {
-        match base.as_term() {
-            Some((coefficient, monomial))
-                if coefficient.is_one() && monomial.exponent.is_empty() =>
-            {
-                match monomial.powers[..] {
-                    [(atom, 1)] => match &self.atoms[atom as usize] {
-                        Atom::Root(radicand, index) => (radicand.clone(), *index),
-                        _ => (base, 1),
-                    },
-                    _ => (base, 1),
-                }
-            }
+        match base.as_atom().map(|atom| &self.atoms[atom as usize]) {
+            Some(Atom::Root(radicand, index)) => (radicand.clone(), *index),
             _ => (base, 1),
         }
     }
@@ -189,9 +225,7 @@ impl CanonicalForms<'_> {
         );
         for &(atom, power) in &monomial.powers {
             let base = CanonicalForm::term(Coefficient::integer(1), Monomial::atom(atom, 1));
-            let is_positive = self.positive.contains(&atom)
-                || matches!(self.atoms[atom as usize], Atom::Root(..) | Atom::Abs(_));
-            let factor = match is_positive || power % 2 == 0 {
+            let factor = match self.is_positive(atom) || power % 2 == 0 {
                 true => self.power(&base, power)?,
                 false => {
                     let magnitude = self.atom(Atom::Abs(base));

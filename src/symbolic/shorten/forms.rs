@@ -1,0 +1,219 @@
+//! The shortest form of a group of summands.
+
+use std::collections::HashMap;
+
+use super::search::Shortener;
+use super::units::{in_f64, in_units};
+use super::{Scaled, Summands};
+use crate::symbolic::expand::MAX_PRODUCTS;
+use crate::symbolic::intern::BuildIdHasher;
+use crate::symbolic::node::{ExprId, Node};
+use crate::symbolic::number::Number;
+use crate::symbolic::pool::ExprPool;
+
+/// Largest group whose forms are searched, and largest whose terms are chosen one by one.
+const MAX_GROUP: usize = 64;
+const MAX_CHOSEN: usize = 16;
+
+impl Shortener<'_> {
+    /// A shorter form of a sum, if one is found.
+    pub(super) fn shortest(&mut self, old: &Summands) -> Option<Summands> {
+        let (unit, scaled) = in_units(old);
+        let before = self.length(unit, &scaled);
+        let mut best = ((before, 0), None);
+        let singles: Scaled = (scaled.iter())
+            .map(|&(number, expr)| (number, self.single(expr)))
+            .collect();
+        let mut candidates = vec![collected(self.pool, &singles, Keep::Sums)];
+        if old.len() <= MAX_GROUP {
+            candidates.extend(self.candidates(unit, &singles));
+        }
+        let n_terms = self.all_terms(&scaled);
+        for candidate in candidates {
+            // Only a fraction whose sums become fewer may be written as several terms.
+            let is_resolved = old.len() == 1
+                && self.all_terms(&candidate) < n_terms
+                && !self.denominators(old[0].1).is_empty();
+            if candidate.len() > old.len() && !is_resolved {
+                continue;
+            }
+            let length = self.length(unit, &candidate);
+            let is_negative = |(number, _): &&(Number, ExprId)| in_f64(*number, unit) < 0.0;
+            let rank = (length, candidate.iter().filter(is_negative).count());
+            if rank < best.0 {
+                best = (rank, Some(candidate));
+            }
+        }
+        let found = best.1?;
+        let coefficient = |number: Number, expr: ExprId| {
+            let value = in_f64(number, unit);
+            let is_same = |&&(known, of): &&(f64, ExprId)| {
+                of == expr && (known - value).abs() <= 2.0 * f64::EPSILON * value.abs()
+            };
+            old.iter().find(is_same).map_or(value, |&(known, _)| known)
+        };
+        let summands: Summands = (found.into_iter())
+            .map(|(number, expr)| (coefficient(number, expr), expr))
+            .collect();
+        let is_usable = |&(value, _): &(f64, ExprId)| value.is_finite() && value != 0.0;
+        summands.iter().all(is_usable).then_some(summands)
+    }
+
+    /// Terms of a sum with those of sums inside products and fractions.
+    fn all_terms(&self, summands: &Scaled) -> usize {
+        let mut count = summands.len();
+        for &(_, expr) in summands {
+            for &factor in self.pool.factors_of(expr) {
+                let base = match *self.pool.node(factor) {
+                    Node::Power(base, _) => base,
+                    _ => factor,
+                };
+                if let Node::Sum(terms) = self.pool.node(base) {
+                    count += terms.len() - 1;
+                }
+            }
+        }
+        count
+    }
+
+    fn length(&mut self, unit: Number, summands: &Scaled) -> u64 {
+        let terms = summands
+            .iter()
+            .map(|&(number, expr)| (in_f64(number, unit), expr));
+        self.costs.of_terms(self.pool, terms)
+    }
+
+    /// Forms of a group: of its sum as a whole, and of each term chosen by itself.
+    fn candidates(&mut self, unit: Number, singles: &Scaled) -> Vec<Scaled> {
+        let mut budget = MAX_PRODUCTS;
+        let mut candidates = Vec::new();
+        let products: Vec<ExprId> = (singles.iter())
+            .map(|&(number, expr)| {
+                let factor = self.pool.constant(number);
+                self.pool.product(&[factor, expr])
+            })
+            .collect();
+        let sum = self.pool.sum(&products);
+        let mut forms = self.pool.forms(sum, &mut budget);
+        forms.push(self.pool.simplify(sum));
+        for form in forms {
+            let terms = self.pool.terms_of(form);
+            if let [(number, rest)] = terms.as_slice()
+                && let Node::Sum(_) = self.pool.node(*rest)
+            {
+                candidates.push(collected(self.pool, &[(*number, *rest)], Keep::Nothing));
+            }
+            candidates.push(terms);
+            if singles.len() == 1
+                && let Node::Sum(_) = self.pool.node(form)
+            {
+                candidates.push(vec![(Number::ONE, form)]);
+            }
+        }
+        candidates.extend(self.chosen(unit, singles, sum));
+        candidates
+    }
+
+    /// Sums in which each term has the form that suits the others best.
+    fn chosen(&mut self, unit: Number, singles: &Scaled, sum: ExprId) -> Vec<Scaled> {
+        if singles.len() < 2 || singles.len() > MAX_CHOSEN {
+            return Vec::new();
+        }
+        let mut budget = MAX_PRODUCTS;
+        let mut forms: Vec<Vec<ExprId>> = Vec::new();
+        for &(_, expr) in singles {
+            let normal = self.normal(expr, sum);
+            let mut own = vec![expr, self.pool.expand_region(expr, &mut budget), normal];
+            if self.pool.has_waves(normal) {
+                let sines = self.pool.cosines_to_sines(normal);
+                own.push(self.pool.expand_region(sines, &mut budget));
+                own.push(self.pool.combine_angles(normal));
+            } else {
+                own.extend([normal, normal]);
+            }
+            forms.push(own);
+        }
+        let mut found = Vec::new();
+        for start in 1..forms[0].len() {
+            let mut choice = vec![start; singles.len()];
+            let (mut best, mut least) = self.of_choice(unit, singles, &forms, &choice);
+            loop {
+                let before = least;
+                for term in 0..singles.len() {
+                    let kept = choice[term];
+                    for other in 0..forms[term].len() {
+                        choice[term] = other;
+                        let (candidate, length) = self.of_choice(unit, singles, &forms, &choice);
+                        if length < least {
+                            (best, least) = (candidate, length);
+                            break;
+                        }
+                        choice[term] = kept;
+                    }
+                }
+                if least == before {
+                    break;
+                }
+            }
+            found.push(best);
+        }
+        found
+    }
+
+    fn of_choice(
+        &mut self,
+        unit: Number,
+        singles: &Scaled,
+        forms: &[Vec<ExprId>],
+        choice: &[usize],
+    ) -> (Scaled, u64) {
+        let mut parts = Scaled::new();
+        for (term, &(number, _)) in singles.iter().enumerate() {
+            let form = forms[term][choice[term]];
+            let keep = match choice[term] {
+                0 => Keep::Sums,
+                _ => Keep::Nothing,
+            };
+            parts.extend(collected(self.pool, &[(number, form)], keep));
+        }
+        let sum = collected(self.pool, &parts, Keep::Sums);
+        let length = self.length(unit, &sum);
+        (sum, length)
+    }
+}
+
+/// Whether sums among the terms stay terms.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Keep {
+    Sums,
+    Nothing,
+}
+
+/// Summands with the numbers of their terms in the coefficients and like terms added, in the order
+/// of their first appearance.
+fn collected(pool: &ExprPool, summands: &[(Number, ExprId)], keep: Keep) -> Scaled {
+    let mut result = Scaled::new();
+    let mut place: HashMap<ExprId, usize, BuildIdHasher> = HashMap::default();
+    for &(number, expr) in summands {
+        let parts = match pool.node(expr) {
+            Node::Sum(_) if keep == Keep::Sums => vec![(Number::ONE, expr)],
+            _ => pool.terms_of(expr),
+        };
+        for (factor, rest) in parts {
+            let at = *place.entry(rest).or_insert(result.len());
+            let term = number.checked_mul(factor);
+            if at == result.len() {
+                // What overflows stays as written.
+                let fallback = (number, if factor.is_one() { rest } else { expr });
+                result.push(term.map_or(fallback, |term| (term, rest)));
+                continue;
+            }
+            match term.and_then(|term| result[at].0.checked_add(term)) {
+                Some(sum) => result[at].0 = sum,
+                None => result.push((number, expr)),
+            }
+        }
+    }
+    result.retain(|(number, _)| !number.is_zero());
+    result
+}
