@@ -124,12 +124,12 @@ def export(path, phases, encoder=None, decoder=None):
     """
     path = pathlib.Path(path)
     latent, terms, coefficients = union(phases)
-    arrays = {f"xi_{name}": xi for name, xi in coefficients.items()}
+    arrays = {f"xi.{name}": xi for name, xi in coefficients.items()}
     for part, pair in (("encoder", encoder), ("decoder", decoder)):
         if pair is not None:
             weights, bias = pair
-            arrays[f"{part}_weight"] = np.asarray(weights, dtype=np.float64)
-            arrays[f"{part}_bias"] = np.asarray(bias, dtype=np.float64)
+            arrays[f"{part}.weight"] = np.asarray(weights, dtype=np.float64)
+            arrays[f"{part}.bias"] = np.asarray(bias, dtype=np.float64)
     if path.suffix == ".npz":
         np.savez(path, **arrays)
     elif path.suffix == ".safetensors":

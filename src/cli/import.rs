@@ -11,8 +11,7 @@ use super::args::{ImportArguments, LibraryArgument};
 use super::output::{Table, check_output, read_recordings};
 use crate::files::Overwrite;
 use crate::import::{
-    Chosen, ImportError, ImportOptions, ImportReport, LibraryChoice, LibraryOrder, SymbolNames,
-    import, read_terms,
+    Chosen, ImportOptions, ImportReport, LibraryChoice, SymbolNames, import, read_terms,
 };
 use crate::model::{ReducedModel, ScaleFactors, Scaling};
 use crate::robot::Robot;
@@ -118,20 +117,10 @@ fn stem(path: &Path) -> String {
 }
 
 fn library(arguments: &ImportArguments) -> Result<Option<LibraryChoice>, Error> {
-    let order = arguments.library_order;
     Ok(match &arguments.library {
         None => None,
-        Some(LibraryArgument::Shorthand(standard)) => {
-            Some(LibraryChoice::Standard(*standard, order))
-        }
-        Some(LibraryArgument::File(path)) => {
-            if order == LibraryOrder::Paper {
-                let found = "paper, with a file of terms";
-                let expected = "a library of the form degree=N,...";
-                return Err(ImportError::option("--library-order", found, expected).into());
-            }
-            Some(LibraryChoice::Terms(read_terms(path)?))
-        }
+        Some(LibraryArgument::Shorthand(standard)) => Some(LibraryChoice::Standard(*standard)),
+        Some(LibraryArgument::File(path)) => Some(LibraryChoice::Terms(read_terms(path)?)),
     })
 }
 
@@ -173,7 +162,7 @@ fn describe(report: &ImportReport) -> String {
                 used.element.clone(),
                 match used.chosen {
                     Chosen::Mapped => "by --map".to_owned(),
-                    Chosen::Guessed => "by name".to_owned(),
+                    Chosen::Named => "by name".to_owned(),
                 },
                 used.layout.to_string(),
             ]);

@@ -187,14 +187,6 @@ impl<'a> Assembly<'a, '_> {
         let latent_dim = phases[0].xi.ncols();
         let library = library::build(choice, latent_dim)
             .map_err(|source| ImportError::model(self.tensors.file(), source))?;
-        let mut has_moved = false;
-        for phase in &mut phases {
-            let xi = std::mem::take(&mut phase.xi);
-            (phase.xi, has_moved) = library::reorder(choice, latent_dim, xi);
-        }
-        if has_moved {
-            self.notes.notes.push(Note::PaperOrder);
-        }
         Ok((library, phases))
     }
 
@@ -265,7 +257,7 @@ impl<'a> Assembly<'a, '_> {
         let latent = self.known.latent.map_or("d".to_owned(), |d| d.to_string());
         let terms = match (choice, self.known.latent) {
             (LibraryChoice::Terms(terms), _) => Some(terms.len()),
-            (LibraryChoice::Standard(..), latent) => latent.and_then(|d| library::dim(choice, d)),
+            (LibraryChoice::Standard(_), latent) => latent.and_then(|d| library::dim(choice, d)),
         };
         let terms = terms.map_or("terms".to_owned(), |count| count.to_string());
         let source = library::describe(choice);

@@ -1,13 +1,12 @@
-//! The candidate terms of imported coefficients, and the order in which a file has them.
+//! The candidate terms of imported coefficients.
 
 use std::path::Path;
 use std::{fs, io};
 
-use nalgebra::DMatrix;
 use serde_json::Value;
 
 use super::error::ImportError;
-use super::options::{LibraryChoice, LibraryOrder, standard_text};
+use super::options::{LibraryChoice, standard_text};
 use crate::files::{Located, Place};
 use crate::model::{Library, LibraryError, StandardLibrary};
 
@@ -17,7 +16,7 @@ const MAX_TERMS_BYTES: u64 = 32 << 20;
 /// Number of terms that a choice has at a latent dimension.
 pub(super) fn dim(choice: &LibraryChoice, latent_dim: usize) -> Option<usize> {
     match choice {
-        LibraryChoice::Standard(standard, _) => standard.term_count(latent_dim),
+        LibraryChoice::Standard(standard) => standard.term_count(latent_dim),
         LibraryChoice::Terms(terms) => Some(terms.len()),
     }
 }
@@ -25,7 +24,7 @@ pub(super) fn dim(choice: &LibraryChoice, latent_dim: usize) -> Option<usize> {
 /// The library at a latent dimension.
 pub(super) fn build(choice: &LibraryChoice, latent_dim: usize) -> Result<Library, LibraryError> {
     match choice {
-        LibraryChoice::Standard(standard, _) => Library::standard(latent_dim, *standard),
+        LibraryChoice::Standard(standard) => Library::standard(latent_dim, *standard),
         LibraryChoice::Terms(terms) => Library::from_terms(latent_dim, terms),
     }
 }
@@ -33,7 +32,7 @@ pub(super) fn build(choice: &LibraryChoice, latent_dim: usize) -> Result<Library
 /// In words for messages: `15 terms (degree=1,trigonometric,inputs)`.
 pub(super) fn describe(choice: &LibraryChoice) -> String {
     match choice {
-        LibraryChoice::Standard(standard, _) => standard_text(*standard),
+        LibraryChoice::Standard(standard) => standard_text(*standard),
         LibraryChoice::Terms(terms) => format!("a list of {} terms", terms.len()),
     }
 }
@@ -55,33 +54,6 @@ pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String
         }
     }
     texts
-}
-
-/// Puts the rows of Xi from the file's order into the model file's; the flag is set if rows moved.
-pub(super) fn reorder(
-    choice: &LibraryChoice,
-    latent_dim: usize,
-    xi: DMatrix<f64>,
-) -> (DMatrix<f64>, bool) {
-    let LibraryChoice::Standard(standard, LibraryOrder::Paper) = choice else {
-        return (xi, false);
-    };
-    if !standard.trigonometric {
-        return (xi, false);
-    }
-    let inputs = if standard.inputs { latent_dim } else { 0 };
-    let sines = xi.nrows() - inputs - 4 * latent_dim;
-    let block = |row: usize| (row - sines) / latent_dim;
-    let in_file = |row: usize| match row.checked_sub(sines).map(|_| block(row)) {
-        // The model file has sin z, sin dz, cos z, cos dz; the file sin z, cos z, sin dz, cos dz.
-        Some(1) => row + latent_dim,
-        Some(2) => row - latent_dim,
-        _ => row,
-    };
-    let reordered = DMatrix::from_fn(xi.nrows(), xi.ncols(), |row, column| {
-        xi[(in_file(row), column)]
-    });
-    (reordered, true)
 }
 
 /// Reads a list of terms: a JSON list of texts, a JSON object with such a list under `library`, or
@@ -143,34 +115,6 @@ fn kind_of(value: &Value) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn rows_in_the_order_of_the_paper_are_put_into_that_of_the_model_file() {
-        let standard = StandardLibrary {
-            degree: 2,
-            trigonometric: true,
-            inputs: true,
-        };
-        let library = Library::standard(2, standard).expect("a small library");
-        let paper: Vec<String> = [
-            "1 z1 z2 dz1 dz2 z1^2 z1*z2 z1*dz1 z1*dz2 z2^2 z2*dz1 z2*dz2 dz1^2 dz1*dz2 dz2^2",
-            "sin(z1) sin(z2) cos(z1) cos(z2) sin(dz1) sin(dz2) cos(dz1) cos(dz2) u1 u2",
-        ]
-        .iter()
-        .flat_map(|line| line.split(' ').map(str::to_owned))
-        .collect();
-        let xi = DMatrix::from_fn(paper.len(), 2, |row, column| (10 * row + column) as f64);
-        let choice = LibraryChoice::Standard(standard, LibraryOrder::Paper);
-        let (reordered, moved) = reorder(&choice, 2, xi.clone());
-        assert!(moved);
-        for (row, term) in library.terms().iter().enumerate() {
-            let in_file = paper.iter().position(|text| text == term.text());
-            let in_file = in_file.expect("the same terms");
-            assert_eq!(reordered.row(row), xi.row(in_file), "{}", term.text());
-        }
-        let author = LibraryChoice::Standard(standard, LibraryOrder::Author);
-        assert_eq!(reorder(&author, 2, xi.clone()), (xi, false));
-    }
 
     #[test]
     fn terms_are_read_from_lines_and_from_json() {

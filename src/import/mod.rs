@@ -33,7 +33,6 @@ mod error;
 mod latent;
 mod latex;
 mod library;
-mod names;
 mod npz;
 mod options;
 mod report;
@@ -48,8 +47,7 @@ pub use error::{ImportError, ImportFault};
 pub use latex::{NameError, SymbolNames};
 pub use library::read_terms;
 pub use options::{
-    Format, ImportOptions, LibraryChoice, LibraryOrder, PhaseRule, WeightVectors, XiLayout,
-    parse_standard,
+    Format, ImportOptions, LibraryChoice, PhaseRule, WeightVectors, XiLayout, parse_standard,
 };
 pub use report::{Chosen, ImportReport, Layout, Note, ReadEquation, UnusedTensor, UsedTensor};
 pub use role::{Mapping, Part, Role};

@@ -100,20 +100,10 @@ pub enum XiLayout {
 /// The candidate terms that the rows of Xi belong to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LibraryChoice {
-    /// The shorthand, and the order in which the file has its terms.
-    Standard(StandardLibrary, LibraryOrder),
+    /// The shorthand.
+    Standard(StandardLibrary),
     /// A list of terms in the file's order.
     Terms(Vec<String>),
-}
-
-/// In which order a file has the terms of the standard library.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum LibraryOrder {
-    /// sin z, sin dz, cos z, cos dz: the published arrays
-    #[default]
-    Author,
-    /// sin z, cos z, sin dz, cos dz: appendix B of the paper
-    Paper,
 }
 
 /// Reads `degree=2,trigonometric,inputs`.
@@ -225,7 +215,7 @@ pub struct ImportOptions {
     pub description: String,
     /// The kind of file, if its ending is none of the known ones.
     pub format: Option<Format>,
-    /// Tensors by name; those not mentioned are found by their usual names.
+    /// Tensors by name; those not mentioned are found by the names of the parts.
     pub mapping: Vec<Mapping>,
     /// How weights are stored: needed for square ones, checked for others.
     pub weights: Option<WeightVectors>,

@@ -53,7 +53,7 @@ pub enum Chosen {
     /// `--map`.
     Mapped,
     /// Its name.
-    Guessed,
+    Named,
 }
 
 /// How a tensor was stored.
@@ -135,8 +135,6 @@ pub enum Note {
     },
     /// Encoder and decoder are stored in different ways.
     MixedWeights,
-    /// Rows of Xi were put into the order of the published arrays.
-    PaperOrder,
     /// A mask switched coefficients off.
     Masked {
         /// The phase.
@@ -164,10 +162,6 @@ impl fmt::Display for Note {
             Note::MixedWeights => f.write_str(
                 "encoder and decoder are stored in different ways, one for row and one for column \
                  vectors",
-            ),
-            Note::PaperOrder => f.write_str(
-                "rows of Xi were put from the order of appendix B (sin z, cos z, sin dz, cos dz) \
-                 into that of the model file (sin z, sin dz, cos z, cos dz)",
             ),
             Note::Masked { phase, count } => {
                 write!(

@@ -27,14 +27,10 @@ impl Part {
 /// What a tensor is used as; written `encoder.weight`, `xi.contact` and so on.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
-    /// `W_e` or `W_d`.
-    Weights(Part),
-    /// `b_e` or `b_d`.
-    Bias(Part),
-    /// Weights of one of several layers, in the order of their numbers.
-    LayerWeights(Part, usize),
-    /// Bias of one of several layers.
-    LayerBias(Part, usize),
+    /// `W_e` or `W_d`, or the weights of one of several layers by its number.
+    Weights(Part, Option<usize>),
+    /// `b_e` or `b_d`, or the bias of one of several layers.
+    Bias(Part, Option<usize>),
     /// Coefficients of a phase.
     Xi(String),
     /// 0 for the coefficients of a phase that training switched off, 1 for the others.
@@ -56,10 +52,10 @@ const EXPECTED: &str = "encoder.weight, encoder.bias, decoder.weight, decoder.bi
 impl fmt::Display for Role {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Role::Weights(part) => write!(f, "{}.weight", part.name()),
-            Role::Bias(part) => write!(f, "{}.bias", part.name()),
-            Role::LayerWeights(part, layer) => write!(f, "{}.{layer}.weight", part.name()),
-            Role::LayerBias(part, layer) => write!(f, "{}.{layer}.bias", part.name()),
+            Role::Weights(part, None) => write!(f, "{}.weight", part.name()),
+            Role::Bias(part, None) => write!(f, "{}.bias", part.name()),
+            Role::Weights(part, Some(layer)) => write!(f, "{}.{layer}.weight", part.name()),
+            Role::Bias(part, Some(layer)) => write!(f, "{}.{layer}.bias", part.name()),
             Role::Xi(phase) => write!(f, "xi.{phase}"),
             Role::Mask(phase) => write!(f, "mask.{phase}"),
             Role::InputMean(phase) => write!(f, "input_mean.{phase}"),
@@ -73,40 +69,60 @@ impl fmt::Display for Role {
 impl FromStr for Role {
     type Err = ImportError;
 
+    /// Reads the name of a part; underscores may stand for its dots.
     fn from_str(text: &str) -> Result<Self, ImportError> {
         read_role(text)
             .ok_or_else(|| ImportError::option("--map", format!("the part {text:?}"), EXPECTED))
     }
 }
 
+/// What follows the first word of a name and a dot or underscore.
+fn after<'t>(head: &str, text: &'t str) -> Option<&'t str> {
+    let tail = text.strip_prefix(head)?.strip_prefix(['.', '_'])?;
+    (!tail.is_empty()).then_some(tail)
+}
+
 fn read_role(text: &str) -> Option<Role> {
-    let (head, tail) = text.split_once('.').filter(|(_, tail)| !tail.is_empty())?;
-    let part = match head {
-        "encoder" => Part::Encoder,
-        "decoder" => Part::Decoder,
-        "scaling" if tail == "state" => return Some(Role::StateScaling),
-        "scaling" if tail == "input" => return Some(Role::InputScaling),
-        "xi" => return Some(Role::Xi(tail.to_owned())),
-        "mask" => return Some(Role::Mask(tail.to_owned())),
-        "input_mean" => return Some(Role::InputMean(tail.to_owned())),
-        "input_covariance" => return Some(Role::InputCovariance(tail.to_owned())),
-        _ => return None,
+    let of_phase: [(&str, fn(String) -> Role); 4] = [
+        ("xi", Role::Xi),
+        ("mask", Role::Mask),
+        ("input_mean", Role::InputMean),
+        ("input_covariance", Role::InputCovariance),
+    ];
+    if let Some(role) =
+        (of_phase.iter()).find_map(|(head, role)| Some(role(after(head, text)?.to_owned())))
+    {
+        return Some(role);
+    }
+    match after("scaling", text) {
+        Some("state") => return Some(Role::StateScaling),
+        Some("input") => return Some(Role::InputScaling),
+        _ => {}
+    }
+    let (part, tail) = [Part::Encoder, Part::Decoder]
+        .into_iter()
+        .find_map(|part| Some((part, after(part.name(), text)?)))?;
+    let (layer, tensor) = match tail.split_once(['.', '_']) {
+        Some((layer, tensor)) => (Some(layer.parse().ok()?), tensor),
+        None => (None, tail),
     };
-    match tail.split_once('.') {
-        None => match tail {
-            "weight" | "weights" => Some(Role::Weights(part)),
-            "bias" => Some(Role::Bias(part)),
-            _ => None,
-        },
-        Some((layer, tensor)) => match tensor {
-            "weight" | "weights" => Some(Role::LayerWeights(part, layer.parse().ok()?)),
-            "bias" => Some(Role::LayerBias(part, layer.parse().ok()?)),
-            _ => None,
-        },
+    match tensor {
+        "weight" | "weights" => Some(Role::Weights(part, layer)),
+        "bias" => Some(Role::Bias(part, layer)),
+        _ => None,
     }
 }
 
 impl Role {
+    /// The part that the name of a tensor stands for: the part's own name, alone or behind the
+    /// names of the modules that hold it, as in `autoencoder.encoder.0.weight`.
+    pub fn of_name(name: &str) -> Option<Self> {
+        let ends = name
+            .match_indices(['.', '/'])
+            .map(|(dot, _)| &name[dot + 1..]);
+        std::iter::once(name).chain(ends).find_map(read_role)
+    }
+
     /// The phase that the tensor belongs to, if it belongs to one.
     pub fn phase(&self) -> Option<&str> {
         match self {
@@ -114,20 +130,7 @@ impl Role {
             | Role::Mask(phase)
             | Role::InputMean(phase)
             | Role::InputCovariance(phase) => Some(phase),
-            Role::Weights(_)
-            | Role::Bias(_)
-            | Role::LayerWeights(..)
-            | Role::LayerBias(..)
-            | Role::StateScaling
-            | Role::InputScaling => None,
-        }
-    }
-
-    /// The layer's number and the map that it belongs to, of weights of one of several layers.
-    pub(super) fn layer(&self) -> Option<(Part, usize)> {
-        match self {
-            Role::LayerWeights(part, number) => Some((*part, *number)),
-            _ => None,
+            Role::Weights(..) | Role::Bias(..) | Role::StateScaling | Role::InputScaling => None,
         }
     }
 }
@@ -165,22 +168,40 @@ mod tests {
 
     #[test]
     fn role_text_reads_back() {
-        let contact = || "contact".to_owned();
-        for role in [
-            Role::Weights(Part::Encoder),
-            Role::Weights(Part::Decoder),
-            Role::Bias(Part::Encoder),
-            Role::Bias(Part::Decoder),
-            Role::LayerWeights(Part::Encoder, 0),
-            Role::LayerBias(Part::Decoder, 12),
-            Role::Xi(contact()),
-            Role::Mask(contact()),
-            Role::InputMean(contact()),
-            Role::InputCovariance(contact()),
-            Role::StateScaling,
-            Role::InputScaling,
+        for text in [
+            "encoder.weight",
+            "decoder.bias",
+            "encoder.0.weight",
+            "decoder.12.bias",
+            "xi.contact",
+            "mask.rear_stance",
+            "input_mean.contact",
+            "input_covariance.contact",
+            "scaling.state",
+            "scaling.input",
         ] {
-            assert_eq!(role.to_string().parse::<Role>().expect("own text"), role);
+            let role: Role = text.parse().expect("the name of a part");
+            assert_eq!(role.to_string(), text);
+            assert_eq!(Role::of_name(&text.replace('.', "_")), Some(role));
+        }
+    }
+
+    #[test]
+    fn names_are_those_of_parts_alone_or_behind_modules() {
+        let named = |name| Role::of_name(name).map(|role| role.to_string());
+        for (name, expected) in [
+            ("module.encoder.weight", Some("encoder.weight")),
+            ("net/decoder.2.bias", Some("decoder.2.bias")),
+            ("model.xi.rear.stance", Some("xi.rear.stance")),
+            ("W_e", None),
+            ("encoder.weight.mean", None),
+            ("encoder.running_mean", None),
+            ("myencoder.weight", None),
+            ("xi", None),
+            ("xi.", None),
+            ("", None),
+        ] {
+            assert_eq!(named(name).as_deref(), expected, "{name}");
         }
     }
 

@@ -149,7 +149,7 @@ impl<'b> TensorFile<'b> {
     /// A file without a tensor for a use.
     pub(super) fn missing(&self, role: &dyn std::fmt::Display) -> ImportError {
         let found = format!("no tensor for {role} among {}", self.listing());
-        let expected = format!("--map {role}=TENSOR to name one");
+        let expected = format!("a tensor of that name, or --map {role}=TENSOR");
         ImportError::at(&self.file, Place::Whole, found, expected)
     }
 

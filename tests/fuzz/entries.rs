@@ -10,9 +10,7 @@ use romc::artifact;
 use romc::check::{CheckOptions, Side, compare};
 use romc::deploy::{EmitOptions, Target, emit};
 use romc::equations::Equations;
-use romc::import::{
-    Format, ImportOptions, LibraryChoice, LibraryOrder, import_from_bytes, parse_standard,
-};
+use romc::import::{Format, ImportOptions, LibraryChoice, import_from_bytes, parse_standard};
 use romc::model::{ReducedModel, Scaling};
 use romc::recording::PhaseRule;
 use romc::recording::check::{check, without};
@@ -197,7 +195,7 @@ fn imported(format: Format, bytes: &[u8]) {
     let options = ImportOptions {
         name: "fuzz".to_owned(),
         library: matches!(format, Format::Npz | Format::Safetensors)
-            .then_some(LibraryChoice::Standard(library, LibraryOrder::Author)),
+            .then_some(LibraryChoice::Standard(library)),
         scaling: Some(Scaling::uniform(0.1)),
         ..ImportOptions::default()
     };

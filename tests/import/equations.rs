@@ -189,7 +189,7 @@ fn equations_that_do_not_fit_the_options_are_refused() {
         "eq.txt: found equations (line 1) of phase `stance`, expected --phase stance=FEET (any, \
          none, or patterns such as 0011 in the order fr fl rr rl)"
     );
-    let library = LibraryChoice::Standard(StandardLibrary::default(), LibraryOrder::Author);
+    let library = LibraryChoice::Standard(StandardLibrary::default());
     let given = ImportOptions {
         library: Some(library),
         ..base.clone()

@@ -28,7 +28,6 @@ fn options() -> ImportOptions {
         name: "small".to_owned(),
         library: Some(LibraryChoice::Standard(
             parse_standard("degree=1,inputs").expect("a shorthand"),
-            LibraryOrder::Author,
         )),
         scaling: Some(Scaling::uniform(0.1)),
         ..ImportOptions::default()
@@ -155,7 +154,7 @@ fn import_tells_missing_and_doubtful_tensors() {
         message(remove("xi.contact"), |_| {}),
         format!(
             "m.safetensors: found no tensor for xi.PHASE among {listing}, expected \
-             --map xi.PHASE=TENSOR to name one"
+             a tensor of that name, or --map xi.PHASE=TENSOR"
         )
     );
     assert!(
@@ -170,24 +169,11 @@ fn import_tells_missing_and_doubtful_tensors() {
         }),
         format!("m.safetensors: found no tensor `Xi_c` for xi.contact, expected one of {listing}")
     );
-    let second = plain("W_enc", &DMatrix::from_element(2, 5, 1.0));
+    let second = plain("net.encoder.weight", &DMatrix::from_element(2, 5, 1.0));
     assert_eq!(
         tensor_message("", second),
-        "m.safetensors: found `W_enc` (2 x 5), `encoder.weight` (2 x 5) for encoder.weight, \
-         expected one: name it with --map encoder.weight=TENSOR"
-    );
-    let unnamed = |stored: &mut Vec<Stored>| {
-        for tensor in stored
-            .iter_mut()
-            .filter(|tensor| tensor.name == "xi.contact")
-        {
-            tensor.name = "Xi".to_owned();
-        }
-    };
-    assert_eq!(
-        message(unnamed, |_| {}),
-        "m.safetensors: found the coefficients `Xi` (7 x 2), perhaps of phase `contact`, expected \
-         --phase contact=FEET (any, none, or patterns such as 0011 in the order fr fl rr rl)"
+        "m.safetensors: found `encoder.weight` (2 x 5), `net.encoder.weight` (2 x 5) for \
+         encoder.weight, expected one: name it with --map encoder.weight=TENSOR"
     );
     let strange = plain("xi_rear_stance", &DMatrix::zeros(7, 2));
     assert!(tensor_message("", strange).contains("of phase `rear_stance`, expected --phase"));
@@ -214,6 +200,32 @@ fn import_of_a_deeper_network_names_its_layers() {
          of a deeper encoder, expected one linear layer, or --activation elu, tanh or sigmoid to say \
          what is between them"
     );
+}
+
+#[test]
+fn import_of_layers_with_and_without_numbers_is_refused() {
+    let second = plain("encoder.2.weight", &DMatrix::from_element(2, 5, 0.5));
+    assert_eq!(
+        tensor_message("", second),
+        "m.safetensors: found `encoder.weight` (2 x 5), `encoder.2.weight` (2 x 5), the layers of a \
+         deeper encoder, expected numbers for all of them, or one with --map encoder.weight=TENSOR"
+    );
+}
+
+#[test]
+fn import_takes_all_weights_of_a_map_from_mappings_or_all_from_names() {
+    let mut stored = small();
+    stored.push(plain(
+        "other",
+        &DMatrix::from_fn(2, 5, |r, c| ((r + 2 * c * c) as f64).cos()),
+    ));
+    let mut options = options();
+    options.mapping = vec!["encoder.weight=other".parse().expect("a mapping")];
+    let imported = run(&stored, &options).expect("a mapping takes the place of a name");
+    let encoder = imported.model.encoder().expect("an encoder");
+    assert_eq!(encoder.weights()[(0, 1)], 2f64.cos());
+    assert_eq!(encoder.bias().as_slice(), [0.1, 0.2]);
+    assert_eq!(imported.report.unused[0].tensor, "encoder.weight");
 }
 
 fn wave(rows: usize, cols: usize, seed: f64) -> DMatrix<f64> {
@@ -380,8 +392,8 @@ fn import_tells_damaged_containers() {
     assert!(error(Format::Npz, &whole[..whole.len() / 2]).starts_with("m: not a usable npz file"));
     assert_eq!(
         error(Format::Npz, &zip(&[], CompressionMethod::Stored)),
-        "m: found no tensor for xi.PHASE among no tensors at all, expected --map xi.PHASE=TENSOR \
-         to name one"
+        "m: found no tensor for xi.PHASE among no tensors at all, expected a tensor of \
+         that name, or --map xi.PHASE=TENSOR"
     );
     let short = |bytes: usize| {
         let members: Vec<(String, Vec<u8>)> = (small().iter())

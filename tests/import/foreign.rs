@@ -38,20 +38,29 @@ fn rows(value: &Value) -> DMatrix<f64> {
 fn options() -> ImportOptions {
     ImportOptions {
         name: "foreign".to_owned(),
-        library: Some(LibraryChoice::Standard(
-            StandardLibrary::default(),
-            LibraryOrder::Author,
-        )),
+        library: Some(LibraryChoice::Standard(StandardLibrary::default())),
         scaling: Some(Scaling::uniform(0.1)),
         robot: Some(Robot::by_name("go1").expect("registered")),
         ..ImportOptions::default()
     }
 }
 
+fn mappings(texts: &[&str]) -> Vec<Mapping> {
+    let mappings = texts.iter().map(|text| text.parse().expect("a mapping"));
+    mappings.collect()
+}
+
 #[test]
 fn file_of_numpy_imports_with_row_vectors_fortran_order_and_mask() {
     let expected = expected();
-    let imported = import(&fixture("numpy.npz"), &options()).expect("as NumPy wrote it");
+    let mut options = options();
+    options.mapping = mappings(&[
+        "encoder.weight=W_e",
+        "encoder.bias=b_e",
+        "decoder.weight=W_d",
+        "decoder.bias=b_d",
+    ]);
+    let imported = import(&fixture("numpy.npz"), &options).expect("as NumPy wrote it");
     let model = &imported.model;
     let encoder = model.encoder().expect("an encoder");
     assert_eq!(*encoder.weights(), rows(&expected["encoder"]["weights"]));
@@ -83,7 +92,12 @@ fn file_of_numpy_imports_with_row_vectors_fortran_order_and_mask() {
 #[test]
 fn state_dict_in_safetensors_imports_with_column_vectors() {
     let single = &expected()["single"];
-    let imported = import(&fixture("torch.safetensors"), &options()).expect("as PyTorch saves it");
+    let mut options = options();
+    options.mapping = mappings(&[
+        "xi.contact=sindy_coefficients.contact",
+        "xi.flight=sindy_coefficients.flight",
+    ]);
+    let imported = import(&fixture("torch.safetensors"), &options).expect("as PyTorch saves it");
     let model = &imported.model;
     let encoder = model.encoder().expect("an encoder");
     assert_eq!(*encoder.weights(), rows(&single["encoder_weights"]));
@@ -99,7 +113,7 @@ fn state_dict_in_safetensors_imports_with_column_vectors() {
     let provenance = model.provenance();
     assert_eq!(provenance["imported_from"], "torch.safetensors");
     assert_eq!(
-        provenance["tensors"]["encoder.weight"]["tensor"],
+        provenance["tensors"]["encoder.0.weight"]["tensor"],
         "autoencoder.encoder.0.weight"
     );
 }

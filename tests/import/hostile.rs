@@ -14,7 +14,6 @@ fn options() -> ImportOptions {
         name: "hostile".to_owned(),
         library: Some(LibraryChoice::Standard(
             parse_standard("degree=1,inputs").expect("a shorthand"),
-            LibraryOrder::Author,
         )),
         scaling: Some(Scaling::uniform(0.1)),
         ..ImportOptions::default()

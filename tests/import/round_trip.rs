@@ -46,8 +46,14 @@ fn tensors(model: &ReducedModel, way: Way, name_of: impl Fn(&Role) -> String) ->
         (Part::Decoder, model.decoder()),
     ] {
         let Ok(map) = map else { continue };
-        stored.push(store(Role::Weights(part), &turned(map.weights(), row)));
-        stored.push(list(&name_of(&Role::Bias(part)), map.bias().as_slice()));
+        stored.push(store(
+            Role::Weights(part, None),
+            &turned(map.weights(), row),
+        ));
+        stored.push(list(
+            &name_of(&Role::Bias(part, None)),
+            map.bias().as_slice(),
+        ));
     }
     for (index, phase) in model.phases().iter().enumerate() {
         let turn = way.xi == XiLayout::LatentByTerms;
@@ -167,13 +173,13 @@ fn import_maps_names_that_say_nothing() {
 }
 
 #[test]
-fn import_of_usual_names_finds_the_phases_itself() {
+fn import_of_names_of_parts_finds_the_phases_itself() {
     let original = model("models/go1-d6.json");
     let way = ways()[0];
     let torch = |role: &Role| match role {
-        Role::Weights(part) => format!("model.{}.0.weight", part.name()),
-        Role::Bias(part) => format!("model.{}.0.bias", part.name()),
-        Role::Xi(phase) => format!("sindy_coefficients_{phase}"),
+        Role::Weights(part, _) => format!("model.{}.0.weight", part.name()),
+        Role::Bias(part, _) => format!("model.{}.0.bias", part.name()),
+        Role::Xi(phase) => format!("xi_{phase}"),
         other => other.to_string(),
     };
     let mut stored = tensors(&original, way, torch);
@@ -181,15 +187,11 @@ fn import_of_usual_names_finds_the_phases_itself() {
     let mut options = options_of(&original);
     options.phases.clear();
     let bytes = npz(&stored, CompressionMethod::Deflated);
-    let imported = import_from_bytes("m.npz", Format::Npz, &bytes, &options).expect("usual names");
+    let imported =
+        import_from_bytes("m.npz", Format::Npz, &bytes, &options).expect("names of parts");
     assert_same(&imported, &original, NAMES);
     let report = &imported.report;
-    assert!(
-        report
-            .used
-            .iter()
-            .all(|used| used.chosen == Chosen::Guessed)
-    );
+    assert!(report.used.iter().all(|used| used.chosen == Chosen::Named));
     assert_eq!(report.unused[0].tensor, "loss_history");
     let feet = |phase: &str, feet: &str| Note::UsualFeet {
         phase: phase.to_owned(),
@@ -237,7 +239,6 @@ fn import_of_square_weights_follows_the_option() {
         name: "square".to_owned(),
         library: Some(LibraryChoice::Standard(
             parse_standard("degree=1").expect("a shorthand"),
-            LibraryOrder::Author,
         )),
         phases: vec!["contact=any".parse().expect("a rule")],
         scaling: Some(romc::model::Scaling::uniform(1.0)),
@@ -272,7 +273,7 @@ fn import_applies_masks_of_coefficients() {
     for number in [Number::Bool, Number::F32, Number::F64] {
         let stored = [
             plain("xi_contact", &xi),
-            matrix("coefficient_mask_contact", &mask, number, Order::C),
+            matrix("mask.contact", &mask, number, Order::C),
         ];
         let options = ImportOptions {
             name: "masked".to_owned(),
@@ -333,43 +334,4 @@ fn import_takes_scale_factors_from_tensors() {
     let given = run(&options);
     assert_eq!(given.model.scaling().ok(), options.scaling.as_ref());
     assert_eq!(given.report.unused.len(), 2);
-}
-
-#[test]
-fn import_finds_tensors_named_exactly_as_a_part_whatever_the_phase_is_called() {
-    let original = model("models/paper-2d.json");
-    let mut options = options_of(&original);
-    for (rule, name) in options.phases.iter_mut().zip(["net", "expo"]) {
-        rule.name = name.to_owned();
-    }
-    let stored: Vec<Stored> = (original.phases().iter().zip(&options.phases))
-        .map(|(phase, rule)| plain(&format!("xi.{}", rule.name), &phase.xi))
-        .collect();
-    let bytes = safetensors(&stored);
-    let imported = import_from_bytes("m", Format::Safetensors, &bytes, &options).expect("parts");
-    for (phase, original) in imported.model.phases().iter().zip(original.phases()) {
-        assert_eq!(phase.xi, original.xi);
-    }
-}
-
-#[test]
-fn import_of_the_papers_order_moves_the_rows() {
-    let original = model("models/paper-2d.json");
-    let to_paper = |xi: &DMatrix<f64>| {
-        // 1, z, dz are rows 0 to 4; then two rows each of sin z, sin dz, cos z, cos dz; then u.
-        let rows = [0, 1, 2, 3, 4, 5, 6, 9, 10, 7, 8, 11, 12, 13, 14];
-        xi.select_rows(&rows)
-    };
-    let stored: Vec<Stored> = (original.phases().iter())
-        .map(|phase| plain(&format!("xi_{}", phase.name), &to_paper(&phase.xi)))
-        .collect();
-    let mut options = options_of(&original);
-    options.library = Some(LibraryChoice::Standard(
-        parse_standard("degree=1,trigonometric,inputs").expect("a shorthand"),
-        LibraryOrder::Paper,
-    ));
-    let bytes = safetensors(&stored);
-    let imported = import_from_bytes("m", Format::Safetensors, &bytes, &options).expect("rows");
-    assert_same(&imported, &original, NAMES);
-    assert!(imported.report.notes.contains(&Note::PaperOrder));
 }

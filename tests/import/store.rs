@@ -158,9 +158,7 @@ pub fn model(path: &str) -> ReducedModel {
 /// All that tensors do not carry about a model.
 pub fn options_of(model: &ReducedModel) -> ImportOptions {
     let library = match model.library().source() {
-        LibrarySource::Standard(standard) => {
-            LibraryChoice::Standard(standard, LibraryOrder::Author)
-        }
+        LibrarySource::Standard(standard) => LibraryChoice::Standard(standard),
         LibrarySource::Terms => {
             let terms = model.library().terms().iter();
             LibraryChoice::Terms(terms.map(|term| term.text().to_owned()).collect())

@@ -7,7 +7,7 @@ use clap::Args;
 use super::command::OutputArguments;
 use super::number::{at_least_one, positive_seconds};
 use crate::import::{
-    Format, ImportError, LibraryOrder, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
+    Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
 };
 use crate::model::{Activation, StandardLibrary};
 
@@ -33,9 +33,9 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
 #[command(
     after_help = "Tensors are found by the names of the parts, encoder.weight, encoder.bias, decoder.weight,\n\
                   decoder.bias, xi.PHASE, mask.PHASE, input_mean.PHASE, input_covariance.PHASE, scaling.state,\n\
-                  scaling.input, or usual spellings of them (net.encoder.0.weight, encoder/kernel:0, W_e,\n\
-                  xi_contact, ...); --map names the others. Statistics are of u in SI units: 18 numbers and\n\
-                  18 x 18. The part and layout of each tensor are printed.\n\n\
+                  scaling.input, alone or behind names of modules (net.encoder.0.weight), with dots or\n\
+                  underscores (xi_contact); --map names the others. Statistics are of u in SI units: 18 numbers\n\
+                  and 18 x 18. The part and layout of each tensor are printed.\n\n\
                   Examples:\n  \
                   romc import net.safetensors --library degree=1,trigonometric,inputs --scaling 0.1 \\\n      \
                   --map xi.contact=Xi_c --map xi.flight=Xi_f --robot go1 --output my-model.json\n  \
@@ -70,9 +70,6 @@ pub struct ImportArguments {
     /// Candidate terms: `degree=N[,trigonometric][,inputs]`, or a file with the list of terms
     #[arg(long, value_name = "LIBRARY", value_parser = library_argument)]
     pub library: Option<LibraryArgument>,
-    /// Order of the sines and cosines of degree=N,trigonometric
-    #[arg(long, value_enum, default_value = "author")]
-    pub library_order: LibraryOrder,
     /// Number of latent coordinates d: needed if shapes leave it open
     #[arg(long, value_name = "D", value_parser = at_least_one)]
     pub latent_dim: Option<usize>,

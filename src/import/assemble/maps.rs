@@ -2,12 +2,13 @@
 
 use nalgebra::DVector;
 
-use super::super::assign::{Assigned, deeper};
+use super::super::assign::Assigned;
 use super::super::error::ImportError;
 use super::super::options::WeightVectors;
 use super::super::report::{Layout, Note};
 use super::super::role::{Part, Role};
 use super::{Assembly, Known};
+use crate::files::Place;
 use crate::model::{Activation, AffineMap, Layer, StateMap};
 
 /// Weights and bias of a layer.
@@ -36,29 +37,39 @@ impl<'a> Assembly<'a, '_> {
         Ok(maps)
     }
 
-    /// The tensors of a map's layers, the first applied first.
+    /// The tensors of a map's layers, in the order of their numbers.
     fn layers(&self, part: Part) -> Result<Vec<Tensors<'a>>, ImportError> {
         let mut layers: Vec<Tensors<'a>> = Vec::new();
-        // Sorted by role, and so by number.
-        for assigned in &self.assignment.used {
-            match assigned.role.layer() {
-                Some((found, number)) if found == part => {
-                    layers.push((assigned, self.find(&Role::LayerBias(part, number))));
+        let used = &self.assignment.used;
+        for assigned in used {
+            match assigned.role {
+                Role::Weights(found, number) if found == part => {
+                    layers.push((assigned, self.find(&Role::Bias(part, number))));
+                }
+                Role::Bias(found, number) if found == part => {
+                    let weights = Role::Weights(part, number);
+                    (self.find(&weights)).ok_or_else(|| self.tensors.missing(&weights))?;
                 }
                 _ => {}
             }
         }
-        if !layers.is_empty() && self.options.activation.is_none() {
+        let is_mixed = layers.len() > 1 && layers[0].0.role == Role::Weights(part, None);
+        if layers.len() > 1 && (is_mixed || self.options.activation.is_none()) {
+            let name = part.name();
             let texts: Vec<String> = layers.iter().map(|(a, _)| a.info.describe()).collect();
-            return Err(deeper(self.tensors.file(), part, &texts));
-        }
-        if layers.is_empty() {
-            let weights = Role::Weights(part);
-            match (self.find(&weights), self.find(&Role::Bias(part))) {
-                (Some(weights), bias) => layers.push((weights, bias)),
-                (None, Some(_)) => return Err(self.tensors.missing(&weights)),
-                (None, None) => {}
-            }
+            let found = format!("{}, the layers of a deeper {name}", texts.join(", "));
+            let expected = match is_mixed {
+                true => format!("numbers for all of them, or one with --map {name}.weight=TENSOR"),
+                false => "one linear layer, or --activation elu, tanh or sigmoid to say what is \
+                          between them"
+                    .to_owned(),
+            };
+            return Err(ImportError::at(
+                self.tensors.file(),
+                Place::Whole,
+                found,
+                expected,
+            ));
         }
         Ok(layers)
     }
@@ -67,11 +78,11 @@ impl<'a> Assembly<'a, '_> {
     fn map(&mut self, part: Part) -> Result<Option<StateMap>, ImportError> {
         let tensors = self.layers(part)?;
         let part_name = part.name();
-        let Some(((first, _), last)) = tensors.first().zip(tensors.len().checked_sub(1)) else {
+        let Some(last) = tensors.len().checked_sub(1) else {
             self.notes.notes.push(Note::NoMap { part: part_name });
             return Ok(None);
         };
-        let is_deep = first.role.layer().is_some();
+        let is_deep = last > 0;
         let layout = self.orientation(part, &tensors)?;
         let mut layers = Vec::with_capacity(tensors.len());
         for (place, &(assigned, bias)) in tensors.iter().enumerate() {
