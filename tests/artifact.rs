@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use romc::artifact::{self, ArtifactError, ArtifactFault};
 use romc::files::Overwrite;
-use romc::model::{Dimensions, IdentifierError, LibraryError, ModelError, ReducedModel};
+use romc::model::{IdentifierError, LibraryError, ModelError, ReducedModel};
 use serde_json::{Value, json};
 
 fn fixture_folder() -> PathBuf {
@@ -50,6 +50,22 @@ fn refusal(name: &str, change: impl Fn(&mut Value)) -> ArtifactError {
 fn model_refusal(name: &str, change: impl Fn(&mut Value)) -> ModelError {
     match refusal(name, change).kind {
         ArtifactFault::Model(source) => *source,
+        other => panic!("{other}"),
+    }
+}
+
+/// Place, what was found and what was expected, of a part that cannot be as it is.
+fn invalid(name: &str, change: impl Fn(&mut Value)) -> [String; 3] {
+    parts_of(model_refusal(name, change))
+}
+
+fn parts_of(error: ModelError) -> [String; 3] {
+    match error {
+        ModelError::Invalid {
+            place,
+            found,
+            expected,
+        } => [place, found, expected],
         other => panic!("{other}"),
     }
 }
@@ -272,7 +288,9 @@ fn layers_that_are_wrong_are_refused_at_their_place() {
     });
     match found.map_err(|error| error.kind) {
         Err(ArtifactFault::Model(source)) => {
-            assert!(matches!(*source, ModelError::UnknownActivation { .. }));
+            let [_, found, expected] = parts_of(*source);
+            assert_eq!(found, "\"gelu\"");
+            assert!(expected.contains("elu, tanh"), "{expected}");
         }
         other => panic!("{other:?}"),
     }
@@ -300,14 +318,11 @@ fn layers_that_are_wrong_are_refused_at_their_place() {
     });
     match narrow.map_err(|error| error.kind) {
         Err(ArtifactFault::Model(source)) => {
-            assert!(matches!(
-                *source,
-                ModelError::Count {
-                    found: 1,
-                    unit: "units",
-                    ..
-                }
-            ));
+            let [place, found, _] = parts_of(*source);
+            assert_eq!(
+                (place.as_str(), found.as_str()),
+                ("`encoder.layers[0]`", "1 units")
+            );
         }
         other => panic!("{other:?}"),
     }
@@ -489,36 +504,28 @@ fn numbers_that_are_not_finite_are_refused_at_their_place() {
 #[test]
 fn scale_factors_that_are_zero_negative_or_tiny_are_refused() {
     for factor in [0.0, -0.1, 1e-310] {
-        let error = model_refusal("robot-degree-2", |value| {
+        let [place, found, _] = invalid("robot-degree-2", |value| {
             value["scaling"]["input"][7] = json!(factor);
         });
         assert_eq!(
-            error,
-            ModelError::ScaleFactor {
-                tensor: "input",
-                index: 7,
-                found: factor
-            }
+            (place, found),
+            ("`scaling.input`[7]".to_owned(), factor.to_string())
         );
     }
-    let error = model_refusal("three-phases", |value| value["scaling"]["state"] = json!(0));
-    assert!(matches!(
-        error,
-        ModelError::ScaleFactor {
-            tensor: "state",
-            index: 0,
-            ..
-        }
-    ));
+    let [place, ..] = invalid("three-phases", |value| value["scaling"]["state"] = json!(0));
+    assert_eq!(place, "`scaling.state`[0]");
 }
 
 #[test]
 fn sample_time_that_is_not_a_short_positive_time_is_refused() {
     for time in [0.0, -0.002, 1.5] {
-        let error = model_refusal("robot-degree-2", |value| {
+        let [place, found, _] = invalid("robot-degree-2", |value| {
             value["sample_time_s"] = json!(time)
         });
-        assert!(matches!(error, ModelError::SampleTime { found, .. } if found == time));
+        assert_eq!(
+            (place, found),
+            ("`sample_time_s`".to_owned(), time.to_string())
+        );
     }
 }
 
@@ -539,27 +546,26 @@ fn latent_dim_of_zero_or_beyond_bound_is_refused() {
 
 #[test]
 fn each_tensor_with_one_row_too_few_or_many_is_refused() {
-    let shape = |rows, columns| Dimensions(rows, columns);
     for (pointer, tensor, expected) in [
-        ("/encoder/weights", "encoder.weights", shape(3, 18)),
-        ("/encoder/bias", "encoder.bias", shape(3, 1)),
-        ("/decoder/weights", "decoder.weights", shape(18, 3)),
-        ("/decoder/bias", "decoder.bias", shape(18, 1)),
-        ("/phases/0/xi", "phases[0].xi", shape(43, 3)),
-        ("/phases/1/xi", "phases[1].xi", shape(43, 3)),
-        ("/scaling/state", "scaling.state", shape(18, 1)),
-        ("/scaling/input", "scaling.input", shape(18, 1)),
-        ("/state/units", "state.units", shape(18, 1)),
-        ("/input/names", "input.names", shape(18, 1)),
-        ("/input/units", "input.units", shape(18, 1)),
+        ("/encoder/weights", "encoder.weights", (3, 18)),
+        ("/encoder/bias", "encoder.bias", (3, 1)),
+        ("/decoder/weights", "decoder.weights", (18, 3)),
+        ("/decoder/bias", "decoder.bias", (18, 1)),
+        ("/phases/0/xi", "phases[0].xi", (43, 3)),
+        ("/phases/1/xi", "phases[1].xi", (43, 3)),
+        ("/scaling/state", "scaling.state", (18, 1)),
+        ("/scaling/input", "scaling.input", (18, 1)),
+        ("/state/units", "state.units", (18, 1)),
+        ("/input/names", "input.names", (18, 1)),
+        ("/input/units", "input.units", (18, 1)),
         (
             "/input_statistics/flight/covariance",
             "input_statistics.flight.covariance",
-            shape(18, 18),
+            (18, 18),
         ),
     ] {
         for grow in [false, true] {
-            let error = model_refusal("robot-degree-2", |value| {
+            let [place, found, wanted] = invalid("robot-degree-2", |value| {
                 let rows = array(value, pointer);
                 let last = rows.pop().expect("not empty");
                 if grow {
@@ -567,22 +573,17 @@ fn each_tensor_with_one_row_too_few_or_many_is_refused() {
                     rows.push(last);
                 }
             });
-            match error {
-                ModelError::Shape {
-                    tensor: t,
-                    found,
-                    expected: e,
-                } => {
-                    // A bias is compared with its weights first: either may be told.
-                    let rows = if grow { expected.0 + 1 } else { expected.0 - 1 };
-                    let told_itself = t == tensor && e == expected && found.0 == rows;
-                    let told_bias = tensor.ends_with(".weights")
-                        && t == tensor.replace("weights", "bias")
-                        && e.0 == rows;
-                    assert!(told_itself || told_bias, "{t}: {found}, {e}");
-                }
-                other => panic!("{pointer}: {other:?}"),
-            }
+            let rows: usize = if grow { expected.0 + 1 } else { expected.0 - 1 };
+            let of = |rows, columns| format!("{rows} x {columns}");
+            let suffix = " (rows x columns)";
+            let names_itself = place == format!("`{tensor}`")
+                && found == of(rows, expected.1)
+                && wanted == of(expected.0, expected.1) + suffix;
+            // A bias is compared with its weights first: either may be named.
+            let names_bias = tensor.ends_with(".weights")
+                && place == format!("`{}`", tensor.replace("weights", "bias"))
+                && wanted == of(rows, 1) + suffix;
+            assert!(names_itself || names_bias, "{place}: {found}, {wanted}");
         }
     }
 }
@@ -590,7 +591,7 @@ fn each_tensor_with_one_row_too_few_or_many_is_refused() {
 #[test]
 fn state_names_off_by_one_are_refused() {
     for grow in [false, true] {
-        let error = model_refusal("robot-degree-2", |value| {
+        let [place, _, expected] = invalid("robot-degree-2", |value| {
             for key in ["/state/names", "/state/units"] {
                 let texts = array(value, key);
                 let last = texts.pop().expect("not empty");
@@ -600,15 +601,8 @@ fn state_names_off_by_one_are_refused() {
                 }
             }
         });
-        match error {
-            ModelError::Shape {
-                tensor, expected, ..
-            } => {
-                assert_eq!(tensor, "state.names");
-                assert_eq!(expected, Dimensions(18, 1));
-            }
-            other => panic!("{other:?}"),
-        }
+        assert_eq!(place, "`state.names`");
+        assert_eq!(expected, "18 x 1 (rows x columns)");
     }
 }
 
@@ -666,7 +660,7 @@ fn mean_off_by_one_is_refused() {
 #[test]
 fn library_longer_or_shorter_by_one_than_xi_is_refused() {
     for grow in [false, true] {
-        let error = model_refusal("three-phases", |value| {
+        let parts = invalid("three-phases", |value| {
             let terms = array(value, "/library");
             if grow {
                 terms.push(json!("z1^2"));
@@ -675,14 +669,8 @@ fn library_longer_or_shorter_by_one_than_xi_is_refused() {
             }
         });
         let rows = if grow { 10 } else { 8 };
-        assert_eq!(
-            error,
-            ModelError::Shape {
-                tensor: "phases[0].xi".into(),
-                found: Dimensions(9, 2),
-                expected: Dimensions(rows, 2)
-            }
-        );
+        let expected = format!("{rows} x 2 (rows x columns)");
+        assert_eq!(parts, ["`phases[0].xi`", "9 x 2", expected.as_str()]);
     }
 }
 
@@ -748,36 +736,25 @@ fn encoder_with_huge_or_tiny_entries_keeps_its_rank() {
 
 #[test]
 fn covariance_that_is_not_symmetric_or_positive_is_refused() {
-    let error = model_refusal("robot-degree-2", |value| {
+    let [place, ..] = invalid("robot-degree-2", |value| {
         let cell = &mut value["input_statistics"]["contact"]["covariance"][5][2];
         *cell = json!(cell.as_f64().unwrap() + 0.5);
     });
-    assert!(matches!(
-        error,
-        ModelError::NotSymmetric {
-            row: 5,
-            column: 2,
-            ..
-        }
-    ));
-    let error = model_refusal("robot-degree-2", |value| {
+    assert_eq!(place, "`input_statistics.contact.covariance`[5][2]");
+    let [_, found, _] = invalid("robot-degree-2", |value| {
         value["input_statistics"]["flight"]["covariance"][4][4] = json!(-3.0);
     });
-    assert!(matches!(error, ModelError::NotPositive { smallest, .. } if smallest <= -3.0));
+    let eigenvalue = found.strip_prefix("the eigenvalue ").expect("a number");
+    assert!(eigenvalue.parse::<f64>().expect("a number") <= -3.0);
 }
 
 #[test]
 fn statistics_of_an_unknown_or_repeated_phase_are_refused() {
-    let error = model_refusal("robot-degree-2", |value| {
+    let [place, found, _] = invalid("robot-degree-2", |value| {
         let entry = value["input_statistics"]["contact"].clone();
         value["input_statistics"]["stance"] = entry;
     });
-    assert_eq!(
-        error,
-        ModelError::StatisticsPhase {
-            name: "stance".into()
-        }
-    );
+    assert_eq!([place, found], ["`input_statistics`", "\"stance\""]);
     let text = fixture("robot-degree-2").to_string();
     let (statistics, contact) = (
         "\"input_statistics\":{",
@@ -959,18 +936,13 @@ fn phase_names_that_collide_as_identifiers_are_refused() {
         ("rear-stance", "rear stance"),
         ("contact", "Contact"),
     ] {
-        let error = model_refusal("degree-3", |value| {
+        let [place, found, expected] = invalid("degree-3", |value| {
             value["phases"][0]["name"] = json!(first);
             value["phases"][1]["name"] = json!(second);
         });
-        assert!(matches!(
-            error,
-            ModelError::DuplicatePhase {
-                first: 0,
-                second: 1,
-                ..
-            }
-        ));
+        assert_eq!(place, "phases[1].name");
+        assert!(found.starts_with(&format!("{second:?}")), "{found}");
+        assert!(expected.ends_with("phases[0]"), "{expected}");
     }
 }
 
@@ -1001,23 +973,16 @@ fn feet_in_another_spelling_are_refused() {
         });
         assert!(place.starts_with("phases[0].feet"), "{place}");
     }
-    let error = model_refusal("three-phases", |value| {
+    let [place, ..] = invalid("three-phases", |value| {
         value["phases"][1]["feet"] = json!([[0, 0, 1, 1], [0, 0, 1, 1]]);
     });
-    assert_eq!(error, ModelError::DuplicatePattern { phase: 1, index: 1 });
+    assert_eq!(place, "phases[1].feet[1]");
 }
 
 #[test]
 fn model_without_phases_is_refused() {
-    let error = model_refusal("degree-3", |value| value["phases"] = json!([]));
-    assert!(matches!(
-        error,
-        ModelError::Count {
-            found: 0,
-            unit: "phases",
-            ..
-        }
-    ));
+    let [_, found, _] = invalid("degree-3", |value| value["phases"] = json!([]));
+    assert_eq!(found, "0 phases");
 }
 
 #[test]
@@ -1031,42 +996,41 @@ fn signal_names_and_units_that_smuggle_or_repeat_are_refused() {
         ("/state/units/0", "\\input{x}"),
         ("/state/units/0", "m\n"),
     ] {
-        let error = model_refusal("three-phases", |value| {
+        let [place, _, expected] = invalid("three-phases", |value| {
             *value.pointer_mut(pointer).expect("there") = json!(text);
         });
-        assert!(
-            matches!(error, ModelError::SignalText { .. }),
-            "{text:?}: {error}"
-        );
+        let list = if pointer.contains("names") {
+            "`state.names`[1]"
+        } else {
+            "`state.units`[0]"
+        };
+        assert_eq!(place, list, "{text:?}");
+        assert!(expected.starts_with("1 to 64 characters"), "{expected}");
     }
-    let error = model_refusal("three-phases", |value| {
+    let [place, found, _] = invalid("three-phases", |value| {
         value["state"]["names"][4] = json!("b")
     });
-    assert!(matches!(
-        error,
-        ModelError::DuplicateSignal {
-            first: 1,
-            second: 4,
-            ..
-        }
-    ));
+    assert_eq!(
+        [place, found],
+        ["`state.names`[4]", "\"b\" as in [1] already"]
+    );
 }
 
 #[test]
 fn unknown_robot_and_foreign_coordinates_are_refused() {
     let error = model_refusal("robot-degree-2", |value| value["robot"] = json!("rex"));
     assert!(matches!(error, ModelError::Robot(_)), "{error}");
-    let error = model_refusal("robot-degree-2", |value| {
+    let [place, ..] = invalid("robot-degree-2", |value| {
         array(value, "/state/names").swap(3, 6);
     });
-    assert!(matches!(error, ModelError::RobotSignal { index: 3, .. }));
+    assert_eq!(place, "`state.names`[3]");
 }
 
 #[test]
 fn description_with_control_characters_is_refused() {
     for text in ["a\u{7}b".to_owned(), "x".repeat(20_000)] {
-        let error = model_refusal("degree-3", |value| value["description"] = json!(text));
-        assert!(matches!(error, ModelError::Description { .. }));
+        let [place, ..] = invalid("degree-3", |value| value["description"] = json!(text));
+        assert_eq!(place, "`description`");
     }
 }
 

@@ -113,9 +113,10 @@ impl FromStr for Activation {
 
     fn from_str(name: &str) -> Result<Self, ModelError> {
         let known = Self::ALL.into_iter().find(|known| known.name() == name);
-        known.ok_or_else(|| ModelError::UnknownActivation {
-            found: name.chars().take(40).collect(),
-            expected: Self::ALL.map(Self::name).join(", "),
+        known.ok_or_else(|| {
+            let name: String = name.chars().take(40).collect();
+            let expected = format!("one of {}", Self::ALL.map(Self::name).join(", "));
+            ModelError::invalid("activation", format!("{name:?}"), expected)
         })
     }
 }

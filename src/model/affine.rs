@@ -18,7 +18,7 @@ impl AffineMap {
     /// The map with these weights and this bias; `tensor` names it in errors.
     ///
     /// # Errors
-    /// [`ModelError::Shape`] unless `bias` has one entry per row of `weights`,
+    /// [`ModelError::Invalid`] unless `bias` has one entry per row of `weights`,
     /// [`ModelError::NonFinite`] if an entry is infinite or not a number.
     pub fn new(
         tensor: &str,

@@ -190,7 +190,7 @@ impl ModelBuilder {
         }
         let linear = self.encoder.as_ref().and_then(StateMap::as_affine);
         let input_projection = match linear {
-            Some(encoder) => Some(pinv_of_transpose(encoder.weights())?),
+            Some(encoder) => Some(pinv_of_transpose(encoder.weights(), "`encoder.weights`")?),
             None => None,
         };
         let statistics = self.check_statistics(state_dim)?;
@@ -216,24 +216,20 @@ impl ModelBuilder {
 
     fn check_phase_names(&self) -> Result<Vec<Identifier>, ModelError> {
         if !(1..=MAX_PHASES).contains(&self.phases.len()) {
-            return Err(ModelError::Count {
-                part: "phases".to_owned(),
-                found: self.phases.len(),
-                unit: "phases",
-                expected: format!("1 to {MAX_PHASES}"),
-            });
+            let found = format!("{} phases", self.phases.len());
+            let expected = format!("1 to {MAX_PHASES}");
+            return Err(ModelError::invalid("`phases`", found, expected));
         }
         let mut first_use = HashMap::new();
         let mut identifiers = Vec::with_capacity(self.phases.len());
         for (second, phase) in self.phases.iter().enumerate() {
-            let identifier = identifier_of(&format!("phases[{second}].name"), &phase.name)?;
+            let place = format!("phases[{second}].name");
+            let identifier = identifier_of(&place, &phase.name)?;
             if let Some(first) = first_use.insert(identifier.upper(), second) {
-                return Err(ModelError::DuplicatePhase {
-                    first,
-                    second,
-                    name: phase.name.clone(),
-                    identifier: identifier.to_string(),
-                });
+                // Identifiers are compared without case, because macros are upper case.
+                let found = format!("{:?}, which becomes `{identifier}` in code", phase.name);
+                let expected = format!("another identifier than that of phases[{first}]");
+                return Err(ModelError::invalid(place, found, expected));
             }
             identifiers.push(identifier);
         }
@@ -250,10 +246,9 @@ impl ModelBuilder {
                 let repeated = (1..patterns.len())
                     .find(|&second| patterns[..second].contains(&patterns[second]));
                 if let Some(second) = repeated {
-                    return Err(ModelError::DuplicatePattern {
-                        phase: index,
-                        index: second,
-                    });
+                    let place = format!("phases[{index}].feet[{second}]");
+                    let found = "a pattern that is in the list already";
+                    return Err(ModelError::invalid(place, found, "each pattern once"));
                 }
             }
         }
@@ -276,17 +271,14 @@ impl ModelBuilder {
         let printable = |c: char| !c.is_control() || c == '\n';
         if self.description.len() > MAX_DESCRIPTION_LEN || !self.description.chars().all(printable)
         {
-            return Err(ModelError::Description {
-                found: self.description.len(),
-                max: MAX_DESCRIPTION_LEN,
-            });
+            let found = format!("{} bytes or a control character", self.description.len());
+            let expected = format!("at most {MAX_DESCRIPTION_LEN} bytes of text");
+            return Err(ModelError::invalid("`description`", found, expected));
         }
         match self.sample_time_s {
             Some(found) if !(found > 0.0 && found <= MAX_SAMPLE_TIME_S) => {
-                Err(ModelError::SampleTime {
-                    found,
-                    max: MAX_SAMPLE_TIME_S,
-                })
+                let expected = format!("a positive number up to {MAX_SAMPLE_TIME_S}");
+                Err(ModelError::invalid("`sample_time_s`", found, expected))
             }
             _ => Ok(()),
         }
@@ -318,12 +310,9 @@ impl ModelBuilder {
             return Ok(None);
         };
         if !(latent_dim..=MAX_STATE_DIM).contains(&dim) {
-            return Err(ModelError::Count {
-                part: "state".to_owned(),
-                found: dim,
-                unit: "robot coordinates",
-                expected: format!("{latent_dim} (one per latent coordinate) to {MAX_STATE_DIM}"),
-            });
+            let found = format!("{dim} robot coordinates");
+            let expected = format!("{latent_dim} (one per latent coordinate) to {MAX_STATE_DIM}");
+            return Err(ModelError::invalid("`state`", found, expected));
         }
         if let Some(encoder) = &self.encoder {
             check_map("encoder", encoder, (latent_dim, dim))?;
@@ -362,7 +351,10 @@ impl ModelBuilder {
                 .position(|phase| phase.name == *name)
                 .map(|phase| &mut ordered[phase])
                 .filter(|slot| slot.is_none())
-                .ok_or_else(|| ModelError::StatisticsPhase { name: name.clone() })?;
+                .ok_or_else(|| {
+                    let expected = "the name of one phase, each once";
+                    ModelError::invalid("`input_statistics`", format!("{name:?}"), expected)
+                })?;
             let dim = state_dim.ok_or(ModelError::Incomplete {
                 part: "input_statistics",
                 needs: "encoder",
@@ -393,13 +385,9 @@ fn check_robot_names(
     };
     for (index, (found, expected)) in given.names.iter().zip(expected).enumerate() {
         if found != expected {
-            return Err(ModelError::RobotSignal {
-                signals,
-                index,
-                found: found.clone(),
-                expected: expected.clone(),
-                robot: robot.name().to_owned(),
-            });
+            let place = format!("`{signals}.names`[{index}]");
+            let expected = format!("{expected:?} as on robot {}", robot.name());
+            return Err(ModelError::invalid(place, format!("{found:?}"), expected));
         }
     }
     Ok(())
@@ -430,11 +418,14 @@ fn check_widths(encoder: &StateMap, latent_dim: usize) -> Result<(), ModelError>
     let widths = encoder.layers().iter().map(|layer| layer.map.output_dim());
     match widths.enumerate().find(|&(_, width)| width < latent_dim) {
         None => Ok(()),
-        Some((layer, found)) => Err(ModelError::Count {
-            part: format!("encoder.layers[{layer}]"),
-            found,
-            unit: "units",
-            expected: format!("at least {latent_dim}, one per latent coordinate"),
-        }),
+        Some((layer, found)) => {
+            let expected = format!("at least {latent_dim}, one per latent coordinate");
+            let place = format!("`encoder.layers[{layer}]`");
+            Err(ModelError::invalid(
+                place,
+                format!("{found} units"),
+                expected,
+            ))
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{ModelError, SignalPart, check_shape};
+use super::error::{ModelError, check_shape};
 
 const MAX_TEXT_LEN: usize = 64;
 
@@ -34,33 +34,30 @@ impl CoordinateNames {
         let dim = dim.unwrap_or(self.names.len());
         check_shape(&format!("{signals}.names"), (self.names.len(), 1), (dim, 1))?;
         check_shape(&format!("{signals}.units"), (self.units.len(), 1), (dim, 1))?;
-        check_texts(signals, SignalPart::Name, &self.names)?;
-        check_texts(signals, SignalPart::Unit, &self.units)?;
+        let names = ("ASCII letters, digits, `.`, `_`, `-`", "._-");
+        check_texts(&format!("{signals}.names"), &self.names, names)?;
+        let units = ("ASCII letters, digits, space, `/`, `^`, `.`, `-`", " /^.-");
+        check_texts(&format!("{signals}.units"), &self.units, units)?;
         let mut sorted: Vec<usize> = (0..dim).collect();
         sorted.sort_by_key(|&index| (&self.names[index], index));
         for pair in sorted.windows(2) {
             if self.names[pair[0]] == self.names[pair[1]] {
-                return Err(ModelError::DuplicateSignal {
-                    signals,
-                    first: pair[0],
-                    second: pair[1],
-                    name: self.names[pair[1]].clone(),
-                });
+                let place = format!("`{signals}.names`[{}]", pair[1]);
+                let found = format!("{:?} as in [{}] already", self.names[pair[1]], pair[0]);
+                return Err(ModelError::invalid(place, found, "different names"));
             }
         }
         Ok(())
     }
 }
 
+/// Refuses texts of other characters than letters, digits and the given punctuation, which comes
+/// with its description.
 fn check_texts(
-    signals: &'static str,
-    part: SignalPart,
+    list: &str,
     texts: &[String],
+    (allowed, punctuation): (&str, &str),
 ) -> Result<(), ModelError> {
-    let (allowed, punctuation) = match part {
-        SignalPart::Name => ("ASCII letters, digits, `.`, `_`, `-`", "._-"),
-        SignalPart::Unit => ("ASCII letters, digits, space, `/`, `^`, `.`, `-`", " /^.-"),
-    };
     let fits = |text: &String| {
         (1..=MAX_TEXT_LEN).contains(&text.len())
             && !text.contains("//")
@@ -70,13 +67,11 @@ fn check_texts(
     };
     match texts.iter().position(|text| !fits(text)) {
         None => Ok(()),
-        Some(index) => Err(ModelError::SignalText {
-            signals,
-            part,
-            index,
-            found: texts[index].chars().take(2 * MAX_TEXT_LEN).collect(),
-            max: MAX_TEXT_LEN,
-            allowed,
-        }),
+        Some(index) => {
+            let found: String = texts[index].chars().take(2 * MAX_TEXT_LEN).collect();
+            let expected = format!("1 to {MAX_TEXT_LEN} characters out of {allowed}");
+            let place = format!("`{list}`[{index}]");
+            Err(ModelError::invalid(place, format!("{found:?}"), expected))
+        }
     }
 }

@@ -58,7 +58,7 @@ pub use activation::Activation;
 pub use affine::AffineMap;
 pub use builder::ModelBuilder;
 pub use coordinate_names::CoordinateNames;
-pub use error::{Dimensions, ModelError, SignalPart};
+pub use error::ModelError;
 pub(crate) use evaluation::{Step, Tape};
 pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN};
 pub use library::{

@@ -9,27 +9,21 @@ pub const RANK_TOLERANCE: f64 = 1e-10;
 
 /// `pinv(J^T)` of a nonlinear encoder's Jacobian at a state.
 pub(super) fn pinv_of_jacobian(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
-    pinv_of_transpose(jacobian).map_err(|error| match error {
-        ModelError::RankDeficient {
-            smallest,
-            largest,
-            expected,
-            tolerance,
-        } => ModelError::SingularJacobian {
-            smallest,
-            largest,
-            expected,
-            tolerance,
-        },
-        other => other,
-    })
+    pinv_of_transpose(jacobian, "Jacobian of the encoder at this state")
 }
 
 /// `pinv(W_e^T)`, `latent_dim x state_dim`, from the singular values of `W_e = U S V^T`:
 /// `pinv(W_e^T) = U S^-1 V^T`.
-pub(super) fn pinv_of_transpose(weights: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
+///
+/// # Errors
+/// [`ModelError::RankDeficient`], with the name of the matrix.
+pub(super) fn pinv_of_transpose(
+    weights: &DMatrix<f64>,
+    matrix: &'static str,
+) -> Result<DMatrix<f64>, ModelError> {
     let expected = weights.nrows();
     let deficient = |smallest, largest| ModelError::RankDeficient {
+        matrix,
         smallest,
         largest,
         expected,
@@ -44,9 +38,7 @@ pub(super) fn pinv_of_transpose(weights: &DMatrix<f64>) -> Result<DMatrix<f64>, 
     let max_iterations = 1_000 * weights.ncols();
     let svd = nalgebra::SVD::try_new(normalised, true, true, f64::EPSILON, max_iterations)
         .filter(|svd| svd.singular_values.iter().all(|value| value.is_finite()))
-        .ok_or_else(|| ModelError::Decomposition {
-            tensor: "encoder.weights".to_owned(),
-        })?;
+        .ok_or_else(|| ModelError::no_decomposition("encoder.weights"))?;
     let smallest = svd.singular_values.min();
     let largest = svd.singular_values.max();
     if smallest <= RANK_TOLERANCE * largest {

@@ -40,11 +40,11 @@ impl ScaleFactors {
         let usable = |f: f64| f.is_finite() && f > 0.0 && (1.0 / f).is_finite();
         match factors.iter().position(|&f| !usable(f)) {
             None => Ok(()),
-            Some(index) => Err(ModelError::ScaleFactor {
-                tensor,
-                index,
-                found: factors[index],
-            }),
+            Some(index) => {
+                let place = format!("`scaling.{tensor}`[{index}]");
+                let expected = "a positive number with a finite reciprocal";
+                Err(ModelError::invalid(place, factors[index], expected))
+            }
         }
     }
 }

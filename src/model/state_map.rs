@@ -46,27 +46,28 @@ impl StateMap {
     /// The chain of these layers, the first applied first; `tensor` names it in errors.
     ///
     /// # Errors
-    /// [`ModelError::Count`] unless there are 1 to [`MAX_LAYERS`], each of at most
-    /// [`MAX_LAYER_WIDTH`] units; [`ModelError::Shape`] if a layer does not take the outputs of the
-    /// layer before it.
+    /// [`ModelError::Invalid`] unless there are 1 to [`MAX_LAYERS`], each of at most
+    /// [`MAX_LAYER_WIDTH`] units, and each takes the outputs of the layer before it.
     pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self, ModelError> {
         if !(1..=MAX_LAYERS).contains(&layers.len()) {
-            return Err(ModelError::Count {
-                part: format!("{tensor}.layers"),
-                found: layers.len(),
-                unit: "layers",
-                expected: format!("1 to {MAX_LAYERS}"),
-            });
+            let (place, found) = (format!("`{tensor}.layers`"), layers.len());
+            let expected = format!("1 to {MAX_LAYERS}");
+            return Err(ModelError::invalid(
+                place,
+                format!("{found} layers"),
+                expected,
+            ));
         }
         for (index, layer) in layers.iter().enumerate() {
             let (rows, columns) = layer.map.weights().shape();
             if rows > MAX_LAYER_WIDTH {
-                return Err(ModelError::Count {
-                    part: format!("{tensor}.layers[{index}].weights"),
-                    found: rows,
-                    unit: "units",
-                    expected: format!("at most {MAX_LAYER_WIDTH}"),
-                });
+                let place = format!("`{tensor}.layers[{index}].weights`");
+                let expected = format!("at most {MAX_LAYER_WIDTH}");
+                return Err(ModelError::invalid(
+                    place,
+                    format!("{rows} units"),
+                    expected,
+                ));
             }
             let expected = match index {
                 0 => columns,
@@ -310,25 +311,19 @@ mod tests {
             map: AffineMap::new("m", wave(rows, cols, 0.0), DVector::zeros(rows)).unwrap(),
             activation: Activation::Elu,
         };
-        let found = StateMap::new("encoder", vec![layer(4, 5), layer(2, 3)]);
-        assert!(
-            matches!(&found, Err(ModelError::Shape { tensor, .. })
-                if tensor == "encoder.layers[1].weights"),
-            "{found:?}"
+        let refusal = |layers| {
+            let error = StateMap::new("encoder", layers).expect_err("no chain");
+            error.to_string()
+        };
+        assert_eq!(
+            refusal(vec![layer(4, 5), layer(2, 3)]),
+            "`encoder.layers[1].weights`: found 2 x 3, expected 2 x 4 (rows x columns)"
         );
-        let found = StateMap::new("encoder", Vec::new());
-        assert!(matches!(
-            found,
-            Err(ModelError::Count {
-                found: 0,
-                unit: "layers",
-                ..
-            })
-        ));
-        let found = StateMap::new("encoder", vec![layer(MAX_LAYER_WIDTH + 1, 2)]);
-        assert!(matches!(
-            found,
-            Err(ModelError::Count { unit: "units", .. })
-        ));
+        assert_eq!(
+            refusal(Vec::new()),
+            format!("`encoder.layers`: found 0 layers, expected 1 to {MAX_LAYERS}")
+        );
+        let wide = refusal(vec![layer(MAX_LAYER_WIDTH + 1, 2)]);
+        assert!(wide.contains("units, expected at most"), "{wide}");
     }
 }

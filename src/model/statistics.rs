@@ -66,13 +66,10 @@ fn check_symmetric(tensor: &str, covariance: &DMatrix<f64>) -> Result<(), ModelE
             let found = covariance[(row, column)];
             let expected = covariance[(column, row)];
             if (found - expected).abs() > bound {
-                return Err(ModelError::NotSymmetric {
-                    tensor: tensor.to_owned(),
-                    row,
-                    column,
-                    found,
-                    expected,
-                });
+                let place = format!("`{tensor}`[{row}][{column}]");
+                let expected =
+                    format!("{expected} as in [{column}][{row}] (a covariance is symmetric)");
+                return Err(ModelError::invalid(place, found, expected));
             }
         }
     }
@@ -89,17 +86,14 @@ fn check_positive(tensor: &str, covariance: &DMatrix<f64>) -> Result<(), ModelEr
     let max_iterations = 1_000 * covariance.nrows();
     let eigen = nalgebra::SymmetricEigen::try_new(normalised, f64::EPSILON, max_iterations)
         .filter(|eigen| eigen.eigenvalues.iter().all(|value| value.is_finite()))
-        .ok_or_else(|| ModelError::Decomposition {
-            tensor: tensor.to_owned(),
-        })?;
+        .ok_or_else(|| ModelError::no_decomposition(tensor))?;
     let smallest = eigen.eigenvalues.min();
     let bound = -ROUNDING * eigen.eigenvalues.max();
     if smallest < bound.min(-f64::EPSILON) {
-        return Err(ModelError::NotPositive {
-            tensor: tensor.to_owned(),
-            smallest: smallest * largest_entry,
-            bound: bound * largest_entry,
-        });
+        let (smallest, bound) = (smallest * largest_entry, bound * largest_entry);
+        let found = format!("the eigenvalue {smallest:e}");
+        let expected = format!("none below {bound:e} (a covariance is positive semidefinite)");
+        return Err(ModelError::invalid(format!("`{tensor}`"), found, expected));
     }
     Ok(())
 }

@@ -28,7 +28,7 @@ impl ReducedModel {
     /// The maps that the encoder's Jacobian at the state `x` (SI units) gives.
     ///
     /// # Errors
-    /// As [`ReducedModel::encode`], and [`ModelError::SingularJacobian`] where the Jacobian does not have full row
+    /// As [`ReducedModel::encode`], and [`ModelError::RankDeficient`] where the Jacobian does not have full row
     /// rank.
     pub fn tangent(&self, x: &DVector<f64>) -> Result<Tangent, ModelError> {
         let jacobian = self.encoder_map()?.jacobian(&self.scaled_state(x)?)?;
