@@ -22,7 +22,8 @@ pub struct Side {
     pub file: String,
     /// Number of latent coordinates.
     pub latent_dim: usize,
-    pub(super) is_rounded: bool,
+    /// Whether its decimals stand for numbers that were rounded in the last digit.
+    pub is_rounded: bool,
     pub(super) phases: Vec<SidePhase>,
 }
 

@@ -72,6 +72,12 @@ fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
                 equation.output,
                 verdict_text(&equation.verdict)
             );
+            for (file, side) in dropping(&equation.verdict, [left, right]) {
+                let _ = writeln!(
+                    text,
+                    "    note: {file} ({side}) has rounded decimals, and terms that round to zero are not printed"
+                );
+            }
             if let Some(gap) = &equation.one_sided {
                 let (has, lacks) = if gap.left.is_nan() {
                     ("B", "A")
@@ -93,14 +99,33 @@ fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
         0 => String::new(),
         n => format!(", {n} of them up to the printed digits"),
     };
+    let equations = if all == 1 { "equation" } else { "equations" };
     let summary = match comparison.says_the_same() {
-        true => format!("A and B say the same: {all} equations proven equal{rounded}"),
-        false => {
-            format!("A and B do not say the same: {equal} of {all} equations proven equal{rounded}")
-        }
+        true => format!("A and B say the same: {all} {equations} proven equal{rounded}"),
+        false => format!(
+            "A and B do not say the same: {equal} of {all} {equations} proven equal{rounded}"
+        ),
     };
     let _ = writeln!(text, "\n{summary}");
     text
+}
+
+/// The files in print that lack a term of the other: rounding may have dropped it.
+fn dropping<'s>(verdict: &Verdict, [left, right]: [&'s Side; 2]) -> Vec<(&'static str, &'s str)> {
+    let terms: &[TermDifference] = match verdict {
+        Verdict::Different(difference) => &difference.terms,
+        Verdict::Undecided(_, terms) => terms,
+        Verdict::Equal | Verdict::EqualAsPrinted(_) | Verdict::Missing(_) => &[],
+    };
+    let lacks = |of: fn(&TermDifference) -> f64| terms.iter().any(|term| of(term) == 0.0);
+    let mut files = Vec::new();
+    if left.is_rounded && lacks(|term| term.left) {
+        files.push(("A", left.file.as_str()));
+    }
+    if right.is_rounded && lacks(|term| term.right) {
+        files.push(("B", right.file.as_str()));
+    }
+    files
 }
 
 fn verdict_text(verdict: &Verdict) -> String {
@@ -155,11 +180,14 @@ fn place(gap: &Gap) -> String {
 }
 
 fn terms_text(terms: &[TermDifference]) -> String {
+    // A term that is not there has the coefficient 0.
+    let side = |coefficient: f64, file: &str| match coefficient {
+        0.0 => format!("not in {file}"),
+        _ => format!("{coefficient} in {file}"),
+    };
     let lines = terms.iter().map(|term| {
-        format!(
-            "\n    {}: {} in A, {} in B",
-            term.term, term.left, term.right
-        )
+        let (left, right) = (side(term.left, "A"), side(term.right, "B"));
+        format!("\n    {}: {left}, {right}", term.term)
     });
     lines.collect()
 }

@@ -35,7 +35,7 @@ fn equal_files_exit_with_0_and_say_how_far_rounding_reaches() {
     assert_eq!(
         text(&output.stdout),
         "A: a.txt\nB: b.tex\n\nphase contact\n  ddz1: proven equal up to the printed digits \
-         (coefficients differ by at most 6.000e-4)\n\nA and B say the same: 1 equations proven \
+         (coefficients differ by at most 6.000e-4)\n\nA and B say the same: 1 equation proven \
          equal, 1 of them up to the printed digits\n"
     );
     let output = check(folder.path(), &["a.txt", "b.tex", "--exact", "--json"]);
@@ -45,7 +45,7 @@ fn equal_files_exit_with_0_and_say_how_far_rounding_reaches() {
     assert_eq!(value["phases"][0]["equations"][0]["verdict"], "different");
     let output = check(folder.path(), &["a.txt", "a.txt"]);
     assert_eq!(output.status.code(), Some(0));
-    assert!(text(&output.stdout).ends_with("A and B say the same: 1 equations proven equal\n"));
+    assert!(text(&output.stdout).ends_with("A and B say the same: 1 equation proven equal\n"));
 }
 
 #[test]
@@ -82,6 +82,26 @@ fn different_files_exit_with_1_and_a_point_inside_the_domain() {
     assert_eq!(flight["verdict"], "equal");
     assert!(flight["one_sided"]["a"].is_null() && flight["one_sided"]["b"].is_number());
     assert_eq!(value["phases"][2]["equations"][0]["missing_in"], "A");
+}
+
+#[test]
+fn terms_that_rounding_drops_are_named_as_such() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let exact = "[contact]\nddz1 = 0.36*z1 + 0.004*u1\n";
+    fs::write(folder.path().join("a.txt"), exact).expect("written");
+    let paper = r"\begin{equation}\label{eq:contact} \ddot z_1 = 0.36 z_1 \end{equation}";
+    fs::write(folder.path().join("b.tex"), paper).expect("written");
+    let output = check(folder.path(), &["a.txt", "b.tex"]);
+    assert_eq!(output.status.code(), Some(1));
+    let shown = text(&output.stdout);
+    assert!(
+        shown.contains("\n    u1: 0.004 in A, not in B\n"),
+        "{shown}"
+    );
+    let note =
+        "    note: B (b.tex) has rounded decimals, and terms that round to zero are not printed\n";
+    assert!(shown.contains(note), "{shown}");
+    assert!(shown.ends_with("0 of 1 equation proven equal\n"), "{shown}");
 }
 
 #[test]
