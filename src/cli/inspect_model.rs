@@ -1,4 +1,4 @@
-//! `romc inspect` of a model: its parts, its phases, the pattern of Xi, what each latent is made of.
+//! `romc inspect` of a model: its parts, its phases, the pattern of Xi, the composition of each latent.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -6,13 +6,13 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::output::{Table, significant};
 use super::simplification::{exact_json, exact_words};
 use crate::Error;
 use crate::artifact;
 use crate::equations::Equations;
 use crate::model::{FeetRule, Phase, ReducedModel, StateMap};
 use crate::robot::Robot;
+use crate::typeset::{Table, significant};
 
 /// Library terms that still fit as a pattern in a terminal.
 const PATTERN_WIDTH: usize = 120;
@@ -36,15 +36,12 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     if !model.description().is_empty() {
         let _ = writeln!(text, "  {}", model.description());
     }
-    let mut phases = Table::new(["phase", "feet", "active terms", "of"]);
-    for phase in model.phases() {
-        phases.row([
-            phase.name.clone(),
-            feet(&phase.feet),
-            phase.active_count().to_string(),
-            phase.xi.len().to_string(),
-        ]);
-    }
+    let phases = Table::of(model.phases())
+        .column("phase", "", |phase| &phase.name)
+        .column("feet", "", |phase| feet(&phase.feet))
+        .column("active terms", "", |phase| phase.active_count())
+        .column("of", "", |phase| phase.xi.len())
+        .table();
     let _ = writeln!(text, "\n{phases}");
     text.push_str(&exact_words(&equations));
     for phase in model.phases() {
@@ -104,7 +101,7 @@ fn pattern(model: &ReducedModel, phase: &Phase) -> String {
         return String::new();
     }
     let mut text = format!(
-        "Xi of {} (a column a term, + positive, - negative)\n",
+        "Xi of {} (one column per term, + positive, - negative)\n",
         phase.name
     );
     for output in 0..model.latent_dim() {

@@ -1,13 +1,12 @@
-//! Which figures a report has, from an assessment and the controller's runs.
-
-use std::path::PathBuf;
+//! The figures of a report, from an assessment and the controller's runs.
 
 use nalgebra::DVector;
 
 use super::complexity::study_figures;
-use super::control::{Place, latent_inputs, torques};
+use super::control::{latent_inputs, torques};
 use super::figures::{Figure, HeatMap, LinePlot, Panel, Role, Series};
-use crate::evaluate::Run;
+use super::place::Place;
+use super::tables::NamedRun;
 use crate::evaluate::{Assessment, SegmentRun};
 use crate::model::{ModelError, ReducedModel};
 use crate::mpc::Lift;
@@ -17,28 +16,28 @@ use crate::study::Summary;
 
 /// Segments that get figures of their own; tables cover all.
 const MAX_SEGMENTS: usize = 3;
-const PANEL: (f64, f64) = (240.0, 150.0);
-const WIDE_PANEL: (f64, f64) = (360.0, 210.0);
 
-/// What a report is made from.
+/// The model and results that a report shows.
 #[derive(Debug, Clone, Copy)]
 pub struct Content<'a> {
     /// The model.
     pub model: &'a ReducedModel,
-    /// The model held against the recordings.
+    /// The model compared with the recordings.
     pub assessment: &'a Assessment<'a>,
-    /// The controller along each recording, with the lift that keeps torques and forces consistent.
-    pub runs: &'a [(PathBuf, Run)],
+    /// The controller along each recording with the plain lift; empty if it did not run.
+    pub plain: &'a [NamedRun],
+    /// The same with the lift that keeps torques and forces consistent.
+    pub consistent: &'a [NamedRun],
     /// A study over the latent dimension, if there is one.
     pub study: Option<&'a Summary>,
 }
 
-/// Figures of one section of the page.
+/// Figures by section of the page.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct AllFigures {
     /// The encoder's weights.
     pub encoder: Vec<Figure>,
-    /// Joints and body against the recording.
+    /// Joints and body beside the recording.
     pub coordinates: Vec<Figure>,
     /// Latent accelerations.
     pub accelerations: Vec<Figure>,
@@ -75,49 +74,21 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
         figures.encoder.push(encoder(model, assessment, run)?);
     }
     for (index, run) in assessment.runs.iter().take(MAX_SEGMENTS).enumerate() {
-        let place = Place::of(index, run);
+        let place = Place::of_segment(index, run);
         let [joints, body] = coordinates(model, assessment, run, &place)?;
         figures.coordinates.extend([joints, body]);
         (figures.accelerations).push(accelerations(model, assessment, run, &place)?);
         (figures.baselines).push(baselines(model, assessment, run, &place)?);
     }
-    for (index, (path, run)) in content.runs.iter().take(MAX_SEGMENTS).enumerate() {
-        let place = Place {
-            suffix: (index + 1).to_string(),
-            words: stem(path),
-        };
-        figures
-            .control
-            .push(torques(model, Lift::Consistent, run, &place));
-        figures.control.push(latent_inputs(model, run, &place));
+    for (index, (path, run)) in content.consistent.iter().take(MAX_SEGMENTS).enumerate() {
+        let place = Place::of_recording(index, path);
+        let torques = torques(model, Lift::Consistent, run, &place);
+        (figures.control).extend([torques, latent_inputs(model, run, &place)]);
     }
     if let Some(summary) = content.study {
         figures.study = study_figures(summary);
     }
     Ok(figures)
-}
-
-impl Place {
-    fn of(index: usize, run: &SegmentRun<'_>) -> Self {
-        Self {
-            suffix: (index + 1).to_string(),
-            words: format!(
-                "{}, from row {}",
-                stem(&run.segment.path),
-                run.segment.first_row
-            ),
-        }
-    }
-}
-
-/// Name of a recording without folder and endings.
-pub(super) fn stem(path: &std::path::Path) -> String {
-    let name = path.file_name().map(|name| name.to_string_lossy());
-    name.map_or(String::new(), |name| {
-        name.trim_end_matches(".gz")
-            .trim_end_matches(".csv")
-            .to_owned()
-    })
 }
 
 /// Figures 6, 9 and 15 of the paper.
@@ -155,10 +126,10 @@ fn encoder(
     })
 }
 
-/// A value of every sample; none where a rollout did not get.
+/// A value of every sample; none where a rollout did not arrive.
 type Samples = Vec<Option<DVector<f64>>>;
 
-/// What a function makes of every predicted sample.
+/// A function's value at every predicted sample.
 fn predicted(
     run: &SegmentRun<'_>,
     rollout: &Rollout,
@@ -200,15 +171,40 @@ fn flights(run: &SegmentRun<'_>) -> Vec<(f64, f64)> {
     spans
 }
 
-fn rollout_legend(assessment: &Assessment<'_>) -> Vec<(Role, String)> {
-    vec![
-        (Role::Recorded, "recorded".to_owned()),
-        (Role::Full, "model, whole jump".to_owned()),
-        (
-            Role::Restarted,
-            format!("model, restarted every {} s", assessment.restart_every_s),
-        ),
-    ]
+/// A figure of rollouts beside the recording.
+fn rollout_figure(
+    assessment: &Assessment<'_>,
+    id: String,
+    caption: String,
+    panels: Vec<Panel>,
+) -> Figure {
+    let restarted = format!("model, restarted every {} s", assessment.restart_every_s);
+    let legend = [
+        (Role::Recorded, "recorded"),
+        (Role::Full, "model, whole jump"),
+        (Role::Restarted, &restarted),
+    ];
+    Figure::over_time(id, caption, panels, &legend)
+}
+
+/// A recorded line with the two of the rollouts; flight is shaded.
+fn beside_rollouts(
+    run: &SegmentRun<'_>,
+    title: String,
+    recorded: impl Fn(usize) -> f64,
+    [full, restarted]: [&Samples; 2],
+    row: usize,
+) -> Panel {
+    let of = |samples: &Samples, k: usize| samples[k].as_ref().map(|values| values[row]);
+    Panel::Lines(LinePlot {
+        title,
+        series: vec![
+            series(run, Role::Recorded, |k| Some(recorded(k))),
+            series(run, Role::Full, |k| of(full, k)),
+            series(run, Role::Restarted, |k| of(restarted, k)),
+        ],
+        shaded: flights(run),
+    })
 }
 
 /// Figures 7, 13 and 14 of the paper: joints, then body.
@@ -222,36 +218,22 @@ fn coordinates(
     let full = predicted(run, &run.full, decode)?;
     let restarted = predicted(run, &run.restarted, decode)?;
     let panel = |row: usize| {
-        let of = |samples: &Samples, k: usize| samples[k].as_ref().map(|x| x[row]);
-        Panel::Lines(LinePlot {
-            title: format!("{}, {}", assessment.names[row], assessment.units[row]),
-            series: vec![
-                series(run, Role::Recorded, |k| Some(run.segment.x[(row, k)])),
-                series(run, Role::Full, |k| of(&full, k)),
-                series(run, Role::Restarted, |k| of(&restarted, k)),
-            ],
-            shaded: flights(run),
-        })
+        let title = format!("{}, {}", assessment.names[row], assessment.units[row]);
+        let recorded = |k| run.segment.x[(row, k)];
+        beside_rollouts(run, title, recorded, [&full, &restarted], row)
     };
-    let figure = |id: &str, what: &str, rows: std::ops::Range<usize>| Figure {
-        id: format!("{id}_{}", place.suffix),
-        caption: format!(
+    let figure = |id: &str, what: &str, rows: std::ops::Range<usize>| {
+        let caption = format!(
             "{what} of {}: recorded, and decoded from the model's rollouts. Grey: flight.",
             place.words
-        ),
-        x_label: "time, s".to_owned(),
-        panel_size: PANEL,
-        columns: 3,
-        panels: rows.map(panel).collect(),
-        legend: rollout_legend(assessment),
+        );
+        let id = format!("{id}_{}", place.suffix);
+        rollout_figure(assessment, id, caption, rows.map(panel).collect())
     };
+    let body = JOINT_DIM..assessment.names.len();
     Ok([
         figure("joints", "Joint angles", 0..JOINT_DIM),
-        figure(
-            "body",
-            "Body position and orientation",
-            JOINT_DIM..assessment.names.len(),
-        ),
+        figure("body", "Body position and orientation", body),
     ])
 }
 
@@ -269,29 +251,17 @@ fn accelerations(
     let full = predicted(run, &run.full, ddz)?;
     let restarted = predicted(run, &run.restarted, ddz)?;
     let panel = |row: usize| {
-        let of = |samples: &Samples, k: usize| samples[k].as_ref().map(|x| x[row]);
-        Panel::Lines(LinePlot {
-            title: format!("d²z{}/dt²", row + 1),
-            series: vec![
-                series(run, Role::Recorded, |k| Some(run.latent.ddz[(row, k)])),
-                series(run, Role::Full, |k| of(&full, k)),
-                series(run, Role::Restarted, |k| of(&restarted, k)),
-            ],
-            shaded: flights(run),
-        })
+        let title = format!("d²z{}/dt²", row + 1);
+        let recorded = |k| run.latent.ddz[(row, k)];
+        beside_rollouts(run, title, recorded, [&full, &restarted], row)
     };
-    Ok(Figure {
-        id: format!("latent_accelerations_{}", place.suffix),
-        caption: format!(
-            "Latent accelerations of {} (scaled units): encoded from the recording, and by the model along its rollouts.",
-            place.words
-        ),
-        x_label: "time, s".to_owned(),
-        panel_size: PANEL,
-        columns: 3,
-        panels: (0..model.latent_dim()).map(panel).collect(),
-        legend: rollout_legend(assessment),
-    })
+    let caption = format!(
+        "Latent accelerations of {} (scaled units): encoded from the recording, and by the model along its rollouts.",
+        place.words
+    );
+    let id = format!("latent_accelerations_{}", place.suffix);
+    let panels = (0..model.latent_dim()).map(panel).collect();
+    Ok(rollout_figure(assessment, id, caption, panels))
 }
 
 /// Figure 8 of the paper, with the fitted pendulum beside the published one.
@@ -320,23 +290,26 @@ fn baselines(
             shaded: flights(run),
         })
     };
-    let mut legend = rollout_legend(assessment);
-    legend.truncate(2);
-    let names = assessment.baselines.iter().map(|b| b.name.to_owned());
+    let mut legend = vec![
+        (Role::Recorded, "recorded"),
+        (Role::Full, "model, whole jump"),
+    ];
+    let names = assessment.baselines.iter().map(|b| b.name);
     legend.extend(roles.into_iter().zip(names));
     Ok(Figure {
-        id: format!("aslip_{}", place.suffix),
-        caption: format!(
-            "Body position of {}: the learned model and the pendulum under the same recorded forces.",
-            place.words
-        ),
-        x_label: "time, s".to_owned(),
-        panel_size: WIDE_PANEL,
+        panel_size: (360.0, 210.0),
         columns: 2,
-        panels: vec![
-            panel(JOINT_DIM, 0, "body.x, m"),
-            panel(JOINT_DIM + 2, 1, "body.z, m"),
-        ],
-        legend,
+        ..Figure::over_time(
+            format!("aslip_{}", place.suffix),
+            format!(
+                "Body position of {}: the learned model and the pendulum under the same recorded forces.",
+                place.words
+            ),
+            vec![
+                panel(JOINT_DIM, 0, "body.x, m"),
+                panel(JOINT_DIM + 2, 1, "body.z, m"),
+            ],
+            &legend,
+        )
     })
 }

@@ -1,4 +1,4 @@
-//! What was changed, and how far it can make `ddz` differ.
+//! The changes of a simplification and the bounds of their effect on `ddz`.
 
 use super::measure::Measured;
 use super::tolerance::Tolerance;
@@ -6,7 +6,7 @@ use crate::equations::ExactStep;
 use crate::model::LatentVariable;
 use crate::symbolic::Interval;
 
-/// What became of a term.
+/// The kind of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChangeKind {
     /// It is gone.
@@ -38,7 +38,7 @@ pub struct Effect {
 /// One change of one equation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// What was done.
+    /// Its kind.
     pub kind: ChangeKind,
     /// The term in the library's syntax.
     pub term: String,
@@ -78,7 +78,7 @@ pub struct EquationCertificate {
     pub digits_before: usize,
     /// The same of the simplified model.
     pub digits_after: usize,
-    /// What was done, in order.
+    /// The changes, in order.
     pub changes: Vec<Change>,
 }
 
@@ -100,7 +100,7 @@ pub struct PhaseCertificate {
     /// Variables that some `ddz` of the phase depended on, and none does any more: inputs among them
     /// can no longer be used for control.
     pub lost: Vec<LatentVariable>,
-    /// One entry a latent coordinate.
+    /// One entry per latent coordinate.
     pub equations: Vec<EquationCertificate>,
 }
 
@@ -112,7 +112,7 @@ pub struct PhaseCertificate {
 /// largest summand, comes on top for both models.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {
-    /// What was asked for.
+    /// The requested tolerance.
     pub tolerance: Tolerance,
     /// What exact simplification did before: equal as real functions, without any error.
     pub exact: Vec<ExactStep>,

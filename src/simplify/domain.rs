@@ -10,11 +10,11 @@ use crate::model::{LatentVariable, ReducedModel};
 use crate::sim::LatentSegment;
 use crate::symbolic::Interval;
 
-/// How far a domain reaches beyond the samples unless told otherwise, as a share of each variable's
+/// How far a domain reaches beyond the samples unless given, as a share of each variable's
 /// range.
 pub const MARGIN: f64 = 0.1;
 
-/// Recorded samples of one phase; matrices are `latent_dim x n`, a column a sample, scaled units.
+/// Recorded samples of one phase; matrices are `latent_dim x n`, one column per sample, scaled units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhaseSamples {
     /// Latent positions.
@@ -28,7 +28,7 @@ pub struct PhaseSamples {
 /// Recorded samples, sorted by the model's phases.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Samples {
-    /// One entry a phase of the model.
+    /// One entry per phase of the model.
     pub phases: Vec<PhaseSamples>,
 }
 
@@ -78,7 +78,7 @@ impl PhaseSamples {
     }
 }
 
-/// A box a phase, over `z`, then `dz`, then `u_lat` (scaled units). A phase without one keeps its
+/// One box per phase, over `z`, then `dz`, then `u_lat` (scaled units). A phase without one keeps its
 /// equations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Domain {
@@ -86,7 +86,7 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// The domain with these boxes, one a phase of the model.
+    /// The domain with these boxes, one per phase of the model.
     ///
     /// # Errors
     /// [`SimplifyError::PhaseCount`], [`SimplifyError::BoxDimension`], [`SimplifyError::Range`].
@@ -143,7 +143,7 @@ impl Domain {
         Self::new(model, boxes.collect())
     }
 
-    /// Reads boxes from TOML: a table a phase, with a range a variable, such as `z1 = [-0.2, 0.4]`.
+    /// Reads boxes from TOML: one table per phase, with a range per variable, such as `z1 = [-0.2, 0.4]`.
     ///
     /// # Errors
     /// [`SimplifyError::DomainFile`] for a phase or variable that the model does not have or that
@@ -169,7 +169,7 @@ impl Domain {
                         phase.name
                     ))
                 })?;
-                // told as typed: an interval has no ends that are not numbers
+                // reported as typed: an interval has no ends that are not numbers
                 if !(lo.is_finite() && hi.is_finite() && lo <= hi) {
                     return Err(refused(format!(
                         "[{}] {variable} = [{lo}, {hi}], expected finite numbers in order",

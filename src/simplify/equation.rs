@@ -140,7 +140,7 @@ impl Equation {
     /// together fit.
     fn round(&mut self, terms: &mut Terms<'_>, allowed: f64) {
         let mut chosen: Vec<Option<Step>> = vec![None; self.xi.len()];
-        // sums of floats tell what to try; what is made is checked with intervals
+        // sums of floats select candidates; accepted changes are checked with intervals
         let (mut lo, mut hi) = (self.spent.lo(), self.spent.hi());
         for step in self.roundings(terms) {
             let place = &mut chosen[step.row];

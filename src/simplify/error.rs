@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use crate::lower::LowerError;
 use crate::model::{LibraryError, ModelError};
 
-/// What can go wrong in simplifying a model.
+/// Errors of simplification.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimplifyError {
-    /// Not one box a phase.
+    /// The number of boxes differs from the number of phases.
     #[error("the domain has {found} boxes, expected one for each of {expected} phases")]
     PhaseCount {
         /// Boxes.
@@ -48,12 +48,12 @@ pub enum SimplifyError {
     DomainFile {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         message: String,
     },
     /// Recordings for a model that cannot encode them.
     #[error(
-        "model `{model}` has no encoder, so recordings give it no domain; give a .toml file with a table a phase, such as [contact], and a range for each of z1, dz1, u1, ..., such as z1 = [-0.2, 0.4]"
+        "model `{model}` has no encoder, so recordings give it no domain; give a .toml file with one table per phase, such as [contact], and a range for each of z1, dz1, u1, ..., such as z1 = [-0.2, 0.4]"
     )]
     NoEncoder {
         /// The model's name.

@@ -27,7 +27,7 @@ impl Measured {
     }
 }
 
-/// `sum delta_j theta_j` at every sample; `theta` has a row a sample and a column a term.
+/// `sum delta_j theta_j` at every sample; `theta` has one row per sample and one column per term.
 pub(super) fn at_samples<'a>(
     theta: &'a DMatrix<f64>,
     parts: &'a [(usize, f64)],

@@ -1,4 +1,4 @@
-//! What rounding coefficients for print costs.
+//! Errors of printed equations, whose coefficients are rounded.
 
 use super::domain::{Domain, Samples};
 use super::error::SimplifyError;

@@ -25,6 +25,16 @@ pub struct ToleranceError {
 }
 
 impl Tolerance {
+    /// The tolerance with its unit, in words.
+    pub fn words(self) -> String {
+        match self {
+            Self::ShareOfRms(_) => {
+                format!("{self} of the root mean square of each ddz over the recordings")
+            }
+            Self::Absolute(_) => format!("{self} scaled units per s^2"),
+        }
+    }
+
     /// Whether nothing may change.
     pub fn is_zero(self) -> bool {
         match self {

@@ -133,7 +133,7 @@ impl Workspace {
         xi.insert_rows(self.original, added, 0.0)
     }
 
-    /// The model with these coefficients, one matrix a phase. Appended terms that no phase uses are
+    /// The model with these coefficients, one matrix per phase. Appended terms that no phase uses are
     /// left out, so that a model keeps its library where it can.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! What can keep a study from its result.
+//! Errors of a study.
 
 use std::io;
 use std::path::PathBuf;
@@ -11,9 +11,9 @@ pub enum StudyError {
     /// A range of dimensions or seeds that cannot be trained.
     #[error("{found}, expected {expected}")]
     Range {
-        /// What was asked for.
+        /// The request.
         found: String,
-        /// What could be.
+        /// The accepted range.
         expected: &'static str,
     },
     /// A folder holds another study.
@@ -31,7 +31,7 @@ pub enum StudyError {
     Broken {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it, and where.
+        /// The fault and its place.
         message: String,
     },
     /// Two parts computed the same training with different results.

@@ -59,7 +59,7 @@ pub struct PanelDrawing {
     pub width: f64,
     /// Height.
     pub height: f64,
-    /// What to draw, the first below the others.
+    /// Marks, the first below the others.
     pub marks: Vec<Mark>,
 }
 

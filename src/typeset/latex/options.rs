@@ -5,15 +5,16 @@ use crate::typeset::{Rounding, SymbolTable};
 use super::math::NumberStyle;
 
 /// How the equations of a phase stand on the page.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Form {
     /// [`Form::Cases`] for a phase that fits on a page, [`Form::Align`] for a longer one.
     #[default]
+    #[value(skip)]
     Automatic,
-    /// One numbered `equation` with a brace, the paper's form.
-    Cases,
-    /// One `align` with a number for each equation; breaks across pages.
+    /// A number for each equation; breaks across pages.
     Align,
+    /// One number, a brace around the phase's equations.
+    Cases,
 }
 
 /// Options of the LaTeX backend.
