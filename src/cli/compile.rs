@@ -8,15 +8,12 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::{CodeArguments, CompileArguments, EquationArguments, UnitsChoice};
 use super::output::check_output;
-use super::simplification::{self, exact_json, exact_words};
+use super::simplification::{self, exact_words};
 use crate::deploy::{self, EmitOptions, Target};
 use crate::equations::{EquationForm, Equations, PhaseEquations};
 use crate::files::EmittedFile;
 use crate::files::Overwrite;
-use crate::typeset::latex::{LatexOptions, NumberStyle};
-use crate::typeset::markdown::MarkdownOptions;
-use crate::typeset::mathml::MathmlOptions;
-use crate::typeset::{Rounding, SymbolTable, Table};
+use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
 use crate::{Error, artifact};
 
 /// Compiles a model into a folder.
@@ -75,7 +72,7 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
             "name": model.name(),
             "digest": artifact::digest(model).to_string(),
             "targets": arguments.emit.iter().map(|target| target.name()).collect::<Vec<_>>(),
-            "exact": exact.steps().iter().map(exact_json).collect::<Vec<_>>(),
+            "exact": exact.steps(),
             "simplification": certificate,
             "saved_model": save_model.map(|path| path.display().to_string()),
             "files": written.iter().map(|(path, bytes)| file_json(path, *bytes)).collect::<Vec<_>>(),
@@ -137,40 +134,21 @@ pub fn emit(
     unless_given: Rounding,
 ) -> Result<Vec<EmittedFile>, Error> {
     let model = model_equations.model();
-    let digest = Some(artifact::digest(model).short());
-    let symbols = SymbolTable::parse(&equations.rename, model.latent_dim())?;
-    let rounding = rounding(equations, unless_given);
-    let latex = LatexOptions::default();
-    let markdown = MarkdownOptions::default();
-    let mathml = MathmlOptions::default();
     let options = EmitOptions {
         precision: code.precision,
-        units: code.units.of_interface(),
         sines: code.sincos,
-        latex: LatexOptions {
-            rounding,
+        units: code.units.of_interface(),
+        print: PrintOptions {
+            rounding: rounding(equations, unless_given),
+            width_em: equations.width,
+            symbols: SymbolTable::parse(&equations.rename, model.latent_dim())?,
+            digest: Some(artifact::digest(model).short()),
             numbers: match equations.siunitx {
                 true => NumberStyle::Siunitx,
                 false => NumberStyle::Plain,
             },
             form: equations.form.unwrap_or_default(),
-            width_em: equations.width.unwrap_or(latex.width_em),
-            symbols: symbols.clone(),
-            digest: digest.clone(),
         },
-        markdown: MarkdownOptions {
-            rounding,
-            width_em: equations.width.unwrap_or(markdown.width_em),
-            symbols: symbols.clone(),
-            digest: digest.clone(),
-        },
-        mathml: MathmlOptions {
-            rounding,
-            width_em: equations.width.unwrap_or(mathml.width_em),
-            symbols,
-            digest: digest.clone(),
-        },
-        digest,
         ..EmitOptions::default()
     };
     Ok(match code.units {

@@ -6,11 +6,11 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::simplification::{exact_json, exact_words};
+use super::simplification::exact_words;
 use crate::Error;
 use crate::artifact;
 use crate::equations::Equations;
-use crate::model::{FeetRule, Phase, ReducedModel, StateMap};
+use crate::model::{Phase, ReducedModel, StateMap};
 use crate::robot::Robot;
 use crate::typeset::{Table, significant};
 
@@ -38,7 +38,7 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     }
     let phases = Table::of(model.phases())
         .column("phase", "", |phase| &phase.name)
-        .column("feet", "", |phase| feet(&phase.feet))
+        .column("feet", "", |phase| phase.feet.to_string())
         .column("active terms", "", |phase| phase.active_count())
         .column("of", "", |phase| phase.xi.len())
         .table();
@@ -74,25 +74,13 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
             "library_dim": model.library().len(),
             "library": model.library().terms().iter().map(|term| term.text()).collect::<Vec<_>>(),
             "phases": model.phases().iter().map(phase_json).collect::<Vec<_>>(),
-            "exact": equations.steps().iter().map(exact_json).collect::<Vec<_>>(),
+            "exact": equations.steps(),
             "dominant_coordinates": dominant,
             "encoder": model.encoder_map().ok().map(StateMap::summary),
             "decoder": model.decoder_map().ok().map(StateMap::summary),
             "provenance": model.provenance(),
         }),
     })
-}
-
-fn feet(rule: &FeetRule) -> String {
-    match rule {
-        FeetRule::Any => "any".to_owned(),
-        FeetRule::None => "none".to_owned(),
-        FeetRule::Patterns(patterns) => {
-            let text =
-                |pattern: &[bool; 4]| pattern.map(|down| if down { "1" } else { "0" }).concat();
-            patterns.iter().map(text).collect::<Vec<_>>().join(" ")
-        }
-    }
 }
 
 /// Rows are outputs, columns library terms; a dot is an inactive one.
@@ -144,7 +132,7 @@ fn dominant_coordinates(model: &ReducedModel) -> Option<Vec<Vec<(String, f64)>>>
 fn phase_json(phase: &Phase) -> Value {
     json!({
         "name": phase.name,
-        "feet": feet(&phase.feet),
+        "feet": phase.feet.to_string(),
         "active_terms": phase.active_count(),
         "coefficients": phase.xi.len(),
     })

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::args::SimplifyArguments;
 use super::output::{names, read_recordings, spinner};
-use crate::equations::{Equations, ExactStep};
+use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::EmittedFile;
 use crate::model::ReducedModel;
@@ -193,7 +193,10 @@ impl Outcome {
         let basis = &self.basis;
         let printed = match rounding {
             Rounding::Exact => Vec::new(),
-            _ => printed(&self.model, &basis.domain, basis.samples.as_ref(), rounding)?,
+            _ => {
+                let equations = Equations::of(&self.model);
+                printed(&equations, &basis.domain, basis.samples.as_ref(), rounding)?
+            }
         };
         let name = format!("{}-simplification.md", self.model.identifier());
         let page = markdown(
@@ -203,7 +206,6 @@ impl Outcome {
             &printed,
         );
         let mut value = certificate_json(&self.certificate);
-        value["exact"] = (self.certificate.exact.iter()).map(exact_json).collect();
         value["file"] = json!(name);
         value["domain_files"] = json!(self.domain_files);
         value["margin"] = json!(self.margin);
@@ -238,11 +240,10 @@ impl Outcome {
     }
 
     fn summary(&self) -> String {
-        let ((before, after), (slow, fast)) =
-            (self.certificate.terms(), self.certificate.operations());
-        let (long, short) = self.certificate.digits();
+        let (terms, digits) = (self.certificate.terms(), self.certificate.digits());
+        let operations = self.certificate.operations();
         let mut text = format!(
-            "simplified within {}:\n{before} to {after} active terms, {long} to {short} digits, {slow} to {fast} operations of ddz\n\n{}",
+            "simplified within {}:\n{terms} active terms, {digits} digits, {operations} operations of ddz\n\n{}",
             self.certificate.tolerance.words(),
             equation_table(&self.certificate)
         );
@@ -277,17 +278,6 @@ pub fn exact_words(equations: &Equations<'_>) -> String {
         "" => lines,
         _ => format!("simplified exactly:\n{lines}\n"),
     }
-}
-
-/// One step of exact simplification.
-pub fn exact_json(step: &ExactStep) -> Value {
-    json!({
-        "phase": step.phase,
-        "equation": format!("ddz{}", step.output + 1),
-        "terms": { "before": step.before.len(), "after": step.after.len() },
-        "before": ExactStep::sum_words(&step.before),
-        "after": ExactStep::sum_words(&step.after),
-    })
 }
 
 fn printed_json(equation: &PrintedEquation) -> Value {
@@ -369,10 +359,12 @@ fn ladder_table(steps: &[Step], restart_every_s: f64) -> Table {
     };
     Table::of(steps)
         .column("tolerance", "", |(name, ..)| name)
-        .column("terms", "", |(_, certificate, _)| certificate.terms().1)
-        .column("digits", "", |(_, certificate, _)| certificate.digits().1)
+        .column("terms", "", |(_, certificate, _)| certificate.terms().after)
+        .column("digits", "", |(_, certificate, _)| {
+            certificate.digits().after
+        })
         .column("operations", "", |(_, certificate, _)| {
-            certificate.operations().1
+            certificate.operations().after
         })
         .column("certified error", "", |(_, certificate, _)| {
             percent(certificate.largest_bound_share(), bound_words)

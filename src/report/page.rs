@@ -10,9 +10,11 @@ use super::tables::{
 };
 use crate::artifact;
 use crate::equations::Equations;
-use crate::typeset::latex::{LatexOptions, tex_cases};
+use crate::typeset::latex::tex_cases;
 use crate::typeset::mathml::{HtmlText, system};
-use crate::typeset::{Rounding, SymbolTable, Table, Typeset, TypesetError, significant, words};
+use crate::typeset::{
+    Rounding, SymbolTable, Table, Typeset, TypesetError, rendered, significant, words,
+};
 
 /// Longest line of an equation, in em.
 const WIDTH_EM: f64 = 44.0;
@@ -67,10 +69,7 @@ pub fn page(
             .map(|command| html(command))
             .collect(),
     };
-    let mut text = page.render()?;
-    text.truncate(text.trim_end().len());
-    text.push('\n');
-    Ok(text)
+    Ok(rendered(&page)?)
 }
 
 fn html(text: &str) -> String {
@@ -213,10 +212,6 @@ const SIMPLIFICATION_WORDS: [&str; 2] = [
 const STUDY_WORDS: &str = "One model for every latent dimension and seed, judged on recordings that were not trained on. With more coordinates the decoder errs less and the equations grow.";
 
 fn phases(latent: &Equations<'_>, typeset: &Typeset) -> Vec<PhaseView> {
-    let options = LatexOptions {
-        width_em: WIDTH_EM,
-        ..LatexOptions::default()
-    };
     (typeset.systems.iter().zip(latent.phases()))
         .enumerate()
         .map(|(index, (equations, phase))| PhaseView {
@@ -225,7 +220,7 @@ fn phases(latent: &Equations<'_>, typeset: &Typeset) -> Vec<PhaseView> {
             feet: html(&words::feet(&phase.feet)),
             terms: phase.active_count(),
             math: system(equations, WIDTH_EM),
-            latex: HtmlLines(&tex_cases(equations, &options)).to_string(),
+            latex: HtmlLines(&tex_cases(equations, WIDTH_EM)).to_string(),
         })
         .collect()
 }

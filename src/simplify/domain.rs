@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::{DMatrix, DVector};
 
 use super::error::SimplifyError;
-use crate::model::{LatentVariable, ReducedModel};
+use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
 use crate::sim::LatentSegment;
 use crate::symbolic::Interval;
 
@@ -223,11 +223,26 @@ impl Domain {
             .all(|(range, value)| range.contains(value))
     }
 
-    /// Which samples of a phase lie in its box.
-    pub(super) fn inside(&self, phase: usize, samples: &PhaseSamples) -> Vec<usize> {
-        (0..samples.len())
+    /// Values of the terms of `library` at the samples of a phase that lie in its box: one row per
+    /// sample, none without samples.
+    ///
+    /// # Errors
+    /// [`ModelError::Dimension`] for samples of another model.
+    pub(super) fn theta(
+        &self,
+        phase: usize,
+        samples: Option<&Samples>,
+        library: &Library,
+    ) -> Result<DMatrix<f64>, ModelError> {
+        let Some(samples) = samples.map(|samples| &samples.phases[phase]) else {
+            return Ok(DMatrix::zeros(0, library.len()));
+        };
+        let inside: Vec<usize> = (0..samples.len())
             .filter(|&k| self.contains(phase, samples.point(k)))
-            .collect()
+            .collect();
+        let of = |all: &DMatrix<f64>| all.select_columns(&inside);
+        let [z, dz, u_lat] = [&samples.z, &samples.dz, &samples.u_lat].map(of);
+        library.evaluate_points(&z, &dz, &u_lat)
     }
 }
 

@@ -103,19 +103,20 @@ fn exact_steps(steps: &[ExactStep]) -> String {
 }
 
 fn summary(certificate: &Certificate) -> String {
-    let ((before, after), (slow, fast)) = (certificate.terms(), certificate.operations());
-    let (digits_before, digits_after) = certificate.digits();
     let share = |share: Option<f64>| {
         share.map_or("not known without recordings".to_owned(), |share| {
             format!("{} %", bound_words(100.0 * share))
         })
     };
     format!(
-        "- tolerance: {}\n- active terms: {before} before, {after} after\n- significant digits of all coefficients together: \
-         {digits_before} before, {digits_after} after\n- operations of `ddz` in straight-line code: {slow} before, \
-         {fast} after\n- changes: {}\n- largest bound, as a share of the \
-         root mean square of its `ddz`: {}\n- largest error at a recorded sample, likewise: {}\n",
+        "- tolerance: {}\n- active terms: {}\n- significant digits of all coefficients together: {}\n\
+         - operations of `ddz` in straight-line code: {}\n- changes: {}\n\
+         - largest bound, as a share of the root mean square of its `ddz`: {}\n\
+         - largest error at a recorded sample, likewise: {}\n",
         certificate.tolerance.words(),
+        certificate.terms(),
+        certificate.digits(),
+        certificate.operations(),
         certificate.n_changes(),
         share(certificate.largest_bound_share()),
         share(certificate.largest_measured_share()),

@@ -56,7 +56,7 @@ mod workspace;
 mod tests;
 
 pub use certificate::{
-    Certificate, Change, ChangeKind, Effect, EquationCertificate, PhaseCertificate,
+    BeforeAfter, Certificate, Change, ChangeKind, Effect, EquationCertificate, PhaseCertificate,
 };
 pub use domain::{Domain, MARGIN, PhaseSamples, Samples};
 pub use error::SimplifyError;

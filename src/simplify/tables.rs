@@ -10,9 +10,7 @@ use crate::typeset::{Cell, Table, rounded_up, significant};
 pub fn equation_table(certificate: &Certificate) -> Table {
     Table::of(certificate.equations())
         .column("phase, equation", "", |(phase, e)| name(phase, e.output))
-        .column("terms", "", |(_, e)| {
-            format!("{} to {}", e.terms_before, e.terms_after)
-        })
+        .column("terms", "", |(_, e)| e.terms.to_string())
         .column("rms of ddz", "", |(_, e)| e.rms)
         .column("allowed error", "", |(_, e)| e.allowed)
         .column("certified error", "", |(_, e)| {

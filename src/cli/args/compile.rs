@@ -7,8 +7,7 @@ use clap::{Args, ValueEnum};
 use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::Target;
 use crate::simplify::Tolerance;
-use crate::typeset::MOST_DIGITS;
-use crate::typeset::latex::Form;
+use crate::typeset::{Form, MOST_DIGITS};
 
 /// `romc compile`
 #[derive(Debug, Args)]
@@ -19,14 +18,13 @@ pub struct CompileArguments {
     /// Model file
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// Targets, separated by commas: latex, markdown, mathml; c, rust, python, casadi, matlab;
-    /// controller
+    /// Targets, separated by commas
     #[arg(
         long,
+        value_enum,
         value_name = "TARGET",
         value_delimiter = ',',
-        default_value = "latex,c,rust",
-        value_parser = target
+        default_value = "latex,c,rust"
     )]
     pub emit: Vec<Target>,
     /// Folder for the emitted files
@@ -167,8 +165,4 @@ fn positive_width(text: &str) -> Result<f64, String> {
         Ok(width) if width.is_finite() && width > 0.0 => Ok(width),
         _ => Err("expected a positive width in em".to_owned()),
     }
-}
-
-fn target(text: &str) -> Result<Target, String> {
-    text.parse::<Target>().map_err(|error| error.to_string())
 }

@@ -1,10 +1,13 @@
 //! Equations as lines of a `cases` or `align` environment.
 
-use crate::typeset::{EQUALS, Equation, EquationSystem, break_lines, symbol_width};
+use crate::typeset::{
+    EQUALS, Equation, EquationSystem, Form, PrintOptions, break_lines, symbol_width,
+};
 
 use super::math::{TexMath, TexSymbol, TexTerms};
-use super::options::{Form, LatexOptions};
 
+/// Longest line unless chosen, in em.
+const WIDTH_EM: f64 = 32.0;
 /// What a continued line is set in by, in em: `\qquad` and the empty group
 /// before its sign.
 const INDENT: f64 = 2.3;
@@ -23,7 +26,7 @@ pub(super) struct Block {
 }
 
 /// Spells the equations of one phase; `label` is the stem of its labels.
-pub(super) fn block(system: &EquationSystem, label: &str, options: &LatexOptions) -> Block {
+pub(super) fn block(system: &EquationSystem, label: &str, options: &PrintOptions) -> Block {
     let printer = Printer { options, label };
     let equations: Vec<Vec<String>> = system
         .equations
@@ -56,17 +59,18 @@ pub(super) fn block(system: &EquationSystem, label: &str, options: &LatexOptions
 }
 
 /// One phase as a bare `cases` environment, for a place that is in math mode already.
-pub fn tex_cases(system: &EquationSystem, options: &LatexOptions) -> String {
-    let options = LatexOptions {
+pub fn tex_cases(system: &EquationSystem, width_em: f64) -> String {
+    let options = PrintOptions {
         form: Form::Cases,
-        ..options.clone()
+        width_em: Some(width_em),
+        ..PrintOptions::default()
     };
     let lines = block(system, "", &options).lines.join("\n  ");
     format!("\\begin{{cases}}\n  {lines}\n\\end{{cases}}")
 }
 
 struct Printer<'a> {
-    options: &'a LatexOptions,
+    options: &'a PrintOptions,
     label: &'a str,
 }
 
@@ -89,7 +93,7 @@ impl Printer<'_> {
             let math = &zero;
             return vec![TexMath { math, numbers }.to_string()];
         }
-        let available = self.options.width_em - BRACE;
+        let available = self.options.width_em.unwrap_or(WIDTH_EM) - BRACE;
         let first = symbol_width(&equation.left) + EQUALS;
         break_lines(&equation.terms, available, first, INDENT)
             .into_iter()

@@ -3,17 +3,9 @@
 use std::fmt;
 
 use crate::equations::Unit;
-use crate::typeset::{Decimal, FunctionName, GREEK, Glyph, Math, Signed, Symbol};
-
-/// How numbers are written.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum NumberStyle {
-    /// Digits as they are: `0.36`, `1.2 \times 10^{-9}`.
-    #[default]
-    Plain,
-    /// The macro of siunitx: `\num{0.36}`.
-    Siunitx,
-}
+use crate::symbolic::Function;
+use crate::typeset::tree::function_name;
+use crate::typeset::{Decimal, GREEK, Glyph, Math, NumberStyle, Signed, Symbol};
 
 /// A typeset tree that displays as LaTeX, for math mode.
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +84,7 @@ impl fmt::Display for TexMath<'_> {
                 write!(f, r"\sqrt[{index}]{{{}}}", inner(radicand))
             }
             Math::Function(name, power, argument) => {
-                f.write_str(function(*name))?;
+                f.write_str(&function(*name))?;
                 if let Some(power) = power {
                     write!(f, "^{}", exponent_of(power))?;
                 }
@@ -192,15 +184,10 @@ fn glyph(glyph: &Glyph) -> String {
     }
 }
 
-fn function(name: FunctionName) -> &'static str {
-    match name {
-        FunctionName::Sin => r"\sin",
-        FunctionName::Cos => r"\cos",
-        FunctionName::Tan => r"\tan",
-        FunctionName::Tanh => r"\tanh",
-        FunctionName::Exp => r"\exp",
-        FunctionName::Ln => r"\ln",
-        FunctionName::Sgn => r"\mathop{\mathrm{sgn}}",
+fn function(function: Function) -> String {
+    match function {
+        Function::Sign => r"\mathop{\mathrm{sgn}}".to_owned(),
+        named => format!(r"\{}", function_name(named)),
     }
 }
 

@@ -2,10 +2,10 @@
 
 use crate::equations::{Equations, LatentUnits};
 use crate::model::{Activation, ReducedModel, ScaleFactors, StateMap};
-use crate::typeset::{Decimal, Quantity, Rounding, SymbolTable, Variable};
+use crate::typeset::{Decimal, NumberStyle, Quantity, Rounding, SymbolTable, Variable};
 
 use super::escape::TexText;
-use super::math::{NumberStyle, TexNumber, TexSymbol, TexUnit};
+use super::math::{TexNumber, TexSymbol, TexUnit};
 
 /// How many of an encoder row's weights are named.
 const STRONGEST: usize = 3;

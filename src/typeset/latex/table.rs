@@ -1,9 +1,9 @@
 //! The coefficients as booktabs tables.
 
-use crate::typeset::{CoefficientRow, CoefficientTable, Decimal};
+use crate::typeset::{CoefficientRow, CoefficientTable, Decimal, NumberStyle};
 
 use super::escape::{TexText, label};
-use super::math::{NumberStyle, TexMath, TexNumber, TexSymbol, TexUnit};
+use super::math::{TexMath, TexNumber, TexSymbol, TexUnit};
 
 /// Most columns of numbers side by side.
 const WIDEST: usize = 8;
