@@ -14,7 +14,7 @@ use romc::model::{Library, ReducedModel};
 use romc::symbolic::Function;
 use romc::typeset::{
     Equation, Math, Quantity, RobotTypeset, Rounding, Signed, Symbol, SymbolTable, Typeset,
-    Variable, expression,
+    expression,
 };
 
 type Values = BTreeMap<Symbol, f64>;
@@ -122,7 +122,7 @@ fn latent_values(z: &DVector<f64>, dz: &DVector<f64>, u: &DVector<f64>) -> Value
     for (quantity, vector) in quantities {
         for (row, value) in vector.iter().enumerate() {
             let index = row + 1;
-            values.insert(symbols.symbol(Variable { quantity, index }), *value);
+            values.insert(symbols.symbol(quantity, index), *value);
         }
     }
     values

@@ -3,14 +3,15 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::json;
 
 use super::Answer;
 use super::simplification::exact_words;
 use crate::Error;
 use crate::artifact;
 use crate::equations::Equations;
-use crate::model::{Phase, ReducedModel, StateMap};
+use crate::model::{ReducedModel, StateMap};
 use crate::robot::Robot;
 use crate::typeset::{Table, significant};
 
@@ -18,6 +19,15 @@ use crate::typeset::{Table, significant};
 const PATTERN_WIDTH: usize = 120;
 /// Coordinates named for each latent.
 const DOMINANT: usize = 4;
+
+/// One phase of the equations.
+#[derive(Serialize)]
+struct PhaseView<'a> {
+    name: &'a str,
+    feet: String,
+    active_terms: usize,
+    coefficients: usize,
+}
 
 /// Describes a model.
 ///
@@ -36,16 +46,24 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     if !model.description().is_empty() {
         let _ = writeln!(text, "  {}", model.description());
     }
-    let phases = Table::of(model.phases())
-        .column("phase", "", |phase| &phase.name)
-        .column("feet", "", |phase| phase.feet.to_string())
-        .column("active terms", "", |phase| phase.active_count())
-        .column("of", "", |phase| phase.xi.len())
+    let phases: Vec<PhaseView> = (equations.phases().iter())
+        .map(|phase| PhaseView {
+            name: &phase.name,
+            feet: phase.feet.to_string(),
+            active_terms: phase.active_count(),
+            coefficients: equations.terms().len() * equations.latent_dim(),
+        })
+        .collect();
+    let table = Table::of(&phases)
+        .column("phase", "", |phase| phase.name)
+        .column("feet", "", |phase| &phase.feet)
+        .column("active terms", "", |phase| phase.active_terms)
+        .column("of", "", |phase| phase.coefficients)
         .table();
-    let _ = writeln!(text, "\n{phases}");
+    let _ = writeln!(text, "\n{table}");
     text.push_str(&exact_words(&equations));
-    for phase in model.phases() {
-        text.push_str(&pattern(model, phase));
+    for phase in 0..equations.phases().len() {
+        text.push_str(&pattern(&equations, phase));
     }
     if let Some(dominant) = &dominant {
         for (latent, weights) in dominant.iter().enumerate() {
@@ -73,7 +91,7 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
             "latent_dim": model.latent_dim(),
             "library_dim": model.library().len(),
             "library": model.library().terms().iter().map(|term| term.text()).collect::<Vec<_>>(),
-            "phases": model.phases().iter().map(phase_json).collect::<Vec<_>>(),
+            "phases": phases,
             "exact": equations.steps(),
             "dominant_coordinates": dominant,
             "encoder": model.encoder_map().ok().map(StateMap::summary),
@@ -83,24 +101,22 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     })
 }
 
-/// Rows are outputs, columns library terms; a dot is an inactive one.
-fn pattern(model: &ReducedModel, phase: &Phase) -> String {
-    if model.library().len() > PATTERN_WIDTH {
+/// Rows are outputs, columns terms; a dot is an inactive one.
+fn pattern(equations: &Equations<'_>, phase: usize) -> String {
+    if equations.terms().len() > PATTERN_WIDTH {
         return String::new();
     }
     let mut text = format!(
         "Xi of {} (one column per term, + positive, - negative)\n",
-        phase.name
+        equations.phases()[phase].name
     );
-    for output in 0..model.latent_dim() {
-        let cells: String = (phase.xi.column(output).iter())
-            .map(|value| match value {
-                value if *value > 0.0 => '+',
-                value if *value < 0.0 => '-',
-                _ => '.',
-            })
-            .collect();
-        let _ = writeln!(text, "  ddz{}  {cells}", output + 1);
+    for (output, row) in equations.coefficients(phase).column_iter().enumerate() {
+        let cells = row.iter().map(|value| match value {
+            value if *value > 0.0 => '+',
+            value if *value < 0.0 => '-',
+            _ => '.',
+        });
+        let _ = writeln!(text, "  ddz{}  {}", output + 1, cells.collect::<String>());
     }
     text.push('\n');
     text
@@ -127,13 +143,4 @@ fn dominant_coordinates(model: &ReducedModel) -> Option<Vec<Vec<(String, f64)>>>
         pairs
     };
     Some((0..weights.nrows()).map(of_latent).collect())
-}
-
-fn phase_json(phase: &Phase) -> Value {
-    json!({
-        "name": phase.name,
-        "feet": phase.feet.to_string(),
-        "active_terms": phase.active_count(),
-        "coefficients": phase.xi.len(),
-    })
 }

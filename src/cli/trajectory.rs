@@ -6,7 +6,6 @@ use crate::Error;
 use crate::evaluate::SegmentRun;
 use crate::model::ReducedModel;
 use crate::robot::Robot;
-use crate::sim::Rollout;
 use crate::typeset::Table;
 
 /// One row per sample: time, phase, recorded and predicted latent state and coordinates.
@@ -20,7 +19,8 @@ use crate::typeset::Table;
 pub fn trajectory_table(model: &ReducedModel, runs: &[SegmentRun<'_>]) -> Result<Table, Error> {
     let mut table = Table::new(columns(model));
     for (index, run) in runs.iter().enumerate() {
-        let [full, restarted] = [&run.full, &run.restarted].map(|rollout| predicted(run, rollout));
+        let [full, restarted] =
+            [&run.full, &run.restarted].map(|rollout| rollout.states(run.latent.len()));
         for (sample, predictions) in full.iter().zip(&restarted).enumerate() {
             let (segment, latent) = (run.segment, &run.latent);
             let phase = &model.phases()[latent.phase[sample]].name;
@@ -64,16 +64,6 @@ fn columns(model: &ReducedModel) -> Vec<String> {
         .chain(latent("u_lat"))
         .chain(thrice(names))
         .collect()
-}
-
-/// Latent position and velocity at every sample that a rollout reached.
-fn predicted(run: &SegmentRun<'_>, rollout: &Rollout) -> Vec<Option<(DVector<f64>, DVector<f64>)>> {
-    let mut states = vec![None; run.latent.len()];
-    for (sample, window, column) in rollout.predictions() {
-        let [z, dz] = [&window.z, &window.dz].map(|rows| rows.column(column).into_owned());
-        states[sample] = Some((z, dz));
-    }
-    states
 }
 
 /// Adds each recorded value with its two predictions to a row.

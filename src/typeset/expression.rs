@@ -300,7 +300,7 @@ impl Layout<'_> {
                 let variable = Variable::parse(name).ok_or_else(|| UnknownSymbol {
                     name: name.to_owned(),
                 })?;
-                let symbol = Math::Symbol(self.symbols.symbol(variable));
+                let symbol = Math::Symbol(self.symbols.symbol(variable.quantity, variable.index));
                 (FactorKey::Variable(Some(variable)), symbol)
             }
             Node::Apply(function, argument) => {

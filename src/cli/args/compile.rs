@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::number::number;
 use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::Target;
 use crate::simplify::Tolerance;
@@ -140,29 +141,21 @@ pub struct SimplifyArguments {
 }
 
 fn decimal_places(text: &str) -> Result<usize, String> {
-    match text.parse::<usize>() {
-        Ok(places) if places <= MOST_DIGITS => Ok(places),
-        _ => Err(format!("expected a whole number from 0 to {MOST_DIGITS}")),
-    }
+    let expected = format!("a whole number from 0 to {MOST_DIGITS}");
+    number(text, |places| *places <= MOST_DIGITS, &expected)
 }
 
 fn printed_digits(text: &str) -> Result<usize, String> {
-    match text.parse::<usize>() {
-        Ok(digits) if (1..=MOST_DIGITS).contains(&digits) => Ok(digits),
-        _ => Err(format!("expected a whole number from 1 to {MOST_DIGITS}")),
-    }
+    let expected = format!("a whole number from 1 to {MOST_DIGITS}");
+    number(text, |digits| (1..=MOST_DIGITS).contains(digits), &expected)
 }
 
 fn share(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(share) if share.is_finite() && share >= 0.0 => Ok(share),
-        _ => Err("expected a number of at least 0, such as 0.1".to_owned()),
-    }
+    let is_share = |share: &f64| share.is_finite() && *share >= 0.0;
+    number(text, is_share, "a number of at least 0, such as 0.1")
 }
 
 fn positive_width(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(width) if width.is_finite() && width > 0.0 => Ok(width),
-        _ => Err("expected a positive width in em".to_owned()),
-    }
+    let is_width = |width: &f64| width.is_finite() && *width > 0.0;
+    number(text, is_width, "a positive width in em")
 }
