@@ -48,7 +48,8 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let certificate = match &simplified {
         None => None,
         Some(outcome) => {
-            Some(outcome.files_and_summary(rounding(&arguments.equations, unless_given))?)
+            let rounding = rounding(&arguments.equations, unless_given);
+            Some(outcome.files_and_summary(equations, rounding)?)
         }
     };
     if let Some(outcome) = &simplified {

@@ -3,10 +3,10 @@
 //! Model and recordings are part of the binary, so that the demo runs anywhere.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::Answer;
 use super::args::{CodeArguments, DemoArguments, EquationArguments};
@@ -90,17 +90,32 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let self_test = self_test(&model, &arguments.out_dir);
     progress.finish_and_clear();
 
-    let results = Results {
-        jumps: jumps.len(),
-        evaluation,
-        model: &model,
-        control,
-        self_test,
-        made,
-    };
+    let mut text = format!(
+        "romc demo: model {} on {} recorded jumps of a simulated Go1 that its training did not see\n\n{}\n{}",
+        MODEL.0,
+        jumps.len(),
+        baseline_table(&evaluation),
+        command_summary(&control)
+    );
+    let self_test = self_test.words();
+    let _ = writeln!(text, "self-test of the emitted C: {self_test}\n");
+    let _ = writeln!(text, "made in {}:", arguments.out_dir.display());
+    for (path, bytes) in &made {
+        let name = path.strip_prefix(&arguments.out_dir).unwrap_or(path);
+        let _ = writeln!(text, "  {} ({bytes} bytes)", name.display());
+    }
+    let [plain, consistent] =
+        (control.each_ref()).map(|runs| runs.iter().map(mpc_command::run_json).collect::<Vec<_>>());
     Ok(Answer {
-        text: results.text(&arguments.out_dir),
-        json: results.json(),
+        text,
+        json: json!({
+            "command": "demo",
+            "model": MODEL.0,
+            "rollouts": simulate::metrics_json(&model, &evaluation),
+            "mpc": { "transpose": plain, "consistent": consistent },
+            "self_test": self_test,
+            "files": made.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
+        }),
     })
 }
 
@@ -150,78 +165,25 @@ fn self_test(model: &ReducedModel, folder: &Path) -> SelfTest {
     }
 }
 
-/// The results of the demo.
-struct Results<'a> {
-    jumps: usize,
-    evaluation: Assessment<'a>,
-    model: &'a ReducedModel,
-    /// Runs with the plain lift, then with the consistent one.
-    control: [Vec<NamedRun>; 2],
-    self_test: SelfTest,
-    made: Vec<(PathBuf, usize)>,
-}
-
-impl Results<'_> {
-    fn text(&self, folder: &Path) -> String {
-        let mut text = format!(
-            "romc demo: model {} on {} recorded jumps of a simulated Go1 that its training did not see\n\n",
-            MODEL.0, self.jumps
-        );
-        let _ = writeln!(
-            text,
-            "{}\n{}",
-            baseline_table(&self.evaluation),
-            self.commands()
-        );
-        let _ = writeln!(
-            text,
-            "self-test of the emitted C: {}\n",
-            self.self_test.words()
-        );
-        let _ = writeln!(text, "made in {}:", folder.display());
-        for (path, bytes) in &self.made {
-            let name = path.strip_prefix(folder).unwrap_or(path).display();
-            let _ = writeln!(text, "  {name} ({bytes} bytes)");
-        }
-        text
-    }
-
-    /// The controller's commands with each lift.
-    fn commands(&self) -> Table {
-        let lifts = ["plain lift, u = W_e^T u_lat", "consistent lift"];
-        let runs = lifts.into_iter().zip(&self.control);
-        let rows = runs.flat_map(|(lift, runs)| {
-            let row = move |(path, run): &NamedRun| {
-                let name = format!("{lift}, {}", path.display());
-                (name, run.summary.clone())
-            };
-            runs.iter().map(row)
-        });
-        Table::of(rows)
-            .column("controller", "", |(name, _)| name.clone())
-            .column("steps", "", |(_, run)| run.steps)
-            .column("solved", "", |(_, run)| run.solved)
-            .column("torque R^2 in contact", "", |(_, run)| {
-                run.torque_r2.contact
-            })
-            .column("beyond torque limits", "", |(_, run)| run.limit_violations)
-            .column("median step", "us", |(_, run)| {
-                format!("{:.0}", run.step_us.p50)
-            })
-            .table()
-    }
-
-    fn json(&self) -> Value {
-        let [plain, consistent] = (self.control)
-            .each_ref()
-            .map(|runs| runs.iter().map(mpc_command::run_json).collect::<Vec<_>>());
-        json!({
-            "command": "demo",
-            "model": MODEL.0,
-            "rollouts": simulate::metrics_json(self.model, &self.evaluation),
-            "mpc": { "transpose": plain, "consistent": consistent },
-            "self_test": self.self_test.words(),
-            "files": self.made.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
+/// The controller's commands with the plain lift and with the consistent one.
+fn command_summary(control: &[Vec<NamedRun>; 2]) -> Table {
+    let lifts = ["plain lift, u = W_e^T u_lat", "consistent lift"];
+    let runs = lifts.into_iter().zip(control);
+    let rows = runs.flat_map(|(lift, runs)| {
+        let name = move |path: &Path| format!("{lift}, {}", path.display());
+        runs.iter()
+            .map(move |(path, run)| (name(path), &run.summary))
+    });
+    Table::of(rows)
+        .column("controller", "", |(name, _)| name.clone())
+        .column("steps", "", |(_, run)| run.steps)
+        .column("solved", "", |(_, run)| run.solved)
+        .column("torque R^2 in contact", "", |(_, run)| {
+            run.torque_r2.contact
         })
-    }
+        .column("beyond torque limits", "", |(_, run)| run.limit_violations)
+        .column("median step", "us", |(_, run)| {
+            format!("{:.0}", run.step_us.p50)
+        })
+        .table()
 }

@@ -182,21 +182,19 @@ impl Outcome {
     }
 
     /// The certificate as a file beside the emitted ones, its summary, and the same as JSON;
-    /// `rounding` is how coefficients are printed.
+    /// `equations` are those of the model as they are printed, `rounding` is how.
     ///
     /// # Errors
     /// [`Error::Simplify`] if printing cannot be evaluated.
     pub fn files_and_summary(
         &self,
+        equations: &Equations<'_>,
         rounding: Rounding,
     ) -> Result<(EmittedFile, String, Value), Error> {
         let basis = &self.basis;
         let printed = match rounding {
             Rounding::Exact => Vec::new(),
-            _ => {
-                let equations = Equations::of(&self.model);
-                printed(&equations, &basis.domain, basis.samples.as_ref(), rounding)?
-            }
+            _ => printed(equations, &basis.domain, basis.samples.as_ref(), rounding)?,
         };
         let name = format!("{}-simplification.md", self.model.identifier());
         let page = markdown(

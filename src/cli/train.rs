@@ -136,6 +136,8 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
     }
 }
 
+const TORQUE_R2: &str = "torque R^2 of the plain lift, all samples";
+
 /// Every metric on each set of recordings.
 fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
     let mut sets = vec![
@@ -152,24 +154,26 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
             .map(|(_, set)| set.map(cell).unwrap_or_default());
         table.row([name.into(), unit.into()].into_iter().chain(cells));
     };
-    row("decoder mean square", "scaled", &|set| {
-        Some(set.decoder_mse)
-    });
-    row("torque R^2 of the plain lift, all samples", "", &|set| {
-        Some(set.torque_r2)
-    });
-    row("body x, fixed steps over 0.1 s", "m", &|set| {
-        Some(set.prediction_x_m)
-    });
-    row("body z, fixed steps over 0.1 s", "m", &|set| {
-        Some(set.prediction_z_m)
-    });
-    row("body x, fixed steps, whole jump", "m", &|set| {
-        set.rollout_x_m
-    });
-    row("body z, fixed steps, whole jump", "m", &|set| {
-        set.rollout_z_m
-    });
+    type Metric = (&'static str, &'static str, fn(&SetMetrics) -> Option<f64>);
+    let metrics: [Metric; 6] = [
+        ("decoder mean square", "scaled", |set| Some(set.decoder_mse)),
+        (TORQUE_R2, "", |set| Some(set.torque_r2)),
+        ("body x, fixed steps over 0.1 s", "m", |set| {
+            Some(set.prediction_x_m)
+        }),
+        ("body z, fixed steps over 0.1 s", "m", |set| {
+            Some(set.prediction_z_m)
+        }),
+        ("body x, fixed steps, whole jump", "m", |set| {
+            set.rollout_x_m
+        }),
+        ("body z, fixed steps, whole jump", "m", |set| {
+            set.rollout_z_m
+        }),
+    ];
+    for (name, unit, metric) in metrics {
+        row(name, unit, &metric);
+    }
     for (phase, terms) in report.active_terms.iter().enumerate() {
         let name = format!(
             "smoothed ddz R^2 in {} ({} terms)",

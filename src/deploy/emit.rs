@@ -53,7 +53,7 @@ impl Target {
 pub struct EmitOptions {
     /// How programs are made.
     pub lower: LowerOptions,
-    /// How equations are printed, with the digest of the model file for the first lines of all files.
+    /// How equations are printed, with the digest of the model file for the first lines of files.
     pub print: PrintOptions,
     /// Floating-point numbers of C and Rust.
     pub precision: Precision,

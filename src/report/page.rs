@@ -176,8 +176,8 @@ fn sections(content: &Content<'_>, figures: &AllFigures, options: &PageOptions) 
                 runs.map(|(lift, runs)| run_table(runs).captioned(lift)),
             ),
             Section {
-                folded: (!options.changes.is_empty())
-                    .then(|| TableView::folded(&options.changes))
+                folded: Some(options.changes.clone())
+                    .filter(|table| !table.is_empty())
                     .into_iter()
                     .collect(),
                 ..Section::new(
@@ -283,8 +283,9 @@ struct Section {
     id: &'static str,
     title: &'static str,
     paragraphs: Vec<String>,
-    tables: Vec<TableView>,
-    folded: Vec<TableView>,
+    tables: Vec<Table>,
+    /// Tables whose captions are the summaries that unfold them.
+    folded: Vec<Table>,
     figures: Vec<FigureView>,
 }
 
@@ -310,35 +311,9 @@ impl Section {
     /// Adds figures and tables.
     fn with(self, figures: &[Figure], tables: impl IntoIterator<Item = Table>) -> Self {
         Self {
-            tables: tables
-                .into_iter()
-                .map(|table| TableView::open(&table))
-                .collect(),
+            tables: tables.into_iter().collect(),
             figures: figures.iter().map(figure_view).collect(),
             ..self
-        }
-    }
-}
-
-/// A table in the template.
-struct TableView {
-    caption: String,
-    html: String,
-}
-
-impl TableView {
-    fn open(table: &Table) -> Self {
-        Self {
-            caption: html(table.caption()),
-            html: table.html(),
-        }
-    }
-
-    /// One whose caption is the summary that unfolds it.
-    fn folded(table: &Table) -> Self {
-        Self {
-            caption: html(table.caption()),
-            html: table.clone().captioned("").html(),
         }
     }
 }

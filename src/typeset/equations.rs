@@ -3,7 +3,7 @@
 use crate::equations::{Equations, PhaseEquations, Unit};
 
 use super::decimal::{Decimal, Rounding};
-use super::expression::{UnknownSymbol, expression};
+use super::expression::{UnknownSymbol, terms};
 use super::rounder::{Rounder, RoundingReport};
 use super::symbols::{Quantity, SymbolTable};
 use super::tree::{Math, Signed, Symbol};
@@ -70,13 +70,10 @@ impl Typeset {
         symbols: &SymbolTable,
         rounding: Rounding,
     ) -> Result<Self, UnknownSymbol> {
-        let terms = (system.terms().iter())
-            .map(|term| expression(system.pool(), term.expr(), symbols))
-            .collect::<Result<Vec<_>, _>>()?;
         let mut layout = Layout {
             system,
             symbols,
-            terms,
+            terms: terms(system, symbols)?,
             rounder: Rounder::new(rounding),
         };
         let systems = system

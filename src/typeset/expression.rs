@@ -3,6 +3,7 @@
 
 use std::cmp::Ordering;
 
+use crate::equations::Equations;
 use crate::symbolic::{ExprId, ExprPool, Function, Node, Number};
 
 use super::decimal::Decimal;
@@ -27,6 +28,20 @@ pub fn expression(
     symbols: &SymbolTable,
 ) -> Result<Signed, UnknownSymbol> {
     Layout { pool, symbols }.signed(expr)
+}
+
+/// Lays out all terms of equations.
+///
+/// # Errors
+/// [`UnknownSymbol`] as [`expression`].
+pub(super) fn terms(
+    equations: &Equations<'_>,
+    symbols: &SymbolTable,
+) -> Result<Vec<Signed>, UnknownSymbol> {
+    let terms = equations.terms().iter();
+    terms
+        .map(|term| expression(equations.pool(), term.expr(), symbols))
+        .collect()
 }
 
 /// Puts a coefficient before a term: `0.36` and `sin(dz1)` to `0.36 sin(dz1)`.

@@ -32,6 +32,6 @@ pub use page::rendered;
 pub use robot::RobotTypeset;
 pub use rounder::{Place, RoundingReport};
 pub use symbols::{Quantity, SymbolTable, Variable};
-pub use table::{Cell, Rows, Table, rounded_up, significant};
+pub use table::{Cell, Rows, Table, rounded, rounded_up, significant};
 pub use tree::{GREEK, Glyph, Math, Signed, Symbol};
 pub use width::{EQUALS, OPERATOR, break_lines, sum_width, symbol_width, width};

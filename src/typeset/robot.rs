@@ -9,7 +9,7 @@ use crate::model::AffineMap;
 use super::decimal::{Decimal, Rounding};
 use super::equations::{Equation, EquationSystem};
 use super::error::RobotTypesetError;
-use super::expression::expression;
+use super::expression::terms;
 use super::rounder::{Rounder, RoundingReport};
 use super::symbols::{Quantity, SymbolTable, glyph};
 use super::tree::{Glyph, Math, Signed, Symbol};
@@ -54,11 +54,7 @@ impl RobotTypeset {
         };
         let decoder = decoder.weights();
         let coordinates = coordinate_symbols(&state.names);
-        let terms = system
-            .terms()
-            .iter()
-            .map(|term| expression(system.pool(), term.expr(), symbols))
-            .collect::<Result<Vec<_>, _>>()?;
+        let terms = terms(system, symbols)?;
         let (encoder, negligible_weights) = encoder(map, &factors, symbols, &coordinates)?;
         let mut rounder = Rounder::new(rounding);
         let mut systems = Vec::new();

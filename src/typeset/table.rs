@@ -20,18 +20,20 @@ pub fn significant(value: f64) -> String {
     format!("{value:.*}", usize::try_from(4 - before_point).unwrap_or(0))
 }
 
+/// The float nearest to `value` in so many significant decimal digits.
+pub fn rounded(value: f64, digits: usize) -> f64 {
+    let text = format!("{value:.*e}", digits - 1);
+    text.parse().expect("a formatted float reads back")
+}
+
 /// The smallest number of `digits` significant decimal digits that is not below `value`.
 pub fn rounded_up(value: f64, digits: usize) -> f64 {
-    let nearest = |value: f64| -> f64 {
-        let text = format!("{value:.*e}", digits - 1);
-        text.parse().expect("a formatted float reads back")
-    };
-    let rounded = nearest(value);
-    if rounded >= value {
-        return rounded;
+    let nearest = rounded(value, digits);
+    if nearest >= value {
+        return nearest;
     }
     let place = value.abs().log10().floor() as i32 + 1 - digits as i32;
-    nearest(rounded + 10f64.powi(place))
+    rounded(nearest + 10f64.powi(place), digits)
 }
 
 /// Text of one cell; a float has four significant digits, a value that is absent is `-`.
@@ -270,6 +272,14 @@ mod tests {
         assert_eq!(significant(0.0), "0");
         assert_eq!(significant(1.23456e-7), "1.235e-7");
         assert_eq!(significant(f64::NAN), "diverged");
+    }
+
+    #[test]
+    fn rounding_keeps_so_many_digits() {
+        assert_eq!(rounded(-0.123456, 2), -0.12);
+        assert_eq!(rounded(99.6, 1), 100.0);
+        assert_eq!(rounded(6.02214e23, 3), 6.02e23);
+        assert_eq!(rounded(0.1 + 0.2, 17), 0.1 + 0.2);
     }
 
     #[test]

@@ -154,32 +154,18 @@ fn project(
     let (hash, slashes) = (format!("# {provenance}"), format!("// {provenance}"));
     let [hash, slashes] = [hash.as_str(), &slashes];
     let block = &format!("/* {provenance} */");
-    let (header, python) = (
-        format!("{name}_controller.h"),
-        format!("{name}_controller.py"),
-    );
     let templates = [
-        ("Cargo.toml".to_owned(), Cargo::text(hash, facts)?),
-        ("src/lib.rs".to_owned(), Lib::text(slashes, facts)?),
-        (format!("include/{header}"), Header::text(block, facts)?),
-        ("README.md".to_owned(), Readme::text(provenance, facts)?),
-        (
-            "examples/example.c".to_owned(),
-            ExampleC::text(block, facts)?,
-        ),
-        (
-            "examples/example.cpp".to_owned(),
-            ExampleCpp::text(slashes, facts)?,
-        ),
-        (format!("python/{python}"), Binding::text(hash, facts)?),
-        (
-            "python/example.py".to_owned(),
-            ExamplePy::text(hash, facts)?,
-        ),
+        ("Cargo.toml", Cargo::text(hash, facts)?),
+        ("src/lib.rs", Lib::text(slashes, facts)?),
+        ("include/NAME_controller.h", Header::text(block, facts)?),
+        ("README.md", Readme::text(provenance, facts)?),
+        ("examples/example.c", ExampleC::text(block, facts)?),
+        ("examples/example.cpp", ExampleCpp::text(slashes, facts)?),
+        ("python/NAME_controller.py", Binding::text(hash, facts)?),
+        ("python/example.py", ExamplePy::text(hash, facts)?),
     ];
-    let mut files: Vec<(String, String)> = templates
-        .into_iter()
-        .map(|(path, text)| (path, tidy(&text)))
+    let mut files: Vec<(String, String)> = (templates.into_iter())
+        .map(|(path, text)| (path.replace("NAME", name), tidy(&text)))
         .collect();
     files.push(("Cargo.lock".to_owned(), lock.text(hash, name)));
     for (path, text) in sources::LICENCES {

@@ -101,7 +101,8 @@ fn legend_marks(figure: &Figure) -> Vec<Mark> {
     marks
 }
 
-/// Draws one panel in the given size, the first mark below the others; `x_label` stands below its axis.
+/// Draws one panel in the given size, the first mark below the others; `x_label` stands below its
+/// axis.
 pub fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<Mark> {
     match panel {
         Panel::Lines(plot) => draw_lines(plot, size, x_label),

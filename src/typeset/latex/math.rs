@@ -205,27 +205,13 @@ fn delimited(
         write!(f, "{open}{inner}{close}")
     }
 }
+
 /// A unit as upright LaTeX: `\mathrm{m/s^{2}}`.
 pub struct TexUnit(pub Unit);
 
 impl fmt::Display for TexUnit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let product = |factors: &[(&str, i8)]| {
-            let factors = factors.iter().map(|&(symbol, power)| match power {
-                1 => symbol.to_owned(),
-                _ => format!("{symbol}^{{{power}}}"),
-            });
-            factors.collect::<Vec<_>>().join(r"\,")
-        };
-        let [above, below] = self.0.fraction();
-        let above = match above.is_empty() {
-            true => "1".to_owned(),
-            false => product(&above),
-        };
-        match below.len() {
-            0 => write!(f, r"\mathrm{{{above}}}"),
-            1 => write!(f, r"\mathrm{{{above}/{}}}", product(&below)),
-            _ => write!(f, r"\mathrm{{{above}/({})}}", product(&below)),
-        }
+        let unit = self.0.spelled(r"\,", |power| format!("^{{{power}}}"));
+        write!(f, r"\mathrm{{{unit}}}")
     }
 }
