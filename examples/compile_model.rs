@@ -7,8 +7,8 @@ use std::process::ExitCode;
 use romc::artifact;
 use romc::deploy::{EmitOptions, Target, emit};
 use romc::equations::Equations;
-use romc::files::Overwrite;
-use romc::files::write_files;
+use romc::files::{Overwrite, write_files};
+use romc::typeset::PrintOptions;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -28,7 +28,10 @@ fn main() -> ExitCode {
 fn compile(model: &Path, folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
     let model = artifact::read(model)?;
     let options = EmitOptions {
-        digest: Some(artifact::digest(&model).short()),
+        print: PrintOptions {
+            digest: Some(artifact::digest(&model).short()),
+            ..PrintOptions::default()
+        },
         ..EmitOptions::default()
     };
     let files = emit(&Equations::of(&model), &[Target::C, Target::Rust], &options)?;

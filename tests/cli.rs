@@ -1039,7 +1039,7 @@ fn compile_within_a_tolerance_tells_each_change_and_saves_the_simplified_model()
     let page =
         fs::read_to_string(Path::new(&out).join("go1_d6-simplification.md")).expect("written");
     assert!(
-        page.contains("| contact | ddz1 |") && page.contains("rounded to"),
+        page.contains("| contact, ddz1 |") && page.contains("rounded to"),
         "{page}"
     );
     let header = fs::read_to_string(Path::new(&out).join("go1_d6.h")).expect("written");

@@ -9,7 +9,8 @@ use romc::artifact;
 use romc::equations::Equations;
 use romc::files::EmittedFile;
 use romc::model::{FeetRule, Library, Phase, ReducedModel};
-use romc::typeset::latex::{self, Form, LatexOptions, NumberStyle};
+use romc::typeset::latex;
+use romc::typeset::{Form, NumberStyle, PrintOptions};
 use romc::typeset::{Rounding, SymbolTable};
 
 /// Equations (25) and (26) as the paper prints them, without spaces and with plain parentheses.
@@ -147,9 +148,9 @@ fn one_term(term: &str, coefficient: f64) -> String {
         })
         .build()
         .unwrap();
-    let options = LatexOptions {
+    let options = PrintOptions {
         rounding: Rounding::Exact,
-        ..LatexOptions::default()
+        ..PrintOptions::default()
     };
     let files = latex::emit(&Equations::as_learned(&model), &options).unwrap();
     let line = files[0]
@@ -190,7 +191,7 @@ fn normal_form(text: &str) -> Vec<String> {
 fn paper_model_prints_equations_25_and_26_as_published() {
     let files = latex::emit(
         &Equations::of(&model("paper-2d.json")),
-        &LatexOptions::default(),
+        &PrintOptions::default(),
     )
     .unwrap();
     let text = equations(&files, "paper_2d.tex");
@@ -204,9 +205,9 @@ fn paper_model_prints_equations_25_and_26_as_published() {
 #[test]
 fn every_shipped_model_prints_each_active_term_once() {
     for (path, model) in shipped_models() {
-        let options = LatexOptions {
+        let options = PrintOptions {
             form: Form::Cases,
-            ..LatexOptions::default()
+            ..PrintOptions::default()
         };
         let files = latex::emit(&Equations::as_learned(&model), &options).unwrap();
         let systems = normal_form(&files[0].contents);
@@ -276,9 +277,9 @@ fn rounding_to_zero_is_told_with_the_term() {
         })
         .build()
         .unwrap();
-    let fixed = LatexOptions {
+    let fixed = PrintOptions {
         rounding: Rounding::Decimals(2),
-        ..LatexOptions::default()
+        ..PrintOptions::default()
     };
     let text = equations(
         &latex::emit(&Equations::of(&model), &fixed).unwrap(),
@@ -294,7 +295,7 @@ fn rounding_to_zero_is_told_with_the_term() {
         text.contains("left out: contact, ddz1: 4.9e-3 * u1"),
         "{text}"
     );
-    let default = latex::emit(&Equations::of(&model), &LatexOptions::default()).unwrap();
+    let default = latex::emit(&Equations::of(&model), &PrintOptions::default()).unwrap();
     let text = equations(&default, "small.tex");
     assert!(text.contains(r"\ddot{z}_1 = 0.75z_1 + 0.005u_1"), "{text}");
     assert!(!text.contains("left out"), "{text}");
@@ -312,9 +313,9 @@ fn coefficient_of_one_is_left_out_only_when_it_is_exactly_one() {
             })
             .build()
             .unwrap();
-        let options = LatexOptions {
+        let options = PrintOptions {
             rounding: Rounding::Significant(3),
-            ..LatexOptions::default()
+            ..PrintOptions::default()
         };
         let text = equations(
             &latex::emit(&Equations::as_learned(&model), &options).unwrap(),
@@ -338,7 +339,7 @@ fn hostile_description_reaches_the_document_only_escaped() {
         })
         .build()
         .unwrap();
-    let files = latex::emit(&Equations::as_learned(&model), &LatexOptions::default()).unwrap();
+    let files = latex::emit(&Equations::as_learned(&model), &PrintOptions::default()).unwrap();
     let text = equations(&files, "m-preview.tex");
     assert!(
         text.contains(r"100\% \textbackslash{}input\{/etc/passwd\} \$x\$"),
@@ -351,7 +352,7 @@ fn hostile_description_reaches_the_document_only_escaped() {
 #[test]
 fn shipped_models_compile_to_pdf() {
     for (path, model) in shipped_models() {
-        let files = latex::emit(&Equations::as_learned(&model), &LatexOptions::default()).unwrap();
+        let files = latex::emit(&Equations::as_learned(&model), &PrintOptions::default()).unwrap();
         println!("{}", path.display());
         typeset(&files, model.identifier().as_str());
     }
@@ -366,11 +367,11 @@ fn every_kind_of_term_compiles_to_pdf_in_each_form() {
         (Form::Align, NumberStyle::Siunitx),
         (Form::Automatic, NumberStyle::Siunitx),
     ] {
-        let options = LatexOptions {
+        let options = PrintOptions {
             form,
             numbers,
             symbols: symbols.clone(),
-            ..LatexOptions::default()
+            ..PrintOptions::default()
         };
         typeset(
             &latex::emit(&Equations::as_learned(&model), &options).unwrap(),
@@ -382,9 +383,9 @@ fn every_kind_of_term_compiles_to_pdf_in_each_form() {
 #[test]
 fn equations_of_width_22_fit_a_column_of_a_two_column_paper() {
     for (path, model) in shipped_models() {
-        let options = LatexOptions {
-            width_em: 22.0,
-            ..LatexOptions::default()
+        let options = PrintOptions {
+            width_em: Some(22.0),
+            ..PrintOptions::default()
         };
         let mut files = latex::emit(&Equations::as_learned(&model), &options).unwrap();
         let stem = model.identifier();
@@ -403,7 +404,7 @@ fn equations_of_width_22_fit_a_column_of_a_two_column_paper() {
 
 #[test]
 fn emission_is_identical_from_run_to_run() {
-    let options = LatexOptions::default();
+    let options = PrintOptions::default();
     assert_eq!(
         latex::emit(&Equations::as_learned(&every_kind()), &options).unwrap(),
         latex::emit(&Equations::as_learned(&every_kind()), &options).unwrap()

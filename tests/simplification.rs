@@ -10,7 +10,7 @@ use romc::ir::Interpreter;
 use romc::lower::{self, LowerOptions};
 use romc::model::{FeetRule, Library, LibrarySource, Phase, ReducedModel, StandardLibrary};
 use romc::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId};
-use romc::typeset::latex::LatexOptions;
+use romc::typeset::PrintOptions;
 
 const LATENT_DIM: usize = 2;
 
@@ -77,9 +77,9 @@ fn printed(equations: &Equations<'_>) -> String {
 /// The right side of `ddz1` in the emitted LaTeX.
 fn latex(equations: &Equations<'_>) -> String {
     let options = EmitOptions {
-        latex: LatexOptions {
-            width_em: 1000.0,
-            ..LatexOptions::default()
+        print: PrintOptions {
+            width_em: Some(1000.0),
+            ..PrintOptions::default()
         },
         ..EmitOptions::default()
     };

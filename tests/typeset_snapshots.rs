@@ -5,9 +5,10 @@ use std::path::Path;
 use romc::artifact;
 use romc::equations::Equations;
 use romc::model::ReducedModel;
-use romc::typeset::latex::{self, LatexOptions, NumberStyle};
-use romc::typeset::markdown::{self, MarkdownOptions};
-use romc::typeset::mathml::{self, MathmlOptions};
+use romc::typeset::latex;
+use romc::typeset::markdown;
+use romc::typeset::mathml;
+use romc::typeset::{NumberStyle, PrintOptions};
 use romc::typeset::{Rounding, SymbolTable};
 
 fn model(path: &str) -> ReducedModel {
@@ -23,7 +24,7 @@ fn without_version(text: &str) -> String {
 fn latex_of_the_paper_model_is_stable() {
     for file in latex::emit(
         &Equations::of(&model("models/paper-2d.json")),
-        &LatexOptions::default(),
+        &PrintOptions::default(),
     )
     .unwrap()
     {
@@ -37,13 +38,13 @@ fn latex_of_the_paper_model_is_stable() {
 #[test]
 fn latex_of_a_model_with_robot_is_stable() {
     let model = model("tests/fixtures/models/robot-degree-2.json");
-    let options = LatexOptions {
+    let options = PrintOptions {
         rounding: Rounding::Significant(3),
         numbers: NumberStyle::Siunitx,
-        width_em: 22.0,
+        width_em: Some(22.0),
         symbols: SymbolTable::parse(&["z1=x", "z2=theta", "u1=F_x"], 3).unwrap(),
         digest: Some("0123456789abcdef".to_owned()),
-        ..LatexOptions::default()
+        ..PrintOptions::default()
     };
     for file in latex::emit(&Equations::of(&model), &options).unwrap() {
         insta::assert_snapshot!(
@@ -56,7 +57,7 @@ fn latex_of_a_model_with_robot_is_stable() {
 #[test]
 fn latex_of_every_function_is_stable() {
     let model = model("tests/fixtures/models/every-function.json");
-    let files = latex::emit(&Equations::as_learned(&model), &LatexOptions::default()).unwrap();
+    let files = latex::emit(&Equations::as_learned(&model), &PrintOptions::default()).unwrap();
     insta::assert_snapshot!(
         "latex__every_function.tex",
         without_version(&files[0].contents)
@@ -71,7 +72,7 @@ fn markdown_is_stable() {
     ] {
         let files = markdown::emit(
             &Equations::as_learned(&model(name)),
-            &MarkdownOptions::default(),
+            &PrintOptions::default(),
         )
         .unwrap();
         let name = format!("markdown__{}", files[0].path);
@@ -87,7 +88,7 @@ fn mathml_is_stable() {
     ] {
         let files = mathml::emit(
             &Equations::as_learned(&model(name)),
-            &MathmlOptions::default(),
+            &PrintOptions::default(),
         )
         .unwrap();
         let name = format!("mathml__{}", files[0].path);

@@ -11,9 +11,10 @@ use proptest::test_runner::RngSeed;
 use romc::artifact;
 use romc::equations::Equations;
 use romc::model::{Library, ReducedModel};
+use romc::symbolic::Function;
 use romc::typeset::{
-    Equation, FunctionName, Math, Quantity, RobotTypeset, Rounding, Signed, Symbol, SymbolTable,
-    Typeset, Variable, expression,
+    Equation, Math, Quantity, RobotTypeset, Rounding, Signed, Symbol, SymbolTable, Typeset,
+    expression,
 };
 
 type Values = BTreeMap<Symbol, f64>;
@@ -67,13 +68,14 @@ fn value_of(math: &Math, values: &Values) -> f64 {
         Math::Function(name, power, argument) => {
             let argument = of(argument);
             let value = match name {
-                FunctionName::Sin => argument.sin(),
-                FunctionName::Cos => argument.cos(),
-                FunctionName::Tan => argument.tan(),
-                FunctionName::Tanh => argument.tanh(),
-                FunctionName::Exp => argument.exp(),
-                FunctionName::Ln => argument.ln(),
-                FunctionName::Sgn => argument.signum(),
+                Function::Sin => argument.sin(),
+                Function::Cos => argument.cos(),
+                Function::Tan => argument.tan(),
+                Function::Tanh => argument.tanh(),
+                Function::Exp => argument.exp(),
+                Function::Log => argument.ln(),
+                Function::Sign => argument.signum(),
+                Function::Sqrt | Function::Abs => panic!("{name:?} has a form of its own"),
             };
             value.powf(power.as_ref().map_or(1.0, |power| of(power)))
         }
@@ -121,7 +123,7 @@ fn latent_values(z: &DVector<f64>, dz: &DVector<f64>, u: &DVector<f64>) -> Value
     for (quantity, vector) in quantities {
         for (row, value) in vector.iter().enumerate() {
             let index = row + 1;
-            values.insert(symbols.symbol(Variable { quantity, index }), *value);
+            values.insert(symbols.symbol(quantity, index), *value);
         }
     }
     values

@@ -7,13 +7,13 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::CheckArguments;
-use super::output::significant;
 use crate::Error;
 use crate::check::{
     CheckDomain, CheckError, CheckOptions, Comparison, EquationComparison, Gap, Side,
     TermDifference, Verdict, compare, read_sides,
 };
 use crate::import::SymbolNames;
+use crate::typeset::significant;
 
 /// Compares two files. The exit code is 0 if they are proven equal and 1 otherwise.
 ///

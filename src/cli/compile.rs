@@ -6,21 +6,14 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::args::{
-    CodeArguments, CompileArguments, EquationArguments, FormChoice, PrecisionChoice, SinCosChoice,
-    UnitsChoice,
-};
-use super::output::{Table, check_output};
-use super::simplification::{self, exact_json, exact_words};
-use crate::codegen::{Precision, SineCosine, Units};
+use super::args::{CodeArguments, CompileArguments, EquationArguments, UnitsChoice};
+use super::output::check_output;
+use super::simplification::{self, exact_words};
 use crate::deploy::{self, EmitOptions, Target};
 use crate::equations::{EquationForm, Equations, PhaseEquations};
 use crate::files::EmittedFile;
 use crate::files::Overwrite;
-use crate::typeset::latex::{Form, LatexOptions, NumberStyle};
-use crate::typeset::markdown::MarkdownOptions;
-use crate::typeset::mathml::MathmlOptions;
-use crate::typeset::{Rounding, SymbolTable};
+use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
 use crate::{Error, artifact};
 
 /// Compiles a model into a folder.
@@ -52,14 +45,17 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         &arguments.equations,
         unless_given,
     )?;
-    let told = match &simplified {
+    let certificate = match &simplified {
         None => None,
-        Some(outcome) => Some(outcome.told(rounding(&arguments.equations, unless_given))?),
+        Some(outcome) => {
+            let rounding = rounding(&arguments.equations, unless_given);
+            Some(outcome.files_and_summary(equations, rounding)?)
+        }
     };
     if let Some(outcome) = &simplified {
         outcome.comment(&mut files);
     }
-    files.extend(told.iter().map(|(file, _, _)| file.clone()));
+    files.extend(certificate.iter().map(|(file, _, _)| file.clone()));
     if let Some(path) = save_model {
         artifact::check_place(path, model, overwrite)?;
     }
@@ -67,7 +63,8 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     if let Some(path) = save_model {
         artifact::write_with(path, model, overwrite)?;
     }
-    let (summary, certificate) = told.map_or((String::new(), Value::Null), |(_, s, c)| (s, c));
+    let (summary, certificate) =
+        certificate.map_or((String::new(), Value::Null), |(_, s, c)| (s, c));
     Ok(Answer {
         text: exact_words(&exact) + &summary + &text(arguments, equations, &written),
         json: json!({
@@ -76,7 +73,7 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
             "name": model.name(),
             "digest": artifact::digest(model).to_string(),
             "targets": arguments.emit.iter().map(|target| target.name()).collect::<Vec<_>>(),
-            "exact": exact.steps().iter().map(exact_json).collect::<Vec<_>>(),
+            "exact": exact.steps(),
             "simplification": certificate,
             "saved_model": save_model.map(|path| path.display().to_string()),
             "files": written.iter().map(|(path, bytes)| file_json(path, *bytes)).collect::<Vec<_>>(),
@@ -84,17 +81,17 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     })
 }
 
-/// What was written, in words.
+/// The model and the written files as text.
 fn text(
     arguments: &CompileArguments,
     equations: &Equations<'_>,
     written: &[(PathBuf, usize)],
 ) -> String {
     let model = equations.model();
-    let mut table = Table::new(["file", "bytes"]);
-    for (path, bytes) in written {
-        table.row([path.display().to_string(), bytes.to_string()]);
-    }
+    let table = Table::of(written)
+        .column("file", "", |(path, _)| path.display().to_string())
+        .column("bytes", "", |(_, bytes)| *bytes)
+        .table();
     let mut text = format!(
         "model `{}`: {} latent coordinates, {}\n\n{table}",
         model.name(),
@@ -125,7 +122,7 @@ fn rounding(equations: &EquationArguments, unless_given: Rounding) -> Rounding {
 }
 
 /// The files of the targets, in memory, with the model's digest in their headers; `unless_given` is
-/// how coefficients are printed where the arguments do not tell.
+/// how coefficients are printed unless the arguments give it.
 ///
 /// # Errors
 /// [`Error::Emit`] if the model cannot be lowered or typeset, [`Error::Rename`] for a new name that
@@ -138,40 +135,21 @@ pub fn emit(
     unless_given: Rounding,
 ) -> Result<Vec<EmittedFile>, Error> {
     let model = model_equations.model();
-    let digest = Some(artifact::digest(model).short());
-    let symbols = SymbolTable::parse(&equations.rename, model.latent_dim())?;
-    let rounding = rounding(equations, unless_given);
-    let latex = LatexOptions::default();
-    let markdown = MarkdownOptions::default();
-    let mathml = MathmlOptions::default();
     let options = EmitOptions {
-        precision: code.precision.into(),
-        units: code.units.into(),
-        sines: code.sincos.into(),
-        latex: LatexOptions {
-            rounding,
+        precision: code.precision,
+        sines: code.sincos,
+        units: code.units.of_interface(),
+        print: PrintOptions {
+            rounding: rounding(equations, unless_given),
+            width_em: equations.width,
+            symbols: SymbolTable::parse(&equations.rename, model.latent_dim())?,
+            digest: Some(artifact::digest(model).short()),
             numbers: match equations.siunitx {
                 true => NumberStyle::Siunitx,
                 false => NumberStyle::Plain,
             },
-            form: equations.form.map_or(Form::Automatic, Form::from),
-            width_em: equations.width.unwrap_or(latex.width_em),
-            symbols: symbols.clone(),
-            digest: digest.clone(),
+            form: equations.form.unwrap_or_default(),
         },
-        markdown: MarkdownOptions {
-            rounding,
-            width_em: equations.width.unwrap_or(markdown.width_em),
-            symbols: symbols.clone(),
-            digest: digest.clone(),
-        },
-        mathml: MathmlOptions {
-            rounding,
-            width_em: equations.width.unwrap_or(mathml.width_em),
-            symbols,
-            digest: digest.clone(),
-        },
-        digest,
         ..EmitOptions::default()
     };
     Ok(match code.units {
@@ -207,40 +185,4 @@ fn phases_in_words(equations: &Equations<'_>) -> String {
 
 fn file_json(path: &Path, bytes: usize) -> Value {
     json!({ "path": path.display().to_string(), "bytes": bytes })
-}
-
-impl From<PrecisionChoice> for Precision {
-    fn from(choice: PrecisionChoice) -> Self {
-        match choice {
-            PrecisionChoice::F64 => Self::Double,
-            PrecisionChoice::F32 => Self::Single,
-        }
-    }
-}
-
-impl From<UnitsChoice> for Units {
-    fn from(choice: UnitsChoice) -> Self {
-        match choice {
-            UnitsChoice::Si | UnitsChoice::Physical => Self::Si,
-            UnitsChoice::Scaled => Self::Scaled,
-        }
-    }
-}
-
-impl From<SinCosChoice> for SineCosine {
-    fn from(choice: SinCosChoice) -> Self {
-        match choice {
-            SinCosChoice::Inline => Self::Inline,
-            SinCosChoice::Library => Self::Library,
-        }
-    }
-}
-
-impl From<FormChoice> for Form {
-    fn from(choice: FormChoice) -> Self {
-        match choice {
-            FormChoice::Align => Self::Align,
-            FormChoice::Cases => Self::Cases,
-        }
-    }
 }

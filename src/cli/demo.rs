@@ -3,27 +3,23 @@
 //! Model and recordings are part of the binary, so that the demo runs anywhere.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::Answer;
 use super::args::{CodeArguments, DemoArguments, EquationArguments};
-use super::mpc::NamedRun;
-use super::output::{Table, significant, spinner};
+use super::output::spinner;
 use super::{compile, mpc as mpc_command, report, simulate};
 use crate::deploy::Target;
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
-use crate::evaluate::ReferenceInput;
-use crate::files::EmittedFile;
-use crate::files::Overwrite;
+use crate::files::{EmittedFile, Overwrite};
 use crate::model::ReducedModel;
-use crate::mpc::{Lift, MpcSettings};
-use crate::recording::Recording;
+use crate::report::{Content, NamedRun, baseline_table};
 use crate::simplify::Tolerance;
-use crate::typeset::Rounding;
+use crate::typeset::{Rounding, Table};
 use crate::{Error, artifact, recording};
 
 /// The shipped model that the demo works with.
@@ -48,10 +44,10 @@ const JUMPS: [(&str, &[u8]); 3] = [
 /// Time between restarts of the short rollouts, as in the paper's second test.
 const RESTART_S: f64 = 0.1;
 
-/// Within which the report lists what simplification changes.
+/// The tolerance within which the report lists changes.
 const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
-/// Runs the whole path and tells what it made and how well it does.
+/// Runs the whole path and reports its files and metrics.
 ///
 /// # Errors
 /// [`Error::Folder`] for a file in the folder that romc did not make; nothing else should fail on
@@ -76,61 +72,54 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     progress.set_message("rolling the model out");
     let evaluation = Assessment::over(&model, &jumps, RESTART_S)?;
     progress.set_message("running the controller");
-    let control = Control::along(&model, &jumps)?;
-    let commands = mpc_command::command_table(&model, &control.transpose);
+    let control = mpc_command::run_with_both_lifts(&model, &jumps)?;
+    let commands = mpc_command::command_table(&model, &control[0]).csv();
     files.push(EmittedFile::new("commands.csv", commands));
     progress.set_message("drawing the report");
-    let report = report::page_of(
-        &model,
-        &evaluation,
-        [&control.transpose, &control.consistent],
-        None,
-        REPORT_TOLERANCE,
-        &["romc demo".to_owned()],
-    )?;
+    let content = Content {
+        model: &model,
+        assessment: &evaluation,
+        plain: &control[0],
+        consistent: &control[1],
+        study: None,
+    };
+    let report = report::page_of(&content, REPORT_TOLERANCE, vec!["romc demo".to_owned()])?;
     files.push(EmittedFile::new("report.html", report.page));
     let made = compile::write(&arguments.out_dir, &files, overwrite)?;
     progress.set_message("checking the C code");
     let self_test = self_test(&model, &arguments.out_dir);
     progress.finish_and_clear();
 
-    let results = Results {
-        jumps: jumps.len(),
-        evaluation,
-        model: &model,
-        control,
-        self_test,
-        made,
-    };
+    let mut text = format!(
+        "romc demo: model {} on {} recorded jumps of a simulated Go1 that its training did not see\n\n{}\n{}",
+        MODEL.0,
+        jumps.len(),
+        baseline_table(&evaluation),
+        command_summary(&control)
+    );
+    let self_test = self_test.words();
+    let _ = writeln!(text, "self-test of the emitted C: {self_test}\n");
+    let _ = writeln!(text, "made in {}:", arguments.out_dir.display());
+    for (path, bytes) in &made {
+        let name = path.strip_prefix(&arguments.out_dir).unwrap_or(path);
+        let _ = writeln!(text, "  {} ({bytes} bytes)", name.display());
+    }
+    let [plain, consistent] =
+        (control.each_ref()).map(|runs| runs.iter().map(mpc_command::run_json).collect::<Vec<_>>());
     Ok(Answer {
-        text: results.text(&arguments.out_dir),
-        json: results.json(),
+        text,
+        json: json!({
+            "command": "demo",
+            "model": MODEL.0,
+            "rollouts": simulate::metrics_json(&model, &evaluation),
+            "mpc": { "transpose": plain, "consistent": consistent },
+            "self_test": self_test,
+            "files": made.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
+        }),
     })
 }
 
-/// What the controller did along the jumps, with each lift.
-struct Control {
-    transpose: Vec<NamedRun>,
-    consistent: Vec<NamedRun>,
-}
-
-impl Control {
-    fn along(model: &ReducedModel, jumps: &[Recording]) -> Result<Self, Error> {
-        let with = |lift| {
-            let settings = MpcSettings {
-                lift,
-                ..MpcSettings::default()
-            };
-            mpc_command::run_all(model, jumps, settings, ReferenceInput::Recorded)
-        };
-        Ok(Self {
-            transpose: with(Lift::Transpose)?,
-            consistent: with(Lift::Consistent)?,
-        })
-    }
-}
-
-/// What became of the emitted self-test.
+/// Outcome of the emitted self-test.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum SelfTest {
     Passed,
@@ -176,86 +165,25 @@ fn self_test(model: &ReducedModel, folder: &Path) -> SelfTest {
     }
 }
 
-/// Everything the demo has to tell.
-struct Results<'a> {
-    jumps: usize,
-    evaluation: Assessment<'a>,
-    model: &'a ReducedModel,
-    control: Control,
-    self_test: SelfTest,
-    made: Vec<(PathBuf, usize)>,
-}
-
-impl Results<'_> {
-    fn text(&self, folder: &Path) -> String {
-        let mut text = format!(
-            "romc demo: model {} on {} recorded jumps of a simulated Go1 that its training did not see\n\n",
-            MODEL.0, self.jumps
-        );
-        let _ = writeln!(
-            text,
-            "{}\n{}",
-            simulate::baseline_table(&self.evaluation),
-            self.commands()
-        );
-        let _ = writeln!(
-            text,
-            "self-test of the emitted C: {}\n",
-            self.self_test.words()
-        );
-        let _ = writeln!(text, "made in {}:", folder.display());
-        for (path, bytes) in &self.made {
-            let name = path.strip_prefix(folder).unwrap_or(path).display();
-            let _ = writeln!(text, "  {name} ({bytes} bytes)");
-        }
-        text
-    }
-
-    /// What the controller commanded, with each lift.
-    fn commands(&self) -> Table {
-        let header = [
-            "controller",
-            "steps",
-            "solved",
-            "torque R^2 in contact",
-            "beyond torque limits",
-            "median step us",
-        ];
-        let mut table = Table::new(header);
-        for (lift, runs) in [
-            ("plain lift, u = W_e^T u_lat", &self.control.transpose),
-            ("consistent lift", &self.control.consistent),
-        ] {
-            for (path, run) in runs {
-                let summary = &run.summary;
-                table.row([
-                    format!("{lift}, {}", path.display()),
-                    summary.steps.to_string(),
-                    summary.solved.to_string(),
-                    summary
-                        .torque_r2
-                        .contact
-                        .map_or("-".to_owned(), significant),
-                    summary.limit_violations.to_string(),
-                    format!("{:.0}", summary.step_us.p50),
-                ]);
-            }
-        }
-        table
-    }
-
-    fn json(&self) -> Value {
-        let runs = |runs: &[NamedRun]| runs.iter().map(mpc_command::run_json).collect::<Vec<_>>();
-        json!({
-            "command": "demo",
-            "model": MODEL.0,
-            "rollouts": simulate::figures_json(self.model, &self.evaluation),
-            "mpc": {
-                "transpose": runs(&self.control.transpose),
-                "consistent": runs(&self.control.consistent),
-            },
-            "self_test": self.self_test.words(),
-            "files": self.made.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
+/// The controller's commands with the plain lift and with the consistent one.
+fn command_summary(control: &[Vec<NamedRun>; 2]) -> Table {
+    let lifts = ["plain lift, u = W_e^T u_lat", "consistent lift"];
+    let runs = lifts.into_iter().zip(control);
+    let rows = runs.flat_map(|(lift, runs)| {
+        let name = move |path: &Path| format!("{lift}, {}", path.display());
+        runs.iter()
+            .map(move |(path, run)| (name(path), &run.summary))
+    });
+    Table::of(rows)
+        .column("controller", "", |(name, _)| name.clone())
+        .column("steps", "", |(_, run)| run.steps)
+        .column("solved", "", |(_, run)| run.solved)
+        .column("torque R^2 in contact", "", |(_, run)| {
+            run.torque_r2.contact
         })
-    }
+        .column("beyond torque limits", "", |(_, run)| run.limit_violations)
+        .column("median step", "us", |(_, run)| {
+            format!("{:.0}", run.step_us.p50)
+        })
+        .table()
 }

@@ -1,14 +1,14 @@
 //! `romc import`: a model trained elsewhere in, a model file out.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use nalgebra::DVector;
 use serde_json::json;
 
 use super::Answer;
 use super::args::{ImportArguments, LibraryArgument};
-use super::output::{Table, check_output, read_recordings};
+use super::output::{check_output, read_recordings, stem};
 use crate::files::Overwrite;
 use crate::import::{
     Chosen, ImportOptions, ImportReport, LibraryChoice, SymbolNames, import, read_terms,
@@ -16,6 +16,7 @@ use crate::import::{
 use crate::model::{ReducedModel, ScaleFactors, Scaling};
 use crate::robot::Robot;
 use crate::sim::input_statistics;
+use crate::typeset::Table;
 use crate::{Error, artifact};
 
 /// Imports a model and writes it.
@@ -68,7 +69,7 @@ fn with_inputs(model: ReducedModel, recordings: &[PathBuf]) -> Result<ReducedMod
     Ok(builder.build()?)
 }
 
-/// What a model cannot be used for, and what would help.
+/// Commands that cannot use a model, and the option that mends it.
 fn lacking(model: &ReducedModel) -> Option<&'static str> {
     if model.encoder_map().is_err() || model.decoder_map().is_err() {
         return Some(
@@ -109,13 +110,6 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
     })
 }
 
-fn stem(path: &Path) -> String {
-    path.file_stem()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned()
-}
-
 fn library(arguments: &ImportArguments) -> Result<Option<LibraryChoice>, Error> {
     Ok(match &arguments.library {
         None => None,
@@ -140,7 +134,7 @@ fn scaling(arguments: &ImportArguments) -> Option<Scaling> {
     })
 }
 
-/// What the import did, for people.
+/// The report of an import as text.
 fn describe(report: &ImportReport) -> String {
     let mut text = format!(
         "{} ({}): {} latent coordinates, ",
@@ -153,41 +147,31 @@ fn describe(report: &ImportReport) -> String {
     }
     let _ = writeln!(text, "{} candidate terms\n", report.library_dim);
     if !report.used.is_empty() {
-        let mut table = Table::new(["part", "tensor", "shape", "type", "chosen", "stored as"]);
-        for used in &report.used {
-            table.row([
-                used.role.clone(),
-                used.tensor.clone(),
-                shape(&used.shape),
-                used.element.clone(),
-                match used.chosen {
-                    Chosen::Mapped => "by --map".to_owned(),
-                    Chosen::Named => "by name".to_owned(),
-                },
-                used.layout.to_string(),
-            ]);
-        }
+        let table = Table::of(&report.used)
+            .column("part", "", |used| &used.role)
+            .column("tensor", "", |used| &used.tensor)
+            .column("shape", "", |used| shape(&used.shape))
+            .column("type", "", |used| &used.element)
+            .column("chosen", "", |used| match used.chosen {
+                Chosen::Mapped => "by --map",
+                Chosen::Named => "by name",
+            })
+            .column("stored as", "", |used| used.layout.to_string())
+            .table();
         let _ = writeln!(text, "{table}");
     }
     if !report.equations.is_empty() {
-        let mut table = Table::new(["equation", "phase", "line", "terms"]);
-        for equation in &report.equations {
-            table.row([
-                equation.output.clone(),
-                equation.phase.clone(),
-                equation.line.to_string(),
-                equation.terms.to_string(),
-            ]);
-        }
+        let table = Table::of(&report.equations)
+            .column("equation", "", |equation| &equation.output)
+            .column("phase", "", |equation| &equation.phase)
+            .column("line", "", |equation| equation.line)
+            .column("terms", "", |equation| equation.terms)
+            .table();
         let _ = writeln!(text, "{table}");
     }
     for unused in &report.unused {
-        let _ = writeln!(
-            text,
-            "not used: {} ({})",
-            unused.tensor,
-            shape(&unused.shape)
-        );
+        let shape = shape(&unused.shape);
+        let _ = writeln!(text, "not used: {} ({shape})", unused.tensor);
     }
     for note in &report.notes {
         let _ = writeln!(text, "note: {note}");

@@ -1,23 +1,33 @@
-//! `romc inspect` of a model: its parts, its phases, the pattern of Xi, what each latent is made of.
+//! `romc inspect` of a model: its parts, its phases, the pattern of Xi, the composition of each latent.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::json;
 
 use super::Answer;
-use super::output::{Table, significant};
-use super::simplification::{exact_json, exact_words};
+use super::simplification::exact_words;
 use crate::Error;
 use crate::artifact;
 use crate::equations::Equations;
-use crate::model::{FeetRule, Phase, ReducedModel, StateMap};
+use crate::model::{ReducedModel, StateMap};
 use crate::robot::Robot;
+use crate::typeset::{Table, significant};
 
 /// Library terms that still fit as a pattern in a terminal.
 const PATTERN_WIDTH: usize = 120;
 /// Coordinates named for each latent.
 const DOMINANT: usize = 4;
+
+/// One phase of the equations.
+#[derive(Serialize)]
+struct PhaseView<'a> {
+    name: &'a str,
+    feet: String,
+    active_terms: usize,
+    coefficients: usize,
+}
 
 /// Describes a model.
 ///
@@ -36,19 +46,24 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     if !model.description().is_empty() {
         let _ = writeln!(text, "  {}", model.description());
     }
-    let mut phases = Table::new(["phase", "feet", "active terms", "of"]);
-    for phase in model.phases() {
-        phases.row([
-            phase.name.clone(),
-            feet(&phase.feet),
-            phase.active_count().to_string(),
-            phase.xi.len().to_string(),
-        ]);
-    }
-    let _ = writeln!(text, "\n{phases}");
+    let phases: Vec<PhaseView> = (equations.phases().iter())
+        .map(|phase| PhaseView {
+            name: &phase.name,
+            feet: phase.feet.to_string(),
+            active_terms: phase.active_count(),
+            coefficients: equations.terms().len() * equations.latent_dim(),
+        })
+        .collect();
+    let table = Table::of(&phases)
+        .column("phase", "", |phase| phase.name)
+        .column("feet", "", |phase| &phase.feet)
+        .column("active terms", "", |phase| phase.active_terms)
+        .column("of", "", |phase| phase.coefficients)
+        .table();
+    let _ = writeln!(text, "\n{table}");
     text.push_str(&exact_words(&equations));
-    for phase in model.phases() {
-        text.push_str(&pattern(model, phase));
+    for phase in 0..equations.phases().len() {
+        text.push_str(&pattern(&equations, phase));
     }
     if let Some(dominant) = &dominant {
         for (latent, weights) in dominant.iter().enumerate() {
@@ -76,8 +91,8 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
             "latent_dim": model.latent_dim(),
             "library_dim": model.library().len(),
             "library": model.library().terms().iter().map(|term| term.text()).collect::<Vec<_>>(),
-            "phases": model.phases().iter().map(phase_json).collect::<Vec<_>>(),
-            "exact": equations.steps().iter().map(exact_json).collect::<Vec<_>>(),
+            "phases": phases,
+            "exact": equations.steps(),
             "dominant_coordinates": dominant,
             "encoder": model.encoder_map().ok().map(StateMap::summary),
             "decoder": model.decoder_map().ok().map(StateMap::summary),
@@ -86,36 +101,22 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     })
 }
 
-fn feet(rule: &FeetRule) -> String {
-    match rule {
-        FeetRule::Any => "any".to_owned(),
-        FeetRule::None => "none".to_owned(),
-        FeetRule::Patterns(patterns) => {
-            let text =
-                |pattern: &[bool; 4]| pattern.map(|down| if down { "1" } else { "0" }).concat();
-            patterns.iter().map(text).collect::<Vec<_>>().join(" ")
-        }
-    }
-}
-
-/// Rows are outputs, columns library terms; a dot is an inactive one.
-fn pattern(model: &ReducedModel, phase: &Phase) -> String {
-    if model.library().len() > PATTERN_WIDTH {
+/// Rows are outputs, columns terms; a dot is an inactive one.
+fn pattern(equations: &Equations<'_>, phase: usize) -> String {
+    if equations.terms().len() > PATTERN_WIDTH {
         return String::new();
     }
     let mut text = format!(
-        "Xi of {} (a column a term, + positive, - negative)\n",
-        phase.name
+        "Xi of {} (one column per term, + positive, - negative)\n",
+        equations.phases()[phase].name
     );
-    for output in 0..model.latent_dim() {
-        let cells: String = (phase.xi.column(output).iter())
-            .map(|value| match value {
-                value if *value > 0.0 => '+',
-                value if *value < 0.0 => '-',
-                _ => '.',
-            })
-            .collect();
-        let _ = writeln!(text, "  ddz{}  {cells}", output + 1);
+    for (output, row) in equations.coefficients(phase).column_iter().enumerate() {
+        let cells = row.iter().map(|value| match value {
+            value if *value > 0.0 => '+',
+            value if *value < 0.0 => '-',
+            _ => '.',
+        });
+        let _ = writeln!(text, "  ddz{}  {}", output + 1, cells.collect::<String>());
     }
     text.push('\n');
     text
@@ -142,13 +143,4 @@ fn dominant_coordinates(model: &ReducedModel) -> Option<Vec<Vec<(String, f64)>>>
         pairs
     };
     Some((0..weights.nrows()).map(of_latent).collect())
-}
-
-fn phase_json(phase: &Phase) -> Value {
-    json!({
-        "name": phase.name,
-        "feet": feet(&phase.feet),
-        "active_terms": phase.active_count(),
-        "coefficients": phase.xi.len(),
-    })
 }

@@ -3,14 +3,15 @@
 use std::fmt::Write as _;
 
 use nalgebra::DMatrix;
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::output::{Table, significant};
 use crate::Error;
 use crate::recording::check::{Finding, check};
 use crate::recording::{PhaseRule, PhaseSpan, Recording, Segment, Stance};
 use crate::robot::{JOINT_DIM, Robot};
+use crate::typeset::{Cell, Table, significant};
 
 /// Characters of the time bar.
 const BAR_WIDTH: usize = 60;
@@ -60,14 +61,14 @@ pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
             "file": recording.path.display().to_string(),
             "samples": recording.sample_count(),
             "segments": segments,
-            "ranges": ranges.iter().map(Range::json).collect::<Vec<_>>(),
+            "ranges": ranges,
             "ignored_columns": recording.ignored_columns,
             "implausible": findings.iter().map(in_segment).collect::<Vec<_>>(),
         }),
     })
 }
 
-/// Feet on the ground over time, a character a slice of equal duration.
+/// Feet on the ground over time, one character per slice of equal duration.
 fn time_bar(segment: &Segment) -> String {
     (0..BAR_WIDTH)
         .map(
@@ -106,25 +107,13 @@ fn segment_json(segment: &Segment, spans: &[PhaseSpan], rule: &PhaseRule) -> Val
 }
 
 /// Extremes of one coordinate over all segments.
+#[derive(Serialize)]
 struct Range {
-    name: String,
+    coordinate: String,
     unit: String,
     position: (f64, f64),
     velocity: (f64, f64),
-    torque: Option<(f64, f64)>,
-}
-
-impl Range {
-    fn json(&self) -> Value {
-        let pair = |(low, high): (f64, f64)| json!([low, high]);
-        json!({
-            "coordinate": self.name,
-            "unit": self.unit,
-            "position": pair(self.position),
-            "velocity": pair(self.velocity),
-            "torque_nm": self.torque.map(pair),
-        })
-    }
+    torque_nm: Option<(f64, f64)>,
 }
 
 fn ranges(recording: &Recording) -> Vec<Range> {
@@ -141,34 +130,28 @@ fn ranges(recording: &Recording) -> Vec<Range> {
     names
         .enumerate()
         .map(|(row, (name, unit))| Range {
-            name,
+            coordinate: name,
             unit,
             position: extremes(row, &|segment| &segment.x),
             velocity: extremes(row, &|segment| &segment.dx),
-            torque: (row < JOINT_DIM).then(|| extremes(row, &|segment| &segment.torque_nm)),
+            torque_nm: (row < JOINT_DIM).then(|| extremes(row, &|segment| &segment.torque_nm)),
         })
         .collect()
 }
 
 fn range_table(ranges: &[Range]) -> Table {
-    let mut table = Table::new([
-        "coordinate",
-        "unit",
-        "position",
-        "velocity per s",
-        "torque N m",
-    ]);
-    let pair = |(low, high): (f64, f64)| format!("{} .. {}", significant(low), significant(high));
-    for range in ranges {
-        table.row([
-            range.name.clone(),
-            range.unit.clone(),
-            pair(range.position),
-            pair(range.velocity),
-            range.torque.map_or(String::new(), pair),
-        ]);
-    }
-    table
+    let pair = |(low, high): (f64, f64)| -> Cell {
+        format!("{} .. {}", significant(low), significant(high)).into()
+    };
+    Table::of(ranges)
+        .column("coordinate", "", |range| &range.coordinate)
+        .column("unit", "", |range| &range.unit)
+        .column("position", "", |range| pair(range.position))
+        .column("velocity", "per s", |range| pair(range.velocity))
+        .column("torque", "N m", |range| {
+            range.torque_nm.map_or("".into(), pair)
+        })
+        .table()
 }
 
 fn findings_text(findings: &[Finding]) -> String {

@@ -1,13 +1,13 @@
-//! `romc manual` and `romc completions`: what a shell and `man` want to know about the commands.
+//! `romc manual` and `romc completions`: the commands described for `man` and for shells.
 
 use clap::CommandFactory as _;
 use serde_json::json;
 
 use super::Answer;
 use super::args::{Arguments, CompletionsArguments, ManualArguments};
+use super::output::names;
 use crate::Error;
-use crate::files::Overwrite;
-use crate::files::{EmittedFile, write_files};
+use crate::files::{EmittedFile, Overwrite, write_files};
 
 /// Writes `romc.1` and `romc-COMMAND.1` for each command.
 ///
@@ -27,9 +27,7 @@ pub fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
     }
     let overwrite = Overwrite::when_forced(arguments.force);
     let written = write_files(&arguments.out_dir, &files, overwrite)?;
-    let paths: Vec<String> = (written.iter())
-        .map(|path| path.display().to_string())
-        .collect();
+    let paths = names(&written);
     Ok(Answer {
         text: format!("{}\n", paths.join("\n")),
         json: json!({ "command": "manual", "files": paths }),

@@ -1,4 +1,4 @@
-//! The command line: what is typed comes in, text or one JSON object leaves.
+//! The command line: arguments come in, text or one JSON object leaves.
 //!
 //! Each command is a file with one function from its arguments to an [`Answer`]; [`run`] prints the
 //! answer and picks the exit code (0 done, 1 the run failed, 2 wrong usage). Human text and JSON go
@@ -32,7 +32,7 @@ use clap::Parser;
 use crate::Error;
 use args::{Arguments, Command};
 
-/// What a command has to say: to people and to programs.
+/// The result of a command, for people and for programs.
 #[derive(Debug, Clone)]
 pub struct Answer {
     /// Human text, complete with its last newline.
@@ -46,8 +46,7 @@ pub struct Answer {
 /// Wrong usage gives exit code 2 (by clap, or for an option whose value turns out to be none); a failed run gives 1.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
-    let json = arguments.command.wants_json();
-    let printed = execute(arguments.command).map(|(answer, code)| match json {
+    let printed = execute(arguments.command).map(|(answer, code)| match arguments.json {
         true => (format!("{}\n", answer.json), code),
         false => (answer.text, code),
     });
@@ -57,7 +56,7 @@ pub fn run() -> ExitCode {
             failed => failed,
         },
         Err(error) => {
-            tell(&error);
+            print_error(&error);
             match error.is_usage() {
                 true => ExitCode::from(2),
                 false => ExitCode::FAILURE,
@@ -102,7 +101,7 @@ fn print(text: &str) -> ExitCode {
 }
 
 /// Prints an error and its chain of causes to stderr.
-fn tell(error: &Error) {
+fn print_error(error: &Error) {
     eprintln!("error: {error}");
     let mut source = std::error::Error::source(error);
     while let Some(cause) = source {

@@ -1,23 +1,21 @@
 //! `romc mpc`: the latent-space controller along recordings.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::args::{LiftChoice, MpcArguments, ReferenceInput};
-use super::output::{Table, check_output, progress_bar, read_recordings, significant, write_file};
-use super::report::figure_files;
-use crate::evaluate;
-use crate::evaluate::{Run, StepRow};
-use crate::files::Overwrite;
-use crate::files::{EmittedFile, write_files};
+use super::args::MpcArguments;
+use super::output::{check_output, names, progress_bar, read_recordings, write_file};
+use crate::evaluate::{ReferenceInput, along_recording};
+use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
 use crate::mpc::{Controller, Lift, MpcSettings};
 use crate::recording::Recording;
-use crate::report::control_figures;
+use crate::report::figures::figure_files;
+use crate::report::{NamedRun, control_figures, run_table};
 use crate::robot::{JOINT_DIM, Robot};
+use crate::typeset::Table;
 use crate::{Error, artifact};
 
 /// Runs the controller along each recording.
@@ -31,18 +29,11 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     let settings = MpcSettings {
         horizon: arguments.horizon,
         step_s: arguments.step,
-        lift: match arguments.lift {
-            LiftChoice::Transpose => Lift::Transpose,
-            LiftChoice::Consistent => Lift::Consistent,
-        },
+        lift: arguments.lift,
         ..MpcSettings::default()
     };
-    let reference_input = match arguments.reference_input {
-        ReferenceInput::Recorded => evaluate::ReferenceInput::Recorded,
-        ReferenceInput::None => evaluate::ReferenceInput::None,
-    };
     let recordings = read_recordings(&arguments.recordings)?;
-    let runs = run_all(&model, &recordings, settings, reference_input)?;
+    let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
     let mut answer = answer(arguments, &runs);
     if let Some(folder) = &arguments.figures {
         let figures = control_figures(&model, &settings, &runs);
@@ -50,17 +41,17 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
         let written = write_files(folder, &files, overwrite)?;
         let count = figures.len();
         let _ = writeln!(answer.text, "{count} figures: {}", folder.display());
-        let paths = written.iter().map(|path| path.display().to_string());
-        answer.json["figures"] = paths.collect::<Vec<_>>().into();
+        answer.json["figures"] = names(&written).into();
     }
     if let Some(path) = &arguments.output {
-        write_file(path, command_table(&model, &runs).as_bytes(), overwrite)?;
+        write_file(
+            path,
+            command_table(&model, &runs).csv().as_bytes(),
+            overwrite,
+        )?;
     }
     Ok(answer)
 }
-
-/// A recording and what the controller did along it.
-pub type NamedRun = (PathBuf, Run);
 
 /// Runs a fresh controller along each recording.
 ///
@@ -70,14 +61,14 @@ pub fn run_all(
     model: &ReducedModel,
     recordings: &[Recording],
     settings: MpcSettings,
-    reference_input: evaluate::ReferenceInput,
+    reference_input: ReferenceInput,
 ) -> Result<Vec<NamedRun>, Error> {
     let mut controller = Controller::new(model, settings)?;
     let mut runs = Vec::with_capacity(recordings.len());
     for recording in recordings {
         let bar = progress_bar(format!("controlling along {}", recording.path.display()));
         controller.reset();
-        let run = evaluate::along_recording(
+        let run = along_recording(
             &mut controller,
             recording,
             reference_input,
@@ -92,62 +83,34 @@ pub fn run_all(
     Ok(runs)
 }
 
-/// The figures of runs, a row each.
-pub fn run_table(runs: &[NamedRun]) -> Table {
-    let header = [
-        "recording",
-        "steps",
-        "solved",
-        "softened",
-        "failed",
-        "torque R^2 contact",
-        "flight",
-        "rms N m",
-        "lift R^2 contact",
-        "limit violations",
-        "friction violations",
-        "median us",
-        "p99 us",
-    ];
-    let mut table = Table::new(header);
-    let optional = |value: Option<f64>| value.map_or("-".to_owned(), significant);
-    for (path, run) in runs {
-        let summary = &run.summary;
-        table.row([
-            path.file_name()
-                .map_or(String::new(), |name| name.to_string_lossy().into_owned()),
-            summary.steps.to_string(),
-            summary.solved.to_string(),
-            summary.softened.to_string(),
-            summary.failed.to_string(),
-            optional(summary.torque_r2.contact),
-            optional(summary.torque_r2.flight),
-            optional(summary.torque_rms_nm),
-            optional(summary.lift_r2.contact),
-            summary.limit_violations.to_string(),
-            summary
-                .friction_violations
-                .map_or("-".to_owned(), |count| count.to_string()),
-            format!("{:.0}", summary.step_us.p50),
-            format!("{:.0}", summary.step_us.p99),
-        ]);
-    }
-    table
+/// Runs with default settings: with the plain lift, then with the consistent one.
+///
+/// # Errors
+/// As [`run_all`].
+pub fn run_with_both_lifts(
+    model: &ReducedModel,
+    recordings: &[Recording],
+) -> Result<[Vec<NamedRun>; 2], Error> {
+    let with = |lift| {
+        let settings = MpcSettings {
+            lift,
+            ..MpcSettings::default()
+        };
+        run_all(model, recordings, settings, ReferenceInput::Recorded)
+    };
+    Ok([with(Lift::Transpose)?, with(Lift::Consistent)?])
 }
 
 fn answer(arguments: &MpcArguments, runs: &[NamedRun]) -> Answer {
-    let table = run_table(runs);
     let mut text = format!(
-        "{}: latent MPC, {} stages of {} s\n\n{table}\n",
+        "{}: latent MPC, {} stages of {} s\n\n{}\n",
         arguments.model.display(),
         arguments.horizon,
-        arguments.step
+        arguments.step,
+        run_table(runs)
     );
-    if let Some(row) = runs
-        .iter()
-        .flat_map(|(_, run)| &run.rows)
-        .find(|row| row.status.has_plan())
-    {
+    let mut rows = runs.iter().flat_map(|(_, run)| &run.rows);
+    if let Some(row) = rows.find(|row| row.status.has_plan()) {
         let torques = row.torque_nm.map(|torque| format!("{torque:.2}")).join(" ");
         let _ = writeln!(text, "first torque command (N m): {torques}");
     }
@@ -169,97 +132,54 @@ fn answer(arguments: &MpcArguments, runs: &[NamedRun]) -> Answer {
 
 /// The summary of one run, under the names of the documentation.
 pub fn run_json((path, run): &NamedRun) -> Value {
-    let summary = &run.summary;
-    json!({
-        "recording": path.display().to_string(),
-        "steps": summary.steps,
-        "solved": summary.solved,
-        "softened": summary.softened,
-        "failed": summary.failed,
-        "step_us": {
-            "p50": summary.step_us.p50, "p99": summary.step_us.p99, "max": summary.step_us.max,
-        },
-        "torque_r2": {
-            "contact": summary.torque_r2.contact, "flight": summary.torque_r2.flight,
-        },
-        "lift_r2": { "contact": summary.lift_r2.contact, "flight": summary.lift_r2.flight },
-        "torque_rms_nm": summary.torque_rms_nm,
-        "tracking_rms": summary.tracking_rms,
-        "limit_violations": summary.limit_violations,
-        "friction_violations": summary.friction_violations,
-        "inconsistency": summary.inconsistency,
-        "implausible_steps": summary.implausible,
-    })
+    let mut value = json!({ "recording": path.display().to_string() });
+    if let (Value::Object(all), Value::Object(summary)) = (&mut value, json!(run.summary)) {
+        all.extend(summary);
+    }
+    value
 }
 
-/// One CSV row a control step.
-pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> String {
-    let d = model.latent_dim();
-    let input_names = match model.input() {
+/// One row per control step, for a CSV file.
+pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
+    let latent = |name: &str| -> Vec<String> {
+        let indices = 1..=model.latent_dim();
+        indices.map(|index| format!("{name}_{index}")).collect()
+    };
+    let inputs = match model.input() {
         Some(input) => input.names.clone(),
         None => Robot::input_names().to_vec(),
     };
-    let mut header: Vec<String> = [
-        "recording",
-        "segment",
-        "time",
-        "phase",
-        "status",
-        "solve_us",
-        "iterations",
-    ]
-    .map(str::to_owned)
-    .to_vec();
-    header.extend((1..=d).map(|i| format!("u_lat_{i}")));
-    header.extend(input_names.iter().cloned());
-    header.extend(
-        input_names
-            .iter()
-            .take(JOINT_DIM)
-            .map(|name| format!("{name} torque")),
-    );
-    header.extend((1..=d).map(|i| format!("z_ref_{i}")));
-    header.extend((1..=d).map(|i| format!("z_{i}")));
-    let mut text = header.join(",");
-    text.push('\n');
-    for (path, run) in runs {
-        for row in &run.rows {
-            write_row(&mut text, model, &path.display().to_string(), row);
-        }
+    let torques = inputs.iter().take(JOINT_DIM);
+    let torques: Vec<String> = torques.map(|name| format!("{name} torque")).collect();
+    let first = "recording,segment,time,phase,status,solve_us,iterations".split(',');
+    let columns = first
+        .map(str::to_owned)
+        .chain(latent("u_lat"))
+        .chain(inputs)
+        .chain(torques)
+        .chain(latent("z_ref"))
+        .chain(latent("z"));
+    let mut table = Table::new(columns);
+    let steps = runs
+        .iter()
+        .flat_map(|(path, run)| run.rows.iter().map(move |row| (path, row)));
+    for (path, row) in steps {
+        let phase = row.phase.map(|phase| model.phases()[phase].name.clone());
+        let values = (row.u_lat.iter())
+            .chain(&row.input)
+            .chain(&row.torque_nm)
+            .chain(&row.z_reference)
+            .chain(&row.z);
+        let first = [
+            path.display().to_string(),
+            row.segment.to_string(),
+            row.time_s.to_string(),
+            phase.unwrap_or_default(),
+            row.status.word().to_owned(),
+            format!("{:.1}", row.solve_us),
+            row.iterations.to_string(),
+        ];
+        table.row(first.into_iter().chain(values.map(f64::to_string)));
     }
-    text
-}
-
-fn write_row(text: &mut String, model: &ReducedModel, recording: &str, row: &StepRow) {
-    let phase = row
-        .phase
-        .map_or("", |phase| model.phases()[phase].name.as_str());
-    let _ = write!(
-        text,
-        "{},{},{},{phase},{},{:.1},{}",
-        quoted(recording),
-        row.segment,
-        row.time_s,
-        row.status.word(),
-        row.solve_us,
-        row.iterations
-    );
-    let values = (row.u_lat.iter())
-        .chain(&row.input)
-        .chain(&row.torque_nm)
-        .chain(&row.z_reference)
-        .chain(&row.z);
-    for value in values {
-        let _ = write!(text, ",{value}");
-    }
-    text.push('\n');
-}
-
-/// A CSV cell that may hold a comma or a quote.
-fn quoted(cell: &str) -> String {
-    if cell.contains([',', '"', '\n']) {
-        format!("\"{}\"", cell.replace('"', "\"\""))
-    } else {
-        cell.to_owned()
-    }
+    table
 }

@@ -1,6 +1,5 @@
-//! Files, tables and progress: how every command shows what it did.
+//! Files and progress of every command.
 
-use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -10,7 +9,7 @@ use crate::Error;
 use crate::files::{Overwrite, write_whole};
 use crate::recording::{self, Recording};
 
-/// Tells before long work that its output could not be written.
+/// Refuses an output that could not be written, before long work begins.
 ///
 /// # Errors
 /// [`Error::IsFolder`] for a folder, [`Error::Exists`] if the file is there and may not be replaced,
@@ -62,83 +61,20 @@ pub fn read_recordings(paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
     read
 }
 
-/// A table of text cells with a header, columns aligned: the first to the left, the rest to the right.
-#[derive(Debug, Clone)]
-pub struct Table {
-    header: Vec<String>,
-    rows: Vec<Vec<String>>,
+/// Paths as JSON shows them.
+pub fn names(paths: &[PathBuf]) -> Vec<String> {
+    paths
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect()
 }
 
-impl Table {
-    /// An empty table with these column titles.
-    pub fn new<T: Into<String>>(header: impl IntoIterator<Item = T>) -> Self {
-        Self {
-            header: header.into_iter().map(Into::into).collect(),
-            rows: Vec::new(),
-        }
-    }
-
-    /// Adds a row; missing cells stay empty.
-    pub fn row<T: Into<String>>(&mut self, cells: impl IntoIterator<Item = T>) -> &mut Self {
-        self.rows.push(cells.into_iter().map(Into::into).collect());
-        self
-    }
-
-    /// Titles of the columns.
-    pub fn header(&self) -> &[String] {
-        &self.header
-    }
-
-    /// The rows so far.
-    pub fn rows(&self) -> &[Vec<String>] {
-        &self.rows
-    }
-
-    fn width(&self, column: usize) -> usize {
-        std::iter::once(&self.header)
-            .chain(&self.rows)
-            .filter_map(|row| row.get(column))
-            .map(|cell| cell.chars().count())
-            .max()
-            .unwrap_or(0)
-    }
-}
-
-impl Display for Table {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let widths: Vec<usize> = (0..self.header.len()).map(|c| self.width(c)).collect();
-        let line = |f: &mut std::fmt::Formatter<'_>, row: &[String]| {
-            let mut text = String::new();
-            for (column, width) in widths.iter().enumerate() {
-                let cell = row.get(column).map_or("", String::as_str);
-                match column {
-                    0 => text.push_str(&format!("  {cell:<width$}")),
-                    _ => text.push_str(&format!("  {cell:>width$}")),
-                }
-            }
-            writeln!(f, "{}", text.trim_end())
-        };
-        line(f, &self.header)?;
-        let rule: Vec<String> = widths.iter().map(|&width| "-".repeat(width)).collect();
-        line(f, &rule)?;
-        self.rows.iter().try_for_each(|row| line(f, row))
-    }
-}
-
-/// A number with four significant digits, as tables show it.
-pub fn significant(value: f64) -> String {
-    if !value.is_finite() {
-        return "diverged".to_owned();
-    }
-    let magnitude = value.abs();
-    if magnitude == 0.0 {
-        return "0".to_owned();
-    }
-    if !(1e-3..1e5).contains(&magnitude) {
-        return format!("{value:.3e}");
-    }
-    let before_point = magnitude.log10().floor() as i32 + 1;
-    format!("{value:.*}", usize::try_from(4 - before_point).unwrap_or(0))
+/// Name of a file without folder and ending.
+pub fn stem(path: &Path) -> String {
+    path.file_stem()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
 }
 
 /// A spinner on stderr, shown only when stderr is a terminal.
@@ -158,29 +94,4 @@ pub fn progress_bar(message: impl Into<String>) -> ProgressBar {
     let bar = ProgressBar::new(0).with_style(style);
     bar.set_message(message.into());
     bar
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn significant_keeps_four_digits() {
-        assert_eq!(significant(0.0123449), "0.01234");
-        assert_eq!(significant(12.3456), "12.35");
-        assert_eq!(significant(0.0), "0");
-        assert_eq!(significant(1.23456e-7), "1.235e-7");
-        assert_eq!(significant(f64::NAN), "diverged");
-    }
-
-    #[test]
-    fn table_aligns_numbers_to_the_right() {
-        let mut table = Table::new(["coordinate", "rms"]);
-        table.row(["body.x", "0.5"]).row(["body.z", "12.25"]);
-        let text = table.to_string();
-        assert_eq!(
-            text,
-            "  coordinate    rms\n  ----------  -----\n  body.x        0.5\n  body.z      12.25\n"
-        );
-    }
 }

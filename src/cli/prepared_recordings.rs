@@ -21,11 +21,11 @@ type Place = (PathBuf, usize, usize);
 
 /// The recordings of a training; their files are read when the samples are needed.
 pub struct RecordedSets {
-    /// What the model is fitted to.
+    /// Jumps that the model is fitted to.
     pub training: Arc<RecordingFiles>,
-    /// What chooses between candidates.
+    /// Jumps that choose between candidates.
     pub validation: Arc<RecordingFiles>,
-    /// What nothing sees before the end.
+    /// Jumps used only for the final metrics.
     pub test: Arc<RecordingFiles>,
     /// The jumps of each set, if they were divided.
     pub divided: Option<[Vec<Place>; 3]>,
@@ -37,7 +37,7 @@ impl RecordedSets {
     /// settings say.
     ///
     /// # Errors
-    /// [`Error::Recording`] for a file, [`Error::Train`] for fewer jumps than sets or a filter that does not exist.
+    /// [`Error::Recording`] for a file, [`Error::Train`] for fewer jumps than sets.
     pub fn new(
         arguments: &TrainArguments,
         settings: &TrainSettings,
@@ -50,7 +50,7 @@ impl RecordedSets {
                 &arguments.validation,
                 &arguments.test,
             ];
-            return Self::whole(paths, settings, robot);
+            return Ok(Self::whole(paths, settings, robot));
         };
         let jumps = jumps_of(&arguments.recordings)?;
         let sets = split.of(jumps.len(), seed)?;
@@ -59,20 +59,14 @@ impl RecordedSets {
             places.collect()
         });
         let files = sets.each_ref().map(|set| chosen_segments(set));
-        let mut divided = Self::of_files(files, settings, robot)?;
-        divided.divided = Some(sets);
-        Ok(divided)
+        Ok(Self {
+            divided: Some(sets),
+            ..Self::of_files(files, settings, robot)
+        })
     }
 
     /// Whole files for training, validation and test.
-    ///
-    /// # Errors
-    /// [`Error::Train`] for a filter that does not exist.
-    pub fn whole(
-        paths: [&[PathBuf]; 3],
-        settings: &TrainSettings,
-        robot: &'static Robot,
-    ) -> Result<Self, Error> {
+    pub fn whole(paths: [&[PathBuf]; 3], settings: &TrainSettings, robot: &'static Robot) -> Self {
         let whole = |path: &PathBuf| RecordingFile {
             path: path.clone(),
             segments: None,
@@ -85,17 +79,17 @@ impl RecordedSets {
         files: [Vec<RecordingFile>; 3],
         settings: &TrainSettings,
         robot: &'static Robot,
-    ) -> Result<Self, Error> {
-        let options = train_settings::conditioning(settings)?;
+    ) -> Self {
+        let options = train_settings::conditioning(settings);
         let [training, validation, test] =
             files.map(|files| Arc::new(RecordingFiles::new(files, robot, options.clone())));
-        Ok(Self {
+        Self {
             training,
             validation,
             test,
             divided: None,
             options,
-        })
+        }
     }
 
     /// Which jumps came into which set, file and first row of each, if they were divided.
@@ -149,7 +143,7 @@ impl RecordedSets {
                 eprintln!("note: {left_out} samples are left out");
             }
             ImplausibleSamples::Keep if !findings.is_empty() => eprintln!(
-                "note: they stay; `romc inspect` lists them, --leave-out-implausible leaves them out"
+                "note: they are used; `romc inspect` lists them, --leave-out-implausible leaves them out"
             ),
             ImplausibleSamples::LeaveOut | ImplausibleSamples::Keep => {}
         }

@@ -1,4 +1,4 @@
-//! `romc report`: one page that tells whether a model is any good, and its figures as files.
+//! `romc report`: a one-page assessment of a model, and its figures as files.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -7,19 +7,15 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::ReportArguments;
-use super::mpc::{NamedRun, run_all, run_table};
-use super::output::{Table, check_output, read_recordings, significant, spinner, write_file};
+use super::mpc::run_with_both_lifts;
+use super::output::{check_output, names, read_recordings, spinner, write_file};
 use super::simplification;
-use super::simulate::{baseline_table, coordinate_table, dynamics_table, phase_table, remarks};
-use crate::evaluate::ReferenceInput;
 use crate::evaluate::{Assessment, LAMBDA};
-use crate::files::Overwrite;
-use crate::files::{EmittedFile, write_files};
+use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
-use crate::mpc::{Lift, MpcSettings};
 use crate::recording::Recording;
-use crate::report::figures::{Figure, csv, pdf, standalone_svg};
-use crate::report::{Content, PageOptions, PageTable, all_figures, page};
+use crate::report::figures::figure_files;
+use crate::report::{Content, PageOptions, all_figures, page, without_statistics};
 use crate::simplify::Tolerance;
 use crate::study::{Store, Summary};
 use crate::{Error, artifact};
@@ -65,7 +61,7 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
             "model": arguments.model.display().to_string(),
             "output": arguments.output.display().to_string(),
             "bytes": made.page.len(),
-            "figures": written.iter().map(|path| path.display().to_string()).collect::<Vec<_>>(),
+            "figures": names(&written),
         }),
     })
 }
@@ -93,171 +89,60 @@ fn make(
     let progress = spinner("rolling the model out");
     let assessment = Assessment::over(model, recordings, arguments.restart_every)?;
     progress.set_message("running the controller");
-    let along = |lift| {
-        let settings = MpcSettings {
-            lift,
-            ..MpcSettings::default()
-        };
-        run_all(model, recordings, settings, ReferenceInput::Recorded)
-    };
-    let (plain, consistent) = match without_statistics(model) {
-        None => (along(Lift::Transpose)?, along(Lift::Consistent)?),
-        Some(_) => (Vec::new(), Vec::new()),
+    let can_control = without_statistics(model).is_none();
+    let [plain, consistent] = match can_control {
+        true => run_with_both_lifts(model, recordings)?,
+        false => [Vec::new(), Vec::new()],
     };
     progress.set_message("drawing");
-    let commands = commands(arguments, without_statistics(model).is_none());
-    let tolerance = arguments.tolerance;
-    let runs = [&plain[..], &consistent];
-    let made = page_of(model, &assessment, runs, study, tolerance, &commands);
+    let content = Content {
+        model,
+        assessment: &assessment,
+        plain: &plain,
+        consistent: &consistent,
+        study,
+    };
+    let made = page_of(
+        &content,
+        arguments.tolerance,
+        commands(arguments, can_control),
+    );
     progress.finish_and_clear();
     made
 }
 
-/// The first phase whose inputs the controller cannot weigh.
-fn without_statistics(model: &ReducedModel) -> Option<&str> {
-    let phases = model.phases().iter().enumerate();
-    let mut without = phases.filter(|&(index, _)| model.input_statistics(index).is_err());
-    without.next().map(|(_, phase)| phase.name.as_str())
-}
-
-const LADDER_CAPTION: &str = "What is left within each tolerance: active terms, digits of all coefficients, operations; errors as shares of the root mean square of their ddz, the largest of all equations; errors of rollouts over whole jumps and restarted";
-
-/// Draws what was assessed, and the controller's runs with the plain and with the consistent lift.
+/// Draws the assessment and the controller's runs.
 ///
 /// # Errors
-/// [`Error::Model`] for a model without encoder or decoder, [`Error::Emit`] for one that cannot be
+/// [`Error::Model`] for a model without encoder or decoder, [`Error::Typeset`] for one that cannot be
 /// typeset.
 pub fn page_of(
-    model: &ReducedModel,
-    assessment: &Assessment<'_>,
-    [plain, consistent]: [&[NamedRun]; 2],
-    study: Option<&Summary>,
+    content: &Content<'_>,
     tolerance: Tolerance,
-    commands: &[String],
+    commands: Vec<String>,
 ) -> Result<Made, Error> {
-    let content = Content {
-        model,
-        assessment,
-        runs: consistent,
-        study,
-    };
-    let figures = all_figures(&content)?;
-    let ladder = simplification::ladder(model, assessment, tolerance)?;
+    let figures = all_figures(content)?;
+    let ladder = simplification::ladder(content.model, content.assessment, tolerance)?;
+    let errors = format!("Errors of each ddz within {tolerance}, scaled units per s²");
+    let changes = format!("Every change within {tolerance}, with its bound");
     let options = PageOptions {
-        commands: commands.to_vec(),
+        commands,
         simplification: vec![
-            page_table(LADDER_CAPTION, &ladder.tolerances),
-            page_table(
-                &format!("Errors of each ddz within {tolerance}, scaled units per s²"),
-                &ladder.equations,
-            ),
+            ladder.tolerances.captioned(LADDER_CAPTION),
+            ladder.equations.captioned(errors),
         ],
-        changes: Some(&ladder.changes)
-            .filter(|changes| !changes.rows().is_empty())
-            .map(|changes| {
-                let caption = format!("Every change within {tolerance}, with its bound");
-                page_table(&caption, changes)
-            })
-            .into_iter()
-            .collect(),
-        ..options(model, assessment, plain, consistent)
+        changes: ladder.changes.captioned(changes),
     };
-    let page = page(&content, &figures, &options)?;
     Ok(Made {
-        page,
+        page: page(content, &figures, &options)?,
         files: figures.iter().flat_map(figure_files).collect(),
         n_figures: figures.iter().count(),
     })
 }
 
-/// A figure as SVG, PDF and CSV.
-pub fn figure_files(figure: &Figure) -> [EmittedFile; 3] {
-    let id = &figure.id;
-    [
-        EmittedFile::new(format!("{id}.svg"), standalone_svg(figure)),
-        EmittedFile::new(format!("{id}.pdf"), pdf(figure)),
-        EmittedFile::new(format!("{id}.csv"), csv(figure)),
-    ]
-}
+const LADDER_CAPTION: &str = "Size of the equations within each tolerance: active terms, digits of all coefficients, operations; errors as shares of the root mean square of their ddz, the largest of all equations; errors of rollouts over whole jumps and restarted";
 
-fn options(
-    model: &ReducedModel,
-    assessment: &Assessment<'_>,
-    plain: &[NamedRun],
-    consistent: &[NamedRun],
-) -> PageOptions {
-    let every = assessment.restart_every_s;
-    let rms = |sums, name: &str| {
-        let fit = assessment.fit(sums, name);
-        fit.map_or("-".to_owned(), |fit| format!("{} m", significant(fit.rms)))
-    };
-    let optional = |value: Option<f64>| value.map_or("-".to_owned(), significant);
-    let card = |name: &str, value: String| (name.to_owned(), value);
-    PageOptions {
-        headline: vec![
-            card("latent coordinates", model.latent_dim().to_string()),
-            card(
-                "active terms, all phases",
-                assessment.active_terms.to_string(),
-            ),
-            card("body.z error, whole jump", rms(&assessment.full, "body.z")),
-            card(
-                &format!("body.z error, restarted every {every} s"),
-                rms(&assessment.restarted, "body.z"),
-            ),
-            card(
-                "torque R² of the plain lift, contact",
-                optional(assessment.lift.torque_r2().contact),
-            ),
-            card("L_mod (29)", optional(assessment.combined_loss())),
-        ],
-        coordinates: vec![
-            page_table("Errors of every coordinate", &coordinate_table(assessment)),
-            page_table(
-                &format!("Root mean square errors by phase, restarted every {every} s"),
-                &phase_table(model, assessment),
-            ),
-        ],
-        baselines: vec![page_table(
-            "Body position: the model and the pendulum",
-            &baseline_table(assessment),
-        )],
-        baseline_notes: (assessment.baselines.iter())
-            .map(|b| format!("{}: {}.", b.name, b.template.constants()))
-            .collect(),
-        dynamics: vec![page_table(
-            "Each phase of the model",
-            &dynamics_table(model, assessment),
-        )],
-        remarks: remarks(model, assessment),
-        control: match plain.is_empty() {
-            true => Vec::new(),
-            false => vec![
-                page_table("Plain lift, u = W_eᵀ u_lat", &run_table(plain)),
-                page_table("Consistent lift", &run_table(consistent)),
-            ],
-        },
-        control_notes: (without_statistics(model).into_iter())
-            .map(|phase| {
-                format!(
-                    "The controller did not run: the model has no input statistics of phase {phase}, \
-                     which weigh its inputs. romc import --inputs-from takes them from recordings."
-                )
-            })
-            .collect(),
-        ..PageOptions::default()
-    }
-}
-
-fn page_table(caption: &str, table: &Table) -> PageTable {
-    PageTable {
-        caption: caption.to_owned(),
-        header: table.header().to_vec(),
-        rows: table.rows().to_vec(),
-    }
-}
-
-/// The commands whose output the page shows.
+/// The commands that reproduce the page.
 fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
     let paths = |paths: &[PathBuf]| {
         let quoted = paths.iter().map(|path| quoted(path));
@@ -265,9 +150,11 @@ fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
     };
     let (model, recordings) = (quoted(&arguments.model), paths(&arguments.recordings));
     let every = arguments.restart_every;
-    let study = (arguments.study.as_ref()).map_or(String::new(), |folder| {
-        format!(" --study {}", quoted(folder))
-    });
+    let study = arguments
+        .study
+        .as_deref()
+        .map(|folder| format!(" --study {}", quoted(folder)));
+    let study = study.unwrap_or_default();
     let tolerance = arguments.tolerance;
     let mut commands = vec![
         format!(

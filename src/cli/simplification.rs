@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::args::SimplifyArguments;
-use super::output::{Table, read_recordings, significant, spinner};
-use crate::equations::{Equations, ExactStep};
+use super::output::{names, read_recordings, spinner};
+use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::EmittedFile;
 use crate::model::ReducedModel;
@@ -16,10 +16,10 @@ use crate::recording::Recording;
 use crate::sim::LatentSegment;
 use crate::simplify::{
     Certificate, Domain, MARGIN, PrintedEquation, RolloutBasis, RolloutEffect, Samples, Simplified,
-    SimplifyError, Tolerance, bound_words, certificate_json, change_words, interval_words,
-    lost_words, markdown, printed, rollouts_json, simplify,
+    SimplifyError, Tolerance, bound_words, certificate_json, change_table, equation_table,
+    lost_words, markdown, printed, rollout_table, rollouts_json, simplify,
 };
-use crate::typeset::Rounding;
+use crate::typeset::{Cell, Rounding, Table, significant};
 use crate::{Error, artifact};
 
 /// Time between restarts of the short rollouts, as in the paper's second test.
@@ -88,7 +88,7 @@ impl Basis {
         })
     }
 
-    /// What simplification does to rollouts; nothing without recordings or decoder.
+    /// The effect of simplification on rollouts; none without recordings or decoder.
     fn rollouts(
         &self,
         model: &ReducedModel,
@@ -108,7 +108,7 @@ impl Basis {
     }
 }
 
-/// A simplified model and all that is told about it.
+/// A simplified model with its certificate and effects.
 pub struct Outcome {
     /// The model.
     pub model: ReducedModel,
@@ -150,11 +150,7 @@ pub fn run(
         certificate,
         rollouts,
         basis,
-        domain_files: arguments
-            .domain
-            .iter()
-            .map(|path| path.display().to_string())
-            .collect(),
+        domain_files: names(&arguments.domain),
         margin,
     };
     outcome.record_domain()?;
@@ -186,15 +182,19 @@ impl Outcome {
     }
 
     /// The certificate as a file beside the emitted ones, its summary, and the same as JSON;
-    /// `rounding` is how coefficients are printed.
+    /// `equations` are those of the model as they are printed, `rounding` is how.
     ///
     /// # Errors
     /// [`Error::Simplify`] if printing cannot be evaluated.
-    pub fn told(&self, rounding: Rounding) -> Result<(EmittedFile, String, Value), Error> {
+    pub fn files_and_summary(
+        &self,
+        equations: &Equations<'_>,
+        rounding: Rounding,
+    ) -> Result<(EmittedFile, String, Value), Error> {
         let basis = &self.basis;
         let printed = match rounding {
             Rounding::Exact => Vec::new(),
-            _ => printed(&self.model, &basis.domain, basis.samples.as_ref(), rounding)?,
+            _ => printed(equations, &basis.domain, basis.samples.as_ref(), rounding)?,
         };
         let name = format!("{}-simplification.md", self.model.identifier());
         let page = markdown(
@@ -204,7 +204,6 @@ impl Outcome {
             &printed,
         );
         let mut value = certificate_json(&self.certificate);
-        value["exact"] = (self.certificate.exact.iter()).map(exact_json).collect();
         value["file"] = json!(name);
         value["domain_files"] = json!(self.domain_files);
         value["margin"] = json!(self.margin);
@@ -213,16 +212,13 @@ impl Outcome {
         Ok((EmittedFile::new(name, page), self.summary(), value))
     }
 
-    /// Tells in a comment of each file of equations or code what they were simplified from.
+    /// Adds a comment to each file of equations or code that names the model it was simplified from.
     pub fn comment(&self, files: &mut [EmittedFile]) {
         if self.certificate.n_changes() == 0 {
             return;
         }
         let lines = [
-            format!(
-                "Simplified within {}",
-                tolerance_words(self.certificate.tolerance)
-            ),
+            format!("Simplified within {}", self.certificate.tolerance.words()),
             format!(
                 "from the model with digest {}; {}-simplification.md bounds each change.",
                 artifact::digest(&self.original).short(),
@@ -242,12 +238,11 @@ impl Outcome {
     }
 
     fn summary(&self) -> String {
-        let ((before, after), (slow, fast)) =
-            (self.certificate.terms(), self.certificate.operations());
-        let (long, short) = self.certificate.digits();
+        let (terms, digits) = (self.certificate.terms(), self.certificate.digits());
+        let operations = self.certificate.operations();
         let mut text = format!(
-            "simplified within {}:\n{before} to {after} active terms, {long} to {short} digits, {slow} to {fast} operations of ddz\n\n{}",
-            tolerance_words(self.certificate.tolerance),
+            "simplified within {}:\n{terms} active terms, {digits} digits, {operations} operations of ddz\n\n{}",
+            self.certificate.tolerance.words(),
             equation_table(&self.certificate)
         );
         for sentence in lost_words(&self.certificate) {
@@ -260,7 +255,7 @@ impl Outcome {
     }
 }
 
-/// What stands around a comment in a file of this kind; nothing where the model's equations are not.
+/// Delimiters of a comment in a file of this kind; `None` for files without the model's equations.
 fn comment_marks(path: &Path) -> Option<[&'static str; 2]> {
     match path.extension()?.to_str()? {
         "tex" | "m" => Some(["% ", ""]),
@@ -283,70 +278,6 @@ pub fn exact_words(equations: &Equations<'_>) -> String {
     }
 }
 
-/// One step of exact simplification.
-pub fn exact_json(step: &ExactStep) -> Value {
-    json!({
-        "phase": step.phase,
-        "equation": format!("ddz{}", step.output + 1),
-        "terms": { "before": step.before.len(), "after": step.after.len() },
-        "before": ExactStep::sum_words(&step.before),
-        "after": ExactStep::sum_words(&step.after),
-    })
-}
-
-/// A tolerance with its unit.
-pub fn tolerance_words(tolerance: Tolerance) -> String {
-    match tolerance {
-        Tolerance::ShareOfRms(_) => {
-            format!("{tolerance} of the root mean square of each ddz over the recordings")
-        }
-        Tolerance::Absolute(_) => format!("{tolerance} scaled units per s^2"),
-    }
-}
-
-fn equation_table(certificate: &Certificate) -> Table {
-    let mut table = Table::new([
-        "phase, equation",
-        "terms",
-        "rms of ddz",
-        "allowed error",
-        "certified error",
-        "measured max",
-        "measured rms",
-    ]);
-    for (phase, equation) in certificate.equations() {
-        let measured = equation.measured;
-        let cell = |value: Option<f64>| value.map_or("-".to_owned(), significant);
-        table.row([
-            format!("{phase}, ddz{}", equation.output + 1),
-            format!("{} to {}", equation.terms_before, equation.terms_after),
-            cell(equation.rms),
-            significant(equation.allowed),
-            bound_words(equation.bound.magnitude()),
-            cell(measured.map(|measured| measured.max)),
-            cell(measured.map(|measured| measured.rms)),
-        ]);
-    }
-    table
-}
-
-fn rollout_table(effect: &RolloutEffect) -> Table {
-    let every = format!("restarted every {} s, before", effect.restart_every_s);
-    let mut table = Table::new(["rms error", "whole jump, before", "after", &every, "after"]);
-    let cell = |value: Option<f64>| value.map_or("-".to_owned(), significant);
-    for (k, name) in effect.names.iter().enumerate() {
-        let (before, after) = (effect.before.rms[k], effect.after.rms[k]);
-        table.row([
-            format!("{name}, {}", effect.units[k]),
-            cell(before[0]),
-            cell(after[0]),
-            cell(before[1]),
-            cell(after[1]),
-        ]);
-    }
-    table
-}
-
 fn printed_json(equation: &PrintedEquation) -> Value {
     json!({
         "phase": equation.phase,
@@ -359,9 +290,9 @@ fn printed_json(equation: &PrintedEquation) -> Value {
 /// Tolerances that a report compares.
 const LADDER: [f64; 4] = [0.001, 0.01, 0.05, 0.1];
 
-/// What a report tells about simplification.
+/// The tables of a report about simplification.
 pub struct Ladder {
-    /// A row a tolerance: what is left, how far it can be off, how far rollouts are.
+    /// One row per tolerance: size, error and rollouts of the simplified equations.
     pub tolerances: Table,
     /// Errors of each equation at the chosen tolerance.
     pub equations: Table,
@@ -388,101 +319,63 @@ pub fn ladder(
         latent,
         restart_every_s: assessment.restart_every_s,
     };
-    let every = format!("every {} s: body.x, m", assessment.restart_every_s);
-    let mut table = Table::new([
-        "tolerance",
-        "terms",
-        "digits",
-        "operations",
-        "certified error",
-        "measured max",
-        "measured rms",
-        "body.x, m",
-        "body.z, m",
-        &every,
-        "body.z, m",
-    ]);
-    let names = ["body.x", "body.z"];
     let rms = |sums, name| assessment.fit(sums, name).map(|fit| fit.rms);
-    let full = names.map(|name| rms(&assessment.full, name));
-    let restarted = names.map(|name| rms(&assessment.restarted, name));
+    let (whole, short) = (&assessment.full, &assessment.restarted);
+    let [x, z] = ["body.x", "body.z"].map(|name| [rms(whole, name), rms(short, name)]);
     let equations = &Equations::of(model);
-    let none = simplify(equations, &domain, Some(&samples), Tolerance::Absolute(0.0))?.certificate;
-    table.row(ladder_row(
-        "none",
-        &none,
-        [full[0], full[1], restarted[0], restarted[1]],
-    ));
-    let places = names.map(|name| {
-        let body = assessment
-            .names
-            .iter()
-            .filter(|known| known.starts_with("body."));
-        body.clone().position(|known| known == name)
-    });
+    let none = simplify(equations, &domain, Some(&samples), Tolerance::Absolute(0.0))?;
+    let mut steps = vec![("none".to_owned(), none.certificate, [x, z])];
+    let body = assessment
+        .names
+        .iter()
+        .filter(|name| name.starts_with("body."));
+    let places = ["body.x", "body.z"].map(|name| body.clone().position(|known| known == name));
     for share in LADDER {
         let tolerance = Tolerance::ShareOfRms(share);
         let made = simplify(equations, &domain, Some(&samples), tolerance)?;
         let errors = basis.errors(&made.model)?;
-        let of = |place: Option<usize>, kind: usize| errors.rms.get(place?)?[kind];
-        let [x, z] = places;
-        let body = [of(x, 0), of(z, 0), of(x, 1), of(z, 1)];
-        table.row(ladder_row(&tolerance.to_string(), &made.certificate, body));
+        let of = |place: Option<usize>| errors.rms.get(place?).copied();
+        let body = places.map(|place| of(place).unwrap_or_default());
+        steps.push((tolerance.to_string(), made.certificate, body));
     }
     let certificate = simplify(equations, &domain, Some(&samples), chosen)?.certificate;
     Ok(Ladder {
-        tolerances: table,
+        tolerances: ladder_table(&steps, assessment.restart_every_s),
         equations: equation_table(&certificate),
         changes: change_table(&certificate),
     })
 }
 
-fn ladder_row(name: &str, certificate: &Certificate, body: [Option<f64>; 4]) -> Vec<String> {
-    let percent = |share: Option<f64>| {
-        share.map_or("-".to_owned(), |share| {
-            format!("{}\u{a0}%", significant(100.0 * share))
-        })
-    };
-    let mut row = vec![
-        name.to_owned(),
-        certificate.terms().1.to_string(),
-        certificate.digits().1.to_string(),
-        certificate.operations().1.to_string(),
-        (certificate.largest_bound_share()).map_or("-".to_owned(), |share| {
-            format!("{}\u{a0}%", bound_words(100.0 * share))
-        }),
-        percent(certificate.largest_measured_share()),
-        percent(certificate.largest_rms_share()),
-    ];
-    row.extend(body.map(|rms| rms.map_or("-".to_owned(), significant)));
-    row
-}
+/// A tolerance, its certificate, and root mean square errors of body x and z, whole and restarted.
+type Step = (String, Certificate, [[Option<f64>; 2]; 2]);
 
-fn change_table(certificate: &Certificate) -> Table {
-    let mut table = Table::new([
-        "phase, equation",
-        "term",
-        "change",
-        "before",
-        "after",
-        "bound",
-        "measured max",
-        "measured rms",
-    ]);
-    for (phase, equation) in certificate.equations() {
-        for change in &equation.changes {
-            let cell = |value: Option<f64>| value.map_or("-".to_owned(), significant);
-            table.row([
-                format!("{phase}, ddz{}", equation.output + 1),
-                change.term.clone(),
-                change_words(change),
-                change.before.to_string(),
-                change.after.to_string(),
-                interval_words(change.bound),
-                cell(change.measured.map(|measured| measured.max)),
-                cell(change.measured.map(|measured| measured.rms)),
-            ]);
-        }
-    }
-    table
+fn ladder_table(steps: &[Step], restart_every_s: f64) -> Table {
+    let every = format!("every {restart_every_s} s: body.x");
+    let percent = |share: Option<f64>, text: fn(f64) -> String| -> Cell {
+        let text = share.map(|share| format!("{}\u{a0}%", text(100.0 * share)));
+        text.into()
+    };
+    Table::of(steps)
+        .column("tolerance", "", |(name, ..)| name)
+        .column("terms", "", |(_, certificate, _)| certificate.terms().after)
+        .column("digits", "", |(_, certificate, _)| {
+            certificate.digits().after
+        })
+        .column("operations", "", |(_, certificate, _)| {
+            certificate.operations().after
+        })
+        .column("certified error", "", |(_, certificate, _)| {
+            percent(certificate.largest_bound_share(), bound_words)
+        })
+        .column("measured max", "", |(_, certificate, _)| {
+            percent(certificate.largest_measured_share(), significant)
+        })
+        .column("measured rms", "", |(_, certificate, _)| {
+            percent(certificate.largest_rms_share(), significant)
+        })
+        .column("body.x", "m", |(.., [x, _])| x[0])
+        .column("body.z", "m", |(.., [_, z])| z[0])
+        .column(&every, "m", |(.., [x, _])| x[1])
+        .column("body.z", "m", |(.., [_, z])| z[1])
+        .table()
 }

@@ -5,19 +5,19 @@ use std::path::Path;
 use serde_json::json;
 
 use super::Answer;
-use super::args::{StudyArguments, TrainMethod, TrainSettings};
-use super::output::{Table, significant, spinner};
+use super::args::{StudyArguments, TrainSettings};
+use super::output::spinner;
 use super::prepared_recordings::{RecordedSets, read_all};
-use super::report::figure_files;
 use super::train_settings;
 use crate::Error;
-use crate::files::Overwrite;
-use crate::files::{EmittedFile, check_folder, write_files};
+use crate::files::{EmittedFile, Overwrite, check_folder, write_files};
 use crate::recording::Recording;
+use crate::report::figures::figure_files;
 use crate::report::study_figures;
 use crate::robot::Robot;
-use crate::study::{self, Plan, Shard, Spread, Store, Summary, cells_csv};
+use crate::study::{self, Plan, Shard, Spread, Store, Summary, cell_table};
 use crate::train::Origin;
+use crate::typeset::{Cell, Table, significant};
 
 /// The tables of a study.
 const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
@@ -37,10 +37,10 @@ pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
     };
     let cells = store.cells()?;
     let summary = Summary::of(&cells, arguments.lambda);
-    let tables = [cells_csv(&cells, arguments.lambda), summary.csv()];
+    let tables = [cell_table(&cells, arguments.lambda), summary.table()];
     let tables = TABLES.iter().zip(tables);
     let mut files: Vec<EmittedFile> = tables
-        .map(|(name, text)| EmittedFile::new(*name, text))
+        .map(|(name, table)| EmittedFile::new(*name, table.csv()))
         .collect();
     files.extend(study_figures(&summary).iter().flat_map(figure_files));
     write_files(&arguments.out_dir, &files, overwrite)?;
@@ -65,7 +65,7 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
         [&arguments.recordings, &arguments.validation, &[]],
         &settings,
         robot,
-    )?;
+    );
     let training = read_all(&recorded.training)?;
     let validation = read_all(&recorded.validation)?;
     recorded.report_findings();
@@ -97,12 +97,9 @@ fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
         None => TrainSettings::default(),
         Some(path) => {
             let settings = train_settings::read(path)?;
-            let fixed = [
-                ("latent-dim", settings.latent_dim.is_some()),
-                ("seed", settings.seed.is_some()),
-                ("seeds", settings.seeds.is_some()),
-            ];
-            if let Some((name, _)) = fixed.iter().find(|(_, given)| *given) {
+            let given = train_settings::given(&settings);
+            let mut fixed = ["latent-dim", "seed", "seeds"].into_iter();
+            if let Some(name) = fixed.find(|name| given.contains_key(*name)) {
                 let message = format!("`{name}` is not a setting of a study, which runs over them");
                 return Err(train_settings::refused(path, &message));
             }
@@ -122,14 +119,10 @@ fn plan(
     validation: &[Recording],
 ) -> Plan {
     let all: Vec<Recording> = training.iter().chain(validation).cloned().collect();
-    let method = match settings.method {
-        Some(TrainMethod::Joint) => "joint",
-        Some(TrainMethod::ClosedForm) | None => "closed-form",
-    };
     Plan {
         latent_dims: arguments.latent_dims.0.clone(),
         seeds: arguments.seeds,
-        method: method.to_owned(),
+        method: train_settings::method(settings),
         settings: train_settings::as_flags(settings),
         recordings: Origin::new("", &all)
             .recordings
@@ -142,30 +135,19 @@ fn plan(
 }
 
 fn answer(folder: &Path, store: &Store, summary: &Summary) -> Answer {
-    let mut table = Table::new([
-        "d",
-        "models",
-        "decoder mean square",
-        "active in contact",
-        "L_mod",
-        "x after 0.1 s, m",
-        "z after 0.1 s, m",
-        "torque R^2",
-    ]);
-    let cell =
-        |Spread { mean, std }: Spread| format!("{} +- {}", significant(mean), significant(std));
-    for row in &summary.dimensions {
-        table.row([
-            row.latent_dim.to_string(),
-            row.trained.to_string(),
-            cell(row.decoder_mse),
-            cell(row.active),
-            cell(row.combined_loss),
-            cell(row.prediction_x_m),
-            cell(row.prediction_z_m),
-            cell(row.torque_r2),
-        ]);
-    }
+    let spread = |Spread { mean, std }: Spread| -> Cell {
+        format!("{} +- {}", significant(mean), significant(std)).into()
+    };
+    let table = Table::of(&summary.dimensions)
+        .column("d", "", |row| row.latent_dim)
+        .column("models", "", |row| row.trained)
+        .column("decoder mean square", "", |row| spread(row.decoder_mse))
+        .column("active in contact", "", |row| spread(row.active))
+        .column("L_mod", "", |row| spread(row.combined_loss))
+        .column("x after 0.1 s", "m", |row| spread(row.prediction_x_m))
+        .column("z after 0.1 s", "m", |row| spread(row.prediction_z_m))
+        .column("torque R^2", "", |row| spread(row.torque_r2))
+        .table();
     let (missing, total) = (store.missing(), store.plan().cells().len());
     let best = summary.best();
     let mut text = format!(
@@ -179,8 +161,8 @@ fn answer(folder: &Path, store: &Store, summary: &Summary) -> Answer {
             summary.lambda
         );
     }
-    let names: Vec<String> = missing
-        .iter()
+    let names = missing.iter();
+    let names: Vec<String> = names
         .map(|id| format!("d = {} seed {}", id.latent_dim, id.seed))
         .collect();
     if !names.is_empty() {

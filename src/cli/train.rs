@@ -7,13 +7,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde_json::json;
 
 use super::Answer;
-use super::args::{TrainArguments, TrainMethod, TrainSettings};
-use super::output::{Table, check_output, significant, spinner};
+use super::args::{TrainArguments, TrainSettings};
+use super::output::{check_output, names, spinner, stem};
 use super::prepared_recordings::{RecordedSets, read_all};
 use super::train_settings;
 use crate::files::Overwrite;
 use crate::robot::Robot;
-use crate::train::{Origin, Progress, Recordings, SetMetrics, TrainReport, Trained, Watch};
+use crate::train::{Method, Origin, Progress, Recordings, SetMetrics, TrainReport, Trained, Watch};
+use crate::typeset::{Cell, Table};
 use crate::{Error, artifact, train};
 
 /// Learns a model and writes it.
@@ -44,7 +45,7 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
             bar.suspend(|| recorded.report_findings());
         }
     };
-    let mut listener = |news: Progress| match news {
+    let mut listener = |progress: Progress| match progress {
         Progress::Stage { name, .. } => {
             report_findings();
             bar.set_message(name);
@@ -52,22 +53,16 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         Progress::Done { text, .. } => bar.set_message(text),
     };
     let mut watch = Watch::new(&mut listener, stop_on_interrupt());
-    let learn = match method {
-        TrainMethod::ClosedForm => train::closed_form,
-        TrainMethod::Joint => train::joint,
-    };
-    let trained = learn(sets, robot, &options, &origin, &mut watch);
+    let trained = method.learn(sets, robot, &options, &origin, &mut watch);
     report_findings();
     let trained = trained?;
     bar.finish_and_clear();
     artifact::write_with(&arguments.output, &trained.model, overwrite)?;
-    let mut answer = match recorded.test.is_empty() {
-        true => answer(arguments, &trained, None),
-        false => {
-            let tested = train::assess(&trained.model, &recorded.test)?;
-            answer(arguments, &trained, Some(&tested))
-        }
+    let tested = match recorded.test.is_empty() {
+        true => None,
+        false => Some(train::assess(&trained.model, &recorded.test)?),
     };
+    let mut answer = answer(arguments, &trained, tested.as_ref());
     answer.json["recordings"] = recorded.findings_json();
     if let (Some(sets), Some(json)) = (&recorded.divided, recorded.json()) {
         answer.json["split"] = json;
@@ -93,25 +88,15 @@ fn stop_on_interrupt() -> &'static AtomicBool {
 }
 
 fn model_name(arguments: &TrainArguments) -> String {
-    let stem = || {
-        arguments
-            .output
-            .file_stem()
-            .map(|stem| stem.to_string_lossy().into_owned())
-    };
-    arguments.name.clone().or_else(stem).unwrap_or_default()
+    arguments
+        .name
+        .clone()
+        .unwrap_or_else(|| stem(&arguments.output))
 }
 
 /// The command that repeats this training, as the provenance keeps it.
-fn command_line(
-    arguments: &TrainArguments,
-    settings: &TrainSettings,
-    method: TrainMethod,
-) -> String {
-    let paths = |paths: &[PathBuf]| {
-        let texts = paths.iter().map(|path| path.display().to_string());
-        texts.collect::<Vec<_>>().join(" ")
-    };
+fn command_line(arguments: &TrainArguments, settings: &TrainSettings, method: Method) -> String {
+    let paths = |paths: &[PathBuf]| names(paths).join(" ");
     let mut line = format!("romc train {}", paths(&arguments.recordings));
     if !arguments.validation.is_empty() {
         let _ = write!(line, " --validation {}", paths(&arguments.validation));
@@ -130,42 +115,65 @@ fn command_line(
 
 fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetrics>) -> Answer {
     let report = &trained.report;
+    let latent_dim = trained.model.latent_dim();
+    let text = format!(
+        "{}: {latent_dim} latent coordinates from {} recordings\n\n{}{}",
+        arguments.output.display(),
+        arguments.recordings.len(),
+        metrics_table(report, tested),
+        seed_table(report)
+    );
+    Answer {
+        text,
+        json: json!({
+            "command": "train",
+            "model": arguments.output.display().to_string(),
+            "name": trained.model.name(),
+            "latent_dim": latent_dim,
+            "report": report,
+            "test": tested,
+        }),
+    }
+}
+
+const TORQUE_R2: &str = "torque R^2 of the plain lift, all samples";
+
+/// Every metric on each set of recordings.
+fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
     let mut sets = vec![
         ("training", Some(&report.training)),
         ("validation", report.validation.as_ref()),
     ];
-    if tested.is_some() {
-        sets.push(("test", tested));
-    }
-    let names = sets.iter().map(|(name, _)| *name);
-    let mut table = Table::new(["figure", "unit"].into_iter().chain(names));
+    sets.extend(tested.map(|tested| ("test", Some(tested))));
+    let sets_of = sets.iter().map(|(name, _)| *name);
+    let mut table = Table::new(["metric", "unit"].into_iter().chain(sets_of));
     let mut row = |name: &str, unit: &str, value: &dyn Fn(&SetMetrics) -> Option<f64>| {
-        let cell = |set: Option<&SetMetrics>| {
-            set.map_or(String::new(), |set| {
-                value(set).map_or("diverged".to_owned(), significant)
-            })
-        };
-        let label = [name.to_owned(), unit.to_owned()].into_iter();
-        table.row(label.chain(sets.iter().map(|(_, set)| cell(*set))));
+        let cell = |set: &SetMetrics| value(set).map_or("diverged".into(), Cell::from);
+        let cells = sets
+            .iter()
+            .map(|(_, set)| set.map(cell).unwrap_or_default());
+        table.row([name.into(), unit.into()].into_iter().chain(cells));
     };
-    row("decoder mean square", "scaled", &|set| {
-        Some(set.decoder_mse)
-    });
-    row("torque R^2 of the plain lift, all samples", "", &|set| {
-        Some(set.torque_r2)
-    });
-    row("body x, fixed steps over 0.1 s", "m", &|set| {
-        Some(set.prediction_x_m)
-    });
-    row("body z, fixed steps over 0.1 s", "m", &|set| {
-        Some(set.prediction_z_m)
-    });
-    row("body x, fixed steps, whole jump", "m", &|set| {
-        set.rollout_x_m
-    });
-    row("body z, fixed steps, whole jump", "m", &|set| {
-        set.rollout_z_m
-    });
+    type Metric = (&'static str, &'static str, fn(&SetMetrics) -> Option<f64>);
+    let metrics: [Metric; 6] = [
+        ("decoder mean square", "scaled", |set| Some(set.decoder_mse)),
+        (TORQUE_R2, "", |set| Some(set.torque_r2)),
+        ("body x, fixed steps over 0.1 s", "m", |set| {
+            Some(set.prediction_x_m)
+        }),
+        ("body z, fixed steps over 0.1 s", "m", |set| {
+            Some(set.prediction_z_m)
+        }),
+        ("body x, fixed steps, whole jump", "m", |set| {
+            set.rollout_x_m
+        }),
+        ("body z, fixed steps, whole jump", "m", |set| {
+            set.rollout_z_m
+        }),
+    ];
+    for (name, unit, metric) in metrics {
+        row(name, unit, &metric);
+    }
     for (phase, terms) in report.active_terms.iter().enumerate() {
         let name = format!(
             "smoothed ddz R^2 in {} ({} terms)",
@@ -175,52 +183,24 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
     }
     if let Some(overlap) = report.support_overlap {
         let name = format!("overlap of supports, {} seeds", report.seeds.len());
-        table.row([name, String::new(), significant(overlap), String::new()]);
+        table.row([name.into(), "".into(), Cell::from(overlap)]);
     }
-    let text = format!(
-        "{}: {} latent coordinates from {} recordings\n\n{table}{}",
-        arguments.output.display(),
-        trained.model.latent_dim(),
-        arguments.recordings.len(),
-        seed_table(report)
-    );
-    Answer {
-        text,
-        json: json!({
-            "command": "train",
-            "model": arguments.output.display().to_string(),
-            "name": trained.model.name(),
-            "latent_dim": trained.model.latent_dim(),
-            "report": report,
-            "test": tested,
-        }),
-    }
+    table
 }
 
-/// What each seed came to, the one kept first; empty for one seed.
+/// The metrics of each seed, the one kept first; empty for one seed.
 fn seed_table(report: &TrainReport) -> String {
     if report.seeds.len() < 2 {
         return String::new();
     }
-    let mut table = Table::new([
-        "seed",
-        "decoder mean square",
-        "torque R^2",
-        "x after 0.1 s, m",
-        "z after 0.1 s, m",
-        "terms",
-        "latents follow",
-    ]);
-    for seed in &report.seeds {
-        table.row([
-            seed.seed.to_string(),
-            significant(seed.judged.decoder_mse),
-            significant(seed.judged.torque_r2),
-            significant(seed.judged.prediction_x_m),
-            significant(seed.judged.prediction_z_m),
-            seed.active.to_string(),
-            seed.dominant.join(", "),
-        ]);
-    }
+    let table = Table::of(&report.seeds)
+        .column("seed", "", |seed| seed.seed.to_string())
+        .column("decoder mean square", "", |seed| seed.judged.decoder_mse)
+        .column("torque R^2", "", |seed| seed.judged.torque_r2)
+        .column("x after 0.1 s", "m", |seed| seed.judged.prediction_x_m)
+        .column("z after 0.1 s", "m", |seed| seed.judged.prediction_z_m)
+        .column("terms", "", |seed| seed.active)
+        .column("latents follow", "", |seed| seed.dominant.join(", "))
+        .table();
     format!("\n{table}")
 }

@@ -1,110 +1,82 @@
 //! The CSV table of rollouts that `romc simulate --output` writes.
 
-use std::fmt::Write as _;
+use nalgebra::DVector;
 
 use crate::Error;
 use crate::evaluate::SegmentRun;
 use crate::model::ReducedModel;
 use crate::robot::Robot;
+use crate::typeset::Table;
 
-/// One row a sample: time, phase, recorded and predicted latent state and coordinates.
+/// One row per sample: time, phase, recorded and predicted latent state and coordinates.
 ///
-/// Columns: `segment, time, phase`, then `z_i, z_i_full, z_i_restarted` a latent coordinate, the same
+/// Columns: `segment, time, phase`, then `z_i, z_i_full, z_i_restarted` for each latent coordinate, the same
 /// three of its velocity `dz_i`, the latent input `u_lat_i`, then the three of every robot coordinate
 /// in SI units. A prediction that diverged leaves its cell empty.
-#[derive(Debug, Clone)]
-pub struct TrajectoryTable {
-    text: String,
-}
-
-impl TrajectoryTable {
-    /// A table that has only its header.
-    pub fn new(model: &ReducedModel) -> Self {
-        let mut text = "segment,time,phase".to_owned();
-        let latent = |symbol: &str| -> Vec<String> {
-            let indices = 1..=model.latent_dim();
-            indices.map(|index| format!("{symbol}_{index}")).collect()
-        };
-        let names = model.state().map(|state| state.names.clone());
-        let names = names.unwrap_or_else(|| Robot::state_names().to_vec());
-        let mut columns = |names: &[String], kinds: &[&str]| {
-            for (name, kind) in names.iter().flat_map(|n| kinds.iter().map(move |k| (n, k))) {
-                let _ = write!(text, ",{name}{kind}");
-            }
-        };
-        let kinds = ["", "_full", "_restarted"];
-        columns(&latent("z"), &kinds);
-        columns(&latent("dz"), &kinds);
-        columns(&latent("u_lat"), &[""]);
-        columns(&names, &kinds);
-        text.push('\n');
-        Self { text }
-    }
-
-    /// Adds the samples of a segment and its two rollouts.
-    ///
-    /// # Errors
-    /// [`Error::Model`] for a model without decoder.
-    pub fn add(
-        &mut self,
-        model: &ReducedModel,
-        index: usize,
-        run: &SegmentRun<'_>,
-    ) -> Result<(), Error> {
-        let SegmentRun {
-            segment,
-            latent,
-            full,
-            restarted,
-            ..
-        } = run;
-        let [full, restarted] = [full, restarted].map(|rollout| {
-            let mut columns = vec![None; latent.len()];
-            for (sample, window, column) in rollout.predictions() {
-                columns[sample] = Some((
-                    window.z.column(column).into_owned(),
-                    window.dz.column(column).into_owned(),
-                ));
-            }
-            columns
-        });
-        for (sample, (full, restarted)) in full.iter().zip(&restarted).enumerate() {
+///
+/// # Errors
+/// [`Error::Model`] for a model without decoder.
+pub fn trajectory_table(model: &ReducedModel, runs: &[SegmentRun<'_>]) -> Result<Table, Error> {
+    let mut table = Table::new(columns(model));
+    for (index, run) in runs.iter().enumerate() {
+        let [full, restarted] =
+            [&run.full, &run.restarted].map(|rollout| rollout.states(run.latent.len()));
+        for (sample, predictions) in full.iter().zip(&restarted).enumerate() {
+            let (segment, latent) = (run.segment, &run.latent);
             let phase = &model.phases()[latent.phase[sample]].name;
-            let _ = write!(self.text, "{index},{},{phase}", segment.time_s[sample]);
-            let states = [full.as_ref(), restarted.as_ref()];
+            let mut row = vec![
+                index.to_string(),
+                segment.time_s[sample].to_string(),
+                phase.clone(),
+            ];
+            let states = [predictions.0.as_ref(), predictions.1.as_ref()];
             let z = states.map(|state| state.map(|(z, _)| z));
+            add(&mut row, latent.z.column(sample).iter(), z);
             let dz = states.map(|state| state.map(|(_, dz)| dz));
-            let recorded = latent.z.column(sample).into_owned();
-            self.cells(recorded.as_slice(), z.map(|z| z.map(|z| z.as_slice())));
-            let recorded = latent.dz.column(sample).into_owned();
-            self.cells(recorded.as_slice(), dz.map(|dz| dz.map(|dz| dz.as_slice())));
-            for value in latent.u_lat.column(sample).iter() {
-                let _ = write!(self.text, ",{value}");
-            }
+            add(&mut row, latent.dz.column(sample).iter(), dz);
+            row.extend(latent.u_lat.column(sample).iter().map(f64::to_string));
             let [full, restarted] = z.map(|z| z.map(|z| model.decode(z)).transpose());
             let decoded = [full?, restarted?];
-            let recorded = segment.x.column(sample).into_owned();
-            let decoded = decoded.each_ref().map(|x| x.as_ref().map(|x| x.as_slice()));
-            self.cells(recorded.as_slice(), decoded);
-            self.text.push('\n');
-        }
-        Ok(())
-    }
-
-    fn cells(&mut self, recorded: &[f64], predicted: [Option<&[f64]>; 2]) {
-        for (index, value) in recorded.iter().enumerate() {
-            let _ = write!(self.text, ",{value}");
-            for values in predicted {
-                self.text.push(',');
-                if let Some(values) = values {
-                    let _ = write!(self.text, "{}", values[index]);
-                }
-            }
+            let decoded = decoded.each_ref().map(Option::as_ref);
+            add(&mut row, segment.x.column(sample).iter(), decoded);
+            table.row(row);
         }
     }
+    Ok(table)
+}
 
-    /// The table as the bytes of a CSV file.
-    pub fn as_bytes(&self) -> &[u8] {
-        self.text.as_bytes()
+fn columns(model: &ReducedModel) -> Vec<String> {
+    const KINDS: [&str; 3] = ["", "_full", "_restarted"];
+    let latent = |symbol: &str| -> Vec<String> {
+        let indices = 1..=model.latent_dim();
+        indices.map(|index| format!("{symbol}_{index}")).collect()
+    };
+    let thrice = |names: Vec<String>| {
+        let of = |name: String| KINDS.map(|kind| format!("{name}{kind}"));
+        names.into_iter().flat_map(of)
+    };
+    let names = model.state().map(|state| state.names.clone());
+    let names = names.unwrap_or_else(|| Robot::state_names().to_vec());
+    let first = ["segment", "time", "phase"].map(str::to_owned).into_iter();
+    first
+        .chain(thrice(latent("z")))
+        .chain(thrice(latent("dz")))
+        .chain(latent("u_lat"))
+        .chain(thrice(names))
+        .collect()
+}
+
+/// Adds each recorded value with its two predictions to a row.
+fn add<'a>(
+    row: &mut Vec<String>,
+    recorded: impl Iterator<Item = &'a f64>,
+    predicted: [Option<&DVector<f64>>; 2],
+) {
+    for (index, value) in recorded.enumerate() {
+        row.push(value.to_string());
+        let cell = |values: Option<&DVector<f64>>| {
+            values.map_or(String::new(), |values| values[index].to_string())
+        };
+        row.extend(predicted.map(cell));
     }
 }

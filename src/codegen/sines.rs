@@ -1,10 +1,10 @@
 //! What computes sines and cosines in generated C and Rust.
 
 /// Where sines and cosines come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum SineCosine {
-    /// A kernel of romc's own inside the generated file: within about one unit of the last place,
-    /// without branches, so that loops over it vectorise; the same bits on every machine.
+    // Within about one unit of the last place, without branches, so that loops over it vectorise.
+    /// A function inside the file that compilers vectorise, the same bits everywhere.
     #[default]
     Inline,
     /// The platform's mathematics library.

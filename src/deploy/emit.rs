@@ -1,6 +1,6 @@
 //! Equations to the files of the chosen targets.
 
-use std::str::FromStr;
+use clap::ValueEnum as _;
 
 use super::controller;
 use super::error::EmitError;
@@ -10,72 +10,41 @@ use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::lower::{LowerError, LowerOptions};
 use crate::model::ReducedModel;
-use crate::typeset::latex::{self, LatexOptions};
-use crate::typeset::markdown::{self, MarkdownOptions};
-use crate::typeset::mathml::{self, MathmlOptions};
+use crate::typeset::{PrintOptions, latex, markdown, mathml};
 
 /// What can be generated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Target {
-    /// Equations, table of coefficients and nomenclature for papers.
+    /// Equations, table of coefficients and nomenclature for papers
     Latex,
-    /// C99: header, source, self-test and CMake project.
+    /// C99: header, source, self-test and CMake project
     C,
-    /// A Rust crate without `std` or allocation.
+    /// A crate without `std` or allocation
     Rust,
-    /// Equations in GitHub's Markdown.
+    /// Equations in GitHub's Markdown
     Markdown,
-    /// Equations for web pages.
+    /// Equations for web pages
     Mathml,
-    /// A Python module on NumPy.
+    /// A Python module on NumPy
     Python,
-    /// A Python module of CasADi functions.
+    /// A Python module of CasADi functions
     Casadi,
-    /// A function file for MATLAB and Octave.
+    /// A function file for MATLAB and Octave
     Matlab,
-    /// The controller as a crate with a C interface.
+    /// The controller as a crate with a C interface
     Controller,
 }
 
 impl Target {
     /// All targets, in the order in which they are listed.
-    pub const ALL: [Target; 9] = [
-        Target::Latex,
-        Target::C,
-        Target::Rust,
-        Target::Markdown,
-        Target::Mathml,
-        Target::Python,
-        Target::Casadi,
-        Target::Matlab,
-        Target::Controller,
-    ];
+    pub fn all() -> &'static [Self] {
+        Self::value_variants()
+    }
 
     /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Latex => "latex",
-            Self::C => "c",
-            Self::Rust => "rust",
-            Self::Markdown => "markdown",
-            Self::Mathml => "mathml",
-            Self::Python => "python",
-            Self::Casadi => "casadi",
-            Self::Matlab => "matlab",
-            Self::Controller => "controller",
-        }
-    }
-}
-
-impl FromStr for Target {
-    type Err = EmitError;
-
-    fn from_str(name: &str) -> Result<Self, EmitError> {
-        let known = Self::ALL.into_iter().find(|target| target.name() == name);
-        known.ok_or_else(|| EmitError::UnknownTarget {
-            found: name.to_owned(),
-            expected: Self::ALL.map(Self::name).join(", "),
-        })
+    pub fn name(self) -> String {
+        let value = self.to_possible_value().expect("no target is hidden");
+        value.get_name().to_owned()
     }
 }
 
@@ -84,20 +53,14 @@ impl FromStr for Target {
 pub struct EmitOptions {
     /// How programs are made.
     pub lower: LowerOptions,
-    /// How equations are set in LaTeX.
-    pub latex: LatexOptions,
-    /// How equations are set in Markdown.
-    pub markdown: MarkdownOptions,
-    /// How equations are set in MathML.
-    pub mathml: MathmlOptions,
+    /// How equations are printed, with the digest of the model file for the first lines of files.
+    pub print: PrintOptions,
     /// Floating-point numbers of C and Rust.
     pub precision: Precision,
     /// What computes sines and cosines in C and Rust.
     pub sines: SineCosine,
     /// Units of robot coordinates in generated code.
     pub units: Units,
-    /// Digest of the model file, for the first line of generated code.
-    pub digest: Option<String>,
 }
 
 /// The files of the chosen targets, each with its path below the output folder; a target that is chosen
@@ -114,7 +77,7 @@ pub fn emit(
     targets: &[Target],
     options: &EmitOptions,
 ) -> Result<Vec<EmittedFile>, EmitError> {
-    let provenance = provenance(equations.model(), options.digest.as_deref());
+    let provenance = provenance(equations.model(), options.print.digest.as_deref());
     let (precision, sines) = (options.precision, options.sines);
     let mut entries = EntriesOnDemand {
         equations,
@@ -133,9 +96,9 @@ pub fn emit(
             Target::Python => python::emit(entries.scripts()?, &provenance)?,
             Target::Casadi => python::emit_casadi(entries.scripts()?, &provenance)?,
             Target::Matlab => matlab::emit(entries.scripts()?, &provenance)?,
-            Target::Latex => latex::emit(equations, &options.latex)?,
-            Target::Markdown => markdown::emit(equations, &options.markdown)?,
-            Target::Mathml => mathml::emit(equations, &options.mathml)?,
+            Target::Latex => latex::emit(equations, &options.print)?,
+            Target::Markdown => markdown::emit(equations, &options.print)?,
+            Target::Mathml => mathml::emit(equations, &options.print)?,
             Target::Controller => controller::emit(equations, &options.lower, &provenance)?,
         });
     }

@@ -17,14 +17,6 @@ pub enum EmitError {
     /// The model cannot be lowered.
     #[error(transparent)]
     Lower(#[from] LowerError),
-    /// There is no such target.
-    #[error("target `{found}`: expected one of {expected}")]
-    UnknownTarget {
-        /// The name given.
-        found: String,
-        /// The names that there are.
-        expected: String,
-    },
     /// The model lacks what a controller needs.
     #[error("the controller cannot be generated")]
     Control(#[from] MpcError),

@@ -6,6 +6,8 @@
 use std::collections::HashMap;
 use std::fmt;
 
+use serde::{Serialize, Serializer};
+
 use super::system::{Equations, Summand};
 use crate::model::{CandidateTerm, MAX_TERM_LEN};
 use crate::symbolic::{ExprId, Shortened, Shortener};
@@ -50,6 +52,20 @@ impl ExactStep {
             [] => "0".to_owned(),
             _ => words.collect::<Vec<_>>().join(" + "),
         }
+    }
+}
+
+impl Serialize for ExactStep {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let [before, after] = [&self.before, &self.after];
+        let step = serde_json::json!({
+            "phase": self.phase,
+            "equation": format!("ddz{}", self.output + 1),
+            "terms": { "before": before.len(), "after": after.len() },
+            "before": Self::sum_words(before),
+            "after": Self::sum_words(after),
+        });
+        step.serialize(to)
     }
 }
 

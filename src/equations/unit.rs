@@ -58,8 +58,29 @@ impl Unit {
         }
     }
 
+    /// The unit with this text between factors, and powers above 1 in this spelling.
+    pub fn spelled(self, between: &str, power: impl Fn(i8) -> String) -> String {
+        let product = |factors: &[(&str, i8)]| {
+            let factors = factors.iter().map(|&(symbol, exponent)| match exponent {
+                1 => symbol.to_owned(),
+                _ => format!("{symbol}{}", power(exponent)),
+            });
+            factors.collect::<Vec<_>>().join(between)
+        };
+        let [above, below] = self.fraction();
+        let above = match above.is_empty() {
+            true => "1".to_owned(),
+            false => product(&above),
+        };
+        match below.len() {
+            0 => above,
+            1 => format!("{above}/{}", product(&below)),
+            _ => format!("{above}/({})", product(&below)),
+        }
+    }
+
     /// Numerator and denominator as lists of symbol and positive power.
-    pub fn fraction(self) -> [Vec<(&'static str, i8)>; 2] {
+    fn fraction(self) -> [Vec<(&'static str, i8)>; 2] {
         match self {
             NEWTON => return [vec![("N", 1)], Vec::new()],
             NEWTON_METRE => return [vec![("N", 1), ("m", 1)], Vec::new()],
@@ -95,23 +116,7 @@ impl Div for Unit {
 /// `1`, `m/s^2`, `1/kg`, `rad/(kg m^2)`.
 impl fmt::Display for Unit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let product = |factors: &[(&str, i8)]| {
-            let factors = factors.iter().map(|&(symbol, power)| match power {
-                1 => symbol.to_owned(),
-                _ => format!("{symbol}^{power}"),
-            });
-            factors.collect::<Vec<_>>().join(" ")
-        };
-        let [above, below] = self.fraction();
-        match above.is_empty() {
-            true => f.write_str("1")?,
-            false => f.write_str(&product(&above))?,
-        }
-        match below.len() {
-            0 => Ok(()),
-            1 => write!(f, "/{}", product(&below)),
-            _ => write!(f, "/({})", product(&below)),
-        }
+        f.write_str(&self.spelled(" ", |power| format!("^{power}")))
     }
 }
 

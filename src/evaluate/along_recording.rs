@@ -28,12 +28,12 @@ use crate::mpc::{
 use crate::recording::{Recording, Segment};
 use crate::robot::{ContactFlags, JOINT_DIM, Robot, STATE_DIM};
 
-/// Whether the recorded input is part of the reference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+/// Where the controller's input reference comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
 pub enum ReferenceInput {
-    /// The recorded input is the reference input.
+    /// The recorded torques and forces, projected into the latent space.
     Recorded,
-    /// The controller has to find the input by itself.
+    /// None: the controller finds the input itself.
     None,
 }
 

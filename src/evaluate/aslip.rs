@@ -31,6 +31,14 @@ impl Aslip {
         gravity_m_s2: 9.81,
     };
 
+    /// The constants with their units, for a reader.
+    pub fn constants(&self) -> String {
+        format!(
+            "m = {:.2} kg, k_s = {:.1} N/m, l_0 = {:.3} m, g = {:.2} m/s^2",
+            self.mass_kg, self.stiffness_n_m, self.rest_length_m, self.gravity_m_s2
+        )
+    }
+
     /// Accelerations of body x and z, in m/s^2.
     ///
     /// In contact `ddx = k_s/m (p_f,x - x) + F_x/m`, `ddz = k_s/m (l_0 + p_f,z - z) - g + F_z/m`

@@ -1,7 +1,6 @@
 //! Template models that a learned model is held against.
 //!
-//! A baseline is a template with a name that says where its constants come from. Later templates
-//! become variants of [`Template`].
+//! A baseline is a pendulum with a name that says where its constants come from.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,46 +9,13 @@ use crate::recording::{RecordingError, Segment};
 use crate::robot::Robot;
 use crate::sim::{Restart, SimError};
 
-/// A template model with its constants.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Template {
-    /// The actuated spring-loaded inverted pendulum.
-    Aslip(Aslip),
-}
-
-impl Template {
-    /// Rolls the template out over a segment under its recorded forces.
-    ///
-    /// # Errors
-    /// As [`Aslip::rollout`].
-    pub fn rollout(
-        &self,
-        robot: &Robot,
-        segment: &Segment,
-        restart: Restart,
-    ) -> Result<AslipRollout, SimError> {
-        match self {
-            Self::Aslip(aslip) => aslip.rollout(robot, segment, restart),
-        }
-    }
-
-    /// The constants with their units, for a reader.
-    pub fn constants(&self) -> String {
-        let Self::Aslip(aslip) = self;
-        format!(
-            "m = {:.2} kg, k_s = {:.1} N/m, l_0 = {:.3} m, g = {:.2} m/s^2",
-            aslip.mass_kg, aslip.stiffness_n_m, aslip.rest_length_m, aslip.gravity_m_s2
-        )
-    }
-}
-
 /// A template, where its constants come from, and its residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Baseline {
     /// Its name in tables, such as `ASLIP, published constants`.
     pub name: &'static str,
     /// The template.
-    pub template: Template,
+    pub template: Aslip,
     /// Residuals over whole segments.
     pub full: AslipSums,
     /// Residuals of rollouts that start again from the recorded state.
@@ -58,7 +24,7 @@ pub struct Baseline {
 
 impl Baseline {
     /// A template without residuals yet.
-    pub fn new(name: &'static str, template: Template) -> Self {
+    pub fn new(name: &'static str, template: Aslip) -> Self {
         Self {
             name,
             template,
@@ -72,10 +38,8 @@ impl Baseline {
     /// # Errors
     /// [`RecordingFault::Wrench`](crate::recording::RecordingFault::Wrench) if a leg in contact is singular.
     pub fn all(robot: &Robot, segments: &[&Segment]) -> Result<Vec<Self>, RecordingError> {
-        let published = Template::Aslip(Aslip::PUBLISHED);
-        let mut baselines = vec![Self::new("ASLIP, published constants", published)];
+        let mut baselines = vec![Self::new("ASLIP, published constants", Aslip::PUBLISHED)];
         if let Some(fitted) = fit_aslip(robot, segments)? {
-            let fitted = Template::Aslip(fitted);
             baselines.push(Self::new("ASLIP, fitted constants", fitted));
         }
         Ok(baselines)
@@ -84,7 +48,7 @@ impl Baseline {
     /// Adds the residuals over one segment; the rollout over the whole of it is returned.
     ///
     /// # Errors
-    /// As [`Template::rollout`].
+    /// As [`Aslip::rollout`].
     pub fn add(
         &mut self,
         robot: &Robot,
@@ -187,7 +151,7 @@ mod tests {
         }
         let rms = |b: &Baseline| b.restarted.z.fit().expect("samples").rms;
         assert!(rms(&baselines[1]) < rms(&baselines[0]));
-        let Template::Aslip(fitted) = baselines[1].template;
+        let fitted = baselines[1].template;
         assert!((8.0..30.0).contains(&fitted.mass_kg), "{fitted:?}");
     }
 

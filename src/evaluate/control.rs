@@ -1,10 +1,12 @@
 //! What a run comes to: counts, times and the agreement of torques.
 
+use serde::Serialize;
+
 use super::torque::{ByContact, Comparison};
 use crate::mpc::{Command, Status};
 
 /// Times of steps, µs.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct StepTimes {
     /// Median.
     pub p50: f64,
@@ -15,7 +17,7 @@ pub struct StepTimes {
 }
 
 /// Summary of a run along a recording.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// Control steps.
     pub steps: usize,
@@ -45,6 +47,7 @@ pub struct Summary {
     /// Mean of `|F_lift − G τ| / |F_lift|` over the steps where it is defined.
     pub inconsistency: Option<f64>,
     /// Steps left out of the comparison of torques: the recording's are no torques of the robot.
+    #[serde(rename = "implausible_steps")]
     pub implausible: usize,
 }
 

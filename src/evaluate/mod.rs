@@ -20,7 +20,7 @@ mod torque;
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
 pub use aslip::{Aslip, AslipRollout, AslipSums};
 pub use assessment::{Assessment, SegmentRun};
-pub use baseline::{Baseline, Template, fit_aslip};
+pub use baseline::{Baseline, fit_aslip};
 pub use control::{StepTimes, Summary};
 pub use coordinates::{CoordinateSums, PointwiseSums};
 pub use error::EvaluateError;

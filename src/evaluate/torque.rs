@@ -23,7 +23,7 @@ pub(super) fn exceeds(
 }
 
 /// A figure for samples with and without ground contact; none where there were too few.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct ByContact {
     /// At least one foot on the ground.
     pub contact: Option<f64>,

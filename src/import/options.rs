@@ -193,19 +193,6 @@ fn parse_pattern(text: &str) -> Option<ContactFlags> {
     flags.try_into().ok()
 }
 
-/// A foot rule as [`PhaseRule`] reads it.
-pub(super) fn feet_text(feet: &FeetRule) -> String {
-    match feet {
-        FeetRule::Any => "any".to_owned(),
-        FeetRule::None => "none".to_owned(),
-        FeetRule::Patterns(patterns) => {
-            let text = |pattern: &ContactFlags| pattern.map(|down| if down { "1" } else { "0" });
-            let texts: Vec<String> = patterns.iter().map(|p| text(p).concat()).collect();
-            texts.join(",")
-        }
-    }
-}
-
 /// Options of an import; only the name is always needed.
 #[derive(Clone, Debug, Default)]
 pub struct ImportOptions {
@@ -257,7 +244,7 @@ impl ImportOptions {
     pub(super) fn usual_feet(&self, phase: &str, feet: &FeetRule) -> Option<Note> {
         self.phases.is_empty().then(|| Note::UsualFeet {
             phase: phase.to_owned(),
-            feet: feet_text(feet),
+            feet: feet.to_string(),
         })
     }
 }
@@ -304,7 +291,7 @@ mod tests {
     #[test]
     fn phase_rule_reads_back_from_its_text() {
         let rear: PhaseRule = "rear=0011, 0001".parse().expect("two patterns");
-        assert_eq!(feet_text(&rear.feet), "0011,0001");
+        assert_eq!(rear.feet.to_string(), "0011,0001");
         let contact: PhaseRule = "contact=any".parse().expect("a rule");
         assert_eq!(contact.feet, FeetRule::Any);
         for text in "|contact|=any|rear=|rear=001|rear=00112|rear=002x".split('|') {

@@ -8,17 +8,18 @@ use serde::{Deserialize, Serialize};
 use super::error::ModelError;
 
 /// What a layer applies to each of its units.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Activation {
-    /// `a`
+    /// a
     #[default]
+    #[value(skip)]
     Linear,
-    /// `a` for positive `a`, else `exp(a) - 1` (alpha = 1).
+    /// a, below zero exp(a) - 1
     Elu,
-    /// `tanh(a)`
+    /// Hyperbolic tangent
     Tanh,
-    /// `1 / (1 + exp(-a))`
+    /// 1 / (1 + exp(-a))
     Sigmoid,
 }
 

@@ -1,7 +1,9 @@
 //! Recordings made ready for training: implausible samples are found and,
 //! when asked, left out; accelerations are recomputed and rows smoothed, when asked.
 
+use clap::ValueEnum;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 use super::check::{Finding, check, without};
 use super::error::{RecordingError, RecordingFault};
@@ -21,22 +23,24 @@ pub enum ImplausibleSamples {
 }
 
 /// Where accelerations come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Accelerations {
-    /// From the file; by differences where it has none.
+    /// The recording's own columns, differences where it has none.
     #[default]
     Recorded,
-    /// From the velocities by differences (equation 21).
+    /// Differences of the recorded velocities.
     Differences,
 }
 
 /// Rows that a filter is applied to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum SmoothedRows {
-    /// Accelerations only: the targets of the regression.
+    /// Accelerations only.
     #[default]
     Accelerations,
-    /// State, rates, accelerations, torques and recorded wrench.
+    /// State, velocities, accelerations and torques.
     All,
 }
 

@@ -5,12 +5,16 @@
 //! evaluated off centre, so no sample is lost and polynomials up to the order
 //! pass unchanged everywhere. Samples count as equally spaced.
 
+use std::str::FromStr;
+
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 use super::error::{RecordingError, RecordingFault};
 
-/// A smoothing filter.
-#[derive(Debug, Clone, PartialEq)]
+/// A smoothing filter; as text its window and order, such as `11,2`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct SavitzkyGolay {
     window: usize,
     order: usize,
@@ -68,6 +72,32 @@ impl SavitzkyGolay {
                 .gemv(1.0, &window, &weights.transpose(), 0.0);
         }
         Some(out)
+    }
+}
+
+impl FromStr for SavitzkyGolay {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let refused =
+            || format!("found `{text}`, expected an odd window and an order such as 11,2");
+        let (window, order) = text.split_once(',').ok_or_else(refused)?;
+        let number = |text: &str| text.trim().parse::<usize>().map_err(|_| refused());
+        Self::new(number(window)?, number(order)?).map_err(|error| error.to_string())
+    }
+}
+
+impl TryFrom<String> for SavitzkyGolay {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl From<SavitzkyGolay> for String {
+    fn from(filter: SavitzkyGolay) -> String {
+        format!("{},{}", filter.window, filter.order)
     }
 }
 

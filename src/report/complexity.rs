@@ -1,24 +1,22 @@
 //! Accuracy against complexity over the latent dimension: figures 10 and 11 of the paper.
 
-use super::figures::{Figure, LinePlot, Panel, Role, Series};
+use super::figures::{Figure, Panel, Role, Series};
 use crate::study::{DimensionSummary, Spread, Summary};
 
 const PANEL: (f64, f64) = (360.0, 210.0);
+const LEGEND: [(Role, &str); 2] = [
+    (Role::Recorded, "mean over seeds"),
+    (Role::SecondBaseline, "standard deviation"),
+];
 
 /// Figures 10 (decoder error and active coefficients) and 11 (combined loss) of a study; bars are one standard deviation
 /// over the seeds to either side.
 pub fn study_figures(summary: &Summary) -> Vec<Figure> {
     let figure = |id: &str, caption: String, panels: Vec<Panel>| Figure {
-        id: id.to_owned(),
-        caption,
         x_label: "latent coordinates".to_owned(),
         panel_size: PANEL,
         columns: 2,
-        panels,
-        legend: vec![
-            (Role::Recorded, "mean over seeds".to_owned()),
-            (Role::SecondBaseline, "standard deviation".to_owned()),
-        ],
+        ..Figure::over_time(id.to_owned(), caption, panels, &LEGEND)
     };
     let rows = &summary.dimensions;
     let over_dimensions = vec![
@@ -79,14 +77,8 @@ fn panel(title: &str, rows: &[DimensionSummary], bar: impl Fn(&DimensionSummary)
         bars.extend([(x, Some(low)), (x, Some(high)), (x, None)]);
     }
     let series = |role, points| Series { role, points };
-    Panel::Lines(LinePlot {
-        title: title.to_owned(),
-        series: vec![
-            series(Role::SecondBaseline, bars),
-            series(Role::Recorded, means),
-        ],
-        shaded: Vec::new(),
-    })
+    let bars = series(Role::SecondBaseline, bars);
+    Panel::lines(title, vec![bars, series(Role::Recorded, means)])
 }
 
 #[cfg(test)]

@@ -1,13 +1,12 @@
-//! Which figures a report has, from an assessment and the controller's runs.
-
-use std::path::PathBuf;
+//! The figures of a report, from an assessment and the controller's runs.
 
 use nalgebra::DVector;
 
 use super::complexity::study_figures;
-use super::control::{Place, latent_inputs, torques};
+use super::control::{latent_inputs, torques};
 use super::figures::{Figure, HeatMap, LinePlot, Panel, Role, Series};
-use crate::evaluate::Run;
+use super::place::Place;
+use super::tables::NamedRun;
 use crate::evaluate::{Assessment, SegmentRun};
 use crate::model::{ModelError, ReducedModel};
 use crate::mpc::Lift;
@@ -17,28 +16,28 @@ use crate::study::Summary;
 
 /// Segments that get figures of their own; tables cover all.
 const MAX_SEGMENTS: usize = 3;
-const PANEL: (f64, f64) = (240.0, 150.0);
-const WIDE_PANEL: (f64, f64) = (360.0, 210.0);
 
-/// What a report is made from.
+/// The model and results that a report shows.
 #[derive(Debug, Clone, Copy)]
 pub struct Content<'a> {
     /// The model.
     pub model: &'a ReducedModel,
-    /// The model held against the recordings.
+    /// The model compared with the recordings.
     pub assessment: &'a Assessment<'a>,
-    /// The controller along each recording, with the lift that keeps torques and forces consistent.
-    pub runs: &'a [(PathBuf, Run)],
+    /// The controller along each recording with the plain lift; empty if it did not run.
+    pub plain: &'a [NamedRun],
+    /// The same with the lift that keeps torques and forces consistent.
+    pub consistent: &'a [NamedRun],
     /// A study over the latent dimension, if there is one.
     pub study: Option<&'a Summary>,
 }
 
-/// Figures of one section of the page.
+/// Figures by section of the page.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct AllFigures {
     /// The encoder's weights.
     pub encoder: Vec<Figure>,
-    /// Joints and body against the recording.
+    /// Joints and body beside the recording.
     pub coordinates: Vec<Figure>,
     /// Latent accelerations.
     pub accelerations: Vec<Figure>,
@@ -75,49 +74,25 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
         figures.encoder.push(encoder(model, assessment, run)?);
     }
     for (index, run) in assessment.runs.iter().take(MAX_SEGMENTS).enumerate() {
-        let place = Place::of(index, run);
-        let [joints, body] = coordinates(model, assessment, run, &place)?;
-        figures.coordinates.extend([joints, body]);
-        (figures.accelerations).push(accelerations(model, assessment, run, &place)?);
-        (figures.baselines).push(baselines(model, assessment, run, &place)?);
-    }
-    for (index, (path, run)) in content.runs.iter().take(MAX_SEGMENTS).enumerate() {
-        let place = Place {
-            suffix: (index + 1).to_string(),
-            words: stem(path),
+        let jump = Jump {
+            model,
+            assessment,
+            run,
+            place: Place::of_segment(index, run),
         };
-        figures
-            .control
-            .push(torques(model, Lift::Consistent, run, &place));
-        figures.control.push(latent_inputs(model, run, &place));
+        figures.coordinates.extend(jump.coordinates()?);
+        figures.accelerations.push(jump.accelerations()?);
+        figures.baselines.push(jump.baselines()?);
+    }
+    for (index, (path, run)) in content.consistent.iter().take(MAX_SEGMENTS).enumerate() {
+        let place = Place::of_recording(index, path);
+        let torques = torques(model, Lift::Consistent, run, &place);
+        (figures.control).extend([torques, latent_inputs(model, run, &place)]);
     }
     if let Some(summary) = content.study {
         figures.study = study_figures(summary);
     }
     Ok(figures)
-}
-
-impl Place {
-    fn of(index: usize, run: &SegmentRun<'_>) -> Self {
-        Self {
-            suffix: (index + 1).to_string(),
-            words: format!(
-                "{}, from row {}",
-                stem(&run.segment.path),
-                run.segment.first_row
-            ),
-        }
-    }
-}
-
-/// Name of a recording without folder and endings.
-pub(super) fn stem(path: &std::path::Path) -> String {
-    let name = path.file_name().map(|name| name.to_string_lossy());
-    name.map_or(String::new(), |name| {
-        name.trim_end_matches(".gz")
-            .trim_end_matches(".csv")
-            .to_owned()
-    })
 }
 
 /// Figures 6, 9 and 15 of the paper.
@@ -155,188 +130,193 @@ fn encoder(
     })
 }
 
-/// A value of every sample; none where a rollout did not get.
+/// A value of every sample; none where a rollout did not arrive.
 type Samples = Vec<Option<DVector<f64>>>;
 
-/// What a function makes of every predicted sample.
-fn predicted(
-    run: &SegmentRun<'_>,
-    rollout: &Rollout,
-    value: impl Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>, ModelError>,
-) -> Result<Samples, ModelError> {
-    let mut samples = vec![None; run.latent.len()];
-    for (sample, window, column) in rollout.predictions() {
-        let (z, dz) = (
-            window.z.column(column).into_owned(),
-            window.dz.column(column).into_owned(),
-        );
-        samples[sample] = Some(value(sample, &z, &dz)?);
-    }
-    Ok(samples)
+/// One segment of a recording beside its rollouts.
+struct Jump<'a> {
+    model: &'a ReducedModel,
+    assessment: &'a Assessment<'a>,
+    run: &'a SegmentRun<'a>,
+    place: Place,
 }
 
-fn series(run: &SegmentRun<'_>, role: Role, value: impl Fn(usize) -> Option<f64>) -> Series {
-    let times = run.latent.time_s.iter().enumerate();
-    Series {
-        role,
-        points: times.map(|(k, &time)| (time, value(k))).collect(),
+impl Jump<'_> {
+    /// A function's value at every predicted sample.
+    fn predicted(
+        &self,
+        rollout: &Rollout,
+        value: impl Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>, ModelError>,
+    ) -> Result<Samples, ModelError> {
+        let states = rollout
+            .states(self.run.latent.len())
+            .into_iter()
+            .enumerate();
+        states
+            .map(|(sample, state)| state.map(|(z, dz)| value(sample, &z, &dz)).transpose())
+            .collect()
     }
-}
 
-/// Times without a foot down.
-fn flights(run: &SegmentRun<'_>) -> Vec<(f64, f64)> {
-    let time = &run.segment.time_s;
-    let mut spans: Vec<(f64, f64)> = Vec::new();
-    let mut airborne = false;
-    for (sample, feet) in run.segment.feet.iter().enumerate() {
-        let in_air = !feet.contains(&true);
-        match (spans.last_mut(), in_air, airborne) {
-            (Some(span), true, true) => span.1 = time[sample],
-            (_, true, _) => spans.push((time[sample], time[sample])),
-            (_, false, _) => {}
+    /// Coordinates of the robot along a rollout.
+    fn decoded(&self, rollout: &Rollout) -> Result<Samples, ModelError> {
+        self.predicted(rollout, |_, z, _| self.model.decode(z))
+    }
+
+    fn series(&self, role: Role, value: impl Fn(usize) -> Option<f64>) -> Series {
+        let times = self.run.latent.time_s.iter().enumerate();
+        Series {
+            role,
+            points: times.map(|(k, &time)| (time, value(k))).collect(),
         }
-        airborne = in_air;
     }
-    spans
-}
 
-fn rollout_legend(assessment: &Assessment<'_>) -> Vec<(Role, String)> {
-    vec![
-        (Role::Recorded, "recorded".to_owned()),
-        (Role::Full, "model, whole jump".to_owned()),
-        (
-            Role::Restarted,
-            format!("model, restarted every {} s", assessment.restart_every_s),
-        ),
-    ]
-}
-
-/// Figures 7, 13 and 14 of the paper: joints, then body.
-fn coordinates(
-    model: &ReducedModel,
-    assessment: &Assessment<'_>,
-    run: &SegmentRun<'_>,
-    place: &Place,
-) -> Result<[Figure; 2], ModelError> {
-    let decode = |_: usize, z: &DVector<f64>, _: &DVector<f64>| model.decode(z);
-    let full = predicted(run, &run.full, decode)?;
-    let restarted = predicted(run, &run.restarted, decode)?;
-    let panel = |row: usize| {
-        let of = |samples: &Samples, k: usize| samples[k].as_ref().map(|x| x[row]);
+    /// Lines over the samples; flight is shaded.
+    fn panel(&self, title: String, series: Vec<Series>) -> Panel {
         Panel::Lines(LinePlot {
-            title: format!("{}, {}", assessment.names[row], assessment.units[row]),
-            series: vec![
-                series(run, Role::Recorded, |k| Some(run.segment.x[(row, k)])),
-                series(run, Role::Full, |k| of(&full, k)),
-                series(run, Role::Restarted, |k| of(&restarted, k)),
-            ],
-            shaded: flights(run),
+            title,
+            series,
+            shaded: self.flights(),
         })
-    };
-    let figure = |id: &str, what: &str, rows: std::ops::Range<usize>| Figure {
-        id: format!("{id}_{}", place.suffix),
-        caption: format!(
-            "{what} of {}: recorded, and decoded from the model's rollouts. Grey: flight.",
-            place.words
-        ),
-        x_label: "time, s".to_owned(),
-        panel_size: PANEL,
-        columns: 3,
-        panels: rows.map(panel).collect(),
-        legend: rollout_legend(assessment),
-    };
-    Ok([
-        figure("joints", "Joint angles", 0..JOINT_DIM),
-        figure(
-            "body",
-            "Body position and orientation",
-            JOINT_DIM..assessment.names.len(),
-        ),
-    ])
-}
+    }
 
-/// Figure 12 of the paper.
-fn accelerations(
-    model: &ReducedModel,
-    assessment: &Assessment<'_>,
-    run: &SegmentRun<'_>,
-    place: &Place,
-) -> Result<Figure, ModelError> {
-    let ddz = |k: usize, z: &DVector<f64>, dz: &DVector<f64>| {
-        let u_lat = run.latent.u_lat.column(k).into_owned();
-        model.ddz(run.latent.phase[k], z, dz, &u_lat)
-    };
-    let full = predicted(run, &run.full, ddz)?;
-    let restarted = predicted(run, &run.restarted, ddz)?;
-    let panel = |row: usize| {
-        let of = |samples: &Samples, k: usize| samples[k].as_ref().map(|x| x[row]);
-        Panel::Lines(LinePlot {
-            title: format!("d²z{}/dt²", row + 1),
-            series: vec![
-                series(run, Role::Recorded, |k| Some(run.latent.ddz[(row, k)])),
-                series(run, Role::Full, |k| of(&full, k)),
-                series(run, Role::Restarted, |k| of(&restarted, k)),
-            ],
-            shaded: flights(run),
-        })
-    };
-    Ok(Figure {
-        id: format!("latent_accelerations_{}", place.suffix),
-        caption: format!(
-            "Latent accelerations of {} (scaled units): encoded from the recording, and by the model along its rollouts.",
-            place.words
-        ),
-        x_label: "time, s".to_owned(),
-        panel_size: PANEL,
-        columns: 3,
-        panels: (0..model.latent_dim()).map(panel).collect(),
-        legend: rollout_legend(assessment),
-    })
-}
+    /// Times without a foot down.
+    fn flights(&self) -> Vec<(f64, f64)> {
+        let time = &self.run.segment.time_s;
+        let mut spans: Vec<(f64, f64)> = Vec::new();
+        let mut airborne = false;
+        for (sample, feet) in self.run.segment.feet.iter().enumerate() {
+            let in_air = !feet.contains(&true);
+            match (spans.last_mut(), in_air, airborne) {
+                (Some(span), true, true) => span.1 = time[sample],
+                (_, true, _) => spans.push((time[sample], time[sample])),
+                (_, false, _) => {}
+            }
+            airborne = in_air;
+        }
+        spans
+    }
 
-/// Figure 8 of the paper, with the fitted pendulum beside the published one.
-fn baselines(
-    model: &ReducedModel,
-    assessment: &Assessment<'_>,
-    run: &SegmentRun<'_>,
-    place: &Place,
-) -> Result<Figure, ModelError> {
-    let decode = |_: usize, z: &DVector<f64>, _: &DVector<f64>| model.decode(z);
-    let full = predicted(run, &run.full, decode)?;
-    let roles = [Role::Baseline, Role::SecondBaseline];
-    let panel = |row: usize, axis: usize, title: &str| {
-        let mut lines = vec![
-            series(run, Role::Recorded, |k| Some(run.segment.x[(row, k)])),
-            series(run, Role::Full, |k| full[k].as_ref().map(|x| x[row])),
+    /// A figure of rollouts beside the recording; `id` gets the number of the jump.
+    fn rollout_figure(&self, id: &str, caption: String, panels: Vec<Panel>) -> Figure {
+        let every = self.assessment.restart_every_s;
+        let restarted = format!("model, restarted every {every} s");
+        let legend = [
+            (Role::Recorded, "recorded"),
+            (Role::Full, "model, whole jump"),
+            (Role::Restarted, &restarted),
         ];
-        for (role, rollout) in roles.into_iter().zip(&run.baselines) {
-            lines.push(series(run, role, |k| {
-                rollout.position_m[k].map(|position| position[axis])
-            }));
-        }
-        Panel::Lines(LinePlot {
-            title: title.to_owned(),
-            series: lines,
-            shaded: flights(run),
-        })
-    };
-    let mut legend = rollout_legend(assessment);
-    legend.truncate(2);
-    let names = assessment.baselines.iter().map(|b| b.name.to_owned());
-    legend.extend(roles.into_iter().zip(names));
-    Ok(Figure {
-        id: format!("aslip_{}", place.suffix),
-        caption: format!(
+        let id = format!("{id}_{}", self.place.suffix);
+        Figure::over_time(id, caption, panels, &legend)
+    }
+
+    /// A recorded line with the two of the rollouts.
+    fn beside_rollouts(
+        &self,
+        title: String,
+        recorded: impl Fn(usize) -> f64,
+        [full, restarted]: [&Samples; 2],
+        row: usize,
+    ) -> Panel {
+        let of = |samples: &Samples, k: usize| samples[k].as_ref().map(|values| values[row]);
+        let series = vec![
+            self.series(Role::Recorded, |k| Some(recorded(k))),
+            self.series(Role::Full, |k| of(full, k)),
+            self.series(Role::Restarted, |k| of(restarted, k)),
+        ];
+        self.panel(title, series)
+    }
+
+    /// Figures 7, 13 and 14 of the paper: joints, then body.
+    fn coordinates(&self) -> Result<[Figure; 2], ModelError> {
+        let (names, units) = (&self.assessment.names, &self.assessment.units);
+        let full = self.decoded(&self.run.full)?;
+        let restarted = self.decoded(&self.run.restarted)?;
+        let panel = |row: usize| {
+            let title = format!("{}, {}", names[row], units[row]);
+            let recorded = |k| self.run.segment.x[(row, k)];
+            self.beside_rollouts(title, recorded, [&full, &restarted], row)
+        };
+        let figure = |id: &str, what: &str, rows: std::ops::Range<usize>| {
+            let caption = format!(
+                "{what} of {}: recorded, and decoded from the model's rollouts. Grey: flight.",
+                self.place.words
+            );
+            self.rollout_figure(id, caption, rows.map(panel).collect())
+        };
+        let body = JOINT_DIM..names.len();
+        Ok([
+            figure("joints", "Joint angles", 0..JOINT_DIM),
+            figure("body", "Body position and orientation", body),
+        ])
+    }
+
+    /// Figure 12 of the paper.
+    fn accelerations(&self) -> Result<Figure, ModelError> {
+        let latent = &self.run.latent;
+        let ddz = |k: usize, z: &DVector<f64>, dz: &DVector<f64>| {
+            let u_lat = latent.u_lat.column(k).into_owned();
+            self.model.ddz(latent.phase[k], z, dz, &u_lat)
+        };
+        let full = self.predicted(&self.run.full, ddz)?;
+        let restarted = self.predicted(&self.run.restarted, ddz)?;
+        let panel = |row: usize| {
+            let title = format!("d²z{}/dt²", row + 1);
+            let recorded = |k| latent.ddz[(row, k)];
+            self.beside_rollouts(title, recorded, [&full, &restarted], row)
+        };
+        let caption = format!(
+            "Latent accelerations of {} (scaled units): encoded from the recording, and by the model along its rollouts.",
+            self.place.words
+        );
+        let panels = (0..self.model.latent_dim()).map(panel).collect();
+        Ok(self.rollout_figure("latent_accelerations", caption, panels))
+    }
+
+    /// Figure 8 of the paper, with the fitted pendulum beside the published one.
+    fn baselines(&self) -> Result<Figure, ModelError> {
+        let run = self.run;
+        let full = self.decoded(&run.full)?;
+        let roles = [Role::Baseline, Role::SecondBaseline];
+        let panel = |row: usize, axis: usize, title: &str| {
+            let mut lines = vec![
+                self.series(Role::Recorded, |k| Some(run.segment.x[(row, k)])),
+                self.series(Role::Full, |k| full[k].as_ref().map(|x| x[row])),
+            ];
+            lines.extend(
+                roles
+                    .into_iter()
+                    .zip(&run.baselines)
+                    .map(|(role, rollout)| {
+                        let position =
+                            |k: usize| rollout.position_m[k].map(|position| position[axis]);
+                        self.series(role, position)
+                    }),
+            );
+            self.panel(title.to_owned(), lines)
+        };
+        let mut legend = vec![
+            (Role::Recorded, "recorded"),
+            (Role::Full, "model, whole jump"),
+        ];
+        let names = self.assessment.baselines.iter().map(|b| b.name);
+        legend.extend(roles.into_iter().zip(names));
+        let caption = format!(
             "Body position of {}: the learned model and the pendulum under the same recorded forces.",
-            place.words
-        ),
-        x_label: "time, s".to_owned(),
-        panel_size: WIDE_PANEL,
-        columns: 2,
-        panels: vec![
+            self.place.words
+        );
+        let panels = vec![
             panel(JOINT_DIM, 0, "body.x, m"),
             panel(JOINT_DIM + 2, 1, "body.z, m"),
-        ],
-        legend,
-    })
+        ];
+        Ok(Figure {
+            panel_size: (360.0, 210.0),
+            columns: 2,
+            ..Figure::over_time(
+                format!("aslip_{}", self.place.suffix),
+                caption,
+                panels,
+                &legend,
+            )
+        })
+    }
 }

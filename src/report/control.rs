@@ -1,30 +1,23 @@
 //! Figures of the controller's runs: torques beside the recorded ones and the limits, latent inputs,
 //! latent tracking, solve times.
 
-use std::path::PathBuf;
-
-use super::contents::stem;
-use super::figures::{Figure, LinePlot, Panel, Role, Series};
+use super::figures::{Figure, Panel, Role, Series};
+use super::place::Place;
+use super::tables::NamedRun;
 use crate::evaluate::{Run, StepRow};
 use crate::model::ReducedModel;
 use crate::mpc::{Lift, MpcSettings};
 use crate::robot::{JOINT_DIM, Robot};
-
-const PANEL: (f64, f64) = (240.0, 150.0);
-const WIDE_PANEL: (f64, f64) = (360.0, 170.0);
 
 /// The figures of each run, numbered in their names: torques, latent inputs, latent tracking and
 /// solve times.
 pub fn control_figures(
     model: &ReducedModel,
     settings: &MpcSettings,
-    runs: &[(PathBuf, Run)],
+    runs: &[NamedRun],
 ) -> Vec<Figure> {
     let figures = runs.iter().enumerate().flat_map(|(index, (path, run))| {
-        let place = Place {
-            suffix: (index + 1).to_string(),
-            words: stem(path),
-        };
+        let place = Place::of_recording(index, path);
         [
             torques(model, settings.lift, run, &place),
             latent_inputs(model, run, &place),
@@ -35,10 +28,11 @@ pub fn control_figures(
     figures.collect()
 }
 
-/// Which jump a figure shows.
-pub(super) struct Place {
-    pub suffix: String,
-    pub words: String,
+/// The first phase without input statistics, by which the controller weighs inputs.
+pub fn without_statistics(model: &ReducedModel) -> Option<&str> {
+    let mut phases = model.phases().iter().enumerate();
+    let without = phases.find(|&(index, _)| model.input_statistics(index).is_err());
+    without.map(|(_, phase)| phase.name.as_str())
 }
 
 /// A line over the steps of a run.
@@ -57,68 +51,56 @@ fn line(run: &Run, role: Role, value: impl Fn(&StepRow) -> Option<f64>) -> Serie
 pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &Place) -> Figure {
     let limits = model.robot().ok().map(Robot::torque_limit_nm);
     let panel = |joint: usize| {
-        let mut series = vec![
-            line(run, Role::Recorded, |row| {
-                Some(row.recorded_torque_nm[joint])
-            }),
-            line(run, Role::Full, |row| Some(row.torque_nm[joint])),
-        ];
-        for sign in [1.0, -1.0] {
+        let limit = |sign: f64| {
             let limit = limits.map(|limits| sign * limits[joint]);
-            series.push(line(run, Role::Limit, |_| limit));
-        }
-        Panel::Lines(LinePlot {
-            title: format!("{}, N m", Robot::state_names()[joint]),
-            series,
-            shaded: Vec::new(),
-        })
+            line(run, Role::Limit, |_| limit)
+        };
+        let recorded = |row: &StepRow| Some(row.recorded_torque_nm[joint]);
+        let lines = vec![
+            line(run, Role::Recorded, recorded),
+            line(run, Role::Full, |row| Some(row.torque_nm[joint])),
+            limit(1.0),
+            limit(-1.0),
+        ];
+        Panel::lines(format!("{}, N m", Robot::state_names()[joint]), lines)
     };
     let lift = match lift {
         Lift::Transpose => "plain",
         Lift::Consistent => "consistent",
     };
-    Figure {
-        id: format!("torques_{}", place.suffix),
-        caption: format!(
+    Figure::over_time(
+        format!("torques_{}", place.suffix),
+        format!(
             "Joint torques along {}: recorded, and commanded by the latent controller ({lift} lift), within the robot's limits.",
             place.words
         ),
-        x_label: "time, s".to_owned(),
-        panel_size: PANEL,
-        columns: 3,
-        panels: (0..JOINT_DIM).map(panel).collect(),
-        legend: vec![
-            (Role::Recorded, "recorded".to_owned()),
-            (Role::Full, "commanded".to_owned()),
-            (Role::Limit, "limits".to_owned()),
+        (0..JOINT_DIM).map(panel).collect(),
+        &[
+            (Role::Recorded, "recorded"),
+            (Role::Full, "commanded"),
+            (Role::Limit, "limits"),
         ],
-    }
+    )
 }
 
 /// The controller's latent inputs.
 pub(super) fn latent_inputs(model: &ReducedModel, run: &Run, place: &Place) -> Figure {
     let panel = |latent: usize| {
-        Panel::Lines(LinePlot {
-            title: format!("u{}", latent + 1),
-            series: vec![line(run, Role::Full, |row| row.u_lat.get(latent).copied())],
-            shaded: Vec::new(),
-        })
+        let chosen = line(run, Role::Full, |row| row.u_lat.get(latent).copied());
+        Panel::lines(format!("u{}", latent + 1), vec![chosen])
     };
-    Figure {
-        id: format!("latent_inputs_{}", place.suffix),
-        caption: format!(
+    Figure::over_time(
+        format!("latent_inputs_{}", place.suffix),
+        format!(
             "Latent inputs that the controller chose along {} (scaled units).",
             place.words
         ),
-        x_label: "time, s".to_owned(),
-        panel_size: PANEL,
-        columns: 3,
-        panels: (0..model.latent_dim()).map(panel).collect(),
-        legend: vec![(Role::Full, "commanded".to_owned())],
-    }
+        (0..model.latent_dim()).map(panel).collect(),
+        &[(Role::Full, "commanded")],
+    )
 }
 
-/// What the plans expect at the end of their horizon beside the reference there.
+/// The latent positions that plans expect at the end of their horizon, beside the reference there.
 fn latent_tracking(
     model: &ReducedModel,
     settings: &MpcSettings,
@@ -131,61 +113,47 @@ fn latent_tracking(
             let end = row.z_planned.as_ref().map(|z| z[latent]);
             (row.time_s + horizon_s, end)
         });
-        Panel::Lines(LinePlot {
-            title: format!("z{}", latent + 1),
-            series: vec![
-                line(run, Role::Recorded, |row| Some(row.z_reference[latent])),
-                Series {
-                    role: Role::Full,
-                    points: planned.collect(),
-                },
-            ],
-            shaded: Vec::new(),
-        })
+        let planned = Series {
+            role: Role::Full,
+            points: planned.collect(),
+        };
+        let reference = line(run, Role::Recorded, |row| Some(row.z_reference[latent]));
+        Panel::lines(format!("z{}", latent + 1), vec![reference, planned])
     };
-    Figure {
-        id: format!("latent_tracking_{}", place.suffix),
-        caption: format!(
+    Figure::over_time(
+        format!("latent_tracking_{}", place.suffix),
+        format!(
             "Latent positions along {} (scaled units): the reference, and what each plan expects \
              {horizon_s} s ahead, drawn where it expects it.",
             place.words
         ),
-        x_label: "time, s".to_owned(),
-        panel_size: PANEL,
-        columns: 3,
-        panels: (0..model.latent_dim()).map(panel).collect(),
-        legend: vec![
-            (Role::Recorded, "reference".to_owned()),
-            (Role::Full, "end of the plan".to_owned()),
+        (0..model.latent_dim()).map(panel).collect(),
+        &[
+            (Role::Recorded, "reference"),
+            (Role::Full, "end of the plan"),
         ],
-    }
+    )
 }
 
 /// Wall time and iterations of every step.
 fn solve_times(settings: &MpcSettings, run: &Run, place: &Place) -> Figure {
-    let panel = |title: &str, series| {
-        Panel::Lines(LinePlot {
-            title: title.to_owned(),
-            series: vec![series],
-            shaded: Vec::new(),
-        })
-    };
     let milliseconds = line(run, Role::Recorded, |row| Some(1e-3 * row.solve_us));
     let iterations = line(run, Role::Recorded, |row| Some(f64::from(row.iterations)));
     Figure {
-        id: format!("solve_times_{}", place.suffix),
-        caption: format!(
-            "Steps along {}: wall time from measurement to command, {} stages of {} s each, and \
-             interior-point iterations.",
-            place.words, settings.horizon, settings.step_s
-        ),
-        x_label: "time, s".to_owned(),
-        panel_size: WIDE_PANEL,
+        panel_size: (360.0, 170.0),
         columns: 2,
-        panels: vec![
-            panel("time of a step, ms", milliseconds),
-            panel("iterations", iterations),
-        ],
-        legend: vec![(Role::Recorded, "a step".to_owned())],
+        ..Figure::over_time(
+            format!("solve_times_{}", place.suffix),
+            format!(
+                "Steps along {}: wall time from measurement to command, {} stages of {} s each, and \
+                 interior-point iterations.",
+                place.words, settings.horizon, settings.step_s
+            ),
+            vec![
+                Panel::lines("time of a step, ms", vec![milliseconds]),
+                Panel::lines("iterations", vec![iterations]),
+            ],
+            &[(Role::Recorded, "one step")],
+        )
     }
 }

@@ -1,16 +1,22 @@
-//! One page that tells whether a model is any good, and its figures on their own.
+//! A one-page assessment of a model, its tables and its figures.
 //!
 //! An assessment and controller runs come in; a self-contained HTML page and figures leave.
-//! `contents.rs` picks what is drawn, `figures/` draws it, `page.rs` places it. Start with
-//! `page.rs`.
+//! `tables.rs` holds the tables, `contents.rs` picks what is drawn, `figures/` draws it, `page.rs`
+//! places all. Start with `page.rs`.
 
 mod complexity;
 mod contents;
 mod control;
 pub mod figures;
 mod page;
+mod place;
+mod tables;
 
 pub use complexity::study_figures;
 pub use contents::{AllFigures, Content, all_figures};
-pub use control::control_figures;
-pub use page::{PageOptions, PageTable, page};
+pub use control::{control_figures, without_statistics};
+pub use page::{PageOptions, page};
+pub use tables::{
+    NamedRun, baseline_table, coordinate_table, dynamics_table, phase_table, remarks, run_table,
+    template_rms,
+};

@@ -3,51 +3,29 @@
 use askama::Template;
 
 use super::contents::{AllFigures, Content};
+use super::control::without_statistics;
 use super::figures::{Figure, panel_svg};
+use super::tables::{
+    baseline_table, body_rms, coordinate_table, dynamics_table, phase_table, remarks, run_table,
+};
 use crate::artifact;
 use crate::equations::Equations;
-use crate::typeset::TypesetError;
-use crate::typeset::latex::{LatexOptions, tex_cases};
+use crate::typeset::latex::tex_cases;
 use crate::typeset::mathml::{HtmlText, system};
-use crate::typeset::{Rounding, SymbolTable, Typeset, words};
+use crate::typeset::{
+    Rounding, SymbolTable, Table, Typeset, TypesetError, rendered, significant, words,
+};
 
 /// Longest line of an equation, in em.
 const WIDTH_EM: f64 = 44.0;
 
-/// A table for the page; the first column names the rows.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct PageTable {
-    /// What it lists.
-    pub caption: String,
-    /// Titles of the columns.
-    pub header: Vec<String>,
-    /// Cells, a row after the other.
-    pub rows: Vec<Vec<String>>,
-}
-
-/// Words and tables that the caller has.
+/// The parts of the page that do not follow from its [`Content`].
 #[derive(Debug, Clone, Default)]
 pub struct PageOptions {
-    /// The most telling figures: a name and a value.
-    pub headline: Vec<(String, String)>,
-    /// Warnings below the figures of the headline.
-    pub remarks: Vec<String>,
-    /// Errors of every coordinate.
-    pub coordinates: Vec<PageTable>,
-    /// The model beside the template models.
-    pub baselines: Vec<PageTable>,
-    /// Latent accelerations, stability, input gain.
-    pub dynamics: Vec<PageTable>,
-    /// The controller's runs.
-    pub control: Vec<PageTable>,
-    /// Sentences below the tables of the controller.
-    pub control_notes: Vec<String>,
-    /// What simplification within several tolerances does.
-    pub simplification: Vec<PageTable>,
-    /// Long lists of changes, shown when asked for.
-    pub changes: Vec<PageTable>,
-    /// Sentences below the tables of baselines.
-    pub baseline_notes: Vec<String>,
+    /// Effects of simplification within several tolerances.
+    pub simplification: Vec<Table>,
+    /// Every change of the chosen tolerance, folded away; none if it has no rows.
+    pub changes: Table,
     /// Commands that reproduce the report, in order.
     pub commands: Vec<String>,
 }
@@ -62,109 +40,169 @@ pub fn page(
     options: &PageOptions,
 ) -> Result<String, TypesetError> {
     let model = content.model;
-    let mut sections = vec![
-        section(
-            "latent",
-            "What the latent coordinates are",
-            &[ENCODER_WORDS],
-            &figures.encoder,
-            &[],
-        ),
-        section(
-            "coordinates",
-            "The model against the recordings",
-            &[COORDINATE_WORDS],
-            &figures.coordinates,
-            &options.coordinates,
-        ),
-        section(
-            "accelerations",
-            "Latent accelerations, stability and inputs",
-            &[DYNAMICS_WORDS],
-            &figures.accelerations,
-            &options.dynamics,
-        ),
-        with_notes(
-            section(
-                "aslip",
-                "Beside the pendulum",
-                &[BASELINE_WORDS],
-                &figures.baselines,
-                &options.baselines,
-            ),
-            &options.baseline_notes,
-        ),
-        with_notes(
-            section(
-                "control",
-                "The controller along the recordings",
-                &[CONTROL_WORDS],
-                &figures.control,
-                &options.control,
-            ),
-            &options.control_notes,
-        ),
-    ];
-    if !options.simplification.is_empty() {
-        sections.push(Section {
-            folded: options.changes.iter().map(table_view).collect(),
-            ..section(
-                "simplification",
-                "How far the equations can be simplified",
-                &SIMPLIFICATION_WORDS,
-                &[],
-                &options.simplification,
-            )
-        });
-    }
-    if !figures.study.is_empty() {
-        sections.push(section(
-            "study",
-            "How many latent coordinates",
-            &[STUDY_WORDS],
-            &figures.study,
-            &[],
-        ));
-    }
     let equations = &Equations::of(model);
     let typeset = Typeset::new(equations, &SymbolTable::default(), Rounding::default())?;
     let page = Page {
-        name: HtmlText(model.name()).to_string(),
-        description: HtmlText(model.description()).to_string(),
+        name: html(model.name()),
+        description: html(model.description()),
         version: env!("CARGO_PKG_VERSION"),
         digest: artifact::digest(model).to_string(),
-        headline: (options.headline.iter())
-            .map(|(name, value)| (HtmlText(name).to_string(), HtmlText(value).to_string()))
+        headline: (headline(content).iter())
+            .map(|(name, value)| (html(name), html(value)))
             .collect(),
-        remarks: (options.remarks.iter())
-            .map(|remark| HtmlText(remark).to_string())
+        remarks: remarks(model, content.assessment)
+            .iter()
+            .map(|remark| html(remark))
             .collect(),
         phases: phases(equations, &typeset),
-        rounding: HtmlText(&words::rounding(Rounding::default(), &typeset.rounding)).to_string(),
-        sections,
+        rounding: html(&words::rounding(Rounding::default(), &typeset.rounding)),
+        sections: sections(content, figures, options),
         provenance: (model.provenance().iter())
-            .map(|(key, value)| {
-                let words = value
-                    .as_str()
-                    .map_or_else(|| value.to_string(), str::to_owned);
-                (HtmlText(key).to_string(), HtmlText(&words).to_string())
+            .map(|(key, value)| match value.as_str() {
+                Some(text) => (html(key), html(text)),
+                None => (html(key), html(&value.to_string())),
             })
             .collect(),
-        commands: (options.commands.iter())
-            .map(|command| HtmlText(command).to_string())
+        commands: options
+            .commands
+            .iter()
+            .map(|command| html(command))
             .collect(),
     };
-    let mut text = page.render()?;
-    text.truncate(text.trim_end().len());
-    text.push('\n');
-    Ok(text)
+    Ok(rendered(&page)?)
+}
+
+fn html(text: &str) -> String {
+    HtmlText(text).to_string()
+}
+
+/// The numbers at the top of the page, each with its name.
+fn headline(content: &Content<'_>) -> [(String, String); 6] {
+    let Content {
+        model, assessment, ..
+    } = content;
+    let every = assessment.restart_every_s;
+    let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
+    let metres = |value: Option<f64>| value.map_or("-".to_owned(), |v| significant(v) + " m");
+    let [full, restarted] =
+        [&assessment.full, &assessment.restarted].map(|sums| metres(body_rms(assessment, sums)[1]));
+    let card = |name: &str, value: String| (name.to_owned(), value);
+    [
+        card("latent coordinates", model.latent_dim().to_string()),
+        card(
+            "active terms, all phases",
+            assessment.active_terms.to_string(),
+        ),
+        card("body.z error, whole jump", full),
+        card(
+            &format!("body.z error, restarted every {every} s"),
+            restarted,
+        ),
+        card(
+            "torque R² of the plain lift, contact",
+            shown(assessment.lift.torque_r2().contact),
+        ),
+        card("L_mod (29)", shown(assessment.combined_loss())),
+    ]
+}
+
+/// The sections below the equations, in their order.
+fn sections(content: &Content<'_>, figures: &AllFigures, options: &PageOptions) -> Vec<Section> {
+    let Content {
+        model, assessment, ..
+    } = content;
+    let every = assessment.restart_every_s;
+    let by_phase = format!("Root mean square errors by phase, restarted every {every} s");
+    let constants = assessment.baselines.iter();
+    let constants = constants.map(|b| format!("{}: {}.", b.name, b.template.constants()));
+    let without = (content.consistent.is_empty())
+        .then(|| without_statistics(model))
+        .flatten()
+        .map(|phase| {
+            format!(
+                "The controller did not run: the model has no input statistics of phase {phase}, \
+                 which weigh its inputs. romc import --inputs-from takes them from recordings."
+            )
+        });
+    let runs = [
+        ("Plain lift, u = W_eᵀ u_lat", content.plain),
+        ("Consistent lift", content.consistent),
+    ];
+    let runs = runs.into_iter().filter(|(_, runs)| !runs.is_empty());
+    let mut sections =
+        vec![
+            Section::new(
+                "latent",
+                "Composition of the latent coordinates",
+                &[ENCODER_WORDS],
+            )
+            .with(&figures.encoder, []),
+            Section::new(
+                "coordinates",
+                "The model against the recordings",
+                &[COORDINATE_WORDS],
+            )
+            .with(
+                &figures.coordinates,
+                [
+                    coordinate_table(assessment).captioned("Errors of every coordinate"),
+                    phase_table(model, assessment).captioned(by_phase),
+                ],
+            ),
+            Section::new(
+                "accelerations",
+                "Latent accelerations, stability and inputs",
+                &[DYNAMICS_WORDS],
+            )
+            .with(
+                &figures.accelerations,
+                [dynamics_table(model, assessment).captioned("Each phase of the model")],
+            ),
+            Section::new("aslip", "Beside the pendulum", &[BASELINE_WORDS])
+                .and(constants)
+                .with(
+                    &figures.baselines,
+                    [baseline_table(assessment)
+                        .captioned("Body position: the model and the pendulum")],
+                ),
+            Section::new(
+                "control",
+                "The controller along the recordings",
+                &[CONTROL_WORDS],
+            )
+            .and(without)
+            .with(
+                &figures.control,
+                runs.map(|(lift, runs)| run_table(runs).captioned(lift)),
+            ),
+            Section {
+                folded: Some(options.changes.clone())
+                    .filter(|table| !table.is_empty())
+                    .into_iter()
+                    .collect(),
+                ..Section::new(
+                    "simplification",
+                    "How far the equations can be simplified",
+                    &SIMPLIFICATION_WORDS,
+                )
+                .with(&[], options.simplification.iter().cloned())
+            },
+            Section::new("study", "How many latent coordinates", &[STUDY_WORDS])
+                .with(&figures.study, []),
+        ];
+    sections.retain(|section| match section.id {
+        "simplification" => !section.tables.is_empty(),
+        "study" => !section.figures.is_empty(),
+        _ => true,
+    });
+    sections
 }
 
 const ENCODER_WORDS: &str = "The darker a cell (the brighter on a dark screen), the more of that coordinate the latent one takes.";
 const COORDINATE_WORDS: &str = "The model is started from the recorded state and driven by the recorded torques and contacts: once over the whole jump, and again and again from the recorded state. Errors are root mean squares in SI units.";
 const DYNAMICS_WORDS: &str = "Eigenvalues belong to each phase's linearisation at its mean state: a positive real part means that small deviations grow at that rate. The input gain is the matrix by which latent inputs accelerate the latent coordinates; its rank counts singular values above 1 % of the largest.";
 const BASELINE_WORDS: &str = "The actuated spring-loaded inverted pendulum under the same forces, with the published constants and with the constants that fit the accelerations of these very recordings best.";
-const CONTROL_WORDS: &str = "At each control step the controller sees the recorded state and plans along the recording. Its commands are not fed back to a robot: this tells what it would have commanded where the robot really was.";
+const CONTROL_WORDS: &str = "At each control step the controller sees the recorded state and plans along the recording. Its commands are not fed back to a robot: these are the commands that it would have given in the states that the robot really had.";
 
 const SIMPLIFICATION_WORDS: [&str; 2] = [
     "Terms are dropped, coefficients shortened and nearly linear functions made linear, as long as no ddz of a phase can be off by more than the tolerance anywhere in its domain: the smallest box around the recorded latent states and inputs of the phase, a tenth of each range wider on both sides.",
@@ -174,19 +212,15 @@ const SIMPLIFICATION_WORDS: [&str; 2] = [
 const STUDY_WORDS: &str = "One model for every latent dimension and seed, judged on recordings that were not trained on. With more coordinates the decoder errs less and the equations grow.";
 
 fn phases(latent: &Equations<'_>, typeset: &Typeset) -> Vec<PhaseView> {
-    let options = LatexOptions {
-        width_em: WIDTH_EM,
-        ..LatexOptions::default()
-    };
     (typeset.systems.iter().zip(latent.phases()))
         .enumerate()
         .map(|(index, (equations, phase))| PhaseView {
             index,
-            name: HtmlText(&phase.name).to_string(),
-            feet: HtmlText(&words::feet(&phase.feet)).to_string(),
+            name: html(&phase.name),
+            feet: html(&words::feet(&phase.feet)),
             terms: phase.active_count(),
             math: system(equations, WIDTH_EM),
-            latex: HtmlLines(&tex_cases(equations, &options)).to_string(),
+            latex: HtmlLines(&tex_cases(equations, WIDTH_EM)).to_string(),
         })
         .collect()
 }
@@ -200,50 +234,17 @@ impl std::fmt::Display for HtmlLines<'_> {
     }
 }
 
-fn section(
-    id: &'static str,
-    title: &'static str,
-    paragraphs: &[&str],
-    figures: &[Figure],
-    tables: &[PageTable],
-) -> Section {
-    Section {
-        id,
-        title,
-        paragraphs: paragraphs.iter().map(|p| HtmlText(p).to_string()).collect(),
-        tables: tables.iter().map(table_view).collect(),
-        folded: Vec::new(),
-        figures: figures.iter().map(figure_view).collect(),
-    }
-}
-
-fn with_notes(mut section: Section, notes: &[String]) -> Section {
-    (section.paragraphs).extend(notes.iter().map(|note| HtmlText(note).to_string()));
-    section
-}
-
-fn table_view(table: &PageTable) -> PageTable {
-    let escape = |cells: &Vec<String>| cells.iter().map(|c| HtmlText(c).to_string()).collect();
-    PageTable {
-        caption: HtmlText(&table.caption).to_string(),
-        header: escape(&table.header),
-        rows: table.rows.iter().map(escape).collect(),
-    }
-}
-
 fn figure_view(figure: &Figure) -> FigureView {
     FigureView {
-        id: HtmlText(&figure.id).to_string(),
-        caption: HtmlText(&figure.caption).to_string(),
-        kind: if figure.panels.len() == 1 {
-            "one"
-        } else if figure.columns == 2 {
-            "two"
-        } else {
-            "many"
+        id: html(&figure.id),
+        caption: html(&figure.caption),
+        kind: match (figure.panels.len(), figure.columns) {
+            (1, _) => "one",
+            (_, 2) => "two",
+            _ => "many",
         },
         legend: (figure.legend.iter())
-            .map(|(role, words)| (role.class(), HtmlText(words).to_string()))
+            .map(|(role, words)| (role.class(), html(words)))
             .collect(),
         panels: (figure.panels.iter())
             .map(|panel| panel_svg(figure, panel))
@@ -282,9 +283,39 @@ struct Section {
     id: &'static str,
     title: &'static str,
     paragraphs: Vec<String>,
-    tables: Vec<PageTable>,
-    folded: Vec<PageTable>,
+    tables: Vec<Table>,
+    /// Tables whose captions are the summaries that unfold them.
+    folded: Vec<Table>,
     figures: Vec<FigureView>,
+}
+
+impl Section {
+    fn new(id: &'static str, title: &'static str, paragraphs: &[&str]) -> Self {
+        Self {
+            id,
+            title,
+            paragraphs: paragraphs.iter().map(|text| html(text)).collect(),
+            tables: Vec::new(),
+            folded: Vec::new(),
+            figures: Vec::new(),
+        }
+    }
+
+    /// Adds paragraphs.
+    fn and(mut self, notes: impl IntoIterator<Item = String>) -> Self {
+        self.paragraphs
+            .extend(notes.into_iter().map(|note| html(&note)));
+        self
+    }
+
+    /// Adds figures and tables.
+    fn with(self, figures: &[Figure], tables: impl IntoIterator<Item = Table>) -> Self {
+        Self {
+            tables: tables.into_iter().collect(),
+            figures: figures.iter().map(figure_view).collect(),
+            ..self
+        }
+    }
 }
 
 /// A figure in the template.

@@ -1,5 +1,7 @@
 //! Rules on which feet are on the ground.
 
+use std::fmt;
+
 use super::joints::ContactFlags;
 
 /// Which foot patterns select a phase.
@@ -11,6 +13,19 @@ pub enum FeetRule {
     None,
     /// Exactly one of these patterns (order fr, fl, rr, rl).
     Patterns(Vec<ContactFlags>),
+}
+
+impl fmt::Display for FeetRule {
+    /// `any`, `none`, or patterns such as `0011,0001`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let patterns = match self {
+            FeetRule::Any => return f.write_str("any"),
+            FeetRule::None => return f.write_str("none"),
+            FeetRule::Patterns(patterns) => patterns,
+        };
+        let digits = |feet: &ContactFlags| feet.map(|down| if down { "1" } else { "0" }).concat();
+        f.write_str(&patterns.iter().map(digits).collect::<Vec<_>>().join(","))
+    }
 }
 
 impl FeetRule {

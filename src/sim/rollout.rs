@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::integrate::{IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
 use super::latent::LatentSegment;
@@ -48,6 +48,16 @@ impl Rollout {
         self.windows.iter().flat_map(|window| {
             (0..window.z.ncols()).map(move |column| (window.samples.start + column, window, column))
         })
+    }
+
+    /// `z` and `dz` at each of the `n` samples of the segment; `None` where no window arrived.
+    pub fn states(&self, n: usize) -> Vec<Option<(DVector<f64>, DVector<f64>)>> {
+        let mut states = vec![None; n];
+        for (sample, window, column) in self.predictions() {
+            let [z, dz] = [&window.z, &window.dz].map(|rows| rows.column(column).into_owned());
+            states[sample] = Some((z, dz));
+        }
+        states
     }
 
     /// First time at which a window diverged.

@@ -1,12 +1,42 @@
-//! What was changed, and how far it can make `ddz` differ.
+//! The changes of a simplification and the bounds of their effect on `ddz`.
 
+use std::fmt;
+
+use serde::Serialize;
+
+use super::json;
 use super::measure::Measured;
 use super::tolerance::Tolerance;
 use crate::equations::ExactStep;
 use crate::model::LatentVariable;
 use crate::symbolic::Interval;
 
-/// What became of a term.
+/// A count before and after simplification.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct BeforeAfter {
+    /// In the model.
+    pub before: usize,
+    /// In the simplified model.
+    pub after: usize,
+}
+
+impl fmt::Display for BeforeAfter {
+    /// `8 to 5`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} to {}", self.before, self.after)
+    }
+}
+
+impl std::iter::Sum for BeforeAfter {
+    fn sum<I: Iterator<Item = Self>>(counts: I) -> Self {
+        counts.fold(Self::default(), |sum, count| Self {
+            before: sum.before + count.before,
+            after: sum.after + count.after,
+        })
+    }
+}
+
+/// The kind of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChangeKind {
     /// It is gone.
@@ -25,7 +55,7 @@ pub enum ChangeKind {
 }
 
 /// Another coefficient that a change altered.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Effect {
     /// The term in the library's syntax.
     pub term: String,
@@ -36,9 +66,10 @@ pub struct Effect {
 }
 
 /// One change of one equation.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// What was done.
+    /// Its kind.
+    #[serde(flatten, serialize_with = "json::kind")]
     pub kind: ChangeKind,
     /// The term in the library's syntax.
     pub term: String,
@@ -47,17 +78,20 @@ pub struct Change {
     /// And after it; zero unless the change is a rounding.
     pub after: f64,
     /// Coefficients that took over.
+    #[serde(rename = "others")]
     pub effects: Vec<Effect>,
     /// Contains `ddz` before this change minus `ddz` after it at every point of the domain.
+    #[serde(serialize_with = "json::ends")]
     pub bound: Interval,
     /// The same at the recorded samples.
     pub measured: Option<Measured>,
 }
 
 /// One equation of one phase; all errors in scaled units per second squared.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EquationCertificate {
     /// Index of the latent coordinate.
+    #[serde(rename = "equation", serialize_with = "json::equation")]
     pub output: usize,
     /// Root mean square of the model's `ddz` over the recorded samples.
     pub rms: Option<f64>,
@@ -65,42 +99,42 @@ pub struct EquationCertificate {
     pub allowed: f64,
     /// Contains `ddz` of the model minus `ddz` of the simplified model at every point of the domain;
     /// found from the two models, not from the list of changes.
+    #[serde(serialize_with = "json::ends")]
     pub bound: Interval,
     /// The sum of the changes' bounds, which contains the same difference.
+    #[serde(serialize_with = "json::ends")]
     pub sum_of_bounds: Interval,
     /// The difference at the recorded samples.
     pub measured: Option<Measured>,
-    /// Active terms of the model.
-    pub terms_before: usize,
-    /// Active terms of the simplified model.
-    pub terms_after: usize,
-    /// Significant decimal digits that the model's coefficients need, added up.
-    pub digits_before: usize,
-    /// The same of the simplified model.
-    pub digits_after: usize,
-    /// What was done, in order.
+    /// Active terms.
+    pub terms: BeforeAfter,
+    /// Significant decimal digits that the coefficients need, added up.
+    pub digits: BeforeAfter,
+    /// The changes, in order.
     pub changes: Vec<Change>,
 }
 
 /// One phase.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseCertificate {
     /// The phase's name.
     pub name: String,
     /// The box: each variable's name and range. `None` if there is no sample of the phase, so that
     /// its equations were kept.
+    #[serde(serialize_with = "json::ranges")]
     pub domain: Option<Vec<(String, Interval)>>,
     /// Recorded samples in the box, at which errors were measured.
     pub samples: usize,
     /// Recorded samples of the phase outside the box, about which nothing is stated.
+    #[serde(rename = "samples_outside_domain")]
     pub samples_outside: usize,
-    /// Operations of the straight-line code of `ddz`, before and after; a sine with its cosine
-    /// counts as two.
-    pub operations: (usize, usize),
+    /// Operations of the straight-line code of `ddz`; a sine with its cosine counts as two.
+    pub operations: BeforeAfter,
     /// Variables that some `ddz` of the phase depended on, and none does any more: inputs among them
     /// can no longer be used for control.
+    #[serde(rename = "no_longer_depends_on", serialize_with = "json::names")]
     pub lost: Vec<LatentVariable>,
-    /// One entry a latent coordinate.
+    /// One entry per latent coordinate.
     pub equations: Vec<EquationCertificate>,
 }
 
@@ -112,7 +146,7 @@ pub struct PhaseCertificate {
 /// largest summand, comes on top for both models.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {
-    /// What was asked for.
+    /// The requested tolerance.
     pub tolerance: Tolerance,
     /// What exact simplification did before: equal as real functions, without any error.
     pub exact: Vec<ExactStep>,
@@ -134,29 +168,19 @@ impl Certificate {
             .sum()
     }
 
-    /// Active terms before and after, all phases together.
-    pub fn terms(&self) -> (usize, usize) {
-        self.equations()
-            .fold((0, 0), |(before, after), (_, equation)| {
-                (before + equation.terms_before, after + equation.terms_after)
-            })
+    /// Active terms, all phases together.
+    pub fn terms(&self) -> BeforeAfter {
+        self.equations().map(|(_, equation)| equation.terms).sum()
     }
 
-    /// Significant decimal digits of all coefficients before and after, added up.
-    pub fn digits(&self) -> (usize, usize) {
-        self.equations()
-            .fold((0, 0), |(before, after), (_, equation)| {
-                (
-                    before + equation.digits_before,
-                    after + equation.digits_after,
-                )
-            })
+    /// Significant decimal digits of all coefficients, added up.
+    pub fn digits(&self) -> BeforeAfter {
+        self.equations().map(|(_, equation)| equation.digits).sum()
     }
 
-    /// Operations of the straight-line code of `ddz` before and after, all phases together.
-    pub fn operations(&self) -> (usize, usize) {
-        let phases = self.phases.iter().map(|phase| phase.operations);
-        phases.fold((0, 0), |(a, b), (before, after)| (a + before, b + after))
+    /// Operations of the straight-line code of `ddz`, all phases together.
+    pub fn operations(&self) -> BeforeAfter {
+        self.phases.iter().map(|phase| phase.operations).sum()
     }
 
     /// The largest bound as a share of the root mean square of its `ddz`.

@@ -6,15 +6,15 @@ use std::path::Path;
 use nalgebra::{DMatrix, DVector};
 
 use super::error::SimplifyError;
-use crate::model::{LatentVariable, ReducedModel};
+use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
 use crate::sim::LatentSegment;
 use crate::symbolic::Interval;
 
-/// How far a domain reaches beyond the samples unless told otherwise, as a share of each variable's
+/// How far a domain reaches beyond the samples unless given, as a share of each variable's
 /// range.
 pub const MARGIN: f64 = 0.1;
 
-/// Recorded samples of one phase; matrices are `latent_dim x n`, a column a sample, scaled units.
+/// Recorded samples of one phase; matrices are `latent_dim x n`, one column per sample, scaled units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhaseSamples {
     /// Latent positions.
@@ -28,7 +28,7 @@ pub struct PhaseSamples {
 /// Recorded samples, sorted by the model's phases.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Samples {
-    /// One entry a phase of the model.
+    /// One entry per phase of the model.
     pub phases: Vec<PhaseSamples>,
 }
 
@@ -78,7 +78,7 @@ impl PhaseSamples {
     }
 }
 
-/// A box a phase, over `z`, then `dz`, then `u_lat` (scaled units). A phase without one keeps its
+/// One box per phase, over `z`, then `dz`, then `u_lat` (scaled units). A phase without one keeps its
 /// equations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Domain {
@@ -86,7 +86,7 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// The domain with these boxes, one a phase of the model.
+    /// The domain with these boxes, one per phase of the model.
     ///
     /// # Errors
     /// [`SimplifyError::PhaseCount`], [`SimplifyError::BoxDimension`], [`SimplifyError::Range`].
@@ -143,7 +143,7 @@ impl Domain {
         Self::new(model, boxes.collect())
     }
 
-    /// Reads boxes from TOML: a table a phase, with a range a variable, such as `z1 = [-0.2, 0.4]`.
+    /// Reads boxes from TOML: one table per phase, with a range per variable, such as `z1 = [-0.2, 0.4]`.
     ///
     /// # Errors
     /// [`SimplifyError::DomainFile`] for a phase or variable that the model does not have or that
@@ -169,7 +169,7 @@ impl Domain {
                         phase.name
                     ))
                 })?;
-                // told as typed: an interval has no ends that are not numbers
+                // reported as typed: an interval has no ends that are not numbers
                 if !(lo.is_finite() && hi.is_finite() && lo <= hi) {
                     return Err(refused(format!(
                         "[{}] {variable} = [{lo}, {hi}], expected finite numbers in order",
@@ -223,11 +223,26 @@ impl Domain {
             .all(|(range, value)| range.contains(value))
     }
 
-    /// Which samples of a phase lie in its box.
-    pub(super) fn inside(&self, phase: usize, samples: &PhaseSamples) -> Vec<usize> {
-        (0..samples.len())
+    /// Values of the terms of `library` at the samples of a phase that lie in its box: one row per
+    /// sample, none without samples.
+    ///
+    /// # Errors
+    /// [`ModelError::Dimension`] for samples of another model.
+    pub(super) fn theta(
+        &self,
+        phase: usize,
+        samples: Option<&Samples>,
+        library: &Library,
+    ) -> Result<DMatrix<f64>, ModelError> {
+        let Some(samples) = samples.map(|samples| &samples.phases[phase]) else {
+            return Ok(DMatrix::zeros(0, library.len()));
+        };
+        let inside: Vec<usize> = (0..samples.len())
             .filter(|&k| self.contains(phase, samples.point(k)))
-            .collect()
+            .collect();
+        let of = |all: &DMatrix<f64>| all.select_columns(&inside);
+        let [z, dz, u_lat] = [&samples.z, &samples.dz, &samples.u_lat].map(of);
+        library.evaluate_points(&z, &dz, &u_lat)
     }
 }
 

@@ -8,6 +8,7 @@ use super::ranges::Ranges;
 use super::rewrite::{Rewrite, rewrites};
 use super::workspace::{Workspace, has_function};
 use crate::symbolic::Interval;
+use crate::typeset::rounded;
 
 /// Share of the tolerance that removing terms may use; the rest is for shorter coefficients.
 const REMOVAL_SHARE: f64 = 0.75;
@@ -140,7 +141,7 @@ impl Equation {
     /// together fit.
     fn round(&mut self, terms: &mut Terms<'_>, allowed: f64) {
         let mut chosen: Vec<Option<Step>> = vec![None; self.xi.len()];
-        // sums of floats tell what to try; what is made is checked with intervals
+        // sums of floats select candidates; accepted changes are checked with intervals
         let (mut lo, mut hi) = (self.spent.lo(), self.spent.hi());
         for step in self.roundings(terms) {
             let place = &mut chosen[step.row];
@@ -230,24 +231,5 @@ impl Equation {
         }
         self.spent = self.spent + step.bound;
         self.steps.push(step);
-    }
-}
-
-/// The float nearest to `value` in so many significant decimal digits.
-fn rounded(value: f64, digits: usize) -> f64 {
-    let text = format!("{value:.*e}", digits - 1);
-    text.parse().expect("a formatted float reads back")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rounding_keeps_so_many_digits() {
-        assert_eq!(rounded(-0.123456, 2), -0.12);
-        assert_eq!(rounded(99.6, 1), 100.0);
-        assert_eq!(rounded(6.02214e23, 3), 6.02e23);
-        assert_eq!(rounded(0.1 + 0.2, 17), 0.1 + 0.2);
     }
 }

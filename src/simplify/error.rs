@@ -1,32 +1,26 @@
 //! Why a model was not simplified.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use std::path::PathBuf;
 
 use crate::lower::LowerError;
 use crate::model::{LibraryError, ModelError};
 
-/// What can go wrong in simplifying a model.
+/// Errors of simplification.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimplifyError {
-    /// Not one box a phase.
+    /// The number of boxes differs from the number of phases.
     #[error("the domain has {found} boxes, expected one for each of {expected} phases")]
-    PhaseCount {
-        /// Boxes.
-        found: usize,
-        /// Phases of the model.
-        expected: usize,
-    },
+    PhaseCount { found: usize, expected: usize },
     /// A box of the wrong dimension.
     #[error(
         "the domain of phase `{phase}` has {found} ranges, expected {expected} (z, dz, u of each latent coordinate)"
     )]
     BoxDimension {
-        /// The phase's name.
         phase: String,
-        /// Ranges.
         found: usize,
-        /// `3 latent_dim`.
         expected: usize,
     },
     /// A range that is empty or infinite.
@@ -34,31 +28,19 @@ pub enum SimplifyError {
         "the domain of `{variable}` in phase `{phase}` is {lo} to {hi}, expected finite numbers in order"
     )]
     Range {
-        /// The phase's name.
         phase: String,
-        /// The variable's name.
         variable: String,
-        /// Lower end.
         lo: f64,
-        /// Upper end.
         hi: f64,
     },
     /// A file of ranges that cannot be read as such.
     #[error("{path}: {message}", path = path.display())]
-    DomainFile {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        message: String,
-    },
+    DomainFile { path: PathBuf, message: String },
     /// Recordings for a model that cannot encode them.
     #[error(
-        "model `{model}` has no encoder, so recordings give it no domain; give a .toml file with a table a phase, such as [contact], and a range for each of z1, dz1, u1, ..., such as z1 = [-0.2, 0.4]"
+        "model `{model}` has no encoder, so recordings give it no domain; give a .toml file with one table per phase, such as [contact], and a range for each of z1, dz1, u1, ..., such as z1 = [-0.2, 0.4]"
     )]
-    NoEncoder {
-        /// The model's name.
-        model: String,
-    },
+    NoEncoder { model: String },
     /// A share of the recorded accelerations without recordings.
     #[error(
         "a tolerance in percent is a share of the root mean square of each ddz over recordings, and the domain has none; give a number in scaled units per s^2"
@@ -74,13 +56,9 @@ pub enum SimplifyError {
         "internal error: in phase `{phase}`, ddz{output} of the simplified model is off by {measured:e} at a recorded sample, beyond the bound {bound:e}", output = output + 1
     )]
     Contradiction {
-        /// The phase's name.
         phase: String,
-        /// Index of the latent coordinate.
         output: usize,
-        /// The error at a sample.
         measured: f64,
-        /// The certified bound.
         bound: f64,
     },
     /// The final evaluation does not confirm the tolerance: a defect of romc.
@@ -88,13 +66,9 @@ pub enum SimplifyError {
         "internal error: in phase `{phase}`, the bound {bound:e} of ddz{output} exceeds the tolerance {allowed:e}", output = output + 1
     )]
     Uncertified {
-        /// The phase's name.
         phase: String,
-        /// Index of the latent coordinate.
         output: usize,
-        /// The bound found.
         bound: f64,
-        /// The bound allowed.
         allowed: f64,
     },
     /// The simplified model is not a model.

@@ -1,9 +1,13 @@
-//! Errors at recorded samples.
+//! Differences of equations: their bounds over a box, their size at recorded samples.
 
 use nalgebra::DMatrix;
+use serde::Serialize;
+
+use super::ranges::Ranges;
+use crate::symbolic::Interval;
 
 /// How large an error is at recorded samples (scaled units per second squared).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Measured {
     /// Largest magnitude.
     pub max: f64,
@@ -27,17 +31,37 @@ impl Measured {
     }
 }
 
-/// `sum delta_j theta_j` at every sample; `theta` has a row a sample and a column a term.
-pub(super) fn at_samples<'a>(
-    theta: &'a DMatrix<f64>,
-    parts: &'a [(usize, f64)],
-) -> impl Iterator<Item = f64> + 'a {
-    (0..theta.nrows()).map(move |k| {
-        parts
+/// Rows of terms with their coefficients before and after a change.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Differences(pub Vec<(usize, f64, f64)>);
+
+impl Differences {
+    /// The rows in which two equations differ.
+    pub fn between(before: &[f64], after: &[f64]) -> Self {
+        let rows = before.iter().zip(after).enumerate();
+        let rows = rows.map(|(row, (&before, &after))| (row, before, after));
+        Self(rows.filter(|(_, before, after)| before != after).collect())
+    }
+
+    /// Contains the equation before minus the equation after at every point of the box.
+    pub fn bound(&self, ranges: &mut Ranges) -> Interval {
+        let parts = self
+            .0
             .iter()
-            .map(|&(row, delta)| delta * theta[(k, row)])
-            .sum()
-    })
+            .map(|&(row, before, after)| (row, Interval::point(before) - Interval::point(after)));
+        ranges.combination(&parts.collect::<Vec<_>>())
+    }
+
+    /// The same at samples; `theta` has one row per sample and one column per term.
+    pub fn measured(&self, theta: &DMatrix<f64>) -> Option<Measured> {
+        let at = |sample: usize| -> f64 {
+            let parts = self.0.iter();
+            parts
+                .map(|&(row, before, after)| (before - after) * theta[(sample, row)])
+                .sum()
+        };
+        Measured::of((0..theta.nrows()).map(at))
+    }
 }
 
 #[cfg(test)]

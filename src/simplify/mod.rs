@@ -1,6 +1,6 @@
 //! Simplification with a certificate: fewer terms and digits, and how far `ddz` can be off for it.
 //!
-//! A model, a [`Domain`] (a box of latent states and inputs a phase, from recordings or given) and a
+//! A model, a [`Domain`] (a box of latent states and inputs per phase, from recordings or given) and a
 //! [`Tolerance`] enter; a simpler model leaves with a [`Certificate`] that lists every change with
 //! the interval in which its error lies over the whole box, and with its error at the recorded
 //! samples. `docs/simplification.md` has the mathematics. Read `run.rs` first, then `rewrite.rs` (what
@@ -48,6 +48,7 @@ mod ranges;
 mod rewrite;
 mod rollouts;
 mod run;
+mod tables;
 mod tolerance;
 mod workspace;
 
@@ -55,14 +56,15 @@ mod workspace;
 mod tests;
 
 pub use certificate::{
-    Certificate, Change, ChangeKind, Effect, EquationCertificate, PhaseCertificate,
+    BeforeAfter, Certificate, Change, ChangeKind, Effect, EquationCertificate, PhaseCertificate,
 };
 pub use domain::{Domain, MARGIN, PhaseSamples, Samples};
 pub use error::SimplifyError;
 pub use json::{certificate_json, rollouts_json};
-pub use markdown::{bound_words, change_words, interval_words, lost_words, markdown};
+pub use markdown::{lost_words, markdown};
 pub use measure::Measured;
 pub use printing::{PrintedEquation, printed};
 pub use rollouts::{RolloutBasis, RolloutEffect, RolloutErrors};
 pub use run::{Simplified, simplify};
+pub use tables::{bound_words, change_table, equation_table, rollout_table};
 pub use tolerance::{Tolerance, ToleranceError};

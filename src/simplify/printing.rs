@@ -1,10 +1,10 @@
-//! What rounding coefficients for print costs.
+//! Errors of printed equations, whose coefficients are rounded.
 
 use super::domain::{Domain, Samples};
 use super::error::SimplifyError;
-use super::measure::{Measured, at_samples};
+use super::measure::{Differences, Measured};
 use super::workspace::Workspace;
-use crate::model::ReducedModel;
+use crate::equations::Equations;
 use crate::symbolic::Interval;
 use crate::typeset::{Decimal, Rounding};
 
@@ -27,48 +27,30 @@ pub struct PrintedEquation {
 /// # Errors
 /// [`SimplifyError::Model`] for samples of another model.
 pub fn printed(
-    model: &ReducedModel,
+    equations: &Equations<'_>,
     domain: &Domain,
     samples: Option<&Samples>,
     rounding: Rounding,
 ) -> Result<Vec<PrintedEquation>, SimplifyError> {
-    let workspace = Workspace::new(model)?;
-    let mut equations = Vec::new();
-    for (index, phase) in model.phases().iter().enumerate() {
-        let theta = match samples.map(|samples| &samples.phases[index]) {
-            None => None,
-            Some(samples) => {
-                let inside = domain.inside(index, samples);
-                let of = |all: &nalgebra::DMatrix<f64>| all.select_columns(&inside);
-                let [z, dz, u_lat] = [&samples.z, &samples.dz, &samples.u_lat].map(of);
-                Some(workspace.library().evaluate_points(&z, &dz, &u_lat)?)
-            }
-        };
+    let workspace = Workspace::new(equations)?;
+    let mut all = Vec::new();
+    for (index, phase) in equations.phases().iter().enumerate() {
+        let theta = domain.theta(index, samples, workspace.library())?;
         let mut ranges = domain.phase(index).map(|domain| workspace.ranges(domain));
-        for output in 0..model.latent_dim() {
-            let errors = phase.active_terms(output).map(|(term, coefficient)| {
-                let printed = Decimal::rounded(coefficient, rounding).value();
-                (term.index(), coefficient, printed)
+        for (output, summands) in phase.ddz.iter().enumerate() {
+            let differences = summands.iter().map(|summand| {
+                let printed = Decimal::rounded(summand.coefficient, rounding).value();
+                (summand.term, summand.coefficient, printed)
             });
-            let errors: Vec<_> = errors
-                .filter(|(_, exact, printed)| exact != printed)
-                .collect();
-            let intervals = errors.iter().map(|&(row, exact, printed)| {
-                (row, Interval::point(exact) - Interval::point(printed))
-            });
-            let intervals: Vec<_> = intervals.collect();
-            let parts: Vec<_> = errors
-                .iter()
-                .map(|&(row, exact, print)| (row, exact - print))
-                .collect();
-            equations.push(PrintedEquation {
+            let differences = differences.filter(|(_, exact, printed)| exact != printed);
+            let differences = Differences(differences.collect());
+            all.push(PrintedEquation {
                 phase: phase.name.clone(),
                 output,
-                bound: (ranges.as_mut()).map(|ranges| ranges.combination(&intervals)),
-                measured: (theta.as_ref())
-                    .and_then(|theta| Measured::of(at_samples(theta, &parts))),
+                bound: (ranges.as_mut()).map(|ranges| differences.bound(ranges)),
+                measured: differences.measured(&theta),
             });
         }
     }
-    Ok(equations)
+    Ok(all)
 }

@@ -192,7 +192,7 @@ impl Ranges {
             .intersection(whole)
     }
 
-    /// Some values of `expr` in a box, in floating point: they only tell when to stop.
+    /// Some values of `expr` in a box, in floating point: they only decide when to stop.
     fn values(&self, expr: ExprId, cell: &[(SymbolId, Interval)]) -> Interval {
         let ends: [fn(Interval) -> f64; 3] = [
             |range| range.lo(),

@@ -1,4 +1,4 @@
-//! What may take the place of a term: nothing, a constant, a straight line, a parabola.
+//! Replacements of a term: nothing, a constant, a straight line, a parabola.
 
 use super::certificate::ChangeKind;
 use super::ranges::Ranges;

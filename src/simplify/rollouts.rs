@@ -1,4 +1,4 @@
-//! What simplification does to rollouts over recordings.
+//! The effect of simplification on rollouts over recordings.
 
 use super::domain::Domain;
 use crate::evaluate::CoordinateSums;
@@ -14,7 +14,7 @@ const BODY: &str = "body.";
 /// Errors of a model's rollouts in the robot's body coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RolloutErrors {
-    /// Root mean squares, a coordinate: whole jumps, restarted.
+    /// Root mean squares of each coordinate: whole jumps, restarted.
     pub rms: Vec<[Option<f64>; 2]>,
     /// Windows that diverged: whole jumps, restarted.
     pub diverged: [usize; 2],

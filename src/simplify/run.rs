@@ -3,12 +3,14 @@
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
 
-use super::certificate::{Certificate, Change, Effect, EquationCertificate, PhaseCertificate};
+use super::certificate::{
+    BeforeAfter, Certificate, Change, Effect, EquationCertificate, PhaseCertificate,
+};
 use super::count::{digits, operations, variables};
 use super::domain::{Domain, Samples};
 use super::equation::{Equation, Step, Terms};
 use super::error::SimplifyError;
-use super::measure::{Measured, at_samples};
+use super::measure::Differences;
 use super::tolerance::Tolerance;
 use super::workspace::Workspace;
 use crate::artifact;
@@ -53,19 +55,18 @@ pub fn simplify(
         return Err(SimplifyError::NoSamples);
     }
     let original = equations.model();
-    let model = &*equations.to_model()?;
-    let n_phases = model.phases().len();
+    let n_phases = equations.phases().len();
     if let Some(found) = samples.map(|s| s.phases.len()).filter(|&n| n != n_phases) {
         return Err(SimplifyError::PhaseCount {
             found,
             expected: n_phases,
         });
     }
-    let workspace = Workspace::new(model)?;
+    let workspace = Workspace::new(equations)?;
     let mut xi = Vec::new();
     let mut phases = Vec::new();
     for phase in 0..n_phases {
-        let problem = PhaseProblem::new(model, &workspace, domain, samples, phase)?;
+        let problem = PhaseProblem::new(equations, &workspace, domain, samples, phase)?;
         let (of_phase, certificate) = problem.solve(tolerance)?;
         xi.push(of_phase);
         phases.push(certificate);
@@ -76,9 +77,9 @@ pub fn simplify(
         exact,
         phases,
     };
-    let mut simplified = model.clone();
+    let mut simplified = equations.to_model()?.into_owned();
     if certificate.n_changes() > 0 {
-        simplified = workspace.finish(model, &xi)?;
+        simplified = workspace.finish(simplified, &xi)?;
     }
     if certificate.n_changes() > 0 || !certificate.exact.is_empty() {
         let mut provenance = original.provenance().clone();
@@ -90,7 +91,10 @@ pub fn simplify(
     }
     let (learned, new) = (Equations::as_learned(original), Equations::of(&simplified));
     for (phase, certificate) in certificate.phases.iter_mut().enumerate() {
-        certificate.operations = (operations(equations, phase)?, operations(&new, phase)?);
+        certificate.operations = BeforeAfter {
+            before: operations(equations, phase)?,
+            after: operations(&new, phase)?,
+        };
         let (before, after) = (variables(&learned, phase), variables(&new, phase));
         certificate.lost = before.into_iter().filter(|v| !after.contains(v)).collect();
     }
@@ -141,28 +145,20 @@ struct PhaseProblem<'a> {
 
 impl<'a> PhaseProblem<'a> {
     fn new(
-        model: &'a ReducedModel,
+        equations: &'a Equations<'_>,
         workspace: &'a Workspace,
         domain: &'a Domain,
         samples: Option<&Samples>,
         phase: usize,
     ) -> Result<Self, SimplifyError> {
-        let samples = samples.map(|samples| &samples.phases[phase]);
-        let inside = samples.map_or(Vec::new(), |samples| domain.inside(phase, samples));
-        let theta = match samples {
-            None => DMatrix::zeros(0, workspace.len()),
-            Some(samples) => {
-                let of = |all: &DMatrix<f64>| all.select_columns(&inside);
-                let [z, dz, u_lat] = [&samples.z, &samples.dz, &samples.u_lat].map(of);
-                workspace.library().evaluate_points(&z, &dz, &u_lat)?
-            }
-        };
+        let theta = domain.theta(phase, samples, workspace.library())?;
+        let recorded = samples.map_or(0, |samples| samples.phases[phase].len());
         Ok(Self {
-            name: &model.phases()[phase].name,
+            name: &equations.phases()[phase].name,
             workspace,
-            xi: workspace.xi(model, phase),
+            xi: workspace.coefficients(equations, phase),
             domain: domain.phase(phase),
-            samples_outside: samples.map_or(0, |samples| samples.len()) - theta.nrows(),
+            samples_outside: recorded - theta.nrows(),
             theta,
         })
     }
@@ -201,7 +197,7 @@ impl<'a> PhaseProblem<'a> {
             }),
             samples: self.theta.nrows(),
             samples_outside: self.samples_outside,
-            operations: (0, 0),
+            operations: BeforeAfter::default(),
             lost: Vec::new(),
             equations,
         };
@@ -224,9 +220,8 @@ impl<'a> PhaseProblem<'a> {
         let mut largest = 0.0;
         for _ in 0..MAX_RETREATS {
             let equation = Equation::simplified(terms, self.coefficients(output), budget);
-            let bound = terms
-                .ranges
-                .combination(&self.difference(output, &equation.xi));
+            let differences = Differences::between(&self.coefficients(output), &equation.xi);
+            let bound = differences.bound(&mut terms.ranges);
             largest = bound.magnitude();
             if largest <= allowed {
                 return Ok((equation, bound));
@@ -241,22 +236,11 @@ impl<'a> PhaseProblem<'a> {
         })
     }
 
-    /// The original coefficients minus these, where they differ.
-    fn difference(&self, output: usize, xi: &[f64]) -> Vec<(usize, Interval)> {
-        (xi.iter().enumerate())
-            .filter(|&(row, &after)| self.xi[(row, output)] != after)
-            .map(|(row, &after)| {
-                let before = self.xi[(row, output)];
-                (row, Interval::point(before) - Interval::point(after))
-            })
-            .collect()
-    }
-
+    /// Root mean square of an acceleration over the samples.
     fn rms(&self, output: usize) -> Option<f64> {
-        let active: Vec<(usize, f64)> = (self.coefficients(output).into_iter().enumerate())
-            .filter(|&(_, coefficient)| coefficient != 0.0)
-            .collect();
-        Measured::of(at_samples(&self.theta, &active)).map(|measured| measured.rms)
+        let all = self.coefficients(output);
+        let active = Differences::between(&all, &vec![0.0; all.len()]);
+        active.measured(&self.theta).map(|measured| measured.rms)
     }
 
     fn certified(
@@ -267,14 +251,14 @@ impl<'a> PhaseProblem<'a> {
         allowed: f64,
         rms: Option<f64>,
     ) -> Result<EquationCertificate, SimplifyError> {
-        let parts: Vec<(usize, f64)> = (equation.xi.iter().enumerate())
-            .map(|(row, &after)| (row, self.xi[(row, output)] - after))
-            .filter(|&(_, delta)| delta != 0.0)
-            .collect();
-        let measured = Measured::of(at_samples(&self.theta, &parts));
+        let before = self.coefficients(output);
+        let differences = Differences::between(&before, &equation.xi);
+        let measured = differences.measured(&self.theta);
         if let Some(measured) = measured {
-            let size = self.theta.amax() * parts.iter().map(|(_, d)| d.abs()).sum::<f64>();
-            let slack = EVALUATION * bound.magnitude() + f64::EPSILON * size * parts.len() as f64;
+            let parts = differences.0.iter();
+            let sum: f64 = parts.map(|(_, before, after)| (before - after).abs()).sum();
+            let size = self.theta.amax() * sum * differences.0.len() as f64;
+            let slack = EVALUATION * bound.magnitude() + f64::EPSILON * size;
             if measured.max > bound.magnitude() + slack {
                 return Err(SimplifyError::Contradiction {
                     phase: self.name.to_owned(),
@@ -285,6 +269,10 @@ impl<'a> PhaseProblem<'a> {
             }
         }
         let active = |xi: &[f64]| xi.iter().filter(|&&coefficient| coefficient != 0.0).count();
+        let counts = |of: &dyn Fn(&[f64]) -> usize| BeforeAfter {
+            before: of(&before),
+            after: of(&equation.xi),
+        };
         Ok(EquationCertificate {
             output,
             rms,
@@ -292,10 +280,8 @@ impl<'a> PhaseProblem<'a> {
             bound,
             sum_of_bounds: equation.spent,
             measured,
-            terms_before: active(&self.coefficients(output)),
-            terms_after: active(&equation.xi),
-            digits_before: digits(&self.coefficients(output)),
-            digits_after: digits(&equation.xi),
+            terms: counts(&active),
+            digits: counts(&digits),
             changes: equation
                 .steps
                 .iter()
@@ -305,12 +291,9 @@ impl<'a> PhaseProblem<'a> {
     }
 
     fn change(&self, step: &Step) -> Change {
-        let own = (step.row, step.before - step.after);
-        let others = step
-            .effects
-            .iter()
-            .map(|&(row, before, after)| (row, before - after));
-        let parts: Vec<(usize, f64)> = std::iter::once(own).chain(others).collect();
+        let own = (step.row, step.before, step.after);
+        let differences = std::iter::once(own).chain(step.effects.iter().copied());
+        let differences = Differences(differences.collect());
         let effect = |&(row, before, after): &(usize, f64, f64)| Effect {
             term: self.workspace.text(row).to_owned(),
             before,
@@ -323,7 +306,7 @@ impl<'a> PhaseProblem<'a> {
             after: step.after,
             effects: step.effects.iter().map(effect).collect(),
             bound: step.bound,
-            measured: Measured::of(at_samples(&self.theta, &parts)),
+            measured: differences.measured(&self.theta),
         }
     }
 }

@@ -209,7 +209,7 @@ fn changes_of_the_certificate_replayed_give_the_simplified_coefficients() {
                 }
                 replayed.retain(|_, xi| *xi != 0.0);
                 assert_eq!(replayed, coefficients(&made.model), "seed {seed}");
-                assert_eq!(equation.terms_after, replayed.len());
+                assert_eq!(equation.terms.after, replayed.len());
             }
         }
     }
@@ -351,7 +351,7 @@ fn rounding_spends_the_tolerance_where_it_saves_most_digits() {
         .map(|(text, xi)| (text.as_str(), *xi))
         .collect();
     assert_eq!(names, [("z1", 3.24), ("dz1", 3.0), ("u1", 1.4)]);
-    assert_eq!(equation.digits_after, 6);
+    assert_eq!(equation.digits.after, 6);
     assert!(equation.bound.magnitude() <= 0.06);
 }
 
@@ -453,7 +453,7 @@ fn printing_error_is_bounded_by_what_was_cut_off() {
     let ranges = vec![Some(vec![Interval::new(-2.0, 1.0); 3])];
     let domain = Domain::new(&model, ranges).expect("a box");
     let rounding = crate::typeset::Rounding::Decimals(2);
-    let printed = printed(&model, &domain, None, rounding).expect("evaluates");
+    let printed = printed(&Equations::of(&model), &domain, None, rounding).expect("evaluates");
     let bound = printed[0].bound.expect("has a box");
     assert!((bound.magnitude() - 0.008).abs() < 1e-12, "{bound}");
 }

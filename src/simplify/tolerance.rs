@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::typeset::rounded;
+
 /// The largest |ddz of the model - ddz of the simplified model| at any point of the domain, each
 /// latent coordinate for itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +27,16 @@ pub struct ToleranceError {
 }
 
 impl Tolerance {
+    /// The tolerance with its unit, in words.
+    pub fn words(self) -> String {
+        match self {
+            Self::ShareOfRms(_) => {
+                format!("{self} of the root mean square of each ddz over the recordings")
+            }
+            Self::Absolute(_) => format!("{self} scaled units per s^2"),
+        }
+    }
+
     /// Whether nothing may change.
     pub fn is_zero(self) -> bool {
         match self {
@@ -57,10 +69,7 @@ impl fmt::Display for Tolerance {
         match self {
             // two roundings, of the division and of this product, may leave 0.30000000000000004
             Tolerance::ShareOfRms(share) => {
-                let percent: f64 = format!("{:.12e}", share * 100.0)
-                    .parse()
-                    .expect("a formatted float reads back");
-                write!(f, "{percent}%")
+                write!(f, "{}%", rounded(share * 100.0, 13))
             }
             Tolerance::Absolute(value) => write!(f, "{value}"),
         }

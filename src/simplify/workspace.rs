@@ -1,39 +1,37 @@
-//! The model's library with the terms that others may be rewritten to.
+//! The terms of equations, with those that they may be rewritten to.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::DMatrix;
 
 use super::error::SimplifyError;
 use super::ranges::Ranges;
+use crate::equations::Equations;
 use crate::model::{LatentVariable, Library, LibraryError, ReducedModel};
 use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
 
-/// Rows of the terms `1`, `z1`, `z1^2` and so on, in a library that has them.
+/// A library of terms, counted by rows, and the rows of `1`, of variables and of their squares.
 #[derive(Clone, Debug)]
 pub(super) struct Workspace {
     library: Library,
-    /// Number of the model's own terms; the others are appended.
+    /// Number of the equations' own terms; the others are appended.
     original: usize,
-    constant: Option<usize>,
-    linear: BTreeMap<SymbolId, usize>,
-    squares: BTreeMap<SymbolId, usize>,
+    /// Rows of powers of variables; the constant is the power 0 of no variable.
+    powers: BTreeMap<(Option<SymbolId>, i64), usize>,
 }
 
 impl Workspace {
-    /// The library of `model`, extended by `1`, by every variable of its active terms that are not
-    /// affine, and by the squares of variables that such a term takes a function of.
+    /// The terms of `equations`, extended by `1`, by every variable of those summands that are not
+    /// affine, and by the squares of variables that such a summand takes a function of.
     ///
     /// # Errors
-    /// [`LibraryError`] if the model's own terms are refused, which a model excludes.
-    pub fn new(model: &ReducedModel) -> Result<Self, LibraryError> {
-        let own = model.library();
-        let mut texts: Vec<String> = (own.terms().iter())
-            .map(|term| term.text().to_owned())
-            .collect();
-        let mut pool = own.pool().clone();
-        let known: Vec<ExprId> = own.terms().iter().map(|term| term.expr()).collect();
-        for text in wanted(model) {
+    /// [`LibraryError`] if the equations' own terms are refused, which equations exclude.
+    pub fn new(equations: &Equations<'_>) -> Result<Self, LibraryError> {
+        let own = equations.terms();
+        let mut texts: Vec<String> = own.iter().map(|term| term.text().to_owned()).collect();
+        let mut pool = equations.pool().clone();
+        let known: BTreeSet<ExprId> = own.iter().map(|term| term.expr()).collect();
+        for text in wanted(equations) {
             let expr = pool
                 .parse(&text, &|_| true)
                 .expect("constants, variables and their squares parse");
@@ -41,47 +39,16 @@ impl Workspace {
                 texts.push(text);
             }
         }
-        let library = match Library::from_terms(own.latent_dim(), &texts) {
-            Ok(extended) => extended,
-            Err(LibraryError::TooManyTerms { .. }) => own.clone(),
-            Err(error) => return Err(error),
-        };
-        let mut workspace = Self {
+        let dim = equations.latent_dim();
+        let library = match Library::from_terms(dim, &texts) {
+            Err(LibraryError::TooManyTerms { .. }) => Library::from_terms(dim, &texts[..own.len()]),
+            library => library,
+        }?;
+        Ok(Self {
             original: own.len(),
+            powers: powers(&library),
             library,
-            constant: None,
-            linear: BTreeMap::new(),
-            squares: BTreeMap::new(),
-        };
-        workspace.find_rows();
-        Ok(workspace)
-    }
-
-    fn find_rows(&mut self) {
-        let mut pool = self.library.pool().clone();
-        let one = pool.number(1.0);
-        let variables = LatentVariable::all(self.library.latent_dim());
-        let symbols: Vec<SymbolId> = variables
-            .filter_map(|variable| self.library.symbol(variable))
-            .collect();
-        let mut linear = BTreeMap::new();
-        let mut squares = BTreeMap::new();
-        for symbol in symbols {
-            let expr = pool.symbol_expr(symbol);
-            linear.insert(expr, symbol);
-            squares.insert(pool.powi(expr, 2), symbol);
-        }
-        for (row, term) in self.library.terms().iter().enumerate() {
-            if term.expr() == one {
-                self.constant = Some(row);
-            }
-            if let Some(&symbol) = linear.get(&term.expr()) {
-                self.linear.insert(symbol, row);
-            }
-            if let Some(&symbol) = squares.get(&term.expr()) {
-                self.squares.insert(symbol, row);
-            }
-        }
+        })
     }
 
     /// Number of terms.
@@ -101,17 +68,17 @@ impl Workspace {
 
     /// The row of `1`.
     pub fn constant(&self) -> Option<usize> {
-        self.constant
+        self.powers.get(&(None, 0)).copied()
     }
 
     /// The row of a variable itself.
     pub fn linear(&self, symbol: SymbolId) -> Option<usize> {
-        self.linear.get(&symbol).copied()
+        self.powers.get(&(Some(symbol), 1)).copied()
     }
 
     /// The row of a variable's square.
     pub fn square(&self, symbol: SymbolId) -> Option<usize> {
-        self.squares.get(&symbol).copied()
+        self.powers.get(&(Some(symbol), 2)).copied()
     }
 
     /// Ranges over a box, `3 latent_dim` intervals.
@@ -126,27 +93,28 @@ impl Workspace {
         )
     }
 
-    /// Xi of a phase with zeros for the appended terms.
-    pub fn xi(&self, model: &ReducedModel, phase: usize) -> DMatrix<f64> {
+    /// The coefficients of a phase with zeros for the appended terms, one row per term.
+    pub fn coefficients(&self, equations: &Equations<'_>, phase: usize) -> DMatrix<f64> {
         let added = self.len() - self.original;
-        let xi = model.phases()[phase].xi.clone();
-        xi.insert_rows(self.original, added, 0.0)
+        let own = equations.coefficients(phase);
+        own.insert_rows(self.original, added, 0.0)
     }
 
-    /// The model with these coefficients, one matrix a phase. Appended terms that no phase uses are
+    /// A model of these coefficients, one matrix per phase. Appended terms that no phase uses are
     /// left out, so that a model keeps its library where it can.
     ///
     /// # Errors
     /// [`SimplifyError::Model`] if a coefficient is not finite.
     pub fn finish(
         &self,
-        model: &ReducedModel,
+        model: ReducedModel,
         xi: &[DMatrix<f64>],
     ) -> Result<ReducedModel, SimplifyError> {
         let used = |row: &usize| xi.iter().any(|xi| xi.row(*row).iter().any(|&c| c != 0.0));
-        let added: Vec<usize> = (self.original..self.len()).filter(used).collect();
-        let rows: Vec<usize> = (0..self.original).chain(added.iter().copied()).collect();
-        let library = if added.is_empty() {
+        let rows: Vec<usize> = (0..self.original)
+            .chain((self.original..self.len()).filter(used))
+            .collect();
+        let library = if rows.len() == self.original {
             model.library().clone()
         } else {
             let texts: Vec<String> = rows.iter().map(|&row| self.text(row).to_owned()).collect();
@@ -158,33 +126,51 @@ impl Workspace {
                 ..phase.clone()
             })
             .collect();
-        let builder = model.clone().into_builder();
+        let builder = model.into_builder();
         Ok(builder.library(library).phases(phases).build()?)
     }
 }
 
+/// The rows of `1`, of variables and of their squares.
+fn powers(library: &Library) -> BTreeMap<(Option<SymbolId>, i64), usize> {
+    let mut pool = library.pool().clone();
+    let mut exprs = vec![((None, 0), pool.number(1.0))];
+    for variable in LatentVariable::all(library.latent_dim()) {
+        let Some(symbol) = library.symbol(variable) else {
+            continue;
+        };
+        let expr = pool.symbol_expr(symbol);
+        exprs.push(((Some(symbol), 1), expr));
+        exprs.push(((Some(symbol), 2), pool.powi(expr, 2)));
+    }
+    let terms = library.terms().iter().enumerate();
+    let rows: BTreeMap<ExprId, usize> = terms.map(|(row, term)| (term.expr(), row)).collect();
+    let row = |(power, expr)| Some((power, *rows.get(&expr)?));
+    exprs.into_iter().filter_map(row).collect()
+}
+
 /// Texts of the terms that rewriting may need.
-fn wanted(model: &ReducedModel) -> Vec<String> {
-    let library = model.library();
-    let pool = library.pool();
+fn wanted(equations: &Equations<'_>) -> Vec<String> {
+    let pool = equations.pool();
+    let summands = equations
+        .phases()
+        .iter()
+        .flat_map(|phase| &phase.ddz)
+        .flatten();
+    let active: BTreeSet<usize> = summands.map(|summand| summand.term).collect();
     let mut texts = vec!["1".to_owned()];
-    for (row, term) in library.terms().iter().enumerate() {
-        let is_active = model.phases().iter().any(|phase| {
-            let coefficients = phase.xi.row(row);
-            coefficients.iter().any(|&c| c != 0.0)
-        });
-        if !is_active || pool.as_symbol(term.expr()).is_some() {
+    for term in active.into_iter().map(|term| &equations.terms()[term]) {
+        if pool.as_symbol(term.expr()).is_some() {
             continue;
         }
         let symbols = pool.symbols_of(term.expr());
         let names = symbols.iter().map(|&symbol| pool.symbol_name(symbol));
-        texts.extend(names.map(str::to_owned));
+        texts.extend(names.clone().map(str::to_owned));
         if symbols.len() == 1 && has_function(pool, term.expr()) {
-            let names = symbols.iter().map(|&symbol| pool.symbol_name(symbol));
             texts.extend(names.map(|name| format!("{name}^2")));
         }
     }
-    let mut seen = std::collections::BTreeSet::new();
+    let mut seen = BTreeSet::new();
     texts.retain(|text| seen.insert(text.clone()));
     texts
 }

@@ -1,4 +1,4 @@
-//! What one training of a study came to.
+//! The outcome of one training of a study.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,24 +12,24 @@ use crate::train::{SetMetrics, TrainReport};
 pub struct Cell {
     /// Which training.
     pub id: CellId,
-    /// What it came to.
+    /// Its outcome.
     pub outcome: Outcome,
 }
 
-/// Figures, or why there are none.
+/// Metrics, or the reason why there are none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
     /// A model was found.
-    Trained(Figures),
+    Trained(Metrics),
     /// Training refused, for this reason; the same settings would refuse again.
     Refused(String),
 }
 
-/// Figures of one model, on the validation jumps where there are any, else on the training jumps.
+/// Metrics of one model, on the validation jumps where there are any, else on the training jumps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Figures {
+pub struct Metrics {
     /// Mean square of `x - decode(encode(x))`, scaled units (16).
     pub decoder_mse: f64,
     /// Active coefficients in the first phase (contact), as the paper counts them.
@@ -44,8 +44,8 @@ pub struct Figures {
     pub prediction_z_m: f64,
 }
 
-impl Figures {
-    /// The figures of a finished training.
+impl Metrics {
+    /// The metrics of a finished training.
     pub fn of(report: &TrainReport) -> Self {
         let set: &SetMetrics = report.validation.as_ref().unwrap_or(&report.training);
         let active = report.active_terms.iter().map(|phase| phase.active);

@@ -1,19 +1,17 @@
-//! What can keep a study from its result.
+//! Errors of a study.
+
+#![allow(missing_docs, reason = "each variant's message names its fields")]
 
 use std::io;
 use std::path::PathBuf;
 
-use thiserror::Error;
-
 /// Why a study stopped.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// A range of dimensions or seeds that cannot be trained.
     #[error("{found}, expected {expected}")]
     Range {
-        /// What was asked for.
         found: String,
-        /// What could be.
         expected: &'static str,
     },
     /// A folder holds another study.
@@ -21,35 +19,20 @@ pub enum StudyError {
         "{path}: belongs to another study ({difference} differ); choose another folder, or repeat the command that made it"
     )]
     OtherStudy {
-        /// Its plan.
         path: PathBuf,
-        /// Which part of the plan is not the same.
         difference: &'static str,
     },
     /// A file of a study does not hold what it should.
     #[error("{path}: {message}")]
-    Broken {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it, and where.
-        message: String,
-    },
+    Broken { path: PathBuf, message: String },
     /// Two parts computed the same training with different results.
     #[error("{first} and {second} are the same training with different results")]
-    Contradiction {
-        /// One file.
-        first: PathBuf,
-        /// The other.
-        second: PathBuf,
-    },
-    /// The file system refused.
+    Contradiction { first: PathBuf, second: PathBuf },
+    /// The file system refused to `read`, `write` or `make the folder`.
     #[error("{path}: cannot {action}")]
     File {
-        /// File or folder.
         path: PathBuf,
-        /// `read`, `write`, `make the folder`.
         action: &'static str,
-        /// Why.
         source: io::Error,
     },
 }

@@ -1,6 +1,6 @@
 //! Accuracy against complexity: one training for every latent dimension and seed (figures 10 and 11 of the paper).
 //!
-//! Enters: a [`Plan`] and recordings. Leaves: a folder with one file a training, each written whole, so that a stopped
+//! Enters: a [`Plan`] and recordings. Leaves: a folder with one file per training, each written whole, so that a stopped
 //! study goes on where it was and parts computed on several machines can be joined; and their [`Summary`]. Read
 //! [`plan`] first, then [`run()`](run()).
 
@@ -12,9 +12,9 @@ mod run;
 mod store;
 mod summary;
 
-pub use cell::{Cell, Figures, Outcome};
+pub use cell::{Cell, Metrics, Outcome};
 pub use error::StudyError;
 pub use plan::{CellId, Plan, Shard};
 pub use run::run;
 pub use store::Store;
-pub use summary::{DimensionSummary, Spread, Summary, cells_csv};
+pub use summary::{DimensionSummary, Spread, Summary, cell_table};

@@ -4,11 +4,12 @@ use serde::{Deserialize, Serialize};
 
 use super::error::StudyError;
 use crate::robot::STATE_DIM;
+use crate::train::Method;
 
 /// Seeds of the closed form leave out every jump whose number has this remainder of the seed.
 pub const FOLDS: usize = 5;
 
-/// What a study trains; parts of one study have equal plans.
+/// The trainings of a study; parts of one study have equal plans.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
@@ -16,8 +17,8 @@ pub struct Plan {
     pub latent_dims: Vec<usize>,
     /// Seeds, counted from 1.
     pub seeds: usize,
-    /// `closed-form` or `joint`.
-    pub method: String,
+    /// How models are learned.
+    pub method: Method,
     /// The settings of the training as flags.
     pub settings: String,
     /// Digests of the recordings, training then validation.
@@ -39,7 +40,7 @@ pub struct CellId {
 }
 
 impl Plan {
-    /// Complains about dimensions and seeds that no training can have.
+    /// Refuses dimensions and seeds that no training can have.
     ///
     /// # Errors
     /// [`StudyError::Range`].
@@ -88,7 +89,7 @@ impl Shard {
     /// Reads `3/8`.
     ///
     /// # Errors
-    /// What was expected, if it is anything else.
+    /// The expected form, if it is anything else.
     pub fn parse(text: &str) -> Result<Self, String> {
         let expected = || format!("found `{text}`, expected a part such as 3/8");
         let (index, count) = text.split_once('/').ok_or_else(expected)?;

@@ -56,7 +56,7 @@ impl Store {
         Ok(Self { folder, plan })
     }
 
-    /// What is trained.
+    /// The plan of the study.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
@@ -138,7 +138,7 @@ impl Store {
     }
 }
 
-/// What of two plans is not the same.
+/// The first part in which two plans differ.
 fn difference(found: &Plan, expected: &Plan) -> Option<&'static str> {
     let parts = [
         ("the versions of romc", found.romc != expected.romc),
@@ -187,12 +187,13 @@ fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), StudyError> {
 mod tests {
     use super::*;
     use crate::study::cell::Outcome;
+    use crate::train::Method;
 
     fn plan() -> Plan {
         Plan {
             latent_dims: vec![1, 2],
             seeds: 2,
-            method: "closed-form".to_owned(),
+            method: Method::ClosedForm,
             settings: String::new(),
             recordings: vec!["sha256:1".to_owned()],
             training: 1,

@@ -1,10 +1,9 @@
-//! Means and spreads over the seeds of a study, and the tables of it.
-
-use std::fmt::Write as _;
+//! Means and spreads over the seeds of a study, and its tables.
 
 use serde::Serialize;
 
-use super::cell::{Cell, Figures, Outcome};
+use super::cell::{Cell, Metrics, Outcome};
+use crate::typeset::Table;
 
 /// Mean and standard deviation over seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -28,7 +27,7 @@ impl Spread {
     }
 }
 
-/// What the seeds of one latent dimension came to.
+/// Metrics of one latent dimension over its seeds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DimensionSummary {
     /// Number of latent coordinates.
@@ -83,82 +82,81 @@ impl Summary {
         best.map(|row| row.latent_dim)
     }
 
-    /// One row a latent dimension: means and standard deviations.
-    pub fn csv(&self) -> String {
-        let mut text = String::from("latent_dim,trained,refused");
-        let columns = [
-            "decoder_mse",
-            "active",
-            "combined_loss",
-            "torque_r2",
-            "prediction_x_m",
-            "prediction_z_m",
+    /// One row per latent dimension: means and standard deviations.
+    pub fn table(&self) -> Table {
+        let mut table = Table::of(&self.dimensions)
+            .column("latent_dim", "", |row| row.latent_dim)
+            .column("trained", "", |row| row.trained)
+            .column("refused", "", |row| row.refused)
+            .table();
+        let rows = self.dimensions.iter();
+        let columns: [(&str, fn(&DimensionSummary) -> Spread); 6] = [
+            ("decoder_mse", |row| row.decoder_mse),
+            ("active", |row| row.active),
+            ("combined_loss", |row| row.combined_loss),
+            ("torque_r2", |row| row.torque_r2),
+            ("prediction_x_m", |row| row.prediction_x_m),
+            ("prediction_z_m", |row| row.prediction_z_m),
         ];
-        for column in columns {
-            let _ = write!(text, ",{column}_mean,{column}_std");
+        for (name, spread) in columns {
+            let (mean, std) = (format!("{name}_mean"), format!("{name}_std"));
+            table.column(
+                &mean,
+                "",
+                rows.clone().map(|row| spread(row).mean.to_string()),
+            );
+            table.column(
+                &std,
+                "",
+                rows.clone().map(|row| spread(row).std.to_string()),
+            );
         }
-        text.push('\n');
-        for row in &self.dimensions {
-            let _ = write!(text, "{},{},{}", row.latent_dim, row.trained, row.refused);
-            let spreads = [
-                row.decoder_mse,
-                row.active,
-                row.combined_loss,
-                row.torque_r2,
-                row.prediction_x_m,
-                row.prediction_z_m,
-            ];
-            for Spread { mean, std } in spreads {
-                let _ = write!(text, ",{mean},{std}");
-            }
-            text.push('\n');
-        }
-        text
+        table
     }
 }
 
-/// One row a training, in the order of the plan.
-pub fn cells_csv(cells: &[Cell], lambda: f64) -> String {
-    let mut text = String::from(
-        "latent_dim,seed,decoder_mse,active,active_all_phases,combined_loss,torque_r2,prediction_x_m,prediction_z_m,refused\n",
-    );
+/// One row per training, in the order of the plan.
+pub fn cell_table(cells: &[Cell], lambda: f64) -> Table {
+    let columns = "latent_dim,seed,decoder_mse,active,active_all_phases,combined_loss,torque_r2,prediction_x_m,prediction_z_m,refused";
+    let mut table = Table::new(columns.split(','));
     for Cell { id, outcome } in cells {
-        let _ = write!(text, "{},{}", id.latent_dim, id.seed);
-        let _ = match outcome {
-            Outcome::Trained(figures) => writeln!(
-                text,
-                ",{},{},{},{},{},{},{},",
-                figures.decoder_mse,
-                figures.active,
-                figures.active_all_phases,
-                figures.combined_loss(lambda),
-                figures.torque_r2,
-                figures.prediction_x_m,
-                figures.prediction_z_m
-            ),
+        let mut row = vec![id.latent_dim.to_string(), id.seed.to_string()];
+        match outcome {
+            Outcome::Trained(metrics) => row.extend([
+                metrics.decoder_mse.to_string(),
+                metrics.active.to_string(),
+                metrics.active_all_phases.to_string(),
+                metrics.combined_loss(lambda).to_string(),
+                metrics.torque_r2.to_string(),
+                metrics.prediction_x_m.to_string(),
+                metrics.prediction_z_m.to_string(),
+                String::new(),
+            ]),
             Outcome::Refused(reason) => {
-                writeln!(text, ",,,,,,,,\"{}\"", reason.replace('"', "\"\""))
+                row.resize(columns.matches(',').count(), String::new());
+                row.push(reason.clone());
             }
-        };
+        }
+        table.row(row);
     }
-    text
+    table
 }
 
 fn dimension(cells: &[Cell], latent_dim: usize, lambda: f64) -> Option<DimensionSummary> {
     let own = cells.iter().filter(|cell| cell.id.latent_dim == latent_dim);
-    let (mut figures, mut refused): (Vec<&Figures>, usize) = (Vec::new(), 0);
+    let (mut metrics, mut refused): (Vec<&Metrics>, usize) = (Vec::new(), 0);
     for cell in own {
         match &cell.outcome {
-            Outcome::Trained(found) => figures.push(found),
+            Outcome::Trained(found) => metrics.push(found),
             Outcome::Refused(_) => refused += 1,
         }
     }
-    let spread = |value: &dyn Fn(&Figures) -> f64| {
-        Spread::of(&figures.iter().map(|found| value(found)).collect::<Vec<_>>())
+    let spread = |value: &dyn Fn(&Metrics) -> f64| {
+        Spread::of(&metrics.iter().map(|found| value(found)).collect::<Vec<_>>())
     };
     Some(DimensionSummary {
         latent_dim,
-        trained: figures.len(),
+        trained: metrics.len(),
         refused,
         decoder_mse: spread(&|found| found.decoder_mse)?,
         active: spread(&|found| found.active as f64)?,
@@ -181,7 +179,7 @@ mod tests {
                 latent_dim: 2,
                 seed,
             },
-            outcome: Outcome::Trained(Figures {
+            outcome: Outcome::Trained(Metrics {
                 decoder_mse,
                 active,
                 active_all_phases: active,
@@ -210,7 +208,7 @@ mod tests {
         );
         let expected = (2.0 + 10.0_f64.ln() + 6.0 + 20.0_f64.ln()) / 2.0;
         assert!((row.combined_loss.mean - expected).abs() < 1e-12);
-        let table = cells_csv(&cells, 0.5);
+        let table = cell_table(&cells, 0.5).csv();
         assert_eq!(table.lines().count(), 4);
         assert!(table.contains("\"no \"\"stable\"\" model\""), "{table}");
         assert!(

@@ -44,8 +44,8 @@ pub use error::TrainError;
 pub use joint::{Integrator, Unroll, joint};
 pub use metrics::{SetMetrics, assess};
 pub use options::{
-    EncoderOptions, JointOptions, LibraryChoice, MapOptions, RegressionOptions, TrainOptions,
-    Transfer,
+    EncoderOptions, JointOptions, LibraryChoice, MapOptions, Method, RegressionOptions,
+    TrainOptions, Transfer,
 };
 pub use progress::{Progress, Watch};
 pub use report::{PhaseTerms, SeedReport, TrainReport, Trained};

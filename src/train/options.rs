@@ -1,17 +1,23 @@
 //! What to train and how.
 
+use clap::ValueEnum;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
+use super::assemble::Origin;
+use super::closed_form::closed_form;
+use super::data_sets::Recordings;
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
-use super::joint::{LossWeights, Schedule, Unroll};
+use super::joint::{LossWeights, Schedule, Unroll, joint};
 use super::metrics::{BODY_X, BODY_Z};
+use super::progress::Watch;
+use super::report::Trained;
 use super::sparse::Pruning;
 use crate::model::{Activation, Library, MAX_LAYER_WIDTH, MAX_LAYERS, StandardLibrary};
 use crate::recording::PhaseRule;
 use crate::recording::phases::CHATTER_SAMPLES;
-use crate::robot::STATE_DIM;
+use crate::robot::{Robot, STATE_DIM};
 
 /// Candidate terms to choose from.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +26,36 @@ pub enum LibraryChoice {
     Standard(StandardLibrary),
     /// Expressions over `z1..zd`, `dz1..dzd`, `u1..ud`.
     Terms(Vec<String>),
+}
+
+/// How a model is learned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Encoder, decoder and coefficients each from a least-squares problem; seconds.
+    ClosedForm,
+    /// Encoder, decoder and coefficients together by Adam, as published; minutes.
+    Joint,
+}
+
+impl Method {
+    /// Learns a model: [`closed_form`] or [`joint`].
+    ///
+    /// # Errors
+    /// As the method's own function.
+    pub fn learn(
+        self,
+        recordings: Recordings<'_>,
+        robot: &'static Robot,
+        options: &TrainOptions,
+        origin: &Origin,
+        watch: &mut Watch<'_>,
+    ) -> Result<Trained, TrainError> {
+        match self {
+            Self::ClosedForm => closed_form(recordings, robot, options, origin, watch),
+            Self::Joint => joint(recordings, robot, options, origin, watch),
+        }
+    }
 }
 
 /// Settings of the training; [`TrainOptions::new`] gives the defaults for a latent dimension.

@@ -3,9 +3,9 @@
 use crate::equations::{Equations, PhaseEquations, Unit};
 
 use super::decimal::{Decimal, Rounding};
-use super::expression::{UnknownSymbol, expression};
+use super::expression::{UnknownSymbol, terms};
 use super::rounder::{Rounder, RoundingReport};
-use super::symbols::{Quantity, SymbolTable, Variable};
+use super::symbols::{Quantity, SymbolTable};
 use super::tree::{Math, Signed, Symbol};
 
 /// The equations of one phase, ready for a printer.
@@ -70,15 +70,10 @@ impl Typeset {
         symbols: &SymbolTable,
         rounding: Rounding,
     ) -> Result<Self, UnknownSymbol> {
-        let terms = system
-            .terms()
-            .iter()
-            .map(|term| expression(system.pool(), term.expr(), symbols))
-            .collect::<Result<Vec<_>, _>>()?;
         let mut layout = Layout {
             system,
             symbols,
-            terms,
+            terms: terms(system, symbols)?,
             rounder: Rounder::new(rounding),
         };
         let systems = system
@@ -104,10 +99,7 @@ struct Layout<'a> {
 
 impl Layout<'_> {
     fn acceleration(&self, output: usize) -> Symbol {
-        self.symbols.symbol(Variable {
-            quantity: Quantity::Acceleration,
-            index: output + 1,
-        })
+        self.symbols.symbol(Quantity::Acceleration, output + 1)
     }
 
     fn system(&mut self, phase: &PhaseEquations) -> EquationSystem {
@@ -133,46 +125,33 @@ impl Layout<'_> {
     }
 
     fn table(&self) -> CoefficientTable {
-        let outputs = 0..self.system.latent_dim();
         let phases = self.system.phases();
-        let columns = phases
-            .iter()
-            .flat_map(|phase| {
-                let name = &phase.name;
-                outputs
-                    .clone()
-                    .map(|output| (name.clone(), self.acceleration(output)))
-            })
+        let columns: Vec<(usize, usize)> = (0..phases.len())
+            .flat_map(|phase| (0..self.system.latent_dim()).map(move |output| (phase, output)))
             .collect();
         let xi: Vec<_> = (0..phases.len())
             .map(|phase| self.system.coefficients(phase))
             .collect();
-        let rows = self
-            .terms
-            .iter()
-            .enumerate()
-            .map(|(row, term)| CoefficientRow {
-                term: term.clone(),
-                unit: self.unit_of_term(row),
-                coefficients: xi
-                    .iter()
-                    .flat_map(|xi| outputs.clone().map(move |output| xi[(row, output)]))
-                    .map(|value| {
-                        let printed = self.rounder.round(value);
-                        (!printed.is_zero()).then_some(printed)
-                    })
-                    .collect(),
-            })
-            .filter(|row| row.coefficients.iter().any(Option::is_some))
-            .collect();
+        let cell = |value: f64| Some(self.rounder.round(value)).filter(|cell| !cell.is_zero());
+        let row = |(row, term): (usize, &Signed)| CoefficientRow {
+            term: term.clone(),
+            unit: self.unit_of_term(row),
+            coefficients: (columns.iter())
+                .map(|&(phase, output)| cell(xi[phase][(row, output)]))
+                .collect(),
+        };
         let units = self.system.latent_units().map(|units| {
-            let of_phase = phases.iter().flat_map(|_| outputs.clone());
-            of_phase.map(|output| units.acceleration(output)).collect()
+            let outputs = columns.iter().map(|(_, output)| *output);
+            outputs.map(|output| units.acceleration(output)).collect()
         });
         CoefficientTable {
-            columns,
+            rows: (self.terms.iter().enumerate().map(row))
+                .filter(|row| row.coefficients.iter().any(Option::is_some))
+                .collect(),
+            columns: (columns.iter())
+                .map(|&(phase, output)| (phases[phase].name.clone(), self.acceleration(output)))
+                .collect(),
             units,
-            rows,
         }
     }
 

@@ -3,11 +3,12 @@
 
 use std::cmp::Ordering;
 
+use crate::equations::Equations;
 use crate::symbolic::{ExprId, ExprPool, Function, Node, Number};
 
 use super::decimal::Decimal;
 use super::symbols::{SymbolTable, Variable};
-use super::tree::{FunctionName, Glyph, Math, Signed};
+use super::tree::{Glyph, Math, Signed};
 
 /// A name in an expression that no symbol is known for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -27,6 +28,20 @@ pub fn expression(
     symbols: &SymbolTable,
 ) -> Result<Signed, UnknownSymbol> {
     Layout { pool, symbols }.signed(expr)
+}
+
+/// Lays out all terms of equations.
+///
+/// # Errors
+/// [`UnknownSymbol`] as [`expression`].
+pub(super) fn terms(
+    equations: &Equations<'_>,
+    symbols: &SymbolTable,
+) -> Result<Vec<Signed>, UnknownSymbol> {
+    let terms = equations.terms().iter();
+    terms
+        .map(|term| expression(equations.pool(), term.expr(), symbols))
+        .collect()
 }
 
 /// Puts a coefficient before a term: `0.36` and `sin(dz1)` to `0.36 sin(dz1)`.
@@ -260,12 +275,12 @@ impl Layout<'_> {
         power: i64,
     ) -> Result<(FactorKey, Math), UnknownSymbol> {
         let power = Box::new(integer(power));
-        let math = match powered_name(function) {
-            Some(name) => {
+        let math = match has_power_on_name(function) {
+            true => {
                 let argument = Box::new(self.signed(argument)?.into_math());
-                Math::Function(name, Some(power), argument)
+                Math::Function(function, Some(power), argument)
             }
-            None => Math::Power(Box::new(self.apply(function, argument)?), power),
+            false => Math::Power(Box::new(self.apply(function, argument)?), power),
         };
         Ok((FactorKey::Function, math))
     }
@@ -300,7 +315,7 @@ impl Layout<'_> {
                 let variable = Variable::parse(name).ok_or_else(|| UnknownSymbol {
                     name: name.to_owned(),
                 })?;
-                let symbol = Math::Symbol(self.symbols.symbol(variable));
+                let symbol = Math::Symbol(self.symbols.symbol(variable.quantity, variable.index));
                 (FactorKey::Variable(Some(variable)), symbol)
             }
             Node::Apply(function, argument) => {
@@ -325,17 +340,10 @@ impl Layout<'_> {
 
     fn apply(&self, function: Function, argument: ExprId) -> Result<Math, UnknownSymbol> {
         let argument = Box::new(self.signed(argument)?.into_math());
-        let named = |name| Math::Function(name, None, argument.clone());
         Ok(match function {
-            Function::Sin => named(FunctionName::Sin),
-            Function::Cos => named(FunctionName::Cos),
-            Function::Tan => named(FunctionName::Tan),
-            Function::Tanh => named(FunctionName::Tanh),
-            Function::Exp => named(FunctionName::Exp),
-            Function::Log => named(FunctionName::Ln),
-            Function::Sign => named(FunctionName::Sgn),
             Function::Sqrt => Math::Root(argument, None),
             Function::Abs => Math::Absolute(argument),
+            named => Math::Function(named, None, argument),
         })
     }
 
@@ -413,15 +421,12 @@ fn ends_with_word(math: &Math) -> bool {
     }
 }
 
-/// Functions whose power is written on the name, as in `sin^2`.
-fn powered_name(function: Function) -> Option<FunctionName> {
+/// Whether the power of a function is written on its name, as in `sin^2`.
+fn has_power_on_name(function: Function) -> bool {
+    use Function::{Abs, Cos, Exp, Log, Sign, Sin, Sqrt, Tan, Tanh};
     match function {
-        Function::Sin => Some(FunctionName::Sin),
-        Function::Cos => Some(FunctionName::Cos),
-        Function::Tan => Some(FunctionName::Tan),
-        Function::Tanh => Some(FunctionName::Tanh),
-        Function::Log => Some(FunctionName::Ln),
-        Function::Exp | Function::Sqrt | Function::Abs | Function::Sign => None,
+        Sin | Cos | Tan | Tanh | Log => true,
+        Exp | Sqrt | Abs | Sign => false,
     }
 }
 

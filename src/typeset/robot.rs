@@ -8,9 +8,10 @@ use crate::model::AffineMap;
 
 use super::decimal::{Decimal, Rounding};
 use super::equations::{Equation, EquationSystem};
-use super::expression::{UnknownSymbol, expression};
+use super::error::RobotTypesetError;
+use super::expression::terms;
 use super::rounder::{Rounder, RoundingReport};
-use super::symbols::{Quantity, SymbolTable, Variable, glyph};
+use super::symbols::{Quantity, SymbolTable, glyph};
 use super::tree::{Glyph, Math, Signed, Symbol};
 
 /// Weights below this share of their row's largest are left out of the printed encoder.
@@ -28,24 +29,6 @@ pub struct RobotTypeset {
     pub systems: Vec<EquationSystem>,
     /// What rounding changed in `systems`.
     pub rounding: RoundingReport,
-}
-
-/// Why a model cannot be printed in robot coordinates.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RobotTypesetError {
-    /// A variable has no symbol in print.
-    #[error(transparent)]
-    Symbol(#[from] UnknownSymbol),
-    /// A coefficient is too large once folded with weights and scale factors.
-    #[error("robot coordinates, {output}: the coefficient of {term:?} is {value} in SI units")]
-    NotFinite {
-        /// Left side of the equation.
-        output: String,
-        /// The term.
-        term: String,
-        /// What the coefficient became.
-        value: f64,
-    },
 }
 
 impl RobotTypeset {
@@ -71,11 +54,7 @@ impl RobotTypeset {
         };
         let decoder = decoder.weights();
         let coordinates = coordinate_symbols(&state.names);
-        let terms = system
-            .terms()
-            .iter()
-            .map(|term| expression(system.pool(), term.expr(), symbols))
-            .collect::<Result<Vec<_>, _>>()?;
+        let terms = terms(system, symbols)?;
         let (encoder, negligible_weights) = encoder(map, &factors, symbols, &coordinates)?;
         let mut rounder = Rounder::new(rounding);
         let mut systems = Vec::new();
@@ -155,10 +134,7 @@ fn encoder(
             .zip(&terms)
             .filter(|(weight, _)| is_printed(**weight))
             .map(|(weight, term)| (*weight, "", term));
-        let left = symbols.symbol(Variable {
-            quantity: Quantity::Position,
-            index: row + 1,
-        });
+        let left = symbols.symbol(Quantity::Position, row + 1);
         equations.push(rounder.equation(left, ("encoder", ""), bias.chain(entries)));
     }
     Ok((equations, left_out))

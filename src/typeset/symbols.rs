@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::error::RenameError;
 use super::tree::{GREEK, Glyph, Symbol};
 
 /// What a variable of the latent model is.
@@ -43,50 +44,6 @@ impl Variable {
         let index = digits.parse().ok()?;
         Some(Self { quantity, index })
     }
-}
-
-/// Why a table of new names was refused.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum RenameError {
-    /// The entry has no `=`.
-    #[error("`{entry}`: expected `VARIABLE=NAME`, for example `z1=x`")]
-    Form {
-        /// The entry as given.
-        entry: String,
-    },
-    /// The left side is no variable that can have a new name.
-    #[error("`{found}` cannot be renamed: expected z1, z2, ... or u1, u2, ... (dots follow z)")]
-    Variable {
-        /// What stood left of `=`.
-        found: String,
-    },
-    /// The right side is no name.
-    #[error(
-        "`{variable}={found}`: expected a letter, a word or a Greek letter's name, with an \
-         optional subscript of letters and digits after `_` (x, theta, p_x, F_lin,1)"
-    )]
-    Name {
-        /// The variable.
-        variable: String,
-        /// What stood right of `=`.
-        found: String,
-    },
-    /// The same variable is renamed twice.
-    #[error("`{variable}` is renamed twice")]
-    Twice {
-        /// The variable.
-        variable: String,
-    },
-    /// Two variables would look the same in print.
-    #[error("`{first}` and `{second}` would both be printed as `{name}`")]
-    Collision {
-        /// One variable.
-        first: String,
-        /// The other.
-        second: String,
-        /// Their common name.
-        name: String,
-    },
 }
 
 /// New names for latent coordinates and inputs, such as `z1=x`, `u2=F_z`.
@@ -143,24 +100,25 @@ impl SymbolTable {
         self.names.is_empty()
     }
 
-    /// How `variable` is written.
-    pub fn symbol(&self, variable: Variable) -> Symbol {
-        let (base, dots) = match variable.quantity {
-            Quantity::Position => (Quantity::Position, 0),
-            Quantity::Velocity => (Quantity::Position, 1),
-            Quantity::Acceleration => (Quantity::Position, 2),
-            Quantity::Input => (Quantity::Input, 0),
+    /// How a variable is written, its index counted from one.
+    pub fn symbol(&self, quantity: Quantity, index: usize) -> Symbol {
+        let (base, letter, dots) = match quantity {
+            Quantity::Position => (Quantity::Position, 'z', 0),
+            Quantity::Velocity => (Quantity::Position, 'z', 1),
+            Quantity::Acceleration => (Quantity::Position, 'z', 2),
+            Quantity::Input => (Quantity::Input, 'u', 0),
         };
-        let mut symbol = match self.names.get(&(base, variable.index)) {
-            Some(symbol) => symbol.clone(),
-            None => Symbol {
-                glyph: Glyph::Letter(if base == Quantity::Input { 'u' } else { 'z' }),
-                dots: 0,
-                subscript: vec![Glyph::Digits(variable.index.to_string())],
+        match self.names.get(&(base, index)) {
+            Some(symbol) => Symbol {
+                dots,
+                ..symbol.clone()
             },
-        };
-        symbol.dots = dots;
-        symbol
+            None => Symbol {
+                glyph: Glyph::Letter(letter),
+                dots,
+                subscript: vec![Glyph::Digits(index.to_string())],
+            },
+        }
     }
 
     fn check_distinct(&self, latent_dim: usize) -> Result<(), RenameError> {
@@ -168,7 +126,7 @@ impl SymbolTable {
         for (quantity, letter) in [(Quantity::Position, 'z'), (Quantity::Input, 'u')] {
             for index in 1..=latent_dim {
                 let name = format!("{letter}{index}");
-                let symbol = self.symbol(Variable { quantity, index });
+                let symbol = self.symbol(quantity, index);
                 if let Some(first) = seen.insert(symbol.clone(), name.clone()) {
                     return Err(RenameError::Collision {
                         first,
@@ -275,7 +233,10 @@ mod tests {
     #[test]
     fn table_renames_the_coordinate_and_all_its_derivatives() {
         let table = SymbolTable::parse(&["z1 = x", "u2=F_lin,z", "z2=theta"], 2).unwrap();
-        let show = |name: &str| table.symbol(Variable::parse(name).unwrap()).to_string();
+        let show = |name: &str| {
+            let Variable { quantity, index } = Variable::parse(name).unwrap();
+            table.symbol(quantity, index).to_string()
+        };
         assert_eq!(show("z1"), "x");
         assert_eq!(show("ddz1"), "ddx");
         assert_eq!(show("dz2"), "dtheta");

@@ -1,6 +1,7 @@
 //! The typeset tree: mathematics as it is laid out, before it has a spelling.
 
 use super::decimal::Decimal;
+use crate::symbolic::Function;
 
 /// One piece of laid-out mathematics.
 ///
@@ -27,8 +28,9 @@ pub enum Math {
     Power(Box<Math>, Box<Math>),
     /// A root; no index means the square root.
     Root(Box<Math>, Option<u32>),
-    /// A named function of one argument, with an optional power on its name.
-    Function(FunctionName, Option<Box<Math>>, Box<Math>),
+    /// A function of one argument by its name, with an optional power on that; square roots and
+    /// magnitudes have forms of their own.
+    Function(Function, Option<Box<Math>>, Box<Math>),
     /// The absolute value.
     Absolute(Box<Math>),
     /// Parentheses.
@@ -125,37 +127,12 @@ pub const GREEK: [(&str, char); 34] = [
     ("Sigma", 'Σ'),
 ];
 
-/// The functions that are printed by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FunctionName {
-    /// Sine.
-    Sin,
-    /// Cosine.
-    Cos,
-    /// Tangent.
-    Tan,
-    /// Hyperbolic tangent.
-    Tanh,
-    /// Exponential.
-    Exp,
-    /// Natural logarithm.
-    Ln,
-    /// Sign.
-    Sgn,
-}
-
-impl FunctionName {
-    /// The name as it is read, `ln` for the natural logarithm.
-    pub fn text(self) -> &'static str {
-        match self {
-            FunctionName::Sin => "sin",
-            FunctionName::Cos => "cos",
-            FunctionName::Tan => "tan",
-            FunctionName::Tanh => "tanh",
-            FunctionName::Exp => "exp",
-            FunctionName::Ln => "ln",
-            FunctionName::Sgn => "sgn",
-        }
+/// The name of a function as it is read: `ln` for the natural logarithm, `sgn` for the sign.
+pub(super) fn function_name(function: Function) -> &'static str {
+    match function {
+        Function::Log => "ln",
+        Function::Sign => "sgn",
+        named => named.name(),
     }
 }
 

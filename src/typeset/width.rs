@@ -3,7 +3,7 @@
 //! Widths are in em of the surrounding text, from the metrics of Computer
 //! Modern: good to a few percent, which is all that line breaking needs.
 
-use super::tree::{FunctionName, Glyph, Math, Signed, Symbol};
+use super::tree::{Glyph, Math, Signed, Symbol, function_name};
 
 const DIGIT: f64 = 0.5;
 const POINT: f64 = 0.278;
@@ -40,7 +40,11 @@ pub fn width(math: &Math) -> f64 {
         Math::Root(inner, _) => width(inner) + 0.9,
         Math::Function(name, power, argument) => {
             let power = power.as_ref().map_or(0.0, |power| SCRIPT * width(power));
-            name_width(*name) + power + width(argument) + 2.0 * PARENTHESIS + THIN_SPACE
+            0.45 * function_name(*name).len() as f64
+                + power
+                + width(argument)
+                + 2.0 * PARENTHESIS
+                + THIN_SPACE
         }
         Math::Absolute(inner) => width(inner) + 0.56,
         Math::Group(inner) => width(inner) + 2.0 * PARENTHESIS,
@@ -73,10 +77,6 @@ fn glyph_width(glyph: &Glyph) -> f64 {
         Glyph::Letter(_) | Glyph::Greek(_) => LETTER,
         Glyph::Digits(text) | Glyph::Word(text) => text.len() as f64 * DIGIT,
     }
-}
-
-fn name_width(name: FunctionName) -> f64 {
-    name.text().len() as f64 * 0.45
 }
 
 /// Splits `terms` into lines no wider than `available` em where that is

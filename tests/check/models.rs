@@ -10,8 +10,9 @@ use romc::equations::Equations;
 use romc::import::SymbolNames;
 use romc::model::{FeetRule, Library, Phase, ReducedModel};
 use romc::symbolic::ExprPool;
-use romc::typeset::latex::{self, Form, LatexOptions, NumberStyle};
-use romc::typeset::markdown::{self, MarkdownOptions};
+use romc::typeset::latex;
+use romc::typeset::markdown;
+use romc::typeset::{Form, NumberStyle, PrintOptions};
 use romc::typeset::{Rounding, SymbolTable};
 
 const COUNT: u64 = 200;
@@ -132,7 +133,7 @@ const RENAMED: [&str; 3] = ["z1=x", "u1=F_lin,x", "u2=tau_2"];
 fn printed(model: &ReducedModel, kind: u64) -> (String, String, SymbolNames) {
     let equations = Equations::of(model);
     let renamed = &RENAMED[..if model.latent_dim() == 1 { 2 } else { 3 }];
-    let plain = LatexOptions::default();
+    let plain = PrintOptions::default();
     let options = match kind {
         0 => return ("own.txt".into(), text_of(model), SymbolNames::default()),
         1 | 2 => {
@@ -141,9 +142,9 @@ fn printed(model: &ReducedModel, kind: u64) -> (String, String, SymbolNames) {
             } else {
                 Rounding::Exact
             };
-            let options = MarkdownOptions {
+            let options = PrintOptions {
                 rounding,
-                ..MarkdownOptions::default()
+                ..PrintOptions::default()
             };
             let files = markdown::emit(&equations, &options).expect("Markdown");
             return (
@@ -153,35 +154,35 @@ fn printed(model: &ReducedModel, kind: u64) -> (String, String, SymbolNames) {
             );
         }
         3 => plain,
-        4 => LatexOptions {
+        4 => PrintOptions {
             rounding: Rounding::Significant(2),
             ..plain
         },
-        5 => LatexOptions {
+        5 => PrintOptions {
             numbers: NumberStyle::Siunitx,
             ..plain
         },
-        6 => LatexOptions {
+        6 => PrintOptions {
             form: Form::Align,
-            width_em: 18.0,
+            width_em: Some(18.0),
             ..plain
         },
-        7 => LatexOptions {
+        7 => PrintOptions {
             form: Form::Cases,
             rounding: Rounding::Significant(6),
             ..plain
         },
         8 => {
             let symbols = SymbolTable::parse(renamed, model.latent_dim()).expect("names");
-            LatexOptions {
+            PrintOptions {
                 symbols,
                 numbers: NumberStyle::Siunitx,
                 ..plain
             }
         }
-        _ => LatexOptions {
+        _ => PrintOptions {
             rounding: Rounding::Exact,
-            width_em: 20.0,
+            width_em: Some(20.0),
             ..plain
         },
     };

@@ -44,8 +44,8 @@ fn written_and_read_back(model: &ReducedModel) {
 /// Emission may refuse a model, and is the same twice.
 fn compiled(model: &ReducedModel) {
     let options = EmitOptions::default();
-    let first = emit(&Equations::of(model), &Target::ALL, &options);
-    let second = emit(&Equations::of(model), &Target::ALL, &options);
+    let first = emit(&Equations::of(model), Target::all(), &options);
+    let second = emit(&Equations::of(model), Target::all(), &options);
     match (first, second) {
         (Ok(first), Ok(second)) => assert_eq!(first, second),
         (Err(first), Err(second)) => assert_eq!(first.to_string(), second.to_string()),

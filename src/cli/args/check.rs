@@ -4,8 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::command::OutputArguments;
-
 /// `romc check`
 #[derive(Debug, Args)]
 #[command(
@@ -35,6 +33,4 @@ pub struct CheckArguments {
     /// Another name that LaTeX has for a variable, such as z1=x or u2=F_z; can be repeated
     #[arg(long, value_name = "VARIABLE=NAME")]
     pub symbols: Vec<String>,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
 }

@@ -1,6 +1,6 @@
 //! The program, its commands, and what each command offers.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 
 use super::check::CheckArguments;
 use super::compile::CompileArguments;
@@ -22,6 +22,9 @@ use super::train::{StudyArguments, TrainArguments};
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Command,
+    /// Print one JSON object to stdout and nothing else there
+    #[arg(long, global = true, help_heading = None)]
+    pub json: bool,
 }
 
 /// One of romc's commands.
@@ -29,7 +32,7 @@ pub struct Arguments {
 pub enum Command {
     /// The main job on the shipped model and recordings: equations, code, rollouts, controller
     Demo(DemoArguments),
-    /// Tell what a recording or a model holds, and what is implausible in it
+    /// Describe a recording or a model, and list what is implausible in it
     Inspect(InspectArguments),
     /// Learn a model from recordings
     Train(Box<TrainArguments>),
@@ -47,36 +50,8 @@ pub enum Command {
     Mpc(MpcArguments),
     /// Put equations, errors, baselines and the controller's torques on one HTML page
     Report(ReportArguments),
-    /// Write man pages, one a command
+    /// Write man pages, one per command
     Manual(ManualArguments),
     /// Print completions for a shell
     Completions(CompletionsArguments),
-}
-
-impl Command {
-    /// Whether `--json` was given.
-    pub fn wants_json(&self) -> bool {
-        match self {
-            Self::Demo(arguments) => arguments.output_format.json,
-            Self::Inspect(arguments) => arguments.output_format.json,
-            Self::Train(arguments) => arguments.output_format.json,
-            Self::Study(arguments) => arguments.output_format.json,
-            Self::Import(arguments) => arguments.output_format.json,
-            Self::Check(arguments) => arguments.output_format.json,
-            Self::Compile(arguments) => arguments.output_format.json,
-            Self::Simulate(arguments) => arguments.output_format.json,
-            Self::Mpc(arguments) => arguments.output_format.json,
-            Self::Report(arguments) => arguments.output_format.json,
-            Self::Manual(arguments) => arguments.output_format.json,
-            Self::Completions(arguments) => arguments.output_format.json,
-        }
-    }
-}
-
-/// Output every command offers.
-#[derive(Debug, Clone, Args)]
-pub struct OutputArguments {
-    /// Print one JSON object to stdout and nothing else there
-    #[arg(long, help_heading = None)]
-    pub json: bool,
 }

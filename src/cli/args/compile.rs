@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::command::OutputArguments;
+use super::number::number;
+use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::Target;
 use crate::simplify::Tolerance;
-use crate::typeset::MOST_DIGITS;
+use crate::typeset::{Form, MOST_DIGITS};
 
 /// `romc compile`
 #[derive(Debug, Args)]
@@ -18,14 +19,13 @@ pub struct CompileArguments {
     /// Model file
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// What to write, separated by commas: latex, markdown, mathml; c, rust, python, casadi, matlab;
-    /// controller
+    /// Targets, separated by commas
     #[arg(
         long,
+        value_enum,
         value_name = "TARGET",
         value_delimiter = ',',
-        default_value = "latex,c,rust",
-        value_parser = target
+        default_value = "latex,c,rust"
     )]
     pub emit: Vec<Target>,
     /// Folder for the emitted files
@@ -40,18 +40,6 @@ pub struct CompileArguments {
     /// Write into a folder that holds files romc did not make
     #[arg(long, help_heading = None)]
     pub force: bool,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
-}
-
-/// Floating-point numbers of generated code.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub enum PrecisionChoice {
-    /// 64 bits: `double` and `f64`
-    #[default]
-    F64,
-    /// 32 bits: `float` and `f32`; each function states the bound of its rounding errors
-    F32,
 }
 
 /// Units of coordinates and inputs in equations and generated code.
@@ -67,23 +55,14 @@ pub enum UnitsChoice {
     Physical,
 }
 
-/// What computes sines and cosines in generated code.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub enum SinCosChoice {
-    /// A kernel inside the file that compilers vectorise, the same bits everywhere
-    #[default]
-    Inline,
-    /// The platform's mathematics library
-    Library,
-}
-
-/// How the equations of a phase stand on a page of LaTeX.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum FormChoice {
-    /// A number for each equation; breaks across pages
-    Align,
-    /// One number, a brace around the phase's equations
-    Cases,
+impl UnitsChoice {
+    /// Units at the interface of functions.
+    pub fn of_interface(self) -> Units {
+        match self {
+            Self::Si | Self::Physical => Units::Si,
+            Self::Scaled => Units::Scaled,
+        }
+    }
 }
 
 /// How code is generated.
@@ -92,13 +71,13 @@ pub enum FormChoice {
 pub struct CodeArguments {
     /// Floating-point numbers of C and Rust
     #[arg(long, value_enum, default_value = "f64")]
-    pub precision: PrecisionChoice,
+    pub precision: Precision,
     /// Units of coordinates and inputs in equations and functions
     #[arg(long, value_enum, default_value = "si")]
     pub units: UnitsChoice,
-    /// What computes sines and cosines in C and Rust
+    /// Source of sines and cosines in C and Rust
     #[arg(long, value_enum, default_value = "inline")]
-    pub sincos: SinCosChoice,
+    pub sincos: SineCosine,
 }
 
 /// How equations are printed.
@@ -119,7 +98,7 @@ pub struct EquationArguments {
     pub width: Option<f64>,
     /// Arrangement in LaTeX; cases for what fits on a page, align for longer phases, unless given
     #[arg(long, value_enum)]
-    pub form: Option<FormChoice>,
+    pub form: Option<Form>,
     /// Write numbers in LaTeX with siunitx's \\num
     #[arg(long)]
     pub siunitx: bool,
@@ -143,7 +122,7 @@ pub struct SimplifyArguments {
         allow_negative_numbers = true
     )]
     pub tolerance: Option<Tolerance>,
-    /// Recordings whose smallest box is the domain, a phase; or one .toml file of ranges
+    /// Recordings whose bounding box in each phase is the domain; or one .toml file of ranges
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     pub domain: Vec<PathBuf>,
     /// How far the domain reaches beyond the recordings, as a share of each variable's range (0.1
@@ -162,33 +141,21 @@ pub struct SimplifyArguments {
 }
 
 fn decimal_places(text: &str) -> Result<usize, String> {
-    match text.parse::<usize>() {
-        Ok(places) if places <= MOST_DIGITS => Ok(places),
-        _ => Err(format!("expected a whole number from 0 to {MOST_DIGITS}")),
-    }
+    let expected = format!("a whole number from 0 to {MOST_DIGITS}");
+    number(text, |places| *places <= MOST_DIGITS, &expected)
 }
 
 fn printed_digits(text: &str) -> Result<usize, String> {
-    match text.parse::<usize>() {
-        Ok(digits) if (1..=MOST_DIGITS).contains(&digits) => Ok(digits),
-        _ => Err(format!("expected a whole number from 1 to {MOST_DIGITS}")),
-    }
+    let expected = format!("a whole number from 1 to {MOST_DIGITS}");
+    number(text, |digits| (1..=MOST_DIGITS).contains(digits), &expected)
 }
 
 fn share(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(share) if share.is_finite() && share >= 0.0 => Ok(share),
-        _ => Err("expected a number of at least 0, such as 0.1".to_owned()),
-    }
+    let is_share = |share: &f64| share.is_finite() && *share >= 0.0;
+    number(text, is_share, "a number of at least 0, such as 0.1")
 }
 
 fn positive_width(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(width) if width.is_finite() && width > 0.0 => Ok(width),
-        _ => Err("expected a positive width in em".to_owned()),
-    }
-}
-
-fn target(text: &str) -> Result<Target, String> {
-    text.parse::<Target>().map_err(|error| error.to_string())
+    let is_width = |width: &f64| width.is_finite() && *width > 0.0;
+    number(text, is_width, "a positive width in em")
 }

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::command::OutputArguments;
 use super::number::{at_least_one, positive_seconds};
 use crate::import::{
     Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
@@ -43,13 +42,13 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
                   romc import paper.tex --symbols z1=x --symbols z2=theta --output paper.json"
 )]
 pub struct ImportArguments {
-    /// What to import: .safetensors, .npz, or equations as .txt, .tex or .md
+    /// File to import: .safetensors, .npz, or equations as .txt, .tex or .md
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// The model file to write
     #[arg(long, value_name = "MODEL.json")]
     pub output: PathBuf,
-    /// Kind of file, unless its ending is .safetensors, .npz or .txt
+    /// Kind of file, if its extension does not identify it
     #[arg(long, value_enum)]
     pub format: Option<Format>,
     /// Take a tensor for a part of the model; can be repeated
@@ -94,8 +93,8 @@ pub struct ImportArguments {
     /// Sampling period of the training recordings
     #[arg(long, value_name = "SECONDS", value_parser = positive_seconds)]
     pub sample_time: Option<f64>,
-    /// Recordings to compute the input statistics of each phase from; the controller weighs inputs by
-    /// them. Needs --robot
+    /// Recordings that give the mean and covariance of the inputs in each phase, by which the
+    /// controller weighs inputs. Needs --robot
     #[arg(long, value_name = "RECORDING", num_args = 1.., requires = "robot")]
     pub inputs_from: Vec<PathBuf>,
     /// Name of the model; the output file's stem unless given
@@ -112,6 +111,4 @@ pub struct ImportArguments {
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
 }

@@ -4,8 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::command::OutputArguments;
-
 /// `romc manual`
 #[derive(Debug, Args)]
 #[command(
@@ -18,8 +16,6 @@ pub struct ManualArguments {
     /// Replace files in the folder that romc did not make
     #[arg(long)]
     pub force: bool,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
 }
 
 /// `romc completions`
@@ -31,6 +27,4 @@ pub struct CompletionsArguments {
     /// The shell: bash, zsh, fish, elvish or powershell
     #[arg(value_enum, value_name = "SHELL")]
     pub shell: clap_complete::Shell,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
 }

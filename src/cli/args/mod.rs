@@ -1,4 +1,4 @@
-//! What can be typed: the commands, their options, and an example for each.
+//! The command line's grammar: the commands, their options, and an example for each.
 //!
 //! The command line enters; [`Arguments`] leaves, with everything checked that needs no file. Read
 //! `command.rs` first; each other file holds the commands of one family.
@@ -18,18 +18,11 @@ mod run;
 mod train;
 
 pub use check::CheckArguments;
-pub use command::{Arguments, Command, OutputArguments};
+pub use command::{Arguments, Command};
 pub use compile::{
-    CodeArguments, CompileArguments, EquationArguments, FormChoice, PrecisionChoice,
-    SimplifyArguments, SinCosChoice, UnitsChoice,
+    CodeArguments, CompileArguments, EquationArguments, SimplifyArguments, UnitsChoice,
 };
 pub use import::{ImportArguments, LibraryArgument};
 pub use manual::{CompletionsArguments, ManualArguments};
-pub use run::{
-    DemoArguments, InspectArguments, LiftChoice, MpcArguments, ReferenceInput, ReportArguments,
-    SimulateArguments,
-};
-pub use train::{
-    AccelerationSource, BpttIntegrator, Dimensions, FilterShape, FilteredRows, HiddenActivation,
-    PhaseSet, StudyArguments, TrainArguments, TrainMethod, TrainSettings, Widths,
-};
+pub use run::{DemoArguments, InspectArguments, MpcArguments, ReportArguments, SimulateArguments};
+pub use train::{Dimensions, PhaseSet, StudyArguments, TrainArguments, TrainSettings, Widths};

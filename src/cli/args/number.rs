@@ -1,17 +1,27 @@
 //! Numbers as several commands take them.
 
+use std::str::FromStr;
+
 /// A positive, finite number of seconds.
 pub(super) fn positive_seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if seconds.is_finite() && seconds > 0.0 => Ok(seconds),
-        _ => Err("expected a positive number of seconds".to_owned()),
-    }
+    number(
+        text,
+        |value: &f64| value.is_finite() && *value > 0.0,
+        "a positive number of seconds",
+    )
 }
 
 /// A whole number of at least 1.
 pub(super) fn at_least_one(text: &str) -> Result<usize, String> {
-    match text.parse::<usize>() {
-        Ok(count) if count > 0 => Ok(count),
-        _ => Err("expected a whole number of at least 1".to_owned()),
-    }
+    number(text, |value| *value > 0, "a whole number of at least 1")
+}
+
+/// A number that is in range, or what was expected.
+pub(super) fn number<T: FromStr>(
+    text: &str,
+    is_in_range: impl Fn(&T) -> bool,
+    expected: &str,
+) -> Result<T, String> {
+    let parsed = text.parse().ok().filter(is_in_range);
+    parsed.ok_or_else(|| format!("expected {expected}"))
 }

@@ -1,25 +1,25 @@
-//! `romc demo`, `inspect`, `simulate`, `mpc`, `report`: models held against recordings.
+//! `romc demo`, `inspect`, `simulate`, `mpc`, `report`: models compared with recordings.
 
 use std::path::PathBuf;
 
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
-use super::command::OutputArguments;
 use super::number::{at_least_one, positive_seconds};
+use crate::evaluate::ReferenceInput;
+use crate::mpc::Lift;
 use crate::simplify::Tolerance;
 
 /// `romc demo`
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  romc demo --out-dir out/demo")]
 pub struct DemoArguments {
-    /// Folder for what the demo makes
+    /// Folder for the files of the demo
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     pub out_dir: PathBuf,
     /// Write into a folder that holds files romc did not make
     #[arg(long)]
     pub force: bool,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
 }
 
 /// `romc inspect`
@@ -31,11 +31,9 @@ pub struct InspectArguments {
     /// Models (`.json`) and recordings (`.csv`, `.csv.gz`)
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// Robot whose limits the recordings are held against
+    /// Robot whose limits the recordings are compared with
     #[arg(long, default_value = "go1")]
     pub robot: String,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
 }
 
 /// `romc simulate`
@@ -59,26 +57,22 @@ pub struct SimulateArguments {
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
 }
 
-/// Where the controller's input reference comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ReferenceInput {
-    /// The recorded torques and forces, projected into the latent space
-    Recorded,
-    /// None: the controller finds the input itself
-    None,
-}
+impl ValueEnum for Lift {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Transpose, Self::Consistent]
+    }
 
-/// How a latent input becomes joint torques.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum LiftChoice {
-    /// `u = W_e^T u_lat`, the paper's
-    Transpose,
-    /// Torques whose own ground reaction forces reproduce the latent input
-    Consistent,
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(match self {
+            Self::Transpose => {
+                PossibleValue::new("transpose").help("`u = W_e^T u_lat`, the paper's")
+            }
+            Self::Consistent => PossibleValue::new("consistent")
+                .help("Torques whose own ground reaction forces reproduce the latent input"),
+        })
+    }
 }
 
 /// `romc mpc`
@@ -101,7 +95,7 @@ pub struct MpcArguments {
     pub step: f64,
     /// How latent inputs become joint torques
     #[arg(long, value_enum, default_value = "transpose")]
-    pub lift: LiftChoice,
+    pub lift: Lift,
     /// Where the input reference comes from
     #[arg(long, value_enum, default_value = "recorded")]
     pub reference_input: ReferenceInput,
@@ -114,8 +108,6 @@ pub struct MpcArguments {
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
 }
 
 /// `romc report`
@@ -127,7 +119,7 @@ pub struct ReportArguments {
     /// Model file
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// Recordings that the model is held against
+    /// Recordings that the model is compared with
     #[arg(required = true, value_name = "RECORDING")]
     pub recordings: Vec<PathBuf>,
     /// The page to write
@@ -153,6 +145,4 @@ pub struct ReportArguments {
     /// Replace an existing page, or write into a folder that holds files romc did not make
     #[arg(long)]
     pub force: bool,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
 }

@@ -1,4 +1,4 @@
-//! What can be typed after `romc train` and `romc study`.
+//! Arguments of `romc train` and `romc study`.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -6,34 +6,13 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
-use super::command::OutputArguments;
 use super::number::at_least_one;
+use crate::model::Activation;
 use crate::recording::smoothing::SavitzkyGolay;
+use crate::recording::{Accelerations, SmoothedRows};
 use crate::robot::STATE_DIM;
 use crate::study::Shard;
-use crate::train::Split;
-
-/// How a model is learned.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum TrainMethod {
-    /// Encoder, decoder and coefficients each from a least-squares problem; seconds
-    ClosedForm,
-    /// Encoder, decoder and coefficients together by Adam, as published; minutes
-    Joint,
-}
-
-/// What the hidden layers of a nonlinear encoder or decoder apply to each unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum HiddenActivation {
-    /// a, below zero exp(a) - 1
-    Elu,
-    /// Hyperbolic tangent
-    Tanh,
-    /// 1 / (1 + exp(-a))
-    Sigmoid,
-}
+use crate::train::{Integrator, Method, Split};
 
 /// Widths of hidden layers in their order: `32,16`, or `linear` for none; a list of numbers in a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -55,79 +34,38 @@ impl FromStr for Widths {
     }
 }
 
-/// How the window of predictions is integrated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum BpttIntegrator {
-    /// Explicit Euler
-    Euler,
-    /// Midpoint rule
-    Rk2,
-    /// Classical Runge-Kutta
-    Rk4,
-}
+/// A number that is neither infinite nor NaN.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "f64", into = "f64")]
+pub struct Finite(f64);
 
-/// Where accelerations come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum AccelerationSource {
-    /// The recording's own columns, differences where it has none
-    Recorded,
-    /// Differences of the recorded velocities
-    Differences,
-}
+impl TryFrom<f64> for Finite {
+    type Error = String;
 
-/// What a filter is applied to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum FilteredRows {
-    /// Accelerations only
-    Accelerations,
-    /// State, velocities, accelerations and torques
-    All,
-}
-
-/// Window and order of a filter: `11,2`, also in a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(into = "String", try_from = "String")]
-pub struct FilterShape {
-    /// Samples of the window, odd.
-    pub window: usize,
-    /// Degree of the polynomial.
-    pub order: usize,
-}
-
-impl FromStr for FilterShape {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let refused =
-            || format!("found `{text}`, expected an odd window and an order such as 11,2");
-        let (window, order) = text.split_once(',').ok_or_else(refused)?;
-        let number = |text: &str| text.trim().parse::<usize>().map_err(|_| refused());
-        let (window, order) = (number(window)?, number(order)?);
-        match SavitzkyGolay::new(window, order) {
-            Ok(_) => Ok(Self { window, order }),
-            Err(error) => Err(error.to_string()),
+    fn try_from(value: f64) -> Result<Self, String> {
+        match value.is_finite() {
+            true => Ok(Self(value)),
+            false => Err(format!("found {value}, expected a finite number")),
         }
     }
 }
 
-impl TryFrom<String> for FilterShape {
-    type Error = String;
+impl FromStr for Finite {
+    type Err = String;
 
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
+    fn from_str(text: &str) -> Result<Self, String> {
+        let value: f64 = text.parse().map_err(|_| "expected a number".to_owned())?;
+        value.try_into()
     }
 }
 
-impl From<FilterShape> for String {
-    fn from(shape: FilterShape) -> String {
-        format!("{},{}", shape.window, shape.order)
+impl From<Finite> for f64 {
+    fn from(Finite(value): Finite) -> f64 {
+        value
     }
 }
 
-/// Phases that a model tells apart.
+/// The phases of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PhaseSet {
@@ -149,7 +87,7 @@ pub struct TrainArguments {
     /// Recordings that choose between candidate models
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     pub validation: Vec<PathBuf>,
-    /// Recordings that nothing sees before the end; the model's figures on them are told
+    /// Recordings that training does not see; metrics of the finished model on them are reported
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     pub test: Vec<PathBuf>,
     /// Divide the jumps by these shares for training, validation and test, such as 14,3,3
@@ -169,8 +107,6 @@ pub struct TrainArguments {
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
 }
 
 /// Settings of `romc train`; what is not given keeps the default of the method.
@@ -182,7 +118,7 @@ pub struct TrainSettings {
     pub latent_dim: Option<usize>,
     /// How to learn (closed-form unless given)
     #[arg(long, value_enum)]
-    pub method: Option<TrainMethod>,
+    pub method: Option<Method>,
     /// Robot that made the recordings (go1 unless given)
     #[arg(long)]
     pub robot: Option<String>,
@@ -206,79 +142,79 @@ pub struct TrainSettings {
     pub decoder_layers: Option<Widths>,
     /// Activation of the hidden layers (elu unless given)
     #[arg(long, value_enum)]
-    pub activation: Option<HiddenActivation>,
-    /// Weight of the input energy that the latent input cannot carry
+    pub activation: Option<Activation>,
+    /// Weight of the input energy that the latent input does not represent
     #[arg(long, value_name = "WEIGHT")]
-    pub lift_weight: Option<f64>,
+    pub lift_weight: Option<Finite>,
     /// Weight of body x, y, z in the reconstruction error
     #[arg(long, value_name = "WEIGHT")]
-    pub body_weight: Option<f64>,
+    pub body_weight: Option<Finite>,
     /// Weight of the loss over a window of predictions, 0 for none (joint method)
     #[arg(long, value_name = "WEIGHT")]
-    pub bptt_weight: Option<f64>,
+    pub bptt_weight: Option<Finite>,
     /// Steps of that window (5 unless given)
     #[arg(long, value_name = "STEPS", value_parser = at_least_one)]
     pub bptt_window: Option<usize>,
-    /// Samples a step of that window (5 unless given: 10 ms at 500 Hz)
+    /// Samples per step of that window (5 unless given: 10 ms at 500 Hz)
     #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
     pub bptt_stride: Option<usize>,
-    /// Weight of a prediction against the one a step earlier (0.9 unless given)
+    /// Weight of a prediction relative to the previous one (0.9 unless given)
     #[arg(long, value_name = "FACTOR")]
-    pub bptt_decay: Option<f64>,
+    pub bptt_decay: Option<Finite>,
     /// How predictions are integrated (rk2 unless given)
     #[arg(long, value_enum)]
-    pub bptt_integrator: Option<BpttIntegrator>,
-    /// Validation error to give up for fewer terms, as a share of the least
+    pub bptt_integrator: Option<Integrator>,
+    /// Accepted increase of the validation error for fewer terms, as a share of the least error
     #[arg(long, value_name = "SHARE")]
-    pub slack: Option<f64>,
+    pub slack: Option<Finite>,
     /// Highest degree of the polynomial candidate terms
     #[arg(long, value_name = "P")]
     pub degree: Option<u32>,
     /// Add sines and cosines of z and dz to the candidate terms
     #[arg(long)]
     pub trigonometric: bool,
-    /// Candidate terms of your own, separated by semicolons: "1; z1; dz1; u1; z1*dz2"
+    /// Custom candidate terms, separated by semicolons: "1; z1; dz1; u1; z1*dz2"
     #[arg(long, value_name = "TERMS", conflicts_with_all = ["degree", "trigonometric"])]
     pub terms: Option<String>,
-    /// Phases to tell apart
+    /// Phases of the model
     #[arg(long, value_enum)]
     pub phases: Option<PhaseSet>,
-    /// Leave out samples that a robot cannot have done (`romc inspect` lists them)
+    /// Leave out physically implausible samples (`romc inspect` lists them)
     #[arg(long)]
     pub leave_out_implausible: bool,
     /// Where accelerations come from (recorded unless given)
     #[arg(long, value_enum)]
-    pub accelerations: Option<AccelerationSource>,
+    pub accelerations: Option<Accelerations>,
     /// Savitzky-Golay filter over each jump: samples of the window and degree, such as 11,2
     #[arg(long, value_name = "WINDOW,ORDER")]
-    pub smooth: Option<FilterShape>,
-    /// What that filter is applied to (accelerations unless given)
+    pub smooth: Option<SavitzkyGolay>,
+    /// Signals that the filter is applied to (accelerations unless given)
     #[arg(long, value_enum)]
-    pub smooth_rows: Option<FilteredRows>,
+    pub smooth_rows: Option<SmoothedRows>,
     /// Window of the mean over accelerations within each phase (11 unless given, 1 with --paper)
     #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
     pub moving_average: Option<usize>,
     /// Coordinates with a smaller standard deviation (rad or m) are masked unless actuated; 0 for no mask
     #[arg(long, value_name = "STD")]
-    pub mask_std: Option<f64>,
+    pub mask_std: Option<Finite>,
     /// Coordinates with a larger share of the input's energy count as actuated
     #[arg(long, value_name = "SHARE")]
-    pub mask_input_share: Option<f64>,
-    /// Leave the latent basis as it comes, without varimax
+    pub mask_input_share: Option<Finite>,
+    /// Keep the latent basis as trained, without varimax rotation
     #[arg(long)]
     pub no_rotation: bool,
     /// Scaled units of the state in one rad or m (0.1 unless given)
     #[arg(long, value_name = "FACTOR")]
-    pub state_scaling: Option<f64>,
+    pub state_scaling: Option<Finite>,
     /// Scaled units of joint torques in one N m (0.1 unless given)
     #[arg(long, value_name = "FACTOR")]
-    pub torque_scaling: Option<f64>,
+    pub torque_scaling: Option<Finite>,
     /// Scaled units of forces on the body in one N (0.005 unless given, 0.1 with --paper)
     #[arg(long, value_name = "FACTOR")]
-    pub force_scaling: Option<f64>,
+    pub force_scaling: Option<Finite>,
     /// Scaled units of moments on the body in one N m (0.05 unless given, 0.1 with --paper)
     #[arg(long, value_name = "FACTOR")]
-    pub moment_scaling: Option<f64>,
+    pub moment_scaling: Option<Finite>,
 }
 
 /// `romc study`
@@ -290,18 +226,18 @@ pub struct StudyArguments {
     /// Recordings to learn from
     #[arg(value_name = "RECORDING", required_unless_present = "merge")]
     pub recordings: Vec<PathBuf>,
-    /// Recordings that choose between candidate models and give the figures
+    /// Recordings that choose between candidate models and give the metrics
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     pub validation: Vec<PathBuf>,
     /// Latent dimensions: `4`, `1..18` (both ends counted) or `2,4,6`
     #[arg(long, value_name = "DIMS", default_value = "1..18", value_parser = dimensions)]
     pub latent_dims: Dimensions,
-    /// Seeds a dimension
+    /// Seeds per dimension
     #[arg(long, default_value_t = 5, value_parser = at_least_one)]
     pub seeds: usize,
     /// How to learn (closed-form unless given)
     #[arg(long, value_enum)]
-    pub method: Option<TrainMethod>,
+    pub method: Option<Method>,
     /// Train as published (joint method)
     #[arg(long)]
     pub paper: bool,
@@ -323,8 +259,6 @@ pub struct StudyArguments {
     /// Replace tables and figures of these names that romc did not make
     #[arg(long)]
     pub force: bool,
-    #[command(flatten)]
-    pub output_format: OutputArguments,
 }
 
 /// Latent dimensions of a study, ascending.

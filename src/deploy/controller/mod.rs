@@ -8,14 +8,13 @@ mod control_model;
 mod lock;
 mod sources;
 
+use std::ops::Deref;
+
 use askama::Template;
 
-use crate::codegen::Precision;
-use crate::codegen::SineCosine;
-use crate::codegen::Units;
 use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
-use crate::codegen::rust;
+use crate::codegen::{Precision, SineCosine, Units, rust};
 use crate::deploy::EmitError;
 use crate::equations::Equations;
 use crate::files::EmittedFile;
@@ -26,34 +25,11 @@ use crate::robot::{Robot, STATE_DIM};
 use control_model::ControlModelText;
 use lock::Lock;
 
-#[derive(Template)]
-#[template(path = "controller/cargo.askama", config = "templates/askama.toml")]
-struct Cargo<'a> {
-    banner: String,
-    name: &'a str,
-    rust_version: &'static str,
-    clarabel: &'a str,
-    nalgebra: &'a str,
-    thiserror: &'a str,
-}
-
-#[derive(Template)]
-#[template(path = "controller/lib.askama", config = "templates/askama.toml")]
-struct Lib<'a> {
-    banner: String,
+/// What the files of a controller's project take from the model, the robot and romc.
+struct Facts<'a> {
     model: &'a str,
     name: &'a str,
-    robot: &'a str,
-    state_dim: usize,
-}
-
-#[derive(Template)]
-#[template(path = "controller/header.askama", config = "templates/askama.toml")]
-struct Header<'a> {
-    banner: String,
-    model: &'a str,
-    name: &'a str,
-    upper: &'a str,
+    upper: String,
     robot: &'a str,
     latent_dim: usize,
     state_dim: usize,
@@ -61,61 +37,50 @@ struct Header<'a> {
     input_names: String,
     /// Constant and value of every code.
     codes: Vec<(String, i32)>,
-    defaults: Settings,
-}
-
-#[derive(Template)]
-#[template(path = "controller/readme.askama", config = "templates/askama.toml")]
-struct Readme<'a> {
-    provenance: &'a str,
-    model: &'a str,
-    name: &'a str,
-    robot: &'a str,
-    latent_dim: usize,
     texts: Vec<(i32, String)>,
-}
-
-#[derive(Template)]
-#[template(path = "controller/example_c.askama", config = "templates/askama.toml")]
-struct ExampleC<'a> {
-    banner: String,
-    name: &'a str,
-    upper: &'a str,
+    defaults: Settings,
     link_m: String,
+    rust_version: &'static str,
+    clarabel: &'a str,
+    nalgebra: &'a str,
+    thiserror: &'a str,
 }
 
-#[derive(Template)]
-#[template(
-    path = "controller/example_cpp.askama",
-    config = "templates/askama.toml"
-)]
-struct ExampleCpp<'a> {
-    banner: String,
-    name: &'a str,
-    upper: &'a str,
+/// Templates of the project, each a struct of its first line and the [`Facts`].
+macro_rules! templates {
+    ($($template:ident: $path:tt),* $(,)?) => {$(
+        #[derive(Template)]
+        #[template(path = $path, config = "templates/askama.toml")]
+        struct $template<'a> {
+            banner: &'a str,
+            facts: &'a Facts<'a>,
+        }
+
+        impl<'a> $template<'a> {
+            fn text(banner: &'a str, facts: &'a Facts<'a>) -> askama::Result<String> {
+                Self { banner, facts }.render()
+            }
+        }
+
+        impl<'a> Deref for $template<'a> {
+            type Target = Facts<'a>;
+
+            fn deref(&self) -> &Facts<'a> {
+                self.facts
+            }
+        }
+    )*};
 }
 
-#[derive(Template)]
-#[template(
-    path = "controller/binding_py.askama",
-    config = "templates/askama.toml"
-)]
-struct Binding<'a> {
-    banner: String,
-    model: &'a str,
-    name: &'a str,
-    latent_dim: usize,
-    state_dim: usize,
-}
-
-#[derive(Template)]
-#[template(
-    path = "controller/example_py.askama",
-    config = "templates/askama.toml"
-)]
-struct ExamplePy<'a> {
-    banner: String,
-    name: &'a str,
+templates! {
+    Cargo: "controller/cargo.askama",
+    Lib: "controller/lib.askama",
+    Header: "controller/header.askama",
+    Readme: "controller/readme.askama",
+    ExampleC: "controller/example_c.askama",
+    ExampleCpp: "controller/example_cpp.askama",
+    Binding: "controller/binding_py.askama",
+    ExamplePy: "controller/example_py.askama",
 }
 
 /// The crate of a model's controller; `provenance` is the text of each file's first line.
@@ -164,89 +129,45 @@ fn project(
     plant: &ControlModel,
     provenance: &str,
 ) -> Result<Vec<(String, String)>, EmitError> {
-    let (model, name) = (entries.name.as_str(), entries.identifier.as_str());
-    let upper = &name.to_ascii_uppercase();
-    let robot = plant.robot().name();
-    let (latent_dim, state_dim) = (entries.latent_dim, STATE_DIM);
-    let comments = [format!("// {provenance}"), format!("/* {provenance} */")];
-    let [slashes, block] = &comments;
-    let hash = format!("# {provenance}");
+    let name = entries.identifier.as_str();
     let lock = Lock::own();
-    let cargo = Cargo {
-        banner: hash.clone(),
+    let facts = &Facts {
+        model: &entries.name,
         name,
-        rust_version: env!("CARGO_PKG_RUST_VERSION"),
-        clarabel: lock.version("clarabel"),
-        nalgebra: lock.version("nalgebra"),
-        thiserror: lock.version("thiserror"),
-    };
-    let lib = Lib {
-        banner: slashes.clone(),
-        model,
-        name,
-        robot,
-        state_dim,
-    };
-    let header = Header {
-        banner: block.clone(),
-        model,
-        name,
-        upper,
-        robot,
-        latent_dim,
-        state_dim,
+        upper: name.to_ascii_uppercase(),
+        robot: plant.robot().name(),
+        latent_dim: entries.latent_dim,
+        state_dim: STATE_DIM,
         state_names: Robot::state_names().join(" "),
         input_names: Robot::input_names().join(" "),
         codes: texts()
             .map(|(code, text)| (constant(&text), code))
             .collect(),
-        defaults: Settings::default(),
-    };
-    let readme = Readme {
-        provenance,
-        model,
-        name,
-        robot,
-        latent_dim,
         texts: texts().collect(),
-    };
-    let example_c = ExampleC {
-        banner: block.clone(),
-        name,
-        upper,
+        defaults: Settings::default(),
         link_m: format!("{:?}", plant.robot().geometry().thigh_m),
+        rust_version: env!("CARGO_PKG_RUST_VERSION"),
+        clarabel: lock.version("clarabel"),
+        nalgebra: lock.version("nalgebra"),
+        thiserror: lock.version("thiserror"),
     };
-    let example_cpp = ExampleCpp {
-        banner: slashes.clone(),
-        name,
-        upper,
-    };
-    let binding = Binding {
-        banner: hash.clone(),
-        model,
-        name,
-        latent_dim,
-        state_dim,
-    };
-    let example_py = ExamplePy {
-        banner: hash.clone(),
-        name,
-    };
+    let (hash, slashes) = (format!("# {provenance}"), format!("// {provenance}"));
+    let [hash, slashes] = [hash.as_str(), &slashes];
+    let block = &format!("/* {provenance} */");
     let templates = [
-        ("Cargo.toml".to_owned(), cargo.render()?),
-        ("src/lib.rs".to_owned(), lib.render()?),
-        (format!("include/{name}_controller.h"), header.render()?),
-        ("README.md".to_owned(), readme.render()?),
-        ("examples/example.c".to_owned(), example_c.render()?),
-        ("examples/example.cpp".to_owned(), example_cpp.render()?),
-        (format!("python/{name}_controller.py"), binding.render()?),
-        ("python/example.py".to_owned(), example_py.render()?),
+        ("Cargo.toml", Cargo::text(hash, facts)?),
+        ("src/lib.rs", Lib::text(slashes, facts)?),
+        ("include/NAME_controller.h", Header::text(block, facts)?),
+        ("README.md", Readme::text(provenance, facts)?),
+        ("examples/example.c", ExampleC::text(block, facts)?),
+        ("examples/example.cpp", ExampleCpp::text(slashes, facts)?),
+        ("python/NAME_controller.py", Binding::text(hash, facts)?),
+        ("python/example.py", ExamplePy::text(hash, facts)?),
     ];
-    let mut files: Vec<(String, String)> = templates
-        .into_iter()
-        .map(|(path, text)| (path, tidy(&text)))
+    let mut files: Vec<(String, String)> = (templates.into_iter())
+        .map(|(path, text)| (path.replace("NAME", name), tidy(&text)))
         .collect();
-    files.push(("Cargo.lock".to_owned(), lock.text(&hash, name)));
+    files.push(("Cargo.lock".to_owned(), lock.text(hash, name)));
     for (path, text) in sources::LICENCES {
         files.push((path.to_owned(), text.to_owned()));
     }

@@ -1,6 +1,6 @@
 //! From a panel to marks on a plane; y grows downwards, lengths are points.
 
-use super::figure::{HeatMap, LinePlot, Panel, Role};
+use super::figure::{Figure, HeatMap, LinePlot, Panel, Role};
 use super::ticks::{padded, ticks};
 
 /// Space left of the axes, for their numbers.
@@ -52,27 +52,61 @@ pub enum Mark {
     Text(f64, f64, Anchor, String),
 }
 
-/// A panel as marks.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PanelDrawing {
-    /// Width.
-    pub width: f64,
-    /// Height.
-    pub height: f64,
-    /// What to draw, the first below the others.
-    pub marks: Vec<Mark>,
+/// Height of the legend's line.
+const LEGEND: f64 = 18.0;
+
+/// Size of a figure on a page of its own.
+pub(super) fn figure_size(figure: &Figure) -> (f64, f64) {
+    let columns = figure.columns.min(figure.panels.len()).max(1);
+    let rows = figure.panels.len().div_ceil(columns);
+    let (width, height) = figure.panel_size;
+    (
+        columns as f64 * width,
+        rows as f64 * height + legend_height(figure),
+    )
 }
 
-/// Draws one panel in the given size; `x_label` stands below its axis.
-pub fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> PanelDrawing {
-    let marks = match panel {
+fn legend_height(figure: &Figure) -> f64 {
+    match figure.legend.is_empty() {
+        true => 0.0,
+        false => LEGEND,
+    }
+}
+
+/// The marks of a figure's legend and of each of its panels, with their upper left corners.
+pub(super) fn placed_marks(figure: &Figure) -> Vec<(Vec<Mark>, (f64, f64))> {
+    let columns = figure.columns.max(1);
+    let (width, height) = figure.panel_size;
+    let mut all = vec![(legend_marks(figure), (0.0, 0.0))];
+    for (place, panel) in figure.panels.iter().enumerate() {
+        let corner = (
+            (place % columns) as f64 * width,
+            (place / columns) as f64 * height + legend_height(figure),
+        );
+        let marks = draw_panel(panel, figure.panel_size, &figure.x_label);
+        all.push((marks, corner));
+    }
+    all
+}
+
+fn legend_marks(figure: &Figure) -> Vec<Mark> {
+    let mut marks = Vec::new();
+    let mut x = 10.0;
+    for (role, words) in &figure.legend {
+        marks.push(Mark::Line(vec![(x, 10.0), (x + 24.0, 10.0)], *role));
+        let words_at = x + 28.0;
+        marks.push(Mark::Text(words_at, 13.0, Anchor::Start, words.clone()));
+        x += 44.0 + 0.52 * FONT * words.chars().count() as f64;
+    }
+    marks
+}
+
+/// Draws one panel in the given size, the first mark below the others; `x_label` stands below its
+/// axis.
+pub fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<Mark> {
+    match panel {
         Panel::Lines(plot) => draw_lines(plot, size, x_label),
         Panel::Heat(map) => draw_heat(map, size, x_label),
-    };
-    PanelDrawing {
-        width: size.0,
-        height: size.1,
-        marks,
     }
 }
 
@@ -269,8 +303,8 @@ mod tests {
             ],
             shaded: vec![(1.0, 9.0)],
         };
-        let drawing = draw_panel(&Panel::Lines(plot), (240.0, 150.0), "time, s");
-        let lines = drawing.marks.iter().filter_map(|mark| match mark {
+        let marks = draw_panel(&Panel::Lines(plot), (240.0, 150.0), "time, s");
+        let lines = marks.iter().filter_map(|mark| match mark {
             Mark::Line(points, _) => Some(points),
             Mark::Rectangle(..) | Mark::Rule(..) | Mark::Text(..) => None,
         });

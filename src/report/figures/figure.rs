@@ -1,6 +1,6 @@
-//! What a figure holds.
+//! The content of a figure: panels, lines, shades, captions.
 
-/// What a line stands for; it picks colour and dashes, the same in every figure.
+/// The meaning of a line, which selects its colour and dashes in every figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
     /// Measured, or encoded from what was measured.
@@ -66,7 +66,7 @@ impl Role {
 /// One line: points in the order of x; a point without y breaks the line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// What it stands for.
+    /// Its meaning.
     pub role: Role,
     /// Pairs of x and y.
     pub points: Vec<(f64, Option<f64>)>,
@@ -75,7 +75,7 @@ pub struct Series {
 /// Lines over one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinePlot {
-    /// What is drawn, with its unit, such as `body.x, m`.
+    /// The quantity with its unit, such as `body.x, m`.
     pub title: String,
     /// The lines.
     pub series: Vec<Series>,
@@ -86,13 +86,13 @@ pub struct LinePlot {
 /// Magnitudes of a matrix as shades.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatMap {
-    /// What is drawn.
+    /// The quantity.
     pub title: String,
     /// Names of the rows.
     pub rows: Vec<String>,
     /// Names of the columns.
     pub columns: Vec<String>,
-    /// Values, a row after the other.
+    /// Values, row by row.
     pub values: Vec<f64>,
 }
 
@@ -106,6 +106,15 @@ pub enum Panel {
 }
 
 impl Panel {
+    /// Lines over one axis, without shaded ranges.
+    pub fn lines(title: impl Into<String>, series: Vec<Series>) -> Self {
+        Self::Lines(LinePlot {
+            title: title.into(),
+            series,
+            shaded: Vec::new(),
+        })
+    }
+
     /// Its title.
     pub fn title(&self) -> &str {
         match self {
@@ -120,7 +129,7 @@ impl Panel {
 pub struct Figure {
     /// Stem of its files.
     pub id: String,
-    /// What it shows, as a paper's caption.
+    /// Caption, as in a paper.
     pub caption: String,
     /// The common axis below, such as `time, s`.
     pub x_label: String,
@@ -130,6 +139,27 @@ pub struct Figure {
     pub columns: usize,
     /// The panels.
     pub panels: Vec<Panel>,
-    /// What the lines stand for, in the order of the legend.
+    /// The meaning of each line, in the order of the legend.
     pub legend: Vec<(Role, String)>,
+}
+
+impl Figure {
+    /// Small panels over time, three side by side; the legend explains the lines.
+    pub fn over_time(
+        id: String,
+        caption: String,
+        panels: Vec<Panel>,
+        legend: &[(Role, &str)],
+    ) -> Self {
+        let words = |(role, words): &(Role, &str)| (*role, (*words).to_owned());
+        Self {
+            id,
+            caption,
+            x_label: "time, s".to_owned(),
+            panel_size: (240.0, 150.0),
+            columns: 3,
+            panels,
+            legend: legend.iter().map(words).collect(),
+        }
+    }
 }

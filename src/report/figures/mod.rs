@@ -6,12 +6,14 @@
 mod csv;
 mod draw;
 mod figure;
+mod files;
 mod pdf;
 mod svg;
 mod ticks;
 
 pub use csv::csv;
-pub use draw::{Anchor, Mark, Paint, PanelDrawing, draw_panel};
+pub use draw::{Anchor, Mark, Paint, draw_panel};
 pub use figure::{Figure, HeatMap, LinePlot, Panel, Role, Series};
+pub use files::figure_files;
 pub use pdf::pdf;
 pub use svg::{panel_svg, standalone_svg};

@@ -2,21 +2,16 @@
 
 use std::fmt::Write as _;
 
-use super::draw::{Anchor, FONT, Mark, Paint, draw_panel};
+use super::draw::{Anchor, FONT, Mark, Paint, figure_size, placed_marks};
 use super::figure::Figure;
-use super::svg::{figure_size, legend_marks, panel_corner};
 
 /// A figure as a PDF file (version 1.4).
 pub fn pdf(figure: &Figure) -> String {
     let size = figure_size(figure);
     let mut content = String::from("1 J 1 j\n");
-    for (mark, at) in legend_marks(figure) {
-        write_mark(&mut content, &mark, at, size.1);
-    }
-    for (place, panel) in figure.panels.iter().enumerate() {
-        let drawing = draw_panel(panel, figure.panel_size, &figure.x_label);
-        for mark in &drawing.marks {
-            write_mark(&mut content, mark, panel_corner(figure, place), size.1);
+    for (marks, corner) in placed_marks(figure) {
+        for mark in &marks {
+            write_mark(&mut content, mark, corner, size.1);
         }
     }
     file(&content, size)

@@ -2,20 +2,20 @@
 
 use std::fmt::Write as _;
 
-use super::draw::{Anchor, FONT, Mark, Paint, PanelDrawing, draw_panel};
+use super::draw::{Anchor, FONT, Mark, Paint, draw_panel, figure_size, placed_marks};
 use super::figure::{Figure, Panel, Role};
 use crate::typeset::mathml::HtmlText;
 
 /// One panel as an `svg` element that takes its colours from the page.
 pub fn panel_svg(figure: &Figure, panel: &Panel) -> String {
-    let drawing = draw_panel(panel, figure.panel_size, &figure.x_label);
+    let (width, height) = figure.panel_size;
+    let title = HtmlText(panel.title());
     let mut text = format!(
-        "<svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">",
-        drawing.width,
-        drawing.height,
-        HtmlText(panel.title())
+        "<svg class=\"plot\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\">"
     );
-    write_marks(&mut text, &drawing, (0.0, 0.0));
+    for mark in draw_panel(panel, figure.panel_size, &figure.x_label) {
+        write_mark(&mut text, &mark, (0.0, 0.0));
+    }
     text.push_str("</svg>");
     text
 }
@@ -30,64 +30,14 @@ pub fn standalone_svg(figure: &Figure) -> String {
         HtmlText(&figure.caption),
         style()
     );
-    for (mark, at) in legend_marks(figure) {
-        write_mark(&mut text, &mark, at);
-    }
-    for (place, panel) in figure.panels.iter().enumerate() {
-        let drawing = draw_panel(panel, figure.panel_size, &figure.x_label);
-        write_marks(&mut text, &drawing, panel_corner(figure, place));
+    for (marks, corner) in placed_marks(figure) {
+        for mark in &marks {
+            write_mark(&mut text, mark, corner);
+        }
         text.push('\n');
     }
     text.push_str("</svg>\n");
     text
-}
-
-/// Height of the legend's line.
-const LEGEND: f64 = 18.0;
-
-/// Size of a figure on a page of its own.
-pub(super) fn figure_size(figure: &Figure) -> (f64, f64) {
-    let columns = figure.columns.min(figure.panels.len()).max(1);
-    let rows = figure.panels.len().div_ceil(columns);
-    let legend = if figure.legend.is_empty() {
-        0.0
-    } else {
-        LEGEND
-    };
-    (
-        columns as f64 * figure.panel_size.0,
-        rows as f64 * figure.panel_size.1 + legend,
-    )
-}
-
-/// Upper left corner of a panel.
-pub(super) fn panel_corner(figure: &Figure, place: usize) -> (f64, f64) {
-    let columns = figure.columns.max(1);
-    let legend = if figure.legend.is_empty() {
-        0.0
-    } else {
-        LEGEND
-    };
-    (
-        (place % columns) as f64 * figure.panel_size.0,
-        (place / columns) as f64 * figure.panel_size.1 + legend,
-    )
-}
-
-/// The legend's marks, each with its offset.
-pub(super) fn legend_marks(figure: &Figure) -> Vec<(Mark, (f64, f64))> {
-    let mut marks = Vec::new();
-    let mut x = 10.0;
-    for (role, words) in &figure.legend {
-        marks.push((
-            Mark::Line(vec![(x, 10.0), (x + 24.0, 10.0)], *role),
-            (0.0, 0.0),
-        ));
-        let text = Mark::Text(x + 28.0, 13.0, Anchor::Start, words.clone());
-        marks.push((text, (0.0, 0.0)));
-        x += 44.0 + 0.52 * FONT * words.chars().count() as f64;
-    }
-    marks
 }
 
 fn style() -> String {
@@ -111,12 +61,6 @@ fn style() -> String {
         );
     }
     text
-}
-
-fn write_marks(text: &mut String, drawing: &PanelDrawing, corner: (f64, f64)) {
-    for mark in &drawing.marks {
-        write_mark(text, mark, corner);
-    }
 }
 
 fn write_mark(text: &mut String, mark: &Mark, (dx, dy): (f64, f64)) {

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::train::features::{FeatureValues, Features};
 
 /// How predictions are integrated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrator {
     /// Explicit Euler.

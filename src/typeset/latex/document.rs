@@ -6,13 +6,14 @@ use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::model::ReducedModel;
 use crate::typeset::TypesetError;
-use crate::typeset::{EquationSystem, RobotTypeset, RoundingReport, Typeset, words};
+use crate::typeset::{
+    EquationSystem, NumberStyle, PrintOptions, RobotTypeset, RoundingReport, Typeset, rendered,
+    words,
+};
 
 use super::escape::{CommentText, TexText, label};
 use super::lines;
-use super::math::NumberStyle;
 use super::nomenclature::{self, Entry};
-use super::options::LatexOptions;
 use super::table::{self, TableBlock};
 
 /// The LaTeX files of a model; NAME is its identifier:
@@ -32,7 +33,7 @@ use super::table::{self, TableBlock};
 /// [`TypesetError`] if a candidate term has a variable without a symbol.
 pub fn emit(
     system: &Equations<'_>,
-    options: &LatexOptions,
+    options: &PrintOptions,
 ) -> Result<Vec<EmittedFile>, TypesetError> {
     let model = system.model();
     let typeset = Typeset::new(system, &options.symbols, options.rounding)?;
@@ -128,7 +129,7 @@ impl System {
     fn sentence(&self) -> String {
         let label = &self.label;
         let number = if self.aligned {
-            format!(r"EquationsFile \eqref{{{label}:1}} and on")
+            format!(r"Equations \eqref{{{label}:1}} and on")
         } else {
             format!(r"Equation \eqref{{{label}}}")
         };
@@ -180,7 +181,7 @@ fn phases(
     model: &ReducedModel,
     systems: &[EquationSystem],
     part: &str,
-    options: &LatexOptions,
+    options: &PrintOptions,
 ) -> Vec<System> {
     systems
         .iter()
@@ -241,7 +242,7 @@ fn robot_equations(
 /// The comments at the top of each file.
 struct Header<'a> {
     model: &'a ReducedModel,
-    options: &'a LatexOptions,
+    options: &'a PrintOptions,
 }
 
 impl Header<'_> {
@@ -275,10 +276,6 @@ impl Header<'_> {
     }
 }
 
-/// Renders one file; a file ends with one line end.
 fn file(path: String, template: &impl Template) -> Result<EmittedFile, TypesetError> {
-    let mut contents = template.render()?;
-    contents.truncate(contents.trim_end().len());
-    contents.push('\n');
-    Ok(EmittedFile::new(path, contents))
+    Ok(EmittedFile::new(path, rendered(template)?))
 }

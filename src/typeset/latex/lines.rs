@@ -1,10 +1,13 @@
 //! Equations as lines of a `cases` or `align` environment.
 
-use crate::typeset::{EQUALS, Equation, EquationSystem, break_lines, symbol_width};
+use crate::typeset::{
+    EQUALS, Equation, EquationSystem, Form, PrintOptions, break_lines, symbol_width,
+};
 
 use super::math::{TexMath, TexSymbol, TexTerms};
-use super::options::{Form, LatexOptions};
 
+/// Longest line unless chosen, in em.
+const WIDTH_EM: f64 = 32.0;
 /// What a continued line is set in by, in em: `\qquad` and the empty group
 /// before its sign.
 const INDENT: f64 = 2.3;
@@ -23,127 +26,104 @@ pub(super) struct Block {
 }
 
 /// Spells the equations of one phase; `label` is the stem of its labels.
-pub(super) fn block(system: &EquationSystem, label: &str, options: &LatexOptions) -> Block {
-    let printer = Printer { options, label };
-    let equations: Vec<Vec<String>> = system
-        .equations
-        .iter()
-        .map(|equation| printer.right_sides(equation))
+pub(super) fn block(system: &EquationSystem, label: &str, options: &PrintOptions) -> Block {
+    let sides: Vec<Vec<String>> = (system.equations.iter())
+        .map(|equation| right_sides(equation, options))
         .collect();
-    let count: usize = equations.iter().map(Vec::len).sum();
+    let count: usize = sides.iter().map(Vec::len).sum();
     let aligned = match options.form {
         Form::Automatic => count > CASES_LINES,
         Form::Cases => false,
         Form::Align => true,
     };
+    // the equations of the phase stand apart if one of them is broken
+    let is_spaced = count > sides.len();
     let mut lines = Vec::with_capacity(count);
-    for (place, (equation, sides)) in system.equations.iter().zip(&equations).enumerate() {
-        let is_last = place + 1 == system.equations.len();
-        let equation = Row {
-            equation,
-            sides,
-            number: place + 1,
-            is_last,
-            is_spaced: count > system.equations.len(),
-        };
-        if aligned {
-            printer.align(&equation, &mut lines);
-        } else {
-            printer.cases(&equation, &mut lines);
+    for (place, (equation, of_equation)) in system.equations.iter().zip(&sides).enumerate() {
+        let label = format!("{label}:{}", place + 1);
+        for (line, side) in of_equation.iter().enumerate() {
+            let ends = [line + 1 == of_equation.len(), place + 1 == sides.len()];
+            lines.push(match aligned {
+                true => align_line(equation, line, side, ends, &label),
+                false => cases_line(equation, line, side, ends, is_spaced),
+            });
         }
     }
     Block { aligned, lines }
 }
 
 /// One phase as a bare `cases` environment, for a place that is in math mode already.
-pub fn tex_cases(system: &EquationSystem, options: &LatexOptions) -> String {
-    let options = LatexOptions {
+pub fn tex_cases(system: &EquationSystem, width_em: f64) -> String {
+    let options = PrintOptions {
         form: Form::Cases,
-        ..options.clone()
+        width_em: Some(width_em),
+        ..PrintOptions::default()
     };
     let lines = block(system, "", &options).lines.join("\n  ");
     format!("\\begin{{cases}}\n  {lines}\n\\end{{cases}}")
 }
 
-struct Printer<'a> {
-    options: &'a LatexOptions,
-    label: &'a str,
+/// The right side of an equation, one entry per line.
+fn right_sides(equation: &Equation, options: &PrintOptions) -> Vec<String> {
+    let numbers = options.numbers;
+    if equation.terms.is_empty() {
+        let math = &equation.right();
+        return vec![TexMath { math, numbers }.to_string()];
+    }
+    let available = options.width_em.unwrap_or(WIDTH_EM) - BRACE;
+    let first = symbol_width(&equation.left) + EQUALS;
+    let lines = break_lines(&equation.terms, available, first, INDENT).into_iter();
+    let side = |(line, terms)| TexTerms {
+        terms,
+        numbers,
+        continues: line > 0,
+    };
+    lines
+        .enumerate()
+        .map(|line| side(line).to_string())
+        .collect()
 }
 
-/// One equation, broken into lines, and its place in the phase.
-struct Row<'a> {
-    equation: &'a Equation,
-    sides: &'a [String],
-    number: usize,
-    is_last: bool,
-    /// Whether the equations of the phase stand apart, because one of them is broken.
+/// One line of `cases`; `ends` tells whether its equation and the phase end with it.
+fn cases_line(
+    equation: &Equation,
+    line: usize,
+    side: &str,
+    ends: [bool; 2],
     is_spaced: bool,
+) -> String {
+    let is_tall = equation.is_tall();
+    // `cases` sets its lines in text style, in which fractions shrink.
+    let style = if is_tall { r"\displaystyle " } else { "" };
+    let start = match line {
+        0 => format!("{} = ", TexSymbol(&equation.left)),
+        _ => r"\qquad ".to_owned(),
+    };
+    let end = match ends {
+        [true, true] => "",
+        [true, false] if is_tall || is_spaced => r" \\[1ex]",
+        [false, _] if is_tall => r" \\[0.5ex]",
+        [_, _] => r" \\",
+    };
+    format!("{style}{start}{side}{end}")
 }
 
-impl Printer<'_> {
-    /// The right side of an equation, one entry a line.
-    fn right_sides(&self, equation: &Equation) -> Vec<String> {
-        let numbers = self.options.numbers;
-        if equation.terms.is_empty() {
-            let zero = equation.right();
-            let math = &zero;
-            return vec![TexMath { math, numbers }.to_string()];
-        }
-        let available = self.options.width_em - BRACE;
-        let first = symbol_width(&equation.left) + EQUALS;
-        break_lines(&equation.terms, available, first, INDENT)
-            .into_iter()
-            .enumerate()
-            .map(|(line, terms)| {
-                TexTerms {
-                    terms,
-                    numbers,
-                    continues: line > 0,
-                }
-                .to_string()
-            })
-            .collect()
-    }
-
-    fn cases(&self, row: &Row<'_>, lines: &mut Vec<String>) {
-        // `cases` sets its lines in text style, in which fractions shrink.
-        let style = if row.equation.is_tall() {
-            r"\displaystyle "
-        } else {
-            ""
-        };
-        for (line, side) in row.sides.iter().enumerate() {
-            let start = if line == 0 {
-                format!("{style}{} = ", TexSymbol(&row.equation.left))
-            } else {
-                format!(r"{style}\qquad ")
-            };
-            let ends_equation = line + 1 == row.sides.len();
-            let is_tall = row.equation.is_tall();
-            let end = match (ends_equation, row.is_last) {
-                (true, true) => "",
-                (true, false) if is_tall || row.is_spaced => r" \\[1ex]",
-                (false, _) if is_tall => r" \\[0.5ex]",
-                (_, _) => r" \\",
-            };
-            lines.push(format!("{start}{side}{end}"));
-        }
-    }
-
-    fn align(&self, row: &Row<'_>, lines: &mut Vec<String>) {
-        for (line, side) in row.sides.iter().enumerate() {
-            let start = if line == 0 {
-                format!("{} &= ", TexSymbol(&row.equation.left))
-            } else {
-                r"&\qquad ".to_owned()
-            };
-            let end = if line + 1 < row.sides.len() {
-                r" \notag \\".to_owned()
-            } else {
-                let stop = if row.is_last { "" } else { r" \\" };
-                format!(r" \label{{{}:{}}}{stop}", self.label, row.number)
-            };
-            lines.push(format!("{start}{side}{end}"));
-        }
-    }
+/// One line of `align`; the last of an equation has its label.
+fn align_line(
+    equation: &Equation,
+    line: usize,
+    side: &str,
+    ends: [bool; 2],
+    label: &str,
+) -> String {
+    let start = match line {
+        0 => format!("{} &= ", TexSymbol(&equation.left)),
+        _ => r"&\qquad ".to_owned(),
+    };
+    let end = match ends {
+        [false, _] => r" \notag \\".to_owned(),
+        [true, true] => format!(r" \label{{{label}}}"),
+        [true, false] => format!(r" \label{{{label}}} \\"),
+    };
+    format!("{start}{side}{end}")
 }

@@ -3,17 +3,9 @@
 use std::fmt;
 
 use crate::equations::Unit;
-use crate::typeset::{Decimal, FunctionName, GREEK, Glyph, Math, Signed, Symbol};
-
-/// How numbers are written.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum NumberStyle {
-    /// Digits as they are: `0.36`, `1.2 \times 10^{-9}`.
-    #[default]
-    Plain,
-    /// The macro of siunitx: `\num{0.36}`.
-    Siunitx,
-}
+use crate::symbolic::Function;
+use crate::typeset::tree::function_name;
+use crate::typeset::{Decimal, GREEK, Glyph, Math, NumberStyle, Signed, Symbol};
 
 /// A typeset tree that displays as LaTeX, for math mode.
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +84,7 @@ impl fmt::Display for TexMath<'_> {
                 write!(f, r"\sqrt[{index}]{{{}}}", inner(radicand))
             }
             Math::Function(name, power, argument) => {
-                f.write_str(function(*name))?;
+                f.write_str(&function(*name))?;
                 if let Some(power) = power {
                     write!(f, "^{}", exponent_of(power))?;
                 }
@@ -192,15 +184,10 @@ fn glyph(glyph: &Glyph) -> String {
     }
 }
 
-fn function(name: FunctionName) -> &'static str {
-    match name {
-        FunctionName::Sin => r"\sin",
-        FunctionName::Cos => r"\cos",
-        FunctionName::Tan => r"\tan",
-        FunctionName::Tanh => r"\tanh",
-        FunctionName::Exp => r"\exp",
-        FunctionName::Ln => r"\ln",
-        FunctionName::Sgn => r"\mathop{\mathrm{sgn}}",
+fn function(function: Function) -> String {
+    match function {
+        Function::Sign => r"\mathop{\mathrm{sgn}}".to_owned(),
+        named => format!(r"\{}", function_name(named)),
     }
 }
 
@@ -218,27 +205,13 @@ fn delimited(
         write!(f, "{open}{inner}{close}")
     }
 }
+
 /// A unit as upright LaTeX: `\mathrm{m/s^{2}}`.
 pub struct TexUnit(pub Unit);
 
 impl fmt::Display for TexUnit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let product = |factors: &[(&str, i8)]| {
-            let factors = factors.iter().map(|&(symbol, power)| match power {
-                1 => symbol.to_owned(),
-                _ => format!("{symbol}^{{{power}}}"),
-            });
-            factors.collect::<Vec<_>>().join(r"\,")
-        };
-        let [above, below] = self.0.fraction();
-        let above = match above.is_empty() {
-            true => "1".to_owned(),
-            false => product(&above),
-        };
-        match below.len() {
-            0 => write!(f, r"\mathrm{{{above}}}"),
-            1 => write!(f, r"\mathrm{{{above}/{}}}", product(&below)),
-            _ => write!(f, r"\mathrm{{{above}/({})}}", product(&below)),
-        }
+        let unit = self.0.spelled(r"\,", |power| format!("^{{{power}}}"));
+        write!(f, r"\mathrm{{{unit}}}")
     }
 }

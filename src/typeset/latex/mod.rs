@@ -9,7 +9,7 @@
 //! ```
 //! use nalgebra::DMatrix;
 //! use romc::equations::Equations;
-//! use romc::typeset::latex::{self, LatexOptions};
+//! use romc::typeset::{PrintOptions, latex};
 //! use romc::model::{FeetRule, Library, Phase, ReducedModel};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -21,7 +21,7 @@
 //!         xi: DMatrix::from_column_slice(3, 1, &[0.29, -1.22, -1.0]),
 //!     })
 //!     .build()?;
-//! let files = latex::emit(&Equations::of(&model), &LatexOptions::default())?;
+//! let files = latex::emit(&Equations::of(&model), &PrintOptions::default())?;
 //! assert_eq!(files[0].path, "flight_only.tex");
 //! let equation = r"\ddot{z}_1 = 0.29 - 1.22\dot{z}_1 - 1.00\sin(\dot{z}_1)";
 //! assert!(files[0].contents.contains(equation));
@@ -38,11 +38,9 @@ mod escape;
 mod lines;
 mod math;
 mod nomenclature;
-mod options;
 mod table;
 
 pub use document::emit;
 pub use escape::{CommentText, TexText, label};
 pub use lines::tex_cases;
-pub use math::{NumberStyle, TexMath, TexNumber, TexSymbol, TexTerms, TexUnit};
-pub use options::{Form, LatexOptions};
+pub use math::{TexMath, TexNumber, TexSymbol, TexTerms, TexUnit};

@@ -2,10 +2,10 @@
 
 use crate::equations::{Equations, LatentUnits};
 use crate::model::{Activation, ReducedModel, ScaleFactors, StateMap};
-use crate::typeset::{Decimal, Quantity, Rounding, SymbolTable, Variable};
+use crate::typeset::{Decimal, NumberStyle, Quantity, Rounding, SymbolTable};
 
 use super::escape::TexText;
-use super::math::{NumberStyle, TexNumber, TexSymbol, TexUnit};
+use super::math::{TexNumber, TexSymbol, TexUnit};
 
 /// How many of an encoder row's weights are named.
 const STRONGEST: usize = 3;
@@ -20,6 +20,16 @@ pub(super) struct Entry {
     pub meaning: String,
 }
 
+fn entry(symbol: impl Into<String>, meaning: impl Into<String>) -> Entry {
+    Entry {
+        symbol: symbol.into(),
+        meaning: meaning.into(),
+    }
+}
+
+const ROBOT_STATE: &str = r"$\mathbf{x}$, $\mathbf{u}$";
+const ENCODER: &str = r"$\mathbf{W}_e$, $\mathbf{b}_e$";
+
 /// The list of symbols of the equations.
 pub(super) fn entries(
     system: &Equations<'_>,
@@ -31,34 +41,44 @@ pub(super) fn entries(
         return physical_entries(model, units, symbols, numbers);
     }
     let dim = model.latent_dim();
-    let has_layers = model.encoder_map().is_ok();
     let mut list: Vec<Entry> = (1..=dim)
-        .map(|index| Entry {
-            symbol: symbol(symbols, Quantity::Position, index),
-            meaning: coordinate(model, index - 1, numbers),
+        .map(|index| {
+            let symbol = symbol(symbols, Quantity::Position, index);
+            entry(symbol, coordinate(model, index - 1, numbers))
         })
         .collect();
-    list.push(Entry {
-        symbol: range(symbols, Quantity::Velocity, dim),
-        meaning: match model.encoder() {
-            Ok(_) => r"latent velocities, $\dot{\mathbf{z}} = \mathbf{W}_e (\mathbf{s}_x \dot{\mathbf{x}})$".to_owned(),
-            Err(_) if has_layers => r"latent velocities, $\dot{\mathbf{z}} = \mathbf{J} (\mathbf{s}_x \dot{\mathbf{x}})$".to_owned(),
-            Err(_) => "latent velocities".to_owned(),
-        },
+    // the map of velocities: the weights of an affine encoder, the Jacobian of another
+    let map = match (model.encoder(), model.encoder_map()) {
+        (Ok(_), _) => Some(r"\mathbf{W}_e"),
+        (Err(_), Ok(_)) => Some(r"\mathbf{J}"),
+        (Err(_), Err(_)) => None,
+    };
+    let velocities = map.map(|map| {
+        format!(r", $\dot{{\mathbf{{z}}}} = {map} (\mathbf{{s}}_x \dot{{\mathbf{{x}}}})$")
     });
-    list.push(Entry {
-        symbol: range(symbols, Quantity::Input, dim),
-        meaning: match model.encoder() {
-            Ok(_) => r"latent inputs, $\mathbf{u}_{\mathrm{lat}} = (\mathbf{W}_e^{\mathsf{T}})^{+} (\mathbf{s}_u \mathbf{u})$, lifted by $\mathbf{s}_u \mathbf{u} = \mathbf{W}_e^{\mathsf{T}} \mathbf{u}_{\mathrm{lat}}$".to_owned(),
-            Err(_) if has_layers => r"latent inputs, $\mathbf{u}_{\mathrm{lat}} = (\mathbf{J}^{\mathsf{T}})^{+} (\mathbf{s}_u \mathbf{u})$, lifted by $\mathbf{s}_u \mathbf{u} = \mathbf{J}^{\mathsf{T}} \mathbf{u}_{\mathrm{lat}}$".to_owned(),
-            Err(_) => "latent inputs".to_owned(),
-        },
+    list.push(entry(
+        range(symbols, Quantity::Velocity, dim),
+        format!("latent velocities{}", velocities.unwrap_or_default()),
+    ));
+    let inputs = map.map(|map| {
+        format!(
+            r", $\mathbf{{u}}_{{\mathrm{{lat}}}} = ({map}^{{\mathsf{{T}}}})^{{+}} (\mathbf{{s}}_u \mathbf{{u}})$, lifted by $\mathbf{{s}}_u \mathbf{{u}} = {map}^{{\mathsf{{T}}}} \mathbf{{u}}_{{\mathrm{{lat}}}}$"
+        )
     });
-    if model.encoder().is_ok() {
-        list.extend(robot_entries(model, numbers));
-    } else if let Ok(encoder) = model.encoder_map() {
-        list.push(robot_state());
-        list.push(layers(encoder));
+    list.push(entry(
+        range(symbols, Quantity::Input, dim),
+        format!("latent inputs{}", inputs.unwrap_or_default()),
+    ));
+    if let Ok(encoder) = model.encoder_map() {
+        let state = "robot state and generalised input in SI units";
+        list.push(entry(ROBOT_STATE, state));
+        list.push(match model.encoder() {
+            Ok(_) => entry(
+                ENCODER,
+                r"encoder, $\mathbf{z} = \mathbf{W}_e (\mathbf{s}_x \mathbf{x}) + \mathbf{b}_e$",
+            ),
+            Err(_) => layers(encoder),
+        });
         list.extend(scale_factors(model, numbers));
     }
     list
@@ -72,44 +92,36 @@ fn physical_entries(
     numbers: NumberStyle,
 ) -> Vec<Entry> {
     let indices = || 1..=model.latent_dim();
-    let mut list: Vec<Entry> = indices()
-        .map(|index| Entry {
-            symbol: symbol(symbols, Quantity::Position, index),
-            meaning: format!(
-                "${}$; {}",
-                TexUnit(units.position[index - 1]),
-                coordinate(model, index - 1, numbers)
-            ),
-        })
-        .collect();
-    list.push(Entry {
-        symbol: range(symbols, Quantity::Velocity, model.latent_dim()),
-        meaning: r"their derivatives by time, $\dot{\mathbf{z}} = \mathbf{W}_e \dot{\mathbf{x}}$, per second".to_owned(),
+    let positions = indices().map(|index| {
+        let unit = TexUnit(units.position[index - 1]);
+        let meaning = format!("${unit}$; {}", coordinate(model, index - 1, numbers));
+        entry(symbol(symbols, Quantity::Position, index), meaning)
     });
-    list.extend(indices().map(|index| Entry {
-        symbol: symbol(symbols, Quantity::Input, index),
-        meaning: format!(
-            "${}$; the input that does work along latent coordinate {index}",
-            TexUnit(units.input[index - 1])
+    let inputs = indices().map(|index| {
+        let unit = TexUnit(units.input[index - 1]);
+        let meaning = format!("${unit}$; the input that does work along latent coordinate {index}");
+        entry(symbol(symbols, Quantity::Input, index), meaning)
+    });
+    let velocities = entry(
+        range(symbols, Quantity::Velocity, model.latent_dim()),
+        r"their derivatives by time, $\dot{\mathbf{z}} = \mathbf{W}_e \dot{\mathbf{x}}$, per second",
+    );
+    let robot = [
+        entry(
+            ROBOT_STATE,
+            r"robot state and generalised input in SI units; $\mathbf{u} = \mathbf{L}\,\mathbf{u}_{\mathrm{lat}}$ with the constant matrix $\mathbf{L}$ of the generated code",
         ),
-    }));
-    list.push(Entry {
-        symbol: r"$\mathbf{x}$, $\mathbf{u}$".to_owned(),
-        meaning: r"robot state and generalised input in SI units; $\mathbf{u} = \mathbf{L}\,\mathbf{u}_{\mathrm{lat}}$ with the constant matrix $\mathbf{L}$ of the generated code".to_owned(),
-    });
-    list.push(Entry {
-        symbol: r"$\mathbf{W}_e$, $\mathbf{b}_e$".to_owned(),
-        meaning: r"encoder in these units, $\mathbf{z} = \mathbf{W}_e \mathbf{x} + \mathbf{b}_e$"
-            .to_owned(),
-    });
-    list
+        entry(
+            ENCODER,
+            r"encoder in these units, $\mathbf{z} = \mathbf{W}_e \mathbf{x} + \mathbf{b}_e$",
+        ),
+    ];
+    let latent = positions.chain([velocities]).chain(inputs);
+    latent.chain(robot).collect()
 }
 
 fn symbol(symbols: &SymbolTable, quantity: Quantity, index: usize) -> String {
-    format!(
-        "${}$",
-        TexSymbol(&symbols.symbol(Variable { quantity, index }))
-    )
+    format!("${}$", TexSymbol(&symbols.symbol(quantity, index)))
 }
 
 /// `$z_1, \dots, z_6$`, or all of up to three.
@@ -127,54 +139,24 @@ fn coordinate(model: &ReducedModel, row: usize, numbers: NumberStyle) -> String 
     let (Ok(encoder), Some(state)) = (model.encoder(), model.state()) else {
         return format!("latent coordinate {}", row + 1);
     };
-    let mut weights: Vec<(usize, f64)> = encoder
-        .weights()
-        .row(row)
-        .iter()
-        .copied()
-        .enumerate()
-        .collect();
+    let weights = encoder.weights().row(row);
+    let mut weights: Vec<(&String, f64)> =
+        state.names.iter().zip(weights.iter().copied()).collect();
     weights.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
     let largest = weights.first().map_or(0.0, |(_, weight)| weight.abs());
-    let strongest: Vec<String> = weights
-        .iter()
-        .take(STRONGEST)
+    let strongest: Vec<String> = (weights.iter().take(STRONGEST))
         .filter(|(_, weight)| weight.abs() > NEGLIGIBLE * largest)
-        .map(|(column, weight)| {
+        .map(|(name, weight)| {
             let number = &Decimal::rounded(*weight, Rounding::default());
             let weight = TexNumber { number, numbers };
-            format!(
-                r"\texttt{{{}}} (${weight}$)",
-                TexText(&state.names[*column])
-            )
+            format!(r"\texttt{{{}}} (${weight}$)", TexText(name))
         })
         .collect();
+    let strongest = strongest.join(", ");
     format!(
-        "latent coordinate {}; largest weights: {}",
-        row + 1,
-        strongest.join(", ")
+        "latent coordinate {}; largest weights: {strongest}",
+        row + 1
     )
-}
-
-fn robot_entries(model: &ReducedModel, numbers: NumberStyle) -> Vec<Entry> {
-    let mut list = vec![
-        robot_state(),
-        Entry {
-            symbol: r"$\mathbf{W}_e$, $\mathbf{b}_e$".to_owned(),
-            meaning:
-                r"encoder, $\mathbf{z} = \mathbf{W}_e (\mathbf{s}_x \mathbf{x}) + \mathbf{b}_e$"
-                    .to_owned(),
-        },
-    ];
-    list.extend(scale_factors(model, numbers));
-    list
-}
-
-fn robot_state() -> Entry {
-    Entry {
-        symbol: r"$\mathbf{x}$, $\mathbf{u}$".to_owned(),
-        meaning: "robot state and generalised input in SI units".to_owned(),
-    }
 }
 
 /// A nonlinear encoder by the widths of its layers; its weights stay in the model file.
@@ -188,33 +170,32 @@ fn layers(encoder: &StateMap) -> Entry {
             }
         }
     });
-    let widths: Vec<String> = widths.collect();
-    Entry {
-        symbol: r"$\mathbf{E}$, $\mathbf{J}$".to_owned(),
-        meaning: format!(
-            r"nonlinear encoder, $\mathbf{{z}} = \mathbf{{E}}(\mathbf{{s}}_x \mathbf{{x}})$, and its Jacobian at $\mathbf{{s}}_x \mathbf{{x}}$; inputs {}, layers {}",
-            encoder.input_dim(),
-            widths.join(", ")
+    let (inputs, widths) = (encoder.input_dim(), widths.collect::<Vec<_>>().join(", "));
+    entry(
+        r"$\mathbf{E}$, $\mathbf{J}$",
+        format!(
+            r"nonlinear encoder, $\mathbf{{z}} = \mathbf{{E}}(\mathbf{{s}}_x \mathbf{{x}})$, and its Jacobian at $\mathbf{{s}}_x \mathbf{{x}}$; inputs {inputs}, layers {widths}"
         ),
-    }
+    )
 }
 
 fn scale_factors(model: &ReducedModel, numbers: NumberStyle) -> Vec<Entry> {
-    let mut list = Vec::new();
-    if let Ok(scaling) = model.scaling() {
-        for (symbol, factors) in [("x", &scaling.state), ("u", &scaling.input)] {
-            let value = match factors {
-                ScaleFactors::Uniform(factor) => {
-                    let number = &Decimal::exact(*factor);
-                    format!("${}$ for all", TexNumber { number, numbers })
-                }
-                ScaleFactors::PerCoordinate(_) => "one a coordinate".to_owned(),
-            };
-            list.push(Entry {
-                symbol: format!(r"$\mathbf{{s}}_{symbol}$"),
-                meaning: format!(r"scale factors of $\mathbf{{{symbol}}}$: {value}"),
-            });
-        }
-    }
-    list
+    let Ok(scaling) = model.scaling() else {
+        return Vec::new();
+    };
+    let factors = [("x", &scaling.state), ("u", &scaling.input)];
+    let line = |(symbol, factors): (&str, &ScaleFactors)| {
+        let value = match factors {
+            ScaleFactors::Uniform(factor) => {
+                let number = &Decimal::exact(*factor);
+                format!("${}$ for all", TexNumber { number, numbers })
+            }
+            ScaleFactors::PerCoordinate(_) => "one per coordinate".to_owned(),
+        };
+        entry(
+            format!(r"$\mathbf{{s}}_{symbol}$"),
+            format!(r"scale factors of $\mathbf{{{symbol}}}$: {value}"),
+        )
+    };
+    factors.into_iter().map(line).collect()
 }

@@ -1,9 +1,9 @@
 //! The coefficients as booktabs tables.
 
-use crate::typeset::{CoefficientRow, CoefficientTable, Decimal};
+use crate::typeset::{CoefficientRow, CoefficientTable, Decimal, NumberStyle};
 
 use super::escape::{TexText, label};
-use super::math::{NumberStyle, TexMath, TexNumber, TexSymbol, TexUnit};
+use super::math::{TexMath, TexNumber, TexSymbol, TexUnit};
 
 /// Most columns of numbers side by side.
 const WIDEST: usize = 8;
@@ -51,33 +51,27 @@ pub(super) fn blocks(
         }
     }
     let count = groups.len();
-    groups
-        .iter()
-        .enumerate()
-        .map(|(place, columns)| {
-            let layout = Layout {
-                table,
-                columns,
-                numbers,
-            };
-            let part = if count > 1 {
-                format!(", part {} of {count}", place + 1)
-            } else {
-                String::new()
-            };
-            layout.block(
-                format!(
-                    "Coefficients of \\texttt{{{}}}{part}{}",
-                    TexText(model_name),
-                    match table.units {
-                        Some(_) => ". The unit of a coefficient is that of its column over that of its term",
-                        None => "",
-                    }
-                ),
-                format!("tab:{}:{}", label(model_name), place + 1),
-            )
-        })
-        .collect()
+    let units = match table.units {
+        Some(_) => ". The unit of a coefficient is that of its column over that of its term",
+        None => "",
+    };
+    let block = |(place, columns): (usize, &Vec<usize>)| {
+        let part = match count {
+            1 => String::new(),
+            _ => format!(", part {} of {count}", place + 1),
+        };
+        let name = TexText(model_name);
+        let layout = Layout {
+            table,
+            columns,
+            numbers,
+        };
+        layout.block(
+            format!(r"Coefficients of \texttt{{{name}}}{part}{units}"),
+            format!("tab:{}:{}", label(model_name), place + 1),
+        )
+    };
+    groups.iter().enumerate().map(block).collect()
 }
 
 struct Layout<'a> {
@@ -143,27 +137,19 @@ impl Layout<'_> {
     }
 
     fn heads(&self) -> String {
-        let mut heads = "Term".to_owned();
-        for &column in self.columns {
-            let symbol = TexSymbol(&self.table.columns[column].1);
-            heads.push_str(&match self.numbers {
-                NumberStyle::Plain => format!(" & ${symbol}$"),
-                NumberStyle::Siunitx => format!(" & {{${symbol}$}}"),
-            });
-        }
-        heads.push_str(r" \\");
-        if let Some(units) = &self.table.units {
-            heads.push('\n');
-            for &column in self.columns {
-                let unit = TexUnit(units[column]);
-                heads.push_str(&match self.numbers {
-                    NumberStyle::Plain => format!(" & ${unit}$"),
-                    NumberStyle::Siunitx => format!(" & {{${unit}$}}"),
-                });
-            }
-            heads.push_str(r" \\");
-        }
-        heads
+        let cell = |math: String| match self.numbers {
+            NumberStyle::Plain => format!(" & ${math}$"),
+            NumberStyle::Siunitx => format!(" & {{${math}$}}"),
+        };
+        let symbol = |&column: &usize| cell(TexSymbol(&self.table.columns[column].1).to_string());
+        let symbols: String = self.columns.iter().map(symbol).collect();
+        let heads = format!(r"Term{symbols} \\");
+        let Some(units) = &self.table.units else {
+            return heads;
+        };
+        let unit = |&column: &usize| cell(TexUnit(units[column]).to_string());
+        let units: String = self.columns.iter().map(unit).collect();
+        format!("{heads}\n{units} \\\\")
     }
 
     fn row(&self, row: &CoefficientRow, widths: &[ColumnWidth]) -> String {

@@ -6,5 +6,5 @@
 mod document;
 mod escape;
 
-pub use document::{MarkdownOptions, emit};
+pub use document::emit;
 pub use escape::MarkdownText;

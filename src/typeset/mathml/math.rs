@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::typeset::tree::function_name;
 use crate::typeset::{Decimal, GREEK, Glyph, Math, Signed, Symbol};
 
 const INVISIBLE_TIMES: &str = "<mo>\u{2062}</mo>";
@@ -80,7 +81,7 @@ impl fmt::Display for Mathml<'_> {
                 write!(f, "<mroot>{}<mn>{index}</mn></mroot>", Mathml(inner))
             }
             Math::Function(name, power, argument) => {
-                let name = format!("<mi>{}</mi>", name.text());
+                let name = format!("<mi>{}</mi>", function_name(*name));
                 let head = match power {
                     Some(power) => format!("<msup>{name}{}</msup>", Mathml(power)),
                     None => name,

@@ -10,4 +10,4 @@ mod page;
 
 pub use escape::HtmlText;
 pub use math::{Mathml, MathmlNumber, MathmlSymbol, MathmlTerms};
-pub use page::{MathmlOptions, emit, system};
+pub use page::{emit, system};

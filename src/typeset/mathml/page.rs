@@ -4,10 +4,11 @@ use askama::Template;
 
 use crate::equations::{Equations, Unit};
 use crate::files::EmittedFile;
-use crate::typeset::TypesetError;
-use crate::typeset::latex::{LatexOptions, tex_cases};
+use crate::typeset::latex::tex_cases;
+use crate::typeset::page::{Markup, Page, rendered};
 use crate::typeset::{
-    EQUALS, EquationSystem, Rounding, SymbolTable, Typeset, break_lines, symbol_width, words,
+    Decimal, EQUALS, EquationSystem, Math, PrintOptions, Symbol, TypesetError, break_lines,
+    symbol_width,
 };
 
 use super::escape::HtmlText;
@@ -15,30 +16,6 @@ use super::math::{Mathml, MathmlNumber, MathmlSymbol, MathmlTerms};
 
 /// What a continued line is set in by, in em.
 const INDENT: f64 = 2.0;
-
-/// Options of the MathML backend.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MathmlOptions {
-    /// How coefficients are rounded.
-    pub rounding: Rounding,
-    /// Longest line in em.
-    pub width_em: f64,
-    /// New names for variables.
-    pub symbols: SymbolTable,
-    /// Digest of the model file, for the page's head.
-    pub digest: Option<String>,
-}
-
-impl Default for MathmlOptions {
-    fn default() -> Self {
-        Self {
-            rounding: Rounding::default(),
-            width_em: 44.0,
-            symbols: SymbolTable::default(),
-            digest: None,
-        }
-    }
-}
 
 /// One phase as a `math` element: a brace before its equations, each broken into
 /// lines of `width_em`. The LaTeX of the same equations stands in an annotation,
@@ -62,11 +39,7 @@ pub fn system(system: &EquationSystem, width_em: f64) -> String {
             head.clear();
         }
     }
-    let options = LatexOptions {
-        width_em,
-        ..LatexOptions::default()
-    };
-    let tex = tex_cases(system, &options);
+    let tex = tex_cases(system, width_em);
     format!(
         "<math display=\"block\"><semantics><mrow><mo fence=\"true\" form=\"prefix\" \
          stretchy=\"true\">{{</mo><mtable displaystyle=\"true\">{rows}</mtable></mrow>\
@@ -93,110 +66,43 @@ fn row(left: &str, right: &str, indent: f64) -> String {
 /// # Errors
 /// [`TypesetError`] if a candidate term has a variable without a symbol.
 pub fn emit(
-    latent: &Equations<'_>,
-    options: &MathmlOptions,
+    equations: &Equations<'_>,
+    options: &PrintOptions,
 ) -> Result<Vec<EmittedFile>, TypesetError> {
-    let model = latent.model();
-    let typeset = Typeset::new(latent, &options.symbols, options.rounding)?;
-    let phases = typeset
-        .systems
-        .iter()
-        .zip(model.phases())
-        .map(|(equations, phase)| PhaseView {
-            name: HtmlText(&phase.name).to_string(),
-            feet: HtmlText(&words::feet(&phase.feet)).to_string(),
-            math: system(equations, options.width_em),
-        })
-        .collect();
-    let page = Page {
-        name: HtmlText(model.name()).to_string(),
-        description: HtmlText(model.description()).to_string(),
-        version: env!("CARGO_PKG_VERSION"),
-        digest: options
-            .digest
-            .as_deref()
-            .map(|digest| HtmlText(digest).to_string()),
-        phases,
-        rounding: HtmlText(&words::rounding(options.rounding, &typeset.rounding)).to_string(),
-        heads: heads(&typeset),
-        rows: rows(&typeset),
-    };
-    let mut contents = page.render()?;
-    contents.truncate(contents.trim_end().len());
-    contents.push('\n');
-    let path = format!("{}.html", model.identifier().as_str());
-    Ok(vec![EmittedFile::new(path, contents)])
+    let page = Page::new::<Html>(equations, options)?;
+    let path = format!("{}.html", equations.model().identifier());
+    Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])
 }
 
 #[derive(Template)]
 #[template(path = "mathml/page.askama", config = "templates/askama.toml")]
-struct Page {
-    name: String,
-    description: String,
-    version: &'static str,
-    digest: Option<String>,
-    phases: Vec<PhaseView>,
-    rounding: String,
-    heads: Vec<String>,
-    rows: Vec<RowView>,
+struct Document {
+    page: Page,
 }
 
-/// One phase in the template.
-struct PhaseView {
-    name: String,
-    feet: String,
-    math: String,
-}
+struct Html;
 
-/// One candidate term in the template.
-struct RowView {
-    term: String,
-    cells: Vec<String>,
-}
+impl Markup for Html {
+    fn text(text: &str) -> String {
+        HtmlText(text).to_string()
+    }
 
-fn heads(typeset: &Typeset) -> Vec<String> {
-    let columns = &typeset.table.columns;
-    columns
-        .iter()
-        .enumerate()
-        .map(|(column, (phase, symbol))| {
-            let unit = typeset.table.units.as_ref().map(|units| units[column]);
-            format!(
-                "<math>{}</math><br><small>{}{}</small>",
-                MathmlSymbol(symbol),
-                HtmlText(phase),
-                after_comma(unit)
-            )
-        })
-        .collect()
-}
+    fn system(equations: &EquationSystem, width_em: f64) -> String {
+        system(equations, width_em)
+    }
 
-/// A unit behind a name, if there is one.
-fn after_comma(unit: Option<Unit>) -> String {
-    unit.map_or(String::new(), |unit| format!(", {unit}"))
-}
+    fn number(number: &Decimal) -> String {
+        format!("<math>{}</math>", MathmlNumber(number))
+    }
 
-fn rows(typeset: &Typeset) -> Vec<RowView> {
-    typeset
-        .table
-        .rows
-        .iter()
-        .map(|row| RowView {
-            term: format!(
-                "<math>{}</math><small>{}</small>",
-                Mathml(&row.term.clone().into_math()),
-                after_comma(row.unit)
-            )
-            .replace("<small></small>", ""),
-            cells: row
-                .coefficients
-                .iter()
-                .map(|cell| {
-                    cell.as_ref().map_or(String::new(), |number| {
-                        format!("<math>{}</math>", MathmlNumber(number))
-                    })
-                })
-                .collect(),
-        })
-        .collect()
+    fn head(symbol: &Symbol, phase: &str, unit: Option<Unit>) -> String {
+        let (symbol, phase) = (MathmlSymbol(symbol), HtmlText(phase));
+        let unit = unit.map_or(String::new(), |unit| format!(", {unit}"));
+        format!("<math>{symbol}</math><br><small>{phase}{unit}</small>")
+    }
+
+    fn term(term: &Math, unit: Option<Unit>) -> String {
+        let unit = unit.map(|unit| format!("<small>, {unit}</small>"));
+        format!("<math>{}</math>{}", Mathml(term), unit.unwrap_or_default())
+    }
 }

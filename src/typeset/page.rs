@@ -1,0 +1,104 @@
+//! Pages of Markdown and HTML: what stands on them, in a markup that the page chooses.
+
+use askama::Template;
+
+use super::decimal::Decimal;
+use super::equations::{EquationSystem, Typeset};
+use super::error::TypesetError;
+use super::options::PrintOptions;
+use super::tree::{Math, Symbol};
+use super::words;
+use crate::equations::{Equations, Unit};
+
+/// Longest line of an equation unless chosen, in em.
+const WIDTH_EM: f64 = 44.0;
+
+/// How a page spells text and mathematics.
+pub(super) trait Markup {
+    /// Text from outside, so that it shows as it is.
+    fn text(text: &str) -> String;
+    /// The equations of a phase.
+    fn system(system: &EquationSystem, width_em: f64) -> String;
+    /// A number within a line or cell.
+    fn number(number: &Decimal) -> String;
+    /// The head of a column: an acceleration of a phase, with its unit where that is physical.
+    fn head(symbol: &Symbol, phase: &str, unit: Option<Unit>) -> String;
+    /// The head of a row: a candidate term, with its unit where that is physical.
+    fn term(term: &Math, unit: Option<Unit>) -> String;
+}
+
+/// A page for a template, all parts in the page's markup.
+pub(super) struct Page {
+    pub name: String,
+    pub description: String,
+    pub version: &'static str,
+    pub digest: Option<String>,
+    pub phases: Vec<PhaseView>,
+    pub rounding: String,
+    pub heads: Vec<String>,
+    pub rows: Vec<RowView>,
+}
+
+/// One phase in the template.
+pub(super) struct PhaseView {
+    pub name: String,
+    pub feet: String,
+    pub math: String,
+}
+
+/// One candidate term in the template, with a cell for each column.
+pub(super) struct RowView {
+    pub term: String,
+    pub cells: Vec<String>,
+}
+
+impl Page {
+    /// The page of a model's equations.
+    ///
+    /// # Errors
+    /// [`TypesetError::Symbol`] if a candidate term has a variable without a symbol.
+    pub fn new<M: Markup>(
+        equations: &Equations<'_>,
+        options: &PrintOptions,
+    ) -> Result<Self, TypesetError> {
+        let model = equations.model();
+        let width_em = options.width_em.unwrap_or(WIDTH_EM);
+        let typeset = Typeset::new(equations, &options.symbols, options.rounding)?;
+        let phases = typeset.systems.iter().zip(equations.phases());
+        let table = &typeset.table;
+        let unit = |column: usize| table.units.as_ref().map(|units| units[column]);
+        let columns = table.columns.iter().enumerate();
+        let cell = |number: &Option<Decimal>| number.as_ref().map_or(String::new(), M::number);
+        Ok(Self {
+            name: M::text(model.name()),
+            description: M::text(model.description()),
+            version: env!("CARGO_PKG_VERSION"),
+            digest: options.digest.as_deref().map(M::text),
+            phases: phases
+                .map(|(system, phase)| PhaseView {
+                    name: M::text(&phase.name),
+                    feet: M::text(&words::feet(&phase.feet)),
+                    math: M::system(system, width_em),
+                })
+                .collect(),
+            rounding: M::text(&words::rounding(options.rounding, &typeset.rounding)),
+            heads: columns
+                .map(|(column, (phase, symbol))| M::head(symbol, phase, unit(column)))
+                .collect(),
+            rows: (table.rows.iter())
+                .map(|row| RowView {
+                    term: M::term(&row.term.clone().into_math(), row.unit),
+                    cells: row.coefficients.iter().map(cell).collect(),
+                })
+                .collect(),
+        })
+    }
+}
+
+/// The text of a template, with one line end at its end.
+pub fn rendered(template: &impl Template) -> askama::Result<String> {
+    let mut text = template.render()?;
+    text.truncate(text.trim_end().len());
+    text.push('\n');
+    Ok(text)
+}

@@ -1,0 +1,337 @@
+//! Tables of results: one set of cells, rendered as text, Markdown, HTML or CSV.
+
+use std::fmt;
+
+use super::mathml::HtmlText;
+
+/// A number with four significant digits; `diverged` for one that is not finite.
+pub fn significant(value: f64) -> String {
+    if !value.is_finite() {
+        return "diverged".to_owned();
+    }
+    let magnitude = value.abs();
+    if magnitude == 0.0 {
+        return "0".to_owned();
+    }
+    if !(1e-3..1e5).contains(&magnitude) {
+        return format!("{value:.3e}");
+    }
+    let before_point = magnitude.log10().floor() as i32 + 1;
+    format!("{value:.*}", usize::try_from(4 - before_point).unwrap_or(0))
+}
+
+/// The float nearest to `value` in so many significant decimal digits.
+pub fn rounded(value: f64, digits: usize) -> f64 {
+    let text = format!("{value:.*e}", digits - 1);
+    text.parse().expect("a formatted float reads back")
+}
+
+/// The smallest number of `digits` significant decimal digits that is not below `value`.
+pub fn rounded_up(value: f64, digits: usize) -> f64 {
+    let nearest = rounded(value, digits);
+    if nearest >= value {
+        return nearest;
+    }
+    let place = value.abs().log10().floor() as i32 + 1 - digits as i32;
+    rounded(nearest + 10f64.powi(place), digits)
+}
+
+/// Text of one cell; a float has four significant digits, a value that is absent is `-`.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Cell(String);
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self(text)
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self(text.to_owned())
+    }
+}
+
+impl From<&String> for Cell {
+    fn from(text: &String) -> Self {
+        Self(text.clone())
+    }
+}
+
+impl From<usize> for Cell {
+    fn from(count: usize) -> Self {
+        Self(count.to_string())
+    }
+}
+
+impl From<f64> for Cell {
+    fn from(value: f64) -> Self {
+        Self(significant(value))
+    }
+}
+
+impl<T: Into<Cell>> From<Option<T>> for Cell {
+    fn from(value: Option<T>) -> Self {
+        value.map_or("-".into(), T::into)
+    }
+}
+
+/// A table with named columns; the first column names the rows. `Display` aligns it for a terminal.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Table {
+    caption: String,
+    /// Name and unit of each column.
+    columns: Vec<(String, String)>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// An empty table with these columns, which have no units.
+    pub fn new<T: Into<String>>(columns: impl IntoIterator<Item = T>) -> Self {
+        let columns = columns.into_iter().map(|name| (name.into(), String::new()));
+        Self {
+            columns: columns.collect(),
+            ..Self::default()
+        }
+    }
+
+    /// Starts a table with a row for each item; columns follow by [`Rows::column`].
+    pub fn of<T>(items: impl IntoIterator<Item = T>) -> Rows<T> {
+        let items: Vec<T> = items.into_iter().collect();
+        let table = Self {
+            rows: vec![Vec::new(); items.len()],
+            ..Self::default()
+        };
+        Rows { items, table }
+    }
+
+    /// Adds a row; missing cells stay empty.
+    pub fn row<T: Into<Cell>>(&mut self, cells: impl IntoIterator<Item = T>) -> &mut Self {
+        let cells = cells.into_iter().map(|cell| cell.into().0);
+        self.rows.push(cells.collect());
+        self
+    }
+
+    /// Adds a column to the right, with a cell for each row; the first column of an empty table makes the rows.
+    pub fn column<T: Into<Cell>>(
+        &mut self,
+        name: &str,
+        unit: &str,
+        cells: impl IntoIterator<Item = T>,
+    ) -> &mut Self {
+        let cells: Vec<String> = cells.into_iter().map(|cell| cell.into().0).collect();
+        if self.columns.is_empty() && self.rows.is_empty() {
+            self.rows.resize(cells.len(), Vec::new());
+        }
+        self.columns.push((name.to_owned(), unit.to_owned()));
+        for (row, cell) in self.rows.iter_mut().zip(cells) {
+            row.push(cell);
+        }
+        self
+    }
+
+    /// The table with a caption, which only HTML shows.
+    pub fn captioned(self, caption: impl Into<String>) -> Self {
+        Self {
+            caption: caption.into(),
+            ..self
+        }
+    }
+
+    /// The caption.
+    pub fn caption(&self) -> &str {
+        &self.caption
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Titles of the columns: names, with units after a comma.
+    fn header(&self) -> Vec<String> {
+        let title = |(name, unit): &(String, String)| match unit.as_str() {
+            "" => name.clone(),
+            unit => format!("{name}, {unit}"),
+        };
+        self.columns.iter().map(title).collect()
+    }
+
+    /// A Markdown table; characters that would become markup are escaped.
+    pub fn markdown(&self) -> String {
+        let line = |row: &[String]| {
+            let cells: Vec<String> = row.iter().map(|cell| escaped(cell)).collect();
+            format!("| {} |\n", cells.join(" | "))
+        };
+        let rule = "---|".repeat(self.columns.len());
+        let rows: String = self.rows.iter().map(|row| line(row)).collect();
+        format!("{}|{rule}\n{rows}", line(&self.header()))
+    }
+
+    /// A `<table>` with the caption, if there is one.
+    pub fn html(&self) -> String {
+        let caption = match self.caption.as_str() {
+            "" => String::new(),
+            caption => format!("<caption>{}</caption>\n", HtmlText(caption)),
+        };
+        let header: String = (self.header().iter())
+            .map(|title| format!("<th scope=\"col\">{}</th>", HtmlText(title)))
+            .collect();
+        let cell = |(column, cell): (usize, &String)| match column {
+            0 => format!("<th scope=\"row\">{}</th>", HtmlText(cell)),
+            _ => format!("<td>{}</td>", HtmlText(cell)),
+        };
+        let rows: String = (self.rows.iter())
+            .map(|row| row.iter().enumerate().map(cell).collect::<String>())
+            .map(|cells| format!("<tr>{cells}</tr>\n"))
+            .collect();
+        format!(
+            "<table>\n{caption}<thead><tr>{header}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table>"
+        )
+    }
+
+    /// Comma-separated values: names of the columns, then the rows; cells with commas, quotes or line ends are quoted.
+    pub fn csv(&self) -> String {
+        let quoted = |cell: &String| match cell.contains([',', '"', '\n']) {
+            true => format!("\"{}\"", cell.replace('"', "\"\"")),
+            false => cell.clone(),
+        };
+        let names = self.columns.iter().map(|(name, _)| name.clone()).collect();
+        std::iter::once(&names)
+            .chain(&self.rows)
+            .map(|row| row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n")
+            .collect()
+    }
+}
+
+/// A table under construction, with a row for each item.
+#[derive(Debug, Clone)]
+pub struct Rows<T> {
+    items: Vec<T>,
+    table: Table,
+}
+
+impl<T> Rows<T> {
+    /// Adds a column to the right: its name, its unit (may be empty) and the cell of an item.
+    pub fn column<C: Into<Cell>>(mut self, name: &str, unit: &str, cell: impl Fn(&T) -> C) -> Self {
+        (self.table).column(name, unit, self.items.iter().map(cell));
+        self
+    }
+
+    /// The table.
+    pub fn table(self) -> Table {
+        self.table
+    }
+}
+
+/// Text that Markdown shows as it is inside a cell.
+fn escaped(cell: &str) -> String {
+    let escape = |letter: char| match letter {
+        '|' | '*' | '_' | '`' | '<' | '\\' | '$' => vec!['\\', letter],
+        _ => vec![letter],
+    };
+    cell.chars().flat_map(escape).collect()
+}
+
+impl fmt::Display for Table {
+    /// Columns aligned under their titles: the first to the left, the rest to the right.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let header = self.header();
+        let width = |column: usize| {
+            let cells = std::iter::once(&header).chain(&self.rows);
+            let widths = cells.filter_map(|row| Some(row.get(column)?.chars().count()));
+            widths.max().unwrap_or(0)
+        };
+        let widths: Vec<usize> = (0..header.len()).map(width).collect();
+        let line = |f: &mut fmt::Formatter<'_>, row: &[String]| {
+            let mut text = String::new();
+            for (column, width) in widths.iter().enumerate() {
+                let cell = row.get(column).map_or("", String::as_str);
+                match column {
+                    0 => text.push_str(&format!("  {cell:<width$}")),
+                    _ => text.push_str(&format!("  {cell:>width$}")),
+                }
+            }
+            writeln!(f, "{}", text.trim_end())
+        };
+        line(f, &header)?;
+        let rule: Vec<String> = widths.iter().map(|&width| "-".repeat(width)).collect();
+        line(f, &rule)?;
+        self.rows.iter().try_for_each(|row| line(f, row))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn significant_keeps_four_digits() {
+        assert_eq!(significant(0.0123449), "0.01234");
+        assert_eq!(significant(12.3456), "12.35");
+        assert_eq!(significant(0.0), "0");
+        assert_eq!(significant(1.23456e-7), "1.235e-7");
+        assert_eq!(significant(f64::NAN), "diverged");
+    }
+
+    #[test]
+    fn rounding_keeps_so_many_digits() {
+        assert_eq!(rounded(-0.123456, 2), -0.12);
+        assert_eq!(rounded(99.6, 1), 100.0);
+        assert_eq!(rounded(6.02214e23, 3), 6.02e23);
+        assert_eq!(rounded(0.1 + 0.2, 17), 0.1 + 0.2);
+    }
+
+    #[test]
+    fn rounded_up_is_never_below_and_at_most_a_unit_of_the_last_digit_above() {
+        let mut value = 1.23456789e-8;
+        while value < 1e6 {
+            for (digits, share) in [(2, 0.11), (4, 1.1e-3)] {
+                for value in [value, -value] {
+                    let shown = rounded_up(value, digits);
+                    assert!(
+                        shown >= value && shown - value <= share * value.abs(),
+                        "{value}"
+                    );
+                    let text = format!("{shown:.*e}", digits - 1);
+                    assert_eq!(text.parse(), Ok(shown), "{value}");
+                }
+            }
+            value *= 1.0373;
+        }
+        assert_eq!(rounded_up(9.96e-3, 2), 1e-2);
+        assert_eq!(rounded_up(0.0, 2), 0.0);
+    }
+
+    #[test]
+    fn every_rendering_has_the_same_cells() {
+        let items = [("body.x", Some(0.5)), ("a|<b>, c", None)];
+        let mut table = Table::of(items)
+            .column("coordinate", "", |row| row.0)
+            .column("rms", "m", |row| row.1)
+            .table();
+        table.column("count", "", [3, 12]);
+        assert_eq!(
+            table.to_string(),
+            "  coordinate  rms, m  count\n  ----------  ------  -----\n  body.x      0.5000      3\n  a|<b>, c         -     12\n"
+        );
+        assert_eq!(
+            table.markdown(),
+            "| coordinate | rms, m | count |\n|---|---|---|\n| body.x | 0.5000 | 3 |\n| a\\|\\<b>, c | - | 12 |\n"
+        );
+        assert_eq!(
+            table.csv(),
+            "coordinate,rms,count\nbody.x,0.5000,3\n\"a|<b>, c\",-,12\n"
+        );
+        let mut by_columns = Table::default();
+        by_columns.column("coordinate", "", ["body.x", "a|<b>, c"]);
+        by_columns.column("rms", "m", [Some(0.5), None]);
+        assert_eq!(*by_columns.column("count", "", [3, 12]), table);
+        let html = table.captioned("Errors & more").html();
+        assert!(html.starts_with("<table>\n<caption>Errors &amp; more</caption>\n<thead><tr><th scope=\"col\">coordinate</th>"), "{html}");
+        assert!(
+            html.contains("<tr><th scope=\"row\">a|&lt;b&gt;, c</th><td>-</td><td>12</td></tr>\n"),
+            "{html}"
+        );
+    }
+}
