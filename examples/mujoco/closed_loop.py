@@ -36,7 +36,7 @@ drives the shipped model go1-d6 with its generated controller over the test jump
 recorder and over those of another one; --models takes others, --recordings other folders, --folds 3
 trains three models, each without another third of the training jumps, --seeds 3 with the joint
 method and seeds 1 to 3. Writes closed_loop.csv (one row per run), closed_loop.json, table.txt and
-a film strip for each jump of the first folder, recorded above and driven below."""
+a film strip for each jump of the first folder given, recorded above and driven below."""
 QUICK = ("payload +2 kg", "torque x0.9")
 QUICK_STRIDE = 3
 FRAMES = 8
@@ -154,14 +154,14 @@ def parse_arguments():
         "--jumps",
         choices=["test", "validation", "train"],
         default="test",
-        help="which recordings of a folder (default: test, which includes all of an unsplit folder)",
+        help="which recordings of a folder (default: test; an unsplit folder is for testing)",
     )
     parser.add_argument(
         "--recordings",
         type=pathlib.Path,
         nargs="+",
-        metavar="FOLDER",
-        help="folders of recorded jumps (default: go1, and go1-other with --jumps test)",
+        metavar="PATH",
+        help="folders of jumps, or single ones (default: go1, and go1-other with --jumps test)",
     )
     parser.add_argument(
         "--followers",
@@ -245,7 +245,10 @@ def controlled(path, arguments):
 
 
 def jumps_in(folder, arguments):
-    """Recordings of a folder: those of the split asked for; an unsplit folder is for testing."""
+    """Recordings of a folder: those of the split asked for; an unsplit folder is for testing. Of a
+    recording, itself."""
+    if folder.is_file():
+        return [folder]
     paths = sorted(folder.glob(f"{arguments.jumps}_*.csv.gz"))
     unsplit = not paths and arguments.jumps == "test"
     if unsplit:
