@@ -3,6 +3,7 @@
 import argparse
 import concurrent.futures
 import csv
+import functools
 import json
 import pathlib
 import sys
@@ -13,54 +14,83 @@ from PIL import Image
 
 import romc_controller
 from assessment import assess, longest_flight, repetition_faults
+from closed_loop_table import missed_aims, summary, table
 from film_strip import render
 from followers import Jump, LatentMpc, Replay, TorquesOnly, WithoutFeedback
+from jump_sets import recorded_floor
 from perturbations import NOMINAL, PERTURBATIONS, Motors, perturbed_simulation
 from recording_format import read_recording, states_of
 from robot_model import RobotModel
 from simulation import CONTROL_STEP_S
+from uninformed import write_uninformed
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-RECORDINGS = ROOT / "examples/recordings/go1"
+TRAINING = ROOT / "examples/recordings/go1"
+RECORDINGS = [TRAINING, ROOT / "examples/recordings/go1-other"]
 ROMC = ROOT / "target/release/romc"
 ROBOT = "go1"
 EXAMPLE = """example:
   cargo build --release
   MUJOCO_GL=egl python closed_loop.py --out-dir ../../out/closed_loop
-drives the shipped model go1-d6 with its generated controller; --models takes others, --folds 3
+drives the shipped model go1-d6 with its generated controller over the test jumps of the training's
+recorder and over those of another one; --models takes others, --recordings other folders, --folds 3
 trains three models, each without another third of the training jumps, --seeds 3 with the joint
-method and seeds 1 to 3. Writes closed_loop.csv (a row a run), closed_loop.json, table.txt and a
-film strip per test jump, recorded above and driven below."""
+method and seeds 1 to 3. Writes closed_loop.csv (one row per run), closed_loop.json, table.txt and
+a film strip for each jump of the first folder given, recorded above and driven below."""
 QUICK = ("payload +2 kg", "torque x0.9")
+QUICK_STRIDE = 3
 FRAMES = 8
-LEAST_SHARE = 0.9
-LEAST_WITHOUT_INPUT = 2
 
-# Who drives, and whether that depends on the model.
-WITH_INPUT, WITHOUT_INPUT = "MPC", "MPC, no recorded input"
+
+@dataclass(frozen=True)
+class Driver:
+    """Who drives: the controller of a `model`, of its copy that is `uninformed`, or neither."""
+
+    model: bool = False
+    uninformed: bool = False
+    recorded_input: bool = True
+
+
 FOLLOWERS = {
-    WITH_INPUT: True,
-    WITHOUT_INPUT: True,
-    "MPC, feedback off": True,
-    "recorded torques + PD": False,
-    "recorded torques alone": False,
-    "PD alone": False,
+    "MPC": Driver(model=True),
+    "MPC, no recorded input": Driver(model=True, recorded_input=False),
+    "MPC, feedback off": Driver(model=True),
+    "knows nothing": Driver(model=True, uninformed=True),
+    "knows nothing, no recorded input": Driver(model=True, uninformed=True, recorded_input=False),
+    "recorded torques + PD": Driver(),
+    "recorded torques alone": Driver(),
+    "PD alone": Driver(),
 }
+
+
+@dataclass(frozen=True)
+class Controlled:
+    """A model by name, its generated controller, that of its uninformed copy, and the copy's
+    gains by phase."""
+
+    name: str
+    crate: pathlib.Path
+    uninformed_crate: pathlib.Path
+    gains: dict
 
 
 @dataclass
 class Outcome:
     """One run: what drove which jump under what, and how it ended."""
 
+    recordings: str
     model: str
     follower: str
     perturbation: str
     jump: str
+    draw: int
     success: bool
     faults: str
     flight_s: float
     apex_rise_m: float
     distance_m: float
+    apex_error_m: float
+    distance_error_m: float
     largest_tilt_rad: float
     final_height_m: float
     torque_share: float
@@ -73,20 +103,18 @@ def main():
     arguments.out_dir.mkdir(parents=True, exist_ok=True)
     if not arguments.romc.is_file():
         raise SystemExit(f"no {arguments.romc}: cargo build --release")
-    models = []
-    for path in [*arguments.models, *trained(arguments)]:
-        folder = arguments.out_dir / "controllers" / path.stem
-        models.append((path.stem, romc_controller.build(path, folder, arguments.romc)))
-    jumps = [read_jump(path) for path in sorted(RECORDINGS.glob(f"{arguments.jumps}_*.csv.gz"))]
+    models = [controlled(path, arguments) for path in [*arguments.models, *trained(arguments)]]
+    jumps = [path for folder in arguments.recordings for path in jumps_in(folder, arguments)]
     perturbations = [NOMINAL]
     perturbations += [p for p in PERTURBATIONS if not arguments.quick or p.name in QUICK]
     settings = dict(arguments.setting)
     tasks = [
-        (follower, model, settings, perturbation, jump)
-        for follower, has_model in FOLLOWERS.items()
-        for model in (models if has_model else [None])
+        (follower, model, settings, perturbation, jump, draw)
+        for follower in arguments.followers
+        for model in (models if FOLLOWERS[follower].model else [None])
         for perturbation in perturbations
         for jump in jumps
+        for draw in range(arguments.draws)
     ]
     outcomes = []
     with concurrent.futures.ProcessPoolExecutor(arguments.jobs) as pool:
@@ -94,14 +122,16 @@ def main():
             outcomes.append(outcome)
             print(f"\r{len(outcomes)} of {len(tasks)} runs", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
-    text = table(outcomes, perturbations)
-    print(text)
+    missed = missed_aims(outcomes, TRAINING.name, len(models))
+    report = summary(outcomes, perturbations, {m.name: m.gains for m in models}, missed)
+    text = table(report)
+    print(json.dumps(report, indent=1) if arguments.json else text)
     write_outcomes(arguments.out_dir, outcomes, text)
     if not arguments.no_pictures:
-        for jump in jumps:
-            _, states = run((WITH_INPUT, models[0], settings, NOMINAL, jump))
+        for path in jumps_in(arguments.recordings[0], arguments):
+            _, states = run(("MPC", models[0], settings, NOMINAL, path, 0))
+            jump = read_jump(path)
             write_strip(arguments.out_dir / f"{jump.name}.png", jump, states)
-    missed = missed_aims(outcomes, len(models))
     for aim in missed:
         print(f"MISSED {aim}", file=sys.stderr)
     sys.exit(1 if missed else 0)
@@ -121,8 +151,32 @@ def parse_arguments():
     parser.add_argument("--romc", type=pathlib.Path, default=ROMC, help="the compiler")
     parser.add_argument("--out-dir", type=pathlib.Path, default=ROOT / "out/closed_loop")
     parser.add_argument(
-        "--jumps", choices=["test", "validation", "train"], default="test", help="which recordings"
+        "--jumps",
+        choices=["test", "validation", "train"],
+        default="test",
+        help="which recordings of a folder (default: test; an unsplit folder is for testing)",
     )
+    parser.add_argument(
+        "--recordings",
+        type=pathlib.Path,
+        nargs="+",
+        metavar="PATH",
+        help="folders of jumps, or single ones (default: go1, and go1-other with --jumps test)",
+    )
+    parser.add_argument(
+        "--followers",
+        choices=FOLLOWERS,
+        nargs="+",
+        default=list(FOLLOWERS),
+        metavar="NAME",
+        help="rows of the table (default: all of them)",
+    )
+    parser.add_argument(
+        "--draws",
+        type=int,
+        help="runs per condition, each with other random numbers (default: 3; --quick: 1)",
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object, not the table")
     parser.add_argument(
         "--setting",
         type=named_number,
@@ -131,12 +185,21 @@ def parse_arguments():
         metavar="NAME=NUMBER",
         help="a setting of the controller, such as velocity_weight=0.02",
     )
-    parser.add_argument("--quick", action="store_true", help="two perturbations instead of all")
+    parser.add_argument(
+        "--quick", action="store_true", help="two perturbations, a third of the unsplit folders"
+    )
     parser.add_argument("--no-pictures", action="store_true", help="no film strips")
-    parser.add_argument("--jobs", type=int, help="runs at a time (default: one a core)")
+    parser.add_argument("--jobs", type=int, help="runs at a time (default: one per core)")
     arguments = parser.parse_args()
     arguments.out_dir, arguments.romc = arguments.out_dir.resolve(), arguments.romc.resolve()
     arguments.models = [path.resolve() for path in arguments.models]
+    if arguments.recordings is None:
+        arguments.recordings = RECORDINGS if arguments.jumps == "test" else [TRAINING]
+    arguments.recordings = [path.resolve() for path in arguments.recordings]
+    if arguments.draws is None:
+        arguments.draws = 1 if arguments.quick else 3
+    if arguments.draws < 1:
+        parser.error("--draws: at least 1")
     if not (arguments.models or arguments.seeds or arguments.folds):
         arguments.models = [ROOT / "models/go1-d6.json"]
     return arguments
@@ -150,8 +213,8 @@ def named_number(text):
 
 def trained(arguments):
     """Model files trained for this comparison: joint seeds, closed form on parts of the jumps."""
-    jumps = sorted(RECORDINGS.glob("train_*.csv.gz"))
-    validation = sorted(RECORDINGS.glob("validation_*.csv.gz"))
+    jumps = sorted(TRAINING.glob("train_*.csv.gz"))
+    validation = sorted(TRAINING.glob("validation_*.csv.gz"))
     plans = [
         (f"joint-seed-{seed}", jumps, ["--method", "joint", "--seed", seed, "--seeds", 1])
         for seed in range(1, arguments.seeds + 1)
@@ -170,26 +233,65 @@ def trained(arguments):
         yield path
 
 
+def controlled(path, arguments):
+    """Generates and builds the controllers of a model file and of its uninformed copy."""
+    folder = arguments.out_dir / "controllers"
+    copy = folder / f"{path.stem}-uninformed.json"
+    training = sorted(TRAINING.glob("train_*.csv.gz"))
+    gains = write_uninformed(path, copy, training, RobotModel(ROBOT))
+    crate = romc_controller.build(path, folder / path.stem, arguments.romc)
+    uninformed_crate = romc_controller.build(copy, folder / copy.stem, arguments.romc)
+    return Controlled(path.stem, crate, uninformed_crate, gains)
+
+
+def jumps_in(folder, arguments):
+    """Recordings of a folder: those of the split asked for; an unsplit folder is for testing. Of a
+    recording, itself."""
+    if folder.is_file():
+        return [folder]
+    paths = sorted(folder.glob(f"{arguments.jumps}_*.csv.gz"))
+    unsplit = not paths and arguments.jumps == "test"
+    if unsplit:
+        paths = sorted(folder.glob("jump_*.csv.gz"))
+        paths = paths[::QUICK_STRIDE] if arguments.quick else paths
+    if not paths:
+        names = f"{arguments.jumps}_*.csv.gz"
+        raise SystemExit(f"{folder}: holds no {names}" + " or jump_*.csv.gz" * unsplit)
+    return paths
+
+
+@functools.cache
 def read_jump(path):
     """A recorded jump."""
     columns = read_recording(path)
     x, dx, _, torque_nm, feet = states_of(columns)
-    return Jump(path.name.removesuffix(".csv.gz"), columns["Time"], x, dx, torque_nm, feet)
+    name = path.name.removesuffix(".csv.gz")
+    folder = path.parent.name
+    floor = recorded_floor(folder, name)
+    return Jump(name, columns["Time"], x, dx, torque_nm, feet, folder, floor)
+
+
+@functools.cache
+def recorded_input(path):
+    """(rows, 18) input of a recorded jump, as `Jump.inputs`."""
+    return read_jump(path).inputs(RobotModel(ROBOT))
 
 
 def run(task):
     """One closed-loop run; returns its Outcome and the states (rows, 18).
 
-    A task is who drives, (name, generated crate) of the model or None, settings that are not the
-    controller's own, the perturbation, the jump.
+    A task is who drives, the Controlled model or None, settings that are not the controller's own,
+    the perturbation, the file of the jump, the number of the draw.
     """
-    follower_name, model, settings, perturbation, jump = task
-    robot = RobotModel(ROBOT)
+    follower_name, model, settings, perturbation, path, draw = task
+    jump = read_jump(path)
     takeoff_s = jump.time_s[longest_flight(jump.feet)[0]]
-    simulation = perturbed_simulation(ROBOT, perturbation, jump.x[0], jump.dx[0], takeoff_s)
-    controller = make_controller(follower_name, model, settings, jump, robot)
+    simulation = perturbed_simulation(
+        ROBOT, perturbation, jump.floor, jump.x[0], jump.dx[0], takeoff_s, draw
+    )
+    controller = make_controller(follower_name, model, settings, path)
     follower = make_follower(follower_name, controller, jump)
-    motors = Motors(follower, perturbation, robot.torque_limit_nm)
+    motors = Motors(follower, perturbation, simulation.robot.torque_limit_nm)
     log = simulation.run(motors, jump.time_s[-1])
     reference = assess(ROBOT, jump.time_s, jump.x, jump.dx, jump.torque_nm, jump.feet)
     times = np.arange(len(log.x)) * CONTROL_STEP_S
@@ -197,15 +299,19 @@ def run(task):
     faults = repetition_faults(reference, repeated, log.other_contact.any())
     statuses = getattr(follower, "statuses", {})
     outcome = Outcome(
-        model=model[0] if model else "",
+        recordings=jump.folder,
+        model=model.name if model else "",
         follower=follower_name,
         perturbation=perturbation.name,
         jump=jump.name,
+        draw=draw,
         success=not faults,
         faults="; ".join(faults),
         flight_s=repeated.flight_s,
         apex_rise_m=repeated.apex_rise_m,
         distance_m=repeated.distance_m,
+        apex_error_m=repeated.apex_rise_m - reference.apex_rise_m,
+        distance_error_m=repeated.distance_m - reference.distance_m,
         largest_tilt_rad=repeated.largest_tilt_rad,
         final_height_m=repeated.final_height_m,
         torque_share=repeated.torque_share,
@@ -217,52 +323,31 @@ def run(task):
     return outcome, log.x
 
 
-def make_controller(follower_name, model, settings, jump, robot):
+def make_controller(follower_name, model, settings, path):
     """The generated controller with its reference set; none for followers without a model."""
-    if not FOLLOWERS[follower_name]:
+    driver = FOLLOWERS[follower_name]
+    if not driver.model:
         return None
-    module = romc_controller.load(model[1])
+    module = romc_controller.load(model.uninformed_crate if driver.uninformed else model.crate)
     chosen = module.Library().default_settings()
     for name, number in settings.items():
         kind = type(getattr(chosen, name))
         setattr(chosen, name, kind(number))
     controller = module.Controller(chosen)
-    u = None if follower_name == WITHOUT_INPUT else jump.inputs(robot)
+    jump = read_jump(path)
+    u = recorded_input(path) if driver.recorded_input else None
     controller.set_reference(jump.time_s, jump.x, jump.dx, u, jump.feet)
     return controller
 
 
 def make_follower(name, controller, jump):
-    if name in (WITH_INPUT, WITHOUT_INPUT):
-        return LatentMpc(controller)
     if name == "MPC, feedback off":
         return WithoutFeedback(controller, jump)
+    if controller:
+        return LatentMpc(controller)
     if name == "recorded torques alone":
         return TorquesOnly(jump)
     return Replay(jump, with_torques=name == "recorded torques + PD")
-
-
-def table(outcomes, perturbations):
-    """Successes of runs, a row a perturbation and a column a follower."""
-    names = [p.name for p in perturbations]
-    width = max(map(len, names)) + 2
-    lines = ["successful runs of all runs", ""]
-    lines.append(" " * width + "".join(f"{name:>24}" for name in FOLLOWERS))
-
-    def cells(chosen):
-        counts = []
-        for follower in FOLLOWERS:
-            runs = [o.success for o in outcomes if o.follower == follower and chosen(o)]
-            counts.append(f"{sum(runs)} of {len(runs)}")
-        return "".join(f"{count:>24}" for count in counts)
-
-    for name in names:
-        lines.append(f"{name:<{width}}" + cells(lambda o, name=name: o.perturbation == name))
-    lines.append(f"{'all':<{width}}" + cells(lambda o: True))
-    models = sorted({o.model for o in outcomes if o.model})
-    for model in models if len(models) > 1 else []:
-        lines.append(f"{model:<{width}}" + cells(lambda o, model=model: o.model == model))
-    return "\n".join(lines)
 
 
 def write_outcomes(folder, outcomes, text):
@@ -281,30 +366,6 @@ def write_strip(path, jump, states):
     rows = np.linspace(0, min(len(jump.x), len(states)) - 1, FRAMES).astype(int)
     strips = [np.hstack(render(robot, x[rows])) for x in (jump.x, states)]
     Image.fromarray(np.vstack(strips)).save(path)
-
-
-def missed_aims(outcomes, models):
-    """Which of the aims that the documentation states these runs do not reach."""
-
-    def share(follower, chosen=lambda o: True):
-        runs = [o.success for o in outcomes if o.follower == follower and chosen(o)]
-        return sum(runs) / len(runs)
-
-    def nominal(outcome):
-        return outcome.perturbation == NOMINAL.name
-
-    missed = []
-    if share(WITH_INPUT, nominal) < 1.0:
-        missed.append(f"{WITH_INPUT}: all nominal runs succeed")
-    if share(WITH_INPUT) < LEAST_SHARE:
-        missed.append(f"{WITH_INPUT}: {LEAST_SHARE:.0%} of all runs succeed")
-    for baseline in list(FOLLOWERS)[2:]:
-        if share(baseline) >= share(WITH_INPUT):
-            missed.append(f"{WITH_INPUT}: more runs succeed than with {baseline}")
-    succeeded = [o.success for o in outcomes if o.follower == WITHOUT_INPUT and nominal(o)]
-    if sum(succeeded) < LEAST_WITHOUT_INPUT * models:
-        missed.append(f"{WITHOUT_INPUT}: {LEAST_WITHOUT_INPUT} nominal runs a model succeed")
-    return missed
 
 
 if __name__ == "__main__":

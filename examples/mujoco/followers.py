@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robot_model import Floor
 from simulation import CONTROL_STEP_S
 
 POSITION_GAIN = 20.0
@@ -18,7 +19,8 @@ MPC_STEP_S = 0.01
 
 @dataclass(frozen=True)
 class Jump:
-    """A recorded jump: (rows,) times in s, (rows, 18) states, rates and inputs, (rows, 4) feet."""
+    """A recorded jump: (rows,) times in s, (rows, 18) states and rates, (rows, 12) torques in N m,
+    (rows, 4) feet; the folder of its recording and the floor that it was made on."""
 
     name: str
     time_s: np.ndarray
@@ -26,6 +28,8 @@ class Jump:
     dx: np.ndarray
     torque_nm: np.ndarray
     feet: np.ndarray
+    folder: str = ""
+    floor: Floor = Floor()
 
     def row_at(self, time_s):
         """Row of the last sample at or before a time."""

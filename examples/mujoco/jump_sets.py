@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from asynchronous import AsynchronousController, AsynchronousPlan
+from countermovement import CountermovementController, CountermovementPlan
 from jump_controller import JumpController, JumpPlan
+from robot_model import Floor
 from simulation import Push, SensorNoise
 
 # The robot stands this long, unrecorded, before each recording starts.
@@ -46,6 +48,37 @@ ASYNCHRONOUS = {
     "roll_rad": (-0.02, 0.02),
     "yaw_rad": (-0.02, 0.02),
 }
+COUNTERMOVEMENT = {
+    "stand_height_m": (0.290, 0.320),
+    "dip_height_m": (0.205, 0.250),
+    "dip_shift_m": (-0.010, 0.030),
+    "dip_pitch_rad": (-0.06, 0.06),
+    "dip_duration_s": (0.20, 0.28),
+    "bottom_acceleration": (3.0, 7.0),
+    "thrust_duration_s": (0.16, 0.20),
+    "takeoff_height_m": (0.315, 0.335),
+    "takeoff_pitch_rad": (-0.04, 0.04),
+    "takeoff_yaw_rad": (-0.06, 0.06),
+    "leg_stiffness": (2000.0, 3000.0),
+    "leg_damping": (35.0, 60.0),
+    "flight_stiffness": (22.0, 38.0),
+    "flight_damping": (0.7, 1.1),
+    "retraction_m": (0.0, 0.03),
+    "landing_leg_m": (0.255, 0.280),
+    "landing_reach_s": (0.07, 0.10),
+    "landing_stiffness": (1200.0, 1900.0),
+    "landing_damping": (45.0, 65.0),
+    "landing_duration_s": (0.24, 0.36),
+    "final_height_m": (0.270, 0.295),
+}
+
+
+@dataclass(frozen=True)
+class FloorRange:
+    """(lowest, highest) of what a `Floor` is drawn from."""
+
+    friction: tuple
+    settling_s: tuple
 
 
 @dataclass(frozen=True)
@@ -53,7 +86,9 @@ class JumpSet:
     """A data set: `splits` counts its jumps, `seed` fixes every draw in it.
 
     `base` is the plan that the draws complete; the velocities go into the field
-    `velocity_field` of it. `to_touchdown` ends recordings before feet land.
+    `velocity_field` of it. `to_touchdown` ends recordings before feet land. Every
+    `push_every`-th jump is pushed. `distance_m` and `flight_s` are what its
+    recordings have to keep.
     """
 
     robot: str
@@ -63,13 +98,19 @@ class JumpSet:
     upward_velocity: tuple
     sideways_velocity: float
     ranges: dict
-    base: JumpPlan
+    base: JumpPlan | CountermovementPlan
     controller: type = JumpController
     velocity_field: str = "takeoff_velocity"
     to_touchdown: bool = False
     noise: SensorNoise | None = None
     start_noise_rad: float = 0.0
     push_n: float = 0.0
+    push_moment_nm: float = 0.0
+    push_every: int = 1
+    push_after_s: tuple = (0.35, 0.55)
+    floor: FloorRange | None = None
+    distance_m: tuple = (0.14, 0.60)
+    flight_s: tuple = (0.2, 0.5)
 
 
 SETS = {
@@ -116,18 +157,37 @@ SETS = {
         velocity_field="front_velocity",
         to_touchdown=True,
     ),
+    "go1-other": JumpSet(
+        robot="go1",
+        seed=2031,
+        splits=(("jump", 8),),
+        forward_velocity=(0.27, 1.10),
+        upward_velocity=(1.48, 1.80),
+        sideways_velocity=0.06,
+        ranges=COUNTERMOVEMENT,
+        base=CountermovementPlan(),
+        controller=CountermovementController,
+        push_n=18.0,
+        push_moment_nm=2.5,
+        push_every=3,
+        push_after_s=(0.15, 0.35),
+        floor=FloorRange(friction=(0.55, 0.75), settling_s=(0.025, 0.045)),
+        distance_m=(0.12, 0.41),
+        flight_s=(0.2, 0.32),
+    ),
 }
 
 
 @dataclass(frozen=True)
 class Jump:
-    """One jump to record: its file's stem, plan, seed and disturbances."""
+    """One jump to record: its file's stem, plan, seed, disturbances and floor."""
 
     stem: str
-    plan: JumpPlan
+    plan: JumpPlan | CountermovementPlan
     seed: int
     start_offset_rad: np.ndarray
     push: Push | None
+    floor: Floor = Floor()
 
 
 def jumps_of(jump_set):
@@ -142,15 +202,22 @@ def jumps_of(jump_set):
     for rank, index in enumerate(order):
         forward[index] = slots[rank]
     jumps = []
-    for stem, vx in zip(stems, forward, strict=True):
+    for number, (stem, vx) in enumerate(zip(stems, forward, strict=True), start=1):
         vz = random.uniform(*jump_set.upward_velocity)
         vy = random.uniform(-jump_set.sideways_velocity, jump_set.sideways_velocity)
         drawn = {name: random.uniform(*span) for name, span in jump_set.ranges.items()}
         plan = replace(jump_set.base, **{jump_set.velocity_field: (vx, vy, vz)}, **drawn)
         seed = int(random.integers(2**31))
         offset = jump_set.start_noise_rad * random.uniform(-1, 1, 12)
-        jumps.append(Jump(stem, plan, seed, offset, _push(jump_set.push_n, random)))
+        push = _push(jump_set, random) if number % jump_set.push_every == 0 else None
+        jumps.append(Jump(stem, plan, seed, offset, push, _floor(jump_set.floor, random)))
     return jumps
+
+
+def recorded_floor(folder, stem):
+    """The floor on which a jump was recorded; the usual one for recordings of no set."""
+    jumps = jumps_of(SETS[folder]) if folder in SETS else []
+    return next((jump.floor for jump in jumps if jump.stem == stem), Floor())
 
 
 def _interleaved(counts, random):
@@ -164,10 +231,21 @@ def _interleaved(counts, random):
     return [index for _, index in sorted(place)]
 
 
-def _push(size_n, random):
+def _push(jump_set, random):
+    """A push in a direction of its own, at some time of crouch or thrust."""
+    size_n = jump_set.push_n
     if size_n == 0:
         return None
-    start = WARMUP_S + random.uniform(0.35, 0.55)
+    start = WARMUP_S + random.uniform(*jump_set.push_after_s)
     angle = random.uniform(0, 2 * np.pi)
     force = size_n * np.array([np.cos(angle), np.sin(angle), random.uniform(-0.5, 0.5)])
-    return Push(start, start + 0.1, tuple(force))
+    if jump_set.push_moment_nm == 0.0:
+        return Push(start, start + 0.1, tuple(force))
+    moment = (0.0, 0.0, jump_set.push_moment_nm * random.uniform(-1, 1))
+    return Push(start, start + 0.1, tuple(force), moment)
+
+
+def _floor(span, random):
+    if span is None:
+        return Floor()
+    return Floor(random.uniform(*span.friction), random.uniform(*span.settling_s))

@@ -25,7 +25,7 @@ def record(jump_set, jump):
     The robot first stands for `WARMUP_S`, unrecorded, so that its feet have
     settled; the log ends when the landing motion has come to rest.
     """
-    robot = RobotModel(jump_set.robot)
+    robot = RobotModel(jump_set.robot, jump.floor)
     plan = jump.plan
     simulation = Simulation(robot, jump_set.noise, jump.seed, jump.push)
     joints = robot.standing_joints(plan.stand_height_m) + jump.start_offset_rad

