@@ -36,6 +36,7 @@ pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String)
     set(&mut encoder.body_weight, settings.body_weight);
     set(&mut encoder.least_std, settings.mask_std);
     set(&mut encoder.least_input_share, settings.mask_input_share);
+    set(&mut encoder.coordinates, settings.coordinates);
     encoder.rotate &= !settings.no_rotation;
     set(&mut options.regression.slack, settings.slack);
     set(&mut options.regression.smoothing, settings.moving_average);

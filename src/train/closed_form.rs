@@ -64,7 +64,7 @@ fn fit(
         restarts: options.encoder.restarts,
         seed,
     };
-    let subspace = find_subspace(&task.moments, &task.active, options.latent_dim, &search)?;
+    let subspace = find_subspace(&task.moments, &task.frame, options.latent_dim, &search)?;
     let encoder = task.encoder_over(&subspace.basis)?.into();
     let decoder = least_squares_decoder(&task.sets.training, &encoder)?.into();
     let fitted = task.fit_dynamics((encoder, decoder), watch)?;

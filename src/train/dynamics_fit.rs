@@ -12,7 +12,7 @@ use super::metrics::{Assessed, BODY_X, BODY_Z, SetMetrics, measure, measure_enco
 use super::progress::Watch;
 use super::report::{PhaseTerms, SeedReport, TrainReport};
 use super::rollout::Candidate;
-use super::select::{Choice, select};
+use super::select::{Choice, Target, select};
 use super::sparse::active_terms;
 use super::task::Task;
 use super::varimax::{order_and_sign, varimax};
@@ -51,9 +51,13 @@ impl Fitted {
 }
 
 impl Task<'_> {
-    /// The encoder over a space with orthonormal `basis` (`18 x d`): in its canonical basis, `b_e = -W_e mean(x)`.
+    /// The encoder of the rows that the frame holds and, in its canonical basis, of a space with orthonormal `basis`
+    /// (`18 x (d - h)`); `b_e = -W_e mean(x)`.
     pub fn encoder_over(&self, basis: &DMatrix<f64>) -> Result<AffineMap, TrainError> {
-        let weights = self.canonical_basis(basis).0.transpose();
+        let held = self.frame.held.column_iter();
+        let learned = self.canonical_basis(basis).0;
+        let rows: Vec<_> = held.chain(learned.column_iter()).collect();
+        let weights = DMatrix::from_columns(&rows).transpose();
         let bias = -(&weights * self.sets.training.mean(Quantity::X, None));
         Ok(AffineMap::new("encoder", weights, bias)?)
     }
@@ -95,7 +99,13 @@ impl Task<'_> {
         let judged_latent = validated.as_ref().unwrap_or(&latent);
         let options = &self.options.regression;
         let judge = Judge::new(judged, judged_latent, options.rollout_weight);
-        let selected = select(training, &latent, &self.features, &judge, options, watch)?;
+        let target = Target {
+            dataset: training,
+            latent: &latent,
+            features: &self.features,
+            knowledge: &self.knowledge,
+        };
+        let selected = select(target, &judge, options, watch)?;
         let weights = match encoder.as_affine() {
             Some(linear) => linear.weights().clone(),
             None => mean_jacobian(&encoder, &training.gather(Quantity::X, None)),

@@ -80,6 +80,40 @@ impl Features {
             .collect()
     }
 
+    /// For every term whether it depends on a variable, counted over `z`, `dz`, `u_lat`.
+    pub fn depend_on(&self, variable: usize) -> Vec<bool> {
+        let mut depends: Vec<bool> = Vec::with_capacity(self.tape.steps.len());
+        for step in &self.tape.steps {
+            let of = |at: &usize| depends[*at];
+            depends.push(match step {
+                Step::Number(_) => false,
+                Step::Variable(own) => *own == variable,
+                Step::Sum(parts) | Step::Product(parts) => parts.iter().any(of),
+                Step::Integer(inner, _)
+                | Step::Sine(inner)
+                | Step::Cosine(inner)
+                | Step::Apply(_, inner) => of(inner),
+                Step::Power(base, exponent) => of(base) || of(exponent),
+            });
+        }
+        self.tape.terms.iter().map(|&step| depends[step]).collect()
+    }
+
+    /// The term that is 1.
+    pub fn constant_term(&self) -> Option<usize> {
+        self.term_of(|step| matches!(step, Step::Number(value) if *value == 1.0))
+    }
+
+    /// The term that is a variable, counted over `z`, `dz`, `u_lat`.
+    pub fn variable_term(&self, variable: usize) -> Option<usize> {
+        self.term_of(|step| matches!(step, Step::Variable(own) if *own == variable))
+    }
+
+    fn term_of(&self, wanted: impl Fn(&Step) -> bool) -> Option<usize> {
+        let mut terms = self.tape.terms.iter();
+        terms.position(|&step| wanted(&self.tape.steps[step]))
+    }
+
     /// `Theta` (`n x library_dim`) from `variables` (`n x 3 latent_dim`, columns z, dz, u_lat).
     pub fn evaluate(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) -> DMatrix<f64> {
         self.forward(variables, values);

@@ -8,7 +8,9 @@
 pub mod closed_form;
 pub mod dataset;
 pub mod features;
+pub mod frame;
 pub mod joint;
+pub mod knowledge;
 pub mod latent;
 pub mod metrics;
 pub mod progress;
@@ -44,8 +46,8 @@ pub use error::TrainError;
 pub use joint::{Integrator, Unroll, joint};
 pub use metrics::{SetMetrics, assess};
 pub use options::{
-    EncoderOptions, JointOptions, LibraryChoice, MapOptions, Method, RegressionOptions,
-    TrainOptions, Transfer,
+    Coordinates, EncoderOptions, JointOptions, LibraryChoice, MapOptions, Method,
+    RegressionOptions, TrainOptions, Transfer,
 };
 pub use progress::{Progress, Watch};
 pub use report::{PhaseTerms, SeedReport, TrainReport, Trained};

@@ -181,8 +181,29 @@ pub struct EncoderOptions {
     pub least_input_share: f64,
     /// Whether the latent basis is rotated by varimax.
     pub rotate: bool,
+    /// What the encoder's rows are made of.
+    #[serde(default = "Coordinates::free")]
+    pub coordinates: Coordinates,
     /// Random starting points of the search.
     pub restarts: usize,
+}
+
+/// What the rows of a linear encoder are made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Coordinates {
+    /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right;
+    /// the dynamics obey what is known of them ([`Knowledge`](super::knowledge::Knowledge)).
+    Named,
+    /// Any rows over all coordinates that move or are actuated.
+    Free,
+}
+
+impl Coordinates {
+    /// What a training did before it had the choice.
+    fn free() -> Self {
+        Self::Free
+    }
 }
 
 /// Settings of the regression for Xi.
@@ -237,6 +258,7 @@ impl TrainOptions {
                 body_weight: 1.0,
                 least_std: 0.0,
                 rotate: false,
+                coordinates: Coordinates::Free,
                 ..EncoderOptions::default()
             },
             regression: RegressionOptions {
@@ -401,6 +423,7 @@ impl Default for EncoderOptions {
             least_std: 0.015,
             least_input_share: 0.005,
             rotate: true,
+            coordinates: Coordinates::Named,
             restarts: 4,
         }
     }

@@ -7,6 +7,7 @@ use super::dataset::Dataset;
 use super::error::TrainError;
 use super::features::Features;
 use super::judge::Judge;
+use super::knowledge::Knowledge;
 use super::latent::Latent;
 use super::options::RegressionOptions;
 use super::progress::Watch;
@@ -42,20 +43,32 @@ pub struct Selected {
     pub candidates: usize,
 }
 
+/// What the dynamics are fitted to.
+#[derive(Clone, Copy, Debug)]
+pub struct Target<'a> {
+    /// Jumps to fit.
+    pub dataset: &'a Dataset,
+    /// Their latent samples.
+    pub latent: &'a [Latent],
+    /// The library.
+    pub features: &'a Features,
+    /// What is known of each phase.
+    pub knowledge: &'a [Knowledge],
+}
+
 /// Fits all combinations of the options and takes, among those within the slack of the best, the sparsest.
 ///
 /// # Errors
 /// [`TrainError::TermValue`] for a term without a finite value at a sample,
 /// [`TrainError::NoStableModel`] if every candidate diverges. If cancelled, the search ends as soon as one does not.
 pub fn select(
-    dataset: &Dataset,
-    latent: &[Latent],
-    features: &Features,
+    target: Target<'_>,
     judge: &Judge<'_>,
     options: &RegressionOptions,
     watch: &mut Watch<'_>,
 ) -> Result<Selected, TrainError> {
-    let regressions = regressions(dataset, latent, features, &options.windows)?;
+    let features = target.features;
+    let regressions = regressions(target, &options.windows)?;
     let tried = try_all(&regressions, features, judge, options, watch);
     let candidates = tried.len();
     let best = best_score(&tried)?;
@@ -101,16 +114,17 @@ pub fn select(
 }
 
 /// For every window the regression of every phase.
-fn regressions(
-    dataset: &Dataset,
-    latent: &[Latent],
-    features: &Features,
-    windows: &[usize],
-) -> Result<Vec<Vec<Regression>>, TrainError> {
+fn regressions(target: Target<'_>, windows: &[usize]) -> Result<Vec<Vec<Regression>>, TrainError> {
+    let Target {
+        dataset,
+        latent,
+        features,
+        knowledge,
+    } = target;
     check_terms(dataset, latent, features)?;
-    let regression = |phase, window| {
-        let (theta, target) = windowed_samples(dataset, latent, features, phase, window);
-        Regression::new(&theta, &target)
+    let regression = |phase: usize, window| {
+        let (theta, ddz) = windowed_samples(dataset, latent, features, phase, window);
+        Regression::new(&theta, &ddz, knowledge[phase].clone())
     };
     let phases = 0..dataset.phases.patterns.len();
     let of_window = |&window: &usize| {

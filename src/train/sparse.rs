@@ -3,6 +3,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::{Deserialize, Serialize};
 
+use super::knowledge::Knowledge;
+
 /// Least ridge on the normalised columns: far above rounding.
 const LEAST_RIDGE: f64 = 1e-10;
 /// Supports up to this size are solved anew after every elimination, larger ones by an update.
@@ -17,6 +19,7 @@ pub struct Regression {
     correlation: DMatrix<f64>, // p x d, normalised theta^T ddz / n
     theta_rms: DVector<f64>,
     target_rms: DVector<f64>,
+    knowledge: Knowledge,
 }
 
 /// When a term of the library is dropped.
@@ -32,13 +35,15 @@ pub enum Pruning {
 }
 
 impl Regression {
-    /// Normal equations from samples: `theta` is `n x library_dim`, `target` is `n x latent_dim`.
-    pub fn new(theta: &DMatrix<f64>, target: &DMatrix<f64>) -> Self {
+    /// Normal equations from samples: `theta` is `n x library_dim`, `target` is `n x latent_dim`; what is known is
+    /// taken off the target.
+    pub fn new(theta: &DMatrix<f64>, target: &DMatrix<f64>, knowledge: Knowledge) -> Self {
         let n = theta.nrows().max(1) as f64;
+        let unknown = target - theta * &knowledge.known;
         let theta_rms = column_rms(theta);
-        let target_rms = column_rms(target);
+        let target_rms = column_rms(&unknown);
         let mut gram = theta.tr_mul(theta) / n;
-        let mut correlation = theta.tr_mul(target) / n;
+        let mut correlation = theta.tr_mul(&unknown) / n;
         for (i, &scale) in theta_rms.iter().enumerate() {
             let factor = if scale > 0.0 { 1.0 / scale } else { 0.0 };
             gram.row_mut(i).scale_mut(factor);
@@ -50,6 +55,7 @@ impl Regression {
             correlation,
             theta_rms,
             target_rms,
+            knowledge,
         }
     }
 
@@ -81,12 +87,13 @@ impl Regression {
         prunings: &[Pruning],
         allowed: &[bool],
     ) -> Vec<DMatrix<f64>> {
-        let zero = DMatrix::zeros(self.library_dim(), self.latent_dim());
-        let mut fits = vec![zero; prunings.len()];
-        let informative: Vec<usize> = (0..self.library_dim())
-            .filter(|&i| self.theta_rms[i] > 0.0 && allowed[i])
-            .collect();
+        let mut fits = vec![self.knowledge.known.clone(); prunings.len()];
         for column in (0..self.latent_dim()).filter(|&column| self.target_rms[column] > 0.0) {
+            let informative: Vec<usize> = (0..self.library_dim())
+                .filter(|&i| {
+                    self.theta_rms[i] > 0.0 && allowed[i] && self.knowledge.free[(i, column)]
+                })
+                .collect();
             let losses: Vec<f64> = (prunings.iter())
                 .filter_map(|pruning| match pruning {
                     Pruning::Elimination(loss) => Some(*loss),
@@ -123,7 +130,10 @@ impl Regression {
             let kept: Vec<usize> = support
                 .iter()
                 .zip(solution.iter())
-                .filter(|(_, value)| value.abs() >= least * self.target_rms[column])
+                .filter(|&(&i, value)| {
+                    self.knowledge.kept[(i, column)]
+                        || value.abs() >= least * self.target_rms[column]
+                })
                 .map(|(&i, _)| i)
                 .collect();
             if kept.len() == support.len() {
@@ -147,6 +157,7 @@ impl Regression {
         let mut lost = 0.0;
         while left.contains(&None) {
             let weakest = (0..fit.support.len())
+                .filter(|&j| !self.knowledge.kept[(fit.support[j], column)])
                 .map(|j| (j, fit.rise(j) / energy))
                 .min_by(|a, b| a.1.total_cmp(&b.1));
             for (left, loss) in left.iter_mut().zip(losses) {
@@ -181,7 +192,7 @@ impl Regression {
     pub fn gains(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> Vec<(usize, f64)> {
         let energy = self.target_rms[column].powi(2).max(f64::MIN_POSITIVE);
         let (inside, outside): (Vec<usize>, Vec<usize>) =
-            (0..self.library_dim()).partition(|&i| support[(i, column)]);
+            (self.free_terms(column)).partition(|&i| support[(i, column)]);
         let fit = self.support_fit(column, inside, ridge);
         let outside = outside.into_iter().filter(|&i| self.theta_rms[i] > 0.0);
         outside
@@ -200,24 +211,32 @@ impl Regression {
 
     /// One column of Xi on a given support (`library_dim x latent_dim`, true where a term is active).
     pub fn fit_column(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> DVector<f64> {
-        let rows: Vec<usize> = (0..self.library_dim())
+        let rows: Vec<usize> = (self.free_terms(column))
             .filter(|&i| support[(i, column)])
             .collect();
         let solution = self.solve(column, &rows, ridge);
-        let mut xi = DMatrix::zeros(self.library_dim(), self.latent_dim());
+        let mut xi = self.knowledge.known.clone();
         self.store(&mut xi, column, &rows, &solution);
         xi.column(column).into_owned()
     }
 
-    /// For every active term of a column: its row, and the share of the acceleration's energy lost without it.
+    /// For every active term of a column that may go: its row, and the share of the acceleration's energy lost
+    /// without it.
     pub fn losses(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> Vec<(usize, f64)> {
-        let rows: Vec<usize> = (0..self.library_dim())
+        let rows: Vec<usize> = (self.free_terms(column))
             .filter(|&i| support[(i, column)])
             .collect();
         let energy = self.target_rms[column].powi(2).max(f64::MIN_POSITIVE);
         let fit = self.support_fit(column, rows, ridge);
         let losses = (0..fit.support.len()).map(|j| fit.rise(j) / energy);
-        fit.support.iter().copied().zip(losses).collect()
+        (fit.support.iter().copied().zip(losses))
+            .filter(|&(term, _)| !self.knowledge.kept[(term, column)])
+            .collect()
+    }
+
+    /// Terms whose coefficient in a column is not known.
+    fn free_terms(&self, column: usize) -> impl Iterator<Item = usize> {
+        (0..self.library_dim()).filter(move |&i| self.knowledge.free[(i, column)])
     }
 
     /// Ridge solution for the normalised columns in `support`.
@@ -302,6 +321,11 @@ mod tests {
     use super::*;
     use crate::train::random::Random;
 
+    fn unconstrained(theta: &DMatrix<f64>, target: &DMatrix<f64>) -> Regression {
+        let nothing = Knowledge::nothing(theta.ncols(), target.ncols());
+        Regression::new(theta, target, nothing)
+    }
+
     fn samples() -> (DMatrix<f64>, DMatrix<f64>) {
         let theta = DMatrix::from_fn(200, 4, |i, j| {
             let t = i as f64 / 20.0;
@@ -322,7 +346,7 @@ mod tests {
     fn fit_finds_the_terms_that_made_the_data_whatever_their_size() {
         let (theta, target) = samples();
         for pruning in [Pruning::Threshold(0.03), Pruning::Elimination(1e-6)] {
-            let xi = Regression::new(&theta, &target).fit(0.0, pruning);
+            let xi = unconstrained(&theta, &target).fit(0.0, pruning);
             assert_eq!(active_terms(&xi), 2, "{pruning:?}");
             assert!(
                 (xi[(0, 0)] - 2.0).abs() < 1e-3 && (xi[(1, 0)] - 30.0).abs() < 0.05,
@@ -335,7 +359,7 @@ mod tests {
     fn elimination_of_everything_leaves_no_term() {
         let (theta, target) = samples();
         assert_eq!(
-            active_terms(&Regression::new(&theta, &target).fit(1e-3, Pruning::Elimination(2.0))),
+            active_terms(&unconstrained(&theta, &target).fit(1e-3, Pruning::Elimination(2.0))),
             0
         );
     }
@@ -346,7 +370,7 @@ mod tests {
         let theta = random.matrix(400, 90, 1.0);
         let weights = DMatrix::from_fn(90, 1, |i, _| if i % 9 == 0 { 1.0 + i as f64 } else { 0.5 });
         let target = &theta * weights + random.matrix(400, 1, 3.0);
-        let regression = Regression::new(&theta, &target);
+        let regression = unconstrained(&theta, &target);
         let losses = [0.3, 1e-4, 0.02];
         let all: Vec<usize> = (0..90).collect();
         let found = regression.eliminate(0, all.clone(), 1e-3, &losses);
@@ -375,7 +399,7 @@ mod tests {
     fn gains_of_terms_are_what_a_fit_with_them_explains_more() {
         let mut random = Random::new(6);
         let (theta, target) = (random.matrix(100, 5, 1.0), random.matrix(100, 1, 1.0));
-        let regression = Regression::new(&theta, &target);
+        let regression = unconstrained(&theta, &target);
         let mut support = DMatrix::from_column_slice(5, 1, &[true, false, true, false, false]);
         let gains = regression.gains(0, &support, 1e-2);
         assert_eq!(
@@ -396,7 +420,7 @@ mod tests {
     fn fit_column_keeps_the_given_support_only() {
         let (theta, target) = samples();
         let support = DMatrix::from_column_slice(4, 1, &[true, false, true, false]);
-        let xi = Regression::new(&theta, &target).fit_column(0, &support, 1e-6);
+        let xi = unconstrained(&theta, &target).fit_column(0, &support, 1e-6);
         assert_eq!((xi[1], xi[3]), (0.0, 0.0));
         assert!((xi[0] - 2.0).abs() < 0.1);
     }
@@ -404,8 +428,7 @@ mod tests {
     #[test]
     fn fit_drops_every_term_of_a_coordinate_that_does_not_accelerate() {
         let (theta, _) = samples();
-        let xi =
-            Regression::new(&theta, &DMatrix::zeros(200, 1)).fit(1e-3, Pruning::Threshold(0.03));
+        let xi = unconstrained(&theta, &DMatrix::zeros(200, 1)).fit(1e-3, Pruning::Threshold(0.03));
         assert_eq!(active_terms(&xi), 0);
     }
 }

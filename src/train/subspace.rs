@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::error::TrainError;
+use super::frame::Frame;
 use super::random::Random;
 
 /// Second moments of the training samples, in scaled units.
@@ -65,56 +66,57 @@ pub struct Subspace {
 /// With the state covariance `C`, the coordinate weights `D` (diagonal), the input second moment `U` and an
 /// orthonormal basis `Q` of the active coordinates: `reconstruction = (tr DC - tr((Q^T C Q)^-1 Q^T C D C Q)) / n` is
 /// the weighted mean square error of the least-squares decoder and `lift_loss = 1 - tr(Q^T U Q) / tr U` is `||u - W_e^T pinv(W_e^T) u||^2 / ||u||^2`.
-/// Descent along the exact gradient on the Stiefel manifold from several starting points; the best is kept.
+/// Rows that the frame holds are taken as seen: `C` is then the covariance given them. The basis returned is that of
+/// the other rows. Descent along the exact gradient on the Stiefel manifold from several starting points; the best is
+/// kept.
 ///
 /// # Errors
-/// [`TrainError::LatentDim`] if fewer coordinates move than the space has dimensions.
+/// [`TrainError::LatentDim`] if the frame has fewer directions than the space has dimensions.
 pub fn find_subspace(
     moments: &Moments,
-    active: &[usize],
+    frame: &Frame,
     latent_dim: usize,
     options: &SubspaceOptions,
 ) -> Result<Subspace, TrainError> {
-    if latent_dim == 0 || latent_dim > active.len() {
+    if latent_dim == 0 || latent_dim > frame.dim() {
         return Err(TrainError::LatentDim {
             requested: latent_dim,
-            active: active.len(),
+            active: frame.dim(),
         });
     }
-    let objective = Objective::new(moments, active, options);
+    let objective = Objective::new(moments, frame, options);
     let mut best: Option<(f64, DMatrix<f64>)> = None;
-    for start in starting_points(&objective, latent_dim, options) {
+    let count = latent_dim - frame.held.ncols();
+    for start in starting_points(&objective, count, options) {
         let (value, basis) = objective.descend(start, options.iterations);
         if best.as_ref().is_none_or(|(least, _)| value < *least) {
             best = Some((value, basis));
         }
     }
     let (_, reduced) = best.expect("at least one starting point");
-    let mut basis = DMatrix::zeros(moments.state.nrows(), latent_dim);
-    for (row, &coordinate) in active.iter().enumerate() {
-        basis.set_row(coordinate, &reduced.row(row));
-    }
     Ok(Subspace {
         reconstruction: objective.reconstruction(&reduced),
         lift_loss: objective.lift_loss(&reduced),
-        basis,
+        basis: &frame.free * reduced,
     })
 }
 
-/// The objective restricted to the active coordinates.
+/// The objective restricted to the free directions of a frame.
 struct Objective {
-    state: DMatrix<f64>,         // m x m covariance of the active coordinates
+    state: DMatrix<f64>, // m x m covariance of the free directions, given the held rows
     state_squared: DMatrix<f64>, // m x m, C_xm^T D C_xm with all coordinates as targets
-    input: DMatrix<f64>,         // m x m
+    input: DMatrix<f64>, // m x m
     total_state: f64,
+    held_input: f64, // energy of the input along the held rows
     total_input: f64,
     state_dim: f64,
     lift_weight: f64,
 }
 
 impl Objective {
-    fn new(moments: &Moments, active: &[usize], options: &SubspaceOptions) -> Self {
-        let columns = moments.state.select_columns(active);
+    fn new(moments: &Moments, frame: &Frame, options: &SubspaceOptions) -> Self {
+        let (given, held_input) = given_held(moments, frame);
+        let columns = &given * &frame.free;
         let mut weighted = columns.clone();
         for (mut row, weight) in weighted
             .row_iter_mut()
@@ -123,10 +125,11 @@ impl Objective {
             row *= *weight;
         }
         Self {
-            state: columns.select_rows(active),
+            state: frame.free.tr_mul(&columns),
             state_squared: columns.transpose() * weighted,
-            input: moments.input.select_columns(active).select_rows(active),
-            total_state: moments.state.diagonal().dot(&options.coordinate_weights),
+            input: frame.free.tr_mul(&(&moments.input * &frame.free)),
+            total_state: given.diagonal().dot(&options.coordinate_weights),
+            held_input,
             total_input: moments.input.trace().max(f64::MIN_POSITIVE),
             state_dim: moments.state.nrows() as f64,
             lift_weight: options.lift_weight,
@@ -135,6 +138,9 @@ impl Objective {
 
     /// `(Q^T C Q)^-1`; directions without variance count as not seen.
     fn inverse_latent_covariance(&self, basis: &DMatrix<f64>) -> DMatrix<f64> {
+        if basis.is_empty() {
+            return DMatrix::zeros(0, 0);
+        }
         let covariance = basis.transpose() * &self.state * basis;
         let floor = 1e-12 * self.total_state.max(f64::MIN_POSITIVE);
         covariance
@@ -148,7 +154,8 @@ impl Objective {
     }
 
     fn lift_loss(&self, basis: &DMatrix<f64>) -> f64 {
-        1.0 - (basis.transpose() * &self.input * basis).trace() / self.total_input
+        let carried = (basis.transpose() * &self.input * basis).trace() + self.held_input;
+        1.0 - carried / self.total_input
     }
 
     fn value(&self, basis: &DMatrix<f64>) -> f64 {
@@ -207,6 +214,21 @@ impl Objective {
     }
 }
 
+/// The covariance of the state given the rows that a frame holds, and the input's energy along these rows.
+fn given_held(moments: &Moments, frame: &Frame) -> (DMatrix<f64>, f64) {
+    let held = &frame.held;
+    if held.ncols() == 0 {
+        return (moments.state.clone(), 0.0);
+    }
+    let seen = &moments.state * held;
+    let inverse = (held.tr_mul(&seen))
+        .pseudo_inverse(1e-12 * moments.state.trace().max(f64::MIN_POSITIVE))
+        .expect("the tolerance is positive");
+    let orthonormal = orthonormal(held.clone());
+    let energy = (orthonormal.tr_mul(&(&moments.input * &orthonormal))).trace();
+    (&moments.state - &seen * inverse * seen.transpose(), energy)
+}
+
 /// The part of `gradient` that is tangent to the Stiefel manifold at `basis`.
 fn tangent(basis: &DMatrix<f64>, gradient: &DMatrix<f64>) -> DMatrix<f64> {
     gradient - basis * (basis.transpose() * gradient)
@@ -262,6 +284,14 @@ mod tests {
         of_samples(&x, &u)
     }
 
+    /// A frame of six coordinates that holds nothing.
+    fn plain(active: &[usize]) -> Frame {
+        Frame {
+            held: DMatrix::zeros(6, 0),
+            free: DMatrix::identity(6, 6).select_columns(active),
+        }
+    }
+
     fn of_samples(x: &DMatrix<f64>, u: &DMatrix<f64>) -> Moments {
         let n = x.ncols() as f64;
         let deviations = centred(x.clone(), &x.column_mean());
@@ -284,7 +314,7 @@ mod tests {
 
     #[test]
     fn gradient_agrees_with_finite_differences() {
-        let objective = Objective::new(&moments(), &[0, 1, 2, 4, 5], &options(0.3));
+        let objective = Objective::new(&moments(), &plain(&[0, 1, 2, 4, 5]), &options(0.3));
         let basis = orthonormal(Random::new(5).matrix(5, 2, 1.0));
         let gradient = tangent(&basis, &objective.gradient(&basis));
         let direction = tangent(&basis, &Random::new(6).matrix(5, 2, 1.0));
@@ -299,8 +329,8 @@ mod tests {
         let moments = moments();
         let mut options = options(0.0);
         options.coordinate_weights.fill(1.0);
-        let found =
-            find_subspace(&moments, &[0, 1, 2, 3, 4, 5], 3, &options).expect("six coordinates");
+        let found = find_subspace(&moments, &plain(&[0, 1, 2, 3, 4, 5]), 3, &options)
+            .expect("six coordinates");
         let mut eigenvalues: Vec<f64> = SymmetricEigen::new(moments.state)
             .eigenvalues
             .iter()
@@ -318,7 +348,7 @@ mod tests {
     #[test]
     fn lift_weight_turns_the_space_towards_the_inputs() {
         let moments = moments();
-        let active = [0, 1, 2, 3, 4, 5];
+        let active = plain(&[0, 1, 2, 3, 4, 5]);
         let blind = find_subspace(&moments, &active, 2, &options(0.0)).expect("six coordinates");
         let lifted = find_subspace(&moments, &active, 2, &options(10.0)).expect("six coordinates");
         assert!(
@@ -329,8 +359,8 @@ mod tests {
 
     #[test]
     fn masked_coordinates_get_no_weight() {
-        let found =
-            find_subspace(&moments(), &[1, 4, 5], 2, &options(0.1)).expect("three coordinates");
+        let found = find_subspace(&moments(), &plain(&[1, 4, 5]), 2, &options(0.1))
+            .expect("three coordinates");
         for masked in [0, 2, 3] {
             assert_eq!(found.basis.row(masked).amax(), 0.0);
         }
@@ -338,7 +368,8 @@ mod tests {
 
     #[test]
     fn more_latents_than_active_coordinates_are_refused() {
-        let error = find_subspace(&moments(), &[1, 4], 3, &options(0.1)).expect_err("too many");
+        let error =
+            find_subspace(&moments(), &plain(&[1, 4]), 3, &options(0.1)).expect_err("too many");
         assert!(matches!(
             error,
             TrainError::LatentDim {

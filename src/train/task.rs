@@ -3,7 +3,9 @@
 use super::data_sets::{DataSets, Recordings};
 use super::error::TrainError;
 use super::features::Features;
-use super::options::TrainOptions;
+use super::frame::Frame;
+use super::knowledge::Knowledge;
+use super::options::{Coordinates, TrainOptions};
 use super::subspace::Moments;
 use crate::model::Library;
 use crate::robot::Robot;
@@ -17,6 +19,10 @@ pub(super) struct Task<'a> {
     pub features: Features,
     /// Coordinates that the encoder may use.
     pub active: Vec<usize>,
+    /// What the rows of a linear encoder are made of.
+    pub frame: Frame,
+    /// What is known of the dynamics in its coordinates, one a phase.
+    pub knowledge: Vec<Knowledge>,
     pub options: &'a TrainOptions,
 }
 
@@ -34,19 +40,27 @@ impl<'a> Task<'a> {
         let moments = sets.training.moments();
         let least_std = options.encoder.least_std * options.scaling.state;
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
-        if options.latent_dim == 0 || options.latent_dim > active.len() {
+        let coordinates = match options.joint.maps.is_linear() {
+            true => options.encoder.coordinates,
+            false => Coordinates::Free,
+        };
+        let frame = Frame::new(&sets.training, &active, options.latent_dim, coordinates)?;
+        if options.latent_dim == 0 || options.latent_dim > frame.dim() {
             return Err(TrainError::LatentDim {
                 requested: options.latent_dim,
-                active: active.len(),
+                active: frame.dim(),
             });
         }
         let library = options.library()?;
+        let features = Features::new(&library);
         Ok(Self {
+            knowledge: Knowledge::of_phases(&sets.training, &features, &frame),
             sets,
             moments,
-            features: Features::new(&library),
+            features,
             library,
             active,
+            frame,
             options,
         })
     }

@@ -173,6 +173,7 @@ impl Span {
 mod tests {
     use super::*;
     use crate::model::{Library, StandardLibrary};
+    use crate::train::knowledge::Knowledge;
     use crate::train::oscillator;
     use crate::train::sparse::{Pruning, Regression};
 
@@ -187,7 +188,8 @@ mod tests {
         let features = Features::new(&Library::standard(2, standard).expect("small library"));
         for window in [0, 20, 60] {
             let (theta, target) = windowed_samples(&dataset, &latent, &features, 0, window);
-            let xi = Regression::new(&theta, &target).fit(1e-9, Pruning::Threshold(1e-3));
+            let xi = Regression::new(&theta, &target, Knowledge::nothing(7, 2))
+                .fit(1e-9, Pruning::Threshold(1e-3));
             // rows: 1, z1, z2, dz1, dz2, u1, u2
             for (row, column, expected) in [
                 (1, 0, -40.0),

@@ -12,7 +12,7 @@ use crate::recording::smoothing::SavitzkyGolay;
 use crate::recording::{Accelerations, SmoothedRows};
 use crate::robot::STATE_DIM;
 use crate::study::Shard;
-use crate::train::{Integrator, Method, Split};
+use crate::train::{Coordinates, Integrator, Method, Split};
 
 /// Widths of hidden layers in their order: `32,16`, or `linear` for none; a list of numbers in a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -200,6 +200,10 @@ pub struct TrainSettings {
     /// Coordinates with a larger share of the input's energy count as actuated
     #[arg(long, value_name = "SHARE")]
     pub mask_input_share: Option<Finite>,
+    /// Rows of a linear encoder: named (the centre of mass, then joints and pitch, left and right alike; the dynamics
+    /// obey gravity, free fall and the invariances) or free [default: named; free with --paper]
+    #[arg(long, value_name = "KIND")]
+    pub coordinates: Option<Coordinates>,
     /// Keep the latent basis as trained, without varimax rotation
     #[arg(long)]
     pub no_rotation: bool,

@@ -337,7 +337,11 @@ impl Trainer<'_> {
 
     /// The encoder over the learned row space, and its least-squares decoder.
     fn linear_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
-        let basis = parameters.encoder.layers[0].weights.clone().qr().q();
+        let learned = parameters.encoder.layers[0].weights.clone().qr().q();
+        let basis = self
+            .task
+            .frame
+            .nearest(&learned, self.task.options.latent_dim);
         let encoder = self.task.encoder_over(&basis)?.into();
         let decoder = least_squares_decoder(&self.task.sets.training, &encoder)?.into();
         Ok((encoder, decoder))
