@@ -233,8 +233,8 @@ fn drive_and_compare(model: &ReducedModel, built: &Built) {
         let path = root().join(format!("examples/recordings/go1/{recording}.csv.gz"));
         let recording = romc::recording::read(&path).expect("a sound recording");
         let segment = &recording.segments[0];
-        let robot = model.robot().expect("a robot");
-        let input = segment.input(robot).expect("inputs").as_slice().to_vec();
+        let rule = model.input_rule().expect("a robot");
+        let input = segment.input(&rule).expect("inputs").as_slice().to_vec();
         for lift in [Lift::Transpose, Lift::Consistent] {
             for has_input in [true, false] {
                 let case = Case { lift, has_input };

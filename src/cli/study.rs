@@ -17,7 +17,7 @@ use crate::recording::Recording;
 use crate::report::study_figures;
 use crate::robot::Robot;
 use crate::study::{self, Plan, Shard, Spread, Store, Summary, cells_csv};
-use crate::train::Origin;
+use crate::train::{Origin, TrainOptions};
 
 /// The tables of a study.
 const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
@@ -73,7 +73,12 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let store = Store::create(&arguments.out_dir, plan)?;
     let bar = spinner("training");
     let total = store.plan().cells().len();
-    let options = |d: usize| train_settings::options(&settings, d, format!("d{d}"));
+    let base = train_settings::options(&settings, 1, String::new())?;
+    let options = |d: usize| TrainOptions {
+        name: format!("d{d}"),
+        latent_dim: d,
+        ..base.clone()
+    };
     let finished = |_| {
         let left = store.missing().len();
         bar.set_message(format!("{} of {total} models trained", total - left));

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use super::actuators;
 use super::args::{
     AccelerationSource, BpttIntegrator, FilteredRows, HiddenActivation, PhaseSet, TrainArguments,
     TrainMethod, TrainSettings,
@@ -19,7 +20,14 @@ use crate::recording::{
 use crate::train::{Integrator, LibraryChoice, MIN_SAMPLES, MapOptions, TrainError, TrainOptions};
 
 /// The options that the settings describe.
-pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String) -> TrainOptions {
+///
+/// # Errors
+/// [`Error::Read`] and [`Error::Config`] for the file of the actuators.
+pub(super) fn options(
+    settings: &TrainSettings,
+    latent_dim: usize,
+    name: String,
+) -> Result<TrainOptions, Error> {
     let mut options = match settings.paper {
         true => TrainOptions::paper(name, latent_dim),
         false => TrainOptions::new(name, latent_dim),
@@ -59,7 +67,12 @@ pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String)
     if settings.phases == Some(PhaseSet::ContactRearFlight) {
         options.phases = PhaseRule::three_phase().with_min_samples(options.phases.min_samples);
     }
-    options
+    set(&mut options.wrench_frame, settings.wrench_frame);
+    options.actuators = match settings.actuators.as_deref() {
+        None | Some(actuators::NONE) => None,
+        Some(path) => Some(actuators::read(Path::new(path))?),
+    };
+    Ok(options)
 }
 
 /// What happens to recordings before they are learned from.
@@ -295,6 +308,8 @@ fn overlay(above: &TrainSettings, below: TrainSettings) -> TrainSettings {
         degree: above.degree.or(below.degree),
         trigonometric: above.trigonometric || below.trigonometric,
         terms: above.terms.or(below.terms),
+        actuators: above.actuators.or(below.actuators),
+        wrench_frame: above.wrench_frame.or(below.wrench_frame),
         phases: above.phases.or(below.phases),
         leave_out_implausible: above.leave_out_implausible || below.leave_out_implausible,
         accelerations: above.accelerations.or(below.accelerations),

@@ -236,6 +236,20 @@ pub enum ModelError {
     /// The robot is unknown.
     #[error(transparent)]
     Robot(#[from] RobotError),
+    /// A friction or an armature is negative or not finite.
+    #[error(
+        "`actuators.{array}`[{index}], joint {joint}: found {found}, expected a number of at least 0"
+    )]
+    Actuator {
+        /// `viscous`, `dry` or `armature`.
+        array: &'static str,
+        /// Index of the joint, from 0.
+        index: usize,
+        /// Its name.
+        joint: &'static str,
+        /// The value.
+        found: f64,
+    },
     /// The sample time is not a positive number of seconds.
     #[error("`sample_time_s`: found {found}, expected a positive number up to {max}")]
     SampleTime {

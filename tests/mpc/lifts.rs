@@ -12,9 +12,10 @@ const FOOTING: StanceState = StanceState {
     joints_rad: [
         0.0, 0.8, -1.6, 0.0, 0.8, -1.6, 0.0, 0.8, -1.6, 0.0, 0.8, -1.6,
     ],
-    attitude_rad: [0.0, 0.0],
+    attitude_rad: [0.0; 3],
     feet: [true; 4],
     phase: 0,
+    losses_nm: [0.0; 12],
 };
 
 fn go1() -> &'static Robot {

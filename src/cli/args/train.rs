@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::command::OutputArguments;
 use super::number::at_least_one;
 use crate::recording::smoothing::SavitzkyGolay;
-use crate::robot::STATE_DIM;
+use crate::robot::{STATE_DIM, WrenchFrame};
 use crate::study::Shard;
 use crate::train::Split;
 
@@ -137,6 +137,10 @@ pub enum PhaseSet {
     ContactRearFlight,
 }
 
+fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
+    WrenchFrame::by_name(text).ok_or_else(|| format!("found `{text}`, expected `world` or `body`"))
+}
+
 /// `romc train`
 #[derive(Debug, Args)]
 #[command(
@@ -186,7 +190,8 @@ pub struct TrainSettings {
     /// Robot that made the recordings (go1 unless given)
     #[arg(long)]
     pub robot: Option<String>,
-    /// Train exactly as published: one scale, no mask, no lift loss, Xi from ones (joint method)
+    /// Train exactly as published: motor torques, forces in the body's axes, one scale, no mask, no lift loss,
+    /// Xi from ones (joint method)
     #[arg(long)]
     pub paper: bool,
     /// Seed of all random choices
@@ -240,6 +245,12 @@ pub struct TrainSettings {
     /// Candidate terms of your own, separated by semicolons: "1; z1; dz1; u1; z1*dz2"
     #[arg(long, value_name = "TERMS", conflicts_with_all = ["degree", "trigonometric"])]
     pub terms: Option<String>,
+    /// Friction and inertia of the joints, taken from the torques: a file with [actuators], or `none`
+    #[arg(long, value_name = "FILE.toml")]
+    pub actuators: Option<String>,
+    /// Axes of force and moment in the inputs: `world` or, as published, `body` (world unless given)
+    #[arg(long, value_name = "FRAME", value_parser = wrench_frame)]
+    pub wrench_frame: Option<WrenchFrame>,
     /// Phases to tell apart
     #[arg(long, value_enum)]
     pub phases: Option<PhaseSet>,
