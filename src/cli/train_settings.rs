@@ -17,7 +17,9 @@ use crate::recording::smoothing::SavitzkyGolay;
 use crate::recording::{
     Accelerations, ConditionOptions, ImplausibleSamples, PhaseRule, SmoothedRows,
 };
-use crate::train::{Integrator, LibraryChoice, MIN_SAMPLES, MapOptions, TrainError, TrainOptions};
+use crate::train::{
+    Integrator, LibraryChoice, MIN_SAMPLES, MapOptions, ScaleOptions, TrainError, TrainOptions,
+};
 
 /// The options that the settings describe.
 ///
@@ -59,6 +61,10 @@ pub(super) fn options(
         settings.mask_input_share,
     );
     options.encoder.rotate &= !settings.no_rotation;
+    set(&mut options.wrench_frame, settings.wrench_frame);
+    if !settings.paper {
+        options.scaling = ScaleOptions::in_frame(options.wrench_frame);
+    }
     set(&mut options.scaling.state, settings.state_scaling);
     set(&mut options.scaling.torque, settings.torque_scaling);
     set(&mut options.scaling.force, settings.force_scaling);
@@ -67,7 +73,6 @@ pub(super) fn options(
     if settings.phases == Some(PhaseSet::ContactRearFlight) {
         options.phases = PhaseRule::three_phase().with_min_samples(options.phases.min_samples);
     }
-    set(&mut options.wrench_frame, settings.wrench_frame);
     options.actuators = match settings.actuators.as_deref() {
         None | Some(actuators::NONE) => None,
         Some(path) => Some(actuators::read(Path::new(path))?),

@@ -15,7 +15,7 @@ use crate::model::InputStatistics;
 use crate::recording::{
     PhaseRule, RecordingError, RecordingFault, RecordingFiles, Segment, Source,
 };
-use crate::robot::{FeetRule, InputRule, JOINT_DIM, STATE_DIM};
+use crate::robot::{FeetRule, InputRule, JOINT_DIM, STATE_DIM, WrenchFrame};
 
 /// Fewest samples of a segment, and of a phase over all segments.
 pub const MIN_SAMPLES: usize = 50;
@@ -53,6 +53,21 @@ impl ScaleOptions {
         }
     }
 
+    /// State and torques 0.1, forces 0.005, so that both kinds of input are of one size; moments 0.05 in the
+    /// body's axes, with which they are of that size too, and 0.02 in the world's: about the body's origin moments
+    /// of a jump nearly cancel, and what remains is the least exact part of the input.
+    pub fn in_frame(frame: WrenchFrame) -> Self {
+        Self {
+            state: 0.1,
+            torque: 0.1,
+            force: 0.005,
+            moment: match frame {
+                WrenchFrame::Body => 0.05,
+                WrenchFrame::World => 0.02,
+            },
+        }
+    }
+
     /// The factor of every coordinate.
     pub fn factors(&self) -> Scaling {
         let input = DVector::from_fn(STATE_DIM, |i, _| match i {
@@ -68,14 +83,9 @@ impl ScaleOptions {
 }
 
 impl Default for ScaleOptions {
-    /// State and torques 0.1, forces 0.005, moments 0.05: all inputs then are of the size of the torques.
+    /// Those of inputs in world axes.
     fn default() -> Self {
-        Self {
-            state: 0.1,
-            torque: 0.1,
-            force: 0.005,
-            moment: 0.05,
-        }
+        Self::in_frame(WrenchFrame::World)
     }
 }
 

@@ -287,7 +287,7 @@ pub struct TrainSettings {
     /// Scaled units of forces on the body in one N (0.005 unless given, 0.1 with --paper)
     #[arg(long, value_name = "FACTOR")]
     pub force_scaling: Option<f64>,
-    /// Scaled units of moments on the body in one N m (0.05 unless given, 0.1 with --paper)
+    /// Scaled units of moments on the body in one N m (0.02 unless given, 0.05 in the body's axes, 0.1 with --paper)
     #[arg(long, value_name = "FACTOR")]
     pub moment_scaling: Option<f64>,
 }

@@ -164,7 +164,9 @@ pub fn emit(
 fn input_in_words(rule: &InputRule, name: &str) -> String {
     let torques = match rule.actuators() {
         None => "its torques are those of the motors",
-        Some(_) => "its torques are those at the links, what the joints take is off; commands have it on top",
+        Some(_) => {
+            "its torques are those at the links, what the joints take is off; commands have it on top"
+        }
     };
     let wrench = match rule.wrench_frame() {
         WrenchFrame::Body => {
@@ -176,7 +178,8 @@ fn input_in_words(rule: &InputRule, name: &str) -> String {
              those that do work on the rates of roll, pitch and yaw about the body's origin"
         }
     };
-    let text = format!("Of u, {torques}; {wrench}. {name}_generalised_input() of the model makes it.");
+    let text =
+        format!("Of u, {torques}; {wrench}. {name}_generalised_input() of the model makes it.");
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
         let last = lines.last_mut().expect("never empty");
