@@ -61,7 +61,7 @@ fn controller(
 ) -> Controller {
     let mut controller = Controller::new(model, settings).expect("the shipped model is complete");
     let input = segment
-        .input(controller.plant().robot())
+        .input(controller.plant().input_rule())
         .expect("no leg is stretched");
     controller
         .set_reference(ReferenceSamples {

@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let model = artifact::read(Path::new(model))?;
     let jump = recording::read(Path::new(jump))?;
     let segment = jump.segments.first().ok_or("the recording is empty")?;
-    let input = segment.input(model.robot()?)?;
+    let input = segment.input(&model.input_rule()?)?;
 
     let mut controller = Controller::new(&model, MpcSettings::default())?;
     controller.set_reference(ReferenceSamples {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use romc::artifact::{self, ArtifactError, ArtifactFault};
 use romc::files::Overwrite;
 use romc::model::{IdentifierError, LibraryError, ModelError, ReducedModel};
+use romc::robot::WrenchFrame;
 use serde_json::{Value, json};
 
 fn fixture_folder() -> PathBuf {
@@ -420,7 +421,7 @@ fn file_beyond_the_size_bound_is_refused() {
 #[test]
 fn unknown_or_missing_schema_is_refused_before_anything_else() {
     for (schema, found) in [
-        (json!("romc-model/2"), "\"romc-model/2\""),
+        (json!("romc-model/3"), "\"romc-model/3\""),
         (json!(1), "1"),
         (Value::Null, "none"),
     ] {
@@ -432,6 +433,89 @@ fn unknown_or_missing_schema_is_refused_before_anything_else() {
             ArtifactFault::Schema(f) => assert_eq!(f, found),
             other => panic!("{other:?}"),
         }
+    }
+}
+
+#[test]
+fn actuators_and_frame_are_read_and_written_with_the_second_schema() {
+    let model = read_value(&fixture("net-torques")).expect("a fixture");
+    let actuators = model.actuators().expect("the file has them");
+    assert_eq!((actuators.viscous[3], actuators.dry[5]), (0.9, 0.3));
+    assert_eq!(model.wrench_frame(), WrenchFrame::World);
+    let rule = model.input_rule().expect("a robot");
+    assert_eq!(rule.robot().name(), "go2");
+    assert!(artifact::to_text(&model).contains("\"schema\": \"romc-model/2\""));
+    // Without them it is a file of the first schema, which keeps old files byte for byte.
+    let plain = model.clone().into_builder().actuators(None);
+    let plain = plain.wrench_frame(WrenchFrame::Body).build();
+    let text = artifact::to_text(&plain.expect("sound"));
+    assert!(text.contains("\"schema\": \"romc-model/1\"") && !text.contains("actuators"));
+    // The frame alone needs the second one as well.
+    let turned = model.into_builder().actuators(None).build().expect("sound");
+    let text = artifact::to_text(&turned);
+    assert!(text.contains("romc-model/2") && text.contains("\"wrench_frame\": \"world\""));
+    let mut published = fixture("net-torques");
+    published["wrench_frame"] = json!("body");
+    let published = read_value(&published).expect("the default, spelled out");
+    assert_eq!(published.wrench_frame(), WrenchFrame::Body);
+}
+
+#[test]
+fn actuators_and_frame_that_are_wrong_are_refused_at_their_place() {
+    let (place, message) = syntax_refusal("net-torques", |value| {
+        value["wrench_frame"] = json!("hips");
+    });
+    assert_eq!(place, "wrench_frame");
+    assert!(
+        message.contains("\"hips\", expected \"body\" or \"world\""),
+        "{message}"
+    );
+    let (place, message) = syntax_refusal("net-torques", |value| {
+        array(value, "/actuators/dry").pop();
+    });
+    assert!(place.starts_with("actuators.dry"), "{place}");
+    assert!(message.contains("array of length 12"), "{message}");
+    let (place, _) = syntax_refusal("net-torques", |value| value["actuators"] = Value::Null);
+    assert_eq!(place, "actuators");
+    let (place, message) = syntax_refusal("net-torques", |value| {
+        value["actuators"]["stiction"] = json!([1.0]);
+    });
+    assert!(
+        place.ends_with("stiction") && message.contains("unknown field"),
+        "{place} {message}"
+    );
+    let error = model_refusal("net-torques", |value| {
+        value["actuators"]["armature"][7] = json!(-0.01);
+    });
+    assert_eq!(
+        error.to_string(),
+        "`actuators.armature`[7], joint rr.hy: found -0.01, expected a number of at least 0"
+    );
+    let without_robot = |key: &'static str| {
+        model_refusal("net-torques", |value| {
+            let file = value.as_object_mut().expect("an object");
+            file.remove("robot");
+            file.remove(key);
+        })
+    };
+    for (gone, part) in [("wrench_frame", "actuators"), ("actuators", "wrench_frame")] {
+        let needs = "robot";
+        assert_eq!(without_robot(gone), ModelError::Incomplete { part, needs });
+    }
+    for key in ["actuators", "wrench_frame"] {
+        let error = refusal("net-torques", |value| {
+            value["schema"] = json!("romc-model/1");
+            let other = if key == "actuators" {
+                "wrench_frame"
+            } else {
+                "actuators"
+            };
+            value.as_object_mut().expect("an object").remove(other);
+        });
+        assert!(
+            matches!(error.kind, ArtifactFault::LaterKey { key: found } if found == key),
+            "{error:?}"
+        );
     }
 }
 

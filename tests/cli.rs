@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use romc::robot::WrenchFrame;
 use serde_json::Value;
 
 fn romc(arguments: &[&str]) -> Output {
@@ -423,6 +424,77 @@ fn train_writes_a_model_that_compiles_and_refuses_to_replace_it() {
 }
 
 #[test]
+fn train_takes_what_the_joints_take_off_the_torques_and_says_so() {
+    let folder = folder();
+    let losses = path(&folder, "losses.toml");
+    let model = path(&folder, "net.json");
+    // As `romc identify` writes it: other tables are passed over.
+    let table =
+        "gravity_m_s2 = 9.8\n[actuators]\nviscous = [1.0, 0.6, 0.6]\ndry = [0.2, 0.2, 0.2]\n";
+    let whole = format!(
+        "{table}armature = [{}]\n[standard_error]\ndry = 1\n",
+        ["0.01"; 12].join(", ")
+    );
+    fs::write(&losses, whole).expect("written");
+    let jump = "examples/recordings/go1/train_01.csv.gz";
+    let train = [
+        "train",
+        jump,
+        "--latent-dim",
+        "2",
+        "--actuators",
+        &losses,
+        "--output",
+        &model,
+        "--force",
+    ];
+    done(&train);
+    let written = romc::artifact::read(Path::new(&model)).expect("a model");
+    let actuators = written.actuators().expect("given");
+    assert_eq!((actuators.viscous[3], actuators.armature[11]), (1.0, 0.01));
+    assert_eq!(written.wrench_frame(), WrenchFrame::World);
+    let command = written.provenance()["command"].to_string();
+    assert!(
+        command.contains(&format!("--actuators {losses} ")),
+        "{command}"
+    );
+    assert!(command.contains("--wrench-frame world"), "{command}");
+    let told = json(&["inspect", &model]);
+    assert_eq!(told["wrench_frame"], "world");
+    assert_eq!(told["actuators"]["viscous"][1], 0.6);
+    let printed = done(&["inspect", &model]);
+    assert!(
+        printed.contains("world's axes") && printed.contains("viscous, N m s/rad"),
+        "{printed}"
+    );
+    assert_eq!(json(&["inspect", MODEL])["wrench_frame"], "body");
+
+    for (content, expected) in [
+        (table.to_owned(), "missing field `armature`"),
+        (
+            format!("{table}armature = [0.1, 0.1]\n"),
+            "found 2 numbers, expected 12, or 3 for hx, hy, kn",
+        ),
+        (
+            format!("{table}armature = [0.1, -0.1, 0.1]\n"),
+            "`actuators.armature`, joint fr.hy: found -0.1",
+        ),
+    ] {
+        fs::write(&losses, content).expect("written");
+        let error = failed(&train);
+        assert!(
+            error.contains("losses.toml") && error.contains(expected),
+            "{error}"
+        );
+    }
+    let error = refused(&["train", jump, "--wrench-frame", "hip", "--output", &model]);
+    assert!(
+        error.contains("found `hip`, expected `world` or `body`"),
+        "{error}"
+    );
+}
+
+#[test]
 fn train_takes_settings_from_a_file_and_flags_override_it() {
     let folder = folder();
     let (config, model) = (path(&folder, "train.toml"), path(&folder, "m.json"));
@@ -764,6 +836,9 @@ fn shipped_models_come_from_the_command_in_their_provenance() {
             dimension,
             "--method",
             "closed-form",
+            // Those of a first file's schema were learned before there were other axes.
+            "--wrench-frame",
+            "body",
             "--output",
             &again,
         ]);

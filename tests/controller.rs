@@ -10,6 +10,7 @@ use romc::files::EmittedFile;
 use romc::model::ReducedModel;
 use romc::mpc::{Controller, Lift, Measurement, MpcSettings, ReferenceSamples};
 use romc::recording::Segment;
+use romc::robot::{Actuators, WrenchFrame};
 
 /// Warnings that generated headers and examples must not raise.
 const STRICT: [&str; 6] = [
@@ -29,6 +30,14 @@ fn root() -> &'static Path {
 
 fn shipped(name: &str) -> ReducedModel {
     romc::artifact::read(&root().join(format!("models/{name}.json"))).expect("a shipped model")
+}
+
+/// The model with other inputs: torques at the links, forces in the world's axes.
+fn with_losses(model: ReducedModel) -> ReducedModel {
+    let actuators = Actuators::of_leg([1.0, 0.6, 0.6], [0.2; 3], [0.01; 3]);
+    let builder = model.into_builder().actuators(Some(actuators));
+    let builder = builder.wrench_frame(WrenchFrame::World);
+    builder.build().expect("a sound model")
 }
 
 fn emitted(model: &ReducedModel) -> Vec<EmittedFile> {
@@ -233,8 +242,8 @@ fn drive_and_compare(model: &ReducedModel, built: &Built) {
         let path = root().join(format!("examples/recordings/go1/{recording}.csv.gz"));
         let recording = romc::recording::read(&path).expect("a sound recording");
         let segment = &recording.segments[0];
-        let robot = model.robot().expect("a robot");
-        let input = segment.input(robot).expect("inputs").as_slice().to_vec();
+        let rule = model.input_rule().expect("a robot");
+        let input = segment.input(&rule).expect("inputs").as_slice().to_vec();
         for lift in [Lift::Transpose, Lift::Consistent] {
             for has_input in [true, false] {
                 let case = Case { lift, has_input };
@@ -324,8 +333,7 @@ fn model_without_a_robot_or_with_activations_is_refused_with_the_reason() {
 
 #[test]
 fn generated_controllers_command_the_librarys_bits_and_survive_abuse() {
-    for name in ["go1-d4", "go1-d6"] {
-        let model = shipped(name);
+    for model in [shipped("go1-d4"), with_losses(shipped("go1-d6"))] {
         let built = Built::new(&model);
         drive_and_compare(&model, &built);
         let abuse = root().join("tests/controller/abuse.c");

@@ -22,7 +22,7 @@ fn latent_segment_agrees_with_the_definition_at_every_sample() {
         model.input_factors().expect("scaled"),
     );
     let input = segment
-        .input(model.robot().expect("a robot"))
+        .input(&model.input_rule().expect("a robot"))
         .expect("regular legs");
     for sample in (0..segment.len()).step_by(37) {
         let column = |m: &nalgebra::DMatrix<f64>| -> DVector<f64> { m.column(sample).into_owned() };

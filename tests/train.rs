@@ -7,14 +7,16 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use romc::artifact;
+use romc::evaluate::{Assessment, ReferenceInput, along_recording};
 use romc::lower::CompiledModel;
 use romc::model::{Activation, StandardLibrary};
+use romc::mpc::{Controller, MpcSettings};
 use romc::recording::{self, Recording};
-use romc::robot::Robot;
+use romc::robot::{Actuators, Robot, WrenchFrame};
 use romc::sim::{IntegrationOptions, LatentSegment, Restart, rollout};
 use romc::train::{
-    self, LibraryChoice, Origin, Progress, Recordings, TrainError, TrainOptions, Trained, Transfer,
-    Watch,
+    self, LibraryChoice, Origin, Progress, Recordings, ScaleOptions, TrainError, TrainOptions,
+    Trained, Transfer, Watch,
 };
 
 fn jumps(set: &str, count: usize) -> Vec<Recording> {
@@ -85,6 +87,93 @@ fn closed_form_d6_is_sparse_and_accurate() {
         .map(|phase| phase.active)
         .collect();
     assert!(active[0] <= 60 && active[1] <= 45, "{active:?}");
+}
+
+/// What the simulated Go1's joints take, as the recorder of the jumps has them.
+fn losses_of_the_simulated_go1() -> Actuators {
+    Actuators::of_leg([1.0, 0.6, 0.6], [0.2; 3], [0.01; 3])
+}
+
+#[test]
+fn net_torques_predict_better_with_fewer_terms_and_command_what_was_recorded() {
+    let (training, validation, test) =
+        (jumps("train", 14), jumps("validation", 3), jumps("test", 3));
+    for frame in WrenchFrame::ALL {
+        let options = |actuators| TrainOptions {
+            actuators,
+            wrench_frame: frame,
+            scaling: ScaleOptions::in_frame(frame),
+            ..TrainOptions::new("d4", 4)
+        };
+        let of_motors = train_with(&training, &validation, &options(None)).expect("trains");
+        let losses = options(Some(losses_of_the_simulated_go1()));
+        let net = train_with(&training, &validation, &losses).expect("trains");
+        assert_eq!(net.model.wrench_frame(), frame);
+        assert_eq!(net.model.actuators(), losses.actuators.as_ref());
+        let [before, after] = [&of_motors, &net]
+            .map(|trained| train::assess(&trained.model, &test).expect("the model fits"));
+        assert!(
+            after.torque_r2 > before.torque_r2 && after.torque_r2 > 0.97,
+            "{after:?}"
+        );
+        assert!(
+            after.prediction_x_m < 0.002 && after.prediction_z_m < 0.002,
+            "{after:?}"
+        );
+        if frame == WrenchFrame::Body {
+            assert!(
+                after.prediction_x_m < 0.5 * before.prediction_x_m,
+                "{before:?} {after:?}"
+            );
+            let terms = |trained: &Trained| -> usize {
+                trained
+                    .report
+                    .active_terms
+                    .iter()
+                    .map(|phase| phase.active)
+                    .sum()
+            };
+            assert!(terms(&net) < terms(&of_motors));
+        }
+        // Simulation and control say the same of the lift as training, and commands have the losses.
+        let assessed = Assessment::over(&net.model, &test, 0.1).expect("the model fits");
+        let r2 = assessed.lift.torque_r2_all().expect("samples");
+        assert!(
+            (r2 - after.torque_r2).abs() < 1e-6,
+            "{r2} {}",
+            after.torque_r2
+        );
+        let mut controller = Controller::new(&net.model, MpcSettings::default()).expect("complete");
+        let along = ReferenceInput::Recorded;
+        let run = along_recording(&mut controller, &test[0], along, |_, _| {}).expect("runs");
+        let found = run.summary.torque_r2.contact.expect("contact");
+        assert!(
+            found > 0.9 && run.summary.limit_violations == 0,
+            "{:?}",
+            run.summary
+        );
+        let ignorant = net
+            .model
+            .into_builder()
+            .actuators(None)
+            .build()
+            .expect("sound");
+        let mut ignorant = Controller::new(&ignorant, MpcSettings::default()).expect("complete");
+        let run = along_recording(&mut ignorant, &test[0], along, |_, _| {}).expect("runs");
+        assert!(run.summary.torque_r2.contact.expect("contact") != found);
+    }
+}
+
+#[test]
+fn training_with_a_negative_friction_is_refused_with_its_joint() {
+    let mut losses = losses_of_the_simulated_go1();
+    losses.viscous[4] = -1.0;
+    let options = TrainOptions {
+        actuators: Some(losses),
+        ..TrainOptions::new("d2", 2)
+    };
+    let error = train_with(&jumps("train", 1), &[], &options).expect_err("no friction drives");
+    assert!(error.to_string().contains("viscous -1 at fl.hy"), "{error}");
 }
 
 #[test]

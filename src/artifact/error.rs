@@ -5,7 +5,7 @@ use std::io;
 
 use thiserror::Error;
 
-use super::manifest::SCHEMA;
+use super::manifest::{SCHEMA, SCHEMA_2};
 use crate::files::{Located, Place};
 use crate::model::ModelError;
 
@@ -39,8 +39,14 @@ pub enum ArtifactFault {
         message: String,
     },
     /// The file follows another schema.
-    #[error("`schema`: found {0}, expected \"{SCHEMA}\"")]
+    #[error("`schema`: found {0}, expected \"{SCHEMA}\" or \"{SCHEMA_2}\"")]
     Schema(String),
+    /// A key that the file's schema does not have.
+    #[error("`{key}`: found in a file of \"{SCHEMA}\", expected only from \"{SCHEMA_2}\" on")]
+    LaterKey {
+        /// The key.
+        key: &'static str,
+    },
     /// A row of a matrix has the wrong length.
     #[error("found {found} numbers, expected {expected}")]
     RowLength {

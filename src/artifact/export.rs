@@ -1,10 +1,12 @@
 //! From a model to the file's grammar.
 
 use super::manifest::{
-    LayerEntry, LibraryEntry, Manifest, MapEntry, Pairs, PhaseEntry, SCHEMA, StatisticsEntry,
+    LayerEntry, LibraryEntry, Manifest, MapEntry, Pairs, PhaseEntry, SCHEMA, SCHEMA_2,
+    StatisticsEntry,
 };
 use super::matrices::to_rows;
 use crate::model::{InputStatistics, Library, LibrarySource, Phase, ReducedModel, StateMap};
+use crate::robot::WrenchFrame;
 
 /// The content of the model file.
 pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
@@ -16,8 +18,15 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
             let statistics = model.input_statistics(index).ok()?;
             Some((phase.name.clone(), statistics_entry(statistics)))
         });
+    let actuators = model.actuators().cloned();
+    let frame = model.wrench_frame();
+    let wrench_frame = (frame != WrenchFrame::Body).then_some(frame);
+    let schema = match (&actuators, wrench_frame) {
+        (None, None) => SCHEMA,
+        _ => SCHEMA_2,
+    };
     Manifest {
-        schema: SCHEMA.to_owned(),
+        schema: schema.to_owned(),
         name: model.name().to_owned(),
         description: model.description().to_owned(),
         state: model.state().cloned(),
@@ -30,6 +39,8 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
         phases: model.phases().iter().map(phase_entry).collect(),
         input_statistics: Pairs(statistics.collect()),
         robot: model.robot().ok().map(|robot| robot.name().to_owned()),
+        actuators,
+        wrench_frame,
         sample_time_s: model.sample_time_s().ok(),
         provenance: model.provenance().clone(),
     }

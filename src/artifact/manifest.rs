@@ -13,9 +13,13 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use crate::model::{Activation, CoordinateNames, FeetRule, ScaleFactors, Scaling, StandardLibrary};
+use crate::robot::{Actuators, JOINT_DIM, WrenchFrame};
 
-/// Name and version of the format.
+/// Name and version of the format of a model without the keys of [`SCHEMA_2`].
 pub const SCHEMA: &str = "romc-model/1";
+
+/// The format with `actuators` and `wrench_frame`.
+pub const SCHEMA_2: &str = "romc-model/2";
 
 /// Rows of a matrix.
 pub(super) type Rows = Vec<Vec<f64>>;
@@ -45,6 +49,18 @@ pub(super) struct Manifest {
     pub input_statistics: Pairs<StatisticsEntry>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<String>,
+    #[serde(
+        default,
+        deserialize_with = "present",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub actuators: Option<Actuators>,
+    #[serde(
+        default,
+        deserialize_with = "present",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub wrench_frame: Option<WrenchFrame>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample_time_s: Option<f64>,
     #[serde(default, skip_serializing_if = "Map::is_empty")]
@@ -235,6 +251,45 @@ impl<'de> Deserialize<'de> for FeetRule {
             }
         }
         deserializer.deserialize_any(Feet)
+    }
+}
+
+/// Three arrays of twelve numbers, as [`Actuators`] has them.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Actuators", deny_unknown_fields)]
+struct ActuatorsEntry {
+    viscous: [f64; JOINT_DIM],
+    dry: [f64; JOINT_DIM],
+    armature: [f64; JOINT_DIM],
+}
+
+impl Serialize for Actuators {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        ActuatorsEntry::serialize(self, serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Actuators {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        ActuatorsEntry::deserialize(deserializer)
+    }
+}
+
+/// `"body"` or `"world"`.
+impl Serialize for WrenchFrame {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.name().serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for WrenchFrame {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        let unknown = || {
+            let found = serde::de::Unexpected::Str(&name);
+            D::Error::invalid_value(found, &"\"body\" or \"world\"")
+        };
+        WrenchFrame::by_name(&name).ok_or_else(unknown)
     }
 }
 

@@ -1,4 +1,7 @@
-//! The model file `romc-model/1`.
+//! The model file, `romc-model/1` and `romc-model/2`.
+//!
+//! The second adds `actuators` and `wrench_frame`, how the model's inputs come from torques; a model
+//! without them is written as the first.
 //!
 //! What enters: a path or bytes; what leaves: a checked [`ReducedModel`], or an error which names
 //! file, tensor, index, what was found and what was expected. The other way, [`write()`] makes files
@@ -39,6 +42,6 @@ mod write;
 
 pub use digest::{Digest, digest};
 pub use error::{ArtifactError, ArtifactFault, describe};
-pub use manifest::SCHEMA;
+pub use manifest::{SCHEMA, SCHEMA_2};
 pub use read::{MAX_FILE_BYTES, read, read_from_bytes};
 pub use write::{check_place, to_text, write, write_with};

@@ -9,7 +9,8 @@ use serde_json::Value;
 
 use super::error::{ArtifactError, ArtifactFault, refused};
 use super::manifest::{
-    LibraryEntry, Manifest, MapEntry, PhaseEntry, Rows, SCHEMA, SchemaProbe, StatisticsEntry,
+    LibraryEntry, Manifest, MapEntry, PhaseEntry, Rows, SCHEMA, SCHEMA_2, SchemaProbe,
+    StatisticsEntry,
 };
 use super::matrices::from_rows;
 use crate::model::{
@@ -48,6 +49,15 @@ pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, Artifac
     }
     check_schema(file, bytes)?;
     let manifest: Manifest = parse(file, bytes)?;
+    if manifest.schema == SCHEMA {
+        let later = [
+            ("actuators", manifest.actuators.is_some()),
+            ("wrench_frame", manifest.wrench_frame.is_some()),
+        ];
+        if let Some((key, _)) = later.into_iter().find(|(_, there)| *there) {
+            return Err(ArtifactFault::LaterKey { key }.of(file));
+        }
+    }
     to_model(file, manifest)
 }
 
@@ -99,7 +109,7 @@ fn check_schema(file: &str, bytes: &[u8]) -> Result<(), ArtifactError> {
         return Ok(());
     };
     let found = match probe.schema {
-        Some(Value::String(schema)) if schema == SCHEMA => return Ok(()),
+        Some(Value::String(schema)) if schema == SCHEMA || schema == SCHEMA_2 => return Ok(()),
         Some(other) => other.to_string().chars().take(80).collect(),
         None => "none".to_owned(),
     };
@@ -146,6 +156,9 @@ fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactErro
         let statistics = statistics_of(file, &name, &entry)?;
         builder = builder.input_statistics(name, statistics);
     }
+    builder = builder
+        .actuators(manifest.actuators)
+        .wrench_frame(manifest.wrench_frame.unwrap_or_default());
     if let Some(sample_time_s) = manifest.sample_time_s {
         builder = builder.sample_time_s(sample_time_s);
     }

@@ -12,7 +12,7 @@ use crate::Error;
 use crate::artifact;
 use crate::equations::Equations;
 use crate::model::{ReducedModel, StateMap};
-use crate::robot::Robot;
+use crate::robot::{JOINT_NAMES, Robot, WrenchFrame};
 use crate::typeset::{Table, significant};
 
 /// Library terms that still fit as a pattern in a terminal.
@@ -46,6 +46,7 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     if !model.description().is_empty() {
         let _ = writeln!(text, "  {}", model.description());
     }
+    text.push_str(&input_rule(model));
     let phases: Vec<PhaseView> = (equations.phases().iter())
         .map(|phase| PhaseView {
             name: &phase.name,
@@ -96,9 +97,40 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
             "dominant_coordinates": dominant,
             "encoder": model.encoder_map().ok().map(StateMap::summary),
             "decoder": model.decoder_map().ok().map(StateMap::summary),
+            "actuators": model.actuators(),
+            "wrench_frame": model.wrench_frame(),
             "provenance": model.provenance(),
         }),
     })
+}
+
+/// What the inputs of a model over a robot are made of.
+fn input_rule(model: &ReducedModel) -> String {
+    let Ok(robot) = model.robot() else {
+        return String::new();
+    };
+    let axes = match model.wrench_frame() {
+        WrenchFrame::Body => "the body's axes, as published",
+        WrenchFrame::World => "the world's axes, moments of roll, pitch and yaw",
+    };
+    let mut text = format!("  inputs of robot {}: forces in {axes};", robot.name());
+    let Some(actuators) = model.actuators() else {
+        return text + " torques of the motors\n";
+    };
+    text.push_str(" torques of the motors less what the joints take\n\n");
+    let mut table = Table::new([
+        "joint",
+        "viscous, N m s/rad",
+        "dry, N m",
+        "armature, kg m^2",
+    ]);
+    for (joint, name) in JOINT_NAMES.into_iter().enumerate() {
+        let values = actuators
+            .named()
+            .map(|(_, values)| significant(values[joint]));
+        table.row([name.to_owned()].into_iter().chain(values));
+    }
+    text + &format!("{table}")
 }
 
 /// Rows are outputs, columns terms; a dot is an inactive one.

@@ -4,6 +4,7 @@
 //! answer and picks the exit code (0 done, 1 the run failed, 2 wrong usage). Human text and JSON go
 //! to stdout; progress, warnings and errors go to stderr. Start with [`args`].
 
+mod actuators;
 pub mod args;
 mod check;
 mod compile;

@@ -122,6 +122,9 @@ impl RecordedSets {
     /// Reports on stderr which files have implausible samples, and what became of them.
     pub fn report_findings(&self) {
         let (findings, left_out) = self.notes();
+        let (findings, singular): (Vec<_>, Vec<_>) =
+            (findings.into_iter()).partition(|(_, finding)| finding.kind.can_be_left_out());
+        report_singular(&singular);
         let mut files: Vec<&Path> = Vec::new();
         for (file, _) in &findings {
             if !files.contains(&file.as_path()) {
@@ -158,6 +161,20 @@ impl RecordedSets {
             value
         });
         json!({ "implausible": findings.collect::<Vec<_>>(), "left_out": left_out })
+    }
+}
+
+/// Reports on stderr which files have legs near a singularity while they are on the ground.
+fn report_singular(findings: &[(PathBuf, Finding)]) {
+    let of_file = findings.chunk_by(|(one, _), (other, _)| one == other);
+    for runs in of_file {
+        let samples: usize = runs.iter().map(|(_, finding)| finding.samples.len()).sum();
+        eprintln!(
+            "note: {}: {samples} samples of legs on the ground near a singularity, where forces are \
+             damped, from {}",
+            runs[0].0.display(),
+            runs[0].1
+        );
     }
 }
 

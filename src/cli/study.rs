@@ -16,7 +16,7 @@ use crate::report::figures::figure_files;
 use crate::report::study_figures;
 use crate::robot::Robot;
 use crate::study::{self, Plan, Shard, Spread, Store, Summary, cell_table};
-use crate::train::Origin;
+use crate::train::{Origin, TrainOptions};
 use crate::typeset::{Cell, Table, significant};
 
 /// The tables of a study.
@@ -59,7 +59,7 @@ fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
 }
 
 fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
-    let settings = settings(arguments)?;
+    let mut settings = settings(arguments)?;
     let robot = Robot::by_name(settings.robot.as_deref().unwrap_or("go1"))?;
     let recorded = RecordedSets::whole(
         [&arguments.recordings, &arguments.validation, &[]],
@@ -69,11 +69,17 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let training = read_all(&recorded.training)?;
     let validation = read_all(&recorded.validation)?;
     recorded.report_findings();
+    let base = train_settings::options(&settings, 1, String::new())?;
+    settings.wrench_frame = Some(base.wrench_frame);
     let plan = plan(arguments, &settings, &training, &validation);
     let store = Store::create(&arguments.out_dir, plan)?;
     let bar = spinner("training");
     let total = store.plan().cells().len();
-    let options = |d: usize| train_settings::options(&settings, d, format!("d{d}"));
+    let options = |d: usize| TrainOptions {
+        name: format!("d{d}"),
+        latent_dim: d,
+        ..base.clone()
+    };
     let finished = |_| {
         let left = store.missing().len();
         bar.set_message(format!("{} of {total} models trained", total - left));

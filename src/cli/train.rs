@@ -7,12 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde_json::json;
 
 use super::Answer;
+use super::actuators::NONE;
 use super::args::{TrainArguments, TrainSettings};
 use super::output::{check_output, names, spinner, stem};
 use super::prepared_recordings::{RecordedSets, read_all};
 use super::train_settings;
 use crate::files::Overwrite;
-use crate::robot::Robot;
+use crate::robot::{Robot, WrenchFrame};
 use crate::train::{Method, Origin, Progress, Recordings, SetMetrics, TrainReport, Trained, Watch};
 use crate::typeset::{Cell, Table};
 use crate::{Error, artifact, train};
@@ -30,13 +31,14 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         .expect("checked by clap, or with the file");
     let method = train_settings::method(&settings);
     let robot = Robot::by_name(settings.robot.as_deref().unwrap_or("go1"))?;
-    let options = train_settings::options(&settings, latent_dim, model_name(arguments));
+    let options = train_settings::options(&settings, latent_dim, model_name(arguments))?;
     let recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
     // a fault of the test recordings ends the command before the training
     read_all(&recorded.test)?;
     let sets = Recordings::new(&recorded.training, &recorded.validation);
     let files = arguments.recordings.iter().chain(&arguments.validation);
-    let origin = Origin::of_files(command_line(arguments, &settings, method), files);
+    let command = command_line(arguments, &settings, method, options.wrench_frame);
+    let origin = Origin::of_files(command, files);
 
     let bar = spinner("training");
     let mut findings_reported = false;
@@ -95,7 +97,12 @@ fn model_name(arguments: &TrainArguments) -> String {
 }
 
 /// The command that repeats this training, as the provenance keeps it.
-fn command_line(arguments: &TrainArguments, settings: &TrainSettings, method: Method) -> String {
+fn command_line(
+    arguments: &TrainArguments,
+    settings: &TrainSettings,
+    method: Method,
+    wrench_frame: WrenchFrame,
+) -> String {
     let paths = |paths: &[PathBuf]| names(paths).join(" ");
     let mut line = format!("romc train {}", paths(&arguments.recordings));
     if !arguments.validation.is_empty() {
@@ -106,6 +113,8 @@ fn command_line(arguments: &TrainArguments, settings: &TrainSettings, method: Me
     }
     let settings = TrainSettings {
         method: Some(method),
+        wrench_frame: Some(wrench_frame),
+        actuators: Some(settings.actuators.clone().unwrap_or(NONE.to_owned())),
         ..settings.clone()
     };
     line += &train_settings::as_flags(&settings);

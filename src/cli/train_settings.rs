@@ -6,14 +6,24 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
+use super::actuators;
 use super::args::{PhaseSet, TrainArguments, TrainSettings, Widths};
 use crate::Error;
 use crate::model::{Activation, StandardLibrary};
 use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule};
-use crate::train::{LibraryChoice, MIN_SAMPLES, MapOptions, Method, TrainError, TrainOptions};
+use crate::train::{
+    LibraryChoice, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError, TrainOptions,
+};
 
 /// The options that the settings describe.
-pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String) -> TrainOptions {
+///
+/// # Errors
+/// [`Error::Read`] and [`Error::Config`] for the file of the actuators.
+pub(super) fn options(
+    settings: &TrainSettings,
+    latent_dim: usize,
+    name: String,
+) -> Result<TrainOptions, Error> {
     let mut options = match settings.paper {
         true => TrainOptions::paper(name, latent_dim),
         false => TrainOptions::new(name, latent_dim),
@@ -40,6 +50,10 @@ pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String)
     encoder.rotate &= !settings.no_rotation;
     set(&mut options.regression.slack, settings.slack);
     set(&mut options.regression.smoothing, settings.moving_average);
+    set(&mut options.wrench_frame, settings.wrench_frame);
+    if !settings.paper {
+        options.scaling = ScaleOptions::in_frame(options.wrench_frame);
+    }
     set(&mut options.scaling.state, settings.state_scaling);
     set(&mut options.scaling.torque, settings.torque_scaling);
     set(&mut options.scaling.force, settings.force_scaling);
@@ -48,7 +62,11 @@ pub(super) fn options(settings: &TrainSettings, latent_dim: usize, name: String)
     if settings.phases == Some(PhaseSet::ContactRearFlight) {
         options.phases = PhaseRule::three_phase().with_min_samples(options.phases.min_samples);
     }
-    options
+    options.actuators = match settings.actuators.as_deref() {
+        None | Some(actuators::NONE) => None,
+        Some(path) => Some(actuators::read(Path::new(path))?),
+    };
+    Ok(options)
 }
 
 /// How recordings are prepared for the training.

@@ -7,6 +7,8 @@ use crate::equations::{Equations, LatentUnits, Unit};
 use crate::ir::{Program, Slot, Statement, Unary};
 use crate::lower::{self, JacobianPattern, LowerError, LowerOptions};
 use crate::model::{CandidateTerm, CoordinateNames, ModelError, ReducedModel, StateMap};
+use crate::robot::WrenchFrame;
+use crate::robot::kinematics::{LEAST_HEIGHT, LEAST_SPAN};
 
 /// Longest equation that documentation spells out, in terms.
 const MOST_TERMS: usize = 40;
@@ -111,7 +113,7 @@ impl ModelInterface {
             latent_dim: model.latent_dim(),
             state_dim: model.state_dim(),
             maps: match units {
-                Units::Si => input_entry(model)?
+                Units::Si => input_entries(model)?
                     .into_iter()
                     .chain(map_entries(model, units, system.latent_units())?)
                     .collect(),
@@ -153,30 +155,70 @@ impl ModelInterface {
     }
 }
 
-/// What computes the input of the maps, if the model is over a known robot's coordinates.
-fn input_entry(model: &ReducedModel) -> Result<Option<FunctionSpec>, LowerError> {
-    let Some(program) = lower::generalised_input(model)? else {
-        return Ok(None);
+/// What computes the input of the maps, and torques of the motors from it, if the model is over a
+/// known robot's coordinates.
+fn input_entries(model: &ReducedModel) -> Result<Vec<FunctionSpec>, LowerError> {
+    let (Some(input), Some(torque)) = (
+        lower::generalised_input(model)?,
+        lower::actuator_torque(model)?,
+    ) else {
+        return Ok(Vec::new());
     };
     let robot = model.robot()?.name();
-    let docs = vec![
-        format!(
-            "Generalised inputs of the {robot}: u = [tau; sum of F_k; sum of p_k x F_k] over the feet on \
-             the ground, F_k = -J_k^-T tau_k the force on the body (equations 4 to 7, 22, 23)."
+    let has_losses = model.actuators().is_some();
+    let axes = match model.wrench_frame() {
+        WrenchFrame::Body => {
+            "Axes are parallel to the body's: x forward, y left, z up. The arm p_k of a moment is the foot in \
+             its own hip frame, as in the data that models are learned from."
+        }
+        WrenchFrame::World => {
+            "Axes are the world's; the arm p_k of a moment is the foot from the body's origin. The three \
+             moments are the generalised forces of roll, pitch and yaw: they do work on the rates of these \
+             angles."
+        }
+    };
+    let (net, losses) = match has_losses {
+        true => (
+            "the torques at the links, tau less the joints' viscous and dry friction b dq + c tanh(dq / \
+             0.05 rad/s)",
+            "tau = net + b dq + c tanh(dq / 0.05 rad/s) + I ddq with the joints' friction and the inertia of \
+             the motors.",
         ),
-        "x: robot coordinates in SI units, of which the joint angles count (0 to 11, rad). tau: joint \
-         torques (N m). feet: 1 on the ground, 0 in the air, order fr, fl, rr, rl. u: the torques \
-         (N m), force (N) and moment (N m) on the body."
-            .to_owned(),
-        "Axes are parallel to the body's: x forward, y left, z up. The arm p_k of a moment is the foot in \
-         its own hip frame, as in the data that models are learned from."
-            .to_owned(),
-        "A leg on the ground that is fully stretched, or whose foot is on its axis of abduction, gives \
-         infinities or no numbers, and huge forces near there: then keep the last u."
-            .to_owned(),
-        shapes(&program),
+        false => (
+            "the torques as they are: the model knows no losses of the joints, dx is not used",
+            "tau = net: the model knows no losses of the joints, dx and ddx are not used.",
+        ),
+    };
+    let input_docs = vec![
+        format!(
+            "Generalised inputs of the {robot}: u = [net; sum of F_k; sum of p_k x F_k] over the feet on \
+             the ground, F_k = -J_k^-T net_k the force on the body (equations 4 to 7, 22, 23)."
+        ),
+        format!(
+            "x, dx: robot coordinates and their velocities in SI units. tau: torques of the motors (N m). \
+             feet: 1 on the ground, 0 in the air, order fr, fl, rr, rl. u: net, force (N) and moment (N m) \
+             on the body. net: {net}. What the inertia of the motors takes is not in it, it would need \
+             accelerations."
+        ),
+        axes.to_owned(),
+        format!(
+            "Near a singularity of a leg on the ground its force is damped: a knee that spans less than \
+             {LEAST_SPAN} of thigh times calf, a foot nearer to its hip's height than {LEAST_HEIGHT} of the \
+             leg."
+        ),
+        shapes(&input),
     ];
-    Ok(Some(entry(program.name().to_owned(), program, docs)))
+    let torque_docs = vec![
+        format!("Torques of the {robot}'s motors behind torques at the links: {losses}"),
+        "dx, ddx: velocities and accelerations of the robot coordinates in SI units, of which the joints \
+         count (0 to 11). net: the first 12 of u (N m). tau: torques of the motors (N m); limits are the \
+         caller's."
+            .to_owned(),
+        shapes(&torque),
+    ];
+    let entries = [(input, input_docs), (torque, torque_docs)];
+    let entries = entries.map(|(program, docs)| entry(program.name().to_owned(), program, docs));
+    Ok(entries.into())
 }
 
 fn map_entries(

@@ -23,10 +23,10 @@ use super::control::{Summary, Tally};
 use super::torque::{Comparison, exceeds, is_plausible};
 use crate::mpc::{
     Command, ControlError, Controller, Lift, Measurement, MpcError, ReferenceSamples, Source,
-    StanceState, Status, foot_forces, upright,
+    StanceState, Status, foot_forces, to_upright,
 };
 use crate::recording::{Recording, Segment};
-use crate::robot::{ContactFlags, JOINT_DIM, Robot, STATE_DIM};
+use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
 /// Where the controller's input reference comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
@@ -57,7 +57,7 @@ pub struct StepRow {
     /// Latent input.
     pub u_lat: Vec<f64>,
     /// Lifted input in SI units: with the transpose lift `W_eᵀ u_lat`, with the consistent lift the
-    /// torques and the force that they produce.
+    /// torques at the links and the force that they produce.
     pub input: [f64; STATE_DIM],
     /// Commanded torques, N m.
     pub torque_nm: [f64; JOINT_DIM],
@@ -121,8 +121,8 @@ pub fn along_recording(
         if segment.len() < 2 {
             continue;
         }
-        let input = clamped_input(segment, controller.plant().robot())?;
-        set_reference(controller, segment, reference_input, &input)?;
+        let input = segment.input_within_limits(controller.plant().input_rule())?;
+        set_reference(controller, segment, reference_input, input.as_slice())?;
         for &sample in schedule {
             rows.push(one_step(controller, segment, number, sample, &mut tally));
             progress(rows.len(), total);
@@ -147,8 +147,9 @@ pub fn lift_comparison(
     let mut comparison = Comparison::default();
     let mut u_lat = vec![0.0; controller.plant().latent_dim()];
     for segment in &recording.segments {
-        let input = clamped_input(segment, controller.plant().robot())?;
-        for (sample, u) in input.chunks_exact(STATE_DIM).enumerate() {
+        let input = segment.input_within_limits(controller.plant().input_rule())?;
+        let losses = segment.losses(controller.plant().input_rule());
+        for (sample, u) in input.as_slice().chunks_exact(STATE_DIM).enumerate() {
             let recorded = segment.torque(sample);
             if !is_plausible(controller.plant().robot(), &recorded) {
                 continue;
@@ -158,9 +159,11 @@ pub fn lift_comparison(
             controller
                 .local_plant()
                 .project(x.as_slice(), u, &mut u_lat);
-            let Some(stance) = stance(controller, segment, sample) else {
+            let Some(mut stance) = stance(controller, segment, sample) else {
                 continue;
             };
+            let losses = std::array::from_fn(|joint| losses[(joint, sample)]);
+            stance.losses_nm = controller.plant().clamp_torque(losses);
             if let Ok(torque) = controller.lift(&u_lat, &stance) {
                 comparison.add(segment.feet[sample], &torque, &recorded);
             }
@@ -268,29 +271,6 @@ fn set_reference(
     })
 }
 
-/// Recorded inputs, 18 values a sample, made from torques within the robot's limits.
-fn clamped_input(segment: &Segment, robot: &Robot) -> Result<Vec<f64>, MpcError> {
-    let input = segment.input(robot)?;
-    let mut values = input.as_slice().to_vec();
-    for (sample, u) in values.chunks_exact_mut(STATE_DIM).enumerate() {
-        let recorded = segment.torque(sample);
-        if !exceeds(&recorded, robot.torque_limit_nm(), 1.0) {
-            continue;
-        }
-        let torque: [f64; JOINT_DIM] = std::array::from_fn(|joint| {
-            let limit = robot.torque_limit_nm()[joint];
-            recorded[joint].clamp(-limit, limit)
-        });
-        u[..JOINT_DIM].copy_from_slice(&torque);
-        if let Ok(wrench) =
-            robot.body_wrench(&segment.joints(sample), &torque, segment.feet[sample])
-        {
-            u[JOINT_DIM..].copy_from_slice(wrench.as_slice());
-        }
-    }
-    Ok(values)
-}
-
 /// Mean recorded torques over the time that a command is held; none if one is not finite.
 fn held_torque(segment: &Segment, sample: usize, step_s: f64) -> Option<[f64; JOINT_DIM]> {
     let until = segment.time_s[sample] + step_s - 1e-9;
@@ -311,9 +291,10 @@ fn stance(controller: &Controller, segment: &Segment, sample: usize) -> Option<S
     let feet: ContactFlags = segment.feet[sample];
     Some(StanceState {
         joints_rad: segment.joints(sample),
-        attitude_rad: [segment.x[(15, sample)], segment.x[(16, sample)]],
+        attitude_rad: std::array::from_fn(|angle| segment.x[(15 + angle, sample)]),
         feet,
         phase: controller.plant().phase_for(feet)?,
+        losses_nm: [0.0; JOINT_DIM],
     })
 }
 
@@ -327,13 +308,10 @@ fn lifted_input(
     match controller.settings().lift {
         Lift::Transpose => {}
         Lift::Consistent => {
-            let robot = controller.plant().robot();
-            input[..JOINT_DIM].copy_from_slice(&command.torque_nm);
-            let wrench = robot.body_wrench(
-                &segment.joints(sample),
-                &command.torque_nm,
-                segment.feet[sample],
-            );
+            let net = command.net_torque_nm();
+            input[..JOINT_DIM].copy_from_slice(&net);
+            let rule = controller.plant().input_rule();
+            let wrench = rule.wrench(&segment.state(sample), &net, segment.feet[sample]);
             if let Ok(wrench) = wrench {
                 input[JOINT_DIM..].copy_from_slice(wrench.as_slice());
             }
@@ -357,9 +335,8 @@ fn friction_violated(
             let forces = foot_forces(plant, stance)?;
             Some(forces.iter().enumerate().any(|(leg, force)| {
                 force.is_some_and(|map| {
-                    let torque = std::array::from_fn::<f64, 3, _>(|joint| {
-                        command.torque_nm[3 * leg + joint]
-                    });
+                    let net = command.net_torque_nm();
+                    let torque = std::array::from_fn::<f64, 3, _>(|joint| net[3 * leg + joint]);
                     let force = map * nalgebra::Vector3::from(torque);
                     force.x.hypot(force.y) > settings.foot_friction * force.z + tolerance_n
                 })
@@ -368,7 +345,9 @@ fn friction_violated(
         Lift::Transpose => {
             let coefficient = settings.body_friction?;
             let lifted = controller.local_plant().lift(&command.u_lat);
-            let rotation = upright(stance.attitude_rad);
+            let [roll, pitch, _] = stance.attitude_rad;
+            let frame = plant.input_rule().wrench_frame();
+            let rotation = to_upright(frame, [roll, pitch]);
             let force =
                 rotation.map(|row| (0..3).map(|k| row[k] * lifted[JOINT_DIM + k]).sum::<f64>());
             Some(force[0].hypot(force[1]) > coefficient * force[2] + tolerance_n)

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, Rotation3, Vector2, Vector3};
 
 use super::metrics::FitSums;
 use crate::recording::{RecordingError, Segment};
-use crate::robot::{JOINT_DIM, Leg, Robot};
+use crate::robot::{InputRule, JOINT_DIM, Leg, Robot, WrenchFrame};
 use crate::sim::{IntegrationOptions, OdeSystem, Restart, SimError, integrate, restart_windows};
 
 /// Constants of the pendulum.
@@ -58,18 +58,17 @@ impl Aslip {
 
     /// Rolls the pendulum out over a segment, from the recorded state at each start.
     ///
-    /// The pendulum is driven by the same recorded forces as a learned model, turned into the world
-    /// frame, and switches between contact and flight as recorded.
+    /// The pendulum is driven by the same forces as a learned model of this rule, in the world's axes, and switches between contact and flight as recorded.
     ///
     /// # Errors
-    /// [`SimError::Recording`] if a leg in contact is singular.
+    /// [`SimError::Recording`] if an angle or torque is not finite.
     pub fn rollout(
         &self,
-        robot: &Robot,
+        rule: &InputRule,
         segment: &Segment,
         restart: Restart,
     ) -> Result<AslipRollout, SimError> {
-        let stances = stances(robot, segment)?;
+        let stances = stances(rule, segment)?;
         let mut position_m = vec![None; segment.len()];
         let windows = restart_windows(&segment.time_s, restart);
         for window in &windows {
@@ -213,10 +212,10 @@ pub(super) struct Stance {
 
 /// The stance of every sample; `None` in flight.
 pub(super) fn stances(
-    robot: &Robot,
+    rule: &InputRule,
     segment: &Segment,
 ) -> Result<Vec<Option<Stance>>, RecordingError> {
-    let wrench = segment.wrench(robot)?;
+    let wrench = segment.wrench(rule)?;
     let mut stances = Vec::with_capacity(segment.len());
     let mut foot_m = None;
     for sample in 0..segment.len() {
@@ -225,13 +224,16 @@ pub(super) fn stances(
             stances.push(None);
             continue;
         }
-        let foot = *foot_m.get_or_insert_with(|| mean_foot(robot, segment, sample));
+        let foot = *foot_m.get_or_insert_with(|| mean_foot(rule.robot(), segment, sample));
         let force = Vector3::new(
             wrench[(0, sample)],
             wrench[(1, sample)],
             wrench[(2, sample)],
         );
-        let force = orientation(segment, sample) * force;
+        let force = match rule.wrench_frame() {
+            WrenchFrame::Body => orientation(segment, sample) * force,
+            WrenchFrame::World => force,
+        };
         stances.push(Some(Stance {
             foot_m: foot,
             force_n: Vector2::new(force.x, force.z),
@@ -299,7 +301,7 @@ mod tests {
         let robot = Robot::by_name("go1").expect("known");
         let mut sums = AslipSums::default();
         let rollout = Aslip::PUBLISHED
-            .rollout(robot, segment, Restart::Never)
+            .rollout(&InputRule::published(robot), segment, Restart::Never)
             .expect("runs");
         sums.add(segment, &rollout);
         sums.z.fit().expect("samples").rms

@@ -85,7 +85,7 @@ impl<'a> Assessment<'a> {
             full: CoordinateSums::new(model)?,
             restarted: CoordinateSums::new(model)?,
             pointwise: PointwiseSums::new(model),
-            baselines: Baseline::all(model.robot()?, &segments)?,
+            baselines: Baseline::all(&model.input_rule()?, &segments)?,
             linearised: Vec::new(),
             lift: LiftSums::default(),
             active_terms: model.phases().iter().map(|p| p.active_count()).sum(),
@@ -113,9 +113,9 @@ impl<'a> Assessment<'a> {
         (self.restarted).add_rollout(model, segment, &latent, &restarted)?;
         self.pointwise.add(model, segment, &latent)?;
         self.lift.add(model, segment)?;
-        let robot = model.robot()?;
+        let rule = model.input_rule()?;
         let baselines = (self.baselines.iter_mut())
-            .map(|baseline| baseline.add(robot, segment, restart))
+            .map(|baseline| baseline.add(&rule, segment, restart))
             .collect::<Result<_, _>>()?;
         self.runs.push(SegmentRun {
             segment,

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::aslip::{Aslip, AslipRollout, AslipSums, BODY_X, BODY_Z, stances};
 use crate::recording::{RecordingError, Segment};
-use crate::robot::Robot;
+use crate::robot::InputRule;
 use crate::sim::{Restart, SimError};
 
 /// A template, where its constants come from, and its residuals.
@@ -36,10 +36,10 @@ impl Baseline {
     /// The pendulum with the published constants, and with those that `segments` fit best.
     ///
     /// # Errors
-    /// [`RecordingFault::Wrench`](crate::recording::RecordingFault::Wrench) if a leg in contact is singular.
-    pub fn all(robot: &Robot, segments: &[&Segment]) -> Result<Vec<Self>, RecordingError> {
+    /// [`RecordingFault::Wrench`](crate::recording::RecordingFault::Wrench) if an angle or torque is not finite.
+    pub fn all(rule: &InputRule, segments: &[&Segment]) -> Result<Vec<Self>, RecordingError> {
         let mut baselines = vec![Self::new("ASLIP, published constants", Aslip::PUBLISHED)];
-        if let Some(fitted) = fit_aslip(robot, segments)? {
+        if let Some(fitted) = fit_aslip(rule, segments)? {
             baselines.push(Self::new("ASLIP, fitted constants", fitted));
         }
         Ok(baselines)
@@ -51,13 +51,13 @@ impl Baseline {
     /// As [`Aslip::rollout`].
     pub fn add(
         &mut self,
-        robot: &Robot,
+        rule: &InputRule,
         segment: &Segment,
         restart: Restart,
     ) -> Result<AslipRollout, SimError> {
-        let full = self.template.rollout(robot, segment, Restart::Never)?;
+        let full = self.template.rollout(rule, segment, Restart::Never)?;
         self.full.add(segment, &full);
-        let restarted = self.template.rollout(robot, segment, restart)?;
+        let restarted = self.template.rollout(rule, segment, restart)?;
         self.restarted.add(segment, &restarted);
         Ok(full)
     }
@@ -72,12 +72,12 @@ impl Baseline {
 /// nothing about a mass.
 ///
 /// # Errors
-/// [`RecordingFault::Wrench`](crate::recording::RecordingFault::Wrench) if a leg in contact is singular.
-pub fn fit_aslip(robot: &Robot, segments: &[&Segment]) -> Result<Option<Aslip>, RecordingError> {
+/// [`RecordingFault::Wrench`](crate::recording::RecordingFault::Wrench) if an angle or torque is not finite.
+pub fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip>, RecordingError> {
     let published = Aslip::PUBLISHED;
     let (mut rows, mut right) = (Vec::new(), Vec::new());
     for segment in segments {
-        for (sample, stance) in stances(robot, segment)?.into_iter().enumerate() {
+        for (sample, stance) in stances(rule, segment)?.into_iter().enumerate() {
             let Some(stance) = stance else { continue };
             let (x, z) = (segment.x[(BODY_X, sample)], segment.x[(BODY_Z, sample)]);
             rows.push([stance.foot_m.x - x, 0.0, stance.force_n.x]);
@@ -134,19 +134,20 @@ mod tests {
 
     use super::*;
     use crate::recording;
+    use crate::robot::Robot;
 
     #[test]
     fn fitted_pendulum_explains_short_rollouts_better_than_the_published_one() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/recordings/go1");
         let recording = recording::read(&folder.join("test_01.csv.gz")).expect("shipped");
-        let robot = Robot::by_name("go1").expect("known");
+        let rule = &InputRule::published(Robot::by_name("go1").expect("known"));
         let segments: Vec<&Segment> = recording.segments.iter().collect();
-        let mut baselines = Baseline::all(robot, &segments).expect("legs are bent");
+        let mut baselines = Baseline::all(rule, &segments).expect("legs are bent");
         assert_eq!(baselines.len(), 2);
         for baseline in &mut baselines {
             let restart = Restart::Every(0.1);
             baseline
-                .add(robot, segments[0], restart)
+                .add(rule, segments[0], restart)
                 .expect("integrates");
         }
         let rms = |b: &Baseline| b.restarted.z.fit().expect("samples").rms;

@@ -5,14 +5,15 @@ use nalgebra::DVector;
 use super::torque::{ByContact, Comparison, is_plausible};
 use crate::model::ReducedModel;
 use crate::recording::Segment;
-use crate::robot::{JOINT_DIM, Robot};
+use crate::robot::{InputRule, JOINT_DIM};
 use crate::sim::SimError;
 
 /// Lifted force and moment, in N and N m together, below which their inconsistency means nothing.
 const SMALL_FORCE_N: f64 = 1.0;
 /// Torques of exactly projected and lifted inputs against the recorded ones.
 ///
-/// Per sample `u_lat = pinv(W_e^T) s_u u`, `u_lift = W_e^T u_lat / s_u`.
+/// Per sample `u_lat = pinv(W_e^T) s_u u`, `u_lift = W_e^T u_lat / s_u`; what the joints take at the
+/// recorded velocities and accelerations is added to the lifted torques.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LiftSums {
     torque: Comparison,
@@ -27,7 +28,9 @@ impl LiftSums {
     /// be computed.
     pub fn add(&mut self, model: &ReducedModel, segment: &Segment) -> Result<(), SimError> {
         let robot = model.robot()?;
-        let input = segment.input(robot)?;
+        let rule = model.input_rule()?;
+        let input = segment.input(&rule)?;
+        let losses = segment.losses(&rule);
         for sample in 0..segment.len() {
             let torque = segment.torque(sample);
             if !is_plausible(robot, &torque) {
@@ -37,10 +40,10 @@ impl LiftSums {
             let tangent = model.tangent(&x)?;
             let lifted = tangent.lift * (tangent.project * input.column(sample));
             let feet = segment.feet[sample];
-            let of_joints = std::array::from_fn(|joint| lifted[joint]);
+            let of_joints = std::array::from_fn(|joint| lifted[joint] + losses[(joint, sample)]);
             self.torque.add(feet, &of_joints, &torque);
             if feet.contains(&true) {
-                self.add_inconsistency(robot, segment, sample, &lifted);
+                self.add_inconsistency(&rule, segment, sample, &lifted);
             }
         }
         Ok(())
@@ -48,15 +51,14 @@ impl LiftSums {
 
     fn add_inconsistency(
         &mut self,
-        robot: &Robot,
+        rule: &InputRule,
         segment: &Segment,
         sample: usize,
         lifted: &DVector<f64>,
     ) {
         let torque = std::array::from_fn(|joint| lifted[joint]);
         let feet = segment.feet[sample];
-        // a leg stretched to its singularity has no force map: nothing to compare there
-        let Ok(produced) = robot.body_wrench(&segment.joints(sample), &torque, feet) else {
+        let Ok(produced) = rule.wrench(&segment.state(sample), &torque, feet) else {
             return;
         };
         let force = lifted.rows(JOINT_DIM, 6).into_owned();

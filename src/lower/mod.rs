@@ -29,4 +29,4 @@ pub use maps::{
     decode, decode_velocity, encode, encode_velocity, lift_input, linear_map, project_input,
 };
 pub use step::rk4_step;
-pub use wrench::generalised_input;
+pub use wrench::{actuator_torque, generalised_input};

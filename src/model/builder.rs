@@ -14,7 +14,7 @@ use super::rom::ReducedModel;
 use super::scaling::Scaling;
 use super::state_map::StateMap;
 use super::statistics::InputStatistics;
-use crate::robot::{FeetRule, Robot};
+use crate::robot::{Actuators, FeetRule, JOINT_NAMES, Robot, WrenchFrame};
 
 const MAX_PHASES: usize = 16;
 const MAX_STATE_DIM: usize = 256;
@@ -35,6 +35,8 @@ pub struct ModelBuilder {
     encoder: Option<StateMap>,
     decoder: Option<StateMap>,
     robot: Option<&'static Robot>,
+    actuators: Option<Actuators>,
+    wrench_frame: WrenchFrame,
     sample_time_s: Option<f64>,
     provenance: Map<String, Value>,
 }
@@ -53,6 +55,8 @@ impl ModelBuilder {
             encoder: None,
             decoder: None,
             robot: None,
+            actuators: None,
+            wrench_frame: WrenchFrame::Body,
             sample_time_s: None,
             provenance: Map::new(),
         }
@@ -77,6 +81,8 @@ impl ModelBuilder {
             encoder: model.encoder,
             decoder: model.decoder,
             robot: model.robot,
+            actuators: model.actuators,
+            wrench_frame: model.wrench_frame,
             sample_time_s: model.sample_time_s,
             provenance: model.provenance,
         }
@@ -160,6 +166,18 @@ impl ModelBuilder {
         self
     }
 
+    /// Sets what the joints take of the motors' torques, or that torques count as they are.
+    pub fn actuators(mut self, actuators: Option<Actuators>) -> Self {
+        self.actuators = actuators;
+        self
+    }
+
+    /// Sets the axes of force and moment in the inputs, the body's unless set.
+    pub fn wrench_frame(mut self, frame: WrenchFrame) -> Self {
+        self.wrench_frame = frame;
+        self
+    }
+
     /// Sets the sampling period of the recordings, s.
     pub fn sample_time_s(mut self, sample_time_s: f64) -> Self {
         self.sample_time_s = Some(sample_time_s);
@@ -184,6 +202,7 @@ impl ModelBuilder {
         self.check_texts()?;
         let state_dim = self.check_maps()?;
         self.check_signals(state_dim)?;
+        self.check_input_rule()?;
         if let Some(scaling) = &self.scaling {
             scaling.state.check("state", state_dim)?;
             scaling.input.check("input", state_dim)?;
@@ -209,6 +228,8 @@ impl ModelBuilder {
             decoder: self.decoder,
             input_projection,
             robot: self.robot,
+            actuators: self.actuators,
+            wrench_frame: self.wrench_frame,
             sample_time_s: self.sample_time_s,
             provenance: self.provenance,
         })
@@ -336,6 +357,26 @@ impl ModelBuilder {
         };
         check_robot_names("state", &self.state, &Robot::state_names(), robot)?;
         check_robot_names("input", &self.input, &Robot::input_names(), robot)
+    }
+
+    /// Actuators and a frame are those of a robot.
+    fn check_input_rule(&self) -> Result<(), ModelError> {
+        let part = match (&self.actuators, self.wrench_frame) {
+            (Some(_), _) => "actuators",
+            (None, WrenchFrame::World) => "wrench_frame",
+            (None, WrenchFrame::Body) => return Ok(()),
+        };
+        if self.robot.is_none() {
+            let needs = "robot";
+            return Err(ModelError::Incomplete { part, needs });
+        }
+        match self.actuators.as_ref().and_then(Actuators::unusable) {
+            None => Ok(()),
+            Some((array, joint, found)) => {
+                let place = format!("`actuators.{array}`[{joint}], joint {}", JOINT_NAMES[joint]);
+                Err(ModelError::invalid(place, found, "a number of at least 0"))
+            }
+        }
     }
 
     /// Checks the statistics and puts them in the order of the phases.

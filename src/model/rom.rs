@@ -25,7 +25,7 @@ use super::phase::Phase;
 use super::scaling::Scaling;
 use super::state_map::StateMap;
 use super::statistics::InputStatistics;
-use crate::robot::{ContactFlags, Robot};
+use crate::robot::{Actuators, ContactFlags, InputRule, Robot, WrenchFrame};
 
 /// A checked reduced-order model; made by [`ReducedModel::builder`] or read from a model file.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,6 +45,8 @@ pub struct ReducedModel {
     /// `pinv(W_e^T)`, `latent_dim x input_dim`; there when the encoder is, and is linear.
     pub(super) input_projection: Option<DMatrix<f64>>,
     pub(super) robot: Option<&'static Robot>,
+    pub(super) actuators: Option<Actuators>,
+    pub(super) wrench_frame: WrenchFrame,
     pub(super) sample_time_s: Option<f64>,
     pub(super) provenance: Map<String, Value>,
 }
@@ -167,6 +169,31 @@ impl ReducedModel {
     pub fn robot(&self) -> Result<&'static Robot, ModelError> {
         self.require(&self.robot, "robot", "kinematics and limits")
             .copied()
+    }
+
+    /// What the joints take of the motors' torques before they count as input; none if the model's
+    /// inputs are the motors' torques.
+    pub fn actuators(&self) -> Option<&Actuators> {
+        self.actuators.as_ref()
+    }
+
+    /// Axes of the force and moment in the model's inputs.
+    pub fn wrench_frame(&self) -> WrenchFrame {
+        self.wrench_frame
+    }
+
+    /// How samples of the robot become the model's inputs: what everything that feeds recorded
+    /// torques to the model, or makes commands of its inputs, goes by.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] if the file names no robot.
+    pub fn input_rule(&self) -> Result<InputRule, ModelError> {
+        let robot = self.robot()?;
+        Ok(InputRule::new(
+            robot,
+            self.actuators.clone(),
+            self.wrench_frame,
+        ))
     }
 
     /// Sampling period of the recordings behind the model, s.

@@ -63,7 +63,7 @@ impl ControlModel {
             let base = Self::new(&model.linearised_at(&stand)?)?;
             return Ok(base.with_nonlinear(Arc::new(ModelMaps(model.clone()))));
         }
-        let robot = model.robot()?;
+        let input_rule = model.input_rule()?;
         let (encoder, decoder) = (model.encoder()?, model.decoder()?);
         if encoder.input_dim() != STATE_DIM {
             return Err(MpcError::StateDim {
@@ -74,7 +74,7 @@ impl ControlModel {
         let tangent = model.tangent(&DVector::zeros(STATE_DIM))?;
         let state_factors = model.state_factors()?;
         Ok(Self::from_parts(ControlModelParts {
-            robot,
+            input_rule,
             encoder_bias: encoder.bias().clone(),
             decoder: model.decoder_jacobian(&DVector::zeros(model.latent_dim()))?,
             decoder_bias: decoder.bias().component_div(&state_factors),

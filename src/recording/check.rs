@@ -12,7 +12,9 @@ use nalgebra::DMatrix;
 use super::columns::Column;
 use super::error::{RecordingError, RecordingFault};
 use super::segment::{Recording, Segment};
-use crate::robot::{JOINT_DIM, Robot, STATE_DIM};
+use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::kinematics::{LEAST_HEIGHT, LEAST_SPAN};
+use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
 
 /// Torque over the robot's limit that is still accepted.
 const TORQUE_FACTOR: f64 = 1.1;
@@ -55,9 +57,19 @@ pub enum Implausible {
     Clipped,
     /// A time step far from the median, which is `bound`.
     TimeStep,
+    /// A leg on the ground is near a singularity: `value` is the span of thigh and calf (its knee's
+    /// column) or the height of its hip over the foot (its flexion's column), both normalised as in
+    /// [`LegGeometry::spans`](crate::robot::LegGeometry::spans), `bound` where damping begins. The robot
+    /// may well have done that, so that such samples are reported, and never left out.
+    NearSingular,
 }
 
 impl Implausible {
+    /// Whether samples with this finding are left out where implausible ones are.
+    pub const fn can_be_left_out(self) -> bool {
+        !matches!(self, Implausible::NearSingular)
+    }
+
     /// The finding in words.
     pub const fn description(self) -> &'static str {
         match self {
@@ -69,6 +81,9 @@ impl Implausible {
             Implausible::Acceleration => "acceleration disagrees with differences of the velocity",
             Implausible::Clipped => "velocity clips at an extreme",
             Implausible::TimeStep => "time step differs from the median",
+            Implausible::NearSingular => {
+                "leg on the ground near a singularity, its force is damped"
+            }
         }
     }
 }
@@ -128,6 +143,7 @@ pub fn check(recording: &Recording, robot: &Robot) -> Vec<Finding> {
             found: &mut out,
         };
         scan.limits(robot);
+        scan.singularities(robot);
         scan.consistency();
         scan.clipping();
         scan.time_steps();
@@ -137,7 +153,7 @@ pub fn check(recording: &Recording, robot: &Robot) -> Vec<Finding> {
 }
 
 /// The recording without the samples of these findings, and how many that
-/// leaves out. Segments are divided where samples are missing; a remainder of
+/// leaves out; those of legs near a singularity stay. Segments are divided where samples are missing; a remainder of
 /// a single sample goes too.
 ///
 /// # Errors
@@ -149,7 +165,8 @@ pub fn without(
     let mut segments = Vec::new();
     for (index, segment) in recording.segments.iter().enumerate() {
         let mut keep = vec![true; segment.len()];
-        for finding in findings.iter().filter(|f| f.segment == index) {
+        let own = findings.iter().filter(|f| f.segment == index);
+        for finding in own.filter(|f| f.kind.can_be_left_out()) {
             let end = finding.samples.end.min(keep.len());
             keep[finding.samples.start.min(end)..end].fill(false);
         }
@@ -246,6 +263,22 @@ impl Scan<'_> {
                 let rise = segment.x[(i, j)] - segment.x[(i, before)];
                 above(rise / (segment.time_s[j] - segment.time_s[before]), bound)
             });
+        }
+    }
+
+    fn singularities(&mut self, robot: &Robot) {
+        let segment = self.segment;
+        for leg in Leg::ALL {
+            let first = LEG_JOINT_DIM * leg.index();
+            let joint_of = [(2, LEAST_SPAN), (1, LEAST_HEIGHT)];
+            for (span, (joint, least)) in joint_of.into_iter().enumerate() {
+                let column = Column::Position(first + joint);
+                self.column(Implausible::NearSingular, column, |j| {
+                    let q = leg.of_joints(&segment.joints(j));
+                    let value = robot.geometry().spans(&q)[span];
+                    (segment.feet[j][leg.index()] && value < least).then_some((value, least))
+                });
+            }
         }
     }
 

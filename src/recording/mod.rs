@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use romc::recording::{self, phases::PhaseRule};
-//! use romc::robot::Robot;
+//! use romc::robot::{InputRule, Robot};
 //!
 //! # let folder = std::env::temp_dir().join(format!("romc-doc-{}", std::process::id()));
 //! # std::fs::create_dir_all(&folder)?;
@@ -23,7 +23,8 @@
 //! #     torque_nm: constant(12, 1.0), feet: (0..8).map(feet).collect(), body_wrench: None }] })?;
 //! let jump = recording::read(&path)?;
 //! let segment = &jump.segments[0];
-//! let u = segment.input(Robot::by_name("go1")?)?; // 18 x samples: [tau; F]
+//! let rule = InputRule::published(Robot::by_name("go1")?);
+//! let u = segment.input(&rule)?; // 18 x samples: [tau; F; M]
 //! assert_eq!(u.shape(), (18, segment.len()));
 //! let spans = PhaseRule::two_phase().spans(segment)?;
 //! assert_eq!(spans[1].range, 3..6); // the flight

@@ -6,7 +6,11 @@ use std::path::PathBuf;
 use nalgebra::DMatrix;
 
 use super::error::{RecordingError, RecordingFault};
-use crate::robot::{BODY_DIM, ContactFlags, JOINT_DIM, Robot, STATE_DIM};
+use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, STATE_DIM};
+
+/// Time over which accelerations of joints are averaged before the inertia of the motors counts, in
+/// s: 11 samples at 500 Hz.
+pub const ACCELERATION_WINDOW_S: f64 = 0.02;
 
 /// What a file holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,6 +92,14 @@ impl Segment {
         std::array::from_fn(|i| self.x[(i, sample)])
     }
 
+    /// State of a sample, in rad and m.
+    ///
+    /// # Panics
+    /// If there is no such sample.
+    pub fn state(&self, sample: usize) -> [f64; STATE_DIM] {
+        std::array::from_fn(|i| self.x[(i, sample)])
+    }
+
     /// Joint torques of a sample, in N m.
     ///
     /// # Panics
@@ -96,40 +108,109 @@ impl Segment {
         std::array::from_fn(|i| self.torque_nm[(i, sample)])
     }
 
-    /// Force and moment on the body, 6 x n: the file's own, or computed from
-    /// torques and contact (equation 22).
-    ///
-    /// # Errors
-    /// [`RecordingFault::Wrench`] with the row at which a leg in contact is singular.
-    pub fn wrench(&self, robot: &Robot) -> Result<DMatrix<f64>, RecordingError> {
-        if let Some(recorded) = &self.body_wrench {
-            return Ok(recorded.clone());
+    /// Accelerations of the joints, 12 x n, in rad/s^2: [`Self::ddx`] averaged over
+    /// [`ACCELERATION_WINDOW_S`] within stretches of equal contact (a foot down, or none), so that
+    /// the noise of differences and the spikes of landings do not become torques.
+    pub fn joint_accelerations(&self) -> DMatrix<f64> {
+        let half = match self.mean_step_s() {
+            step if step > 0.0 => (0.5 * ACCELERATION_WINDOW_S / step).round() as usize,
+            _ => 0,
+        };
+        let mut out = DMatrix::zeros(JOINT_DIM, self.len());
+        let mut start = 0;
+        while start < self.len() {
+            let down = self.feet[start].contains(&true);
+            let same = self.feet[start..].iter();
+            let end = start + same.take_while(|f| f.contains(&true) == down).count();
+            for sample in start..end {
+                let reach = half.min(sample - start).min(end - 1 - sample);
+                let window = self
+                    .ddx
+                    .view((0, sample - reach), (JOINT_DIM, 2 * reach + 1));
+                out.set_column(sample, &(window.column_sum() / window.ncols() as f64));
+            }
+            start = end;
         }
-        let mut out = DMatrix::zeros(BODY_DIM, self.len());
-        for sample in 0..self.len() {
-            let wrench = robot
-                .body_wrench(
-                    &self.joints(sample),
-                    &self.torque(sample),
-                    self.feet[sample],
-                )
-                .map_err(|e| {
-                    RecordingFault::Wrench(Box::new(e)).at(&self.path, self.row(sample))
-                })?;
-            out.column_mut(sample).copy_from(&wrench);
-        }
-        Ok(out)
+        out
     }
 
-    /// Input `u = [tau; F]`, 18 x n, in N m and N (equation 23).
+    /// What the joints take of the motors' torques, 12 x n, in N m; zero without actuators.
+    pub fn losses(&self, rule: &InputRule) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(JOINT_DIM, self.len());
+        if rule.actuators().is_none() {
+            return out;
+        }
+        let ddq = self.joint_accelerations();
+        for (sample, mut column) in out.column_iter_mut().enumerate() {
+            let dq = std::array::from_fn(|i| self.dx[(i, sample)]);
+            let ddq = std::array::from_fn(|i| ddq[(i, sample)]);
+            column.copy_from_slice(&rule.losses(&dq, &ddq));
+        }
+        out
+    }
+
+    /// Force and moment on the body, 6 x n, of the torques at the links and the contacts
+    /// (equation 22). Under the published rule the file's own, if it carries them.
+    ///
+    /// Near a singularity of a leg in contact its force is damped, see
+    /// [`Robot::damped_force_map`](crate::robot::Robot::damped_force_map).
+    ///
+    /// # Errors
+    /// [`RecordingFault::Wrench`] with the row of an angle or torque that is not finite.
+    pub fn wrench(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
+        let input = self.input(rule)?;
+        Ok(input.rows(JOINT_DIM, BODY_DIM).into_owned())
+    }
+
+    /// Input `u = [tau; F; M]`, 18 x n, in N m and N (equation 23), by the rule of a model: `tau`
+    /// are the torques at the links, recorded ones less [`Segment::losses`].
     ///
     /// # Errors
     /// As [`Segment::wrench`].
-    pub fn input(&self, robot: &Robot) -> Result<DMatrix<f64>, RecordingError> {
+    pub fn input(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
+        self.input_of(rule, &self.torque_nm)
+    }
+
+    /// The same of torques that the robot's motors can give: recorded ones beyond a limit count as
+    /// the limit.
+    ///
+    /// # Errors
+    /// As [`Segment::wrench`].
+    pub fn input_within_limits(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
+        let limits = rule.robot().torque_limit_nm();
+        let mut torque_nm = self.torque_nm.clone();
+        for (mut row, limit) in torque_nm.row_iter_mut().zip(limits) {
+            row.apply(|torque| *torque = torque.clamp(-limit, *limit));
+        }
+        self.input_of(rule, &torque_nm)
+    }
+
+    /// The input of these torques of the motors; the file's wrench is that of the recorded ones.
+    fn input_of(
+        &self,
+        rule: &InputRule,
+        torque_nm: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>, RecordingError> {
         let mut out = DMatrix::zeros(STATE_DIM, self.len());
-        out.rows_mut(0, JOINT_DIM).copy_from(&self.torque_nm);
-        out.rows_mut(JOINT_DIM, BODY_DIM)
-            .copy_from(&self.wrench(robot)?);
+        let net = torque_nm - self.losses(rule);
+        out.rows_mut(0, JOINT_DIM).copy_from(&net);
+        let recorded = self.body_wrench.as_ref().filter(|_| rule.is_published());
+        for sample in 0..self.len() {
+            let mut to = out.fixed_view_mut::<BODY_DIM, 1>(JOINT_DIM, sample);
+            if let Some(recorded) = recorded
+                && torque_nm.column(sample) == self.torque_nm.column(sample)
+            {
+                to.copy_from(&recorded.column(sample));
+                continue;
+            }
+            let net = std::array::from_fn(|i| net[(i, sample)]);
+            let wrench = rule
+                .wrench(&self.state(sample), &net, self.feet[sample])
+                .map_err(|e| {
+                    RecordingFault::Wrench(Box::new(e)).at(&self.path, self.row(sample))
+                })?;
+            to.copy_from(&wrench);
+        }
         Ok(out)
     }
 
@@ -157,7 +238,7 @@ impl Segment {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::robot::RobotError;
+    use crate::robot::{Actuators, Robot, RobotError, WrenchFrame};
 
     /// A segment whose entries all differ, of a robot that stands.
     pub fn sample_segment(n: usize) -> Segment {
@@ -184,13 +265,22 @@ pub(super) mod tests {
         }
     }
 
+    fn published() -> InputRule {
+        InputRule::published(Robot::by_name("go1").unwrap())
+    }
+
+    fn with_losses(frame: WrenchFrame) -> InputRule {
+        let actuators = Actuators::of_leg([1.0, 0.6, 0.6], [0.2; 3], [0.01; 3]);
+        InputRule::new(Robot::by_name("go1").unwrap(), Some(actuators), frame)
+    }
+
     #[test]
     fn input_stacks_torques_and_the_robots_wrench() {
         let segment = sample_segment(4);
-        let go1 = Robot::by_name("go1").unwrap();
-        let u = segment.input(go1).unwrap();
+        let u = segment.input(&published()).unwrap();
         assert_eq!(u.rows(0, 12), segment.torque_nm.rows(0, 12));
-        let wrench = go1
+        let wrench = published()
+            .robot()
             .body_wrench(&segment.joints(2), &segment.torque(2), [true; 4])
             .unwrap();
         for axis in 0..BODY_DIM {
@@ -199,27 +289,71 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn input_prefers_the_wrench_of_the_file() {
+    fn input_under_the_published_rule_prefers_the_wrench_of_the_file() {
         let mut segment = sample_segment(3);
         segment.body_wrench = Some(DMatrix::from_element(6, 3, 7.5));
-        let u = segment.input(Robot::by_name("go1").unwrap()).unwrap();
-        assert_eq!(u[(12, 0)], 7.5);
-        assert_eq!(u[(17, 2)], 7.5);
+        let u = segment.input(&published()).unwrap();
+        assert_eq!((u[(12, 0)], u[(17, 2)]), (7.5, 7.5));
+        let u = segment.input(&with_losses(WrenchFrame::Body)).unwrap();
+        assert!(u[(12, 0)] != 7.5 && u[(17, 2)] != 7.5);
     }
 
     #[test]
-    fn input_singular_leg_in_contact_names_its_row() {
+    fn input_with_actuators_has_the_net_torques_and_their_wrench() {
+        let segment = sample_segment(30);
+        for frame in WrenchFrame::ALL {
+            let rule = with_losses(frame);
+            let u = segment.input(&rule).unwrap();
+            let (dq, ddq) = (segment.dx[(4, 15)], segment.ddx[(4, 15)]);
+            // Accelerations rise linearly here, so that their average is their value.
+            let expected = segment.torque_nm[(4, 15)] - 0.6 * dq - 0.2 - 0.01 * ddq;
+            assert!((u[(4, 15)] - expected).abs() < 1e-12);
+            let net = std::array::from_fn(|i| u[(i, 15)]);
+            let wrench = rule.wrench(&segment.state(15), &net, [true; 4]).unwrap();
+            assert_eq!(u.fixed_view::<6, 1>(12, 15), wrench);
+        }
+    }
+
+    #[test]
+    fn joint_accelerations_average_noise_but_not_across_lift_off() {
+        let mut segment = sample_segment(60);
+        segment.feet[30..].fill([false; 4]);
+        segment.ddx = DMatrix::from_fn(STATE_DIM, 60, |_, j| {
+            let noise = if j % 2 == 0 { 11.0 } else { -11.0 };
+            noise + if j < 30 { 0.0 } else { 500.0 }
+        });
+        let smooth = segment.joint_accelerations();
+        assert_eq!(smooth.nrows(), JOINT_DIM);
+        assert!(smooth.columns(5, 20).amax() <= 1.0 + 1e-12);
+        assert!(smooth.columns(0, 30).amax() <= 11.0);
+        assert!(smooth.columns(30, 30).min() >= 489.0);
+    }
+
+    #[test]
+    fn input_of_a_singular_leg_in_contact_is_bounded() {
         let mut segment = sample_segment(5);
         segment.x[(5, 3)] = 0.0;
-        let go1 = Robot::by_name("go1").unwrap();
-        let error = segment.input(go1).unwrap_err();
+        let u = segment.input(&published()).unwrap();
+        let force = u.fixed_view::<3, 1>(12, 3).norm();
+        let before = u.fixed_view::<3, 1>(12, 2).norm();
+        assert!(
+            force.is_finite() && force < 5.0 * before,
+            "{force} {before}"
+        );
+    }
+
+    #[test]
+    fn input_that_is_not_finite_names_its_row() {
+        let mut segment = sample_segment(5);
+        segment.torque_nm[(5, 3)] = f64::NAN;
+        let error = segment.input(&published()).unwrap_err();
         let RecordingFault::Wrench(source) = &error.kind else {
             panic!("{error:?}");
         };
         assert_eq!(error.place.row(), Some(5));
-        assert!(matches!(**source, RobotError::SingularLeg { .. }));
+        assert!(matches!(**source, RobotError::NotFinite { .. }));
         segment.feet[3][1] = false;
-        assert!(segment.input(go1).is_ok());
+        assert!(segment.input(&published()).is_ok());
     }
 
     #[test]

@@ -12,6 +12,14 @@ use super::joints::Leg;
 /// still give a foot force: a knee about 1e-3 rad from full extension.
 pub const SINGULAR_BOUND: f64 = 1e-3;
 
+/// Smallest area that thigh and calf span, over the product of their lengths (about the sine of the
+/// knee), at which torques are turned into forces without damping.
+pub const LEAST_SPAN: f64 = 0.3;
+
+/// Smallest height of the foot above or below its hip in the plane of the leg, over the length of
+/// the stretched leg, at which torques are turned into forces without damping.
+pub const LEAST_HEIGHT: f64 = 0.12;
+
 /// Link lengths of a leg.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LegGeometry {
@@ -75,6 +83,63 @@ impl LegGeometry {
         let plane = self.in_plane(q);
         let area = plane.forward * plane.calf_up - plane.up * plane.calf_forward;
         (area * plane.up).abs() / self.volume_m3()
+    }
+
+    /// `-J^-T` with levers that are never shorter than the damping lets them be, or none where
+    /// neither knee nor foot is that near a singularity.
+    ///
+    /// In the axes `x`, `e = (0, sin hx, -cos hx)`, `n = (0, cos hx, sin hx)` the Jacobian has the
+    /// columns `-h e - up n`, `up x + fwd e` and `c_up x + c_fwd e`, so that `J^T F = -tau` gives
+    ///
+    /// ```text
+    /// F_x = (fwd tau_2 - c_fwd tau_1) / det     F_e = (c_up tau_1 - up tau_2) / det
+    /// F_n = (tau_0 - h F_e) / up                det = up c_fwd - fwd c_up
+    /// ```
+    ///
+    /// Of both divisors `1 / d` becomes `d / max(d^2, least^2)`: equal outside, continuous, and at
+    /// most `1 / least`, with [`LEAST_SPAN`] thigh calf for `det` and [`LEAST_HEIGHT`] (thigh + calf)
+    /// for `up`.
+    pub(super) fn damped_force_map(&self, leg: Leg, q: &[f64; 3]) -> Option<Matrix3<f64>> {
+        let plane = self.in_plane(q);
+        let det = plane.up * plane.calf_forward - plane.forward * plane.calf_up;
+        let [least_det, least_up] = self.least_levers();
+        if det.abs() >= least_det && plane.up.abs() >= least_up {
+            return None;
+        }
+        let reciprocal = |d: f64, least: f64| d / (d * d).max(least * least);
+        let (of_det, of_up) = (reciprocal(det, least_det), reciprocal(plane.up, least_up));
+        let hip = leg.side() * self.hip_m;
+        let along_x = Vector3::new(0.0, -plane.calf_forward, plane.forward) * of_det;
+        let along_e = Vector3::new(0.0, plane.calf_up, -plane.up) * of_det;
+        let along_n = (Vector3::x() - along_e * hip) * of_up;
+        let (sin, cos) = q[0].sin_cos();
+        let across = along_e * sin + along_n * cos;
+        let up = along_n * sin - along_e * cos;
+        Some(Matrix3::from_rows(&[
+            along_x.transpose(),
+            across.transpose(),
+            up.transpose(),
+        ]))
+    }
+
+    /// Below which `|det|` (m^2) and `|up|` (m) are damped.
+    pub fn least_levers(&self) -> [f64; 2] {
+        [
+            LEAST_SPAN * self.thigh_m * self.calf_m,
+            LEAST_HEIGHT * (self.thigh_m + self.calf_m),
+        ]
+    }
+
+    /// Span of thigh and calf over the product of their lengths, and height of the foot over the
+    /// length of the stretched leg, as absolute values: what [`LEAST_SPAN`] and [`LEAST_HEIGHT`]
+    /// are compared with.
+    pub fn spans(&self, q: &[f64; 3]) -> [f64; 2] {
+        let plane = self.in_plane(q);
+        let det = plane.up * plane.calf_forward - plane.forward * plane.calf_up;
+        [
+            det.abs() / (self.thigh_m * self.calf_m),
+            plane.up.abs() / (self.thigh_m + self.calf_m),
+        ]
     }
 
     fn in_plane(&self, q: &[f64; 3]) -> InPlane {

@@ -3,8 +3,9 @@
 //! Enters: joint angles, joint torques and contact flags. Leaves: foot
 //! positions, leg Jacobians, the force and moment that the legs put on the
 //! body (equations 4 to 8, 22 and 23), and the limits a command has to keep.
-//! Read [`joints`] for names and order first, then [`kinematics`] for one leg
-//! and [`wrench`] for all four; [`registry`] holds the robots themselves.
+//! Read [`joints`] for names and order first, then [`kinematics`] for one leg,
+//! [`wrench`] for all four and [`input_rule`] for the inputs of a model;
+//! [`registry`] holds the robots themselves.
 //!
 //! ```
 //! use romc::robot::{Leg, Robot};
@@ -22,6 +23,7 @@
 
 pub mod actuators;
 pub mod feet;
+pub mod input_rule;
 pub mod joints;
 pub mod kinematics;
 pub mod registry;
@@ -32,6 +34,7 @@ mod error;
 pub use actuators::Actuators;
 pub use error::RobotError;
 pub use feet::FeetRule;
+pub use input_rule::{InputRule, WrenchFrame};
 pub use joints::{
     BODY_DIM, BODY_NAMES, ContactFlags, FOOT_DIM, JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM,
 };

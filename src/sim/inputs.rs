@@ -7,7 +7,7 @@ use super::latent::phases;
 use crate::model::{InputStatistics, ReducedModel};
 use crate::recording::Segment;
 
-/// Mean and covariance of the recorded inputs `u = [tau; F]` (SI) in each phase of a model; phases
+/// Mean and covariance of the recorded inputs `u = [tau; F; M]` (SI, by the model's rule) in each phase of a model; phases
 /// without a sample have none.
 ///
 /// # Errors
@@ -17,10 +17,10 @@ pub fn input_statistics(
     model: &ReducedModel,
     segments: &[&Segment],
 ) -> Result<Vec<Option<InputStatistics>>, SimError> {
-    let robot = model.robot()?;
+    let rule = model.input_rule()?;
     let mut of_phases = vec![Vec::new(); model.phases().len()];
     for segment in segments {
-        let input = segment.input(robot)?;
+        let input = segment.input(&rule)?;
         for (sample, phase) in phases(model, segment)?.into_iter().enumerate() {
             of_phases[phase].push(input.column(sample).into_owned());
         }

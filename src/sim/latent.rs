@@ -34,7 +34,7 @@ impl LatentSegment {
     /// [`SimError::Model`] for a latent-only model, [`SimError::Recording`] if the body wrench cannot
     /// be computed or no feet of the segment are in a phase of the model.
     pub fn encode(model: &ReducedModel, segment: &Segment) -> Result<Self, SimError> {
-        let input = segment.input(model.robot()?)?;
+        let input = segment.input(&model.input_rule()?)?;
         let samples = |map: &dyn Fn(usize) -> Result<DVector<f64>, SimError>| {
             let mut out = DMatrix::zeros(model.latent_dim(), segment.x.ncols());
             for (sample, mut to) in out.column_iter_mut().enumerate() {

@@ -87,6 +87,8 @@ pub(super) fn assemble(
     let mut builder = ReducedModel::builder(options.name.clone(), parts.library)
         .description(description(options, robot))
         .robot(robot)
+        .actuators(options.actuators.clone())
+        .wrench_frame(options.wrench_frame)
         .state(signals(Robot::state_names(), Robot::state_units()))
         .input(signals(Robot::input_names(), Robot::input_units()))
         .scaling(Scaling {

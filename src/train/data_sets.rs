@@ -35,12 +35,13 @@ impl DataSets {
     /// Cuts the recordings into phases, checks options and samples.
     pub fn new(
         recordings: Recordings<'_>,
-        robot: &Robot,
+        robot: &'static Robot,
         options: &TrainOptions,
     ) -> Result<Self, TrainError> {
         options.check()?;
         let (scaling, smoothing) = (options.scaling.factors(), options.regression.smoothing);
-        let read = |set: Source<'_>| Dataset::new(set, robot, &options.phases, &scaling, smoothing);
+        let rule = options.input_rule(robot);
+        let read = |set: Source<'_>| Dataset::new(set, &rule, &options.phases, &scaling, smoothing);
         let training = read(recordings.training)?;
         training.check_for_training()?;
         Ok(Self {

@@ -15,7 +15,7 @@ use crate::model::InputStatistics;
 use crate::recording::{
     PhaseRule, RecordingError, RecordingFault, RecordingFiles, Segment, Source,
 };
-use crate::robot::{FeetRule, JOINT_DIM, Robot, STATE_DIM};
+use crate::robot::{FeetRule, InputRule, JOINT_DIM, STATE_DIM, WrenchFrame};
 
 /// Fewest samples of a segment, and of a phase over all segments.
 pub const MIN_SAMPLES: usize = 50;
@@ -53,6 +53,21 @@ impl ScaleOptions {
         }
     }
 
+    /// State and torques 0.1, forces 0.005, so that both kinds of input are of one size; moments 0.05 in the
+    /// body's axes, with which they are of that size too, and 0.02 in the world's: about the body's origin moments
+    /// of a jump nearly cancel, and what remains is the least exact part of the input.
+    pub fn in_frame(frame: WrenchFrame) -> Self {
+        Self {
+            state: 0.1,
+            torque: 0.1,
+            force: 0.005,
+            moment: match frame {
+                WrenchFrame::Body => 0.05,
+                WrenchFrame::World => 0.02,
+            },
+        }
+    }
+
     /// The factor of every coordinate.
     pub fn factors(&self) -> Scaling {
         let input = DVector::from_fn(STATE_DIM, |i, _| match i {
@@ -68,14 +83,9 @@ impl ScaleOptions {
 }
 
 impl Default for ScaleOptions {
-    /// State and torques 0.1, forces 0.005, moments 0.05: all inputs then are of the size of the torques.
+    /// Those of inputs in world axes.
     fn default() -> Self {
-        Self {
-            state: 0.1,
-            torque: 0.1,
-            force: 0.005,
-            moment: 0.05,
-        }
+        Self::in_frame(WrenchFrame::World)
     }
 }
 
@@ -88,8 +98,10 @@ pub struct Jump {
     pub time_s: Vec<f64>,
     /// States, `18 x n`.
     pub x: DMatrix<f64>,
-    /// Inputs `[tau; F]`, `18 x n`.
+    /// Inputs `[tau; F; M]`, `18 x n`.
     pub u: DMatrix<f64>,
+    /// What the recorded torques have on top of those in `u`, `12 x n`; none without actuators.
+    pub losses: Option<DMatrix<f64>>,
     /// Velocities and accelerations; `None` where the dataset reads them again when they are needed.
     pub rates: Option<Rates>,
     /// Index of the model's phase at every sample.
@@ -158,10 +170,10 @@ impl Dataset {
     ///
     /// # Errors
     /// [`TrainError::TooFewSamples`] for a segment under 50 samples; [`TrainError::Recording`] where no phase
-    /// matches, a leg in contact is singular, or a file cannot be read.
+    /// matches, a value is not finite, or a file cannot be read.
     pub fn new<'a>(
         recordings: impl Into<Source<'a>>,
-        robot: &Robot,
+        rule: &InputRule,
         phases: &PhaseRule,
         scaling: &Scaling,
         smoothing: usize,
@@ -177,7 +189,7 @@ impl Dataset {
         let mut n_samples = 0;
         source.for_each(|recording| {
             for segment in &recording.segments {
-                let jump = dataset.jump(segment, robot)?;
+                let jump = dataset.jump(segment, rule)?;
                 n_samples += jump.len();
                 dataset.jumps.push(jump);
             }
@@ -358,7 +370,7 @@ impl Dataset {
         Ok(())
     }
 
-    fn jump(&self, segment: &Segment, robot: &Robot) -> Result<Jump, TrainError> {
+    fn jump(&self, segment: &Segment, rule: &InputRule) -> Result<Jump, TrainError> {
         let n = segment.len();
         if n < MIN_SAMPLES {
             return Err(TrainError::TooFewSamples {
@@ -378,7 +390,9 @@ impl Dataset {
             path: segment.path.clone(),
             time_s: segment.time_s.clone(),
             x: scaled(segment.x.clone(), &self.scaling.state),
-            u: scaled(segment.input(robot)?, &self.scaling.input),
+            losses: (rule.actuators().is_some())
+                .then(|| scaled(segment.losses(rule), &self.scaling.input)),
+            u: scaled(segment.input(rule)?, &self.scaling.input),
             rates: match self.files {
                 None => Some(self.rates(segment, &spans)),
                 Some(_) => None,
@@ -386,7 +400,7 @@ impl Dataset {
             phase,
             spans,
             implausible: (0..n)
-                .filter(|&sample| !is_plausible(robot, &segment.torque(sample)))
+                .filter(|&sample| !is_plausible(rule.robot(), &segment.torque(sample)))
                 .collect(),
         })
     }

@@ -29,8 +29,8 @@ pub struct SetMetrics {
     pub decoder_mse: f64,
     /// Coefficient of determination of the smoothed `ddz` in each phase, over all latent coordinates together.
     pub ddz_r2: Vec<f64>,
-    /// Coefficient of determination of the 12 joint torques of `W_e^T pinv(W_e^T) u` (`J^T pinv(J^T) u`) against the
-    /// recorded ones over all plausible samples, as [`LiftSums::torque_r2_all`](crate::evaluate::LiftSums::torque_r2_all).
+    /// Coefficient of determination of the 12 joint torques of `W_e^T pinv(W_e^T) u` (`J^T pinv(J^T) u`), and what the
+    /// joints take on top, against the recorded ones over all plausible samples, as [`LiftSums::torque_r2_all`](crate::evaluate::LiftSums::torque_r2_all).
     pub torque_r2: f64,
     /// Root mean square error of body x over predictions of 0.1 s with fixed steps.
     pub prediction_x_m: f64,
@@ -67,7 +67,7 @@ pub fn assess<'a>(
     };
     let dataset = Dataset::new(
         recordings,
-        model.robot()?,
+        &model.input_rule()?,
         &phase_rule(model),
         &scaling,
         SMOOTHING,
@@ -178,8 +178,12 @@ fn torque_r2(encoder: &StateMap, dataset: &Dataset, latent: &[Latent]) -> f64 {
     let n = dataset.torque_samples().count();
     let mut mean = DVector::zeros(JOINT_DIM);
     for (jump, sample) in dataset.torque_samples() {
-        let torque = dataset.jumps[jump].u.column(sample);
-        mean.axpy(1.0 / n as f64, &torque.rows(0, JOINT_DIM), 1.0);
+        let Jump { u, .. } = &dataset.jumps[jump];
+        mean.axpy(
+            1.0 / n as f64,
+            &recorded_torque(&dataset.jumps[jump], u, sample),
+            1.0,
+        );
     }
     let mut sums = Determination::about(mean);
     let mut lifted: Option<(usize, DMatrix<f64>)> = None;
@@ -189,10 +193,22 @@ fn torque_r2(encoder: &StateMap, dataset: &Dataset, latent: &[Latent]) -> f64 {
             lifted = Some((jump, lift_samples(encoder, x, &latent[jump].u_lat)));
         }
         let (_, lift) = lifted.as_ref().expect("just set");
-        let torques = |u: &DMatrix<f64>| u.view((0, sample), (JOINT_DIM, 1)).into_owned();
+        let torques = |u| {
+            let torque = recorded_torque(&dataset.jumps[jump], u, sample);
+            DMatrix::from_column_slice(JOINT_DIM, 1, torque.as_slice())
+        };
         sums.add(&torques(lift), &torques(u));
     }
     sums.r2()
+}
+
+/// The motors' torques of a sample for inputs `u`: those at the links and what the joints take.
+fn recorded_torque(jump: &Jump, u: &DMatrix<f64>, sample: usize) -> DVector<f64> {
+    let net = u.view((0, sample), (JOINT_DIM, 1)).column(0).into_owned();
+    match &jump.losses {
+        None => net,
+        Some(losses) => net + losses.column(sample),
+    }
 }
 
 /// Sums of a coefficient of determination over all rows together, each about its mean; samples are columns.

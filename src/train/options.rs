@@ -17,7 +17,7 @@ use super::sparse::Pruning;
 use crate::model::{Activation, Library, MAX_LAYER_WIDTH, MAX_LAYERS, StandardLibrary};
 use crate::recording::PhaseRule;
 use crate::recording::phases::CHATTER_SAMPLES;
-use crate::robot::{Robot, STATE_DIM};
+use crate::robot::{Actuators, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame};
 
 /// Candidate terms to choose from.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,6 +75,11 @@ pub struct TrainOptions {
     pub n_seeds: usize,
     /// Factors from SI to scaled units.
     pub scaling: ScaleOptions,
+    /// What the joints take of the recorded torques before they count as input; none if the motors'
+    /// torques count as they are.
+    pub actuators: Option<Actuators>,
+    /// Axes of the force and moment in the inputs.
+    pub wrench_frame: WrenchFrame,
     /// Which coordinates the encoder looks at, and what it is to carry.
     pub encoder: EncoderOptions,
     /// How Xi is fitted and chosen.
@@ -240,19 +245,28 @@ impl TrainOptions {
             seed: 1,
             n_seeds: 1,
             scaling: ScaleOptions::default(),
+            actuators: None,
+            wrench_frame: WrenchFrame::World,
             encoder: EncoderOptions::default(),
             regression: RegressionOptions::default(),
             joint: JointOptions::default(),
         }
     }
 
-    /// The settings of the paper: one scale for everything, no mask, no lift loss, all coordinates alike, Xi starting
+    /// How samples of a robot become inputs under these settings.
+    pub fn input_rule(&self, robot: &'static Robot) -> InputRule {
+        InputRule::new(robot, self.actuators.clone(), self.wrench_frame)
+    }
+
+    /// The settings of the paper: motors' torques, forces in the body's axes, one scale for everything, no mask, no lift loss, all coordinates alike, Xi starting
     /// at ones, the published library and transfer steps, accelerations as recorded.
     pub fn paper(name: impl Into<String>, latent_dim: usize) -> Self {
         let plain = Self::new(name, latent_dim);
         Self {
             library: LibraryChoice::Standard(StandardLibrary::default()),
             scaling: ScaleOptions::uniform(0.1),
+            actuators: None,
+            wrench_frame: WrenchFrame::Body,
             encoder: EncoderOptions {
                 lift_weight: 0.0,
                 body_weight: 1.0,
@@ -324,6 +338,13 @@ impl TrainOptions {
             at_least_zero("threshold", *value)?;
         }
         self.scaling.check()?;
+        if let Some((array, joint, found)) = self.actuators.as_ref().and_then(Actuators::unusable) {
+            return Err(TrainError::Option {
+                option: "actuators",
+                found: format!("{array} {found} at {}", JOINT_NAMES[joint]),
+                expected: "finite numbers of at least 0",
+            });
+        }
         let RegressionOptions {
             windows,
             ridges,

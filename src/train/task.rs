@@ -33,7 +33,7 @@ impl<'a> Task<'a> {
     /// [`TrainError`]: options out of range, too few samples, too many latent coordinates.
     pub fn new(
         recordings: Recordings<'_>,
-        robot: &Robot,
+        robot: &'static Robot,
         options: &'a TrainOptions,
     ) -> Result<Self, TrainError> {
         let sets = DataSets::new(recordings, robot, options)?;

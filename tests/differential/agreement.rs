@@ -5,8 +5,8 @@
 //!   transcendental functions; with them because both call one mathematics library.
 //! - [`Rule::UlpsATerm`]: fused operations or another mathematics library; a result differs by
 //!   at most 4 ulp of each term of its sum, and one more for each operation inside the term
-//!   (`terms.rs`). Outputs of curved layers, of the solve behind their inputs' projection, and the
-//!   feet's forces are no such sums: 1e-11 of the largest output.
+//!   (`terms.rs`). Outputs of curved layers, of the solve behind their inputs' projection, the
+//!   feet's forces and the motors' torques are no such sums: 1e-11 of the largest output.
 
 use romc::ir::{Program, Statement, Unary};
 use romc::model::ReducedModel;

@@ -22,7 +22,7 @@ pub enum Kind {
     Affine,
     /// A map through curved layers.
     Curved,
-    /// Generalised inputs from torques and contacts.
+    /// Generalised inputs from torques and contacts, and torques from them.
     Wrench,
     Dynamics(usize),
     Jacobian(usize, JacobianPattern),
@@ -62,7 +62,8 @@ impl Function {
                     points.push(match (slot.name.as_str(), k % 3) {
                         ("h", _) => random.between(1e-4, 1e-2),
                         ("feet", _) => random.below(2) as f64,
-                        // Knees far from where a leg is singular.
+                        // Slow joints, where dry friction changes its sign; bent knees.
+                        ("dx", 0) => random.between(-0.1, 0.1),
                         ("x", 1) if self.kind == Kind::Wrench => random.between(0.0, 1.2),
                         ("x", 2) if self.kind == Kind::Wrench => random.between(-2.2, -1.0),
                         ("x", 0) if self.kind == Kind::Wrench => random.between(-0.8, 0.8),
@@ -130,9 +131,15 @@ pub fn functions(model: &ReducedModel, n_points: usize, options: &LowerOptions) 
             list.push(function(name, program, kind.clone(), n_points.min(100)));
         }
     }
-    if let Some(program) = lower::generalised_input(model).expect("lowers") {
-        let name = program.name().to_owned();
-        list.push(function(name, program, Kind::Wrench, n_points.min(100)));
+    let of_robot = [
+        lower::generalised_input(model),
+        lower::actuator_torque(model),
+    ];
+    for program in of_robot {
+        if let Some(program) = program.expect("lowers") {
+            let name = program.name().to_owned();
+            list.push(function(name, program, Kind::Wrench, n_points.min(100)));
+        }
     }
     for phase in 0..model.phases().len() {
         let phase_name = model.phase_identifier(phase);

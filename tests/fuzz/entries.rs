@@ -17,7 +17,7 @@ use romc::recording::check::{check, without};
 use romc::recording::preprocess::prepare;
 use romc::recording::write::{Notation, WriteOptions, write_to};
 use romc::recording::{self, Recording, Segment};
-use romc::robot::Robot;
+use romc::robot::{InputRule, Robot};
 use romc::symbolic::ExprPool;
 
 /// A model that reads is written and reads back equal; small ones are compiled to every target.
@@ -117,7 +117,7 @@ pub fn recording(bytes: &[u8]) {
         assert_eq!(rest.sample_count() + dropped, found.sample_count());
     }
     for segment in &found.segments {
-        if let Ok(input) = segment.input(go1) {
+        if let Ok(input) = segment.input(&InputRule::published(go1)) {
             assert_eq!(input.shape(), (18, segment.len()));
         }
     }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, SVector, Vector3};
 use romc::model::{InputStatistics, ReducedModel};
 use romc::mpc::{ConsistentLift, ControlModel, LiftFailure, MpcSettings, StanceState};
-use romc::robot::{Leg, Robot};
+use romc::robot::{Actuators, InputRule, Leg, Robot, WrenchFrame};
 
 use crate::random::Random;
 use crate::synthetic::{D, Equations, STAND, model, model_with};
@@ -12,9 +12,10 @@ const FOOTING: StanceState = StanceState {
     joints_rad: [
         0.0, 0.8, -1.6, 0.0, 0.8, -1.6, 0.0, 0.8, -1.6, 0.0, 0.8, -1.6,
     ],
-    attitude_rad: [0.0, 0.0],
+    attitude_rad: [0.0; 3],
     feet: [true; 4],
     phase: 0,
+    losses_nm: [0.0; 12],
 };
 
 fn go1() -> &'static Robot {
@@ -231,4 +232,98 @@ fn stretched_leg_is_a_failure_in_contact_only() {
         .expect("the stretched leg carries nothing");
     assert!(found.iter().all(|torque| torque.is_finite()), "{found:?}");
     assert_eq!(STAND[..12], FOOTING.joints_rad);
+}
+
+/// Viscous and dry friction, and inertia of the motors, of every leg.
+fn losses() -> Actuators {
+    Actuators::of_leg([1.0, 0.6, 0.6], [0.2; 3], [0.01; 3])
+}
+
+#[test]
+fn consistent_lift_keeps_the_command_with_its_losses_within_the_limits() {
+    let model = informed_model().into_builder().actuators(Some(losses()));
+    let plant = ControlModel::new(&model.build().expect("sound")).expect("complete");
+    let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
+    let wanted = projected(&plant, &torque_for([Vector3::new(0.0, 0.0, 900.0); 4]));
+    let limits = go1().torque_limit_nm();
+    let at_rest = lift.lift(&plant, &wanted, &FOOTING).expect("bent legs");
+    let mut moving = FOOTING;
+    moving.losses_nm = std::array::from_fn(|joint| if joint % 3 == 2 { 9.0 } else { -4.0 });
+    let found = lift.lift(&plant, &wanted, &moving).expect("bent legs");
+    let command = |joint: usize| found[joint] + moving.losses_nm[joint];
+    let shares = (0..12).map(|joint| command(joint).abs() / limits[joint]);
+    let largest = shares.fold(0.0, f64::max);
+    assert!(
+        (0.999..=1.0 + 1e-12).contains(&largest),
+        "{largest} of a limit"
+    );
+    // What the joints take is missing at the links.
+    let knee = |torque: &[f64; 12]| {
+        torque
+            .iter()
+            .skip(2)
+            .step_by(3)
+            .fold(0.0, |a: f64, b| a.max(*b))
+    };
+    assert!((knee(&at_rest) - limits[2]).abs() < 0.05, "{at_rest:?}");
+    assert!((knee(&found) - (limits[2] - 9.0)).abs() < 0.05, "{found:?}");
+    assert!(cone_violation(&found, 0.6) < 0.05);
+}
+
+#[test]
+fn consistent_lift_in_world_axes_recovers_the_torques_of_a_pitched_robot() {
+    let rule = InputRule::new(go1(), None, WrenchFrame::World);
+    let mut pitched = FOOTING;
+    pitched.attitude_rad = [0.1, -0.3, 0.8];
+    let input = |torque: &[f64; 12]| {
+        let mut x = STAND;
+        x[15..].copy_from_slice(&pitched.attitude_rad);
+        let wrench = rule.wrench(&x, torque, pitched.feet).expect("finite");
+        DVector::from_iterator(18, torque.iter().chain(wrench.iter()).copied())
+    };
+    let mut random = Random::new(7);
+    let model = informed_model()
+        .into_builder()
+        .wrench_frame(WrenchFrame::World);
+    let plant = ControlModel::new(&model.build().expect("sound")).expect("complete");
+    let settings = MpcSettings {
+        lift_prior_weight: 1e-6,
+        ..MpcSettings::default()
+    };
+    let mut lift = ConsistentLift::new(&plant, &settings).expect("a sound program");
+    let (mut error, mut size) = (0.0, 0.0);
+    for _ in 0..100 {
+        let torque = sample_torque(&mut random);
+        let mut u_lat = [0.0; D];
+        plant.project(&STAND, input(&torque).as_slice(), &mut u_lat);
+        let found = lift.lift(&plant, &u_lat, &pitched).expect("bent legs");
+        let mean = plant.phases()[0].torque_mean;
+        for joint in 0..12 {
+            error += (found[joint] - torque[joint]).powi(2);
+            size += (torque[joint] - mean[joint]).powi(2);
+        }
+    }
+    let r2 = 1.0 - error / size;
+    assert!(r2 > 0.99, "R^2 {r2}");
+}
+
+#[test]
+fn losses_of_a_plan_are_those_at_its_mean_velocity_and_its_acceleration() {
+    let model = informed_model().into_builder().actuators(Some(losses()));
+    let plant = ControlModel::new(&model.build().expect("sound")).expect("complete");
+    let start = [0.1, -0.05, 0.02, 0.4, -0.3, 0.2];
+    let end = [0.104, -0.052, 0.021, 0.43, -0.28, 0.15];
+    let found = plant.planned_losses(&start, &end, 0.01);
+    let velocity = |state: &[f64; 6]| plant.decode_joint_velocities(&state[..D], &state[D..]);
+    let (before, after) = (velocity(&start), velocity(&end));
+    for joint in 0..12 {
+        let dq = 0.5 * (before[joint] + after[joint]);
+        let ddq = (after[joint] - before[joint]) / 0.01;
+        let viscous = [1.0, 0.6, 0.6][joint % 3];
+        let expected = viscous * dq + 0.2 * (dq / 0.05).tanh() + 0.01 * ddq;
+        assert!((found[joint] - expected).abs() < 1e-12, "{joint}");
+    }
+    assert!(found.iter().any(|loss| loss.abs() > 0.5), "{found:?}");
+    let ideal = ControlModel::new(&informed_model()).expect("complete");
+    assert_eq!(ideal.planned_losses(&start, &end, 0.01), [0.0; 12]);
 }

@@ -6,7 +6,7 @@ use romc::recording::PhaseRule;
 use romc::recording::check::{check, without};
 use romc::recording::preprocess::prepare;
 use romc::recording::{Recording, read_from_bytes};
-use romc::robot::Robot;
+use romc::robot::{InputRule, Robot};
 
 use crate::sheet::{Sheet, gzip};
 
@@ -25,7 +25,7 @@ fn exercise(bytes: &[u8]) {
         assert_eq!(rest.sample_count() + dropped, recording.sample_count());
     }
     for segment in &recording.segments {
-        if let Ok(input) = segment.input(go1) {
+        if let Ok(input) = segment.input(&InputRule::published(go1)) {
             assert_eq!(input.shape(), (18, segment.len()));
         }
     }

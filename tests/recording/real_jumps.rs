@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use romc::recording::check::{Implausible, check, without};
 use romc::recording::preprocess::prepare;
 use romc::recording::{self, PhaseRule, Recording, Stance};
-use romc::robot::Robot;
+use romc::robot::{InputRule, Robot};
 
 use crate::outside;
 
@@ -68,7 +68,9 @@ fn own_jumps_are_one_segment_of_launch_flight_and_landing() {
 fn own_jumps_carry_their_weight_while_standing() {
     for path in own_jumps() {
         let jump = recording::read(&path).unwrap();
-        let u = jump.segments[0].input(go1()).unwrap();
+        let u = jump.segments[0]
+            .input(&InputRule::published(go1()))
+            .unwrap();
         let weight = 9.81 * go1().mass_kg();
         let lift = u[(14, 0)];
         // The torques carry the body and the thighs, not the feet.
@@ -113,7 +115,8 @@ fn asynchronous_jumps_leave_the_ground_front_feet_first() {
             (2, Stance::Flight),
         ];
         assert_eq!(found, expected, "{}", path.display());
-        let lift = segment.input(go2).unwrap()[(14, 0)] / (9.81 * go2.mass_kg());
+        let lift =
+            segment.input(&InputRule::published(go2)).unwrap()[(14, 0)] / (9.81 * go2.mass_kg());
         assert!((0.92..1.02).contains(&lift), "{}: {lift}", path.display());
     }
 }
@@ -143,7 +146,7 @@ fn hardware_jump_is_read_and_divided() {
     let spans = PhaseRule::two_phase().spans(segment).unwrap();
     let ranges: Vec<_> = spans.iter().map(|span| span.range.clone()).collect();
     assert_eq!(ranges, [0..256, 256..378, 378..800]);
-    let input = segment.input(go1()).unwrap();
+    let input = segment.input(&InputRule::published(go1())).unwrap();
     assert_eq!(input.shape(), (18, 800));
     assert_eq!(input.rows(0, 12), segment.torque_nm);
     assert!(input.iter().all(|value| value.is_finite()));

@@ -10,7 +10,7 @@ use super::number::at_least_one;
 use crate::model::Activation;
 use crate::recording::smoothing::SavitzkyGolay;
 use crate::recording::{Accelerations, SmoothedRows};
-use crate::robot::STATE_DIM;
+use crate::robot::{STATE_DIM, WrenchFrame};
 use crate::study::Shard;
 use crate::train::{Coordinates, Integrator, Method, Split};
 
@@ -122,7 +122,8 @@ pub struct TrainSettings {
     /// Robot that made the recordings (go1 unless given)
     #[arg(long)]
     pub robot: Option<String>,
-    /// Train exactly as published: one scale, no mask, no lift loss, Xi from ones (joint method)
+    /// Train exactly as published: motor torques, forces in the body's axes, one scale, no mask, no lift loss,
+    /// Xi from ones (joint method)
     #[arg(long)]
     pub paper: bool,
     /// Seed of all random choices
@@ -176,6 +177,12 @@ pub struct TrainSettings {
     /// Custom candidate terms, separated by semicolons: "1; z1; dz1; u1; z1*dz2"
     #[arg(long, value_name = "TERMS", conflicts_with_all = ["degree", "trigonometric"])]
     pub terms: Option<String>,
+    /// Friction and inertia of the joints, taken from the torques: a file with [actuators], or `none`
+    #[arg(long, value_name = "FILE.toml")]
+    pub actuators: Option<String>,
+    /// Axes of force and moment in the inputs: `world` or, as published, `body` (world unless given)
+    #[arg(long, value_name = "FRAME")]
+    pub wrench_frame: Option<WrenchFrame>,
     /// Phases of the model
     #[arg(long, value_enum)]
     pub phases: Option<PhaseSet>,
@@ -216,7 +223,7 @@ pub struct TrainSettings {
     /// Scaled units of forces on the body in one N (0.005 unless given, 0.1 with --paper)
     #[arg(long, value_name = "FACTOR")]
     pub force_scaling: Option<Finite>,
-    /// Scaled units of moments on the body in one N m (0.05 unless given, 0.1 with --paper)
+    /// Scaled units of moments on the body in one N m (0.02 unless given, 0.05 in the body's axes, 0.1 with --paper)
     #[arg(long, value_name = "FACTOR")]
     pub moment_scaling: Option<Finite>,
 }

@@ -6,7 +6,7 @@ use nalgebra::storage::RawStorage;
 
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::{ControlModel, ControlPhase};
-use crate::robot::STATE_DIM;
+use crate::robot::{STATE_DIM, WrenchFrame};
 
 /// Numbers per line.
 const WIDTH: usize = 5;
@@ -22,6 +22,9 @@ pub struct ControlModelText<'a> {
     model: &'a str,
     name: &'a str,
     robot: &'a str,
+    frame: &'static str,
+    /// Names and values of the actuators' arrays.
+    actuators: Vec<(&'static str, String)>,
     latent_dim: usize,
     state_dim: usize,
     encoder: Numbers,
@@ -76,12 +79,21 @@ impl<'a> ControlModelText<'a> {
     /// The text for a plant.
     pub fn new(entries: &'a ModelInterface, plant: &'a ControlModel, banner: String) -> Self {
         let parts = plant.parts();
+        let rule = plant.input_rule();
         let pairs = entries.phases.iter().zip(plant.phases());
         Self {
             banner,
             model: &entries.name,
             name: &entries.identifier,
             robot: plant.robot().name(),
+            frame: match rule.wrench_frame() {
+                WrenchFrame::Body => "Body",
+                WrenchFrame::World => "World",
+            },
+            actuators: (rule.actuators().iter())
+                .flat_map(|actuators| actuators.named())
+                .map(|(name, values)| (name, format!("{values:?}")))
+                .collect(),
             latent_dim: plant.latent_dim(),
             state_dim: STATE_DIM,
             encoder: Numbers::new(&parts.encoder),

@@ -21,7 +21,7 @@ use crate::files::EmittedFile;
 use crate::lower::LowerOptions;
 use crate::mpc::ControlModel;
 use crate::mpc::interface::{Settings, TEXTS};
-use crate::robot::{Robot, STATE_DIM};
+use crate::robot::{InputRule, Robot, STATE_DIM, WrenchFrame};
 use control_model::ControlModelText;
 use lock::Lock;
 
@@ -35,6 +35,8 @@ struct Facts<'a> {
     state_dim: usize,
     state_names: String,
     input_names: String,
+    /// How `u` comes from torques, lines of a comment.
+    input_is: String,
     /// Constant and value of every code.
     codes: Vec<(String, i32)>,
     texts: Vec<(i32, String)>,
@@ -123,6 +125,38 @@ pub fn emit(
     Ok(files)
 }
 
+/// How the controller's inputs come from torques, for the header's first comment.
+fn input_in_words(rule: &InputRule, name: &str) -> String {
+    let torques = match rule.actuators() {
+        None => "its torques are those of the motors",
+        Some(_) => {
+            "its torques are those at the links, what the joints take is off; commands have it on top"
+        }
+    };
+    let wrench = match rule.wrench_frame() {
+        WrenchFrame::Body => {
+            "force and moment are those of the feet on the body, along axes parallel to the body's: sums \
+             of F_k = -J_k^-T tau_k and of p_k x F_k, p_k the foot from its own hip"
+        }
+        WrenchFrame::World => {
+            "force and moment are those of the feet on the body, the force in world axes, the moments \
+             those that do work on the rates of roll, pitch and yaw about the body's origin"
+        }
+    };
+    let text =
+        format!("Of u, {torques}; {wrench}. {name}_generalised_input() of the model makes it.");
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let last = lines.last_mut().expect("never empty");
+        match last.len() + word.len() {
+            ..100 if last.is_empty() => last.push_str(word),
+            ..100 => *last += &format!(" {word}"),
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines.join("\n * ")
+}
+
 /// What is the same for all models but for names.
 fn project(
     entries: &ModelInterface,
@@ -140,6 +174,7 @@ fn project(
         state_dim: STATE_DIM,
         state_names: Robot::state_names().join(" "),
         input_names: Robot::input_names().join(" "),
+        input_is: input_in_words(plant.input_rule(), name),
         codes: texts()
             .map(|(code, text)| (constant(&text), code))
             .collect(),

@@ -16,7 +16,7 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 33] = sources![
+const SOURCES: [(&str, &str); 35] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
@@ -43,8 +43,10 @@ const SOURCES: [(&str, &str); 33] = sources![
     "mpc/online/settings.rs",
     "mpc/online/sparse.rs",
     "mpc/online/transcribe.rs",
+    "robot/actuators.rs",
     "robot/error.rs",
     "robot/feet.rs",
+    "robot/input_rule.rs",
     "robot/joints.rs",
     "robot/kinematics.rs",
     "robot/mod.rs",

@@ -146,6 +146,9 @@ impl Source {
 pub struct Command {
     /// Feed-forward torques, N m, within the robot's limits whatever happened.
     pub torque_nm: [f64; JOINT_DIM],
+    /// What the planned motion takes of the torques in the joints, N m: `torque_nm` less this reaches the
+    /// links. Zero in a hold and for a model without actuators.
+    pub losses_nm: [f64; JOINT_DIM],
     /// Desired joint positions, rad, within the robot's limits: the decoded reference at the end of
     /// the step. The plan begins at the measurement, so its own posture would leave a joint PD
     /// nothing to correct.
@@ -167,15 +170,21 @@ pub struct Command {
     /// Largest violation of a joint limit in the plan, in half ranges of the joint.
     pub slack: f64,
     /// `|F_lift − G τ| / |F_lift|`: how far the force that the latent input was lifted to is from
-    /// the force that the commanded torques produce; none in flight or without a lifted force.
+    /// the force that the commanded torques produce after the losses; none in flight or without a lifted force.
     pub inconsistency: Option<f64>,
 }
 
 impl Command {
+    /// The torques that reach the links, N m.
+    pub fn net_torque_nm(&self) -> [f64; JOINT_DIM] {
+        std::array::from_fn(|joint| self.torque_nm[joint] - self.losses_nm[joint])
+    }
+
     /// A command of zeros, to be filled by [`Controller::step_into`](super::Controller::step_into).
     pub fn zeros(latent_dim: usize) -> Self {
         Self {
             torque_nm: [0.0; JOINT_DIM],
+            losses_nm: [0.0; JOINT_DIM],
             joint_position_rad: [0.0; JOINT_DIM],
             joint_velocity_rad_s: [0.0; JOINT_DIM],
             u_lat: vec![0.0; latent_dim],

@@ -1,7 +1,7 @@
 //! The numbers of one model on one robot, in SI units on the robot's side.
 //!
 //! Everything the controller needs besides the latent dynamics: the affine maps with their scale
-//! factors multiplied in, limits, and for each phase the distribution of the training inputs.
+//! factors multiplied in, how torques become inputs, limits, and for each phase the distribution of the training inputs.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::error::ControlError;
 use super::nonlinear::{InputMaps, NonlinearMaps};
-use crate::robot::{ContactFlags, JOINT_DIM, Robot, STATE_DIM};
+use crate::robot::{ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
 /// Maps, limits and input statistics of a model on its robot.
 #[derive(Debug, Clone)]
@@ -23,8 +23,8 @@ pub struct ControlModel {
 /// The numbers of a [`ControlModel`], with scale factors multiplied in: SI units on the robot's side.
 #[derive(Debug, Clone)]
 pub struct ControlModelParts {
-    /// The robot.
-    pub robot: &'static Robot,
+    /// The robot, what its joints take of the motors' torques, and the axes of force and moment.
+    pub input_rule: InputRule,
     /// `W_e s_x`, `latent_dim × 18`.
     pub encoder: DMatrix<f64>,
     /// `b_e`, `latent_dim`.
@@ -128,9 +128,14 @@ impl ControlModel {
         &self.parts
     }
 
+    /// How torques become inputs of the model: commands are made by its inverse.
+    pub fn input_rule(&self) -> &InputRule {
+        &self.parts.input_rule
+    }
+
     /// The robot.
     pub fn robot(&self) -> &'static Robot {
-        self.parts.robot
+        self.parts.input_rule.robot()
     }
 
     /// Number of latent coordinates.
@@ -189,6 +194,22 @@ impl ControlModel {
         std::array::from_fn(|joint| row_product(decoder, joint, dz))
     }
 
+    /// What the joints take, N m, over a time `step_s` in which the latent state goes from `start` to
+    /// `end` (both `(z, dz)`): at the mean of the decoded velocities, with their difference over the
+    /// time as acceleration. Zero without actuators, and never beyond a joint's torque limit.
+    pub fn planned_losses(&self, start: &[f64], end: &[f64], step_s: f64) -> [f64; JOINT_DIM] {
+        if self.parts.input_rule.actuators().is_none() {
+            return [0.0; JOINT_DIM];
+        }
+        let [before, after] = [start, end].map(|state| {
+            let (z, dz) = state.split_at(self.latent_dim);
+            self.decode_joint_velocities(z, dz)
+        });
+        let dq = std::array::from_fn(|joint| 0.5 * (before[joint] + after[joint]));
+        let ddq = std::array::from_fn(|joint| (after[joint] - before[joint]) / step_s);
+        self.clamp_torque(self.parts.input_rule.losses(&dq, &ddq))
+    }
+
     /// `u_lat = pinv(J_Eᵀ) s_u u` with the encoder's Jacobian at `x` if it is nonlinear and has full row rank there,
     /// else with the one of the parts; SI units (18), `u_lat` is overwritten.
     pub fn project(&self, x: &[f64], u: &[f64], u_lat: &mut [f64]) {
@@ -227,7 +248,7 @@ impl ControlModel {
     /// number.
     pub fn clamp_torque(&self, torque_nm: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
         std::array::from_fn(|joint| {
-            let limit = self.parts.robot.torque_limit_nm()[joint];
+            let limit = self.robot().torque_limit_nm()[joint];
             if torque_nm[joint].is_nan() {
                 0.0
             } else {
@@ -239,7 +260,7 @@ impl ControlModel {
     /// The joint positions within the robot's limits that are nearest to these.
     pub fn clamp_joints(&self, joints_rad: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
         std::array::from_fn(|joint| {
-            let (lower, upper) = self.parts.robot.joint_limit_rad()[joint];
+            let (lower, upper) = self.robot().joint_limit_rad()[joint];
             joints_rad[joint].clamp(lower, upper)
         })
     }

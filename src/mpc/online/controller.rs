@@ -202,7 +202,8 @@ impl Controller {
         Ok(())
     }
 
-    /// Torques, N m, that this controller's lift makes of a latent input on a stance; not clamped.
+    /// Torques of the motors, N m, that this controller's lift makes of a latent input on a stance: those
+    /// at the links and the stance's losses; not clamped.
     ///
     /// # Errors
     /// [`LiftFailure`] of the consistent lift; the transpose lift has none.
@@ -211,13 +212,16 @@ impl Controller {
         u_lat: &[f64],
         stance: &StanceState,
     ) -> Result<[f64; JOINT_DIM], LiftFailure> {
-        match &mut self.consistent {
-            Some(lift) => lift.lift(&self.plant, u_lat, stance),
+        let net: [f64; JOINT_DIM] = match &mut self.consistent {
+            Some(lift) => lift.lift(&self.plant, u_lat, stance)?,
             None => {
                 let input = self.local_plant().lift(u_lat);
-                Ok(std::array::from_fn(|joint| input[joint]))
+                std::array::from_fn(|joint| input[joint])
             }
-        }
+        };
+        Ok(std::array::from_fn(|joint| {
+            net[joint] + stance.losses_nm[joint]
+        }))
     }
 
     /// Planned minus reference positions at the end of every stage of the last plan, in standard
@@ -361,9 +365,10 @@ impl Controller {
         command.slack = self.largest_violation();
         self.memory.stance = Some(StanceState {
             joints_rad: std::array::from_fn(|joint| measurement.x[joint]),
-            attitude_rad: [measurement.x[15], measurement.x[16]],
+            attitude_rad: std::array::from_fn(|angle| measurement.x[15 + angle]),
             feet: measurement.feet,
             phase,
+            losses_nm: [0.0; JOINT_DIM],
         });
         if !self.write_plan(0, command) {
             return Status::LiftFailed;
@@ -407,7 +412,12 @@ impl Controller {
         command.joint_position_rad = self.plant.clamp_joints(self.plant.decode_joints(z));
         command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
         let lifted = self.local_plant().lift(input);
-        let torque = match (&mut self.consistent, &self.memory.stance) {
+        let (start, end) = (self.plan.start(stage), self.plan.end(stage));
+        let losses = self.plant.planned_losses(start, end, self.settings.step_s);
+        if let Some(stance) = &mut self.memory.stance {
+            stance.losses_nm = losses;
+        }
+        let net: [f64; JOINT_DIM] = match (&mut self.consistent, &self.memory.stance) {
             (None, _) => std::array::from_fn(|joint| lifted[joint]),
             (Some(lift), Some(stance)) => match lift.lift(&self.plant, input, stance) {
                 Ok(torque) => torque,
@@ -415,28 +425,26 @@ impl Controller {
             },
             (Some(_), None) => return false,
         };
+        let torque = std::array::from_fn(|joint| net[joint] + losses[joint]);
         command.torque_nm = self.plant.clamp_torque(torque);
+        command.losses_nm = losses;
         self.memory.feed_forward_nm = command.torque_nm;
-        command.inconsistency = self.inconsistency(&lifted, &command.torque_nm);
+        command.inconsistency = self.inconsistency(&lifted, &command.net_torque_nm());
         true
     }
 
-    /// `|F_lift − G τ| / |F_lift|`, with force and moment as they are lifted.
-    fn inconsistency(
-        &self,
-        lifted: &[f64; STATE_DIM],
-        torque_nm: &[f64; JOINT_DIM],
-    ) -> Option<f64> {
+    /// `|F_lift − G τ| / |F_lift|` of torques at the links, with force and moment as they are lifted.
+    fn inconsistency(&self, lifted: &[f64; STATE_DIM], net_nm: &[f64; JOINT_DIM]) -> Option<f64> {
         let stance = self.memory.stance.as_ref()?;
         if !stance.feet.contains(&true) {
             return None;
         }
         let map = self
             .plant
-            .robot()
-            .wrench_map(&stance.joints_rad, stance.feet)
+            .input_rule()
+            .wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet)
             .ok()?;
-        let produced = map * SVector::<f64, JOINT_DIM>::from(*torque_nm);
+        let produced = map * SVector::<f64, JOINT_DIM>::from(*net_nm);
         let force = SVector::<f64, 6>::from_fn(|axis, _| lifted[JOINT_DIM + axis]);
         (force.norm() > SMALL_FORCE_N).then(|| (force - produced).norm() / force.norm())
     }

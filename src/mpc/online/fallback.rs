@@ -77,6 +77,7 @@ impl Controller {
             self.memory.feed_forward_nm[joint] - damping * self.memory.joint_velocity[joint]
         });
         command.torque_nm = self.plant.clamp_torque(torque);
+        command.losses_nm = [0.0; JOINT_DIM];
         command.joint_position_rad = match self.memory.joint_position {
             Some(position) => position,
             None => self.posture(now),

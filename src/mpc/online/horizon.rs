@@ -185,6 +185,7 @@ impl Horizon {
                 .input
                 .copy_from_slice(plant.phases()[stage.phase].latent_mean.as_slice());
         }
+        stage.losses_nm = plant.planned_losses(&stage.state, &self.ends[index], settings.step_s);
         stage.rows = reference.robot_state_at(start_s).and_then(|x| {
             let z = &self.ends[index][..plant.latent_dim()];
             let local = plant.tangent_at(&x, z)?;

@@ -5,13 +5,15 @@
 //!
 //! ```text
 //! minimise   ‖ M τ − u_lat ‖² + w (τ − m_p)ᵀ S_p⁻¹ (τ − m_p),   M = pinv(W_eᵀ) s_u [ I ; G(q, c) ]
-//! subject to |τ| ≤ τ_max,   ‖(R F_k)_{x,y}‖ ≤ μ (R F_k)_z,   F_k = −J_k⁻ᵀ τ_k for each foot k in contact
+//! subject to |τ + ℓ| ≤ τ_max,   ‖(R F_k)_{x,y}‖ ≤ μ (R F_k)_z,   F_k = −J_k⁻ᵀ τ_k for each foot k in contact
 //! ```
 //!
-//! `G(q, c)` maps torques to force and moment of the feet in contact, `m_p` and `S_p` are mean and
-//! covariance of the training torques in the phase, `R` turns the body frame upright. The prior
+//! `τ` are the torques at the links and `τ + ℓ` the command, with what the joints take, `ℓ`, in the
+//! planned motion. `G(q, c)` maps torques to force and moment of the feet in contact, in the frame of
+//! the model's inputs; `m_p` and `S_p` are mean and covariance of the training torques in the phase,
+//! `R` turns the body frame upright. The prior
 //! decides what the latent input leaves open, twelve torques against a few latent coordinates.
-//! `τ = 0` satisfies every constraint.
+//! `τ = 0` satisfies every constraint, as `ℓ` is never beyond the limits.
 //!
 //! If the optimum without constraints satisfies them it is the optimum; only otherwise is the
 //! conic program solved.
@@ -34,17 +36,20 @@ const GRAVITY: f64 = 9.81;
 /// Rows of the two sides of the torque limits.
 const BOUND_ROWS: usize = 2 * JOINT_DIM;
 
-/// Posture and contact that a lift is made for.
+/// Posture, contact and motion that a lift is made for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StanceState {
     /// Joint positions, rad.
     pub joints_rad: [f64; JOINT_DIM],
-    /// Roll and pitch, rad.
-    pub attitude_rad: [f64; 2],
+    /// Roll, pitch and yaw, rad.
+    pub attitude_rad: [f64; 3],
     /// Feet in contact.
     pub feet: ContactFlags,
     /// Phase of the model.
     pub phase: usize,
+    /// What the joints take of the motors' torques, N m, at most the torque limits; zero in a model
+    /// without actuators.
+    pub losses_nm: [f64; JOINT_DIM],
 }
 
 /// Why no torques were found.
@@ -110,7 +115,8 @@ impl ConsistentLift {
         }
     }
 
-    /// Torques, N m, for a latent input on a stance.
+    /// Torques at the links, N m, for a latent input on a stance; with the stance's losses added they
+    /// are within the motors' limits.
     ///
     /// # Errors
     /// [`LiftFailure`] if a leg in contact is singular or the program is not solved.
@@ -122,18 +128,18 @@ impl ConsistentLift {
     ) -> Result<[f64; JOINT_DIM], LiftFailure> {
         self.iterations = 0;
         let wrench = plant
-            .robot()
-            .wrench_map(&stance.joints_rad, stance.feet)
+            .input_rule()
+            .wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet)
             .map_err(|_| LiftFailure::SingularLeg)?;
         let forces = foot_forces(plant, stance).ok_or(LiftFailure::SingularLeg)?;
         let (hessian, gradient) = self.cost(&plant.phases()[stance.phase], &wrench, u_lat);
         if let Some(factor) = Cholesky::new(hessian) {
             let torque = factor.solve(&-gradient);
-            if self.is_allowed(&torque, &forces) {
+            if self.is_allowed(&torque, &forces, &stance.losses_nm) {
                 return Ok(torque.into());
             }
         }
-        self.solve(&hessian, &gradient, &forces)
+        self.solve(&hessian, &gradient, &forces, &stance.losses_nm)
     }
 
     /// Interior-point iterations of the last lift; zero if no constraint was active.
@@ -159,11 +165,15 @@ impl ConsistentLift {
         (hessian, gradient)
     }
 
-    fn is_allowed(&self, torque: &Torque, forces: &[Option<Matrix3<f64>>; FOOT_DIM]) -> bool {
-        let within = torque
-            .iter()
+    fn is_allowed(
+        &self,
+        torque: &Torque,
+        forces: &[Option<Matrix3<f64>>; FOOT_DIM],
+        losses: &[f64; JOINT_DIM],
+    ) -> bool {
+        let within = (torque.iter().zip(losses))
             .zip(self.limit_nm.iter())
-            .all(|(torque, limit)| torque.abs() <= *limit);
+            .all(|((torque, loss), limit)| (torque + loss).abs() <= *limit);
         within
             && forces.iter().enumerate().all(|(leg, force)| match force {
                 None => true,
@@ -179,6 +189,7 @@ impl ConsistentLift {
         hessian: &TorqueSquare,
         gradient: &Torque,
         forces: &[Option<Matrix3<f64>>; FOOT_DIM],
+        losses: &[f64; JOINT_DIM],
     ) -> Result<[f64; JOINT_DIM], LiftFailure> {
         let (friction, weight, limit) = (self.friction, self.weight_n, self.limit_nm);
         let program = self.solver.program_mut();
@@ -193,6 +204,8 @@ impl ConsistentLift {
                 program.p.set(row, col, cost_scale * scaled(row, col));
             }
             program.q[col] = cost_scale * gradient[col] * limit[col];
+            program.b[col] = 1.0 - losses[col] / limit[col];
+            program.b[JOINT_DIM + col] = 1.0 + losses[col] / limit[col];
         }
         for (leg, force) in forces.iter().enumerate() {
             let first_row = BOUND_ROWS + 3 * leg;
@@ -217,7 +230,8 @@ impl ConsistentLift {
             Outcome::Solved => {
                 let solution = self.solver.solution();
                 Ok(std::array::from_fn(|joint| {
-                    (solution[joint] * limit[joint]).clamp(-limit[joint], limit[joint])
+                    let (loss, limit) = (losses[joint], limit[joint]);
+                    (solution[joint] * limit).clamp(-limit - loss, limit - loss)
                 }))
             }
             Outcome::Inaccurate
@@ -234,7 +248,9 @@ pub fn foot_forces(
     plant: &ControlModel,
     stance: &StanceState,
 ) -> Option<[Option<Matrix3<f64>>; FOOT_DIM]> {
-    let rotation = Matrix3::from_fn(|row, col| upright(stance.attitude_rad)[row][col]);
+    let [roll, pitch, _] = stance.attitude_rad;
+    let turned = upright([roll, pitch]);
+    let rotation = Matrix3::from_fn(|row, col| turned[row][col]);
     let mut forces = [None; FOOT_DIM];
     for leg in Leg::ALL {
         if stance.feet[leg.index()] {

@@ -35,7 +35,7 @@ pub use error::ControlError;
 pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces};
 pub use nonlinear::{InputMaps, NonlinearMaps};
 pub use plan::Plan;
-pub use problem::upright;
+pub use problem::{to_upright, upright};
 pub use qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, SolverProfile};
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{

@@ -71,6 +71,11 @@ impl Plan {
         &self.inputs[stage * self.latent_dim..][..self.latent_dim]
     }
 
+    /// State at the beginning of a stage.
+    pub fn start(&self, stage: usize) -> &[f64] {
+        &self.states[stage * 2 * self.latent_dim..][..2 * self.latent_dim]
+    }
+
     /// State at the end of a stage.
     pub fn end(&self, stage: usize) -> &[f64] {
         &self.states[(stage + 1) * 2 * self.latent_dim..][..2 * self.latent_dim]

@@ -8,8 +8,8 @@
 //!          + Σ_{k=0..N-1} w_u/2 (u_k − u_r,k)ᵀ S_p⁻¹ (u_k − u_r,k)
 //!          + ρ Σ_{k=1..N} s_k
 //! subject to x_{k+1} = F̄_k + A_k (x_k − x̄_k) + B_k (u_k − ū_k) + e_k          dynamics
-//!            |T u_k| ≤ τ_max                                    lifted joint torques
-//!            |T (u_k − u_{k-1})| ≤ h r                          rate of the torques, if asked for
+//!            |T u_k + ℓ_k| ≤ τ_max                              torques of the motors
+//!            |T (u_k − u_{k-1})| ≤ h r                          rate of the lifted torques, if asked for
 //!            ‖(R F u_k)_{x,y}‖ ≤ μ (R F u_k)_z                  lifted body force in contact, if asked for
 //!            q_min − s_k q_half ≤ D z_k + d ≤ q_max + s_k q_half,   s_k ≥ 0   decoded joints, k ≥ 1
 //! ```
@@ -25,8 +25,10 @@
 //!   itself a trajectory and the model answers for deviations only.
 //! - Without a recorded input `u_r` is estimated from the reference's accelerations
 //!   ([`estimate`](super::estimate)) or, if asked for, the phase's mean training input.
-//! - `T` and `F` are the torque and force rows of `W_eᵀ / s_u`, `R` turns the body frame upright by
-//!   the reference's roll and pitch. With the consistent lift the torques are chosen afterwards
+//! - `T` and `F` are the torque and force rows of `W_eᵀ / s_u`; `R` turns a force in the body's axes
+//!   upright by the reference's roll and pitch, and leaves one in the world's as it is. `ℓ_k` is what
+//!   the joints take of the motors' torques along the reference, zero in a model without actuators.
+//!   With the consistent lift the torques are chosen afterwards
 //!   within their limits, so the rows of `T` are left out.
 //! - `ρ` is an exact penalty: above the sum of the multipliers of a stage's joint rows it changes
 //!   nothing where the limits can be kept. One `s_k` serves all joints of a stage. Joint limits are
@@ -43,7 +45,7 @@ use super::control_model::ControlModel;
 use super::prune::needed_rows;
 use super::reference::Reference;
 use super::settings::{Lift, MpcSettings, RowSelection};
-use crate::robot::JOINT_DIM;
+use crate::robot::{JOINT_DIM, WrenchFrame};
 
 /// Gravity, m/s², for the weight that scales rows of forces.
 const GRAVITY: f64 = 9.81;
@@ -67,6 +69,9 @@ pub struct Row {
     pub row: Vec<f64>,
     /// Right-hand side.
     pub bound: f64,
+    /// By how much a loss of 1 N m in the joint takes from the right-hand side; zero unless the row is
+    /// that of a torque limit.
+    pub per_loss: f64,
 }
 
 /// The constraint rows that every stage has, decided once.
@@ -87,8 +92,10 @@ pub struct StageRows {
 pub struct BodyFriction {
     /// Friction coefficient.
     pub coefficient: f64,
-    /// Force over the robot's weight along the body's x, y and z, `3 × latent_dim` row-major.
+    /// Force over the robot's weight along x, y and z of the model's frame, `3 × latent_dim` row-major.
     pub force: Vec<f64>,
+    /// The model's frame.
+    pub frame: WrenchFrame,
 }
 
 impl BodyFriction {
@@ -101,13 +108,14 @@ impl BodyFriction {
             force: rows
                 .flat_map(|row| lift.row(row).iter().map(|e| e / weight).collect::<Vec<_>>())
                 .collect(),
+            frame: plant.input_rule().wrench_frame(),
         }
     }
 
     /// Writes the cone's rows `(μ F_z, F_x, F_y)` of the force turned upright into `out`.
     pub fn turned(&self, attitude_rad: [f64; 2], out: &mut [f64]) {
         let d = self.force.len() / 3;
-        let rotation = upright(attitude_rad);
+        let rotation = to_upright(self.frame, attitude_rad);
         for (row, (axis, factor)) in [(2, self.coefficient), (0, 1.0), (1, 1.0)]
             .into_iter()
             .enumerate()
@@ -128,7 +136,8 @@ impl StageRows {
     /// Unless all are asked for, two kinds are left out, once: rows that the others imply to within
     /// 2 % of the limit, and torque rows that in no phase an input within `INPUT_REACH` standard
     /// deviations of the training inputs can reach. A plan may pass a limit that was left out, by
-    /// 2 % or by asking for an input unlike any in training; the command is clamped and does not.
+    /// 2 % or by asking for an input unlike any in training, or where the joints take much; the command
+    /// is clamped and does not.
     pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Self {
         Self::selected(plant, settings, row_selection(plant, settings))
     }
@@ -149,7 +158,7 @@ impl StageRows {
         };
         let rate = match settings.torque_rate_nm_s {
             None => Vec::new(),
-            Some(rate) => select(both_sides(plant, |_| rate * settings.step_s)),
+            Some(rate) => select(both_sides(plant, |_| rate * settings.step_s, 0.0)),
         };
         Self {
             torque,
@@ -212,10 +221,11 @@ fn is_reachable(plant: &ControlModel, row: &Row) -> bool {
 /// Both sides of every torque limit; joints that the lift does not reach have none.
 pub(super) fn torque_rows(plant: &ControlModel) -> Vec<Row> {
     let limits = plant.robot().torque_limit_nm();
-    both_sides(plant, |joint| limits[joint])
+    both_sides(plant, |joint| limits[joint], 1.0)
 }
 
-fn both_sides(plant: &ControlModel, limit: impl Fn(usize) -> f64) -> Vec<Row> {
+/// Both sides of a limit (N m) on the torque of each joint, from which losses take `loss_share`.
+fn both_sides(plant: &ControlModel, limit: impl Fn(usize) -> f64, loss_share: f64) -> Vec<Row> {
     let lift = plant.lift_matrix();
     let mut rows = Vec::new();
     for joint in 0..JOINT_DIM {
@@ -230,6 +240,7 @@ fn both_sides(plant: &ControlModel, limit: impl Fn(usize) -> f64) -> Vec<Row> {
                     joint,
                     row,
                     bound: 1.0,
+                    per_loss: loss_share * sign / limit(joint),
                 });
             }
         }
@@ -251,11 +262,24 @@ pub(super) fn joint_rows(plant: &ControlModel) -> Vec<Row> {
                 .collect();
             let bound = sign * (limit - bias[joint]) / half;
             if row.iter().any(|entry| *entry != 0.0) {
-                rows.push(Row { joint, row, bound });
+                rows.push(Row {
+                    joint,
+                    row,
+                    bound,
+                    per_loss: 0.0,
+                });
             }
         }
     }
     rows
+}
+
+/// Rotation that turns a lifted force upright: none is needed for one in world axes.
+pub fn to_upright(frame: WrenchFrame, attitude: [f64; 2]) -> [[f64; 3]; 3] {
+    match frame {
+        WrenchFrame::Body => upright(attitude),
+        WrenchFrame::World => upright([0.0; 2]),
+    }
 }
 
 /// Rotation from the body frame to an upright frame with the same heading, `R_y(pitch) R_x(roll)`,

@@ -112,6 +112,7 @@ mod tests {
             joint,
             row: row.to_vec(),
             bound,
+            per_loss: 0.0,
         }
     }
 

@@ -10,6 +10,7 @@ use super::linearise::StageModel;
 use super::problem::{Row, StageRows};
 use super::qp::{Cone, ConeProgram};
 use super::sparse::SparseColumns;
+use crate::robot::JOINT_DIM;
 
 /// Price of a slack in the program; the whole cost is scaled to it. The solver starts with all
 /// multipliers near one and needs two iterations more if it has to bring them to 100.
@@ -28,6 +29,8 @@ pub struct Stage {
     pub input: Vec<f64>,
     /// Phase of the stage.
     pub phase: usize,
+    /// What the joints take along the reference, N m.
+    pub losses_nm: [f64; JOINT_DIM],
     /// Friction cone rows `(μ F_z, F_x, F_y) / weight`, `3 × latent_dim` row-major; zero in flight.
     pub force: Vec<f64>,
     /// Rows of this stage, as many as the program has, where they are not the same at all stages.
@@ -43,6 +46,7 @@ impl Stage {
             state: vec![0.0; 2 * latent_dim],
             input: vec![0.0; latent_dim],
             phase: 0,
+            losses_nm: [0.0; JOINT_DIM],
             force: vec![0.0; 3 * latent_dim],
             rows: None,
         }
@@ -332,7 +336,8 @@ impl Transcription {
             let positions = &self.positions[index].torque[number * d..][..d];
             let at_reference = scaled_row(&row.row, root, &stage.input, &mut self.work);
             scatter(&self.work, positions, program.a.values_mut());
-            program.b[self.layout.torque_row(index) + number] = row.bound - at_reference;
+            let bound = row.bound - row.per_loss * stage.losses_nm[row.joint];
+            program.b[self.layout.torque_row(index) + number] = bound - at_reference;
         }
         for (number, row) in rows.rate.iter().enumerate() {
             let positions = &self.positions[index].rate[number * d..][..d];

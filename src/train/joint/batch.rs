@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::recording::preprocess::prepare;
 use crate::recording::{PhaseRule, Source};
-use crate::robot::Robot;
+use crate::robot::InputRule;
 use crate::train::dataset::Scaling;
 use crate::train::error::TrainError;
 use crate::train::smooth::moving_average;
@@ -80,14 +80,14 @@ pub struct BatchOptions<'a> {
 /// [`TrainError::Recording`] for what cannot be resampled or turned into inputs.
 pub fn batches(
     recordings: &Source<'_>,
-    robot: &Robot,
+    rule: &InputRule,
     options: &BatchOptions<'_>,
 ) -> Result<Vec<Batch>, TrainError> {
     let mut out = Vec::new();
     recordings.for_each(|recording| {
         for part in prepare(recording, options.phases, options.rows)? {
             let samples = &part.samples;
-            let u = rows(&samples.input(robot)?, &options.scaling.input);
+            let u = rows(&samples.input(rule)?, &options.scaling.input);
             let x = rows(&samples.x, &options.scaling.state);
             let dx = rows(&samples.dx, &options.scaling.state);
             let smooth = moving_average(&samples.ddx, options.smoothing);

@@ -46,13 +46,14 @@ pub fn joint(
 ) -> Result<Trained, TrainError> {
     let task = Task::new(recordings.clone(), robot, options)?;
     let scaling = options.scaling.factors();
+    let rule = options.input_rule(robot);
     let batch_options = BatchOptions {
         phases: &options.phases,
         scaling: &scaling,
         rows: options.joint.batch_rows,
         smoothing: options.regression.smoothing,
     };
-    let training = batches(&recordings.training, robot, &batch_options)?;
+    let training = batches(&recordings.training, &rule, &batch_options)?;
     let trainer = Trainer {
         task: &task,
         batches: &training,
@@ -60,7 +61,7 @@ pub fn joint(
     };
     let runs = trainer.run_seeds(watch);
 
-    let validation = batches(&recordings.validation, robot, &batch_options)?;
+    let validation = batches(&recordings.validation, &rule, &batch_options)?;
     let judged = if validation.is_empty() {
         &training
     } else {
