@@ -120,7 +120,7 @@ fn main() {
 
     let mut n_entries = 0;
     let mut n_nodes = 0;
-    let jacobian = mean(|| {
+    let derivatives = mean(|| {
         let mut pool = model.pool.clone();
         let time = timed(|| n_entries = jacobian(&mut pool, &model).len());
         n_nodes = pool.len();
@@ -128,7 +128,7 @@ fn main() {
     });
     report(
         "jacobian",
-        jacobian,
+        derivatives,
         &format!("{n_entries} entries, {n_nodes} nodes in the pool"),
     );
 

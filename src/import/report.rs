@@ -155,10 +155,16 @@ impl fmt::Display for Note {
             }
             Note::ZeroBias { part } => write!(f, "the {part} has no bias: zero"),
             Note::Layers { part, layers } => write!(f, "the {part} has layers {layers}"),
-            Note::NoMap { part: "encoder" } => {
-                f.write_str("no encoder: the model has latent coordinates only")
+            Note::NoMap { part } => {
+                let lost = match *part {
+                    "encoder" => "the model has latent coordinates only",
+                    _ => "latent states cannot be mapped back",
+                };
+                write!(
+                    f,
+                    "no tensor {part}.weight, and no --map {part}.weight=TENSOR: {lost}"
+                )
             }
-            Note::NoMap { part } => write!(f, "no {part}: latent states cannot be mapped back"),
             Note::MixedWeights => f.write_str(
                 "encoder and decoder are stored in different ways, one for row and one for column \
                  vectors",

@@ -83,16 +83,13 @@ fn after<'t>(head: &str, text: &'t str) -> Option<&'t str> {
 }
 
 fn read_role(text: &str) -> Option<Role> {
-    let of_phase: [(&str, fn(String) -> Role); 4] = [
-        ("xi", Role::Xi),
-        ("mask", Role::Mask),
-        ("input_mean", Role::InputMean),
-        ("input_covariance", Role::InputCovariance),
-    ];
-    if let Some(role) =
-        (of_phase.iter()).find_map(|(head, role)| Some(role(after(head, text)?.to_owned())))
-    {
-        return Some(role);
+    let phase = |head: &str| after(head, text).map(str::to_owned);
+    let of_phase = (phase("xi").map(Role::Xi))
+        .or_else(|| phase("mask").map(Role::Mask))
+        .or_else(|| phase("input_mean").map(Role::InputMean))
+        .or_else(|| phase("input_covariance").map(Role::InputCovariance));
+    if of_phase.is_some() {
+        return of_phase;
     }
     match after("scaling", text) {
         Some("state") => return Some(Role::StateScaling),

@@ -232,7 +232,7 @@ fn import_of_square_weights_follows_the_option() {
     let stored = [
         plain("encoder.weight", &square),
         plain("decoder.weight", &square),
-        plain("xi", &xi),
+        plain("xi.contact", &xi),
     ];
     let bytes = safetensors(&stored);
     let mut options = ImportOptions {

@@ -11,6 +11,7 @@
 mod document;
 mod expression;
 mod names;
+mod numbers;
 mod reader;
 mod sections;
 mod token;
