@@ -90,7 +90,8 @@ impl Summary {
             .column("refused", "", |row| row.refused)
             .table();
         let rows = self.dimensions.iter();
-        let columns: [(&str, fn(&DimensionSummary) -> Spread); 6] = [
+        type Column = (&'static str, fn(&DimensionSummary) -> Spread);
+        let columns: [Column; 6] = [
             ("decoder_mse", |row| row.decoder_mse),
             ("active", |row| row.active),
             ("combined_loss", |row| row.combined_loss),
