@@ -16,7 +16,7 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 33] = sources![
+const SOURCES: [(&str, &str); 34] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
@@ -43,6 +43,7 @@ const SOURCES: [(&str, &str); 33] = sources![
     "mpc/online/settings.rs",
     "mpc/online/sparse.rs",
     "mpc/online/transcribe.rs",
+    "robot/actuators.rs",
     "robot/error.rs",
     "robot/feet.rs",
     "robot/joints.rs",
