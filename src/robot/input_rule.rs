@@ -5,7 +5,6 @@
 //! frames ([`WrenchFrame`]). A model states which rule its inputs were made by; training,
 //! simulation, control and generated code all follow it.
 
-use clap::ValueEnum;
 use nalgebra::{Matrix3, SMatrix, Vector6};
 
 use super::actuators::Actuators;
@@ -14,7 +13,7 @@ use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg, STATE
 use super::registry::Robot;
 
 /// Axes of the force and moment in an input.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum WrenchFrame {
     /// As published: axes parallel to the body's, the arm of each moment is the foot in its own hip
     /// frame.

@@ -75,6 +75,10 @@ pub enum PhaseSet {
     ContactRearFlight,
 }
 
+fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
+    WrenchFrame::by_name(text).ok_or_else(|| format!("found `{text}`, expected `world` or `body`"))
+}
+
 /// `romc train`
 #[derive(Debug, Args)]
 #[command(
@@ -181,7 +185,7 @@ pub struct TrainSettings {
     #[arg(long, value_name = "FILE.toml")]
     pub actuators: Option<String>,
     /// Axes of force and moment in the inputs: `world` or, as published, `body` (world unless given)
-    #[arg(long, value_name = "FRAME")]
+    #[arg(long, value_name = "FRAME", value_parser = wrench_frame)]
     pub wrench_frame: Option<WrenchFrame>,
     /// Phases of the model
     #[arg(long, value_enum)]
