@@ -4,6 +4,7 @@ use clap::{Args, Parser, Subcommand};
 
 use super::check::CheckArguments;
 use super::compile::CompileArguments;
+use super::identify::IdentifyArguments;
 use super::import::ImportArguments;
 use super::manual::{CompletionsArguments, ManualArguments};
 use super::run::{
@@ -31,6 +32,8 @@ pub enum Command {
     Demo(DemoArguments),
     /// Tell what a recording or a model holds, and what is implausible in it
     Inspect(InspectArguments),
+    /// Find gravity, mass and the joints' losses in recordings
+    Identify(IdentifyArguments),
     /// Learn a model from recordings
     Train(Box<TrainArguments>),
     /// Train every latent dimension with several seeds: accuracy against complexity
@@ -59,6 +62,7 @@ impl Command {
         match self {
             Self::Demo(arguments) => arguments.output_format.json,
             Self::Inspect(arguments) => arguments.output_format.json,
+            Self::Identify(arguments) => arguments.output_format.json,
             Self::Train(arguments) => arguments.output_format.json,
             Self::Study(arguments) => arguments.output_format.json,
             Self::Import(arguments) => arguments.output_format.json,

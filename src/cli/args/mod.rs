@@ -11,6 +11,7 @@
 mod check;
 mod command;
 mod compile;
+mod identify;
 mod import;
 mod manual;
 mod number;
@@ -23,6 +24,7 @@ pub use compile::{
     CodeArguments, CompileArguments, EquationArguments, FormChoice, PrecisionChoice,
     SimplifyArguments, SinCosChoice, UnitsChoice,
 };
+pub use identify::IdentifyArguments;
 pub use import::{ImportArguments, LibraryArgument};
 pub use manual::{CompletionsArguments, ManualArguments};
 pub use run::{
