@@ -6,7 +6,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::recording::preprocess::resampled;
+use crate::recording::preprocess::{differences, resampled};
 use crate::recording::{RecordingError, Segment};
 use crate::robot::{BODY_DIM, JOINT_DIM};
 
@@ -18,6 +18,10 @@ const JOINT_WEIGHT: f64 = 0.01;
 const STANDSTILL: f64 = 1e-3;
 /// Samples closer than this share of a step are the same sample, logged again.
 const SAME_SAMPLE: f64 = 0.4;
+/// Steps between two samples from which what lies between them is lost rather than late.
+const LOST_STEPS: f64 = 5.0;
+/// Disagreement of the trunk's angular rates with its angles from which they are replaced.
+const RATE_DISAGREEMENT: f64 = 0.2;
 /// Unevenness of time steps, relative, from which a segment is resampled.
 const EVEN: f64 = 0.01;
 
@@ -30,56 +34,98 @@ pub struct Timed {
     pub elapsed_ratio: f64,
     /// Whether the times were rebuilt from the motion.
     pub rebuilt: bool,
+    /// Whether the trunk's angular rates are differences of its angles, because those of the file disagree with them.
+    pub rates_replaced: bool,
+    /// Samples that stand in for lost ones: straight lines across more than five steps.
+    pub lost: Vec<bool>,
 }
 
-/// The segment at even time steps; its times are rebuilt where they disagree with the motion.
+/// The segment at even time steps; its times are rebuilt where they disagree with the motion, its
+/// angular rates where they disagree with the angles.
 ///
 /// # Errors
 /// [`TooShort`](crate::recording::RecordingFault::TooShort) if fewer than two samples remain.
 pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
     let n = segment.len();
     let elapsed: Vec<Interval> = (1..n).map(|right| Interval::of(segment, right)).collect();
-    let (moved, stamped) = elapsed
-        .iter()
-        .fold((0.0, 0.0), |(moved, stamped), interval| {
-            (
-                moved + interval.moved,
-                stamped + interval.speed * interval.stamped_s,
-            )
-        });
+    let moved: f64 = elapsed.iter().map(|interval| interval.moved).sum();
+    let stamped: f64 = (elapsed.iter())
+        .map(|interval| interval.speed * interval.stamped_s)
+        .sum();
     let elapsed_ratio = if stamped > 0.0 { moved / stamped } else { 1.0 };
     let rebuilt = (elapsed_ratio - 1.0).abs() > LEAST_DISAGREEMENT && elapsed_ratio > 0.0;
-    if !rebuilt {
-        let step = segment.mean_step_s();
-        let even = (segment.time_s.windows(2)).all(|w| (w[1] - w[0] - step).abs() <= EVEN * step);
-        let segment = if even {
-            segment.clone()
-        } else {
-            resampled(segment, n)?
-        };
-        return Ok(Timed {
-            segment,
-            elapsed_ratio,
-            rebuilt,
-        });
-    }
+    let chosen = match rebuilt {
+        true => by_motion(segment, &elapsed),
+        false => segment.clone(),
+    };
     let step_s = segment.mean_step_s();
-    let mut time_s = vec![segment.time_s.first().copied().unwrap_or(0.0)];
-    let (mut now, mut kept) = (time_s[0], vec![0]);
+    let mut mended = match is_even(&chosen) {
+        true => chosen.clone(),
+        false => {
+            let rows = (chosen.duration_s() / step_s).round() as usize + 1;
+            resampled(&chosen, rows)?
+        }
+    };
+    let lost = lost(&chosen.time_s, &mended.time_s, step_s);
+    let rates_replaced = replace_angular_rates(&mut mended);
+    Ok(Timed {
+        segment: mended,
+        elapsed_ratio,
+        rebuilt,
+        rates_replaced,
+        lost,
+    })
+}
+
+/// Which times lie between samples that are more than [`LOST_STEPS`] apart.
+fn lost(samples_s: &[f64], time_s: &[f64], step_s: f64) -> Vec<bool> {
+    let mut right = 1;
+    let of = |time: &f64| {
+        while right + 1 < samples_s.len() && samples_s[right] < *time {
+            right += 1;
+        }
+        right < samples_s.len() && samples_s[right] - samples_s[right - 1] > LOST_STEPS * step_s
+    };
+    time_s.iter().map(of).collect()
+}
+
+fn is_even(segment: &Segment) -> bool {
+    let step_s = segment.mean_step_s();
+    let mut steps = segment.time_s.windows(2).map(|pair| pair[1] - pair[0]);
+    steps.all(|step| (step - step_s).abs() <= EVEN * step_s)
+}
+
+/// The samples at times that their motion says, without those that were logged twice.
+fn by_motion(segment: &Segment, elapsed: &[Interval]) -> Segment {
+    let least_s = SAME_SAMPLE * segment.mean_step_s();
+    let mut now = segment.time_s[0];
+    let (mut time_s, mut kept) = (vec![now], vec![0]);
     for (interval, right) in elapsed.iter().zip(1..) {
         now += interval.elapsed_s();
-        if now - time_s[time_s.len() - 1] > SAME_SAMPLE * step_s {
+        if now - time_s[time_s.len() - 1] > least_s {
             time_s.push(now);
             kept.push(right);
         }
     }
-    let chosen = chosen(segment, &kept, time_s);
-    let rows = (chosen.duration_s() / step_s).round() as usize + 1;
-    Ok(Timed {
-        segment: resampled(&chosen, rows)?,
-        elapsed_ratio,
-        rebuilt,
-    })
+    chosen(segment, &kept, time_s)
+}
+
+/// Replaces the trunk's angular rates by differences of its angles if the two disagree; whether so.
+///
+/// Rates that clip, that are differences over wrong stamps, or that a gyroscope measured about the
+/// trunk's own axes are no rates of roll, pitch and yaw.
+fn replace_angular_rates(segment: &mut Segment) -> bool {
+    const FIRST: usize = JOINT_DIM + BODY_DIM / 2;
+    let angles = segment.x.rows(FIRST, BODY_DIM / 2).into_owned();
+    let rates = differences(&segment.time_s, &angles);
+    let recorded = segment.dx.rows(FIRST, BODY_DIM / 2);
+    let ratio = recorded.dot(&rates) / recorded.norm_squared();
+    // No motion at all is no disagreement.
+    let disagree = (ratio - 1.0).abs() > RATE_DISAGREEMENT;
+    if disagree {
+        segment.dx.rows_mut(FIRST, BODY_DIM / 2).copy_from(&rates);
+    }
+    disagree
 }
 
 /// What moved between two samples.

@@ -1,6 +1,7 @@
 //! From recordings to an [`Identification`]: equations, fit and delay in turn until they agree.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use super::clock::{Timed, timed};
 use super::equations::SampleEquations;
@@ -49,25 +50,41 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
     let mut segments = Vec::new();
     for recording in recordings {
         notes.extend(implausible(recording, robot));
-        for segment in &recording.segments {
-            let timed = timed(segment)?;
-            notes.extend(clock_note(segment, &timed));
-            let motion = Motion::of(&timed.segment);
-            segments.push((timed.segment, motion));
-        }
+        let timed = recording.segments.iter().map(timed);
+        let timed = timed.collect::<Result<Vec<_>, _>>()?;
+        notes.extend(mended(&recording.path, &timed));
+        segments.extend(timed.into_iter().map(|timed| Prepared {
+            motion: Motion::of(&timed.segment),
+            segment: timed.segment,
+            lost: timed.lost,
+        }));
     }
     let mut state = State::new(robot);
     let mut round = Round::of(&segments, robot, &state)?;
     round.require_enough(recordings.len())?;
+    let mut settled = false;
     for _ in 0..MOST_ROUNDS {
-        let settled = state.improve(&round.windows, robot)?;
+        settled = state.improve(&round.windows, robot)?;
         if settled {
             break;
         }
         round = Round::of(&segments, robot, &state)?;
     }
+    if !settled {
+        notes.push(format!(
+            "mass and delay still changed after {MOST_ROUNDS} rounds: they are less certain than \
+             their standard errors"
+        ));
+    }
     notes.extend(round.notes());
     state.result(robot, &segments, &round.windows, notes)
+}
+
+/// A segment ready for its equations.
+struct Prepared {
+    segment: Segment,
+    motion: Motion,
+    lost: Vec<bool>,
 }
 
 /// The equations of all segments at one estimate of gravity and delay.
@@ -77,20 +94,21 @@ struct Round {
 }
 
 impl Round {
-    fn of(
-        segments: &[(Segment, Motion)],
-        robot: &Robot,
-        state: &State,
-    ) -> Result<Self, IdentifyError> {
+    fn of(segments: &[Prepared], robot: &Robot, state: &State) -> Result<Self, IdentifyError> {
         let mut round = Self {
             windows: Windows::default(),
             clipped_torques: 0,
         };
-        for (segment, motion) in segments {
+        for Prepared {
+            segment,
+            motion,
+            lost,
+        } in segments
+        {
             let equations =
                 SampleEquations::of(segment, motion, robot, state.gravity_m_s2, state.delay_s);
             round.clipped_torques += equations.clipped_torques;
-            round.windows.add(segment, &equations)?;
+            round.windows.add(segment, &equations, lost)?;
         }
         Ok(round)
     }
@@ -198,15 +216,16 @@ impl State {
     fn result(
         &self,
         robot: &Robot,
-        segments: &[(Segment, Motion)],
+        segments: &[Prepared],
         windows: &Windows,
         notes: Vec<String>,
     ) -> Result<Identification, IdentifyError> {
         let priors = priors(robot.geometry(), self.mass_kg, &self.losses);
         let estimate = self.iteration.estimate.unwrap_or_default();
         // When within a step a torque acts is not recorded: uniform over it.
-        let longest_step = |step: f64, segment: &Segment| step.max(segment.mean_step_s());
-        let step_s = segments.iter().map(|(s, _)| s).fold(0.0, longest_step);
+        let longest_step =
+            |step: f64, prepared: &Prepared| step.max(prepared.segment.mean_step_s());
+        let step_s = segments.iter().fold(0.0, longest_step);
         let within_step_s = step_s / 12_f64.sqrt();
         let covariance = self.iteration.covariance(
             &windows.rows,
@@ -296,14 +315,26 @@ fn implausible(recording: &Recording, robot: &Robot) -> Option<String> {
     })
 }
 
-fn clock_note(segment: &Segment, timed: &Timed) -> Option<String> {
-    timed.rebuilt.then(|| {
-        format!(
-            "{}: the robot moved for {:.2} s in each second that row {} and the following count \
-             (velocities against displacements): samples lost? Their times were rebuilt",
-            segment.path.display(),
-            timed.elapsed_ratio,
-            segment.row(0)
-        )
-    })
+/// What was mended in the segments of a recording.
+fn mended(path: &Path, segments: &[Timed]) -> Option<String> {
+    let mut faults = Vec::new();
+    let rebuilt: Vec<f64> = (segments.iter())
+        .filter(|timed| timed.rebuilt)
+        .map(|timed| timed.elapsed_ratio)
+        .collect();
+    if let Some(longest) = rebuilt.iter().copied().reduce(f64::max) {
+        faults.push(format!(
+            "{longest:.2} s of motion pass in a recorded second (displacements against velocities; \
+             samples lost?), times were rebuilt"
+        ));
+    }
+    let lost = |timed: &Timed| timed.lost.iter().filter(|lost| **lost).count();
+    let lost: usize = segments.iter().map(lost).sum();
+    if lost > 0 {
+        faults.push(format!("{lost} samples between distant ones are left out"));
+    }
+    if segments.iter().any(|timed| timed.rates_replaced) {
+        faults.push("angular rates disagree with the angles and were replaced".to_owned());
+    }
+    (!faults.is_empty()).then(|| format!("{}: {}", path.display(), faults.join("; ")))
 }

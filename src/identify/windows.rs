@@ -84,7 +84,7 @@ pub struct Windows {
 }
 
 impl Windows {
-    /// Adds the windows of a segment at even time steps.
+    /// Adds the windows of a segment at even time steps; `lost` are samples to leave out.
     ///
     /// # Errors
     /// [`IdentifyError::Recording`] if the filter cannot be made for the segment's time step.
@@ -92,6 +92,7 @@ impl Windows {
         &mut self,
         segment: &Segment,
         equations: &SampleEquations,
+        lost: &[bool],
     ) -> Result<(), IdentifyError> {
         let step_s = segment.mean_step_s();
         let samples = |time_s: f64| (time_s / step_s).round() as usize;
@@ -102,7 +103,7 @@ impl Windows {
             let margin = samples(MARGIN_S);
             let inner = stance.start + margin..stance.end.saturating_sub(margin).max(stance.start);
             self.singular_samples += inner.clone().filter(|s| equations.singular[*s]).count();
-            for span in runs(inner, |sample| !equations.singular[sample]) {
+            for span in runs(inner, |sample| !equations.singular[sample] && !lost[sample]) {
                 if span.len() < window {
                     continue;
                 }
