@@ -12,6 +12,7 @@ use crate::deploy::EmitError;
 use crate::equations::PhysicalError;
 use crate::evaluate::EvaluateError;
 use crate::files::{FolderError, Place};
+use crate::identify::IdentifyError;
 use crate::import::{ImportError, NameError};
 use crate::lower::LowerError;
 use crate::model::ModelError;
@@ -39,6 +40,8 @@ pub enum Error {
     Artifact(#[from] ArtifactError),
     #[error(transparent)]
     Import(Box<ImportError>),
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
     #[error(transparent)]
     Check(#[from] CheckError),
     #[error(transparent)]
@@ -102,6 +105,7 @@ impl Error {
             // Exit code 1 of `check` says that two files differ.
             Self::Rename(_) | Self::Name(_) | Self::Check(_) => true,
             Self::Recording(_)
+            | Self::Identify(_)
             | Self::Model(_)
             | Self::Artifact(_)
             | Self::Emit(_)

@@ -8,6 +8,7 @@
 //! | stage | in | out |
 //! |---|---|---|
 //! | [`recording`] | CSV files | [`Recording`](recording::Recording): segments of samples in SI units |
+//! | [`identify`] | recordings | gravity, mass and the joints' losses, with standard errors |
 //! | [`train`], [`study`] | recordings | a [`ReducedModel`](model::ReducedModel) |
 //! | [`artifact`], [`import`] | a model file; tensors or equations of other tools | the same |
 //! | [`equations`] | a model | [`Equations`](equations::Equations): its accelerations as expressions of [`symbolic`] |
@@ -52,6 +53,7 @@ pub mod equations;
 mod error;
 pub mod evaluate;
 pub mod files;
+pub mod identify;
 pub mod import;
 pub mod ir;
 pub mod lower;

@@ -9,6 +9,7 @@ pub mod args;
 mod check;
 mod compile;
 mod demo;
+mod identify;
 mod import;
 mod inspect;
 mod inspect_model;
@@ -74,6 +75,7 @@ fn execute(command: Command) -> Result<(Answer, ExitCode), Error> {
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
+        Command::Identify(arguments) => identify::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
         Command::Compile(arguments) => compile::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),

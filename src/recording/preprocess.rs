@@ -88,7 +88,7 @@ pub fn differences(time_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
 ///
 /// # Errors
 /// [`RecordingFault::TooShort`] if it has one sample or `rows` is below 2.
-fn resampled(segment: &Segment, rows: usize) -> Result<Segment, RecordingError> {
+pub fn resampled(segment: &Segment, rows: usize) -> Result<Segment, RecordingError> {
     let n = segment.len();
     if n < 2 || rows < 2 {
         let (found, expected) = (n.min(rows), 2);

@@ -4,6 +4,7 @@ use clap::{Parser, Subcommand};
 
 use super::check::CheckArguments;
 use super::compile::CompileArguments;
+use super::identify::IdentifyArguments;
 use super::import::ImportArguments;
 use super::manual::{CompletionsArguments, ManualArguments};
 use super::run::{
@@ -34,6 +35,8 @@ pub enum Command {
     Demo(DemoArguments),
     /// Describe a recording or a model, and list what is implausible in it
     Inspect(InspectArguments),
+    /// Find gravity, mass and the joints' losses in recordings
+    Identify(IdentifyArguments),
     /// Learn a model from recordings
     Train(Box<TrainArguments>),
     /// Train every latent dimension with several seeds: accuracy against complexity

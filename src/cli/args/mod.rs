@@ -11,6 +11,7 @@
 mod check;
 mod command;
 mod compile;
+mod identify;
 mod import;
 mod manual;
 mod number;
@@ -22,6 +23,7 @@ pub use command::{Arguments, Command};
 pub use compile::{
     CodeArguments, CompileArguments, EquationArguments, SimplifyArguments, UnitsChoice,
 };
+pub use identify::IdentifyArguments;
 pub use import::{ImportArguments, LibraryArgument};
 pub use manual::{CompletionsArguments, ManualArguments};
 pub use run::{DemoArguments, InspectArguments, MpcArguments, ReportArguments, SimulateArguments};

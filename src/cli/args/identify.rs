@@ -1,0 +1,27 @@
+//! `romc identify`: what recordings say of the robot.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+/// `romc identify`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Recordings should hold jumps: flight shows gravity and the legs' inertia, moving legs their losses.\n\n\
+                  Example:\n  \
+                  romc identify examples/recordings/go1/test_*.csv.gz --robot go1 --output actuators.toml"
+)]
+pub struct IdentifyArguments {
+    /// Recordings of one robot
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    /// Robot whose geometry and limits count
+    #[arg(long, value_name = "NAME")]
+    pub robot: String,
+    /// Write what was found to this file: losses of the twelve joints, gravity, mass, standard errors
+    #[arg(long, value_name = "ACTUATORS.toml")]
+    pub output: Option<PathBuf>,
+    /// Replace an existing output file
+    #[arg(long)]
+    pub force: bool,
+}

@@ -1,0 +1,181 @@
+//! Segments whose time stamps disagree with their motion, mended.
+//!
+//! A logger that counts its samples instead of reading a clock says that time passes evenly even
+//! where samples came late or were lost. The velocities know better: between two samples the robot
+//! moved by velocity times elapsed time, in every coordinate.
+
+use nalgebra::DMatrix;
+
+use crate::recording::preprocess::{differences, resampled};
+use crate::recording::{RecordingError, Segment};
+use crate::robot::{BODY_DIM, JOINT_DIM};
+
+/// Elapsed over stamped time from which a segment's clock is replaced.
+const LEAST_DISAGREEMENT: f64 = 0.03;
+/// Weight of a joint's motion (rad/s)^2 beside that of the body's position (m/s)^2.
+const JOINT_WEIGHT: f64 = 0.01;
+/// Motion that counts as evidence of either clock, (m/s)^2.
+const STANDSTILL: f64 = 1e-3;
+/// Samples closer than this share of a step are the same sample, logged again.
+const SAME_SAMPLE: f64 = 0.4;
+/// Steps between two samples from which what lies between them is lost rather than late.
+const LOST_STEPS: f64 = 5.0;
+/// Disagreement of the trunk's angular rates with its angles from which they are replaced.
+const RATE_DISAGREEMENT: f64 = 0.2;
+/// Unevenness of time steps, relative, from which a segment is resampled.
+const EVEN: f64 = 0.01;
+
+/// A segment at even time steps, and what its own clock said.
+#[derive(Debug, Clone)]
+pub struct Timed {
+    /// The segment.
+    pub segment: Segment,
+    /// Time that passed by the motion, over time that passed by the stamps.
+    pub elapsed_ratio: f64,
+    /// Whether the times were rebuilt from the motion.
+    pub rebuilt: bool,
+    /// Whether the trunk's angular rates are differences of its angles, because those of the file disagree with them.
+    pub rates_replaced: bool,
+    /// Samples that stand in for lost ones: straight lines across more than five steps.
+    pub lost: Vec<bool>,
+}
+
+/// The segment at even time steps; its times are rebuilt where they disagree with the motion, its
+/// angular rates where they disagree with the angles.
+///
+/// # Errors
+/// [`TooShort`](crate::recording::RecordingFault::TooShort) if fewer than two samples remain.
+pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
+    let n = segment.len();
+    let elapsed: Vec<Interval> = (1..n).map(|right| Interval::of(segment, right)).collect();
+    let moved: f64 = elapsed.iter().map(|interval| interval.moved).sum();
+    let stamped: f64 = (elapsed.iter())
+        .map(|interval| interval.speed * interval.stamped_s)
+        .sum();
+    let elapsed_ratio = if stamped > 0.0 { moved / stamped } else { 1.0 };
+    let rebuilt = (elapsed_ratio - 1.0).abs() > LEAST_DISAGREEMENT && elapsed_ratio > 0.0;
+    let chosen = match rebuilt {
+        true => by_motion(segment, &elapsed),
+        false => segment.clone(),
+    };
+    let step_s = segment.mean_step_s();
+    let mut mended = match is_even(&chosen) {
+        true => chosen.clone(),
+        false => {
+            let rows = (chosen.duration_s() / step_s).round() as usize + 1;
+            resampled(&chosen, rows)?
+        }
+    };
+    let lost = lost(&chosen.time_s, &mended.time_s, step_s);
+    let rates_replaced = replace_angular_rates(&mut mended);
+    Ok(Timed {
+        segment: mended,
+        elapsed_ratio,
+        rebuilt,
+        rates_replaced,
+        lost,
+    })
+}
+
+/// Which times lie between samples that are more than [`LOST_STEPS`] apart.
+fn lost(samples_s: &[f64], time_s: &[f64], step_s: f64) -> Vec<bool> {
+    let mut right = 1;
+    let of = |time: &f64| {
+        while right + 1 < samples_s.len() && samples_s[right] < *time {
+            right += 1;
+        }
+        right < samples_s.len() && samples_s[right] - samples_s[right - 1] > LOST_STEPS * step_s
+    };
+    time_s.iter().map(of).collect()
+}
+
+fn is_even(segment: &Segment) -> bool {
+    let step_s = segment.mean_step_s();
+    let mut steps = segment.time_s.windows(2).map(|pair| pair[1] - pair[0]);
+    steps.all(|step| (step - step_s).abs() <= EVEN * step_s)
+}
+
+/// The samples at times that their motion says, without those that were logged twice.
+fn by_motion(segment: &Segment, elapsed: &[Interval]) -> Segment {
+    let least_s = SAME_SAMPLE * segment.mean_step_s();
+    let mut now = segment.time_s[0];
+    let (mut time_s, mut kept) = (vec![now], vec![0]);
+    for (interval, right) in elapsed.iter().zip(1..) {
+        now += interval.elapsed_s();
+        if now - time_s[time_s.len() - 1] > least_s {
+            time_s.push(now);
+            kept.push(right);
+        }
+    }
+    chosen(segment, &kept, time_s)
+}
+
+/// Replaces the trunk's angular rates by differences of its angles if the two disagree; whether so.
+///
+/// Rates that clip, that are differences over wrong stamps, or that a gyroscope measured about the
+/// trunk's own axes are no rates of roll, pitch and yaw.
+fn replace_angular_rates(segment: &mut Segment) -> bool {
+    const FIRST: usize = JOINT_DIM + BODY_DIM / 2;
+    let angles = segment.x.rows(FIRST, BODY_DIM / 2).into_owned();
+    let rates = differences(&segment.time_s, &angles);
+    let recorded = segment.dx.rows(FIRST, BODY_DIM / 2);
+    let ratio = recorded.dot(&rates) / recorded.norm_squared();
+    // No motion at all is no disagreement.
+    let disagree = (ratio - 1.0).abs() > RATE_DISAGREEMENT;
+    if disagree {
+        segment.dx.rows_mut(FIRST, BODY_DIM / 2).copy_from(&rates);
+    }
+    disagree
+}
+
+/// What moved between two samples.
+struct Interval {
+    stamped_s: f64,
+    /// Weighted square of the velocity.
+    speed: f64,
+    /// Weighted product of velocity and displacement.
+    moved: f64,
+}
+
+impl Interval {
+    /// From the sample before `right` to `right`.
+    fn of(segment: &Segment, right: usize) -> Self {
+        let (mut speed, mut moved) = (0.0, 0.0);
+        for row in 0..JOINT_DIM + BODY_DIM / 2 {
+            let weight = if row < JOINT_DIM { JOINT_WEIGHT } else { 1.0 };
+            let velocity = (segment.dx[(row, right - 1)] + segment.dx[(row, right)]) / 2.0;
+            let displacement = segment.x[(row, right)] - segment.x[(row, right - 1)];
+            speed += weight * velocity * velocity;
+            moved += weight * velocity * displacement;
+        }
+        Self {
+            stamped_s: segment.time_s[right] - segment.time_s[right - 1],
+            speed,
+            moved,
+        }
+    }
+
+    /// Time that passed, s, at least none.
+    fn elapsed_s(&self) -> f64 {
+        let time = (self.moved + STANDSTILL * self.stamped_s) / (self.speed + STANDSTILL);
+        time.max(0.0)
+    }
+}
+
+/// Some samples of a segment, at other times.
+fn chosen(segment: &Segment, samples: &[usize], time_s: Vec<f64>) -> Segment {
+    let columns = |m: &DMatrix<f64>| m.select_columns(samples);
+    let rows = segment.row(segment.len() - 1) - segment.row(0);
+    Segment {
+        path: segment.path.clone(),
+        first_row: segment.first_row,
+        row_stride: rows as f64 / samples.len().saturating_sub(1).max(1) as f64,
+        time_s,
+        x: columns(&segment.x),
+        dx: columns(&segment.dx),
+        ddx: columns(&segment.ddx),
+        torque_nm: columns(&segment.torque_nm),
+        feet: samples.iter().map(|sample| segment.feet[*sample]).collect(),
+        body_wrench: segment.body_wrench.as_ref().map(columns),
+    }
+}

@@ -1,0 +1,331 @@
+//! The linear equations between motion and torques at every sample of a segment.
+//!
+//! With `m` the mass, `p` the trunk's origin, `e` directions of trunk and links (second derivatives
+//! `e''`) and `s_e` their first moments, Newton's law for the whole robot is
+//! `p'' = -g e_z + 1/m (sum_k F_k - sum_e s_e e'')`. A foot on the ground pushes with
+//! `F_k = -J_k^-T (tau_k - losses - Y_k pi + contact)`: `Y_k pi` are the torques that move the leg's
+//! own links (first and second moments `pi`, linear), and contact is the torque of a foot of radius
+//! `r` that rolls with resistance `rho`. A leg in the air obeys `tau_k = losses + Y_k pi`, joint by
+//! joint. All unknowns enter linearly; torques are taken a delay later, and a column of their rates
+//! tells by how much that delay is wrong.
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::motion::{LegAcceleration, LegFrame, Motion};
+use super::parameters::{
+    ARMATURE, CALF, CALF_FRONT, CALF_SECOND, DELAY, DRY, FOOT_RADIUS, GRAVITY, INVERSE_MASS,
+    LEG_SIDE, PARAMETER_DIM, ROLLING, THIGH, THIGH_FRONT, THIGH_SECOND, TRUNK_FORWARD, TRUNK_UP,
+    VISCOUS,
+};
+use crate::recording::Segment;
+use crate::recording::preprocess::differences;
+use crate::robot::actuators::DRY_SPEED_RAD_S;
+use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::{JOINT_DIM, Leg, Robot};
+
+/// Smallest `|det J|` over the volume of its links at which a foot's force is taken from torques.
+pub const LEAST_MANIPULABILITY: f64 = 0.04;
+/// Speed within which rolling resistance changes its sign, in rad/s.
+const ROLLING_SPEED_RAD_S: f64 = 0.05;
+
+/// Rows of an equation: the coefficients of all unknowns, then the left side.
+pub const BODY_ROWS: usize = PARAMETER_DIM + 1;
+/// Rows of a joint's equation in [`SampleEquations::joints`].
+pub const JOINT_ROWS: usize = 12;
+
+/// The unknowns of a joint's equation, in the order of its rows; the left side follows.
+pub fn joint_unknowns(kind: usize) -> [usize; JOINT_ROWS - 1] {
+    [
+        VISCOUS + kind,
+        DRY + kind,
+        ARMATURE + kind,
+        LEG_SIDE,
+        THIGH,
+        THIGH_SECOND,
+        CALF,
+        CALF_SECOND,
+        THIGH_FRONT,
+        CALF_FRONT,
+        DELAY,
+    ]
+}
+
+/// The equations of a segment; one column a sample.
+#[derive(Debug, Clone)]
+pub struct SampleEquations {
+    /// Axes x, y, z one below the other, [`BODY_ROWS`] each: the trunk's acceleration, m/s^2.
+    pub body: DMatrix<f64>,
+    /// The twelve joints one below the other, [`JOINT_ROWS`] each: torque, N m. They hold in the air.
+    pub joints: DMatrix<f64>,
+    /// Samples at which a leg on the ground is too close to a singular posture.
+    pub singular: Vec<bool>,
+    /// Number of torques above the robot's limit, which count as the limit.
+    pub clipped_torques: usize,
+}
+
+impl SampleEquations {
+    /// The equations of a segment whose torques run `delay_s` ahead of its motion.
+    ///
+    /// `gravity_m_s2` is used only for the weight of the links of a leg.
+    pub fn of(
+        segment: &Segment,
+        motion: &Motion,
+        robot: &Robot,
+        gravity_m_s2: f64,
+        delay_s: f64,
+    ) -> Self {
+        let n = segment.len();
+        let (recorded, clipped_torques) = limited_torques(segment, robot);
+        let torque = delayed(&segment.time_s, &recorded, delay_s);
+        let torque_rate = differences(&segment.time_s, &torque);
+        let mut equations = Self {
+            body: DMatrix::zeros(3 * BODY_ROWS, n),
+            joints: DMatrix::zeros(JOINT_DIM * JOINT_ROWS, n),
+            singular: vec![false; n],
+            clipped_torques,
+        };
+        for sample in 0..n {
+            let mut body = BodyEquation::default();
+            body.add(GRAVITY, -Vector3::z());
+            body.add(TRUNK_FORWARD, -motion.trunk_axis(0, sample));
+            body.add(TRUNK_UP, -motion.trunk_axis(2, sample));
+            body.add(PARAMETER_DIM, motion.body(sample));
+            for leg in Leg::ALL {
+                let first = LEG_JOINT_DIM * leg.index();
+                let of = |m: &DMatrix<f64>| m.fixed_view::<3, 1>(first, sample).into_owned();
+                let state = LegSample {
+                    frame: motion.legs[sample][leg.index()],
+                    abduction: motion.attitude[sample].column(0).into_owned(),
+                    trunk_rate: motion.trunk_rate[sample],
+                    rate: of(&segment.dx),
+                    acceleration: of(&motion.coordinates),
+                    torque: of(&torque),
+                    torque_rate: of(&torque_rate),
+                    own: own_torques(robot, motion, leg, sample, gravity_m_s2),
+                };
+                body.add_moments(&motion.leg(leg, sample));
+                if segment.feet[sample][leg.index()] {
+                    let q = leg.of_joints(&segment.joints(sample));
+                    let posture = robot.geometry().manipulability(&q);
+                    match robot.foot_force_map(leg, &q) {
+                        Ok(map) if posture >= LEAST_MANIPULABILITY => {
+                            body.add_foot(&state, &(motion.attitude[sample] * map));
+                        }
+                        Ok(_) | Err(_) => equations.singular[sample] = true,
+                    }
+                }
+                for kind in 0..LEG_JOINT_DIM {
+                    let row = (first + kind) * JOINT_ROWS;
+                    let mut joint = equations
+                        .joints
+                        .fixed_view_mut::<JOINT_ROWS, 1>(row, sample);
+                    joint.copy_from_slice(&state.joint(kind));
+                }
+            }
+            equations.body.column_mut(sample).copy_from_slice(&body.0);
+        }
+        equations
+    }
+}
+
+/// Coefficients and left side for the trunk's acceleration at one sample.
+struct BodyEquation([f64; 3 * BODY_ROWS]);
+
+impl Default for BodyEquation {
+    fn default() -> Self {
+        Self([0.0; 3 * BODY_ROWS])
+    }
+}
+
+impl BodyEquation {
+    /// Adds a vector to the coefficients of an unknown, or to the left side.
+    fn add(&mut self, unknown: usize, vector: Vector3<f64>) {
+        for axis in 0..3 {
+            self.0[axis * BODY_ROWS + unknown] += vector[axis];
+        }
+    }
+
+    /// A leg's share in the acceleration of the centre of mass.
+    fn add_moments(&mut self, leg: &LegAcceleration) {
+        self.add(LEG_SIDE, -leg.side);
+        self.add(THIGH, -leg.thigh);
+        self.add(CALF, -leg.calf);
+        self.add(THIGH_FRONT, -leg.thigh_front);
+        self.add(CALF_FRONT, -leg.calf_front);
+    }
+
+    /// The force of a foot on the ground; `map` takes torques to forces in the world.
+    fn add_foot(&mut self, state: &LegSample, map: &Matrix3<f64>) {
+        let force = map * state.torque;
+        self.add(INVERSE_MASS, force);
+        self.add(DELAY, -(map * state.torque_rate));
+        for kind in 0..LEG_JOINT_DIM {
+            let (rate, joint) = (state.rate[kind], map.column(kind));
+            self.add(VISCOUS + kind, -joint * rate);
+            self.add(DRY + kind, -joint * (rate / DRY_SPEED_RAD_S).tanh());
+            self.add(ARMATURE + kind, -joint * state.acceleration[kind]);
+        }
+        for (unknown, torque) in OWN.into_iter().zip(&state.own) {
+            self.add(unknown, -(map * torque));
+        }
+        // The force acts below the centre of the foot, and the foot rolls.
+        let below = (-Vector3::z()).cross(&force);
+        self.add(FOOT_RADIUS, map * state.about_joints(&below));
+        let mut rolling = state.calf_rate();
+        rolling.z = 0.0;
+        let speed = rolling.norm().hypot(ROLLING_SPEED_RAD_S);
+        let resistance = -force.z.max(0.0) / speed * rolling;
+        self.add(ROLLING, map * state.about_joints(&resistance));
+    }
+}
+
+/// Unknowns of a leg's own links in the torques of its joints.
+const OWN: [usize; 7] = [
+    LEG_SIDE,
+    THIGH,
+    THIGH_SECOND,
+    CALF,
+    CALF_SECOND,
+    THIGH_FRONT,
+    CALF_FRONT,
+];
+
+/// One leg at one sample; vectors over joints unless they are directions.
+struct LegSample {
+    frame: LegFrame,
+    /// Axis of abduction in the world.
+    abduction: Vector3<f64>,
+    /// Angular velocity of the trunk in the world, rad/s.
+    trunk_rate: Vector3<f64>,
+    rate: Vector3<f64>,
+    acceleration: Vector3<f64>,
+    torque: Vector3<f64>,
+    torque_rate: Vector3<f64>,
+    /// Torques per unit of each unknown of [`OWN`].
+    own: [Vector3<f64>; OWN.len()],
+}
+
+impl LegSample {
+    /// Components of a moment (world axes) about the three joints.
+    fn about_joints(&self, moment: &Vector3<f64>) -> Vector3<f64> {
+        let flexion = self.frame.flexion.dot(moment);
+        Vector3::new(self.abduction.dot(moment), flexion, flexion)
+    }
+
+    /// Angular velocity of the calf in the world, rad/s.
+    fn calf_rate(&self) -> Vector3<f64> {
+        self.trunk_rate
+            + self.abduction * self.rate[0]
+            + self.frame.flexion * (self.rate[1] + self.rate[2])
+    }
+
+    /// Coefficients of [`joint_unknowns`] and the torque of one joint.
+    fn joint(&self, kind: usize) -> [f64; JOINT_ROWS] {
+        let rate = self.rate[kind];
+        let own = self.own.map(|torque| torque[kind]);
+        [
+            rate,
+            (rate / DRY_SPEED_RAD_S).tanh(),
+            self.acceleration[kind],
+            own[0],
+            own[1],
+            own[2],
+            own[3],
+            own[4],
+            own[5],
+            own[6],
+            self.torque_rate[kind],
+            self.torque[kind],
+        ]
+    }
+}
+
+/// Torques at the three joints that move the links of a leg, per unit of each unknown of [`OWN`].
+///
+/// A mass at `s` from a point that accelerates by `a` (gravity subtracted) needs the moment
+/// `s x (a + s'')` about it. The mass beside the axis of abduction is taken where the leg's plane is.
+fn own_torques(
+    robot: &Robot,
+    motion: &Motion,
+    leg: Leg,
+    sample: usize,
+    gravity_m_s2: f64,
+) -> [Vector3<f64>; OWN.len()] {
+    let geometry = robot.geometry();
+    let (frame, second) = (&motion.legs[sample][leg.index()], motion.leg(leg, sample));
+    let hip = robot.hip_position(leg);
+    let trunk = motion.body(sample)
+        + Vector3::z() * gravity_m_s2
+        + (0..3).fold(Vector3::zeros(), |sum, axis| {
+            sum + hip[axis] * motion.trunk_axis(axis, sample)
+        });
+    let plane = trunk + geometry.hip_m * second.side;
+    let knee = plane + geometry.thigh_m * second.thigh;
+    let abduction = motion.attitude[sample].column(0).into_owned();
+    let (side, thigh) = (geometry.hip_m * frame.side, geometry.thigh_m * frame.thigh);
+    // Moments about the joint of flexion and about the knee of a first moment along `direction`.
+    let torques = |flexion: Vector3<f64>, knee: Vector3<f64>, force: Vector3<f64>| {
+        Vector3::new(
+            abduction.dot(&(flexion + side.cross(&force))),
+            frame.flexion.dot(&flexion),
+            frame.flexion.dot(&knee),
+        )
+    };
+    let none = Vector3::zeros();
+    let on_thigh = |direction: &Vector3<f64>, second: Vector3<f64>| {
+        torques(direction.cross(&plane), none, second)
+    };
+    let on_calf = |direction: &Vector3<f64>, second: Vector3<f64>| {
+        let about_knee = direction.cross(&knee);
+        torques(about_knee + thigh.cross(&second), about_knee, second)
+    };
+    let thigh_turn = frame.thigh.cross(&second.thigh);
+    let calf_turn = frame.calf.cross(&second.calf);
+    [
+        Vector3::new(abduction.dot(&frame.side.cross(&plane)), 0.0, 0.0),
+        on_thigh(&frame.thigh, second.thigh),
+        torques(thigh_turn, none, none),
+        on_calf(&frame.calf, second.calf),
+        torques(calf_turn, calf_turn, none),
+        on_thigh(&frame.thigh_front, second.thigh_front),
+        on_calf(&frame.calf_front, second.calf_front),
+    ]
+}
+
+/// The recorded torques within the robot's limits, and how many were beyond them.
+fn limited_torques(segment: &Segment, robot: &Robot) -> (DMatrix<f64>, usize) {
+    let mut torque = segment.torque_nm.clone();
+    let mut clipped = 0;
+    for (joint, limit) in robot.torque_limit_nm().iter().enumerate() {
+        for value in torque.row_mut(joint).iter_mut() {
+            if value.abs() > *limit {
+                *value = limit.copysign(*value);
+                clipped += 1;
+            }
+        }
+    }
+    (torque, clipped)
+}
+
+/// Rows as they were `delay_s` before each time, by straight lines; held at the ends.
+fn delayed(time_s: &[f64], rows: &DMatrix<f64>, delay_s: f64) -> DMatrix<f64> {
+    let last = time_s.len() - 1;
+    let mut right = 0;
+    let mut out = rows.clone();
+    for (sample, time) in time_s.iter().enumerate() {
+        let time = (time - delay_s).clamp(time_s[0], time_s[last]);
+        while right < last && time_s[right] < time {
+            right += 1;
+        }
+        let left = right.saturating_sub(1);
+        let step = time_s[right] - time_s[left];
+        let share = if step > 0.0 {
+            (time - time_s[left]) / step
+        } else {
+            1.0
+        };
+        let value = rows.column(left) * (1.0 - share) + rows.column(right) * share;
+        out.set_column(sample, &value);
+    }
+    out
+}

@@ -1,0 +1,340 @@
+//! From recordings to an [`Identification`]: equations, fit and delay in turn until they agree.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::clock::{Timed, timed};
+use super::equations::SampleEquations;
+use super::error::IdentifyError;
+use super::fit::{Estimate, Iteration, explained, force_alone};
+use super::identification::{
+    Fit, ForceAlone, Identification, Legs, PerKind, Samples, StandardError,
+};
+use super::motion::Motion;
+use super::parameters::{
+    ARMATURE, CALF, CALF_SECOND, DELAY, DRY, GRAVITY, INVERSE_MASS, LEG_SIDE, PARAMETER_DIM, THIGH,
+    THIGH_SECOND, VISCOUS, priors,
+};
+use super::windows::{Group, Windows};
+use crate::recording::check::check;
+use crate::recording::{Recording, Segment};
+use crate::robot::{Actuators, JOINT_DIM, Robot};
+
+/// Fewest samples with feet on the ground.
+const LEAST_CONTACT_SAMPLES: usize = 100;
+/// Fewest windows with moving legs; there are 23 unknowns.
+const LEAST_WINDOWS: usize = 30;
+/// Most rounds; a clean recording needs about eight.
+const MOST_ROUNDS: usize = 30;
+/// Largest change of the delay in a round, s.
+const LARGEST_DELAY_CHANGE_S: f64 = 0.004;
+/// Largest delay either way, s.
+const LARGEST_DELAY_S: f64 = 0.06;
+/// Changes in a round below which the rounds end: of the delay (s), of the mass (relative).
+const SETTLED: [f64; 2] = [2e-5, 1e-4];
+/// Gravity before the first round, for the weight of the links.
+const FIRST_GRAVITY: f64 = 9.81;
+
+/// What the recordings say of a robot of this geometry: gravity, mass, losses by kind of joint, with
+/// standard errors.
+///
+/// Implausible samples stay and become notes; samples with a leg on the ground close to a singular
+/// posture are left out one by one.
+///
+/// # Errors
+/// [`IdentifyError::Contact`], [`IdentifyError::Still`] for too little to go by,
+/// [`IdentifyError::Mass`] where forces do not explain the acceleration,
+/// [`IdentifyError::Recording`] for a segment without two samples at different times.
+pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identification, IdentifyError> {
+    let mut notes = Vec::new();
+    let mut segments = Vec::new();
+    for recording in recordings {
+        notes.extend(implausible(recording, robot));
+        let timed = recording.segments.iter().map(timed);
+        let timed = timed.collect::<Result<Vec<_>, _>>()?;
+        notes.extend(mended(&recording.path, &timed));
+        segments.extend(timed.into_iter().map(|timed| Prepared {
+            motion: Motion::of(&timed.segment),
+            segment: timed.segment,
+            lost: timed.lost,
+        }));
+    }
+    let mut state = State::new(robot);
+    let mut round = Round::of(&segments, robot, &state)?;
+    round.require_enough(recordings.len())?;
+    let mut settled = false;
+    for _ in 0..MOST_ROUNDS {
+        settled = state.improve(&round.windows, robot)?;
+        if settled {
+            break;
+        }
+        round = Round::of(&segments, robot, &state)?;
+    }
+    if !settled {
+        notes.push(format!(
+            "mass and delay still changed after {MOST_ROUNDS} rounds: they are less certain than \
+             their standard errors"
+        ));
+    }
+    notes.extend(round.notes());
+    state.result(robot, &segments, &round.windows, notes)
+}
+
+/// A segment ready for its equations.
+struct Prepared {
+    segment: Segment,
+    motion: Motion,
+    lost: Vec<bool>,
+}
+
+/// The equations of all segments at one estimate of gravity and delay.
+struct Round {
+    windows: Windows,
+    clipped_torques: usize,
+}
+
+impl Round {
+    fn of(segments: &[Prepared], robot: &Robot, state: &State) -> Result<Self, IdentifyError> {
+        let mut round = Self {
+            windows: Windows::default(),
+            clipped_torques: 0,
+        };
+        for Prepared {
+            segment,
+            motion,
+            lost,
+        } in segments
+        {
+            let equations =
+                SampleEquations::of(segment, motion, robot, state.gravity_m_s2, state.delay_s);
+            round.clipped_torques += equations.clipped_torques;
+            round.windows.add(segment, &equations, lost)?;
+        }
+        Ok(round)
+    }
+
+    fn require_enough(&self, recordings: usize) -> Result<(), IdentifyError> {
+        let found = self.windows.contact_samples;
+        if found < LEAST_CONTACT_SAMPLES {
+            let expected = LEAST_CONTACT_SAMPLES;
+            return Err(IdentifyError::Contact {
+                recordings,
+                found,
+                expected,
+            });
+        }
+        let is_moving = |group: Group, moving: bool| moving && group == Group::Contact(0);
+        let rows = self.windows.rows.iter();
+        let found = rows.filter(|row| is_moving(row.group, row.moving)).count();
+        if found < LEAST_WINDOWS {
+            let expected = LEAST_WINDOWS;
+            return Err(IdentifyError::Still {
+                recordings,
+                found,
+                expected,
+            });
+        }
+        Ok(())
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.clipped_torques > 0 {
+            notes.push(format!(
+                "{} torques are above the robot's limits: commanded rather than measured? They count \
+                 as the limit",
+                self.clipped_torques
+            ));
+        }
+        if self.windows.singular_samples > 0 {
+            notes.push(format!(
+                "{} samples with a leg on the ground close to a singular posture are left out",
+                self.windows.singular_samples
+            ));
+        }
+        if self.windows.flight_samples == 0 {
+            notes.push(
+                "no flight of at least 70 ms: gravity and the legs' inertia rest on contact alone"
+                    .to_owned(),
+            );
+        }
+        notes
+    }
+}
+
+/// What the rounds improve.
+struct State {
+    gravity_m_s2: f64,
+    mass_kg: f64,
+    delay_s: f64,
+    losses: [f64; PARAMETER_DIM],
+    iteration: Iteration,
+    rounds: usize,
+}
+
+impl State {
+    fn new(robot: &Robot) -> Self {
+        Self {
+            gravity_m_s2: FIRST_GRAVITY,
+            mass_kg: robot.mass_kg(),
+            delay_s: 0.0,
+            losses: [0.0; PARAMETER_DIM],
+            iteration: Iteration::default(),
+            rounds: 0,
+        }
+    }
+
+    /// One fit; whether it changed nothing that matters.
+    fn improve(&mut self, windows: &Windows, robot: &Robot) -> Result<bool, IdentifyError> {
+        const LEAST_ROUNDS: usize = 6;
+        let priors = priors(robot.geometry(), self.mass_kg, &self.losses);
+        let solved = self.iteration.step(&windows.rows, &priors, self.mass_kg);
+        let estimate = solved.and(self.iteration.estimate).unwrap_or_default();
+        let inverse = estimate[INVERSE_MASS];
+        // Ten times lighter or heavier than the robot is no robot: signs, units or order are wrong.
+        let expected = 1.0 / robot.mass_kg();
+        if !(inverse > 0.1 * expected && inverse < 10.0 * expected) {
+            let robot = robot.name().to_owned();
+            return Err(IdentifyError::Mass {
+                inverse,
+                expected,
+                robot,
+            });
+        }
+        let mass_kg = 1.0 / inverse;
+        let change_s =
+            (estimate[DELAY] * mass_kg).clamp(-LARGEST_DELAY_CHANGE_S, LARGEST_DELAY_CHANGE_S);
+        let delay_s = (self.delay_s + change_s).clamp(-LARGEST_DELAY_S, LARGEST_DELAY_S);
+        let settled = (delay_s - self.delay_s).abs() < SETTLED[0]
+            && (mass_kg / self.mass_kg - 1.0).abs() < SETTLED[1];
+        self.losses = std::array::from_fn(|i| estimate[i] * mass_kg);
+        (self.gravity_m_s2, self.mass_kg, self.delay_s) = (estimate[GRAVITY], mass_kg, delay_s);
+        self.rounds += 1;
+        Ok(settled && self.rounds >= LEAST_ROUNDS)
+    }
+
+    fn result(
+        &self,
+        robot: &Robot,
+        segments: &[Prepared],
+        windows: &Windows,
+        notes: Vec<String>,
+    ) -> Result<Identification, IdentifyError> {
+        let priors = priors(robot.geometry(), self.mass_kg, &self.losses);
+        let estimate = self.iteration.estimate.unwrap_or_default();
+        // When within a step a torque acts is not recorded: uniform over it.
+        let longest_step =
+            |step: f64, prepared: &Prepared| step.max(prepared.segment.mean_step_s());
+        let step_s = segments.iter().fold(0.0, longest_step);
+        let within_step_s = step_s / 12_f64.sqrt();
+        let covariance = self.iteration.covariance(
+            &windows.rows,
+            windows.blocks,
+            &priors,
+            self.mass_kg,
+            within_step_s,
+        );
+        let deviation = |i: usize| covariance.map_or(f64::INFINITY, |c| c[(i, i)].sqrt());
+        let per_mass = |i: usize| deviation(i) * self.mass_kg;
+        let kinds = |first: usize, of: &dyn Fn(usize) -> f64| {
+            PerKind::from_array(std::array::from_fn(|kind| of(first + kind)))
+        };
+        let legs = |of: &dyn Fn(usize) -> f64| Legs {
+            side_kg_m: of(LEG_SIDE),
+            thigh_kg_m: of(THIGH),
+            calf_kg_m: of(CALF),
+            thigh_kg_m2: of(THIGH_SECOND),
+            calf_kg_m2: of(CALF_SECOND),
+        };
+        let value = |i: usize| estimate[i] * self.mass_kg;
+        let joints = |first: usize| -> [f64; JOINT_DIM] {
+            std::array::from_fn(|joint| value(first + joint % 3))
+        };
+        Ok(Identification {
+            robot: robot.name().to_owned(),
+            gravity_m_s2: self.gravity_m_s2,
+            mass_kg: self.mass_kg,
+            delay_s: self.delay_s,
+            actuators: Actuators {
+                viscous: joints(VISCOUS),
+                dry: joints(DRY),
+                armature: joints(ARMATURE),
+            },
+            legs: legs(&value),
+            standard_error: StandardError {
+                gravity_m_s2: deviation(GRAVITY),
+                mass_kg: deviation(INVERSE_MASS) * self.mass_kg.powi(2),
+                delay_s: per_mass(DELAY),
+                viscous_nm_s_rad: kinds(VISCOUS, &per_mass),
+                dry_nm: kinds(DRY, &per_mass),
+                armature_kg_m2: kinds(ARMATURE, &per_mass),
+                legs: legs(&per_mass),
+            },
+            r2: fit_of(windows, &estimate),
+            force_alone: self.force_alone(windows)?,
+            samples: Samples {
+                contact: windows.contact_samples,
+                flight: windows.flight_samples,
+            },
+            notes,
+        })
+    }
+
+    fn force_alone(&self, windows: &Windows) -> Result<ForceAlone, IdentifyError> {
+        let estimate = force_alone(&windows.rows).unwrap_or_default();
+        Ok(ForceAlone {
+            gravity_m_s2: estimate[GRAVITY],
+            mass_kg: 1.0 / estimate[INVERSE_MASS],
+            r2: fit_of(windows, &estimate),
+        })
+    }
+}
+
+fn fit_of(windows: &Windows, estimate: &Estimate) -> Fit {
+    Fit {
+        x: explained(&windows.rows, estimate, 0),
+        z: explained(&windows.rows, estimate, 2),
+    }
+}
+
+/// What a robot cannot have done, counted by kind.
+fn implausible(recording: &Recording, robot: &Robot) -> Option<String> {
+    let mut counts: BTreeMap<&'static str, usize> = BTreeMap::new();
+    for finding in check(recording, robot) {
+        *counts.entry(finding.kind.description()).or_default() += finding.samples.len();
+    }
+    let listed: Vec<String> = (counts.iter())
+        .map(|(kind, count)| format!("{kind} ({count})"))
+        .collect();
+    (!listed.is_empty()).then(|| {
+        format!(
+            "{}: implausible samples stay in: {}; `romc inspect` lists them",
+            recording.path.display(),
+            listed.join(", ")
+        )
+    })
+}
+
+/// What was mended in the segments of a recording.
+fn mended(path: &Path, segments: &[Timed]) -> Option<String> {
+    let mut faults = Vec::new();
+    let rebuilt: Vec<f64> = (segments.iter())
+        .filter(|timed| timed.rebuilt)
+        .map(|timed| timed.elapsed_ratio)
+        .collect();
+    if let Some(longest) = rebuilt.iter().copied().reduce(f64::max) {
+        faults.push(format!(
+            "{longest:.2} s of motion pass in a recorded second (displacements against velocities; \
+             samples lost?), times were rebuilt"
+        ));
+    }
+    let lost = |timed: &Timed| timed.lost.iter().filter(|lost| **lost).count();
+    let lost: usize = segments.iter().map(lost).sum();
+    if lost > 0 {
+        faults.push(format!("{lost} samples between distant ones are left out"));
+    }
+    if segments.iter().any(|timed| timed.rates_replaced) {
+        faults.push("angular rates disagree with the angles and were replaced".to_owned());
+    }
+    (!faults.is_empty()).then(|| format!("{}: {}", path.display(), faults.join("; ")))
+}

@@ -1,0 +1,152 @@
+//! The result: what a robot is by its recordings.
+
+use serde::{Deserialize, Serialize};
+
+use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::{Actuators, JOINT_DIM};
+
+/// A value for each kind of joint.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PerKind {
+    /// Abduction of the hip.
+    pub hx: f64,
+    /// Flexion of the hip.
+    pub hy: f64,
+    /// Knee.
+    pub kn: f64,
+}
+
+impl PerKind {
+    /// From abduction, flexion, knee.
+    pub fn from_array([hx, hy, kn]: [f64; LEG_JOINT_DIM]) -> Self {
+        Self { hx, hy, kn }
+    }
+
+    /// Abduction, flexion, knee.
+    pub fn to_array(self) -> [f64; LEG_JOINT_DIM] {
+        [self.hx, self.hy, self.kn]
+    }
+
+    /// Means of a value of all twelve joints over the legs.
+    pub fn mean(joints: &[f64; JOINT_DIM]) -> Self {
+        Self::from_array(std::array::from_fn(|kind| {
+            let legs = joints.iter().skip(kind).step_by(LEG_JOINT_DIM);
+            legs.sum::<f64>() / (JOINT_DIM / LEG_JOINT_DIM) as f64
+        }))
+    }
+}
+
+/// First and second moments of the moving parts of one leg, the same for every leg.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Legs {
+    /// Mass times distance beside the axis of abduction, kg m.
+    pub side_kg_m: f64,
+    /// Mass times distance from the hip along the thigh; the calf's mass counts at the knee, kg m.
+    pub thigh_kg_m: f64,
+    /// Mass times distance from the knee along the calf, kg m.
+    pub calf_kg_m: f64,
+    /// Second moment of the thigh about the hip, the calf's mass at the knee, kg m^2.
+    pub thigh_kg_m2: f64,
+    /// Second moment of the calf about the knee, kg m^2.
+    pub calf_kg_m2: f64,
+}
+
+/// Standard errors of an identification, in the units of its values.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StandardError {
+    /// Of gravity.
+    pub gravity_m_s2: f64,
+    /// Of the mass.
+    pub mass_kg: f64,
+    /// Of the delay of the motion behind the torques.
+    pub delay_s: f64,
+    /// Of viscous friction.
+    pub viscous_nm_s_rad: PerKind,
+    /// Of dry friction.
+    pub dry_nm: PerKind,
+    /// Of the armatures.
+    pub armature_kg_m2: PerKind,
+    /// Of the legs' moments.
+    pub legs: Legs,
+}
+
+/// How well an equation explains the trunk's acceleration with feet on the ground: R^2 over windows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fit {
+    /// Along the world's x axis.
+    pub x: f64,
+    /// Along its z axis.
+    pub z: f64,
+}
+
+/// The trunk's acceleration regressed on the feet's forces `-J^-T tau` alone.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ForceAlone {
+    /// Gravity of that regression, m/s^2.
+    pub gravity_m_s2: f64,
+    /// Its mass, kg.
+    pub mass_kg: f64,
+    /// Its fit.
+    pub r2: Fit,
+}
+
+/// Samples in the windows of the regression.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Samples {
+    /// With a foot on the ground.
+    pub contact: usize,
+    /// In flight.
+    pub flight: usize,
+}
+
+/// What recordings say of a robot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Identification {
+    /// Name of the robot whose geometry was used.
+    pub robot: String,
+    /// Gravity, m/s^2.
+    pub gravity_m_s2: f64,
+    /// Mass of trunk and legs, kg.
+    pub mass_kg: f64,
+    /// Time from a recorded torque to its effect on the motion, s.
+    pub delay_s: f64,
+    /// Losses of the twelve joints.
+    pub actuators: Actuators,
+    /// The legs' own inertia.
+    pub legs: Legs,
+    /// Standard errors of all that.
+    pub standard_error: StandardError,
+    /// Fit of the whole equation.
+    pub r2: Fit,
+    /// The equation without losses, delay and legs.
+    pub force_alone: ForceAlone,
+    /// What entered.
+    pub samples: Samples,
+    /// What a reader of the values should know of the recordings.
+    #[serde(default)]
+    pub notes: Vec<String>,
+}
+
+impl Identification {
+    /// Viscous friction by kind of joint, N m s/rad.
+    pub fn viscous(&self) -> PerKind {
+        PerKind::mean(&self.actuators.viscous)
+    }
+
+    /// Dry friction by kind of joint, N m.
+    pub fn dry(&self) -> PerKind {
+        PerKind::mean(&self.actuators.dry)
+    }
+
+    /// Armature by kind of joint, kg m^2.
+    pub fn armature(&self) -> PerKind {
+        PerKind::mean(&self.actuators.armature)
+    }
+}

@@ -1,0 +1,245 @@
+//! Equations of samples averaged over short windows within one stance.
+//!
+//! The same average is taken on both sides of every equation, so it stays an equation, and noise of
+//! differences of velocities is averaged out. No window crosses a change of the feet on the ground or
+//! comes near one: impacts are not what torques explain.
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
+use super::equations::{BODY_ROWS, JOINT_ROWS, SampleEquations, joint_unknowns};
+use super::error::IdentifyError;
+use super::parameters::PARAMETER_DIM;
+use crate::recording::Segment;
+use crate::recording::smoothing::SavitzkyGolay;
+use crate::robot::JOINT_DIM;
+
+/// Length of a window, s.
+const WINDOW_S: f64 = 0.03;
+/// Distance of windows from a change of the feet on the ground, s.
+const MARGIN_S: f64 = 0.02;
+/// Windows a window's length: neighbours overlap.
+pub const OVERLAP: usize = 4;
+/// Length of the blocks that are left out in turn for standard errors, s.
+const BLOCK_S: f64 = 0.1;
+/// Mean speed of the joints that bear the robot from which their dry friction has a direction, rad/s.
+const MOVING_RAD_S: f64 = 0.1;
+/// Speed that a joint in the air keeps over a window for the same reason, rad/s.
+const TURNING_RAD_S: f64 = 0.15;
+
+/// Which equation a row is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Group {
+    /// Trunk's acceleration along an axis (x, y, z) with feet on the ground.
+    Contact(usize),
+    /// The same in flight.
+    Flight(usize),
+    /// Torque of a joint (hx, hy, kn) of a leg in the air.
+    Joint(usize),
+}
+
+impl Group {
+    /// Number of groups.
+    pub const COUNT: usize = 9;
+
+    /// Place among the groups.
+    pub fn index(self) -> usize {
+        match self {
+            Self::Contact(axis) => axis,
+            Self::Flight(axis) => 3 + axis,
+            Self::Joint(kind) => 6 + kind,
+        }
+    }
+}
+
+/// One equation over a window.
+#[derive(Debug, Clone)]
+pub struct Row {
+    /// Coefficients of the unknowns.
+    pub coefficients: [f64; PARAMETER_DIM],
+    /// Left side: m/s^2, or N m for a joint.
+    pub left: f64,
+    /// Which equation.
+    pub group: Group,
+    /// Block of time that it belongs to, counted over all segments.
+    pub block: usize,
+    /// Whether joints move enough for their friction to have a direction.
+    pub moving: bool,
+}
+
+/// The windows of all segments.
+#[derive(Debug, Clone, Default)]
+pub struct Windows {
+    /// All equations.
+    pub rows: Vec<Row>,
+    /// Number of blocks.
+    pub blocks: usize,
+    /// Samples with a foot on the ground in windows.
+    pub contact_samples: usize,
+    /// Samples in flight in windows.
+    pub flight_samples: usize,
+    /// Samples left out because a leg on the ground was close to a singular posture.
+    pub singular_samples: usize,
+}
+
+impl Windows {
+    /// Adds the windows of a segment at even time steps; `lost` are samples to leave out.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Recording`] if the filter cannot be made for the segment's time step.
+    pub fn add(
+        &mut self,
+        segment: &Segment,
+        equations: &SampleEquations,
+        lost: &[bool],
+    ) -> Result<(), IdentifyError> {
+        let step_s = segment.mean_step_s();
+        let samples = |time_s: f64| (time_s / step_s).round() as usize;
+        let window = (samples(WINDOW_S) | 1).max(3);
+        let filter = SavitzkyGolay::new(window, 1)?;
+        let per_block = samples(BLOCK_S).max(1);
+        for stance in stances(segment) {
+            let margin = samples(MARGIN_S);
+            let inner = stance.start + margin..stance.end.saturating_sub(margin).max(stance.start);
+            self.singular_samples += inner.clone().filter(|s| equations.singular[*s]).count();
+            for span in runs(inner, |sample| !equations.singular[sample] && !lost[sample]) {
+                if span.len() < window {
+                    continue;
+                }
+                let centres = (window / 2..span.len() - window / 2)
+                    .step_by((window / OVERLAP).max(1))
+                    .collect::<Vec<_>>();
+                let first_block = self.blocks;
+                let block = |centre: usize| first_block + (centre - window / 2) / per_block;
+                self.blocks = 1 + centres
+                    .iter()
+                    .map(|c| block(*c))
+                    .fold(first_block, usize::max);
+                let averaged = Averaged {
+                    filter: &filter,
+                    span,
+                    centres: &centres,
+                };
+                self.add_body(segment, equations, &averaged, block);
+                self.add_joints(segment, equations, &averaged, block);
+            }
+        }
+        Ok(())
+    }
+
+    fn add_body(
+        &mut self,
+        segment: &Segment,
+        equations: &SampleEquations,
+        averaged: &Averaged<'_>,
+        block: impl Fn(usize) -> usize,
+    ) {
+        let feet = segment.feet[averaged.span.start];
+        let in_contact = feet.contains(&true);
+        let count = if in_contact {
+            &mut self.contact_samples
+        } else {
+            &mut self.flight_samples
+        };
+        *count += averaged.span.len();
+        let bearing: Vec<usize> = (0..JOINT_DIM)
+            .filter(|joint| joint % 3 != 0 && feet[joint / 3])
+            .collect();
+        let speed = DMatrix::from_fn(1, segment.len(), |_, sample| {
+            let speeds = bearing
+                .iter()
+                .map(|joint| segment.dx[(*joint, sample)].abs());
+            speeds.sum::<f64>() / bearing.len().max(1) as f64
+        });
+        let speed = averaged.of(&speed);
+        let means = averaged.of(&equations.body);
+        for &centre in averaged.centres {
+            for axis in 0..3 {
+                let row = axis * BODY_ROWS;
+                self.rows.push(Row {
+                    coefficients: std::array::from_fn(|i| means[(row + i, centre)]),
+                    left: means[(row + PARAMETER_DIM, centre)],
+                    group: if in_contact {
+                        Group::Contact(axis)
+                    } else {
+                        Group::Flight(axis)
+                    },
+                    block: block(centre),
+                    moving: !in_contact || speed[centre] > MOVING_RAD_S,
+                });
+            }
+        }
+    }
+
+    fn add_joints(
+        &mut self,
+        segment: &Segment,
+        equations: &SampleEquations,
+        averaged: &Averaged<'_>,
+        block: impl Fn(usize) -> usize,
+    ) {
+        let feet = segment.feet[averaged.span.start];
+        let half = averaged.filter.window() / 2;
+        for joint in (0..JOINT_DIM).filter(|joint| !feet[joint / 3]) {
+            let unknowns = joint_unknowns(joint % 3);
+            let rows = equations.joints.rows(joint * JOINT_ROWS, JOINT_ROWS);
+            let means = averaged.of(&rows.into_owned());
+            for &centre in averaged.centres {
+                let at = averaged.span.start + centre;
+                let turning = (at - half..=at + half)
+                    .all(|sample| segment.dx[(joint, sample)].abs() > TURNING_RAD_S);
+                let mut coefficients = [0.0; PARAMETER_DIM];
+                for (row, unknown) in unknowns.into_iter().enumerate() {
+                    coefficients[unknown] = means[(row, centre)];
+                }
+                self.rows.push(Row {
+                    coefficients,
+                    left: means[(JOINT_ROWS - 1, centre)],
+                    group: Group::Joint(joint % 3),
+                    block: block(centre),
+                    moving: turning,
+                });
+            }
+        }
+    }
+}
+
+/// A stretch of samples and the centres of its windows, counted from its start.
+struct Averaged<'a> {
+    filter: &'a SavitzkyGolay,
+    span: Range<usize>,
+    centres: &'a [usize],
+}
+
+impl Averaged<'_> {
+    /// Averages of rows over the windows of the stretch, at their centres.
+    fn of(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
+        let part = rows.columns(self.span.start, self.span.len()).into_owned();
+        (self.filter.smooth(&part)).expect("invariant: a stretch is as long as the window")
+    }
+}
+
+/// Stretches of samples with the same feet on the ground.
+fn stances(segment: &Segment) -> Vec<Range<usize>> {
+    let mut out: Vec<Range<usize>> = Vec::new();
+    for sample in 0..segment.len() {
+        match out.last_mut() {
+            Some(open) if segment.feet[open.start] == segment.feet[sample] => open.end = sample + 1,
+            Some(_) | None => out.push(sample..sample + 1),
+        }
+    }
+    out
+}
+
+/// Maximal stretches of a range in which all samples are kept.
+fn runs(range: Range<usize>, keep: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+    let mut out: Vec<Range<usize>> = Vec::new();
+    for sample in range.filter(|sample| keep(*sample)) {
+        match out.last_mut() {
+            Some(open) if open.end == sample => open.end = sample + 1,
+            Some(_) | None => out.push(sample..sample + 1),
+        }
+    }
+    out
+}

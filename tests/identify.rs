@@ -1,0 +1,193 @@
+//! `romc identify` on the shipped recordings: the simulated robots are known.
+
+#[path = "identify/made.rs"]
+mod made;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use romc::identify::{Identification, identify};
+use romc::recording::{self, Recording};
+use romc::robot::Robot;
+use serde_json::Value;
+
+fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("examples/recordings")
+        .join(name)
+}
+
+fn found(robot: &str, names: &[&str]) -> Identification {
+    let read = |name: &&str| recording::read(&path(name)).expect("a shipped recording");
+    let recordings: Vec<Recording> = names.iter().map(read).collect();
+    let robot = Robot::by_name(robot).expect("a known robot");
+    identify(&recordings, robot).expect("recordings of jumps")
+}
+
+/// Value, standard error and the simulator's value of gravity, mass and the losses of the Go1.
+fn against_the_go1(found: &Identification) -> Vec<(&'static str, f64, f64, f64)> {
+    let error = &found.standard_error;
+    let mut all = vec![
+        ("gravity", found.gravity_m_s2, error.gravity_m_s2, 9.81),
+        ("mass", found.mass_kg, error.mass_kg, 12.743),
+    ];
+    for (names, values, errors, truth) in [
+        (
+            ["viscous hx", "viscous hy", "viscous kn"],
+            found.viscous(),
+            error.viscous_nm_s_rad,
+            [1.0, 0.6, 0.6],
+        ),
+        (
+            ["dry hx", "dry hy", "dry kn"],
+            found.dry(),
+            error.dry_nm,
+            [0.2; 3],
+        ),
+        (
+            ["armature hx", "armature hy", "armature kn"],
+            found.armature(),
+            error.armature_kg_m2,
+            [0.01; 3],
+        ),
+    ] {
+        let (values, errors) = (values.to_array(), errors.to_array());
+        for kind in 0..3 {
+            all.push((names[kind], values[kind], errors[kind], truth[kind]));
+        }
+    }
+    all
+}
+
+fn is_the_go1(names: &[&str]) {
+    let found = found("go1", names);
+    let all = against_the_go1(&found);
+    for (name, value, error, truth) in &all {
+        let (low, high) = match *name {
+            "gravity" => (0.995, 1.005),
+            "mass" => (0.98, 1.02),
+            "viscous hy" | "viscous kn" => (0.9, 1.1),
+            "viscous hx" => (0.4, 1.6),
+            _ => (0.5, 2.0),
+        };
+        let ratio = value / truth;
+        assert!(
+            (low..high).contains(&ratio),
+            "{name}: {value} ± {error}, not {truth}"
+        );
+    }
+    let inside =
+        |(_, value, error, truth): &&(&str, f64, f64, f64)| (value - truth).abs() <= 3.0 * error;
+    assert!(all.iter().filter(inside).count() >= 10, "{all:?}");
+    // Torques act from one row to the next: half a step later than their row on average.
+    assert!((found.delay_s - 0.001).abs() < 0.0007, "{}", found.delay_s);
+    assert!(found.r2.x > 0.97 && found.r2.z > 0.98, "{:?}", found.r2);
+    assert!(found.force_alone.r2.x < 0.9 && found.force_alone.r2.z < 0.9);
+    assert!(!(11.0..14.0).contains(&found.force_alone.mass_kg));
+}
+
+#[test]
+fn shipped_go1_test_jumps_return_the_simulated_robot() {
+    is_the_go1(&[
+        "go1/test_01.csv.gz",
+        "go1/test_02.csv.gz",
+        "go1/test_03.csv.gz",
+    ]);
+}
+
+#[test]
+fn shipped_go1_training_jumps_return_the_same_robot() {
+    is_the_go1(&[
+        "go1/train_02.csv.gz",
+        "go1/train_08.csv.gz",
+        "go1/train_12.csv.gz",
+    ]);
+}
+
+#[test]
+fn noisy_sensors_and_an_unrecorded_push_widen_the_errors_and_keep_the_robot() {
+    let names = [1, 2, 3, 4].map(|i| format!("go1-noisy/train_0{i}.csv.gz"));
+    let noisy = found("go1", &names.each_ref().map(String::as_str));
+    let clean = found("go1", &["go1/test_01.csv.gz", "go1/test_02.csv.gz"]);
+    assert!(
+        (noisy.gravity_m_s2 / 9.81 - 1.0).abs() < 0.02,
+        "{}",
+        noisy.gravity_m_s2
+    );
+    assert!(
+        (noisy.mass_kg / 12.743 - 1.0).abs() < 0.03,
+        "{}",
+        noisy.mass_kg
+    );
+    for (found, truth) in [(noisy.viscous().hy, 0.6), (noisy.viscous().kn, 0.6)] {
+        assert!((found / truth - 1.0_f64).abs() < 0.2, "{found}");
+    }
+    assert!(noisy.standard_error.gravity_m_s2 > 3.0 * clean.standard_error.gravity_m_s2);
+}
+
+#[test]
+fn shipped_go2_jumps_return_the_mass_of_the_go2() {
+    let names = [1, 2, 3].map(|i| format!("go2-asynchronous/train_0{i}.csv.gz"));
+    let go2 = found("go2", &names.each_ref().map(String::as_str));
+    assert!((go2.mass_kg / 15.206 - 1.0).abs() < 0.02, "{}", go2.mass_kg);
+    assert!(
+        (go2.gravity_m_s2 / 9.81 - 1.0).abs() < 0.005,
+        "{}",
+        go2.gravity_m_s2
+    );
+}
+
+fn romc(arguments: &[&str]) -> (Option<i32>, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_romc"))
+        .args(arguments)
+        .output()
+        .expect("romc starts");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    (
+        output.status.code(),
+        text(output.stdout),
+        text(output.stderr),
+    )
+}
+
+#[test]
+fn command_prints_one_object_and_writes_a_file_that_reads_back() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let output = folder.path().join("actuators.toml");
+    let (jump, file) = (path("go1/test_02.csv.gz"), output.to_str().expect("UTF-8"));
+    let jump = jump.to_str().expect("UTF-8");
+    let arguments = [
+        "identify", jump, "--robot", "go1", "--output", file, "--json",
+    ];
+    let (code, stdout, stderr) = romc(&arguments);
+    assert_eq!(code, Some(0), "{stderr}");
+    let json: Value = serde_json::from_str(&stdout).expect("one object");
+    let number = |value: &Value| value.as_f64().expect("a number");
+    for group in ["viscous_nm_s_rad", "dry_nm", "armature_kg_m2"] {
+        for kind in ["hx", "hy", "kn"] {
+            assert!(number(&json[group][kind]) >= 0.0);
+            assert!(number(&json["standard_error"][group][kind]) > 0.0);
+        }
+    }
+    assert!(number(&json["r2"]["losses"]["z"]) > number(&json["r2"]["force"]["z"]));
+    assert!(number(&json["samples"]["contact"]) > number(&json["samples"]["flight"]));
+    let read = Identification::read(&output).expect("its own file");
+    assert!((read.mass_kg / number(&json["mass_kg"]) - 1.0).abs() < 1e-5);
+    assert!((read.actuators.viscous[4] - number(&json["viscous_nm_s_rad"]["hy"])).abs() < 1e-5);
+    // The file stays unless it is asked to be replaced.
+    let (code, _, stderr) = romc(&arguments);
+    assert_eq!(code, Some(1));
+    assert!(stderr.contains("already exists; pass --force"), "{stderr}");
+}
+
+#[test]
+fn command_unknown_robot_is_wrong_usage() {
+    let jump = path("go1/test_02.csv.gz");
+    let (code, stdout, stderr) =
+        romc(&["identify", jump.to_str().expect("UTF-8"), "--robot", "spot"]);
+    assert_eq!((code, stdout.as_str()), (Some(2), ""));
+    assert!(
+        stderr.contains("unknown robot `spot`; known: go1"),
+        "{stderr}"
+    );
+}
