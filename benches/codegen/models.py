@@ -56,10 +56,6 @@ def read(folder):
         "cubic8": scattered(8, 3, 0.1, 83),
         "quadratic8": scattered(8, 2, 0.3, 82),
         "cubic4": scattered(4, 3, 0.3, 43),
-        "quadratic4_dense": scattered(4, 2, 1.0, 424),
-        "quadratic8_dense": scattered(8, 2, 1.0, 824),
-        "cubic4_dense": scattered(4, 3, 1.0, 434),
-        "cubic8_dense": scattered(8, 3, 1.0, 834),
     }
 
 
