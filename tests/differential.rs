@@ -26,7 +26,7 @@ use drivers::{Build, Workshop, contents};
 use functions::{Function, Random, functions as functions_of};
 use nalgebra::DVector;
 use romc::equations::Equations;
-use romc::ir::Interpreter;
+use romc::ir::{Interpreter, Statement};
 use romc::lower::CompiledModel;
 use romc::lower::{self, Form, LowerOptions, dynamics_jacobian};
 use romc::model::{LatentVariable, ReducedModel};
@@ -207,6 +207,13 @@ fn random_models_have_all_shapes() {
         let xi = &model.phases()[0].xi;
         model.phases()[0].active_count() as f64 / xi.len() as f64
     };
+    some("sums of vectors", &|model| {
+        let system = Equations::of(model);
+        let lowered = dynamics_jacobian(&system, 0, &LowerOptions::default());
+        let (program, _) = lowered.expect("lowers");
+        let mut statements = program.statements().iter();
+        statements.any(|statement| matches!(statement, Statement::Quads { .. }))
+    });
     some("dense Xi", &|model| density(model) > 0.8);
     some("sparse Xi", &|model| density(model) < 0.2);
 }

@@ -54,6 +54,8 @@ def read(folder):
         "dense18": scattered(18, 1, 1.0, 18),
         "quadratic4": scattered(4, 2, 0.3, 42),
         "cubic8": scattered(8, 3, 0.1, 83),
+        "quadratic8": scattered(8, 2, 0.3, 82),
+        "cubic4": scattered(4, 3, 0.3, 43),
     }
 
 

@@ -1,5 +1,6 @@
 //! Code as typed statements, before a dialect spells it.
 
+use super::fours::Fours;
 use super::ident::Ident;
 use super::lanes::Row;
 use super::literal::Literal;
@@ -206,6 +207,8 @@ pub enum Stmt {
     Call(Ident, Vec<Argument>),
     /// The columns of one row; languages with lanes run them side by side.
     Row(Box<Row>),
+    /// Sums of vectors of four numbers.
+    Fours(Box<Fours>),
     /// Sums of the lanes, which are assigned later.
     DeclareLanes(Ident),
     /// A loop of the variable over the lanes, or all of them at once.

@@ -1,6 +1,7 @@
 //! What targets spell differently.
 
 use super::code::{Argument, ConstTable, Function, Index, Infix, MathFunction, Parameter};
+use super::fours::{FourBlock, Fours};
 use super::literal::Literal;
 use super::printer::subscript;
 
@@ -23,6 +24,12 @@ pub trait LaneDialect {
 
     /// The total of all lanes.
     fn total(&self, sums: &str) -> String;
+}
+
+/// Spelling of sums of vectors of four numbers.
+pub trait FourDialect {
+    /// Lines that compute the sums of a block, each with its depth of indentation.
+    fn block(&self, fours: &Fours, block: &FourBlock) -> Vec<(usize, String)>;
 }
 
 /// Spelling of a target language. The printer owns precedence and parentheses, the
@@ -74,6 +81,11 @@ pub trait Dialect {
     /// How lanes run side by side, in a language in which they do; in others loops take column
     /// after column.
     fn lanes(&self) -> Option<&dyn LaneDialect> {
+        None
+    }
+
+    /// How four numbers run side by side; other languages take one after the other.
+    fn fours(&self) -> Option<&dyn FourDialect> {
         None
     }
 

@@ -8,6 +8,7 @@ pub(crate) mod c;
 mod code;
 mod dialect;
 mod error;
+mod fours;
 mod functions;
 mod ident;
 pub(crate) mod interface;

@@ -2,6 +2,7 @@
 
 use super::code::{Argument, ConstTable, Expr, Function, Index, Infix, Stmt};
 use super::dialect::{Dialect, LaneDialect};
+use super::fours::Fours;
 
 /// Longest line before an expression is broken, in characters.
 const WIDTH: usize = 100;
@@ -140,6 +141,7 @@ impl<'a> Printer<'a> {
                     Some(_) => self.block(&row.in_lanes(), depth, text),
                     None => self.block(&row.in_columns(), depth, text),
                 },
+                Stmt::Fours(fours) => self.fours(fours, depth, text),
                 Stmt::DeclareLanes(sums) => {
                     let declare = self.lane_dialect().declare(&sums.to_string());
                     self.line(&declare, depth, text);
@@ -162,6 +164,17 @@ impl<'a> Printer<'a> {
                     let call = self.dialect.call(Some(&callee.to_string()), arguments);
                     self.line(&call, depth, text);
                 }
+            }
+        }
+    }
+
+    fn fours(&self, fours: &Fours, depth: usize, text: &mut String) {
+        let Some(dialect) = self.dialect.fours() else {
+            return self.block(&fours.one_by_one(), depth, text);
+        };
+        for block in &fours.blocks {
+            for (inner, line) in dialect.block(fours, block) {
+                self.line(&line, depth + inner, text);
             }
         }
     }

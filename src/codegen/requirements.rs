@@ -15,6 +15,7 @@ pub fn calls_kernel(body: &[Stmt]) -> bool {
         | Stmt::AddAssign(..)
         | Stmt::Call(..)
         | Stmt::Row(_)
+        | Stmt::Fours(_)
         | Stmt::DeclareLanes(_) => false,
     })
 }
@@ -32,10 +33,17 @@ pub fn assigned_in_lanes(body: &[Stmt]) -> Vec<Ident> {
         | Stmt::SinCos { .. }
         | Stmt::SinCosLane { .. }
         | Stmt::Call(..)
+        | Stmt::Fours(_)
         | Stmt::DeclareLanes(_)
         | Stmt::ForLanes(..) => Vec::new(),
     };
     body.iter().flat_map(assigned).collect()
+}
+
+/// Whether the statements have sums of vectors.
+pub fn has_fours(body: &[Stmt]) -> bool {
+    body.iter()
+        .any(|statement| matches!(statement, Stmt::Fours(_)))
 }
 
 /// Whether the statements apply a function.
@@ -52,6 +60,7 @@ pub fn calls_function(body: &[Stmt], function: MathFunction) -> bool {
         | Stmt::SinCos { .. }
         | Stmt::Call(..)
         | Stmt::Row(_)
+        | Stmt::Fours(_)
         | Stmt::DeclareLanes(_) => false,
     })
 }

@@ -72,6 +72,7 @@ pub fn translate_lanes(program: &Program, names: Names, lane: Ident) -> Option<V
                 Unary::Sign | Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log => false,
             },
             Statement::Accumulate { .. }
+            | Statement::Quads { .. }
             | Statement::Constants { .. }
             | Statement::Separable { .. }
             | Statement::Call { .. } => false,
@@ -155,6 +156,11 @@ impl Translator<'_> {
             }
             Statement::SinCos { arguments } => self.sin_cos(first, arguments),
             Statement::Accumulate { table, sections } => self.accumulate(first, *table, sections),
+            Statement::Quads {
+                table,
+                weights,
+                sums,
+            } => self.quads(first, *table, weights, sums),
             Statement::Constants { table } => self.constants(first, *table),
             Statement::Separable {
                 start,

@@ -1,10 +1,11 @@
 //! Array statements as loops.
 
 use super::code::{Argument, Expr, Index, Infix, Span, Stmt};
+use super::fours::{FourBlock, Fours};
 use super::ident::Ident;
 use super::lanes::{Row, Run};
 use super::translate::Translator;
-use crate::ir::{Group, LANES, Slopes, TableId, ValueId};
+use crate::ir::{Group, LANES, QUAD, QuadSum, Slopes, TableId, ValueId};
 
 /// A group of functions where its numbers live.
 struct GroupCode {
@@ -93,6 +94,30 @@ impl Translator<'_> {
             }
             row += w.len;
         }
+    }
+
+    /// Vectors of four numbers in a local array of their own.
+    pub(super) fn quads(
+        &mut self,
+        first: usize,
+        table: TableId,
+        weights: &[ValueId],
+        sums: &[QuadSum],
+    ) {
+        let table = &self.program.tables()[table.index()];
+        let weights = self.whole_span(weights);
+        let home = self.local_home(first, QUAD * sums.len(), "y");
+        let name = |_| self.names.locals.mint("v");
+        let names = (0..FourBlock::LARGEST.min(sums.len())).map(name).collect();
+        self.body.push(Stmt::Fours(Box::new(Fours {
+            array: home.array,
+            sums: sums.to_vec(),
+            weights,
+            table: (table.clone(), self.names.tables.name_in_lanes(table)),
+            names,
+            filled: Fours::filled(table, sums),
+            blocks: FourBlock::divide(sums),
+        })));
     }
 
     /// A constant table, copied to where its entries belong.

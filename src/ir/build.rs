@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 
 use super::program::{
-    Binary, Group, Program, ResultEntry, Slot, Statement, Table, TableId, Unary, ValueId,
+    Binary, Group, Program, QUAD, QuadSum, ResultEntry, Slot, Statement, Table, TableId, Unary,
+    ValueId,
 };
 use super::validate::{IrError, validate};
 
@@ -108,6 +109,22 @@ impl ProgramBuilder {
         let cols = self.program.tables[table.index()].cols;
         let statement = Statement::Accumulate { table, sections };
         self.push_array(statement, cols)
+    }
+
+    /// Sums of vectors, see [`Statement::Quads`]; defines [`QUAD`] values per sum.
+    pub fn quads(
+        &mut self,
+        table: TableId,
+        weights: Vec<ValueId>,
+        sums: Vec<QuadSum>,
+    ) -> Vec<ValueId> {
+        let n = QUAD * sums.len();
+        let statement = Statement::Quads {
+            table,
+            weights,
+            sums,
+        };
+        self.push_array(statement, n)
     }
 
     /// All entries of a constant table, row-major.

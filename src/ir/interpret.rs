@@ -2,7 +2,8 @@
 //! control run.
 
 use super::program::{
-    Binary, Group, LANES, Program, Slopes, Slot, Statement, Table, Unary, ValueId,
+    Binary, Group, LANES, Program, QUAD, Quad, QuadSum, Slopes, Slot, Statement, Table, Unary,
+    ValueId,
 };
 use super::real::Real;
 
@@ -54,6 +55,7 @@ enum Step<T> {
     Square(usize, usize),
     SinCos(Box<[usize]>, usize),
     Accumulate(usize, Box<[Box<[usize]>]>, usize),
+    Quads(usize, Box<[QuadSum]>, usize),
     Constants(usize, usize),
     Separable(Box<SeparableStep<T>>, usize),
     Call(usize, Box<[usize]>, usize),
@@ -123,6 +125,18 @@ impl<T: Real> Interpreter<T> {
                 Statement::Accumulate { table, sections } => {
                     let sections = sections.iter().map(|section| positions(section)).collect();
                     steps.push(Step::Accumulate(table.index(), sections, first));
+                }
+                Statement::Quads {
+                    table,
+                    weights,
+                    sums,
+                } => {
+                    // Weights by their positions in the values.
+                    let mut sums = sums.clone();
+                    for term in sums.iter_mut().flat_map(|sum| &mut sum.terms) {
+                        term.0 = weights[term.0].index();
+                    }
+                    steps.push(Step::Quads(table.index(), sums.into(), first));
                 }
                 Statement::Constants { table } => {
                     steps.push(Step::Constants(table.index(), first));
@@ -203,6 +217,9 @@ impl<T: Real> Interpreter<T> {
                 Step::Accumulate(table, sections, first) => {
                     accumulate(&self.tables[*table], sections, *first, values);
                 }
+                Step::Quads(table, sums, first) => {
+                    quads(&self.tables[*table], sums, *first, values);
+                }
                 Step::Constants(table, first) => {
                     let entries = &self.tables[*table].entries;
                     values[*first..*first + entries.len()].copy_from_slice(entries);
@@ -258,6 +275,26 @@ fn binary<T: Real>(op: Binary, a: T, b: T) -> T {
         Binary::Sub => a - b,
         Binary::Mul => a * b,
         Binary::Div => a / b,
+    }
+}
+
+/// The sums' terms have positions of weights in the values.
+fn quads<T: Real>(table: &Entries<T>, sums: &[QuadSum], first: usize, values: &mut [T]) {
+    let vector = |quad: Quad, values: &[T]| -> [T; QUAD] {
+        std::array::from_fn(|l| match quad {
+            Quad::Row(row) => table.row(row)[l],
+            Quad::Sum(sum) => values[first + QUAD * sum + l],
+        })
+    };
+    for (position, sum) in sums.iter().enumerate() {
+        let mut y = vector(sum.start, values);
+        for &(weight, quad) in &sum.terms {
+            let (w, v) = (values[weight], vector(quad, values));
+            for (y, v) in y.iter_mut().zip(v) {
+                *y = *y + v * w;
+            }
+        }
+        values[first + QUAD * position..][..QUAD].copy_from_slice(&y);
     }
 }
 

@@ -31,8 +31,8 @@ mod validate;
 pub use build::ProgramBuilder;
 pub use interpret::Interpreter;
 pub use program::{
-    Binary, Group, LANES, Program, ResultEntry, Slopes, Slot, Statement, Table, TableId, Unary,
-    ValueId,
+    Binary, Group, LANES, Program, QUAD, Quad, QuadSum, ResultEntry, Slopes, Slot, Statement,
+    Table, TableId, Unary, ValueId,
 };
 pub use real::Real;
 pub use roundoff::{Range, Rounded, rounding_errors};

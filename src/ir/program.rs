@@ -6,6 +6,9 @@ use std::ops::Range;
 /// registers hold.
 pub const LANES: usize = 8;
 
+/// Numbers that [`Statement::Quads`] adds side by side: one register of most processors.
+pub const QUAD: usize = 4;
+
 /// A named, contiguous array of scalars that enters or leaves a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Slot {
@@ -146,6 +149,24 @@ pub struct Group {
     pub slopes: Slopes,
 }
 
+/// A vector of [`QUAD`] numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quad {
+    /// A row of the statement's table.
+    Row(usize),
+    /// An earlier sum of the statement.
+    Sum(usize),
+}
+
+/// One sum of [`Statement::Quads`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct QuadSum {
+    /// What the sum begins with.
+    pub start: Quad,
+    /// What is added: positions of weights, and the vectors that they scale.
+    pub terms: Vec<(usize, Quad)>,
+}
+
 /// One step of the schedule; defines one or several values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Statement {
@@ -180,6 +201,20 @@ pub enum Statement {
         table: TableId,
         /// One weight a row after the first, in sections.
         sections: Vec<Vec<ValueId>>,
+    },
+    /// Sums of vectors of [`QUAD`] numbers, `y_s = start_s + sum_i w_i v_i`, where each `v_i` is a constant
+    /// or an earlier sum of the statement.
+    ///
+    /// Association: from `start` on, one term after the other, each product rounded before it is added.
+    /// No coefficient is `-0` and each chain of starts ends with a constant, so no sum is ever `-0`: with
+    /// finite weights, products with coefficients of zero may be left out. Defines [`QUAD`] values per sum.
+    Quads {
+        /// The constant vectors, one per row.
+        table: TableId,
+        /// The weights.
+        weights: Vec<ValueId>,
+        /// At least one sum.
+        sums: Vec<QuadSum>,
     },
     /// The entries of a constant table, row-major: defines `rows x cols` values.
     Constants {
@@ -226,6 +261,7 @@ impl Statement {
             Self::Binary(_, a, b) => vec![*a, *b],
             Self::SinCos { arguments } | Self::Call { arguments, .. } => arguments.clone(),
             Self::Accumulate { sections, .. } => sections.concat(),
+            Self::Quads { weights, .. } => weights.clone(),
             Self::Separable {
                 start,
                 base,
@@ -256,6 +292,7 @@ impl Statement {
             | Self::Binary(..)
             | Self::SinCos { .. }
             | Self::Accumulate { .. }
+            | Self::Quads { .. }
             | Self::Constants { .. }
             | Self::Call { .. } => Vec::new(),
         }
@@ -378,6 +415,7 @@ impl Program {
             | Statement::Input { .. }
             | Statement::Binary(..)
             | Statement::Accumulate { .. }
+            | Statement::Quads { .. }
             | Statement::Constants { .. }
             | Statement::Separable { .. }
             | Statement::Call { .. } => false,

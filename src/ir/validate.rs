@@ -1,6 +1,6 @@
 //! What every program promises, checked once when it is built.
 
-use super::program::{LANES, Program, Slopes, Statement, TableId, ValueId};
+use super::program::{LANES, Program, QUAD, Quad, Slopes, Statement, TableId, ValueId};
 
 /// Why a program is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -176,6 +176,31 @@ fn check_shape(program: &Program, position: usize, statement: &Statement) -> Res
             finite(&table(id).entries)?;
             let n_weights: usize = sections.iter().map(Vec::len).sum();
             count(n_weights + 1, table(id).rows)
+        }
+        Statement::Quads {
+            table: id,
+            weights,
+            sums,
+        } => {
+            finite(&table(id).entries)?;
+            count(table(id).cols, QUAD)?;
+            let below = |found: usize, end: usize| match found < end {
+                true => Ok(()),
+                false => count(found + 1, end),
+            };
+            for (position, sum) in sums.iter().enumerate() {
+                let vectors = sum.terms.iter().map(|&(_, vector)| vector);
+                for vector in vectors.chain([sum.start]) {
+                    match vector {
+                        Quad::Row(row) => below(row, table(id).rows)?,
+                        Quad::Sum(earlier) => below(earlier, position)?,
+                    }
+                }
+                for &(weight, _) in &sum.terms {
+                    below(weight, weights.len())?;
+                }
+            }
+            Ok(())
         }
         Statement::Constants { table: id } => finite(&table(id).entries),
         Statement::Separable {

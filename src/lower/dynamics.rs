@@ -7,6 +7,7 @@ use super::cost::LowerOptions;
 use super::dense::{self, DenseJacobian};
 use super::error::LowerError;
 use super::expression::ExpressionLowering;
+use super::gradient::Gradient;
 use super::nested::{Demand, Nested, Shared};
 use crate::equations::Equations;
 use crate::ir::{Program, ProgramBuilder, ValueId};
@@ -93,7 +94,17 @@ pub fn dynamics_jacobian(
             }
         }
     }
-    let (mut builder, ddz, jacobian) = if options.uses_tables(&equations) {
+    let n_terms = equations.iter().chain(&entries).map(|sum| sum.items.len());
+    let gradient = Gradient::new(
+        options,
+        &mut pool,
+        &equations,
+        &columns(system),
+        n_terms.sum(),
+    );
+    let (mut builder, ddz, jacobian) = if let Some(gradient) = gradient {
+        polynomial_jacobian(system, &pool, &gradient, &pattern)
+    } else if options.uses_tables(&equations) {
         dense_jacobian(system, &mut pool, &equations, &pattern)
     } else {
         let sums = nested_jacobian(system, &mut pool, &equations, entries, &pattern);
@@ -136,6 +147,28 @@ fn nested_jacobian(
     sums
 }
 
+/// Accelerations and the entries of the pattern by sums of vectors.
+fn polynomial_jacobian(
+    system: &Equations<'_>,
+    pool: &ExprPool,
+    gradient: &Gradient,
+    pattern: &JacobianPattern,
+) -> (ProgramBuilder, Vec<ValueId>, Vec<ValueId>) {
+    let mut lowering = start(system, pool, "dynamics_jacobian");
+    lowering.prepare(gradient.expressions());
+    let (ddz, slopes) = gradient.lower(&mut lowering, system.latent_dim());
+    let places = pattern.rows.iter().zip(&pattern.cols);
+    let jacobian = places.map(|(&row, &col)| slopes[&(row, col)]).collect();
+    (lowering.builder, ddz, jacobian)
+}
+
+/// The variables in the order of the Jacobian's columns.
+fn columns(system: &Equations<'_>) -> Vec<SymbolId> {
+    LatentVariable::all(system.latent_dim())
+        .map(|variable| system.symbol(variable))
+        .collect()
+}
+
 /// Accelerations and the entries of the pattern by tables.
 fn dense_jacobian(
     system: &Equations<'_>,
@@ -143,9 +176,7 @@ fn dense_jacobian(
     equations: &[Combination],
     pattern: &JacobianPattern,
 ) -> (ProgramBuilder, Vec<ValueId>, Vec<ValueId>) {
-    let columns: Vec<SymbolId> = LatentVariable::all(system.latent_dim())
-        .map(|variable| system.symbol(variable))
-        .collect();
+    let columns = columns(system);
     let dense = DenseJacobian::new(pool, equations, &columns);
     let mut lowering = start(system, pool, "dynamics_jacobian");
     let mut roots = expressions(equations);

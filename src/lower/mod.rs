@@ -13,6 +13,7 @@ mod dense;
 mod dynamics;
 mod error;
 mod expression;
+mod gradient;
 mod maps;
 mod nested;
 mod network;

@@ -1,12 +1,13 @@
 //! How C99 spells statements.
 
 use crate::codegen::code::{Argument, ConstTable, Function, MathFunction, Parameter, Role, Span};
-use crate::codegen::dialect::{Dialect, LaneDialect};
+use crate::codegen::dialect::{Dialect, FourDialect, LaneDialect};
+use crate::codegen::fours::{FourBlock, Fours};
 use crate::codegen::line_wrapping::{braced, comment_lines};
 use crate::codegen::literal::Literal;
 use crate::codegen::precision::Precision;
 use crate::codegen::requirements::assigned_in_lanes;
-use crate::ir::LANES;
+use crate::ir::{LANES, QUAD, Quad};
 
 /// C99 with the names of one model.
 #[derive(Clone, Debug)]
@@ -220,6 +221,10 @@ impl Dialect for CDialect {
         Some(self)
     }
 
+    fn fours(&self) -> Option<&dyn FourDialect> {
+        Some(self)
+    }
+
     fn table_base(&self, prefix: &str) -> String {
         format!("{prefix}table")
     }
@@ -266,6 +271,43 @@ impl Dialect for CDialect {
     fn docs(&self, _lines: &[String]) -> String {
         // The header has the documentation.
         String::new()
+    }
+}
+
+impl FourDialect for CDialect {
+    fn block(&self, fours: &Fours, block: &FourBlock) -> Vec<(usize, String)> {
+        let (upper, y, weights) = (self.upper(), &fours.array, &fours.weights);
+        let vector = |vector: Quad| match vector {
+            Quad::Row(row) => format!("{}[{row}]", fours.table.1),
+            Quad::Sum(sum) => format!("&{y}[{}]", QUAD * sum),
+        };
+        let name = |sum: usize| &fours.names[sum - block.sums.start];
+        let names = block.sums.clone().map(|sum| name(sum).to_string());
+        let names = names.collect::<Vec<_>>().join(", ");
+        let mut lines = vec![
+            (0, "{".to_owned()),
+            (1, format!("{}_four {names};", self.name)),
+        ];
+        for sum in block.sums.clone() {
+            let start = vector(fours.sums[sum].start);
+            lines.push((1, format!("{upper}_START_FOUR({}, {start});", name(sum))));
+        }
+        for four in &block.terms {
+            let part = match fours.lanes(four.vector) {
+                [false, false, ..] => "HIGH",
+                [_, _, false, false] => "LOW",
+                _ => "FOUR",
+            };
+            let (sum, vector) = (name(four.sum), vector(four.vector));
+            let weight = format!("{}[{}]", weights.array, weights.offset + four.weight);
+            lines.push((1, format!("{upper}_ADD_{part}({sum}, {vector}, {weight});")));
+        }
+        for sum in block.sums.clone() {
+            let at = QUAD * sum;
+            lines.push((1, format!("{upper}_STORE_FOUR(&{y}[{at}], {});", name(sum))));
+        }
+        lines.push((0, "}".to_owned()));
+        lines
     }
 }
 

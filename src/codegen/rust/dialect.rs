@@ -1,10 +1,15 @@
 //! How Rust spells statements.
 
 use crate::codegen::code::{Argument, ConstTable, Function, MathFunction, Parameter, Role, Span};
-use crate::codegen::dialect::Dialect;
+use crate::codegen::dialect::{Dialect, FourDialect};
+use crate::codegen::fours::{FourBlock, Fours};
 use crate::codegen::line_wrapping::{braced, comment_lines};
 use crate::codegen::literal::Literal;
 use crate::codegen::precision::Precision;
+use crate::ir::{QUAD, Quad};
+
+/// Most terms of a sum in one function: LLVM loses sight of vectors in longer chains.
+const LONGEST_CHAIN: usize = 10;
 
 /// Rust without `std` or allocation.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +29,7 @@ impl RustDialect {
 }
 
 /// Keywords of Rust and the names that generated crates use themselves.
-const RESERVED: [&str; 62] = [
+const RESERVED: [&str; 66] = [
     "abstract",
     "as",
     "async",
@@ -83,6 +88,10 @@ const RESERVED: [&str; 62] = [
     "core",
     "libm",
     "math",
+    "four",
+    "start_four",
+    "add_four",
+    "part",
     "sin_cos",
     "sin_cos_reduced",
     "sign",
@@ -162,6 +171,10 @@ impl Dialect for RustDialect {
         ]
     }
 
+    fn fours(&self) -> Option<&dyn FourDialect> {
+        Some(self)
+    }
+
     fn table_base(&self, _prefix: &str) -> String {
         "TABLE".to_owned()
     }
@@ -206,6 +219,58 @@ impl Dialect for RustDialect {
 
     fn docs(&self, lines: &[String]) -> String {
         documentation(lines)
+    }
+}
+
+impl FourDialect for RustDialect {
+    fn block(&self, fours: &Fours, block: &FourBlock) -> Vec<(usize, String)> {
+        let (real, y, n_sums) = (self.real(), &fours.array, QUAD * fours.sums.len());
+        let (weights, n_weights) = (&fours.weights.array, fours.weights.of);
+        let vector = |vector: Quad| match vector {
+            Quad::Row(row) => format!("{}[{row}]", fours.table.1),
+            Quad::Sum(sum) => format!("four({y}, {})", QUAD * sum),
+        };
+        let starts = block.sums.clone().map(|sum| {
+            let start = vector(fours.sums[sum].start);
+            (2, format!("start_four({y}, {}, {start});", QUAD * sum))
+        });
+        let mut parts: Vec<Vec<(usize, String)>> = vec![starts.collect()];
+        let mut lengths = vec![0; block.sums.len()];
+        for four in &block.terms {
+            let length = &mut lengths[four.sum - block.sums.start];
+            if *length == LONGEST_CHAIN {
+                lengths.fill(0);
+                parts.push(Vec::new());
+            }
+            lengths[four.sum - block.sums.start] += 1;
+            let (at, vector) = (QUAD * four.sum, vector(four.vector));
+            let weight = format!("{weights}[{}]", fours.weights.offset + four.weight);
+            let lanes = fours.lanes(four.vector).map(u8::from);
+            let lanes = lanes.iter().rev().map(u8::to_string).collect::<String>();
+            let line = format!("add_four::<0b{lanes}, _>({y}, {at}, {vector}, {weight});");
+            parts.last_mut().expect("one part at least").push((2, line));
+        }
+        let by = if fours.weights.is_parameter { "" } else { "&" };
+        let mut lines = Vec::new();
+        for part in parts {
+            let head = format!(
+                "fn part({y}: &mut [{real}; {n_sums}], {weights}: &[{real}; {n_weights}]) {{"
+            );
+            lines.push((0, "{".to_owned()));
+            // Without wide registers the compiler adds number by number, best all in one function.
+            let avx = "target_feature = \"avx\"";
+            lines.push((1, format!("#[cfg_attr({avx}, inline(never))]")));
+            lines.push((1, format!("#[cfg_attr(not({avx}), inline(always))]")));
+            lines.push((1, head));
+            if !part.iter().any(|(_, line)| line.contains("add_four")) {
+                lines.push((2, format!("let _ = {weights};")));
+            }
+            lines.extend(part);
+            lines.push((1, "}".to_owned()));
+            lines.push((1, format!("part(&mut {y}, {by}{weights});")));
+            lines.push((0, "}".to_owned()));
+        }
+        lines
     }
 }
 

@@ -14,7 +14,7 @@ use super::interface::{ModelInterface, PhaseInterface};
 use super::line_wrapping::{comment_lines, tidy};
 use super::precision::Precision;
 use super::printer::Printer;
-use super::requirements::calls_kernel;
+use super::requirements::{calls_kernel, has_fours};
 use super::sin_cos::KernelText;
 use super::sines::SineCosine;
 use crate::files::EmittedFile;
@@ -46,6 +46,8 @@ struct Lib<'a> {
     state_dim: Option<usize>,
     kernel: Option<KernelText>,
     tables: Vec<String>,
+    /// Whether there are sums of vectors of four numbers.
+    has_fours: bool,
     /// Whether rows of tables are read by wide registers.
     has_aligned: bool,
     maps: Vec<String>,
@@ -104,6 +106,7 @@ pub fn emit(
         has_lanes: functions.lanes.iter().any(Option::is_some),
         state_dim: entries.state_dim,
         kernel: uses_kernel.then(kernel),
+        has_fours: functions.all().any(|function| has_fours(&function.body)),
         has_aligned: functions.tables.iter().any(|table| table.is_in_lanes),
         tables: functions
             .tables

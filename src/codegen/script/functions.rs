@@ -1,5 +1,7 @@
 //! Functions that return what they compute, as text for the templates.
 
+use std::collections::BTreeSet;
+
 use crate::codegen::code::{Function, Role};
 use crate::codegen::error::CodegenError;
 use crate::codegen::functions::ModelFunctions;
@@ -147,6 +149,10 @@ impl<F> Script<'_, F> {
         let maps = functions.maps.iter().map(|map| print(map, None));
         let phases = entries.phases.iter().zip(&functions.phases).map(phase);
         let first = entries.phases.first();
+        let texts = functions
+            .all()
+            .map(|function| text(function, functions, &self.printer));
+        let read: BTreeSet<String> = texts.flat_map(|text| text.tables).collect();
         Ok(ModelText {
             name: entries.name.clone(),
             example: first.map_or(String::new(), |phase| phase.dynamics.name.clone()),
@@ -156,6 +162,7 @@ impl<F> Script<'_, F> {
             tables: functions
                 .tables
                 .iter()
+                .filter(|table| read.contains(&table.name.to_string()))
                 .map(|table| self.printer.table(table))
                 .collect(),
             maps: maps.collect::<Result<_, CodegenError>>()?,
