@@ -40,6 +40,7 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
             time_s: (0..n).map(|i| i as f64 * STEP_S).collect(),
             x: lift(&samples.z),
             u: lift(&samples.u_lat),
+            losses: None,
             rates: Some(Rates {
                 dx: lift(&samples.dz),
                 ddx: lift(&samples.ddz),
