@@ -13,8 +13,10 @@ use super::output::{check_output, names, spinner, stem};
 use super::prepared_recordings::{RecordedSets, read_all};
 use super::train_settings;
 use crate::files::Overwrite;
-use crate::robot::{Robot, WrenchFrame};
-use crate::train::{Method, Origin, Progress, Recordings, SetMetrics, TrainReport, Trained, Watch};
+use crate::robot::Robot;
+use crate::train::{
+    Method, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained, Watch,
+};
 use crate::typeset::{Cell, Table};
 use crate::{Error, artifact, train};
 
@@ -37,7 +39,7 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     read_all(&recorded.test)?;
     let sets = Recordings::new(&recorded.training, &recorded.validation);
     let files = arguments.recordings.iter().chain(&arguments.validation);
-    let command = command_line(arguments, &settings, method, options.wrench_frame);
+    let command = command_line(arguments, &settings, method, &options);
     let origin = Origin::of_files(command, files);
 
     let bar = spinner("training");
@@ -101,7 +103,7 @@ fn command_line(
     arguments: &TrainArguments,
     settings: &TrainSettings,
     method: Method,
-    wrench_frame: WrenchFrame,
+    options: &TrainOptions,
 ) -> String {
     let paths = |paths: &[PathBuf]| names(paths).join(" ");
     let mut line = format!("romc train {}", paths(&arguments.recordings));
@@ -113,7 +115,8 @@ fn command_line(
     }
     let settings = TrainSettings {
         method: Some(method),
-        wrench_frame: Some(wrench_frame),
+        wrench_frame: Some(options.wrench_frame),
+        coordinates: Some(options.encoder.coordinates),
         actuators: Some(settings.actuators.clone().unwrap_or(NONE.to_owned())),
         ..settings.clone()
     };

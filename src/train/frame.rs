@@ -189,7 +189,7 @@ mod tests {
 
     use super::*;
     use crate::recording::Recording;
-    use crate::robot::Robot;
+    use crate::robot::{InputRule, Robot};
     use crate::train::TrainOptions;
 
     fn go1(name: &str) -> Dataset {
@@ -197,9 +197,10 @@ mod tests {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
         let jump = crate::recording::read(&path).expect("a shipped recording");
         let options = TrainOptions::new("test", 4);
-        let (robot, scaling) = (Robot::by_name("go1").unwrap(), options.scaling.factors());
+        let rule = InputRule::published(Robot::by_name("go1").unwrap());
+        let scaling = options.scaling.factors();
         let jumps: [Recording; 1] = [jump];
-        Dataset::new(&jumps[..], robot, &options.phases, &scaling, 11).expect("a jump")
+        Dataset::new(&jumps[..], &rule, &options.phases, &scaling, 11).expect("a jump")
     }
 
     /// Mean and standard deviation of the acceleration along a row over the windows in flight, m/s^2.
