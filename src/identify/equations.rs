@@ -5,8 +5,8 @@
 //! `p'' = -g e_z + 1/m (sum_k F_k - sum_e s_e e'')`. A foot on the ground pushes with
 //! `F_k = -J_k^-T (tau_k - losses - Y_k pi + contact)`: `Y_k pi` are the torques that move the
 //! leg's own links (first and second moments `pi`, linear), and contact is the torque of a foot
-//! of radius `r` that rolls with resistance `rho`. A leg in the air obeys `tau_k = losses + Y_k pi`, joint by
-//! joint. All unknowns enter linearly; torques are taken a delay later, and a column of their rates
+//! of radius `r` that rolls with resistance `rho`. A leg in the air obeys
+//! `tau_k = losses + Y_k pi`, joint by joint. All unknowns enter linearly; torques are taken a delay later, and a column of their rates
 //! tells by how much that delay is wrong.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};

@@ -1,8 +1,8 @@
 //! Weighted least squares with losses that are not negative, and honest standard errors.
 //!
 //! Rows of a group (contact, flight, joints in the air; by axis or kind) share one residual
-//! deviation, estimated with the unknowns; residuals beyond three deviations count less (Huber). Residuals of
-//! neighbouring windows are alike, so standard errors come from leaving out blocks of 0.1 s in turn
+//! deviation, estimated with the unknowns; residuals beyond three deviations count less (Huber).
+//! Residuals of neighbouring windows are alike, so standard errors come from leaving out blocks of 0.1 s in turn
 //! (jackknife), not from the residuals as if they were independent.
 
 use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
