@@ -17,7 +17,7 @@ use crate::typeset::{Table, significant};
 ///
 /// # Errors
 /// [`Error::Robot`] for an unknown name, [`Error::Recording`] for a file that cannot be read,
-/// [`Error::Identify`] for recordings that do not say enough, [`Error::Exists`] for the output file.
+/// [`Error::Identify`] for recordings that do not say enough, [`Error::Exists`] for the output.
 pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(arguments.output.as_deref(), overwrite)?;

@@ -34,7 +34,8 @@ pub struct Timed {
     pub elapsed_ratio: f64,
     /// Whether the times were rebuilt from the motion.
     pub rebuilt: bool,
-    /// Whether the trunk's angular rates are differences of its angles, because those of the file disagree with them.
+    /// Whether the trunk's angular rates are differences of its angles, because those of the file
+    /// disagree with them.
     pub rates_replaced: bool,
     /// Samples that stand in for lost ones: straight lines across more than five steps.
     pub lost: Vec<bool>,

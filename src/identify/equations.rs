@@ -3,10 +3,10 @@
 //! With `m` the mass, `p` the trunk's origin, `e` directions of trunk and links (second derivatives
 //! `e''`) and `s_e` their first moments, Newton's law for the whole robot is
 //! `p'' = -g e_z + 1/m (sum_k F_k - sum_e s_e e'')`. A foot on the ground pushes with
-//! `F_k = -J_k^-T (tau_k - losses - Y_k pi + contact)`: `Y_k pi` are the torques that move the leg's
-//! own links (first and second moments `pi`, linear), and contact is the torque of a foot of radius
-//! `r` that rolls with resistance `rho`. A leg in the air obeys `tau_k = losses + Y_k pi`, joint by
-//! joint. All unknowns enter linearly; torques are taken a delay later, and a column of their rates
+//! `F_k = -J_k^-T (tau_k - losses - Y_k pi + contact)`: `Y_k pi` are the torques that move the
+//! leg's own links (first and second moments `pi`, linear), and contact is the torque of a foot
+//! of radius `r` that rolls with resistance `rho`. A leg in the air obeys
+//! `tau_k = losses + Y_k pi`, joint by joint. All unknowns enter linearly; torques are taken a delay later, and a column of their rates
 //! tells by how much that delay is wrong.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
@@ -55,7 +55,8 @@ pub fn joint_unknowns(kind: usize) -> [usize; JOINT_ROWS - 1] {
 pub struct SampleEquations {
     /// Axes x, y, z one below the other, [`BODY_ROWS`] each: the trunk's acceleration, m/s^2.
     pub body: DMatrix<f64>,
-    /// The twelve joints one below the other, [`JOINT_ROWS`] each: torque, N m. They hold in the air.
+    /// The twelve joints one below the other, [`JOINT_ROWS`] each: torque, N m. They hold in the
+    /// air.
     pub joints: DMatrix<f64>,
     /// Samples at which a leg on the ground is too close to a singular posture.
     pub singular: Vec<bool>,
@@ -243,7 +244,7 @@ impl LegSample {
 /// Torques at the three joints that move the links of a leg, per unit of each unknown of [`OWN`].
 ///
 /// A mass at `s` from a point that accelerates by `a` (gravity subtracted) needs the moment
-/// `s x (a + s'')` about it. The mass beside the axis of abduction is taken where the leg's plane is.
+/// `s x (a + s'')` about it. The mass beside the axis of abduction is taken in the leg's plane.
 fn own_torques(
     robot: &Robot,
     motion: &Motion,

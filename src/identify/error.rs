@@ -14,8 +14,8 @@ pub enum IdentifyError {
     Recording(#[from] RecordingError),
     /// Too little of the recordings has feet on the ground and is not close to an impact.
     #[error(
-        "{recordings} recordings: found {found} samples with feet on the ground that are 20 ms away \
-         from a change of feet and from a singular leg, expected at least {expected}"
+        "{recordings} recordings: found {found} samples with feet on the ground that are 20 ms \
+         away from a change of feet and from a singular leg, expected at least {expected}"
     )]
     Contact {
         /// Number of recordings.
@@ -27,8 +27,8 @@ pub enum IdentifyError {
     },
     /// The feet do not move enough for the joints' losses to have a direction.
     #[error(
-        "{recordings} recordings: found {found} windows of 30 ms in which the legs move, expected at \
-         least {expected}; a robot that stands still does not show its losses"
+        "{recordings} recordings: found {found} windows of 30 ms in which the legs move, expected \
+         at least {expected}; a robot that stands still does not show its losses"
     )]
     Still {
         /// Number of recordings.
@@ -40,8 +40,9 @@ pub enum IdentifyError {
     },
     /// The feet's forces do not explain the trunk's acceleration by any mass.
     #[error(
-        "the trunk's acceleration does not follow the feet's forces: found {inverse:.3e} as 1/mass, \
-         expected about {expected:.3e} 1/kg; are signs, units and order of the torques those of `{robot}`?"
+        "the trunk's acceleration does not follow the feet's forces: found {inverse:.3e} as \
+         1/mass, expected about {expected:.3e} 1/kg; are signs, units and order of the \
+         torques those of `{robot}`?"
     )]
     Mass {
         /// Estimate of one over the mass, 1/kg.

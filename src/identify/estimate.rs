@@ -35,8 +35,8 @@ const SETTLED: [f64; 2] = [2e-5, 1e-4];
 /// Gravity before the first round, for the weight of the links.
 const FIRST_GRAVITY: f64 = 9.81;
 
-/// What the recordings say of a robot of this geometry: gravity, mass, losses by kind of joint, with
-/// standard errors.
+/// What the recordings say of a robot of this geometry: gravity, mass, losses by kind of joint,
+/// with standard errors.
 ///
 /// Implausible samples stay and become notes; samples with a leg on the ground close to a singular
 /// posture are left out one by one.
@@ -141,8 +141,8 @@ impl Round {
         let mut notes = Vec::new();
         if self.clipped_torques > 0 {
             notes.push(format!(
-                "{} torques are above the robot's limits: commanded rather than measured? They count \
-                 as the limit",
+                "{} torques are above the robot's limits: commanded rather than measured? They \
+                 count as the limit",
                 self.clipped_torques
             ));
         }

@@ -1,8 +1,8 @@
 //! Weighted least squares with losses that are not negative, and honest standard errors.
 //!
-//! Rows of a group (contact, flight, joints in the air; by axis or kind) share one residual deviation,
-//! estimated with the unknowns; residuals beyond three deviations count less (Huber). Residuals of
-//! neighbouring windows are alike, so standard errors come from leaving out blocks of 0.1 s in turn
+//! Rows of a group (contact, flight, joints in the air; by axis or kind) share one residual
+//! deviation, estimated with the unknowns; residuals beyond three deviations count less (Huber).
+//! Residuals of neighbouring windows are alike, so standard errors come from leaving out blocks of 0.1 s in turn
 //! (jackknife), not from the residuals as if they were independent.
 
 use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
@@ -16,7 +16,7 @@ type Square = SMatrix<f64, PARAMETER_DIM, PARAMETER_DIM>;
 
 /// Deviations of a residual from which it counts less.
 const HUBER: f64 = 3.0;
-/// Smallest deviation of a group, m/s^2: what the model of the robot leaves out of the best recordings.
+/// Smallest deviation of a group, m/s^2: what the model leaves out of the best recordings.
 const LEAST_DEVIATION: f64 = 0.005;
 /// Weights of body and joint rows before the deviations are known.
 const FIRST_WEIGHTS: [f64; 2] = [1.0, 0.3];

@@ -73,7 +73,7 @@ pub struct StandardError {
     pub legs: Legs,
 }
 
-/// How well an equation explains the trunk's acceleration with feet on the ground: R^2 over windows.
+/// How well an equation explains the trunk's acceleration in contact: R^2 over windows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fit {

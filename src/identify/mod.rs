@@ -5,8 +5,8 @@
 //! with their motion, [`motion`] has the directions of the links and their accelerations,
 //! [`equations`] the linear equations that these obey at every sample, [`windows`] their averages
 //! over short windows, [`fit`] the weighted least squares, [`estimate`] the loop around it,
-//! [`file`](mod@file) the result on disk. Read [`estimate`] first; `docs/identify.md` has the method and measured
-//! figures.
+//! [`file`](mod@file) the result on disk. Read [`estimate`] first;
+//! `docs/identify.md` has the method and measured figures.
 //!
 //! ```
 //! use std::path::Path;

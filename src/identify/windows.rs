@@ -1,8 +1,8 @@
 //! Equations of samples averaged over short windows within one stance.
 //!
 //! The same average is taken on both sides of every equation, so it stays an equation, and noise of
-//! differences of velocities is averaged out. No window crosses a change of the feet on the ground or
-//! comes near one: impacts are not what torques explain.
+//! differences of velocities is averaged out. No window crosses a change of the feet on the ground
+//! or comes near one: impacts are not what torques explain.
 
 use std::ops::Range;
 
@@ -23,7 +23,7 @@ const MARGIN_S: f64 = 0.02;
 pub const OVERLAP: usize = 4;
 /// Length of the blocks that are left out in turn for standard errors, s.
 const BLOCK_S: f64 = 0.1;
-/// Mean speed of the joints that bear the robot from which their dry friction has a direction, rad/s.
+/// Mean speed of the bearing joints from which their dry friction has a direction, rad/s.
 const MOVING_RAD_S: f64 = 0.1;
 /// Speed that a joint in the air keeps over a window for the same reason, rad/s.
 const TURNING_RAD_S: f64 = 0.15;

@@ -126,8 +126,8 @@ fn hop(phase: f64) -> Segment {
     segment
 }
 
-/// Torques of legs in the air by the joints' equations, of legs on the ground the smallest that give
-/// the trunk its acceleration.
+/// Torques of legs in the air by the joints' equations, of legs on the ground the smallest that
+/// give the trunk its acceleration.
 fn torques(segment: &Segment, truth: &[f64; PARAMETER_DIM]) -> DMatrix<f64> {
     let motion = Motion::of(segment);
     let equations = SampleEquations::of(segment, &motion, go1(), GRAVITY_M_S2, 0.0);

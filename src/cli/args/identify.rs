@@ -7,9 +7,10 @@ use clap::Args;
 /// `romc identify`
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Recordings should hold jumps: flight shows gravity and the legs' inertia, moving legs their losses.\n\n\
+    after_help = "Recordings should hold jumps: flight shows gravity and the legs' inertia,\n\
+                  moving legs their losses.\n\n\
                   Example:\n  \
-                  romc identify examples/recordings/go1/test_*.csv.gz --robot go1 --output actuators.toml"
+                  romc identify examples/recordings/go1/test_*.csv.gz --robot go1"
 )]
 pub struct IdentifyArguments {
     /// Recordings of one robot
@@ -18,7 +19,7 @@ pub struct IdentifyArguments {
     /// Robot whose geometry and limits count
     #[arg(long, value_name = "NAME")]
     pub robot: String,
-    /// Write what was found to this file: losses of the twelve joints, gravity, mass, standard errors
+    /// Write losses of the twelve joints, gravity, mass, standard errors to this file
     #[arg(long, value_name = "ACTUATORS.toml")]
     pub output: Option<PathBuf>,
     /// Replace an existing output file
