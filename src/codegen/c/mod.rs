@@ -5,7 +5,7 @@ mod selftest;
 
 use askama::Template;
 
-use super::code::{Function, MathFunction};
+use super::code::{Function, MathFunction, Stmt};
 use super::dialect::Dialect;
 use super::error::CodegenError;
 use super::functions::ModelFunctions;
@@ -13,7 +13,7 @@ use super::interface::{ModelInterface, PhaseInterface};
 use super::line_wrapping::braced;
 use super::precision::Precision;
 use super::printer::Printer;
-use super::requirements::{calls_function, calls_kernel, has_fours};
+use super::requirements::{assigned_in_lanes, calls_function, calls_kernel, has_fours};
 use super::sin_cos::KernelText;
 use super::sines::SineCosine;
 use crate::files::EmittedFile;
@@ -76,6 +76,8 @@ struct LaneText<'a> {
     real: &'static str,
     /// Bytes of a number.
     size: usize,
+    /// Whether rows of functions are added in eight lanes.
+    has_rows: bool,
     /// Whether there are sums of vectors of four numbers.
     has_fours: bool,
 }
@@ -154,7 +156,11 @@ pub fn emit(
         phases: phases.clone(),
     };
     let uses_kernel = functions.all().any(|function| calls_kernel(&function.body));
-    let fours = functions.all().any(|function| has_fours(&function.body));
+    let has = |is: fn(&[Stmt]) -> bool| functions.all().any(|function| is(&function.body));
+    let (has_rows, has_fours) = (
+        has(|body| !assigned_in_lanes(body).is_empty()),
+        has(has_fours),
+    );
     let uses_lanes = functions.tables.iter().any(|table| table.is_in_lanes);
     let source = Source {
         banner: banner.clone(),
@@ -164,7 +170,9 @@ pub fn emit(
         latent_dim: entries.latent_dim,
         n_lanes: precision.lanes(),
         kernel: uses_kernel.then(|| kernel(&dialect, sines)).transpose()?,
-        lanes: uses_lanes.then(|| lanes(&dialect, fours)).transpose()?,
+        lanes: uses_lanes
+            .then(|| lanes(&dialect, has_rows, has_fours))
+            .transpose()?,
         sign: functions
             .all()
             .any(|function| calls_function(&function.body, MathFunction::Sign)),
@@ -261,7 +269,7 @@ fn kernel(dialect: &CDialect, sines: SineCosine) -> Result<String, CodegenError>
     Ok(kernel.render()?)
 }
 
-fn lanes(dialect: &CDialect, has_fours: bool) -> Result<String, CodegenError> {
+fn lanes(dialect: &CDialect, has_rows: bool, has_fours: bool) -> Result<String, CodegenError> {
     let lanes = LaneText {
         name: &dialect.name,
         upper: dialect.upper(),
@@ -270,6 +278,7 @@ fn lanes(dialect: &CDialect, has_fours: bool) -> Result<String, CodegenError> {
             Precision::Double => 8,
             Precision::Single => 4,
         },
+        has_rows,
         has_fours,
     };
     Ok(lanes.render()?)
