@@ -7,10 +7,36 @@ use serde::Deserialize;
 
 use super::train_settings::refused;
 use crate::Error;
-use crate::robot::{Actuators, JOINT_DIM, JOINT_NAMES};
+use crate::identify::identify;
+use crate::recording::RecordingFiles;
+use crate::robot::{Actuators, JOINT_DIM, JOINT_NAMES, Robot};
 
 /// The word that stands for no file.
 pub(super) const NONE: &str = "none";
+
+/// The word that stands for what the training recordings tell.
+pub(super) const IDENTIFIED: &str = "identify";
+/// Files of recordings that tell it, at most.
+const IDENTIFIED_FROM: usize = 20;
+
+/// The actuators that the first recordings tell, `None` with a note on stderr where they do not.
+///
+/// # Errors
+/// [`Error::Recording`] for a file that cannot be read.
+pub(super) fn identified(
+    recordings: &RecordingFiles,
+    robot: &Robot,
+) -> Result<Option<Actuators>, Error> {
+    match identify(&recordings.first(IDENTIFIED_FROM)?, robot) {
+        Ok(found) => Ok(Some(found.actuators)),
+        Err(reason) => {
+            eprintln!(
+                "note: torques are those of the motors, as the recordings do not tell the joints' losses: {reason}"
+            );
+            Ok(None)
+        }
+    }
+}
 
 /// The tables that are read; a file of `romc identify` has others as well.
 #[derive(Deserialize)]

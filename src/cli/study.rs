@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::json;
 
 use super::Answer;
+use super::actuators;
 use super::args::{StudyArguments, TrainSettings};
 use super::output::spinner;
 use super::prepared_recordings::{RecordedSets, read_all};
@@ -69,7 +70,10 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let training = read_all(&recorded.training)?;
     let validation = read_all(&recorded.validation)?;
     recorded.report_findings();
-    let base = train_settings::options(&settings, 1, String::new())?;
+    let mut base = train_settings::options(&settings, 1, String::new())?;
+    if settings.actuators.as_deref() == Some(actuators::IDENTIFIED) {
+        base.actuators = actuators::identified(&recorded.training, robot)?;
+    }
     settings.wrench_frame = Some(base.wrench_frame);
     let plan = plan(arguments, &settings, &training, &validation);
     let store = Store::create(&arguments.out_dir, plan)?;

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde_json::json;
 
 use super::Answer;
-use super::actuators::NONE;
+use super::actuators::{self, NONE};
 use super::args::{TrainArguments, TrainSettings};
 use super::output::{check_output, names, spinner, stem};
 use super::prepared_recordings::{RecordedSets, read_all};
@@ -33,8 +33,11 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         .expect("checked by clap, or with the file");
     let method = train_settings::method(&settings);
     let robot = Robot::by_name(settings.robot.as_deref().unwrap_or("go1"))?;
-    let options = train_settings::options(&settings, latent_dim, model_name(arguments))?;
+    let mut options = train_settings::options(&settings, latent_dim, model_name(arguments))?;
     let recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
+    if settings.actuators.as_deref() == Some(actuators::IDENTIFIED) {
+        options.actuators = actuators::identified(&recorded.training, robot)?;
+    }
     // a fault of the test recordings ends the command before the training
     read_all(&recorded.test)?;
     let sets = Recordings::new(&recorded.training, &recorded.validation);

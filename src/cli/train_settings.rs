@@ -63,7 +63,7 @@ pub(super) fn options(
         options.phases = PhaseRule::three_phase().with_min_samples(options.phases.min_samples);
     }
     options.actuators = match settings.actuators.as_deref() {
-        None | Some(actuators::NONE) => None,
+        None | Some(actuators::NONE | actuators::IDENTIFIED) => None,
         Some(path) => Some(actuators::read(Path::new(path))?),
     };
     Ok(options)

@@ -112,6 +112,18 @@ impl RecordingFiles {
         self.notes.get().cloned().unwrap_or_default()
     }
 
+    /// The recordings of the first `count` files, neither checked nor conditioned.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
+        let mut recordings = Vec::new();
+        for file in self.files.iter().take(count) {
+            recordings.extend(Self::chosen(file)?);
+        }
+        Ok(recordings)
+    }
+
     /// Reads all files and passes every recording to `take`, in order. Two files at a time are decoded on threads of
     /// their own where there are two cores.
     ///
@@ -164,13 +176,18 @@ impl RecordingFiles {
         })
     }
 
-    /// The recordings of one file. Checks that only report are made once.
-    fn read(&self, file: &RecordingFile) -> Result<Vec<Conditioned>, RecordingError> {
+    /// The recordings of one file as they are.
+    fn chosen(file: &RecordingFile) -> Result<Vec<Recording>, RecordingError> {
         let recording = read(&file.path)?;
-        let recordings = match &file.segments {
+        Ok(match &file.segments {
             None => vec![recording],
             Some(chosen) => single_segments(recording, chosen),
-        };
+        })
+    }
+
+    /// The recordings of one file. Checks that only report are made once.
+    fn read(&self, file: &RecordingFile) -> Result<Vec<Conditioned>, RecordingError> {
+        let recordings = Self::chosen(file)?;
         let keeps = self.options.implausible == ImplausibleSamples::Keep;
         let ready = recordings.into_iter().map(|recording| {
             let findings = match keeps && self.notes.get().is_some() {
