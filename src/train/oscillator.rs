@@ -48,7 +48,6 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
             phase: (0..n).map(|i| usize::from(i >= LIFT_OFF)).collect(),
             spans: vec![(0, 0..LIFT_OFF), (1, LIFT_OFF..n)],
             implausible: Vec::new(),
-            losses: None,
         }
     });
     let scaling = ScaleOptions::uniform(1.0).factors();
