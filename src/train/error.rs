@@ -56,7 +56,7 @@ pub enum TrainError {
     },
     /// More latent coordinates than the encoder may look at, or none.
     #[error(
-        "latent dimension {requested}, expected 1 to {active} (the number of coordinates that move or are actuated)"
+        "latent dimension {requested}, expected 1 to {active} (the rows that an encoder can have of the coordinates that move or are actuated; `--coordinates free` allows more)"
     )]
     LatentDim {
         /// What was asked for.
