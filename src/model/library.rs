@@ -367,7 +367,7 @@ impl Library {
     /// `z`, `dz` and `u_lat` hold one point a column (`latent_dim x n`), as recordings do.
     ///
     /// # Errors
-    /// [`ModelError::Shape`] if an argument has not `latent_dim` rows, or not as many columns as
+    /// [`ModelError::Invalid`] if an argument has not `latent_dim` rows, or not as many columns as
     /// `z`.
     pub fn evaluate_points(
         &self,

@@ -199,7 +199,7 @@ mod tests {
     fn state() -> [f64; STATE_DIM] {
         std::array::from_fn(|i| match i {
             0..JOINT_DIM => [0.1, 0.8, -1.5][i % 3] + 0.02 * i as f64,
-            12 | 13 | 14 => 0.3 * i as f64 - 3.0,
+            12..=14 => 0.3 * i as f64 - 3.0,
             15 => 0.3,
             16 => -0.9,
             _ => 0.7,

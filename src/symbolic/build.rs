@@ -181,7 +181,7 @@ impl ExprPool {
 
     /// The product of all operands: flat, powers of like bases collected, sorted.
     ///
-    /// Sums are not multiplied out; see [`expand`](ExprPool::expand).
+    /// Sums are not multiplied out.
     pub fn product(&mut self, operands: &[ExprId]) -> ExprId {
         if let &[a, b] = operands {
             // Scaling is by far the most frequent product and needs no sorting.

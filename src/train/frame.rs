@@ -42,7 +42,7 @@ impl Frame {
     /// The frame of the options.
     ///
     /// With [`Coordinates::Named`] and two latent coordinates or more, the first two rows are the centre of mass
-    /// forwards and upwards ([`centre_of_mass`]) and the others combine the sums of `active` coordinates left and
+    /// forwards and upwards (see `centre_of_mass`) and the others combine the sums of `active` coordinates left and
     /// right that a mirror leaves alone: such an encoder knows nothing of `y`, roll and yaw, nor of left and right.
     ///
     /// # Errors

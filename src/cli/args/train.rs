@@ -181,7 +181,7 @@ pub struct TrainSettings {
     /// Custom candidate terms, separated by semicolons: "1; z1; dz1; u1; z1*dz2"
     #[arg(long, value_name = "TERMS", conflicts_with_all = ["degree", "trigonometric"])]
     pub terms: Option<String>,
-    /// Friction and inertia of the joints, taken from the torques: a file with [actuators], `identify` for what the
+    /// Friction and inertia of the joints, taken from the torques: a file with a table `actuators`, `identify` for what the
     /// training recordings tell (as `romc identify` does), or `none` (none unless given)
     #[arg(long, value_name = "FILE.toml")]
     pub actuators: Option<String>,
