@@ -38,7 +38,7 @@ const SOME_MODELS: u64 = 24;
 /// interpreter's bits; `.ci/run` asks for 200.
 fn n_random_models() -> u64 {
     let asked = std::env::var("ROMC_RANDOM_MODELS").ok();
-    asked.map_or(72, |count| {
+    asked.map_or(40, |count| {
         count.parse().expect("ROMC_RANDOM_MODELS is a number")
     })
 }
