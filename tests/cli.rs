@@ -873,6 +873,45 @@ fn shipped_models_come_from_the_command_in_their_provenance() {
 }
 
 #[test]
+fn named_coordinates_are_refused_where_they_are_not_learned_and_need_no_joint() {
+    let folder = folder();
+    let model = path(&folder, "m.json");
+    let train = |d: &str, more: &[&str]| {
+        let mut arguments = vec![
+            "train",
+            JUMP,
+            "--latent-dim",
+            d,
+            "--output",
+            &model,
+            "--force",
+        ];
+        arguments.extend(more);
+        romc(&arguments)
+    };
+    let named = ["--coordinates", "named"];
+    for more in [
+        &["--encoder-layers", "8"][..],
+        &["--paper", "--method", "joint"],
+    ] {
+        let refused = train("2", &[&named, more].concat());
+        assert_eq!(refused.status.code(), Some(2));
+        let error = text(&refused.stderr);
+        assert!(
+            error.contains("coordinates") && error.contains("named with"),
+            "{error}"
+        );
+    }
+    // nothing but the body counts as moving
+    let body = ["--mask-std", "10", "--mask-input-share", "1"];
+    let trained = train("2", &body);
+    assert!(trained.status.success(), "{}", text(&trained.stderr));
+    let refused = train("3", &body);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(text(&refused.stderr).contains("expected 1 to 2"));
+}
+
+#[test]
 fn simulate_writes_one_row_a_sample_without_nan() {
     let folder = folder();
     let table = path(&folder, "trajectories.csv");

@@ -119,7 +119,7 @@ fn command_line(
     let settings = TrainSettings {
         method: Some(method),
         wrench_frame: Some(options.wrench_frame),
-        coordinates: Some(options.encoder.coordinates),
+        coordinates: Some(options.coordinates()),
         actuators: Some(settings.actuators.clone().unwrap_or(NONE.to_owned())),
         ..settings.clone()
     };

@@ -12,7 +12,8 @@ use crate::Error;
 use crate::model::{Activation, StandardLibrary};
 use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule};
 use crate::train::{
-    LibraryChoice, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError, TrainOptions,
+    Coordinates, LibraryChoice, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError,
+    TrainOptions,
 };
 
 /// The options that the settings describe.
@@ -179,7 +180,8 @@ pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Err
     Ok(settings)
 }
 
-/// Refuses an activation without hidden layers and rows to filter without a filter.
+/// Refuses an activation without hidden layers, rows to filter without a filter, and named coordinates where a
+/// method learns others.
 fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
     let refused = |option, found, expected| {
         Err(Error::Train(TrainError::Option {
@@ -193,6 +195,21 @@ fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
             "activation",
             format!("{activation:?} without hidden layers"),
             "`--encoder-layers` or `--decoder-layers` beside it",
+        );
+    }
+    let named = settings.coordinates == Some(Coordinates::Named);
+    if named && !maps(settings).is_linear() {
+        return refused(
+            "coordinates",
+            "named with hidden layers".to_owned(),
+            "free, or maps without hidden layers",
+        );
+    }
+    if named && settings.paper && method(settings) == Method::Joint {
+        return refused(
+            "coordinates",
+            "named with the published joint training".to_owned(),
+            "free, or a training without `--paper`",
         );
     }
     if let (Some(rows), None) = (settings.smooth_rows, &settings.smooth) {

@@ -1,6 +1,7 @@
 //! What is generated for a model: programs, with names, roles and documentation.
 
 use super::code::Role;
+use super::map_equations::{MapEquations, in_matrices, without_factors};
 use super::precision::{Precision, stated_bounds};
 use super::units::Units;
 use crate::equations::{Equations, LatentUnits, Unit};
@@ -324,92 +325,6 @@ fn in_units(array: &str, units: Option<&Vec<Unit>>) -> String {
     };
     let elements = (units.iter().enumerate()).map(|(k, unit)| format!("{array}[{k}] {unit}"));
     format!("({})", elements.collect::<Vec<_>>().join(", "))
-}
-
-/// An equation of the maps between physical values, the scale factors folded into the matrices.
-fn in_matrices(title: &str) -> String {
-    without_factors(title)
-        .replace("pinv(W_e^T) u", "P u")
-        .replace("W_e^T u_lat", "L u_lat")
-}
-
-/// An equation of the maps between scaled values.
-fn without_factors(title: &str) -> String {
-    [
-        ("(s_x x)", "x"),
-        ("(s_x dx)", "dx"),
-        ("(s_u u)", "u"),
-        ("s_x x", "x"),
-        (" / s_x", ""),
-        (" / s_u", ""),
-    ]
-    .into_iter()
-    .fold(title.to_owned(), |text, (from, to)| text.replace(from, to))
-}
-
-/// The equations of the maps in words of the documentation, for linear and nonlinear models.
-struct MapEquations {
-    curved_encoder: bool,
-    curved_decoder: bool,
-}
-
-impl MapEquations {
-    /// What the first argument of the encoder's and the decoder's functions is, if they take one.
-    fn points(&self) -> (&'static str, &'static str) {
-        let x = "x: robot coordinates at which the Jacobian is taken, SI units. ";
-        let z = "z: latent coordinates at which the Jacobian is taken (scaled). ";
-        (
-            if self.curved_encoder { x } else { "" },
-            if self.curved_decoder { z } else { "" },
-        )
-    }
-
-    fn encode(&self) -> &'static str {
-        match self.curved_encoder {
-            false => "Latent coordinates: z = W_e (s_x x) + b_e.",
-            true => "Latent coordinates: z = E(s_x x) with the nonlinear encoder E.",
-        }
-    }
-
-    fn encode_velocity(&self) -> &'static str {
-        match self.curved_encoder {
-            false => "Latent velocities: dz = W_e (s_x dx); velocities take no bias.",
-            true => "Latent velocities: dz = J (s_x dx) with J, the encoder's Jacobian at s_x x.",
-        }
-    }
-
-    fn decode(&self) -> &'static str {
-        match self.curved_decoder {
-            false => "Robot coordinates: x = (W_d z + b_d) / s_x.",
-            true => "Robot coordinates: x = D(z) / s_x with the nonlinear decoder D.",
-        }
-    }
-
-    fn decode_velocity(&self) -> &'static str {
-        match self.curved_decoder {
-            false => "Robot velocities: dx = (W_d dz) / s_x; velocities take no bias.",
-            true => "Robot velocities: dx = (J dz) / s_x with J, the decoder's Jacobian at z.",
-        }
-    }
-
-    fn project_input(&self) -> &'static str {
-        match self.curved_encoder {
-            false => "Latent inputs: u_lat = pinv(W_e^T) (s_u u).",
-            true => {
-                "Latent inputs: u_lat = pinv(J^T) (s_u u) with J, the encoder's Jacobian at s_x x, \
-                 by the normal equations; not finite where J has not full row rank."
-            }
-        }
-    }
-
-    fn lift_input(&self) -> &'static str {
-        match self.curved_encoder {
-            false => "Generalised inputs: u = (W_e^T u_lat) / s_u.",
-            true => {
-                "Generalised inputs: u = (J^T u_lat) / s_u with J, the encoder's Jacobian at s_x x."
-            }
-        }
-    }
 }
 
 fn phase_entries(

@@ -15,6 +15,7 @@ pub(crate) mod interface;
 mod lanes;
 pub(crate) mod line_wrapping;
 mod literal;
+mod map_equations;
 mod precision;
 mod printer;
 mod requirements;

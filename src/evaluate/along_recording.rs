@@ -26,7 +26,7 @@ use crate::mpc::{
     StanceState, Status, foot_forces, to_upright,
 };
 use crate::recording::{Recording, Segment};
-use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
+use crate::robot::{ContactFlags, GRAVITY_M_S2, JOINT_DIM, STATE_DIM};
 
 /// Where the controller's input reference comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
@@ -329,7 +329,7 @@ fn friction_violated(
 ) -> Option<bool> {
     let stance = stance.filter(|stance| stance.feet.contains(&true))?;
     let (plant, settings) = (controller.plant(), controller.settings());
-    let tolerance_n = 1e-3 * plant.robot().mass_kg() * 9.81;
+    let tolerance_n = 1e-3 * plant.robot().mass_kg() * GRAVITY_M_S2;
     match settings.lift {
         Lift::Consistent => {
             let forces = foot_forces(plant, stance)?;

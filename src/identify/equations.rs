@@ -35,19 +35,11 @@ pub const JOINT_ROWS: usize = 12;
 
 /// The unknowns of a joint's equation, in the order of its rows; the left side follows.
 pub fn joint_unknowns(kind: usize) -> [usize; JOINT_ROWS - 1] {
-    [
-        VISCOUS + kind,
-        DRY + kind,
-        ARMATURE + kind,
-        LEG_SIDE,
-        THIGH,
-        THIGH_SECOND,
-        CALF,
-        CALF_SECOND,
-        THIGH_FRONT,
-        CALF_FRONT,
-        DELAY,
-    ]
+    let mut unknowns = [DELAY; JOINT_ROWS - 1];
+    let losses = [VISCOUS + kind, DRY + kind, ARMATURE + kind];
+    unknowns[..losses.len()].copy_from_slice(&losses);
+    unknowns[losses.len()..][..OWN.len()].copy_from_slice(&OWN);
+    unknowns
 }
 
 /// The equations of a segment; one column a sample.

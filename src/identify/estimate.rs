@@ -18,7 +18,7 @@ use super::parameters::{
 use super::windows::{Group, Windows};
 use crate::recording::check::check;
 use crate::recording::{Recording, Segment};
-use crate::robot::{Actuators, JOINT_DIM, Robot};
+use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Robot};
 
 /// Fewest samples with feet on the ground.
 const LEAST_CONTACT_SAMPLES: usize = 100;
@@ -32,8 +32,6 @@ const LARGEST_DELAY_CHANGE_S: f64 = 0.004;
 const LARGEST_DELAY_S: f64 = 0.06;
 /// Changes in a round below which the rounds end: of the delay (s), of the mass (relative).
 const SETTLED: [f64; 2] = [2e-5, 1e-4];
-/// Gravity before the first round, for the weight of the links.
-const FIRST_GRAVITY: f64 = 9.81;
 
 /// What the recordings say of a robot of this geometry: gravity, mass, losses by kind of joint,
 /// with standard errors.
@@ -175,7 +173,7 @@ struct State {
 impl State {
     fn new(robot: &Robot) -> Self {
         Self {
-            gravity_m_s2: FIRST_GRAVITY,
+            gravity_m_s2: GRAVITY_M_S2, // for the weight of the links in the first round
             mass_kg: robot.mass_kg(),
             delay_s: 0.0,
             losses: [0.0; PARAMETER_DIM],

@@ -17,6 +17,9 @@ pub const FOOT_DIM: usize = 4;
 /// Number of joints of a leg.
 pub const LEG_JOINT_DIM: usize = 3;
 
+/// Acceleration of free fall, in m/s^2.
+pub const GRAVITY_M_S2: f64 = 9.81;
+
 /// Which feet touch the ground, in the order of [`Leg::ALL`].
 pub type ContactFlags = [bool; FOOT_DIM];
 

@@ -36,7 +36,8 @@ pub use error::RobotError;
 pub use feet::FeetRule;
 pub use input_rule::{InputRule, WrenchFrame};
 pub use joints::{
-    BODY_DIM, BODY_NAMES, ContactFlags, FOOT_DIM, JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM,
+    BODY_DIM, BODY_NAMES, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Leg,
+    STATE_DIM,
 };
 pub use kinematics::LegGeometry;
 pub use registry::Robot;

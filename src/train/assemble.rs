@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::dataset::Dataset;
 use super::error::TrainError;
-use super::options::TrainOptions;
+use super::options::{EncoderOptions, TrainOptions};
 use super::report::TrainReport;
 use crate::model::{
     CoordinateNames, Library, Phase, ReducedModel, ScaleFactors, Scaling, StateMap,
@@ -155,7 +155,11 @@ fn provenance(
     map.insert("romc_version".into(), json!(env!("CARGO_PKG_VERSION")));
     map.insert("method".into(), json!(method));
     map.insert("seed".into(), json!(options.seed));
-    map.insert("encoder_options".into(), json!(options.encoder));
+    let encoder = EncoderOptions {
+        coordinates: options.coordinates(),
+        ..options.encoder.clone()
+    };
+    map.insert("encoder_options".into(), json!(encoder));
     map.insert("recordings".into(), Value::Array(recordings));
     map.insert("report".into(), json!(report));
     Ok(map)

@@ -6,10 +6,8 @@ use super::dataset::{Dataset, Jump, Rates};
 use super::error::TrainError;
 use super::metrics::{BODY_X, BODY_Z};
 use super::options::Coordinates;
-use crate::robot::{FeetRule, JOINT_DIM, Leg, STATE_DIM};
+use crate::robot::{FeetRule, GRAVITY_M_S2, JOINT_DIM, Leg, STATE_DIM};
 
-/// Acceleration of free fall, in m/s^2.
-pub const GRAVITY_M_S2: f64 = 9.81;
 /// Pitch of the body among the 18 coordinates.
 const PITCH: usize = 16;
 /// Time over which accelerations in flight are averaged, in s.
@@ -69,7 +67,10 @@ impl Frame {
                 0 | 1 => DMatrix::zeros(STATE_DIM, 0),
                 _ => centre_of_mass(training)?,
             },
-            free: DMatrix::from_columns(&free),
+            free: match free.is_empty() {
+                true => DMatrix::zeros(STATE_DIM, 0),
+                false => DMatrix::from_columns(&free),
+            },
         })
     }
 
@@ -86,7 +87,7 @@ impl Frame {
         let count = latent_dim - self.held.ncols();
         let mut order: Vec<usize> = (0..left.ncols()).collect();
         order.sort_by(|&a, &b| inside.singular_values[b].total_cmp(&inside.singular_values[a]));
-        &self.free * left.select_columns(&order[..count.min(order.len())])
+        &self.free * left.select_columns(&order[..count])
     }
 }
 

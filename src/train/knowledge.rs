@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::dataset::Dataset;
 use super::features::Features;
-use super::frame::{Frame, GRAVITY_M_S2};
+use super::frame::Frame;
 use super::metrics::BODY_Z;
-use crate::robot::FeetRule;
+use crate::robot::{FeetRule, GRAVITY_M_S2};
 
 /// Coefficients of one phase that are known, those that a regression may choose, and those that it must keep.
 #[derive(Clone, Debug, PartialEq)]

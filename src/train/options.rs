@@ -288,6 +288,14 @@ impl TrainOptions {
         }
     }
 
+    /// What the encoder's rows are made of: networks have no rows to hold, so theirs are free.
+    pub fn coordinates(&self) -> Coordinates {
+        match self.joint.maps.is_linear() {
+            true => self.encoder.coordinates,
+            false => Coordinates::Free,
+        }
+    }
+
     /// The seeds to try.
     pub fn seeds(&self) -> Vec<u64> {
         let count = self.n_seeds.max(1) as u64;

@@ -87,7 +87,11 @@ pub fn find_subspace(
     let objective = Objective::new(moments, frame, options);
     let mut best: Option<(f64, DMatrix<f64>)> = None;
     let count = latent_dim - frame.held.ncols();
-    for start in starting_points(&objective, count, options) {
+    let starts = match count {
+        0 => vec![DMatrix::zeros(frame.free.ncols(), 0)],
+        _ => starting_points(&objective, count, options),
+    };
+    for start in starts {
         let (value, basis) = objective.descend(start, options.iterations);
         if best.as_ref().is_none_or(|(least, _)| value < *least) {
             best = Some((value, basis));

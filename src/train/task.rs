@@ -5,7 +5,7 @@ use super::error::TrainError;
 use super::features::Features;
 use super::frame::Frame;
 use super::knowledge::Knowledge;
-use super::options::{Coordinates, TrainOptions};
+use super::options::TrainOptions;
 use super::subspace::Moments;
 use crate::model::Library;
 use crate::robot::Robot;
@@ -40,10 +40,7 @@ impl<'a> Task<'a> {
         let moments = sets.training.moments();
         let least_std = options.encoder.least_std * options.scaling.state;
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
-        let coordinates = match options.joint.maps.is_linear() {
-            true => options.encoder.coordinates,
-            false => Coordinates::Free,
-        };
+        let coordinates = options.coordinates();
         let frame = Frame::new(&sets.training, &active, options.latent_dim, coordinates)?;
         if options.latent_dim == 0 || options.latent_dim > frame.dim() {
             return Err(TrainError::LatentDim {
