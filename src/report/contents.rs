@@ -4,13 +4,14 @@ use nalgebra::DVector;
 
 use super::complexity::study_figures;
 use super::control::{latent_inputs, torques};
-use super::figures::{Figure, HeatMap, LinePlot, Panel, Role, Series};
+use super::figures::{Figure, HeatMap, LinePlot, Motion, Panel, Role, Series, film_strip, floor_m};
 use super::place::Place;
 use super::tables::NamedRun;
 use crate::evaluate::{Assessment, SegmentRun};
 use crate::model::{ModelError, ReducedModel};
 use crate::mpc::Lift;
-use crate::robot::JOINT_DIM;
+use crate::recording::Segment;
+use crate::robot::{JOINT_DIM, STATE_DIM};
 use crate::sim::Rollout;
 use crate::study::Summary;
 
@@ -37,6 +38,8 @@ pub struct Content<'a> {
 pub struct AllFigures {
     /// The encoder's weights.
     pub encoder: Vec<Figure>,
+    /// The robot as a stick figure, recorded and predicted.
+    pub motion: Vec<Figure>,
     /// Joints and body beside the recording.
     pub coordinates: Vec<Figure>,
     /// Latent accelerations.
@@ -53,6 +56,7 @@ impl AllFigures {
     /// All figures, in the order of the page.
     pub fn iter(&self) -> impl Iterator<Item = &Figure> {
         (self.encoder.iter())
+            .chain(&self.motion)
             .chain(&self.coordinates)
             .chain(&self.accelerations)
             .chain(&self.baselines)
@@ -80,6 +84,7 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
             run,
             place: Place::of_segment(index, run),
         };
+        figures.motion.extend(jump.film_strip()?);
         figures.coordinates.extend(jump.coordinates()?);
         figures.accelerations.push(jump.accelerations()?);
         figures.baselines.push(jump.baselines()?);
@@ -130,6 +135,24 @@ fn encoder(
     })
 }
 
+/// Instants of a film strip.
+const FRAMES: usize = 10;
+
+/// Yaw at the first sample, in rad.
+pub(super) fn heading_rad(segment: &Segment) -> f64 {
+    segment.x[(STATE_DIM - 1, 0)]
+}
+
+/// Whether each coordinate of the robot enters a latent one at the state `x` (18).
+///
+/// # Errors
+/// [`ModelError`] for a model without encoder.
+pub fn modelled(model: &ReducedModel, x: DVector<f64>) -> Result<Vec<bool>, ModelError> {
+    let weights = model.encoder_jacobian(&x)?;
+    let columns = weights.column_iter();
+    Ok(columns.map(|column| column.amax() != 0.0).collect())
+}
+
 /// A value of every sample; none where a rollout did not arrive.
 type Samples = Vec<Option<DVector<f64>>>;
 
@@ -142,6 +165,45 @@ struct Jump<'a> {
 }
 
 impl Jump<'_> {
+    /// The robot as it moved and as the model predicts it over the whole jump; none for a model without a robot.
+    fn film_strip(&self) -> Result<Option<Figure>, ModelError> {
+        let Ok(robot) = self.model.robot() else {
+            return Ok(None);
+        };
+        let segment = self.run.segment;
+        let motions = self.motions()?;
+        let names = (
+            format!("motion_{}", self.place.suffix),
+            format!(
+                "{}: recorded, and predicted over the whole jump.",
+                self.place.words
+            ),
+        );
+        let from = (heading_rad(segment), floor_m(robot, segment));
+        let motions = (segment.time_s.as_slice(), motions.as_slice());
+        Ok(Some(film_strip(robot, names, motions, from, FRAMES)))
+    }
+
+    /// What was recorded, and the rollout over the whole jump; coordinates that the model does not
+    /// encode stay as recorded.
+    fn motions(&self) -> Result<[Motion; 2], ModelError> {
+        let recorded = &self.run.segment.x;
+        let modelled = modelled(self.model, recorded.column(0).into_owned())?;
+        let mut states = self.decoded(&self.run.full)?;
+        for (sample, state) in states.iter_mut().enumerate() {
+            let Some(state) = state else { continue };
+            for row in (0..STATE_DIM).filter(|&row| !modelled[row]) {
+                state[row] = recorded[(row, sample)];
+            }
+        }
+        let predicted = Motion {
+            role: Role::Full,
+            words: "model, whole jump".to_owned(),
+            states,
+        };
+        Ok([Motion::recorded(self.run.segment), predicted])
+    }
+
     /// A function's value at every predicted sample.
     fn predicted(
         &self,

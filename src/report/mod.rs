@@ -13,7 +13,7 @@ mod place;
 mod tables;
 
 pub use complexity::study_figures;
-pub use contents::{AllFigures, Content, all_figures};
+pub use contents::{AllFigures, Content, all_figures, modelled};
 pub use control::{control_figures, without_statistics};
 pub use page::{PageOptions, page};
 pub use tables::{

@@ -1,6 +1,7 @@
 //! The numbers of a figure, all of them.
 
-use super::figure::{Figure, Panel};
+use super::figure::{Figure, Panel, Role};
+use super::sticks::Sticks;
 use crate::typeset::Table;
 
 /// A figure as CSV in long form: `panel,line,x,y`, or `panel,row,column,value` for shades.
@@ -10,16 +11,30 @@ pub fn csv(figure: &Figure) -> String {
         true => ["panel", "row", "column", "value"],
         false => ["panel", "line", "x", "y"],
     });
+    let named = |role: Role| {
+        let words = figure.legend.iter().find(|entry| entry.0 == role);
+        words.map_or(role.class(), |entry| &entry.1)
+    };
     for panel in &figure.panels {
         let title = panel.title();
         match panel {
             Panel::Lines(plot) => {
                 for series in &plot.series {
-                    let words = figure.legend.iter().find(|entry| entry.0 == series.role);
-                    let name = words.map_or(series.role.class(), |entry| &entry.1);
+                    let name = named(series.role);
                     for (x, y) in &series.points {
                         let y = y.map_or(String::new(), |y| y.to_string());
                         table.row([title, name, &x.to_string(), &y]);
+                    }
+                }
+            }
+            Panel::Sticks(plot) => {
+                for (role, sticks) in &plot.sticks {
+                    let lines = sticks.lines.iter().zip(Sticks::NAMES);
+                    for (line, part) in lines {
+                        let name = format!("{}, {part}", named(*role));
+                        for (x, y) in line {
+                            table.row([title, &name, &x.to_string(), &y.to_string()]);
+                        }
                     }
                 }
             }

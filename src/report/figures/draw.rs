@@ -1,6 +1,6 @@
 //! From a panel to marks on a plane; y grows downwards, lengths are points.
 
-use super::figure::{Figure, HeatMap, LinePlot, Panel, Role};
+use super::figure::{Figure, HeatMap, LinePlot, Panel, Role, StickPlot};
 use super::ticks::{padded, ticks};
 
 /// Space left of the axes, for their numbers.
@@ -107,6 +107,7 @@ pub fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<Mark> {
     match panel {
         Panel::Lines(plot) => draw_lines(plot, size, x_label),
         Panel::Heat(map) => draw_heat(map, size, x_label),
+        Panel::Sticks(plot) => draw_sticks(plot, size),
     }
 }
 
@@ -268,6 +269,28 @@ fn draw_heat(map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec<Mark> {
         Anchor::End,
         label,
     ));
+    marks
+}
+
+/// Robots on their floor; the title stands above.
+fn draw_sticks(plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
+    let (x, z) = (plot.extent.forward_m, plot.extent.up_m);
+    let (width, height) = (size.0 - 2.0 * RIGHT, size.1 - TOP - RIGHT);
+    let scale = (width / (x.1 - x.0)).min(height / (z.1 - z.0));
+    let left = RIGHT + 0.5 * (width - scale * (x.1 - x.0));
+    let at = |(forward, up): (f64, f64)| {
+        let down = size.1 - RIGHT - scale * (up - z.0);
+        (left + scale * (forward - x.0), down)
+    };
+    let floor = at((0.0, plot.floor_m)).1;
+    let mut marks = vec![
+        Mark::Text(RIGHT, TOP - 6.0, Anchor::Start, plot.title.clone()),
+        Mark::Rule([RIGHT, floor, size.0 - RIGHT, floor], Paint::Axis),
+    ];
+    for (role, sticks) in &plot.sticks {
+        let lines = sticks.lines.iter();
+        marks.extend(lines.map(|line| Mark::Line(line.iter().copied().map(at).collect(), *role)));
+    }
     marks
 }
 

@@ -1,5 +1,7 @@
 //! The content of a figure: panels, lines, shades, captions.
 
+use super::sticks::{Extent, Sticks};
+
 /// The meaning of a line, which selects its colour and dashes in every figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
@@ -96,6 +98,19 @@ pub struct HeatMap {
     pub values: Vec<f64>,
 }
 
+/// Robots as sticks in a vertical plane, one length for a metre in both directions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StickPlot {
+    /// The instant, such as `0.12 s`.
+    pub title: String,
+    /// The robots, the first below the others.
+    pub sticks: Vec<(Role, Sticks)>,
+    /// The part of the plane that is in sight.
+    pub extent: Extent,
+    /// Height of the floor, in m.
+    pub floor_m: f64,
+}
+
 /// One frame of a figure.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Panel {
@@ -103,6 +118,8 @@ pub enum Panel {
     Lines(LinePlot),
     /// Shades.
     Heat(HeatMap),
+    /// Robots.
+    Sticks(StickPlot),
 }
 
 impl Panel {
@@ -120,6 +137,7 @@ impl Panel {
         match self {
             Self::Lines(plot) => &plot.title,
             Self::Heat(map) => &map.title,
+            Self::Sticks(plot) => &plot.title,
         }
     }
 }

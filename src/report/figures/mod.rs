@@ -1,19 +1,22 @@
 //! Figures: data that draws itself as SVG and PDF and lists itself as CSV.
 //!
 //! A [`Figure`] holds numbers and words. `draw.rs` turns its panels into a list of marks, once;
-//! `svg.rs` and `pdf.rs` spell the same marks. Start with `figure.rs`.
+//! `svg.rs` and `pdf.rs` spell the same marks; `sticks.rs` turns states of a robot into lines. Start with
+//! `figure.rs`.
 
 mod csv;
 mod draw;
 mod figure;
 mod files;
 mod pdf;
+mod sticks;
 mod svg;
 mod ticks;
 
 pub use csv::csv;
 pub use draw::{Anchor, Mark, Paint, draw_panel};
-pub use figure::{Figure, HeatMap, LinePlot, Panel, Role, Series};
+pub use figure::{Figure, HeatMap, LinePlot, Panel, Role, Series, StickPlot};
 pub use files::figure_files;
 pub use pdf::pdf;
+pub use sticks::{Extent, Motion, Sticks, film_strip, floor_m};
 pub use svg::{panel_svg, standalone_svg};

@@ -1,0 +1,281 @@
+//! Stick figures: a robot at a state, seen from its right, and strips of them over time.
+
+use nalgebra::{DVector, Vector3};
+
+use super::figure::{Figure, Panel, Role, StickPlot};
+use crate::recording::Segment;
+use crate::robot::input_rule::rotation;
+use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, LegGeometry, Robot, STATE_DIM};
+
+/// Half the height of the box that stands for a trunk, in m.
+const TRUNK_HALF_HEIGHT_M: f64 = 0.05;
+
+/// Space around the robots in sight, in m.
+const MARGIN_M: f64 = 0.04;
+
+/// A robot's lines in a vertical plane: pairs of forward and up, in m.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sticks {
+    /// The trunk as a closed box, then hip, knee and foot of each leg, as named in [`Sticks::NAMES`].
+    pub lines: Vec<Vec<(f64, f64)>>,
+}
+
+impl Sticks {
+    /// Names of the lines.
+    pub const NAMES: [&str; 1 + FOOT_DIM] = ["trunk", "fr", "fl", "rr", "rl"];
+
+    /// `robot` at the state `x` (18: joint angles in rad, body position in m, roll, pitch and yaw in rad), projected on
+    /// the vertical plane that contains the direction `heading_rad`.
+    ///
+    /// # Panics
+    /// If `x` does not have 18 entries.
+    pub fn of(robot: &Robot, x: &[f64], heading_rad: f64) -> Self {
+        assert_eq!(x.len(), STATE_DIM, "a state of the robot");
+        let joints: [f64; JOINT_DIM] = std::array::from_fn(|joint| x[joint]);
+        let [px, py, pz, roll, pitch, yaw]: [f64; 6] = std::array::from_fn(|k| x[JOINT_DIM + k]);
+        let (origin, turn) = (Vector3::new(px, py, pz), rotation([roll, pitch, yaw]));
+        let (sin, cos) = heading_rad.sin_cos();
+        let seen = |in_body: Vector3<f64>| {
+            let point = origin + turn * in_body;
+            (point.x * cos + point.y * sin, point.z)
+        };
+        let thigh_alone = LegGeometry {
+            calf_m: 0.0,
+            foot_forward_m: 0.0,
+            ..robot.geometry().clone()
+        };
+        let [front, rear] = [Leg::FrontRight, Leg::RearRight].map(|leg| robot.hip_position(leg).x);
+        let corner = |x: f64, z: f64| seen(Vector3::new(x, 0.0, z * TRUNK_HALF_HEIGHT_M));
+        let trunk = vec![
+            corner(rear, -1.0),
+            corner(front, -1.0),
+            corner(front, 1.0),
+            corner(rear, 1.0),
+            corner(rear, -1.0),
+        ];
+        let leg = |leg: Leg| {
+            let (hip, q) = (robot.hip_position(leg), leg.of_joints(&joints));
+            let knee = thigh_alone.foot_position(leg, &q);
+            let foot = robot.foot_position(leg, &q);
+            vec![seen(hip), seen(hip + knee), seen(hip + foot)]
+        };
+        let legs = Leg::ALL.into_iter().map(leg);
+        Self {
+            lines: std::iter::once(trunk).chain(legs).collect(),
+        }
+    }
+}
+
+/// A part of a vertical plane, in m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Least and largest distance forward.
+    pub forward_m: (f64, f64),
+    /// Least and largest height.
+    pub up_m: (f64, f64),
+}
+
+impl Extent {
+    /// The smallest part with a margin that shows all `sticks` and the floor.
+    pub fn around<'a>(sticks: impl IntoIterator<Item = &'a Sticks>, floor_m: f64) -> Self {
+        let none = (f64::INFINITY, f64::NEG_INFINITY);
+        let wider = |(low, high): (f64, f64), value: f64| (low.min(value), high.max(value));
+        let (mut forward_m, mut up_m) = (none, wider(none, floor_m));
+        let points = sticks
+            .into_iter()
+            .flat_map(|sticks| sticks.lines.iter().flatten());
+        for &(forward, up) in points {
+            (forward_m, up_m) = (wider(forward_m, forward), wider(up_m, up));
+        }
+        let margin = |(low, high): (f64, f64)| match low <= high {
+            true => (low - MARGIN_M, high + MARGIN_M),
+            false => (0.0, 1.0),
+        };
+        Self {
+            forward_m: margin(forward_m),
+            up_m: margin(up_m),
+        }
+    }
+}
+
+/// A motion of a robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    /// The line that it is drawn with.
+    pub role: Role,
+    /// Its name in the legend.
+    pub words: String,
+    /// The state (18, as [`Sticks::of`] takes it) at each time; none where there is no prediction.
+    pub states: Vec<Option<DVector<f64>>>,
+}
+
+impl Motion {
+    /// What was recorded of a segment.
+    pub fn recorded(segment: &Segment) -> Self {
+        Self {
+            role: Role::Recorded,
+            words: "recorded".to_owned(),
+            states: (segment.x.column_iter().map(|x| Some(x.into_owned()))).collect(),
+        }
+    }
+
+    /// The robot at each time, for drawing.
+    pub fn sticks(&self, robot: &Robot, heading_rad: f64) -> Vec<Option<Sticks>> {
+        let sticks = |x: &DVector<f64>| Sticks::of(robot, x.as_slice(), heading_rad);
+        let states = self.states.iter();
+        states.map(|state| state.as_ref().map(sticks)).collect()
+    }
+}
+
+/// Height of the floor, in m: the median over samples of the lowest foot in contact; of the lowest foot where no sample
+/// has one.
+pub fn floor_m(robot: &Robot, segment: &Segment) -> f64 {
+    let lowest = |k: usize, all: bool| {
+        let sticks = Sticks::of(robot, segment.x.column(k).as_slice(), 0.0);
+        let feet = sticks.lines[1..].iter().zip(segment.feet[k]);
+        let down = feet
+            .filter(|(_, down)| all || *down)
+            .map(|(leg, _)| leg[2].1);
+        down.min_by(f64::total_cmp)
+    };
+    let heights = |all: bool| (0..segment.len()).filter_map(move |k| lowest(k, all));
+    let mut feet: Vec<f64> = heights(false).collect();
+    if feet.is_empty() {
+        feet = heights(true).collect();
+    }
+    feet.sort_by(f64::total_cmp);
+    feet.get(feet.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Motions at `n_frames` instants, evenly chosen from the first to the last of `time_s`, side by side to one scale, seen
+/// from the right of a robot that looks along `heading_rad`.
+pub fn film_strip(
+    robot: &Robot,
+    (id, caption): (String, String),
+    (time_s, motions): (&[f64], &[Motion]),
+    (heading_rad, floor_m): (f64, f64),
+    n_frames: usize,
+) -> Figure {
+    let last = time_s.len().saturating_sub(1);
+    let of_frame = |frame: usize| frame * last / n_frames.saturating_sub(1).max(1);
+    let chosen: Vec<usize> = (0..n_frames.min(time_s.len())).map(of_frame).collect();
+    let sticks_at = |sample: usize| {
+        let each = motions.iter().filter_map(move |motion| {
+            let state = motion.states.get(sample)?.as_ref()?;
+            let sticks = Sticks::of(robot, state.as_slice(), heading_rad);
+            Some((motion.role, sticks))
+        });
+        each.collect::<Vec<_>>()
+    };
+    let frames: Vec<_> = chosen.iter().map(|&sample| sticks_at(sample)).collect();
+    let extent = Extent::around(frames.iter().flatten().map(|(_, sticks)| sticks), floor_m);
+    let start_s = time_s.first().copied().unwrap_or(0.0);
+    let panels = chosen.iter().zip(frames).map(|(&sample, sticks)| {
+        Panel::Sticks(StickPlot {
+            title: format!("{:.2} s", time_s[sample] - start_s),
+            sticks,
+            extent,
+            floor_m,
+        })
+    });
+    let width = 156.0;
+    let slope = (extent.up_m.1 - extent.up_m.0) / (extent.forward_m.1 - extent.forward_m.0);
+    Figure {
+        id,
+        caption,
+        x_label: String::new(),
+        panel_size: (width, (slope * width + 18.0).clamp(60.0, 300.0)),
+        columns: 5,
+        panels: panels.collect(),
+        legend: (motions.iter())
+            .map(|motion| (motion.role, motion.words.clone()))
+            .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Standing straight: hips above feet, knees behind.
+    fn standing(x_m: f64, yaw_rad: f64) -> DVector<f64> {
+        let mut x = DVector::zeros(STATE_DIM);
+        for leg in 0..FOOT_DIM {
+            (x[3 * leg + 1], x[3 * leg + 2]) = (0.75, -1.5);
+        }
+        (x[12], x[14], x[17]) = (x_m, 0.3, yaw_rad);
+        x
+    }
+
+    fn go1() -> &'static Robot {
+        Robot::by_name("go1").unwrap()
+    }
+
+    #[test]
+    fn links_have_their_lengths_and_feet_their_place() {
+        let robot = go1();
+        let sticks = Sticks::of(robot, standing(0.2, 0.0).as_slice(), 0.0);
+        assert_eq!(sticks.lines.len(), Sticks::NAMES.len());
+        let length = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).hypot(a.1 - b.1);
+        for (leg, line) in Leg::ALL.into_iter().zip(&sticks.lines[1..]) {
+            let LegGeometry {
+                thigh_m, calf_m, ..
+            } = *robot.geometry();
+            assert!((length(line[0], line[1]) - thigh_m).abs() < 1e-12);
+            assert!((length(line[1], line[2]) - calf_m).abs() < 1e-12);
+            let hip = robot.hip_position(leg);
+            assert!((line[0].0 - 0.2 - hip.x).abs() < 1e-12);
+            let drop = (thigh_m + calf_m) * 0.75f64.cos();
+            assert!((line[2].1 - (0.3 - drop)).abs() < 1e-12);
+            // a thigh that swings back puts the knee behind the hip
+            assert!(line[1].0 < line[0].0);
+        }
+    }
+
+    #[test]
+    fn a_robot_seen_along_its_heading_looks_the_same_whatever_that_is() {
+        let straight = Sticks::of(go1(), standing(0.0, 0.0).as_slice(), 0.0);
+        let turned = Sticks::of(go1(), standing(0.0, 1.1).as_slice(), 1.1);
+        for (a, b) in straight
+            .lines
+            .iter()
+            .flatten()
+            .zip(turned.lines.iter().flatten())
+        {
+            assert!((a.0 - b.0).abs() < 1e-12 && (a.1 - b.1).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn film_strip_shows_first_and_last_sample_and_all_of_the_motion() {
+        let time_s: Vec<f64> = (0..101).map(|k| 3.0 + 0.01 * f64::from(k)).collect();
+        let motion = |role, speed: f64| Motion {
+            role,
+            words: "a".to_owned(),
+            states: (0..101)
+                .map(|k| Some(standing(speed * f64::from(k), 0.0)))
+                .collect(),
+        };
+        let mut runaway = motion(Role::Full, 0.02);
+        runaway.states[100] = None;
+        let motions = [motion(Role::Recorded, 0.01), runaway];
+        let names = ("strip".to_owned(), String::new());
+        let figure = film_strip(go1(), names, (&time_s, &motions), (0.0, 0.0), 5);
+        let plots: Vec<&StickPlot> = (figure.panels.iter())
+            .map(|panel| match panel {
+                Panel::Sticks(plot) => plot,
+                other => panic!("{other:?}"),
+            })
+            .collect();
+        assert_eq!(plots.len(), 5);
+        assert_eq!(
+            (plots[0].title.as_str(), plots[4].title.as_str()),
+            ("0.00 s", "1.00 s")
+        );
+        assert_eq!((plots[0].sticks.len(), plots[4].sticks.len()), (2, 1));
+        // the second motion is 1.5 m on at its last frame, its front hip further
+        assert!(plots[0].extent.forward_m.1 > 1.5 + 0.18);
+        let (_, last) = &plots[4].sticks[0];
+        assert_eq!(*last, Sticks::of(go1(), standing(1.0, 0.0).as_slice(), 0.0));
+    }
+}
