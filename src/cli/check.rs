@@ -1,12 +1,11 @@
 //! `romc check`: two files in, equal or a point of difference out.
 
 use std::fmt::Write as _;
-use std::process::ExitCode;
 
 use serde_json::{Value, json};
 
-use super::Answer;
 use super::args::CheckArguments;
+use super::{Answer, DONE, FAILED};
 use crate::Error;
 use crate::check::{
     CheckDomain, CheckError, CheckOptions, Comparison, EquationComparison, Gap, Side,
@@ -19,7 +18,7 @@ use crate::typeset::significant;
 ///
 /// # Errors
 /// [`Error::Check`] for files that cannot be read.
-pub fn run(arguments: &CheckArguments) -> Result<(Answer, ExitCode), Error> {
+pub fn run(arguments: &CheckArguments) -> Result<(Answer, u8), Error> {
     let options = CheckOptions {
         exact: arguments.exact,
         symbols: SymbolNames::parse(&arguments.symbols)?,
@@ -41,11 +40,7 @@ pub fn run(arguments: &CheckArguments) -> Result<(Answer, ExitCode), Error> {
             })).collect::<Vec<_>>(),
         }),
     };
-    let code = if is_equal {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
-    };
+    let code = if is_equal { DONE } else { FAILED };
     Ok((answer, code))
 }
 

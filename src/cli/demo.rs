@@ -11,13 +11,13 @@ use serde_json::json;
 use super::Answer;
 use super::args::{CodeArguments, DemoArguments, EquationArguments};
 use super::output::spinner;
-use super::{compile, mpc as mpc_command, report, simulate};
+use super::{compile, mpc as mpc_command, report};
 use crate::deploy::Target;
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::{EmittedFile, Overwrite};
 use crate::model::ReducedModel;
-use crate::report::{Content, NamedRun, baseline_table};
+use crate::report::{Content, NamedRun, assessment_json, baseline_table};
 use crate::simplify::Tolerance;
 use crate::typeset::{Rounding, Table};
 use crate::{Error, artifact, recording};
@@ -111,7 +111,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
         json: json!({
             "command": "demo",
             "model": MODEL.0,
-            "rollouts": simulate::metrics_json(&model, &evaluation),
+            "rollouts": assessment_json(&model, &evaluation),
             "mpc": { "transpose": plain, "consistent": consistent },
             "self_test": self_test,
             "files": made.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),

@@ -138,9 +138,7 @@ fn scaling(arguments: &ImportArguments) -> Option<Scaling> {
 fn describe(report: &ImportReport) -> String {
     let mut text = format!(
         "{} ({}): {} latent coordinates, ",
-        report.file,
-        report.format.name(),
-        report.latent_dim
+        report.file, report.format, report.latent_dim
     );
     if let Some(state_dim) = report.state_dim {
         let _ = write!(text, "{state_dim} robot coordinates, ");

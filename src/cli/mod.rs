@@ -26,6 +26,7 @@ mod train;
 mod train_settings;
 mod trajectory;
 
+use std::ffi::OsString;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
@@ -47,28 +48,45 @@ pub struct Answer {
 ///
 /// Wrong usage gives exit code 2 (by clap, or for an option whose value turns out to be none); a failed run gives 1.
 pub fn run() -> ExitCode {
-    let arguments = Arguments::parse();
+    ExitCode::from(run_with(std::env::args_os()))
+}
+
+/// The same with the arguments of another program that has the command line in it, the first of them its name;
+/// returns the exit code.
+pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(refusal) => {
+            // Help and the version are refusals of clap that go to stdout; a reader that has gone away is no failure.
+            let _ = refusal.print();
+            return u8::try_from(refusal.exit_code()).unwrap_or(WRONG_USAGE);
+        }
+    };
     let printed = execute(arguments.command).map(|(answer, code)| match arguments.json {
         true => (format!("{}\n", answer.json), code),
         false => (answer.text, code),
     });
     match printed {
         Ok((text, code)) => match print(&text) {
-            ExitCode::SUCCESS => code,
+            DONE => code,
             failed => failed,
         },
         Err(error) => {
             print_error(&error);
             match error.is_usage() {
-                true => ExitCode::from(2),
-                false => ExitCode::FAILURE,
+                true => WRONG_USAGE,
+                false => FAILED,
             }
         }
     }
 }
 
+const DONE: u8 = 0;
+const FAILED: u8 = 1;
+const WRONG_USAGE: u8 = 2;
+
 /// Runs a command; the exit code of one that ran is 0, or 1 for files that `check` finds different.
-fn execute(command: Command) -> Result<(Answer, ExitCode), Error> {
+fn execute(command: Command) -> Result<(Answer, u8), Error> {
     let answer = match command {
         Command::Check(arguments) => return check::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
@@ -84,21 +102,21 @@ fn execute(command: Command) -> Result<(Answer, ExitCode), Error> {
         Command::Manual(arguments) => manual::pages(&arguments),
         Command::Completions(arguments) => Ok(manual::completions(&arguments)),
     };
-    answer.map(|answer| (answer, ExitCode::SUCCESS))
+    answer.map(|answer| (answer, DONE))
 }
 
 /// Prints to stdout; a reader that has gone away (`| head`) is no failure.
-fn print(text: &str) -> ExitCode {
+fn print(text: &str) -> u8 {
     let mut stdout = io::stdout().lock();
     match stdout
         .write_all(text.as_bytes())
         .and_then(|()| stdout.flush())
     {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
+        Ok(()) => DONE,
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => DONE,
         Err(error) => {
             eprintln!("error: cannot write to stdout: {error}");
-            ExitCode::FAILURE
+            FAILED
         }
     }
 }

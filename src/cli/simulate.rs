@@ -2,17 +2,17 @@
 
 use std::fmt::Write as _;
 
-use serde_json::{Map, Value, json};
+use serde_json::json;
 
 use super::Answer;
 use super::args::SimulateArguments;
 use super::output::{check_output, read_recordings, spinner, write_file};
 use super::trajectory::trajectory_table;
-use crate::evaluate::{Assessment, Baseline, CoordinateSums, Fit, LinearisedPhase};
+use crate::evaluate::Assessment;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::report::{
-    baseline_table, coordinate_table, dynamics_table, phase_table, remarks, template_rms,
+    assessment_json, baseline_table, coordinate_table, dynamics_table, phase_table, remarks,
 };
 use crate::typeset::significant;
 use crate::{Error, artifact};
@@ -46,7 +46,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
         json: json!({
             "command": "simulate",
             "model": arguments.model.display().to_string(),
-            "rollouts": metrics_json(&model, &assessment),
+            "rollouts": assessment_json(&model, &assessment),
             "output": arguments.output.as_ref().map(|path| path.display().to_string()),
         }),
     })
@@ -100,85 +100,4 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
         let _ = writeln!(text, "\nnote: {remark}");
     }
     text
-}
-
-/// All metrics of an assessment as JSON.
-pub fn metrics_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Value {
-    let lift = &assessment.lift;
-    json!({
-        "segments": assessment.runs.len(),
-        "restart_every_s": assessment.restart_every_s,
-        "full": rollouts_json(model, assessment, &assessment.full),
-        "restarted": rollouts_json(model, assessment, &assessment.restarted),
-        "acceleration_r2": by_phase(model, |index| {
-            let fit = assessment.pointwise.acceleration[index].fit();
-            json!(fit.and_then(|fit| fit.r2))
-        }),
-        "linearised": by_phase(model, |index| {
-            json!(assessment.linearised[index].as_ref().map(linearised_json))
-        }),
-        "decoder_mean_square_scaled": assessment.decoder_mean_square(),
-        "active_terms": assessment.active_terms,
-        "combined_loss": assessment.combined_loss(),
-        "lift": {
-            "torque_r2": {
-                "contact": lift.torque_r2().contact,
-                "flight": lift.torque_r2().flight,
-                "all": lift.torque_r2_all(),
-            },
-            "inconsistency": lift.inconsistency(),
-        },
-        "baselines": assessment.baselines.iter().map(baseline_json).collect::<Vec<_>>(),
-        "remarks": remarks(model, assessment),
-    })
-}
-
-/// A value of each phase under its name.
-fn by_phase(model: &ReducedModel, value: impl Fn(usize) -> Value) -> Map<String, Value> {
-    let phases = model.phases().iter().enumerate();
-    phases
-        .map(|(index, phase)| (phase.name.clone(), value(index)))
-        .collect()
-}
-
-fn linearised_json(phase: &LinearisedPhase) -> Value {
-    json!({
-        "samples": phase.samples,
-        "eigenvalues_per_s": phase.eigenvalues.iter().map(|v| [v.re, v.im]).collect::<Vec<_>>(),
-        "input_singular_values": phase.input_singular_values,
-        "input_condition": phase.input_condition(),
-        "input_effective_rank": phase.input_effective_rank(),
-    })
-}
-
-fn baseline_json(baseline: &Baseline) -> Value {
-    let [full, restarted] = [&baseline.full, &baseline.restarted]
-        .map(template_rms)
-        .map(|[x, z]| json!({ "body.x": x, "body.z": z }));
-    json!({
-        "name": baseline.name,
-        "constants": baseline.template.constants(),
-        "rms_m": { "full": full, "restarted": restarted },
-    })
-}
-
-fn rollouts_json(
-    model: &ReducedModel,
-    assessment: &Assessment<'_>,
-    sums: &CoordinateSums,
-) -> Value {
-    let named = |fits: Vec<Option<Fit>>| -> Map<String, Value> {
-        let names = assessment.names.iter().zip(&assessment.units).zip(fits);
-        let entry = |((name, unit), fit): ((&String, &String), Option<Fit>)| {
-            let (rms, r2) = (fit.map(|fit| fit.rms), fit.and_then(|fit| fit.r2));
-            (name.clone(), json!({ "unit": unit, "rms": rms, "r2": r2 }))
-        };
-        names.map(entry).collect()
-    };
-    json!({
-        "rollouts": sums.windows,
-        "diverged": sums.diverged,
-        "coordinates": named(sums.fits()),
-        "phases": by_phase(model, |index| json!(named(sums.phase_fits(index)))),
-    })
 }

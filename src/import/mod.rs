@@ -1,4 +1,4 @@
-//! Models trained elsewhere: safetensors, NumPy's npz, equations as text.
+//! Models trained elsewhere: safetensors, NumPy's npz, arrays in memory, equations as text.
 //!
 //! What enters: a file, and in [`ImportOptions`] what tensors do not carry (the candidate terms,
 //! when each phase holds, the scale factors). What leaves: a model checked like any other, and an
@@ -33,6 +33,7 @@ mod error;
 mod latent;
 mod latex;
 mod library;
+mod memory;
 mod npz;
 mod options;
 mod report;
@@ -46,10 +47,11 @@ mod terms;
 pub use error::{ImportError, ImportFault};
 pub use latex::{NameError, SymbolNames};
 pub use library::read_terms;
+pub use memory::Tensor;
 pub use options::{
     Format, ImportOptions, LibraryChoice, PhaseRule, WeightVectors, XiLayout, parse_standard,
 };
 pub use report::{Chosen, ImportReport, Layout, Note, ReadEquation, UnusedTensor, UsedTensor};
 pub use role::{Mapping, Part, Role};
-pub use run::{Imported, import, import_from_bytes};
+pub use run::{Imported, import, import_from_bytes, import_tensors};
 pub use systems::{ReadEquations, ReadSystem, read_equations};

@@ -4,15 +4,13 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-use super::options::Format;
-
 /// Everything that was decided on the way from a foreign file to a model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ImportReport {
     /// The file.
     pub file: String,
-    /// Its kind.
-    pub format: Format,
+    /// Its kind: the name of a [`Format`](super::Format), or `arrays` for tensors in memory.
+    pub format: &'static str,
     /// Number of latent coordinates.
     pub latent_dim: usize,
     /// Number of robot coordinates, if there is an encoder or decoder.

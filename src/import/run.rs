@@ -12,6 +12,7 @@ use super::equations::{self, Sections};
 use super::error::ImportError;
 use super::latent;
 use super::latex;
+use super::memory::{self, Tensor};
 use super::npz;
 use super::options::{Format, ImportOptions};
 use super::report::ImportReport;
@@ -80,13 +81,55 @@ pub fn import_from_bytes(
             of_equations(file, &sections, options)?
         }
     };
-    let provenance = provenance(file, format, bytes, &notes);
+    let source = Source {
+        file,
+        format: format.name(),
+        digest: Sha256::digest(bytes),
+    };
+    finish(&source, parts, notes, options)
+}
+
+/// Imports a model whose tensors are in memory, by their names as those of a file; `source` names them in errors.
+///
+/// # Errors
+/// As [`import`].
+pub fn import_tensors(
+    source: &str,
+    tensors: &[Tensor<'_>],
+    options: &ImportOptions,
+) -> Result<Imported, ImportError> {
+    let (parts, notes) = assemble::parts(&memory::open(source, tensors)?, options)?;
+    let source = Source {
+        file: source,
+        format: "arrays",
+        digest: memory::digest(tensors),
+    };
+    finish(&source, parts, notes, options)
+}
+
+/// Where a model comes from.
+struct Source<'s> {
+    file: &'s str,
+    /// The kind of file, or `arrays`.
+    format: &'static str,
+    /// Of the bytes.
+    digest: sha2::digest::Output<Sha256>,
+}
+
+/// From the parts to the model and the report.
+fn finish(
+    source: &Source<'_>,
+    parts: Parts,
+    notes: ImportNotes,
+    options: &ImportOptions,
+) -> Result<Imported, ImportError> {
+    let provenance = provenance(source, &notes);
     let state_dim = (parts.encoder.as_ref().map(StateMap::input_dim))
         .or(parts.decoder.as_ref().map(StateMap::output_dim));
-    let model = build(file, parts, provenance, options)?;
+    let model = build(source.file, parts, provenance, options)?;
     let report = ImportReport {
-        file: file.to_owned(),
-        format,
+        file: source.file.to_owned(),
+        format: source.format,
         latent_dim: model.latent_dim(),
         state_dim,
         library_dim: model.library().len(),
@@ -121,17 +164,20 @@ fn of_equations(
 }
 
 /// The origin as the model file keeps it: no folders, no time.
-fn provenance(file: &str, format: Format, bytes: &[u8], notes: &ImportNotes) -> Map<String, Value> {
-    let name = Path::new(file).file_name();
+fn provenance(source: &Source<'_>, notes: &ImportNotes) -> Map<String, Value> {
+    let name = Path::new(source.file).file_name();
     let name = name.map_or_else(
-        || file.to_owned(),
+        || source.file.to_owned(),
         |name| name.to_string_lossy().into_owned(),
     );
-    let digest = Sha256::digest(bytes);
-    let digest: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+    let digest: String = source
+        .digest
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
     let mut entries = Map::new();
     entries.insert("imported_from".to_owned(), json!(name));
-    entries.insert("format".to_owned(), json!(format));
+    entries.insert("format".to_owned(), json!(source.format));
     entries.insert("sha256".to_owned(), json!(digest));
     entries.insert("romc".to_owned(), json!(env!("CARGO_PKG_VERSION")));
     if !notes.used.is_empty() {

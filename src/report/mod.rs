@@ -1,13 +1,14 @@
 //! A one-page assessment of a model, its tables and its figures.
 //!
 //! An assessment and controller runs come in; a self-contained HTML page and figures leave.
-//! `tables.rs` holds the tables, `contents.rs` picks what is drawn, `figures/` draws it, `page.rs`
+//! `tables.rs` holds the tables, `json.rs` the same numbers for programs, `contents.rs` picks what is drawn, `figures/` draws it, `page.rs`
 //! places all. Start with `page.rs`.
 
 mod complexity;
 mod contents;
 mod control;
 pub mod figures;
+mod json;
 mod page;
 mod place;
 mod tables;
@@ -15,6 +16,7 @@ mod tables;
 pub use complexity::study_figures;
 pub use contents::{AllFigures, Content, all_figures, modelled};
 pub use control::{control_figures, without_statistics};
+pub use json::assessment_json;
 pub use page::{PageOptions, page};
 pub use tables::{
     NamedRun, baseline_table, coordinate_table, dynamics_table, phase_table, remarks, run_table,
