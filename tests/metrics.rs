@@ -105,7 +105,7 @@ fn train_simulate_report_and_mpc_print_the_same_number_for_the_same_thing() {
         }
 
         let controlled = romc(&["mpc", &model, test, "--lift", "transpose"]);
-        let lift_of_mpc = &controlled["runs"][0]["lift_r2"];
+        let lift_of_mpc = &controlled["runs"][0]["lift"]["torque_r2"];
         assert_same(&lift["contact"], &lift_of_mpc["contact"]);
         assert_same(&lift["flight"], &lift_of_mpc["flight"]);
     }

@@ -7,6 +7,8 @@
 mod bad_files;
 #[path = "recording/formats.rs"]
 mod formats;
+#[path = "recording/mismatches.rs"]
+mod mismatches;
 mod outside;
 #[path = "recording/random_bytes.rs"]
 mod random_bytes;

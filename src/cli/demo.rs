@@ -17,9 +17,9 @@ use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::{EmittedFile, Overwrite};
 use crate::model::ReducedModel;
-use crate::report::{Content, NamedRun, assessment_json, baseline_table};
+use crate::report::{Content, assessment_json, baseline_table, control_table, run_table};
 use crate::simplify::Tolerance;
-use crate::typeset::{Rounding, Table};
+use crate::typeset::Rounding;
 use crate::{Error, artifact, recording};
 
 /// The shipped model that the demo works with.
@@ -91,11 +91,12 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     progress.finish_and_clear();
 
     let mut text = format!(
-        "romc demo: model {} on {} recorded jumps of a simulated Go1 that its training did not see\n\n{}\n{}",
+        "romc demo: model {} on {} recorded jumps of a simulated Go1 that its training did not see\n\n{}\n{}\n{}",
         MODEL.0,
         jumps.len(),
         baseline_table(&evaluation),
-        command_summary(&control)
+        control_table(&control[0]),
+        run_table(&control[0])
     );
     let self_test = self_test.words();
     let _ = writeln!(text, "self-test of the emitted C: {self_test}\n");
@@ -163,27 +164,4 @@ fn self_test(model: &ReducedModel, folder: &Path) -> SelfTest {
             Err(error) => SelfTest::Failed(error.to_string()),
         },
     }
-}
-
-/// The controller's commands with the plain lift and with the consistent one.
-fn command_summary(control: &[Vec<NamedRun>; 2]) -> Table {
-    let lifts = ["plain lift, u = W_e^T u_lat", "consistent lift"];
-    let runs = lifts.into_iter().zip(control);
-    let rows = runs.flat_map(|(lift, runs)| {
-        let name = move |path: &Path| format!("{lift}, {}", path.display());
-        runs.iter()
-            .map(move |(path, run)| (name(path), &run.summary))
-    });
-    Table::of(rows)
-        .column("controller", "", |(name, _)| name.clone())
-        .column("steps", "", |(_, run)| run.steps)
-        .column("solved", "", |(_, run)| run.solved)
-        .column("torque R^2 in contact", "", |(_, run)| {
-            run.torque_r2.contact
-        })
-        .column("beyond torque limits", "", |(_, run)| run.limit_violations)
-        .column("median step", "us", |(_, run)| {
-            format!("{:.0}", run.step_us.p50)
-        })
-        .table()
 }

@@ -11,7 +11,9 @@ use super::simplification::exact_words;
 use crate::Error;
 use crate::artifact;
 use crate::equations::Equations;
+use crate::evaluate::Invariance;
 use crate::model::{ReducedModel, StateMap};
+use crate::report::invariance_table;
 use crate::robot::{JOINT_NAMES, Robot, WrenchFrame};
 use crate::typeset::{Table, significant};
 
@@ -81,6 +83,11 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     } else {
         text.push_str("latent-only: no encoder, so it says nothing about a robot's coordinates\n");
     }
+    let invariance = Invariance::of(model).ok();
+    if let Some(invariance) = &invariance {
+        let table = invariance_table(invariance);
+        let _ = write!(text, "\n{}\n\n{table}", table.caption());
+    }
     Ok(Answer {
         text,
         json: json!({
@@ -99,6 +106,7 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
             "decoder": model.decoder_map().ok().map(StateMap::summary),
             "actuators": model.actuators(),
             "wrench_frame": model.wrench_frame(),
+            "invariance": invariance,
             "provenance": model.provenance(),
         }),
     })

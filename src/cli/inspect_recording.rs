@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use crate::Error;
 use crate::recording::check::{Finding, check};
+use crate::recording::mismatch::{Figures, Mismatch, mismatches};
 use crate::recording::{PhaseRule, PhaseSpan, Recording, Segment, Stance};
 use crate::robot::{JOINT_DIM, Robot};
 use crate::typeset::{Cell, Table, significant};
@@ -53,7 +54,15 @@ pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
     text.push_str("  # a front foot is down, = only rear feet are, blank: flight\n\n");
     let ranges = ranges(recording);
     let _ = writeln!(text, "{}", range_table(&ranges));
-    text.push_str(&findings_text(&findings));
+    let mismatches = mismatches(recording, robot);
+    if findings.is_empty() && mismatches.is_empty() {
+        text.push_str("nothing implausible\n");
+    } else if !findings.is_empty() {
+        text.push_str(&findings_text(&findings));
+    }
+    for mismatch in &mismatches {
+        let _ = writeln!(text, "note: {mismatch}");
+    }
     Ok(Answer {
         text,
         json: json!({
@@ -63,6 +72,8 @@ pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
             "segments": segments,
             "ranges": ranges,
             "ignored_columns": recording.ignored_columns,
+            "figures": Figures::of(recording, robot),
+            "mismatches": mismatches.iter().map(mismatch_json).collect::<Vec<_>>(),
             "implausible": findings.iter().map(in_segment).collect::<Vec<_>>(),
         }),
     })
@@ -155,9 +166,6 @@ fn range_table(ranges: &[Range]) -> Table {
 }
 
 fn findings_text(findings: &[Finding]) -> String {
-    if findings.is_empty() {
-        return "nothing implausible\n".to_owned();
-    }
     let mut text = format!("{} implausible runs of samples\n", findings.len());
     for finding in findings.iter().take(FINDINGS_SHOWN) {
         let _ = writeln!(text, "  {finding}");
@@ -173,6 +181,16 @@ fn in_segment(finding: &Finding) -> Value {
     let mut value = finding_json(finding);
     value["segment"] = json!(finding.segment);
     value
+}
+
+/// A mismatch without its recording.
+pub(super) fn mismatch_json(mismatch: &Mismatch) -> Value {
+    json!({
+        "what": mismatch.kind.word(),
+        "value": mismatch.value,
+        "bound": mismatch.bound,
+        "words": mismatch.words,
+    })
 }
 
 /// A finding without the place of its recording.

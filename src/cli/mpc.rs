@@ -7,13 +7,13 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::MpcArguments;
 use super::output::{check_output, names, progress_bar, read_recordings, write_file};
-use crate::evaluate::{ReferenceInput, along_recording};
+use crate::evaluate::{ReferenceInput, along_recording, control_metrics, remarks};
 use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
 use crate::mpc::{Controller, Lift, MpcSettings};
 use crate::recording::Recording;
 use crate::report::figures::figure_files;
-use crate::report::{NamedRun, control_figures, run_table};
+use crate::report::{NamedRun, control_figures, control_table, run_table};
 use crate::robot::{JOINT_DIM, Robot};
 use crate::typeset::Table;
 use crate::{Error, artifact};
@@ -34,7 +34,8 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     };
     let recordings = read_recordings(&arguments.recordings)?;
     let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
-    let mut answer = answer(arguments, &runs);
+    let remarks = remarks(&model, &recordings)?;
+    let mut answer = answer(arguments, &runs, &remarks);
     if let Some(folder) = &arguments.figures {
         let figures = control_figures(&model, &settings, &runs);
         let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
@@ -68,7 +69,7 @@ pub fn run_all(
     for recording in recordings {
         let bar = progress_bar(format!("controlling along {}", recording.path.display()));
         controller.reset();
-        let run = along_recording(
+        let mut run = along_recording(
             &mut controller,
             recording,
             reference_input,
@@ -77,6 +78,11 @@ pub fn run_all(
                 bar.set_position(done as u64);
             },
         )?;
+        bar.set_message(format!(
+            "comparing with baselines along {}",
+            recording.path.display()
+        ));
+        run.metrics = Some(control_metrics(model, recording, settings)?);
         bar.finish_and_clear();
         runs.push((recording.path.clone(), run));
     }
@@ -101,14 +107,27 @@ pub fn run_with_both_lifts(
     Ok([with(Lift::Transpose)?, with(Lift::Consistent)?])
 }
 
-fn answer(arguments: &MpcArguments, runs: &[NamedRun]) -> Answer {
+fn answer(arguments: &MpcArguments, runs: &[NamedRun], remarks: &[String]) -> Answer {
     let mut text = format!(
-        "{}: latent MPC, {} stages of {} s\n\n{}\n",
+        "{}: latent MPC, {} stages of {} s\n\n{}\n{}\n",
         arguments.model.display(),
         arguments.horizon,
         arguments.step,
+        control_table(runs),
         run_table(runs)
     );
+    for (path, run) in runs {
+        if let Some(failure) = run
+            .metrics
+            .as_ref()
+            .and_then(|metrics| metrics.failure.as_ref())
+        {
+            let _ = writeln!(text, "FAILED along {}: {failure}", path.display());
+        }
+    }
+    for remark in remarks {
+        let _ = writeln!(text, "note: {remark}");
+    }
     let mut rows = runs.iter().flat_map(|(_, run)| &run.rows);
     if let Some(row) = rows.find(|row| row.status.has_plan()) {
         let torques = row.torque_nm.map(|torque| format!("{torque:.2}")).join(" ");
@@ -124,17 +143,38 @@ fn answer(arguments: &MpcArguments, runs: &[NamedRun]) -> Answer {
             "model": arguments.model.display().to_string(),
             "horizon": arguments.horizon,
             "step_s": arguments.step,
+            "remarks": remarks,
             "runs": runs.iter().map(run_json).collect::<Vec<_>>(),
             "output": arguments.output.as_ref().map(|path| path.display().to_string()),
         }),
     }
 }
 
-/// The summary of one run, under the names of the documentation.
+/// One run: what the model is worth, and what happened.
+///
+/// `steps` to `step_us` count and time the solver's work, `lift` is what the maps and the lift make of recorded inputs:
+/// none of these depends on whether the dynamics are right.
 pub fn run_json((path, run): &NamedRun) -> Value {
-    let mut value = json!({ "recording": path.display().to_string() });
-    if let (Value::Object(all), Value::Object(summary)) = (&mut value, json!(run.summary)) {
-        all.extend(summary);
+    let summary = &run.summary;
+    let mut value = json!({
+        "recording": path.display().to_string(),
+        "steps": summary.steps,
+        "solved": summary.solved,
+        "softened": summary.softened,
+        "failed": summary.failed,
+        "limit_violations": summary.limit_violations,
+        "friction_violations": summary.friction_violations,
+        "implausible_steps": summary.implausible,
+        "step_us": summary.step_us,
+        "lift": {
+            "torque_r2": summary.lift_r2,
+            "commanded_torque_r2": summary.torque_r2,
+            "commanded_torque_rms_nm": summary.torque_rms_nm,
+            "inconsistency": summary.inconsistency,
+        },
+    });
+    if let (Value::Object(all), Value::Object(metrics)) = (&mut value, json!(run.metrics)) {
+        all.extend(metrics);
     }
     value
 }

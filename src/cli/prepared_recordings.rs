@@ -6,10 +6,11 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::args::{TrainArguments, TrainSettings};
-use super::inspect_recording::finding_json;
+use super::inspect_recording::{finding_json, mismatch_json};
 use super::train_settings;
 use crate::Error;
 use crate::recording::check::Finding;
+use crate::recording::files::Notes;
 use crate::recording::{
     self, ConditionOptions, ImplausibleSamples, Recording, RecordingError, RecordingFile,
     RecordingFiles,
@@ -108,20 +109,28 @@ impl RecordedSets {
         }))
     }
 
-    /// The findings with their files, and the number of samples left out, as far as files were read.
-    fn notes(&self) -> (Vec<(PathBuf, Finding)>, usize) {
-        let sets = [&self.training, &self.validation, &self.test];
-        let notes = sets.map(|set| set.notes());
-        let left_out = notes.iter().map(|notes| notes.left_out).sum();
-        (
-            notes.into_iter().flat_map(|notes| notes.findings).collect(),
-            left_out,
-        )
+    /// The notes of all sets together, as far as files were read.
+    fn notes(&self) -> Notes {
+        let mut all = Notes::default();
+        for set in [&self.training, &self.validation, &self.test] {
+            let notes = set.notes();
+            all.findings.extend(notes.findings);
+            all.mismatches.extend(notes.mismatches);
+            all.left_out += notes.left_out;
+        }
+        all
     }
 
     /// Reports on stderr which files have implausible samples, and what became of them.
     pub fn report_findings(&self) {
-        let (findings, left_out) = self.notes();
+        let Notes {
+            findings,
+            mismatches,
+            left_out,
+        } = self.notes();
+        for (file, mismatch) in &mismatches {
+            eprintln!("note: {}: {mismatch}", file.display());
+        }
         let (findings, singular): (Vec<_>, Vec<_>) =
             (findings.into_iter()).partition(|(_, finding)| finding.kind.can_be_left_out());
         report_singular(&singular);
@@ -154,13 +163,27 @@ impl RecordedSets {
 
     /// Every finding with its place, and how many samples were left out.
     pub fn findings_json(&self) -> Value {
-        let (findings, left_out) = self.notes();
+        let Notes {
+            findings,
+            mismatches,
+            left_out,
+        } = self.notes();
+        let mismatches = mismatches.iter().map(|(file, mismatch)| {
+            let mut value = mismatch_json(mismatch);
+            value["file"] = json!(file.display().to_string());
+            value
+        });
+        let mismatches: Vec<Value> = mismatches.collect();
         let findings = findings.iter().map(|(file, finding)| {
             let mut value = finding_json(finding);
             value["file"] = json!(file.display().to_string());
             value
         });
-        json!({ "implausible": findings.collect::<Vec<_>>(), "left_out": left_out })
+        json!({
+            "implausible": findings.collect::<Vec<_>>(),
+            "mismatches": mismatches,
+            "left_out": left_out,
+        })
     }
 }
 

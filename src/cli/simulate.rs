@@ -12,7 +12,7 @@ use crate::evaluate::Assessment;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::report::{
-    assessment_json, baseline_table, coordinate_table, dynamics_table, phase_table, remarks,
+    assessment_json, baseline_table, coordinate_table, dynamics_table, phase_table,
 };
 use crate::typeset::significant;
 use crate::{Error, artifact};
@@ -96,7 +96,7 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
         shown(lift.torque_r2_all()),
         shown(lift.inconsistency())
     );
-    for remark in remarks(model, assessment) {
+    for remark in &assessment.remarks {
         let _ = writeln!(text, "\nnote: {remark}");
     }
     text

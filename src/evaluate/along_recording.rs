@@ -20,6 +20,7 @@
 //! ```
 
 use super::control::{Summary, Tally};
+use super::control_metrics::ControlMetrics;
 use super::torque::{Comparison, exceeds, is_plausible};
 use crate::mpc::{
     Command, ControlError, Controller, Lift, Measurement, MpcError, ReferenceSamples, Source,
@@ -81,6 +82,9 @@ pub struct Run {
     pub rows: Vec<StepRow>,
     /// The summary.
     pub summary: Summary,
+    /// The model and its baselines, see [`control_metrics`](super::control_metrics); none where only the controller
+    /// was at hand.
+    pub metrics: Option<ControlMetrics>,
 }
 
 /// Runs the controller along a recording, one segment after the other.
@@ -132,6 +136,7 @@ pub fn along_recording(
     Ok(Run {
         summary: tally.summary(),
         rows,
+        metrics: None,
     })
 }
 
@@ -174,7 +179,7 @@ pub fn lift_comparison(
 
 /// Samples at which a controller with period `step_s` acts: the first at or after each multiple,
 /// as long as the command's whole hold lies within the recording.
-fn control_samples(time_s: &[f64], step_s: f64) -> Vec<usize> {
+pub(super) fn control_samples(time_s: &[f64], step_s: f64) -> Vec<usize> {
     let mut samples = Vec::new();
     let (Some(&first), Some(&last)) = (time_s.first(), time_s.last()) else {
         return samples;
@@ -253,7 +258,7 @@ fn one_step(
     }
 }
 
-fn set_reference(
+pub(super) fn set_reference(
     controller: &mut Controller,
     segment: &Segment,
     reference_input: ReferenceInput,

@@ -7,6 +7,7 @@ use super::error::EvaluateError;
 use super::lift::{LAMBDA, LiftSums, combined_loss};
 use super::linearised::{LinearisedPhase, linearise_phases};
 use super::metrics::Fit;
+use super::remarks::remarks;
 use crate::lower::CompiledModel;
 use crate::model::ReducedModel;
 use crate::recording::{Recording, Segment};
@@ -53,6 +54,8 @@ pub struct Assessment<'a> {
     pub lift: LiftSums,
     /// Active terms, all phases together.
     pub active_terms: usize,
+    /// What speaks against using the model on these recordings.
+    pub remarks: Vec<String>,
 }
 
 impl<'a> Assessment<'a> {
@@ -89,6 +92,7 @@ impl<'a> Assessment<'a> {
             linearised: Vec::new(),
             lift: LiftSums::default(),
             active_terms: model.phases().iter().map(|p| p.active_count()).sum(),
+            remarks: remarks(model, recordings)?,
         };
         for segment in segments {
             assessment.add(model, &compiled, segment)?;

@@ -2,6 +2,7 @@
 
 use crate::lower::LowerError;
 use crate::model::ModelError;
+use crate::mpc::MpcError;
 use crate::recording::RecordingError;
 use crate::sim::SimError;
 
@@ -20,4 +21,7 @@ pub enum EvaluateError {
     /// A rollout cannot be integrated.
     #[error(transparent)]
     Sim(#[from] SimError),
+    /// The controller cannot run.
+    #[error(transparent)]
+    Control(#[from] MpcError),
 }

@@ -10,21 +10,33 @@ mod aslip;
 mod assessment;
 mod baseline;
 mod control;
+mod control_metrics;
 mod coordinates;
 mod error;
+mod invariance;
 mod lift;
 mod linearised;
 mod metrics;
+mod prediction;
+mod recovery;
+mod remarks;
 mod torque;
+mod uninformed;
 
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
 pub use aslip::{Aslip, AslipRollout, AslipSums};
 pub use assessment::{Assessment, SegmentRun};
 pub use baseline::{Baseline, fit_aslip};
 pub use control::{StepTimes, Summary};
+pub use control_metrics::{
+    Baselines, ConstantVelocity, ControlMetrics, KnowsNothing, Pushed, control_metrics,
+};
 pub use coordinates::{CoordinateSums, PointwiseSums};
 pub use error::EvaluateError;
+pub use invariance::{Invariance, PhaseInvariance};
 pub use lift::{LAMBDA, LiftSums, combined_loss};
 pub use linearised::{LinearisedPhase, RANK_THRESHOLD, linearise_phases};
 pub use metrics::{Fit, FitSums};
+pub use prediction::PredictionError;
+pub use remarks::remarks;
 pub use torque::{ByContact, Comparison, is_plausible};

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::check::{Finding, check, without};
 use super::error::{RecordingError, RecordingFault};
+use super::mismatch::{Mismatch, mismatches};
 use super::preprocess::differences;
 use super::segment::{Recording, Segment};
 use super::smoothing::SavitzkyGolay;
@@ -64,6 +65,8 @@ pub struct Conditioned {
     pub recording: Recording,
     /// What is implausible in the one that came in; segments and samples are counted there.
     pub findings: Vec<Finding>,
+    /// What about the one that came in cannot be true of the robot.
+    pub mismatches: Vec<Mismatch>,
     /// Samples left out: the implausible ones, and pieces between them that are too short.
     pub left_out: usize,
 }
@@ -78,10 +81,14 @@ pub fn condition(
     options: &ConditionOptions,
 ) -> Result<Conditioned, RecordingError> {
     let findings = check(&recording, robot);
-    conditioned(recording, findings, options)
+    let mismatches = mismatches(&recording, robot);
+    Ok(Conditioned {
+        mismatches,
+        ..conditioned(recording, findings, options)?
+    })
 }
 
-/// Applies the steps to a recording with these findings.
+/// Applies the steps to a recording with these findings; mismatches are left to the caller.
 pub(super) fn conditioned(
     recording: Recording,
     findings: Vec<Finding>,
@@ -109,6 +116,7 @@ pub(super) fn conditioned(
     Ok(Conditioned {
         recording: kept,
         findings,
+        mismatches: Vec::new(),
         left_out,
     })
 }

@@ -8,6 +8,7 @@ use super::check::{Finding, check};
 use super::condition::{ConditionOptions, Conditioned, ImplausibleSamples, conditioned};
 use super::csv::read;
 use super::error::RecordingError;
+use super::mismatch::{Mismatch, mismatches};
 use super::segment::Recording;
 use crate::robot::Robot;
 
@@ -83,6 +84,8 @@ pub struct RecordingFile {
 pub struct Notes {
     /// Implausible runs of samples with their files.
     pub findings: Vec<(PathBuf, Finding)>,
+    /// What cannot be true of the robot, with the files.
+    pub mismatches: Vec<(PathBuf, Mismatch)>,
     /// Number of samples that were left out.
     pub left_out: usize,
 }
@@ -139,6 +142,8 @@ impl RecordingFiles {
                 let path = &ready.recording.path;
                 let found = ready.findings.into_iter();
                 (notes.findings).extend(found.map(|finding| (path.clone(), finding)));
+                let unlike = ready.mismatches.into_iter();
+                (notes.mismatches).extend(unlike.map(|mismatch| (path.clone(), mismatch)));
                 notes.left_out += ready.left_out;
                 take(ready.recording)?;
             }
@@ -190,11 +195,19 @@ impl RecordingFiles {
         let recordings = Self::chosen(file)?;
         let keeps = self.options.implausible == ImplausibleSamples::Keep;
         let ready = recordings.into_iter().map(|recording| {
-            let findings = match keeps && self.notes.get().is_some() {
+            let is_first = self.notes.get().is_none();
+            let findings = match keeps && !is_first {
                 true => Vec::new(),
                 false => check(&recording, self.robot),
             };
-            conditioned(recording, findings, &self.options)
+            let unlike = match is_first {
+                true => mismatches(&recording, self.robot),
+                false => Vec::new(),
+            };
+            Ok::<_, RecordingError>(Conditioned {
+                mismatches: unlike,
+                ..conditioned(recording, findings, &self.options)?
+            })
         });
         ready.collect()
     }

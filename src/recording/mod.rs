@@ -37,6 +37,7 @@ pub mod columns;
 pub mod condition;
 pub mod csv;
 pub mod files;
+pub mod mismatch;
 pub mod phases;
 pub mod preprocess;
 pub mod segment;

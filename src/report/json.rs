@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::tables::{remarks, template_rms};
+use super::tables::template_rms;
 use crate::evaluate::{Assessment, Baseline, CoordinateSums, Fit, LinearisedPhase};
 use crate::model::ReducedModel;
 
@@ -33,7 +33,7 @@ pub fn assessment_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Val
             "inconsistency": lift.inconsistency(),
         },
         "baselines": assessment.baselines.iter().map(baseline_json).collect::<Vec<_>>(),
-        "remarks": remarks(model, assessment),
+        "remarks": assessment.remarks,
     })
 }
 

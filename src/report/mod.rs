@@ -19,6 +19,6 @@ pub use control::{control_figures, without_statistics};
 pub use json::assessment_json;
 pub use page::{PageOptions, page};
 pub use tables::{
-    NamedRun, baseline_table, coordinate_table, dynamics_table, phase_table, remarks, run_table,
-    template_rms,
+    NamedRun, baseline_table, control_table, coordinate_table, dynamics_table, invariance_table,
+    phase_table, run_table, template_rms,
 };

@@ -6,10 +6,12 @@ use super::contents::{AllFigures, Content};
 use super::control::without_statistics;
 use super::figures::{Figure, panel_svg};
 use super::tables::{
-    baseline_table, body_rms, coordinate_table, dynamics_table, phase_table, remarks, run_table,
+    baseline_table, body_rms, control_table, coordinate_table, dynamics_table, invariance_table,
+    phase_table, run_table,
 };
 use crate::artifact;
 use crate::equations::Equations;
+use crate::evaluate::Invariance;
 use crate::typeset::latex::tex_cases;
 use crate::typeset::mathml::{HtmlText, system};
 use crate::typeset::{
@@ -50,8 +52,7 @@ pub fn page(
         headline: (headline(content).iter())
             .map(|(name, value)| (html(name), html(value)))
             .collect(),
-        remarks: remarks(model, content.assessment)
-            .iter()
+        remarks: (content.assessment.remarks.iter())
             .map(|remark| html(remark))
             .collect(),
         phases: phases(equations, &typeset),
@@ -129,67 +130,76 @@ fn sections(content: &Content<'_>, figures: &AllFigures, options: &PageOptions) 
         ("Consistent lift", content.consistent),
     ];
     let runs = runs.into_iter().filter(|(_, runs)| !runs.is_empty());
-    let mut sections =
-        vec![
-            Section::new(
-                "latent",
-                "Composition of the latent coordinates",
-                &[ENCODER_WORDS],
-            )
-            .with(&figures.encoder, []),
-            Section::new(
-                "coordinates",
-                "The model against the recordings",
-                &[COORDINATE_WORDS],
-            )
+    let mut sections = vec![
+        Section::new(
+            "latent",
+            "Composition of the latent coordinates",
+            &[ENCODER_WORDS],
+        )
+        .with(&figures.encoder, []),
+        Section::new(
+            "coordinates",
+            "The model against the recordings",
+            &[COORDINATE_WORDS],
+        )
+        .with(
+            &figures.coordinates,
+            [
+                coordinate_table(assessment).captioned("Errors of every coordinate"),
+                phase_table(model, assessment).captioned(by_phase),
+            ],
+        ),
+        Section::new(
+            "accelerations",
+            "Latent accelerations, stability and inputs",
+            &[DYNAMICS_WORDS],
+        )
+        .with(
+            &figures.accelerations,
+            std::iter::once(dynamics_table(model, assessment).captioned("Each phase of the model"))
+                .chain(Invariance::of(model).ok().as_ref().map(invariance_table)),
+        ),
+        Section::new("aslip", "Beside the pendulum", &[BASELINE_WORDS])
+            .and(constants)
             .with(
-                &figures.coordinates,
+                &figures.baselines,
                 [
-                    coordinate_table(assessment).captioned("Errors of every coordinate"),
-                    phase_table(model, assessment).captioned(by_phase),
+                    baseline_table(assessment)
+                        .captioned("Body position: the model and the pendulum"),
                 ],
             ),
-            Section::new(
-                "accelerations",
-                "Latent accelerations, stability and inputs",
-                &[DYNAMICS_WORDS],
+        Section::new(
+            "control",
+            "The controller along the recordings",
+            &CONTROL_WORDS,
+        )
+        .and(without)
+        .with(
+            &figures.control,
+            runs.flat_map(|(lift, runs)| {
+                [
+                    control_table(runs).captioned(format!("{lift}: the model and its baselines")),
+                    run_table(runs).captioned(format!(
+                        "{lift}: the solver's work, and what the lift makes of recorded inputs"
+                    )),
+                ]
+            }),
+        ),
+        Section {
+            folded: Some(options.changes.clone())
+                .filter(|table| !table.is_empty())
+                .into_iter()
+                .collect(),
+            ..Section::new(
+                "simplification",
+                "How far the equations can be simplified",
+                &SIMPLIFICATION_WORDS,
             )
-            .with(
-                &figures.accelerations,
-                [dynamics_table(model, assessment).captioned("Each phase of the model")],
-            ),
-            Section::new("aslip", "Beside the pendulum", &[BASELINE_WORDS])
-                .and(constants)
-                .with(
-                    &figures.baselines,
-                    [baseline_table(assessment)
-                        .captioned("Body position: the model and the pendulum")],
-                ),
-            Section::new(
-                "control",
-                "The controller along the recordings",
-                &[CONTROL_WORDS],
-            )
-            .and(without)
-            .with(
-                &figures.control,
-                runs.map(|(lift, runs)| run_table(runs).captioned(lift)),
-            ),
-            Section {
-                folded: Some(options.changes.clone())
-                    .filter(|table| !table.is_empty())
-                    .into_iter()
-                    .collect(),
-                ..Section::new(
-                    "simplification",
-                    "How far the equations can be simplified",
-                    &SIMPLIFICATION_WORDS,
-                )
-                .with(&[], options.simplification.iter().cloned())
-            },
-            Section::new("study", "How many latent coordinates", &[STUDY_WORDS])
-                .with(&figures.study, []),
-        ];
+            .with(&[], options.simplification.iter().cloned())
+        },
+        Section::new("study", "How many latent coordinates", &[STUDY_WORDS])
+            .with(&figures.study, []),
+    ];
     sections.retain(|section| match section.id {
         "simplification" => !section.tables.is_empty(),
         "study" => !section.figures.is_empty(),
@@ -202,7 +212,11 @@ const ENCODER_WORDS: &str = "The darker a cell (the brighter on a dark screen), 
 const COORDINATE_WORDS: &str = "The model is started from the recorded state and driven by the recorded torques and contacts: once over the whole jump, and again and again from the recorded state. Errors are root mean squares in SI units.";
 const DYNAMICS_WORDS: &str = "Eigenvalues belong to each phase's linearisation at its mean state: a positive real part means that small deviations grow at that rate. The input gain is the matrix by which latent inputs accelerate the latent coordinates; its rank counts singular values above 1 % of the largest.";
 const BASELINE_WORDS: &str = "The actuated spring-loaded inverted pendulum under the same forces, with the published constants and with the constants that fit the accelerations of these very recordings best.";
-const CONTROL_WORDS: &str = "At each control step the controller sees the recorded state and plans along the recording. Its commands are not fed back to a robot: these are the commands that it would have given in the states that the robot really had.";
+const CONTROL_WORDS: [&str; 3] = [
+    "At each control step the controller sees the recorded state and plans along the recording. Its commands are not fed back to a robot: these are the commands that it would have given in the states that the robot really had. With the recorded input as reference they are the lifted recorded input whatever the dynamics are, so that the torques in the figures show what the lift is worth.",
+    "What the dynamics are worth is in the tables: predictions one stage ahead with the recorded input; torques where the controller has to find its input itself; and how far the body is off in the 0.2 s after a push of 0.1 m/s, where the commands act on a body with the robot's mass and feet that stay where they stand.",
+    "The model that knows nothing has the same encoder and decoder and ddz = g u for dynamics, with g fitted to this very recording. Feedback off is the same controller, given the recorded state after the push; replay is the recorded torques.",
+];
 
 const SIMPLIFICATION_WORDS: [&str; 2] = [
     "Terms are dropped, coefficients shortened and nearly linear functions made linear, as long as no ddz of a phase can be off by more than the tolerance anywhere in its domain: the smallest box around the recorded latent states and inputs of the phase, a tenth of each range wider on both sides.",

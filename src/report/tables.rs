@@ -1,10 +1,13 @@
 //! Tables of an assessment and of the controller's runs, for pages and terminals alike.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use crate::evaluate::{AslipSums, Assessment, CoordinateSums, Fit, FitSums, LinearisedPhase, Run};
+use crate::evaluate::{
+    AslipSums, Assessment, ByContact, ControlMetrics, CoordinateSums, Fit, FitSums, Invariance,
+    LinearisedPhase, PredictionError, Run,
+};
 use crate::model::ReducedModel;
-use crate::typeset::{Cell, Table};
+use crate::typeset::{Cell, Table, significant};
 
 /// A recording and the controller's run along it.
 pub type NamedRun = (PathBuf, Run);
@@ -109,40 +112,113 @@ pub fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Tabl
         .table()
 }
 
-/// Signs that the recordings are unlike those that the model was learned from. Flight is left out: accelerations
-/// hardly vary there, and any model is as far off as their mean.
-pub fn remarks(model: &ReducedModel, assessment: &Assessment<'_>) -> Vec<String> {
-    let accelerations = assessment.pointwise.acceleration.iter().map(FitSums::fit);
-    let worse_than_mean = |fit: &Option<Fit>| fit.and_then(|fit| fit.r2).is_some_and(|r2| r2 < 0.0);
-    (model.phases().iter().zip(accelerations))
-        .filter(|(phase, fit)| !phase.feet.matches([false; 4]) && worse_than_mean(fit))
-        .map(|(phase, _)| {
-            format!(
-                "in {} the latent accelerations are further off than their mean would be (R^2 below 0): \
-                 these recordings are unlike those of the training. Another robot, other signs or \
-                 frames, or motions that it never saw? Do not rely on predictions or torques there",
-                phase.name
-            )
-        })
-        .collect()
+/// What a model says of known physics, one row per phase.
+pub fn invariance_table(invariance: &Invariance) -> Table {
+    let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
+    let words = format!(
+        "What the model says of physics that is known: gravity in flight {} m/s^2, mass {} kg; by phase, change of \
+         the body's acceleration per metre of shift along x and y, and difference between mirror images",
+        shown(invariance.gravity_m_s2),
+        shown(invariance.mass_kg)
+    );
+    Table::of(&invariance.phases)
+        .column("phase", "", |phase| &phase.phase)
+        .column("shift in x", "1/s^2", |phase| phase.shift_x)
+        .column("shift in y", "1/s^2", |phase| phase.shift_y)
+        .column("mirror", "m/s^2", |phase| phase.mirror_asymmetry)
+        .table()
+        .captioned(words)
 }
 
-/// Steps, torques and times of the controller, one row per run.
+/// A row of [`control_table`]: the recording's name, what drives, and its figures.
+struct Driven {
+    recording: String,
+    controller: &'static str,
+    prediction: Option<PredictionError>,
+    torque_r2: ByContact,
+    recovery_rms_m: Option<f64>,
+}
+
+/// The model and its baselines along each recording: figures that a wrong model changes.
+pub fn control_table(runs: &[NamedRun]) -> Table {
+    let judged = runs
+        .iter()
+        .filter_map(|(path, run)| Some((path, run.metrics.as_ref()?)));
+    let rows: Vec<Driven> = judged
+        .flat_map(|(path, metrics)| driven(path, metrics))
+        .collect();
+    let millimetres = |metres: Option<f64>| metres.map(|metres| 1e3 * metres);
+    Table::of(&rows)
+        .column("recording", "", |row| row.recording.clone())
+        .column("controller", "", |row| row.controller)
+        .column("body.x one stage ahead", "mm", |row| {
+            millimetres(row.prediction.map(|error| error.body_x_m))
+        })
+        .column("body.z", "mm", |row| {
+            millimetres(row.prediction.map(|error| error.body_z_m))
+        })
+        .column("joints", "rad", |row| {
+            row.prediction.map(|error| error.joints_rad)
+        })
+        .column("torque R^2 of its own input, contact", "", |row| {
+            row.torque_r2.contact
+        })
+        .column("flight", "", |row| row.torque_r2.flight)
+        .column("off after a push", "mm", |row| {
+            millimetres(row.recovery_rms_m)
+        })
+        .table()
+}
+
+fn driven(path: &Path, metrics: &ControlMetrics) -> [Driven; 5] {
+    let baseline = &metrics.baseline;
+    let row = |controller, prediction, torque_r2, recovery_rms_m| Driven {
+        recording: file_name(path),
+        controller,
+        prediction,
+        torque_r2,
+        recovery_rms_m,
+    };
+    let none = ByContact::default();
+    let blind = &baseline.knows_nothing;
+    let constant = baseline.constant_velocity.prediction_rms;
+    let [off, replay] = [baseline.feedback_off, baseline.replay].map(|b| b.recovery_rms_m);
+    [
+        row(
+            "model",
+            metrics.prediction_rms,
+            metrics.torque_r2,
+            metrics.recovery_rms_m,
+        ),
+        row(
+            "knows nothing",
+            blind.prediction_rms,
+            blind.torque_r2,
+            blind.recovery_rms_m,
+        ),
+        row("constant velocity", constant, none, None),
+        row("feedback off", None, none, off),
+        row("replay", None, none, replay),
+    ]
+}
+
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// The solver's work along each recording, and what the lift makes of recorded inputs, one row per run: whether the
+/// dynamics are right changes none of it.
 pub fn run_table(runs: &[NamedRun]) -> Table {
     let rows = runs.iter().map(|(path, run)| (path, &run.summary));
     Table::of(rows)
-        .column("recording", "", |(path, _)| {
-            let name = path.file_name().unwrap_or_default();
-            name.to_string_lossy().into_owned()
-        })
+        .column("recording", "", |(path, _)| file_name(path))
         .column("steps", "", |(_, run)| run.steps)
         .column("solved", "", |(_, run)| run.solved)
         .column("softened", "", |(_, run)| run.softened)
         .column("failed", "", |(_, run)| run.failed)
-        .column("torque R^2 contact", "", |(_, run)| run.torque_r2.contact)
-        .column("flight", "", |(_, run)| run.torque_r2.flight)
-        .column("rms", "N m", |(_, run)| run.torque_rms_nm)
         .column("lift R^2 contact", "", |(_, run)| run.lift_r2.contact)
+        .column("flight", "", |(_, run)| run.lift_r2.flight)
         .column("limit violations", "", |(_, run)| run.limit_violations)
         .column("friction violations", "", |(_, run)| {
             run.friction_violations

@@ -5,7 +5,13 @@ use std::path::{Path, PathBuf};
 
 /// The jump recorded on a Go1; where there is none, prints that the calling test is skipped.
 pub fn hardware_jump() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/go1_hardware_jump.csv");
+    beside("go1_hardware_jump.csv")
+}
+
+/// A file or folder of the recordings beside the checkout; where there is none, prints that the calling test is skipped.
+pub fn beside(name: &str) -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let path = folder.join(name);
     if path.exists() {
         return Some(path);
     }

@@ -20,7 +20,7 @@ fn own_jumps() -> Vec<PathBuf> {
 }
 
 /// The recordings of a folder, which holds at least so many.
-fn jumps_in(name: &str, least: usize) -> Vec<PathBuf> {
+pub fn jumps_in(name: &str, least: usize) -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("examples/recordings")
         .join(name);

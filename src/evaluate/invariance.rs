@@ -1,0 +1,299 @@
+//! What a model says of physics that is known: where the robot stands does not matter, bodies fall, forces accelerate
+//! masses, left is like right.
+//!
+//! All figures follow from the model file alone, so they are there for imported models as well. A state is the posture
+//! that the decoder gives for `z = 0`, at rest and at 1 m/s along x, y and z; the input is the phase's mean.
+
+use nalgebra::{DMatrix, DVector, SVector, SymmetricEigen};
+use serde::Serialize;
+
+use crate::model::{ModelError, ReducedModel};
+use crate::robot::{ContactFlags, JOINT_DIM, Leg, STATE_DIM};
+
+/// Rows of body x and of body z.
+const FORWARD: usize = JOINT_DIM;
+const UP: usize = JOINT_DIM + 2;
+/// By how much the robot is moved, m.
+const SHIFT_M: f64 = 0.3;
+/// By how much a joint is off for its mirror image, rad.
+const OFF_RAD: f64 = 0.1;
+/// Largest part of another body coordinate in a latent combination that counts as the height of a centre of mass.
+const PURE: f64 = 1e-6;
+
+/// What a model says of known physics.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Invariance {
+    /// Downward acceleration in flight of the latent combination that is body z and joints alone, and of all such the
+    /// one that state and input change least, m/s^2; none if the latents do not tell body z from the body's other
+    /// coordinates, or no phase is selected by feet in the air.
+    pub gravity_m_s2: Option<f64>,
+    /// Vertical force of four feet over the acceleration of that combination that it makes, kg.
+    pub mass_kg: Option<f64>,
+    /// Each phase under its name.
+    pub phases: Vec<PhaseInvariance>,
+}
+
+/// What one phase says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PhaseInvariance {
+    /// Name of the phase.
+    pub phase: String,
+    /// Change of the body's acceleration for a robot 0.3 m further on, (m/s^2)/m.
+    pub shift_x: f64,
+    /// The same to the left.
+    pub shift_y: f64,
+    /// Largest difference of forward and upward acceleration between a state with one joint off by 0.1 rad and its
+    /// mirror image, m/s^2.
+    pub mirror_asymmetry: f64,
+}
+
+impl Invariance {
+    /// Of a model over the robot's coordinates.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] for a model without encoder, decoder, scaling or robot.
+    pub fn of(model: &ReducedModel) -> Result<Self, ModelError> {
+        let rest = model.decode(&DVector::zeros(model.latent_dim()))?;
+        model.robot()?;
+        let phases = 0..model.phases().len();
+        let phases = phases.map(|phase| PhaseInvariance::of(model, phase, &rest));
+        let height = Height::of(model, &rest)?;
+        Ok(Self {
+            gravity_m_s2: height.as_ref().and_then(|height| height.gravity_m_s2),
+            mass_kg: height.and_then(|height| height.mass_kg),
+            phases: phases.collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+impl PhaseInvariance {
+    fn of(model: &ReducedModel, phase: usize, rest: &DVector<f64>) -> Result<Self, ModelError> {
+        let input = mean_input(model, phase);
+        let mut shifts = [0.0_f64; 2];
+        for velocity in velocities() {
+            let here = body_acceleration(model, phase, rest, &velocity, &input)?;
+            for (axis, shift) in shifts.iter_mut().enumerate() {
+                let mut moved = rest.clone();
+                moved[FORWARD + axis] += SHIFT_M;
+                let there = body_acceleration(model, phase, &moved, &velocity, &input)?;
+                *shift = larger(*shift, (there - &here).norm() / SHIFT_M);
+            }
+        }
+        let mut mirror_asymmetry = 0.0_f64;
+        let still = DVector::zeros(STATE_DIM);
+        for joint in 0..JOINT_DIM {
+            for moving in [false, true] {
+                let (mut x, mut dx) = (rest.clone(), still.clone());
+                let off = if moving { &mut dx } else { &mut x };
+                off[joint] += OFF_RAD;
+                let of_image = |x: &DVector<f64>, dx: &DVector<f64>, u: &DVector<f64>| {
+                    body_acceleration(model, phase, x, dx, u)
+                };
+                let seen = of_image(&x, &dx, &input)?;
+                let image = of_image(&mirrored(&x), &mirrored(&dx), &mirrored(&input))?;
+                let difference = (seen[0] - image[0]).hypot(seen[2] - image[2]);
+                mirror_asymmetry = larger(mirror_asymmetry, difference);
+            }
+        }
+        let [shift_x, shift_y] = shifts;
+        Ok(Self {
+            phase: model.phases()[phase].name.clone(),
+            shift_x,
+            shift_y,
+            mirror_asymmetry,
+        })
+    }
+}
+
+/// The larger of two values; what is not a number is larger than any.
+fn larger(one: f64, other: f64) -> f64 {
+    if other.is_nan() || other > one {
+        other
+    } else {
+        one
+    }
+}
+
+/// At rest, and 1 m/s along each axis.
+fn velocities() -> [DVector<f64>; 4] {
+    std::array::from_fn(|index| {
+        let mut dx = DVector::zeros(STATE_DIM);
+        if let Some(axis) = index.checked_sub(1) {
+            dx[FORWARD + axis] = 1.0;
+        }
+        dx
+    })
+}
+
+/// Mean training input of a phase, SI; zero if the model has none.
+fn mean_input(model: &ReducedModel, phase: usize) -> DVector<f64> {
+    model
+        .input_statistics(phase)
+        .map_or(DVector::zeros(STATE_DIM), |statistics| {
+            statistics.mean.clone()
+        })
+}
+
+/// Latent acceleration at a state of the robot, scaled units.
+fn latent_acceleration(
+    model: &ReducedModel,
+    phase: usize,
+    x: &DVector<f64>,
+    dx: &DVector<f64>,
+    u: &DVector<f64>,
+) -> Result<DVector<f64>, ModelError> {
+    let tangent = model.tangent(x)?;
+    model.ddz(
+        phase,
+        &model.encode(x)?,
+        &(&tangent.encode * dx),
+        &(&tangent.project * u),
+    )
+}
+
+/// Linear acceleration of the body, m/s^2.
+fn body_acceleration(
+    model: &ReducedModel,
+    phase: usize,
+    x: &DVector<f64>,
+    dx: &DVector<f64>,
+    u: &DVector<f64>,
+) -> Result<DVector<f64>, ModelError> {
+    let ddz = latent_acceleration(model, phase, x, dx, u)?;
+    let decoder = model.decoder_jacobian(&model.encode(x)?)?;
+    Ok(decoder.rows(FORWARD, 3) * ddz)
+}
+
+/// The mirror image of a state, a velocity or an input: legs change sides; abduction, y, roll and yaw (and the force and
+/// moments that go with them) change sign.
+fn mirrored(vector: &DVector<f64>) -> DVector<f64> {
+    let mut image = vector.clone();
+    for leg in Leg::ALL {
+        let other = Leg::ALL[leg.index() ^ 1];
+        for joint in 0..3 {
+            let sign = if joint == 0 { -1.0 } else { 1.0 };
+            image[3 * leg.index() + joint] = sign * vector[3 * other.index() + joint];
+        }
+    }
+    for row in [FORWARD + 1, FORWARD + 3, FORWARD + 5] {
+        image[row] = -vector[row];
+    }
+    image
+}
+
+/// What the latent combination that is body z and joints alone says.
+struct Height {
+    gravity_m_s2: Option<f64>,
+    mass_kg: Option<f64>,
+}
+
+impl Height {
+    fn of(model: &ReducedModel, rest: &DVector<f64>) -> Result<Option<Self>, ModelError> {
+        let tangent = model.tangent(rest)?;
+        let body = tangent
+            .encode
+            .columns(JOINT_DIM, STATE_DIM - JOINT_DIM)
+            .transpose();
+        let mut up = DVector::zeros(STATE_DIM - JOINT_DIM);
+        up[UP - JOINT_DIM] = 1.0;
+        let Ok(inverse) = body.clone().pseudo_inverse(1e-9 * body.amax()) else {
+            return Ok(None);
+        };
+        let particular = &inverse * &up;
+        if (&body * &particular - up).amax() > PURE {
+            return Ok(None);
+        }
+        let d = model.latent_dim();
+        let projector = SymmetricEigen::new(DMatrix::identity(d, d) - &inverse * &body);
+        let free: Vec<usize> = (0..d).filter(|&i| projector.eigenvalues[i] > 0.5).collect();
+        let others = projector.eigenvectors.select_columns(&free);
+        let still = DVector::zeros(STATE_DIM);
+        let flight = model.phase_for([false; 4]);
+        let of_flight = |phase| -> Result<(DMatrix<f64>, DVector<f64>), ModelError> {
+            let input = mean_input(model, phase);
+            let ddz = latent_acceleration(model, phase, rest, &still, &input)?;
+            Ok((gain(model, phase, rest, &input, &ddz)?, ddz))
+        };
+        let (combination, gravity_m_s2) = match flight {
+            None => (particular, None),
+            Some(phase) => {
+                let (change, ddz) = of_flight(phase)?;
+                let change = change.transpose();
+                let combination = match free.is_empty() {
+                    true => particular,
+                    false => {
+                        let inside = &change * &others;
+                        let least = 1e-9 * change.amax();
+                        match inside.pseudo_inverse(least) {
+                            Ok(inverse) => {
+                                &particular - &others * (inverse * (&change * &particular))
+                            }
+                            Err(_) => particular,
+                        }
+                    }
+                };
+                let gravity_m_s2 = -combination.dot(&ddz);
+                (combination, Some(gravity_m_s2))
+            }
+        };
+        Ok(Some(Self {
+            gravity_m_s2: gravity_m_s2.filter(|value| value.is_finite()),
+            mass_kg: mass_kg(model, rest, &combination)?,
+        }))
+    }
+}
+
+/// By how much `ddz` changes with each of `(z, dz, u_lat)`, `latent_dim x 3 latent_dim`, by differences over a unit.
+fn gain(
+    model: &ReducedModel,
+    phase: usize,
+    rest: &DVector<f64>,
+    input: &DVector<f64>,
+    ddz: &DVector<f64>,
+) -> Result<DMatrix<f64>, ModelError> {
+    let d = model.latent_dim();
+    let (z, u_lat) = (model.encode(rest)?, &model.tangent(rest)?.project * input);
+    let mut out = DMatrix::zeros(d, 3 * d);
+    for column in 0..3 * d {
+        let mut point = [z.clone(), DVector::zeros(d), u_lat.clone()];
+        point[column / d][column % d] += 1.0;
+        let [z, dz, u_lat] = &point;
+        out.set_column(column, &(model.ddz(phase, z, dz, u_lat)? - ddz));
+    }
+    Ok(out)
+}
+
+/// Force of four feet over the acceleration of a combination that it makes.
+fn mass_kg(
+    model: &ReducedModel,
+    rest: &DVector<f64>,
+    combination: &DVector<f64>,
+) -> Result<Option<f64>, ModelError> {
+    let feet: ContactFlags = [true; 4];
+    let Some(phase) = model.phase_for(feet) else {
+        return Ok(None);
+    };
+    let (robot, rule) = (model.robot()?, model.input_rule()?);
+    let x: [f64; STATE_DIM] = std::array::from_fn(|i| rest[i]);
+    let joints = std::array::from_fn(|joint| x[joint]);
+    let mut newton = [0.0; JOINT_DIM];
+    for leg in Leg::ALL {
+        let jacobian = robot.foot_jacobian(leg, &leg.of_joints(&joints));
+        let torque = -jacobian.transpose() * SVector::<f64, 3>::new(0.0, 0.0, 0.25);
+        newton[3 * leg.index()..][..3].copy_from_slice(torque.as_slice());
+    }
+    let Ok(wrench) = rule.wrench(&x, &newton, feet) else {
+        return Ok(None);
+    };
+    let mut u = DVector::zeros(STATE_DIM);
+    u.rows_mut(0, JOINT_DIM).copy_from_slice(&newton);
+    u.rows_mut(JOINT_DIM, STATE_DIM - JOINT_DIM)
+        .copy_from(&wrench);
+    let input = mean_input(model, phase);
+    let still = DVector::zeros(STATE_DIM);
+    let at = |u: &DVector<f64>| latent_acceleration(model, phase, rest, &still, u);
+    let change = combination.dot(&(at(&(&input + &u))? - at(&input)?));
+    Ok((change != 0.0)
+        .then(|| 1.0 / change)
+        .filter(|mass| mass.is_finite()))
+}

@@ -1,0 +1,219 @@
+//! Pushed, and back to the recording: the controller's feedback in a closed loop that no model has a part in.
+//!
+//! Along a recording the measured state is the reference, so that feedback has nothing to do and a command is the lifted
+//! reference input whatever the dynamics are. Here the trunk gets a push and moves on by Newton's law under what the
+//! commanded torques differ from the recorded ones:
+//!
+//! ```text
+//! m dv' = sum_k R F_k(tau_command - tau_recorded),   F_k = -J_k^-T tau_k for each foot k on the ground,   dp' = dv,
+//! J_k dq_k = -R^T dp
+//! ```
+//!
+//! with the recording's postures, the robot's own geometry and mass, feet that stay where they stand and an attitude
+//! that stays the recorded one. The controller measures the recorded state plus this deviation.
+
+use nalgebra::Vector3;
+
+use super::along_recording::{ReferenceInput, control_samples, set_reference};
+use crate::mpc::{Controller, Measurement, MpcError};
+use crate::recording::{Recording, Segment};
+use crate::robot::input_rule::rotation;
+use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
+
+/// Speed of a push, m/s.
+const PUSH_M_S: f64 = 0.1;
+/// Directions of the pushes.
+const PUSHES: [[f64; 3]; 4] = [
+    [1.0, 0.0, 0.0],
+    [-1.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+];
+/// Control steps from a push to the end, and from one push to the next.
+const WINDOW_STEPS: usize = 20;
+const STEPS_BETWEEN: usize = 10;
+/// Deviation beyond which a run counts with this one, m: the linear geometry ends there.
+const LARGEST_M: f64 = 0.1;
+
+/// What drives the robot after a push.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Driver {
+    /// The controller, given the state with the deviation.
+    Feedback,
+    /// The controller, given the recorded state.
+    NoFeedback,
+    /// The recorded torques.
+    Replay,
+}
+
+/// Deviations after pushes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Recovery {
+    squares: f64,
+    count: usize,
+    deviations: (f64, usize),
+}
+
+impl Recovery {
+    /// Root mean square of the body's deviation from the recording after pushes of 0.1 m/s, over times and pushes, m.
+    pub fn rms_m(&self) -> Option<f64> {
+        (self.count > 0).then(|| (self.squares / self.count as f64).sqrt())
+    }
+
+    /// Root mean square of planned minus reference positions, in standard deviations of the reference.
+    pub fn tracking_rms(&self) -> Option<f64> {
+        let (sum, count) = self.deviations;
+        (count > 0).then(|| (sum / count as f64).sqrt())
+    }
+}
+
+/// Pushes the robot at many times of a recording, with every foot that is on the ground staying there for the time of a
+/// window.
+///
+/// # Errors
+/// Those of [`Controller::set_reference`] and [`MpcError::Recording`].
+pub(super) fn recovery(
+    controller: &mut Controller,
+    recording: &Recording,
+    driver: Driver,
+) -> Result<Recovery, MpcError> {
+    let mut recovery = Recovery::default();
+    for segment in recording.segments.iter().filter(|s| s.len() >= 2) {
+        let input = segment.input_within_limits(controller.plant().input_rule())?;
+        set_reference(
+            controller,
+            segment,
+            ReferenceInput::Recorded,
+            input.as_slice(),
+        )?;
+        let samples = control_samples(&segment.time_s, controller.settings().step_s);
+        for window in samples.windows(WINDOW_STEPS + 1).step_by(STEPS_BETWEEN) {
+            let feet = segment.feet[window[0]];
+            let (first, last) = (window[0], window[WINDOW_STEPS]);
+            if !feet.contains(&true) || segment.feet[first..=last].iter().any(|f| *f != feet) {
+                continue;
+            }
+            for push in PUSHES {
+                controller.reset();
+                let pushed = Deviation::pushed(Vector3::from(push) * PUSH_M_S);
+                run(controller, segment, window, pushed, driver, &mut recovery);
+            }
+        }
+    }
+    Ok(recovery)
+}
+
+fn run(
+    controller: &mut Controller,
+    segment: &Segment,
+    window: &[usize],
+    mut deviation: Deviation,
+    driver: Driver,
+    recovery: &mut Recovery,
+) {
+    let robot = controller.plant().robot();
+    let limits = robot.torque_limit_nm();
+    for pair in window.windows(2) {
+        let (start, end) = (pair[0], pair[1]);
+        let command = (driver != Driver::Replay).then(|| {
+            let seen = match driver {
+                Driver::Feedback => deviation,
+                Driver::NoFeedback | Driver::Replay => Deviation::default(),
+            };
+            let (x, dx) = seen.measured(segment, start, robot);
+            let command = controller.step(Measurement {
+                time_s: segment.time_s[start],
+                x: &x,
+                dx: &dx,
+                feet: segment.feet[start],
+            });
+            if command.status.has_plan() {
+                for planned in controller.planned_deviations() {
+                    recovery.deviations.0 += planned * planned;
+                    recovery.deviations.1 += 1;
+                }
+            }
+            command.torque_nm
+        });
+        for sample in start..end {
+            let recorded = segment.torque(sample);
+            let recorded: [f64; JOINT_DIM] =
+                std::array::from_fn(|i| recorded[i].clamp(-limits[i], limits[i]));
+            let torque = command.unwrap_or(recorded);
+            let difference = std::array::from_fn(|i| torque[i] - recorded[i]);
+            deviation.advance(segment, sample, robot, &difference);
+            recovery.squares += deviation
+                .position_m
+                .norm_squared()
+                .min(LARGEST_M * LARGEST_M);
+            recovery.count += 1;
+        }
+    }
+}
+
+/// Where the trunk is beside the recording.
+#[derive(Debug, Clone, Copy, Default)]
+struct Deviation {
+    position_m: Vector3<f64>,
+    velocity_m_s: Vector3<f64>,
+}
+
+impl Deviation {
+    fn pushed(velocity_m_s: Vector3<f64>) -> Self {
+        Self {
+            velocity_m_s,
+            ..Self::default()
+        }
+    }
+
+    /// State and velocity of the robot, joints such that feet on the ground stay where they are.
+    fn measured(
+        &self,
+        segment: &Segment,
+        sample: usize,
+        robot: &Robot,
+    ) -> ([f64; STATE_DIM], [f64; STATE_DIM]) {
+        let mut x = segment.state(sample);
+        let mut dx: [f64; STATE_DIM] = std::array::from_fn(|i| segment.dx[(i, sample)]);
+        let attitude = rotation([x[15], x[16], x[17]]);
+        let joints = segment.joints(sample);
+        for leg in Leg::ALL {
+            let jacobian = robot.foot_jacobian(leg, &leg.of_joints(&joints));
+            let inverse = jacobian.try_inverse();
+            if let Some(inverse) = inverse.filter(|_| segment.feet[sample][leg.index()]) {
+                let turn = -inverse * attitude.transpose();
+                let (dq, ddq) = (turn * self.position_m, turn * self.velocity_m_s);
+                for joint in 0..3 {
+                    x[3 * leg.index() + joint] += dq[joint];
+                    dx[3 * leg.index() + joint] += ddq[joint];
+                }
+            }
+        }
+        for axis in 0..3 {
+            x[JOINT_DIM + axis] += self.position_m[axis];
+            dx[JOINT_DIM + axis] += self.velocity_m_s[axis];
+        }
+        (x, dx)
+    }
+
+    /// Moves on to the next sample under a difference of the torques.
+    fn advance(
+        &mut self,
+        segment: &Segment,
+        sample: usize,
+        robot: &Robot,
+        difference_nm: &[f64; JOINT_DIM],
+    ) {
+        let step_s = segment.time_s[sample + 1] - segment.time_s[sample];
+        let x = segment.state(sample);
+        let joints = segment.joints(sample);
+        let feet = segment.feet[sample];
+        let force = (robot.body_wrench(&joints, difference_nm, feet))
+            .map_or(Vector3::zeros(), |wrench| {
+                wrench.fixed_rows::<3>(0).into_owned()
+            });
+        let force = rotation([x[15], x[16], x[17]]) * force;
+        self.velocity_m_s += force * (step_s / robot.mass_kg());
+        self.position_m += self.velocity_m_s * step_s;
+    }
+}

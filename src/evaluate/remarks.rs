@@ -1,0 +1,51 @@
+//! Signs that a model and recordings do not belong together.
+
+use super::coordinates::PointwiseSums;
+use super::error::EvaluateError;
+use super::metrics::{Fit, FitSums};
+use crate::model::ReducedModel;
+use crate::recording::Recording;
+use crate::recording::mismatch::notes;
+use crate::sim::LatentSegment;
+
+/// What speaks against using a model on these recordings: recordings that cannot be of its robot
+/// ([`notes`]), and accelerations that it does not explain at all.
+///
+/// # Errors
+/// [`EvaluateError::Model`] for a latent-only model, [`EvaluateError::Sim`] for samples that cannot be encoded.
+pub fn remarks(
+    model: &ReducedModel,
+    recordings: &[Recording],
+) -> Result<Vec<String>, EvaluateError> {
+    let robot = model.robot()?;
+    let mut pointwise = PointwiseSums::new(model);
+    let segments = recordings.iter().flat_map(|recording| &recording.segments);
+    for segment in segments {
+        let latent = LatentSegment::encode(model, segment)?;
+        pointwise.add(model, segment, &latent)?;
+    }
+    let of_recordings = recordings
+        .iter()
+        .flat_map(|recording| notes(recording, robot));
+    Ok(of_recordings
+        .chain(unexplained(model, &pointwise))
+        .collect())
+}
+
+/// Phases whose accelerations the mean would explain better. Flight is left out: accelerations hardly vary there, and
+/// any model is as far off as their mean.
+fn unexplained(model: &ReducedModel, pointwise: &PointwiseSums) -> Vec<String> {
+    let accelerations = pointwise.acceleration.iter().map(FitSums::fit);
+    let worse_than_mean = |fit: &Option<Fit>| fit.and_then(|fit| fit.r2).is_some_and(|r2| r2 < 0.0);
+    (model.phases().iter().zip(accelerations))
+        .filter(|(phase, fit)| !phase.feet.matches([false; 4]) && worse_than_mean(fit))
+        .map(|(phase, _)| {
+            format!(
+                "in {} the latent accelerations are further off than their mean would be (R^2 below 0): \
+                 these recordings are unlike those of the training. Another robot, other signs or \
+                 frames, or motions that it never saw? Do not rely on predictions or torques there",
+                phase.name
+            )
+        })
+        .collect()
+}

@@ -1,0 +1,334 @@
+//! Mismatches: what whole jumps say that cannot be true of this robot.
+//!
+//! [`check`](super::check) looks at samples; a recording in which every sample is possible can still be of another
+//! robot, in other units, or have legs, signs or columns exchanged. The robot's own geometry shows it: a foot on the
+//! ground stays where it is, the feet carry the weight, a body in flight falls, a hip holds the weight on its own
+//! side. Each figure is taken over a whole recording and compared with bounds that leave room for what right
+//! recordings of simulated and real jumps have (`docs/recordings.md` has the table).
+//!
+//! [`mismatches`] is the one definition; `inspect`, `train`, `simulate`, `mpc` and `report` print what it finds.
+
+mod balance;
+mod feet;
+mod stance;
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::check::check;
+use super::segment::Recording;
+use crate::robot::{FOOT_DIM, GRAVITY_M_S2, Leg, Robot};
+use balance::Balance;
+use stance::{Slip, best_other_reading};
+
+/// Largest root mean square of the places of feet on the ground about their medians, m.
+const SLIP_M: f64 = 0.025;
+/// How many times better feet have to stay in place under another reading of the columns.
+const READING_FACTOR: f64 = 1.4;
+/// By how much they have to stay better in place, m.
+const READING_LEAST_M: f64 = 3e-4;
+/// Vertical acceleration of the body in flight, m/s^2.
+const FALL_M_S2: (f64, f64) = (-16.0, -6.5);
+/// Force of the feet over what weight and acceleration need.
+const WEIGHT_SHARE: (f64, f64) = (0.45, 1.7);
+/// Least share of the hips' torques that hold the feet on their own side: 1 for vertical forces.
+const HIP_SHARE: f64 = -0.3;
+/// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2.
+const ACCELERATION_M_S2: f64 = 2.0;
+/// Logarithm of the share of the weight from which another robot may explain it, and up to which it does.
+const OTHER_WEIGHT: (f64, f64) = (0.17, 0.1);
+/// How much worse feet may stay in place with the geometry of a robot that explains the weight.
+const OTHER_SLIP: f64 = 1.15;
+
+/// What does not fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum MismatchKind {
+    /// Feet on the ground move.
+    FootSlip,
+    /// Feet on the ground stay in place better if columns are read otherwise.
+    LegsOrSigns,
+    /// The columns of contact fit the heights of the feet better in another order.
+    FeetColumns,
+    /// The body does not fall in flight.
+    Fall,
+    /// The feet do not carry the robot.
+    Weight,
+    /// The torques of hips hold the feet on the wrong side.
+    HipTorques,
+    /// Accelerations are not those of the velocities.
+    Accelerations,
+    /// Another robot that romc knows fits better.
+    OtherRobot,
+}
+
+impl MismatchKind {
+    /// The kind in one word, as JSON has it.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::FootSlip => "foot_slip",
+            Self::LegsOrSigns => "legs_or_signs",
+            Self::FeetColumns => "feet_columns",
+            Self::Fall => "fall",
+            Self::Weight => "weight",
+            Self::HipTorques => "hip_torques",
+            Self::Accelerations => "accelerations",
+            Self::OtherRobot => "other_robot",
+        }
+    }
+}
+
+/// Something about a whole recording that cannot be true of the robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mismatch {
+    /// What does not fit.
+    pub kind: MismatchKind,
+    /// The figure.
+    pub value: f64,
+    /// The bound that it breaks.
+    pub bound: f64,
+    /// What was found and what it may come from, one sentence.
+    pub words: String,
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.words)
+    }
+}
+
+/// Everything about a recording that cannot be true of the robot.
+pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
+    let slip = Slip::of(recording, robot);
+    let balance = Balance::of(recording, robot);
+    let found = [
+        foot_slip(&slip),
+        legs_or_signs(recording, robot, &slip),
+        feet_columns(recording, robot),
+        fall(&balance),
+        weight(&balance, robot),
+        hip_torques(&balance),
+        accelerations(&balance),
+        other_robot(recording, robot, &slip, &balance),
+    ];
+    found.into_iter().flatten().collect()
+}
+
+/// The figures that [`mismatches`] compares with its bounds; none where a recording has too little of what they need.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Figures {
+    /// Root mean square of the places of feet on the ground about the medians of their stances, m.
+    pub foot_slip_m: Option<f64>,
+    /// The same of what feet that stand together do not have in common, m.
+    pub relative_foot_slip_m: Option<f64>,
+    /// That for the best other order of the legs or sign of an angle, m.
+    pub other_reading_m: Option<f64>,
+    /// Mean vertical acceleration in flight, m/s^2.
+    pub fall_m_s2: Option<f64>,
+    /// Impulse of the feet over what the robot's weight and change of velocity need.
+    pub weight_share: Option<f64>,
+    /// Hip torque of each leg over what holds the force along the leg: 1 for a force in the leg's plane.
+    pub hip_share: [Option<f64>; FOOT_DIM],
+    /// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2.
+    pub acceleration_offset_m_s2: Option<f64>,
+}
+
+impl Figures {
+    /// Of a recording on a robot.
+    pub fn of(recording: &Recording, robot: &Robot) -> Self {
+        let slip = Slip::of(recording, robot);
+        let balance = Balance::of(recording, robot);
+        Self {
+            foot_slip_m: slip.rms_m(),
+            relative_foot_slip_m: slip.relative_rms_m(),
+            other_reading_m: best_other_reading(recording, robot).map(|(rms_m, _)| rms_m),
+            fall_m_s2: balance.fall_m_s2,
+            weight_share: balance.weight_share,
+            hip_share: balance.hip_share,
+            acceleration_offset_m_s2: balance.acceleration_offset_m_s2.map(|(_, value)| value),
+        }
+    }
+}
+
+/// Notes for people: the mismatches of a recording, and how many runs of samples are implausible, such as the first.
+/// Legs near a singularity are no fault.
+pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
+    let path = recording.path.display();
+    let found = mismatches(recording, robot);
+    let mut notes: Vec<String> = (found.iter())
+        .map(|mismatch| format!("{path}: {mismatch}"))
+        .collect();
+    let findings = check(recording, robot);
+    let faults: Vec<_> = (findings.iter())
+        .filter(|finding| finding.kind.can_be_left_out())
+        .collect();
+    if let Some(first) = faults.first() {
+        let count = faults.len();
+        notes.push(format!(
+            "{path}: {count} implausible runs of samples, such as {first}"
+        ));
+    }
+    notes
+}
+
+fn foot_slip(slip: &Slip) -> Option<Mismatch> {
+    let value = slip.rms_m()?;
+    (value.is_nan() || value > SLIP_M).then(|| Mismatch {
+        kind: MismatchKind::FootSlip,
+        value,
+        bound: SLIP_M,
+        words: format!(
+            "feet on the ground move by {:.0} mm (root mean square; {:.0} mm are accepted): the joints, the body's \
+             pose, their units or signs, or the contacts are not this robot's",
+            1e3 * value,
+            1e3 * SLIP_M
+        ),
+    })
+}
+
+fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Mismatch> {
+    let value = slip.relative_rms_m()?;
+    let (best, reading) = best_other_reading(recording, robot)?;
+    let bound = READING_FACTOR * best + READING_LEAST_M;
+    (value > bound).then(|| Mismatch {
+        kind: MismatchKind::LegsOrSigns,
+        value,
+        bound,
+        words: format!(
+            "feet on the ground move by {:.1} mm against each other, and by {:.1} mm {reading}: are legs or signs \
+             exchanged?",
+            1e3 * value,
+            1e3 * best
+        ),
+    })
+}
+
+fn feet_columns(recording: &Recording, robot: &Robot) -> Option<Mismatch> {
+    let order = feet::better_order(recording, robot)?;
+    let names = order.legs.map(Leg::short_name).join(", ");
+    Some(Mismatch {
+        kind: MismatchKind::FeetColumns,
+        value: order.recorded_m,
+        bound: order.least_m,
+        words: format!(
+            "while some feet are on the ground, those said to be in the air are higher by {:.0} mm in sum over the \
+             samples, and by {:.0} mm if the columns of the feet are of {names}: are they exchanged?",
+            1e3 * order.recorded_m,
+            1e3 * order.best_m
+        ),
+    })
+}
+
+fn fall(balance: &Balance) -> Option<Mismatch> {
+    let value = balance.fall_m_s2?;
+    let bound = outside(value, FALL_M_S2)?;
+    Some(Mismatch {
+        kind: MismatchKind::Fall,
+        value,
+        bound,
+        words: format!(
+            "in flight the body accelerates by {value:.2} m/s^2 upwards, expected {} to {}: another axis, sign or \
+             unit, another time, or contacts that are not the feet's",
+            FALL_M_S2.0, FALL_M_S2.1
+        ),
+    })
+}
+
+fn weight(balance: &Balance, robot: &Robot) -> Option<Mismatch> {
+    let value = balance.weight_share?;
+    let bound = outside(value, WEIGHT_SHARE)?;
+    Some(Mismatch {
+        kind: MismatchKind::Weight,
+        value,
+        bound,
+        words: format!(
+            "the torques carry {value:.3} of what {} kg need ({} to {} are accepted): torques in other units, of \
+             other signs or other joints, or another robot",
+            robot.mass_kg(),
+            WEIGHT_SHARE.0,
+            WEIGHT_SHARE.1
+        ),
+    })
+}
+
+fn hip_torques(balance: &Balance) -> Option<Mismatch> {
+    let shares = Leg::ALL.into_iter().zip(balance.hip_share);
+    let wrong: Vec<(Leg, f64)> = shares
+        .filter_map(|(leg, share)| Some((leg, share.filter(|share| *share < HIP_SHARE)?)))
+        .collect();
+    let value = (wrong.iter().map(|(_, share)| *share)).min_by(f64::total_cmp)?;
+    let names: Vec<&str> = wrong.iter().map(|(leg, _)| leg.short_name()).collect();
+    Some(Mismatch {
+        kind: MismatchKind::HipTorques,
+        value,
+        bound: HIP_SHARE,
+        words: format!(
+            "the hips' torques of {} hold the feet on the other side of the body: are left and right legs or the \
+             torques' signs exchanged?",
+            names.join(", ")
+        ),
+    })
+}
+
+fn accelerations(balance: &Balance) -> Option<Mismatch> {
+    let (axis, value) = balance.acceleration_offset_m_s2?;
+    (value.abs() > ACCELERATION_M_S2).then(|| Mismatch {
+        kind: MismatchKind::Accelerations,
+        value,
+        bound: ACCELERATION_M_S2.copysign(value),
+        words: format!(
+            "the body's acceleration along {axis} differs from the slope of its velocity by {value:.2} m/s^2 in the \
+             median: gravity, or another unit?"
+        ),
+    })
+}
+
+fn other_robot(
+    recording: &Recording,
+    robot: &Robot,
+    slip: &Slip,
+    balance: &Balance,
+) -> Option<Mismatch> {
+    let share = balance.weight_share.filter(|share| *share > 0.0)?;
+    let (own, own_slip) = (share.ln().abs(), slip.rms_m()?);
+    if own <= OTHER_WEIGHT.0 {
+        return None;
+    }
+    let others = Robot::known_names().into_iter();
+    let others = others.filter_map(|name| Robot::by_name(name).ok());
+    let explains = others.filter_map(|other| {
+        let share = Balance::of(recording, other).weight_share?;
+        let fits = share > 0.0 && share.ln().abs() < OTHER_WEIGHT.1;
+        let as_well = Slip::of(recording, other).rms_m()? < OTHER_SLIP * own_slip;
+        (fits && as_well && other.name() != robot.name()).then_some((share, other))
+    });
+    let nearest =
+        |one: &(f64, &Robot), two: &(f64, &Robot)| one.0.ln().abs().total_cmp(&two.0.ln().abs());
+    let (other_share, other) = explains.min_by(nearest)?;
+    Some(Mismatch {
+        kind: MismatchKind::OtherRobot,
+        value: share,
+        bound: OTHER_WEIGHT.0.exp(),
+        words: format!(
+            "the torques carry {share:.2} of the weight of a {} and {other_share:.2} of that of a {}, and feet on \
+             the ground stay in place as well: is it a recording of a {}?",
+            robot.name(),
+            other.name(),
+            other.name()
+        ),
+    })
+}
+
+/// The bound of a range that a value breaks.
+fn outside(value: f64, (low, high): (f64, f64)) -> Option<f64> {
+    if value < low {
+        Some(low)
+    } else {
+        (value.is_nan() || value > high).then_some(high)
+    }
+}
+
+/// Weight of a mass, N.
+fn weight_n(mass_kg: f64) -> f64 {
+    GRAVITY_M_S2 * mass_kg
+}

@@ -1,0 +1,137 @@
+//! Forces against weight and acceleration, falling in flight, hips' torques against the side they hold.
+
+use nalgebra::Vector3;
+
+use super::stance::median;
+use super::weight_n;
+use crate::recording::preprocess::differences;
+use crate::recording::{Recording, Segment};
+use crate::robot::input_rule::rotation;
+use crate::robot::{BODY_NAMES, FOOT_DIM, JOINT_DIM, Leg, Robot};
+
+/// Row of the body's height.
+const HEIGHT: usize = JOINT_DIM + 2;
+/// Shortest flight, and shortest time on the ground in all, that counts, s.
+const LEAST_S: f64 = 0.04;
+/// Least force of a foot that counts where a hip's torque is compared with it, as a share of the weight.
+const LEAST_FORCE: f64 = 0.02;
+
+/// What forces and accelerations of a recording come to.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Balance {
+    /// Mean vertical acceleration in flight, upwards.
+    pub fall_m_s2: Option<f64>,
+    /// Impulse of the feet over what weight and change of velocity need.
+    pub weight_share: Option<f64>,
+    /// Slope of each hip's abduction torque over its lever times the force along the leg; 1 for a force in the plane
+    /// of the leg.
+    pub hip_share: [Option<f64>; FOOT_DIM],
+    /// The axis with the largest median difference of acceleration and slope of velocity.
+    pub acceleration_offset_m_s2: Option<(&'static str, f64)>,
+}
+
+/// Sums of a balance.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    /// Change of velocity and time in flight.
+    flight: (f64, f64),
+    /// Impulse of the feet, impulse that is needed, time.
+    ground: (f64, f64, f64),
+    /// Products of torque and lever, squares of the lever.
+    hips: [(f64, f64); FOOT_DIM],
+}
+
+impl Balance {
+    /// Over all segments of a recording; torques beyond the robot's limits count as the limits.
+    pub fn of(recording: &Recording, robot: &Robot) -> Self {
+        let mut sums = Sums::default();
+        for segment in &recording.segments {
+            sums.add(segment, robot);
+        }
+        let (dv, flight_s) = sums.flight;
+        let (impulse, needed, ground_s) = sums.ground;
+        Self {
+            fall_m_s2: (flight_s >= LEAST_S).then(|| dv / flight_s),
+            weight_share: (ground_s >= LEAST_S && needed > 0.0).then(|| impulse / needed),
+            hip_share: sums
+                .hips
+                .map(|(product, square)| (square > 0.0).then(|| product / square)),
+            acceleration_offset_m_s2: acceleration_offset(recording),
+        }
+    }
+}
+
+impl Sums {
+    fn add(&mut self, segment: &Segment, robot: &Robot) {
+        let forces: Vec<Vector3<f64>> = (0..segment.len())
+            .map(|sample| self.add_forces(segment, robot, sample))
+            .collect();
+        let is_grounded = |sample: usize| segment.feet[sample].contains(&true);
+        let mut start = 0;
+        while start + 1 < segment.len() {
+            let grounded = is_grounded(start);
+            let after = start + 1..segment.len();
+            let end = start + after.take_while(|&s| is_grounded(s) == grounded).count();
+            let time_s = segment.time_s[end] - segment.time_s[start];
+            let dv = segment.dx[(HEIGHT, end)] - segment.dx[(HEIGHT, start)];
+            if grounded {
+                let between = (start..end).map(|s| {
+                    let step_s = segment.time_s[s + 1] - segment.time_s[s];
+                    0.5 * step_s * (forces[s].z + forces[s + 1].z)
+                });
+                self.ground.0 += between.sum::<f64>();
+                self.ground.1 += weight_n(robot.mass_kg()) * time_s + robot.mass_kg() * dv;
+                self.ground.2 += time_s;
+            } else if time_s >= LEAST_S {
+                self.flight.0 += dv;
+                self.flight.1 += time_s;
+            }
+            start = end + 1;
+        }
+    }
+
+    /// Adds a sample's hips, and returns the force of its feet on the body in the world, N.
+    fn add_forces(&mut self, segment: &Segment, robot: &Robot, sample: usize) -> Vector3<f64> {
+        let (joints, torque) = (segment.joints(sample), segment.torque(sample));
+        let limits = robot.torque_limit_nm();
+        let torque = std::array::from_fn(|i| torque[i].clamp(-limits[i], limits[i]));
+        let mut sum = Vector3::zeros();
+        for leg in Leg::ALL {
+            let q = leg.of_joints(&joints);
+            let tau = leg.of_joints(&torque);
+            let Some(map) = (robot.damped_force_map(leg, &q).ok())
+                .filter(|_| segment.feet[sample][leg.index()])
+            else {
+                continue;
+            };
+            let force = map * Vector3::from(tau);
+            sum += force;
+            // The axis of abduction leaves the hip's torque this lever on the force along the leg.
+            let along = force.dot(&Vector3::new(0.0, q[0].sin(), -q[0].cos()));
+            if along.abs() > LEAST_FORCE * weight_n(robot.mass_kg()) {
+                let lever = leg.side() * robot.geometry().hip_m * along;
+                let (product, square) = &mut self.hips[leg.index()];
+                *product += tau[0] * lever;
+                *square += lever * lever;
+            }
+        }
+        let [roll, pitch, yaw] = std::array::from_fn(|i| segment.x[(JOINT_DIM + 3 + i, sample)]);
+        rotation([roll, pitch, yaw]) * sum
+    }
+}
+
+fn acceleration_offset(recording: &Recording) -> Option<(&'static str, f64)> {
+    let slopes: Vec<_> = (recording.segments.iter())
+        .map(|segment| differences(&segment.time_s, &segment.dx))
+        .collect();
+    let of_axis = |axis: usize| {
+        let row = JOINT_DIM + axis;
+        let pairs = recording.segments.iter().zip(&slopes);
+        median(pairs.flat_map(|(segment, slopes)| {
+            (0..segment.len()).map(move |s| segment.ddx[(row, s)] - slopes[(row, s)])
+        }))
+    };
+    (0..3)
+        .map(|axis| (BODY_NAMES[axis], of_axis(axis)))
+        .max_by(|one, other| one.1.abs().total_cmp(&other.1.abs()))
+}

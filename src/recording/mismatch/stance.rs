@@ -1,0 +1,229 @@
+//! Places of the feet in the world, and how well those on the ground stay there.
+
+use std::fmt;
+use std::ops::Range;
+
+use nalgebra::Vector3;
+
+use crate::recording::{Recording, Segment};
+use crate::robot::input_rule::rotation;
+use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
+
+/// Shortest stance that counts, s.
+const LEAST_STANCE_S: f64 = 0.05;
+/// Time at both ends of a stance that does not count, s: touchdown and lift-off; at most an eighth of the stance.
+const EDGE_S: f64 = 0.02;
+/// Radius of the sphere that a foot rolls on, m: 0.02 to 0.023 on the robots that romc knows.
+const FOOT_RADIUS_M: f64 = 0.022;
+/// Fewest samples of feet on the ground that say anything.
+const LEAST_SAMPLES: usize = 50;
+
+/// A way to read the columns of joints and body.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Reading {
+    /// The legs whose columns the legs have.
+    Legs([Leg; FOOT_DIM]),
+    /// Coordinates that are recorded with the other sign, and their name.
+    Negated(&'static [usize], &'static str),
+}
+
+impl fmt::Display for Reading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Negated(_, name) => write!(f, "with {name} of the other sign"),
+            Self::Legs(legs) => {
+                let names = legs.map(Leg::short_name).join(", ");
+                write!(f, "with the joints of fr, fl, rr, rl taken from {names}")
+            }
+        }
+    }
+}
+
+/// Coordinates that are easily recorded with the other sign.
+const SIGNS: [Reading; 4] = [
+    Reading::Negated(&[JOINT_DIM + 3], "roll"),
+    Reading::Negated(&[JOINT_DIM + 4], "pitch"),
+    Reading::Negated(&[JOINT_DIM + 5], "yaw"),
+    Reading::Negated(&[0, 3, 6, 9], "hip abduction"),
+];
+
+/// The reading under which feet on the ground stay best in place against each other, and their root mean square then,
+/// m: of all orders of the legs but the recorded one, and of the other signs of [`SIGNS`].
+pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option<(f64, Reading)> {
+    let all: Vec<Stances> = (recording.segments.iter())
+        .map(|segment| Stances::of(segment, robot, &[], &Leg::ALL))
+        .collect();
+    let orders = orders().into_iter().filter(|order| *order != Leg::ALL);
+    let of_orders = orders.map(|order| {
+        let mut slip = Slip::default();
+        all.iter()
+            .for_each(|stances| stances.add_to(&mut slip, &order));
+        (slip, Reading::Legs(order))
+    });
+    let of_signs = SIGNS.into_iter().map(|reading| {
+        let negated: &[usize] = match reading {
+            Reading::Negated(coordinates, _) => coordinates,
+            Reading::Legs(_) => &[],
+        };
+        let mut slip = Slip::default();
+        for segment in &recording.segments {
+            Stances::of(segment, robot, negated, &[]).add_to(&mut slip, &Leg::ALL);
+        }
+        (slip, reading)
+    });
+    let readings = of_orders.chain(of_signs);
+    let judged = readings.filter_map(|(slip, reading)| Some((slip.relative_rms_m()?, reading)));
+    (judged.filter(|(rms_m, _)| rms_m.is_finite())).min_by(|one, other| one.0.total_cmp(&other.0))
+}
+
+/// All orders of the legs.
+pub(super) fn orders() -> Vec<[Leg; FOOT_DIM]> {
+    let mut out = Vec::new();
+    for code in 0..FOOT_DIM.pow(FOOT_DIM as u32) {
+        let digits: [usize; FOOT_DIM] =
+            std::array::from_fn(|place| code / FOOT_DIM.pow(place as u32) % FOOT_DIM);
+        let all = (0..FOOT_DIM).all(|leg| digits.contains(&leg));
+        if all {
+            out.push(digits.map(|leg| Leg::ALL[leg]));
+        }
+    }
+    out
+}
+
+/// Place of a leg's foot in the world, m, in a state `x`; `rolled` without what the foot's sphere has rolled.
+pub(super) fn foot_place(
+    robot: &Robot,
+    leg: Leg,
+    x: &[f64; STATE_DIM],
+    rolled: bool,
+) -> Vector3<f64> {
+    let [px, py, pz, roll, pitch, yaw] = std::array::from_fn(|i| x[JOINT_DIM + i]);
+    let first = 3 * leg.index();
+    let q = [x[first], x[first + 1], x[first + 2]];
+    let attitude = rotation([roll, pitch, yaw]);
+    let foot = robot.hip_position(leg) + robot.foot_position(leg, &q);
+    let place = Vector3::new(px, py, pz) + attitude * foot;
+    if !rolled {
+        return place;
+    }
+    let inclination = pitch + q[1] + q[2];
+    place - FOOT_RADIUS_M * inclination * Vector3::new(yaw.cos(), yaw.sin(), 0.0)
+}
+
+/// How far feet on the ground are from where they stand.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Slip {
+    absolute: (f64, usize),
+    relative: (f64, usize),
+}
+
+impl Slip {
+    /// Over all segments of a recording.
+    pub fn of(recording: &Recording, robot: &Robot) -> Self {
+        let mut slip = Self::default();
+        for segment in &recording.segments {
+            Stances::of(segment, robot, &[], &[]).add_to(&mut slip, &Leg::ALL);
+        }
+        slip
+    }
+
+    /// Root mean square of places about the median of their stance, m; none for fewer than [`LEAST_SAMPLES`].
+    pub fn rms_m(&self) -> Option<f64> {
+        root_mean(self.absolute)
+    }
+
+    /// The same of what feet that stand together do not have in common, m.
+    pub fn relative_rms_m(&self) -> Option<f64> {
+        root_mean(self.relative)
+    }
+}
+
+/// Where the feet of a segment are beside their stance, for each leg with its own columns or those of others.
+struct Stances {
+    /// Sample, leg, leg whose columns are read, place about the median of the stance, m.
+    moved: Vec<(usize, Leg, Leg, Vector3<f64>)>,
+}
+
+impl Stances {
+    /// With `negated` coordinates of the state; each leg is read from its own columns and from those of `others`.
+    fn of(segment: &Segment, robot: &Robot, negated: &[usize], others: &[Leg]) -> Self {
+        let mut moved = Vec::new();
+        for (leg, samples) in stances(segment) {
+            let others = others.iter().copied().filter(|other| *other != leg);
+            for from in std::iter::once(leg).chain(others) {
+                let place = |sample: usize| {
+                    let mut x = segment.state(sample);
+                    negated.iter().for_each(|&i| x[i] = -x[i]);
+                    let q = from.of_joints(&std::array::from_fn(|joint| x[joint]));
+                    x[3 * leg.index()..][..3].copy_from_slice(&q);
+                    foot_place(robot, leg, &x, true)
+                };
+                let places: Vec<Vector3<f64>> = samples.clone().map(place).collect();
+                let stands = Vector3::from_fn(|axis, _| median(places.iter().map(|p| p[axis])));
+                let about = samples.clone().zip(places);
+                moved.extend(about.map(|(sample, place)| (sample, leg, from, place - stands)));
+            }
+        }
+        moved.sort_by_key(|(sample, ..)| *sample);
+        Self { moved }
+    }
+
+    /// Adds the places with the legs read from the columns of `order`.
+    fn add_to(&self, slip: &mut Slip, order: &[Leg; FOOT_DIM]) {
+        let of_sample = self.moved.chunk_by(|one, other| one.0 == other.0);
+        let mut standing = Vec::with_capacity(FOOT_DIM);
+        for feet in of_sample {
+            standing.clear();
+            let chosen = feet
+                .iter()
+                .filter(|(_, leg, from, _)| order[leg.index()] == *from);
+            standing.extend(chosen.map(|(.., place)| *place));
+            for place in &standing {
+                slip.absolute.0 += place.norm_squared();
+                slip.absolute.1 += 1;
+            }
+            if standing.len() < 2 {
+                continue;
+            }
+            let common = standing.iter().sum::<Vector3<f64>>() / standing.len() as f64;
+            for place in &standing {
+                slip.relative.0 += (place - common).norm_squared();
+                slip.relative.1 += 1;
+            }
+        }
+    }
+}
+
+fn root_mean((sum, count): (f64, usize)) -> Option<f64> {
+    (count >= LEAST_SAMPLES).then(|| (sum / count as f64).sqrt())
+}
+
+/// Each foot's times on the ground without their edges.
+fn stances(segment: &Segment) -> Vec<(Leg, Range<usize>)> {
+    let step_s = segment.mean_step_s();
+    if step_s <= 0.0 {
+        return Vec::new();
+    }
+    let samples_in = |time_s: f64| (time_s / step_s).round() as usize;
+    let mut out = Vec::new();
+    for leg in Leg::ALL {
+        let down = |sample: &usize| segment.feet[*sample][leg.index()];
+        let mut start = 0;
+        while start < segment.len() {
+            let count = (start..segment.len()).take_while(down).count();
+            if count >= samples_in(LEAST_STANCE_S).max(2) {
+                let edge = samples_in(EDGE_S).min(count / 8);
+                out.push((leg, start + edge..start + count - edge));
+            }
+            start += count + 1;
+        }
+    }
+    out
+}
+
+/// The middle of the values; 0 if there are none.
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,197 @@
+//! The figures of `romc mpc` fall when the model is wrong: coefficients zeroed, negated, random, ten times as large,
+//! without inputs.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+use nalgebra::DMatrix;
+use romc::artifact;
+use romc::evaluate::Invariance;
+use romc::files::Overwrite;
+use romc::model::ReducedModel;
+use serde_json::Value;
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const JUMPS: [&str; 2] = [
+    "examples/recordings/go1/test_02.csv.gz",
+    "examples/recordings/go1-other/jump_03.csv.gz",
+];
+
+/// Counts, times, what maps and lift alone make of recorded inputs, and what others do: named for what they are, and
+/// not figures of the dynamics.
+const OTHERS: [&str; 10] = [
+    "steps",
+    "solved",
+    "softened",
+    "failed",
+    "limit_violations",
+    "friction_violations",
+    "implausible_steps",
+    "step_us",
+    "lift",
+    "baseline",
+];
+
+fn shipped(name: &str) -> ReducedModel {
+    artifact::read(&Path::new(ROOT).join(format!("models/{name}.json"))).expect("shipped")
+}
+
+/// The model with other coefficients, of term, output and value.
+fn with_xi(model: &ReducedModel, change: impl Fn(&str, f64) -> f64) -> ReducedModel {
+    let terms = model.library().terms();
+    let phases = model.phases().iter().cloned().map(|mut phase| {
+        phase.xi = DMatrix::from_fn(phase.xi.nrows(), phase.xi.ncols(), |row, col| {
+            change(terms[row].text(), phase.xi[(row, col)])
+        });
+        phase
+    });
+    let phases = phases.collect();
+    let builder = model.clone().into_builder().phases(phases);
+    builder.build().expect("a model")
+}
+
+/// Numbers of normal distribution by a linear congruential generator.
+fn random(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    let mut uniform = move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+    };
+    move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+}
+
+fn ablations(model: &ReducedModel) -> Vec<(&'static str, ReducedModel)> {
+    let draws = std::cell::RefCell::new(random(13));
+    let inputs: Vec<String> = (1..=model.latent_dim()).map(|k| format!("u{k}")).collect();
+    let has_input = |term: &str| inputs.iter().any(|input| term.contains(input.as_str()));
+    vec![
+        ("zeroed", with_xi(model, |_, _| 0.0)),
+        ("negated", with_xi(model, |_, value| -value)),
+        ("random", with_xi(model, |_, _| 5.0 * draws.borrow_mut()())),
+        ("ten times", with_xi(model, |_, value| 10.0 * value)),
+        (
+            "without inputs",
+            with_xi(
+                model,
+                |term, value| if has_input(term) { 0.0 } else { value },
+            ),
+        ),
+    ]
+}
+
+/// The runs of `romc mpc --json`.
+fn runs(model: &Path) -> Vec<Value> {
+    let output = Command::new(env!("CARGO_BIN_EXE_romc"))
+        .arg("mpc")
+        .arg(model)
+        .args(JUMPS)
+        .arg("--json")
+        .current_dir(ROOT)
+        .output()
+        .expect("the binary runs");
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    let mut value: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    let Value::Array(runs) = value["runs"].take() else {
+        panic!("{value}");
+    };
+    runs
+}
+
+/// All numbers of a value under their paths, but those of [`OTHERS`].
+fn figures(value: &Value, path: &str, out: &mut BTreeMap<String, f64>) {
+    match value {
+        Value::Number(number) => {
+            out.insert(path.to_owned(), number.as_f64().expect("a number"));
+        }
+        Value::Object(entries) => {
+            let own = entries
+                .iter()
+                .filter(|(key, _)| !OTHERS.contains(&key.as_str()));
+            own.for_each(|(key, value)| figures(value, &format!("{path}/{key}"), out));
+        }
+        Value::Array(values) => {
+            let indexed = values.iter().enumerate();
+            indexed.for_each(|(index, value)| figures(value, &format!("{path}/{index}"), out));
+        }
+        Value::Null | Value::Bool(_) | Value::String(_) => {}
+    }
+}
+
+#[test]
+fn every_figure_of_mpc_differs_for_a_wrong_model_and_the_run_says_that_it_failed() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for name in ["go1-d4", "go1-d6"] {
+        let model = shipped(name);
+        let right = runs(&Path::new(ROOT).join(format!("models/{name}.json")));
+        for run in &right {
+            assert_eq!(run["failure"], Value::Null, "{name}: {run}");
+        }
+        for (what, wrong) in ablations(&model) {
+            let path = folder.path().join("wrong.json");
+            artifact::write_with(&path, &wrong, Overwrite::Replace).expect("writable");
+            for (right, wrong) in right.iter().zip(runs(&path)) {
+                let [mut expected, mut found] = [BTreeMap::new(), BTreeMap::new()];
+                figures(right, "", &mut expected);
+                figures(&wrong, "", &mut found);
+                assert!(expected.len() >= 10, "{expected:?}");
+                for (key, value) in &expected {
+                    let differs = found.get(key).is_none_or(|other| other != value);
+                    assert!(differs, "{name} {what}: {key} is {value} all the same");
+                }
+                assert!(wrong["failure"].is_string(), "{name} {what}: {wrong}");
+            }
+        }
+    }
+}
+
+/// Whether a model was learned with known physics held.
+fn knows_physics(model: &ReducedModel) -> bool {
+    let command = model.provenance().get("command").and_then(Value::as_str);
+    command.is_some_and(|command| command.contains("--coordinates named"))
+}
+
+#[test]
+fn shipped_models_with_named_coordinates_keep_known_physics() {
+    for name in ["go1-d2", "go1-d4", "go1-d6", "go2-async-d4"] {
+        let model = shipped(name);
+        let invariance = Invariance::of(&model).expect("complete");
+        if !knows_physics(&model) {
+            continue;
+        }
+        for phase in &invariance.phases {
+            let shifts = [phase.shift_x, phase.shift_y];
+            assert!(
+                shifts.iter().all(|shift| *shift < 1e-9),
+                "{name}: {phase:?}"
+            );
+            assert!(phase.mirror_asymmetry < 1e-9, "{name}: {phase:?}");
+        }
+        let gravity = invariance.gravity_m_s2.expect("flight and body z");
+        let off = gravity - romc::robot::GRAVITY_M_S2;
+        assert!(off.abs() < 1e-9, "{name}: {gravity}");
+        let mass = invariance.mass_kg.expect("contact and body z");
+        assert!((5.0..30.0).contains(&mass), "{name}: {mass} kg");
+    }
+}
+
+#[test]
+fn invariance_finds_a_model_that_depends_on_the_place() {
+    let model = shipped("go1-d4");
+    let at = |change: f64| {
+        let shifted = with_xi(&model, |term, value| match term {
+            "z1" => value + change,
+            _ => value,
+        });
+        let invariance = Invariance::of(&shifted).expect("complete");
+        invariance
+            .phases
+            .iter()
+            .map(|phase| phase.shift_x)
+            .sum::<f64>()
+    };
+    assert!((at(1.0) - at(0.0)).abs() > 1e-3);
+}
