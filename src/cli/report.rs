@@ -46,6 +46,9 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         made.page.len() / 1000,
         made.n_figures
     );
+    for remark in &made.remarks {
+        let _ = writeln!(text, "note: {remark}");
+    }
     if let Some(folder) = &arguments.figures {
         let _ = writeln!(
             text,
@@ -62,6 +65,7 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
             "output": arguments.output.display().to_string(),
             "bytes": made.page.len(),
             "figures": names(&written),
+            "remarks": made.remarks,
         }),
     })
 }
@@ -74,6 +78,8 @@ pub struct Made {
     pub files: Vec<EmittedFile>,
     /// Number of figures.
     pub n_figures: usize,
+    /// What speaks against using the model on these recordings.
+    pub remarks: Vec<String>,
 }
 
 /// Assesses the model, runs the controller and draws everything.
@@ -137,6 +143,7 @@ pub fn page_of(
         page: page(content, &figures, &options)?,
         files: figures.iter().flat_map(figure_files).collect(),
         n_figures: figures.iter().count(),
+        remarks: content.assessment.remarks.clone(),
     })
 }
 

@@ -151,16 +151,16 @@ pub fn control_table(runs: &[NamedRun]) -> Table {
     Table::of(&rows)
         .column("recording", "", |row| row.recording.clone())
         .column("controller", "", |row| row.controller)
-        .column("body.x one stage ahead", "mm", |row| {
+        .column("x one stage ahead", "mm", |row| {
             millimetres(row.prediction.map(|error| error.body_x_m))
         })
-        .column("body.z", "mm", |row| {
+        .column("z", "mm", |row| {
             millimetres(row.prediction.map(|error| error.body_z_m))
         })
         .column("joints", "rad", |row| {
             row.prediction.map(|error| error.joints_rad)
         })
-        .column("torque R^2 of its own input, contact", "", |row| {
+        .column("own input: torque R^2 contact", "", |row| {
             row.torque_r2.contact
         })
         .column("flight", "", |row| row.torque_r2.flight)
