@@ -1,5 +1,6 @@
 //! From a model to the file's grammar.
 
+use super::jump_prior::entries_of;
 use super::manifest::{
     LayerEntry, LibraryEntry, Manifest, MapEntry, Pairs, PhaseEntry, SCHEMA, SCHEMA_2,
     StatisticsEntry,
@@ -21,8 +22,9 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
     let actuators = model.actuators().cloned();
     let frame = model.wrench_frame();
     let wrench_frame = (frame != WrenchFrame::Body).then_some(frame);
-    let schema = match (&actuators, wrench_frame) {
-        (None, None) => SCHEMA,
+    let (landmarks, prior) = entries_of(model);
+    let schema = match (&actuators, wrench_frame, &prior) {
+        (None, None, None) => SCHEMA,
         _ => SCHEMA_2,
     };
     Manifest {
@@ -42,6 +44,8 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
         actuators,
         wrench_frame,
         sample_time_s: model.sample_time_s().ok(),
+        landmarks,
+        prior,
         provenance: model.provenance().clone(),
     }
 }

@@ -12,13 +12,14 @@ use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use super::jump_prior::{LandmarksEntry, PriorEntry};
 use crate::model::{Activation, CoordinateNames, FeetRule, ScaleFactors, Scaling, StandardLibrary};
 use crate::robot::{Actuators, JOINT_DIM, WrenchFrame};
 
 /// Name and version of the format of a model without the keys of [`SCHEMA_2`].
 pub const SCHEMA: &str = "romc-model/1";
 
-/// The format with `actuators` and `wrench_frame`.
+/// The format with `actuators`, `wrench_frame`, `landmarks` and `prior`.
 pub const SCHEMA_2: &str = "romc-model/2";
 
 /// Rows of a matrix.
@@ -63,6 +64,18 @@ pub(super) struct Manifest {
     pub wrench_frame: Option<WrenchFrame>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample_time_s: Option<f64>,
+    #[serde(
+        default,
+        deserialize_with = "present",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub landmarks: Option<LandmarksEntry>,
+    #[serde(
+        default,
+        deserialize_with = "present",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub prior: Option<PriorEntry>,
     #[serde(default, skip_serializing_if = "Map::is_empty")]
     pub provenance: Map<String, Value>,
 }

@@ -1,7 +1,7 @@
 //! The model file, `romc-model/1` and `romc-model/2`.
 //!
-//! The second adds `actuators` and `wrench_frame`, how the model's inputs come from torques; a model
-//! without them is written as the first.
+//! The second adds `actuators` and `wrench_frame`, how the model's inputs come from torques, and
+//! `landmarks` and `prior` of the training jumps, for planning; a model without them is written as the first.
 //!
 //! What enters: a path or bytes; what leaves: a checked [`ReducedModel`], or an error which names
 //! file, tensor, index, what was found and what was expected. The other way, [`write()`] makes files
@@ -34,6 +34,7 @@
 mod digest;
 mod error;
 mod export;
+mod jump_prior;
 mod manifest;
 mod matrices;
 mod print;

@@ -8,6 +8,7 @@ use nalgebra::DVector;
 use serde_json::Value;
 
 use super::error::{ArtifactError, ArtifactFault, refused};
+use super::jump_prior::prior_of;
 use super::manifest::{
     LibraryEntry, Manifest, MapEntry, PhaseEntry, Rows, SCHEMA, SCHEMA_2, SchemaProbe,
     StatisticsEntry,
@@ -53,6 +54,8 @@ pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, Artifac
         let later = [
             ("actuators", manifest.actuators.is_some()),
             ("wrench_frame", manifest.wrench_frame.is_some()),
+            ("landmarks", manifest.landmarks.is_some()),
+            ("prior", manifest.prior.is_some()),
         ];
         if let Some((key, _)) = later.into_iter().find(|(_, there)| *there) {
             return Err(ArtifactFault::LaterKey { key }.of(file));
@@ -149,9 +152,12 @@ fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactErro
     if let Some(entry) = &manifest.decoder {
         builder = builder.decoder(map_of(file, "decoder", entry, Some(latent_dim))?);
     }
-    for (index, entry) in manifest.phases.into_iter().enumerate() {
-        builder = builder.phase(phase_of(file, index, entry, latent_dim)?);
-    }
+    let phases = manifest.phases.into_iter().enumerate();
+    let phases = phases
+        .map(|(index, entry)| phase_of(file, index, entry, latent_dim))
+        .collect::<Result<Vec<_>, _>>()?;
+    let prior = prior_of(file, (manifest.landmarks, manifest.prior), &phases)?;
+    builder = builder.phases(phases).jump_prior(prior);
     for (name, entry) in manifest.input_statistics.0 {
         let statistics = statistics_of(file, &name, &entry)?;
         builder = builder.input_statistics(name, statistics);

@@ -7,6 +7,7 @@ use serde_json::{Map, Value};
 use super::coordinate_names::CoordinateNames;
 use super::error::{ModelError, check_finite, check_shape};
 use super::identifier::Identifier;
+use super::jump_prior::JumpPrior;
 use super::library::Library;
 use super::phase::{Phase, all_patterns};
 use super::projection::pinv_of_transpose;
@@ -37,6 +38,7 @@ pub struct ModelBuilder {
     robot: Option<&'static Robot>,
     actuators: Option<Actuators>,
     wrench_frame: WrenchFrame,
+    jump_prior: Option<JumpPrior>,
     sample_time_s: Option<f64>,
     provenance: Map<String, Value>,
 }
@@ -57,6 +59,7 @@ impl ModelBuilder {
             robot: None,
             actuators: None,
             wrench_frame: WrenchFrame::Body,
+            jump_prior: None,
             sample_time_s: None,
             provenance: Map::new(),
         }
@@ -83,6 +86,7 @@ impl ModelBuilder {
             robot: model.robot,
             actuators: model.actuators,
             wrench_frame: model.wrench_frame,
+            jump_prior: model.jump_prior,
             sample_time_s: model.sample_time_s,
             provenance: model.provenance,
         }
@@ -178,6 +182,12 @@ impl ModelBuilder {
         self
     }
 
+    /// Sets landmarks and prior of the training jumps.
+    pub fn jump_prior(mut self, prior: Option<JumpPrior>) -> Self {
+        self.jump_prior = prior;
+        self
+    }
+
     /// Sets the sampling period of the recordings, s.
     pub fn sample_time_s(mut self, sample_time_s: f64) -> Self {
         self.sample_time_s = Some(sample_time_s);
@@ -213,6 +223,9 @@ impl ModelBuilder {
             None => None,
         };
         let statistics = self.check_statistics(state_dim)?;
+        if let Some(prior) = &self.jump_prior {
+            self.check_prior(prior)?;
+        }
         Ok(ReducedModel {
             name: self.name,
             identifier,
@@ -230,6 +243,7 @@ impl ModelBuilder {
             robot: self.robot,
             actuators: self.actuators,
             wrench_frame: self.wrench_frame,
+            jump_prior: self.jump_prior,
             sample_time_s: self.sample_time_s,
             provenance: self.provenance,
         })
@@ -377,6 +391,19 @@ impl ModelBuilder {
                 Err(ModelError::invalid(place, found, "a number of at least 0"))
             }
         }
+    }
+
+    /// A prior is that of a robot's jumps in the coordinates of linear maps.
+    fn check_prior(&self, prior: &JumpPrior) -> Result<(), ModelError> {
+        let linear = |map: &Option<StateMap>| map.as_ref().is_some_and(|m| m.as_affine().is_some());
+        let needs = match () {
+            () if self.robot.is_none() => "robot",
+            () if !linear(&self.encoder) => "a linear encoder",
+            () if !linear(&self.decoder) => "a linear decoder",
+            () => return prior.check(self.library.latent_dim(), &self.phases),
+        };
+        let part = "prior";
+        Err(ModelError::Incomplete { part, needs })
     }
 
     /// Checks the statistics and puts them in the order of the phases.

@@ -39,6 +39,7 @@ mod coordinate_names;
 mod error;
 mod evaluation;
 mod identifier;
+mod jump_prior;
 mod library;
 mod maps;
 mod phase;
@@ -61,6 +62,7 @@ pub use coordinate_names::CoordinateNames;
 pub use error::ModelError;
 pub(crate) use evaluation::{Step, Tape};
 pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN};
+pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior};
 pub use library::{
     CandidateTerm, LatentVariable, Library, LibraryError, LibrarySource, MAX_LATENT_DIM,
     MAX_LIBRARY_DIM, MAX_TERM_LEN, TermId,

@@ -20,6 +20,7 @@ use super::builder::ModelBuilder;
 use super::coordinate_names::CoordinateNames;
 use super::error::ModelError;
 use super::identifier::Identifier;
+use super::jump_prior::JumpPrior;
 use super::library::{CandidateTerm, Library};
 use super::phase::Phase;
 use super::scaling::Scaling;
@@ -47,6 +48,7 @@ pub struct ReducedModel {
     pub(super) robot: Option<&'static Robot>,
     pub(super) actuators: Option<Actuators>,
     pub(super) wrench_frame: WrenchFrame,
+    pub(super) jump_prior: Option<JumpPrior>,
     pub(super) sample_time_s: Option<f64>,
     pub(super) provenance: Map<String, Value>,
 }
@@ -203,6 +205,15 @@ impl ReducedModel {
     pub fn sample_time_s(&self) -> Result<f64, ModelError> {
         self.require(&self.sample_time_s, "sample_time_s", "sampling")
             .copied()
+    }
+
+    /// Landmarks and prior of the training jumps.
+    ///
+    /// # Errors
+    /// [`ModelError::Missing`] if the file has none.
+    pub fn jump_prior(&self) -> Result<&JumpPrior, ModelError> {
+        let purpose = "planning; `romc train` on jumps of one kind with a linear encoder makes it";
+        self.require(&self.jump_prior, "prior", purpose)
     }
 
     /// Mean and covariance of the training inputs of one phase, SI units.

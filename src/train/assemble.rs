@@ -11,7 +11,7 @@ use super::error::TrainError;
 use super::options::{EncoderOptions, TrainOptions};
 use super::report::TrainReport;
 use crate::model::{
-    CoordinateNames, Library, Phase, ReducedModel, ScaleFactors, Scaling, StateMap,
+    CoordinateNames, JumpPrior, Library, Phase, ReducedModel, ScaleFactors, Scaling, StateMap,
 };
 use crate::recording::Recording;
 use crate::robot::Robot;
@@ -22,6 +22,7 @@ pub(super) struct Parts {
     pub encoder: StateMap,
     pub decoder: StateMap,
     pub xi: Vec<DMatrix<f64>>,
+    pub jumps: Option<JumpPrior>,
 }
 
 /// Where a training's numbers come from.
@@ -97,6 +98,7 @@ pub(super) fn assemble(
         })
         .encoder(parts.encoder)
         .decoder(parts.decoder)
+        .jump_prior(parts.jumps)
         .sample_time_s(median_step_s(dataset))
         .provenance(provenance(options, method, origin, report)?);
     for (index, (pattern, xi)) in dataset.phases.patterns.iter().zip(parts.xi).enumerate() {

@@ -10,6 +10,7 @@ pub mod dataset;
 pub mod features;
 pub mod frame;
 pub mod joint;
+pub mod jumps;
 pub mod knowledge;
 pub mod latent;
 pub mod metrics;

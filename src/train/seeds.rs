@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::assemble::{Origin, Parts, assemble};
 use super::dynamics_fit::Fitted;
 use super::error::TrainError;
+use super::jumps::jump_prior;
 use super::overlap::support_overlap;
 use super::progress::Watch;
 use super::report::{SeedReport, Trained};
@@ -68,13 +69,15 @@ impl Seeds {
         if best.reports.len() > 1 || best.reports[0].losses.is_some() {
             (report.seeds, report.support_overlap) = (best.reports, best.overlap);
         }
+        let (options, training) = (task.options, &task.sets.training);
+        let jumps = jump_prior(training, &best.fitted.encoder)?;
         let parts = Parts {
             library: task.library,
             encoder: best.fitted.encoder,
             decoder: best.fitted.decoder,
             xi: best.fitted.xi,
+            jumps,
         };
-        let (options, training) = (task.options, &task.sets.training);
         let model = assemble(parts, training, robot, options, method, origin, &report)?;
         Ok(Trained { model, report })
     }

@@ -1,0 +1,227 @@
+//! What a model keeps of the jumps that it was learned from, so that others can be planned.
+//!
+//! A jump is cut at its landmarks into parts (crouch, thrust, flight, landing), each with nodes at
+//! equal shares of its duration. The prior is a regression over the [`GOAL_DIM`] numbers of a goal:
+//! with the features `phi = (1, g_1, g_2, g_3)`, `g = (goal - mean) / std`, the value of a
+//! coordinate at a node is `c . phi`. Per part, `Xi` of deviations says how accelerations change
+//! with what is changed about such a trajectory: `delta ddz = Xi^T (delta z, delta dz, delta u_lat)`.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::error::{ModelError, check_finite, check_shape};
+use super::phase::Phase;
+use crate::robot::{ContactFlags, STATE_DIM};
+
+/// Numbers of a goal: distance, rise of the body at the apex, height of the body at the start, m.
+pub const GOAL_DIM: usize = 3;
+/// Features of the prior: one, and the normalised numbers of the goal.
+pub const FEATURE_DIM: usize = 1 + GOAL_DIM;
+/// Most nodes of a part.
+const MAX_NODES: usize = 200;
+
+/// The features of a goal that the prior multiplies.
+pub type GoalFeatures = [f64; FEATURE_DIM];
+
+/// Range of one number over the training jumps, in m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GoalRange {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation, positive.
+    pub std: f64,
+    /// Smallest value.
+    pub least: f64,
+    /// Largest value.
+    pub most: f64,
+}
+
+/// A part of a jump and its prior; `n` nodes, the first and last at its borders.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JumpPart {
+    /// Name: crouch, thrust, flight, landing, or the phase's.
+    pub name: String,
+    /// Index of the model's phase.
+    pub phase: usize,
+    /// Feet on the ground.
+    pub feet: ContactFlags,
+    /// Duration in s, one coefficient per feature.
+    pub duration_s: GoalFeatures,
+    /// Shortest and longest duration in the training jumps, s.
+    pub duration_range_s: [f64; 2],
+    /// Latent positions, `n x (FEATURE_DIM latent_dim)`: the columns of one feature after the other.
+    pub z: DMatrix<f64>,
+    /// Latent velocities, as `z`.
+    pub dz: DMatrix<f64>,
+    /// Latent inputs, as `z`.
+    pub u_lat: DMatrix<f64>,
+    /// Xi of deviations, `(3 latent_dim) x latent_dim`; none: the phase's own equations are used.
+    pub xi: Option<DMatrix<f64>>,
+    /// Covariance of the training's latent inputs in the part, `latent_dim x latent_dim`.
+    pub input_covariance: DMatrix<f64>,
+    /// Standard deviation over the jumps of the mean acceleration that `xi` leaves unexplained in a
+    /// jump that it was not fitted to, `latent_dim`.
+    pub acceleration_std: DVector<f64>,
+}
+
+impl JumpPart {
+    /// Number of nodes.
+    pub fn nodes(&self) -> usize {
+        self.z.nrows()
+    }
+
+    /// A coordinate's row at a node for a goal: the sum over the features of `table`.
+    pub fn at(table: &DMatrix<f64>, node: usize, features: &GoalFeatures) -> DVector<f64> {
+        let d = table.ncols() / FEATURE_DIM;
+        DVector::from_fn(d, |i, _| {
+            let terms = features.iter().enumerate();
+            terms.map(|(k, f)| f * table[(node, k * d + i)]).sum()
+        })
+    }
+
+    /// Duration for a goal, s.
+    pub fn duration(&self, features: &GoalFeatures) -> f64 {
+        let terms = self.duration_s.iter().zip(features);
+        terms.map(|(c, f)| c * f).sum()
+    }
+}
+
+/// Landmarks and prior of a model's training jumps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JumpPrior {
+    /// Distance, rise at the apex, height at the start.
+    pub goal: [GoalRange; GOAL_DIM],
+    /// Mean state at the start of the jumps, 18, SI units.
+    pub start: DVector<f64>,
+    /// Standard deviations of `z`, then of `dz`, over all samples, `2 latent_dim`.
+    pub state_std: DVector<f64>,
+    /// Lowest and highest body height at the end of the jumps, m.
+    pub end_height_m: [f64; 2],
+    /// Lowest body height after touch-down, m.
+    pub landing_height_m: f64,
+    /// Parts in the order of time.
+    pub parts: Vec<JumpPart>,
+}
+
+impl JumpPrior {
+    /// Features of a goal in m.
+    pub fn features(&self, goal: [f64; GOAL_DIM]) -> GoalFeatures {
+        std::array::from_fn(|k| match k.checked_sub(1) {
+            None => 1.0,
+            Some(i) => (goal[i] - self.goal[i].mean) / self.goal[i].std,
+        })
+    }
+
+    /// Complains unless every table fits the model's dimensions and phases and every number is one.
+    pub(super) fn check(&self, d: usize, phases: &[Phase]) -> Result<(), ModelError> {
+        let goals = ["distance", "apex", "start height"];
+        for (range, name) in self.goal.iter().zip(goals) {
+            let ordered = range.least <= range.most && range.std > 0.0;
+            let numbers = [range.mean, range.std, range.least, range.most];
+            if !ordered || numbers.iter().any(|v| !v.is_finite()) {
+                let expected = "finite numbers, a positive std, least up to most";
+                let place = format!("`landmarks.goal`, {name}");
+                return Err(ModelError::invalid(place, format!("{range:?}"), expected));
+            }
+        }
+        check_vector("landmarks.start", &self.start, STATE_DIM)?;
+        check_vector("prior.state_std", &self.state_std, 2 * d)?;
+        if let Some(found) = self.state_std.iter().find(|v| **v <= 0.0) {
+            return Err(ModelError::invalid("`prior.state_std`", found, "positive"));
+        }
+        let heights = [
+            self.end_height_m[0],
+            self.end_height_m[1],
+            self.landing_height_m,
+        ];
+        if heights.iter().any(|v| !v.is_finite()) || heights[0] > heights[1] {
+            let place = "`landmarks`, heights at the end";
+            return Err(ModelError::invalid(
+                place,
+                format!("{heights:?}"),
+                "ordered",
+            ));
+        }
+        if self.parts.len() < 3 {
+            let found = format!("{} parts", self.parts.len());
+            return Err(ModelError::invalid("`landmarks.parts`", found, "3 or more"));
+        }
+        let parts = self.parts.iter().enumerate();
+        parts
+            .into_iter()
+            .try_for_each(|(i, part)| check_part(part, &format!("prior.parts[{i}]"), d, phases))?;
+        let in_air = |part: &&JumpPart| !part.feet.contains(&true);
+        let (first, last) = (&self.parts[0], &self.parts[self.parts.len() - 1]);
+        if self.parts.iter().filter(in_air).count() != 1 || in_air(&first) || in_air(&last) {
+            let expected = "exactly one part without a foot on the ground, neither first nor last";
+            return Err(ModelError::invalid("`landmarks.parts`", "others", expected));
+        }
+        Ok(())
+    }
+}
+
+fn check_vector(tensor: &str, vector: &DVector<f64>, len: usize) -> Result<(), ModelError> {
+    check_shape(tensor, vector.shape(), (len, 1))?;
+    check_finite(tensor, vector)
+}
+
+fn check_part(part: &JumpPart, name: &str, d: usize, phases: &[Phase]) -> Result<(), ModelError> {
+    let Some(phase) = phases.get(part.phase) else {
+        let expected = format!("one below {}", phases.len());
+        return Err(ModelError::invalid(
+            format!("`{name}`"),
+            part.phase,
+            expected,
+        ));
+    };
+    if phases.iter().position(|p| p.feet.matches(part.feet)) != Some(part.phase) {
+        let expected = format!("feet that select {}", phase.name);
+        let found = format!("{:?}", part.feet);
+        return Err(ModelError::invalid(format!("`{name}`"), found, expected));
+    }
+    let nodes = part.nodes();
+    if !(3..=MAX_NODES).contains(&nodes) {
+        let expected = format!("3 to {MAX_NODES}");
+        return Err(ModelError::invalid(
+            format!("`{name}.z`"),
+            format!("{nodes} nodes"),
+            expected,
+        ));
+    }
+    for (table, key) in [(&part.z, "z"), (&part.dz, "dz"), (&part.u_lat, "u_lat")] {
+        let tensor = format!("{name}.{key}");
+        check_shape(&tensor, table.shape(), (nodes, FEATURE_DIM * d))?;
+        check_finite(&tensor, table)?;
+    }
+    if let Some(xi) = &part.xi {
+        check_shape(&format!("{name}.xi"), xi.shape(), (3 * d, d))?;
+        check_finite(&format!("{name}.xi"), xi)?;
+    }
+    let tensor = format!("{name}.input_covariance");
+    check_shape(&tensor, part.input_covariance.shape(), (d, d))?;
+    check_finite(&tensor, &part.input_covariance)?;
+    if part.input_covariance.clone().cholesky().is_none() {
+        let expected = "a positive definite matrix";
+        return Err(ModelError::invalid(
+            format!("`{tensor}`"),
+            "another",
+            expected,
+        ));
+    }
+    check_vector(
+        &format!("{name}.acceleration_std"),
+        &part.acceleration_std,
+        d,
+    )?;
+    let durations = part.duration_s.iter().chain(&part.duration_range_s);
+    let [least, most] = part.duration_range_s;
+    if durations.clone().any(|v| !v.is_finite()) || !(0.0 < least && least <= most) {
+        let found = format!("{:?} within {:?}", part.duration_s, part.duration_range_s);
+        let expected = "finite durations, the range positive";
+        return Err(ModelError::invalid(
+            format!("`{name}.duration_s`"),
+            found,
+            expected,
+        ));
+    }
+    Ok(())
+}

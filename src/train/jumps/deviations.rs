@@ -1,0 +1,144 @@
+//! How accelerations change with what is changed about a trajectory of the prior.
+//!
+//! Over one interval between nodes of a jump, with `delta` the difference to the prior at the jump's
+//! own goal and a bar the mean of both ends: `delta (dz_(k+1) - dz_k) / h = Xi^T (bar delta z, bar
+//! delta dz, bar delta u_lat)`, the very equation that a plan is made of. Ridge on normalised
+//! columns. Shifting the robot forwards changes nothing: that direction of `delta z` is left out.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::regression::GoalRegression;
+use super::{PartNodes, Sampled, features};
+use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange};
+
+/// Ridge relative to the variance of each column.
+const RIDGE: f64 = 1e-2;
+
+/// What is fitted to one part.
+pub struct Deviations {
+    /// `(3 d) x d`.
+    pub xi: DMatrix<f64>,
+    /// Standard deviation over the jumps of the mean residual, each jump left out of the fit.
+    pub acceleration_std: DVector<f64>,
+}
+
+/// Fits the deviations of one part; `translation` is the change of `z` by a shift forwards.
+pub fn fit_deviations(
+    sampled: &[Sampled],
+    goal: &[GoalRange; GOAL_DIM],
+    part: usize,
+    translation: &DVector<f64>,
+) -> Deviations {
+    let fit = Fit {
+        goal,
+        part,
+        projector: without(translation),
+    };
+    let all: Vec<&Sampled> = sampled.iter().collect();
+    let d = translation.len();
+    let mut square = DVector::zeros(d);
+    for left_out in 0..sampled.len() {
+        let others: Vec<&Sampled> = (all.iter().enumerate())
+            .filter(|(jump, _)| *jump != left_out)
+            .map(|(_, jump)| *jump)
+            .collect();
+        let prior = fit.prior(&others);
+        let xi = fit.xi(&prior, &others);
+        let (variables, target) = fit.deviations(&prior, all[left_out]);
+        let residual = target - variables * xi;
+        let mean = residual.row_mean().transpose();
+        square += mean.component_mul(&mean);
+    }
+    Deviations {
+        xi: fit.xi(&fit.prior(&all), &all),
+        acceleration_std: (square / sampled.len() as f64).map(f64::sqrt),
+    }
+}
+
+/// `I - t t^T / t^T t`.
+fn without(t: &DVector<f64>) -> DMatrix<f64> {
+    let identity = DMatrix::identity(t.len(), t.len());
+    match t.norm_squared() {
+        0.0 => identity,
+        square => identity - t * t.transpose() / square,
+    }
+}
+
+struct Fit<'a> {
+    goal: &'a [GoalRange; GOAL_DIM],
+    part: usize,
+    projector: DMatrix<f64>,
+}
+
+/// Tables of `z`, `dz`, `u_lat` and of mean accelerations over the intervals.
+struct PriorTables([DMatrix<f64>; 4]);
+
+impl Fit<'_> {
+    fn prior(&self, jumps: &[&Sampled]) -> PriorTables {
+        let regression = GoalRegression::of_goals(jumps.iter().map(|jump| &jump.goal), self.goal);
+        let table = |pick: &dyn Fn(&PartNodes) -> DMatrix<f64>| {
+            let values = jumps.iter().map(|jump| pick(&jump.parts[self.part]));
+            let values: Vec<DMatrix<f64>> = values.collect();
+            regression.table(&values.iter().collect::<Vec<_>>())
+        };
+        PriorTables([
+            table(&|nodes| nodes.z.clone()),
+            table(&|nodes| nodes.dz.clone()),
+            table(&|nodes| nodes.u_lat.clone()),
+            table(&accelerations),
+        ])
+    }
+
+    /// Variables, one row per interval and `3 d` columns, and accelerations of a jump about a prior.
+    fn deviations(&self, prior: &PriorTables, jump: &Sampled) -> (DMatrix<f64>, DMatrix<f64>) {
+        let nodes = &jump.parts[self.part];
+        let features = features(self.goal, &jump.goal);
+        let at = |table: &DMatrix<f64>| {
+            let d = table.ncols() / FEATURE_DIM;
+            let blocks = features.iter().enumerate();
+            let blocks = blocks.map(|(k, f)| table.columns(k * d, d) * *f);
+            blocks.fold(DMatrix::zeros(table.nrows(), d), |sum, block| sum + block)
+        };
+        let PriorTables([z, dz, u_lat, ddz]) = prior;
+        let d = nodes.z.ncols();
+        let n = nodes.z.nrows() - 1;
+        let mut variables = DMatrix::zeros(n, 3 * d);
+        let position = (&nodes.z - at(z)) * &self.projector;
+        let others = [&nodes.dz - at(dz), &nodes.u_lat - at(u_lat)];
+        for (k, delta) in std::iter::once(position).chain(others).enumerate() {
+            let mean = (delta.rows(0, n) + delta.rows(1, n)) * 0.5;
+            variables.columns_mut(k * d, d).copy_from(&mean);
+        }
+        (variables, accelerations(nodes) - at(ddz))
+    }
+
+    fn xi(&self, prior: &PriorTables, jumps: &[&Sampled]) -> DMatrix<f64> {
+        let d = self.projector.nrows();
+        let (mut gram, mut product) = (DMatrix::zeros(3 * d, 3 * d), DMatrix::zeros(3 * d, d));
+        for jump in jumps {
+            let (variables, target) = self.deviations(prior, jump);
+            gram += variables.tr_mul(&variables);
+            product += variables.tr_mul(&target);
+        }
+        let scale = gram.diagonal().map(|square| square.sqrt());
+        let largest = scale.amax().max(f64::MIN_POSITIVE);
+        // A direction that never moves keeps a coefficient of zero.
+        let inverse = scale.map(|s| if s > 1e-9 * largest { 1.0 / s } else { 0.0 });
+        let inverse = DMatrix::from_diagonal(&inverse);
+        let normalised = &inverse * gram * &inverse;
+        let ridged = normalised + DMatrix::identity(3 * d, 3 * d) * RIDGE;
+        let factor = ridged
+            .cholesky()
+            .expect("invariant: a Gram matrix and a ridge");
+        let mut xi = &inverse * factor.solve(&(&inverse * product));
+        let positions = &self.projector * xi.rows(0, d);
+        xi.rows_mut(0, d).copy_from(&positions);
+        xi
+    }
+}
+
+/// Mean accelerations over the intervals, one row each.
+fn accelerations(nodes: &PartNodes) -> DMatrix<f64> {
+    let n = nodes.dz.nrows() - 1;
+    (nodes.dz.rows(1, n) - nodes.dz.rows(0, n)) / nodes.step_s()
+}

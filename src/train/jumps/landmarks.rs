@@ -1,0 +1,150 @@
+//! Where jumps are cut.
+
+use std::ops::Range;
+
+use super::super::dataset::{Dataset, Jump};
+use super::super::error::TrainError;
+use super::super::metrics::BODY_Z;
+use crate::robot::{ContactFlags, FeetRule};
+
+/// The thrust begins when the body last rises more slowly than this before the feet leave, m/s.
+const THRUST_SPEED_M_S: f64 = 0.1;
+/// Fewest samples of a part.
+const LEAST_SAMPLES: usize = 8;
+
+/// A part of every jump of a kind.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Landmark {
+    /// Its name.
+    pub name: String,
+    /// Index of the model's phase.
+    pub phase: usize,
+    /// Feet on the ground: those that select the phase, as many as it allows.
+    pub feet: ContactFlags,
+}
+
+/// A jump with its borders.
+pub struct Cut {
+    /// The parts.
+    pub kind: Vec<Landmark>,
+    /// First sample of each part, and the last sample of the jump.
+    borders: Vec<usize>,
+    /// Their times, s.
+    times_s: Vec<f64>,
+}
+
+impl Cut {
+    /// Samples from the first to the last of a part, both borders included.
+    pub fn samples(&self, part: usize) -> Range<usize> {
+        self.borders[part]..self.borders[part + 1] + 1
+    }
+
+    /// Duration of a part, s.
+    pub fn duration_s(&self, part: usize) -> f64 {
+        self.times_s[part + 1] - self.times_s[part]
+    }
+
+    /// First sample after touch-down.
+    pub fn landing(&self) -> usize {
+        self.borders[self.kind.len() - 1]
+    }
+}
+
+/// The cut of every jump; none where a jump has no flight with contact before and after it.
+///
+/// # Errors
+/// As [`Dataset::for_each`].
+pub fn cuts(training: &Dataset) -> Result<Vec<Option<Cut>>, TrainError> {
+    let mut all = Vec::new();
+    let scale = training.scaling.state[BODY_Z];
+    training.for_each(|jump, rates| {
+        let rising = |sample: usize| rates.dx[(BODY_Z, sample)] / scale > THRUST_SPEED_M_S;
+        all.push(cut(training, jump, rising));
+    })?;
+    Ok(all)
+}
+
+fn cut(training: &Dataset, jump: &Jump, rising: impl Fn(usize) -> bool) -> Option<Cut> {
+    let patterns = &training.phases.patterns;
+    let flies = |phase: usize| patterns[phase].feet == FeetRule::None;
+    let spans = jump.spans.iter().enumerate();
+    let (flight, (flight_phase, in_air)) = spans
+        .filter(|(_, (phase, _))| flies(*phase))
+        .max_by_key(|(_, (_, range))| range.len())?;
+    let before = &jump.spans[..flight];
+    let landing = &jump.spans[flight + 1..];
+    if before.is_empty() || landing.is_empty() || before.iter().any(|(phase, _)| flies(*phase)) {
+        return None;
+    }
+    let thrust = 1 + (0..in_air.start).rev().find(|&sample| !rising(sample))?;
+    let feet = |phase: usize| feet_of(training, phase);
+    let landmark = |name: &str, phase: usize| {
+        Some(Landmark {
+            name: name.to_owned(),
+            phase,
+            feet: feet(phase)?,
+        })
+    };
+    let (mut kind, mut borders) = (Vec::new(), Vec::new());
+    for (phase, range) in before {
+        let name = &patterns[*phase].name;
+        if range.contains(&thrust) && range.start < thrust {
+            kind.push(landmark("crouch", *phase)?);
+            kind.push(landmark("thrust", *phase)?);
+            borders.extend([range.start, thrust]);
+        } else {
+            kind.push(landmark(name, *phase)?);
+            borders.push(range.start);
+        }
+    }
+    kind.push(landmark("flight", *flight_phase)?);
+    borders.push(in_air.start);
+    let lengths = (0..patterns.len()).map(|phase| {
+        let own = landing.iter().filter(|(of, _)| *of == phase);
+        own.map(|(_, range)| range.len()).sum::<usize>()
+    });
+    let commonest = lengths
+        .enumerate()
+        .filter(|(phase, _)| !flies(*phase))
+        .max_by_key(|(_, length)| *length)?;
+    kind.push(landmark("landing", commonest.0)?);
+    borders.extend([in_air.end, jump.len() - 1]);
+    if borders
+        .windows(2)
+        .any(|pair| pair[1] < pair[0] + LEAST_SAMPLES)
+    {
+        return None;
+    }
+    let times_s = borders.iter().map(|&sample| jump.time_s[sample]).collect();
+    Some(Cut {
+        kind,
+        borders,
+        times_s,
+    })
+}
+
+/// The pattern with the most feet down that selects a phase.
+fn feet_of(training: &Dataset, phase: usize) -> Option<ContactFlags> {
+    let all = (0..16u8).map(|bits| -> ContactFlags { std::array::from_fn(|k| bits >> k & 1 == 1) });
+    all.filter(|feet| training.phases.phase_of(*feet) == Some(phase))
+        .max_by_key(|feet| feet.iter().filter(|down| **down).count())
+}
+
+/// The parts that most jumps have.
+pub fn commonest_kind(cuts: &[Option<Cut>]) -> Option<Vec<Landmark>> {
+    let kinds = cuts.iter().flatten().map(|cut| &cut.kind);
+    let count = |kind: &Vec<Landmark>| {
+        cuts.iter()
+            .flatten()
+            .filter(|cut| cut.kind == *kind)
+            .count()
+    };
+    // The first of those that are equally common.
+    let mut best: Option<&Vec<Landmark>> = None;
+    for kind in kinds {
+        if best.is_none_or(|best| count(kind) > count(best)) {
+            best = Some(kind);
+        }
+    }
+    best.cloned()
+}

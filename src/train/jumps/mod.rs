@@ -1,0 +1,239 @@
+//! What the training jumps say of jumps that were not recorded: landmarks, prior, deviations.
+//!
+//! In: the training jumps and an encoder. Out: a [`JumpPrior`], or none if fewer than
+//! [`LEAST_JUMPS`] of them are of one kind. [`landmarks`] cuts each jump into parts, [`nodes`]
+//! samples the parts at equal shares of their durations, `regression` fits nodes and durations over
+//! the goals, and `deviations` fits how accelerations change about such a trajectory.
+
+mod deviations;
+mod landmarks;
+mod nodes;
+mod regression;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::dataset::Dataset;
+use super::error::TrainError;
+use super::latent::Latent;
+use super::metrics::{BODY_X, BODY_Z};
+use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange, JumpPart, JumpPrior, StateMap};
+use deviations::{Deviations, fit_deviations};
+use landmarks::{Cut, Landmark, commonest_kind};
+use nodes::{PartNodes, intervals, sample};
+use regression::GoalRegression;
+
+/// Fewest jumps of one kind that say how jumps depend on their goal.
+pub const LEAST_JUMPS: usize = 6;
+/// Significant digits of what is kept: beyond those of any recording.
+const DIGITS: usize = 6;
+
+/// Everything of one jump that the prior is made of.
+struct Sampled {
+    goal: [f64; GOAL_DIM],
+    parts: Vec<PartNodes>,
+}
+
+/// Landmarks and prior of the training jumps; none for a nonlinear encoder or too few jumps of one
+/// kind.
+///
+/// # Errors
+/// As [`Dataset::for_each`].
+pub fn jump_prior(training: &Dataset, encoder: &StateMap) -> Result<Option<JumpPrior>, TrainError> {
+    let Some(affine) = encoder.as_affine() else {
+        return Ok(None);
+    };
+    let cuts = landmarks::cuts(training)?;
+    let Some(kind) = commonest_kind(&cuts) else {
+        return Ok(None);
+    };
+    let chosen: Vec<(usize, &Cut)> = (cuts.iter().enumerate())
+        .filter_map(|(jump, cut)| Some((jump, cut.as_ref().filter(|cut| cut.kind == kind)?)))
+        .collect();
+    if chosen.len() < LEAST_JUMPS {
+        return Ok(None);
+    }
+    let latent = Latent::of(training, encoder)?;
+    let counts: Vec<usize> = (0..kind.len())
+        .map(|part| {
+            let all = chosen.iter().map(|(_, cut)| cut.duration_s(part));
+            intervals(all.sum::<f64>() / chosen.len() as f64)
+        })
+        .collect();
+    let sampled: Vec<Sampled> = chosen
+        .iter()
+        .map(|&(jump, cut)| Sampled {
+            goal: goal_of(training, jump),
+            parts: (counts.iter().enumerate())
+                .map(|(part, &count)| {
+                    sample(&training.jumps[jump], &latent[jump], cut, part, count)
+                })
+                .collect(),
+        })
+        .collect();
+    let translation = affine.weights().column(BODY_X).into_owned();
+    let ends = Ends::of(training, &chosen);
+    let goal = ranges(&sampled);
+    Ok(Some(JumpPrior {
+        parts: (0..kind.len())
+            .map(|part| part_of(&sampled, &goal, &kind[part], part, &translation))
+            .collect(),
+        goal,
+        start: ends.start.map(rounded),
+        state_std: state_std(&latent, &chosen).map(rounded),
+        end_height_m: ends.end_height_m.map(rounded),
+        landing_height_m: rounded(ends.landing_height_m),
+    }))
+}
+
+/// Distance, rise of the body at the apex and height at the start of a jump, m.
+fn goal_of(training: &Dataset, jump: usize) -> [f64; GOAL_DIM] {
+    let x = &training.jumps[jump].x;
+    let scale = &training.scaling.state;
+    let (row, forwards) = (x.row(BODY_Z) / scale[BODY_Z], x.row(BODY_X) / scale[BODY_X]);
+    [
+        forwards[x.ncols() - 1] - forwards[0],
+        row.max() - row[0],
+        row[0],
+    ]
+}
+
+fn ranges(sampled: &[Sampled]) -> [GoalRange; GOAL_DIM] {
+    /// Jumps that differ less in a number of the goal say nothing of how they depend on it, m.
+    const LEAST_STD_M: f64 = 1e-3;
+    std::array::from_fn(|i| {
+        let values: Vec<f64> = sampled.iter().map(|jump| jump.goal[i]).collect();
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        GoalRange {
+            mean: rounded(mean),
+            std: rounded((square / n).sqrt().max(LEAST_STD_M)),
+            least: rounded(values.iter().copied().fold(f64::INFINITY, f64::min)),
+            most: rounded(values.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
+        }
+    })
+}
+
+fn part_of(
+    sampled: &[Sampled],
+    goal: &[GoalRange; GOAL_DIM],
+    landmark: &Landmark,
+    part: usize,
+    translation: &DVector<f64>,
+) -> JumpPart {
+    let regression = GoalRegression::of(sampled, goal);
+    let all: Vec<&PartNodes> = sampled.iter().map(|jump| &jump.parts[part]).collect();
+    let table = |pick: fn(&PartNodes) -> &DMatrix<f64>| {
+        let values: Vec<&DMatrix<f64>> = all.iter().map(|nodes| pick(nodes)).collect();
+        regression.table(&values).map(rounded)
+    };
+    let durations: Vec<f64> = all.iter().map(|nodes| nodes.duration_s).collect();
+    let least = durations.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = durations.iter().copied().fold(0.0, f64::max);
+    let Deviations {
+        xi,
+        acceleration_std,
+    } = fit_deviations(sampled, goal, part, translation);
+    JumpPart {
+        name: landmark.name.clone(),
+        phase: landmark.phase,
+        feet: landmark.feet,
+        duration_s: regression.numbers(&durations).map(rounded),
+        duration_range_s: [rounded(least), rounded(most)],
+        z: table(|nodes| &nodes.z),
+        dz: table(|nodes| &nodes.dz),
+        u_lat: table(|nodes| &nodes.u_lat),
+        xi: Some(xi.map(rounded)),
+        input_covariance: input_covariance(&all).map(rounded),
+        acceleration_std: acceleration_std.map(rounded),
+    }
+}
+
+/// Covariance of the inputs at the nodes of a part over all jumps, with a floor for directions in
+/// which they never moved.
+fn input_covariance(all: &[&PartNodes]) -> DMatrix<f64> {
+    /// Share of the mean variance that is added to every variance.
+    const FLOOR: f64 = 1e-4;
+    let d = all[0].u_lat.ncols();
+    let n: usize = all.iter().map(|nodes| nodes.u_lat.nrows()).sum();
+    let sum = all.iter().map(|nodes| nodes.u_lat.row_sum());
+    let mean = sum.fold(nalgebra::RowDVector::zeros(d), |a, b| a + b) / n as f64;
+    let mut covariance = DMatrix::zeros(d, d);
+    for nodes in all {
+        for row in nodes.u_lat.row_iter() {
+            let deviation = row - &mean;
+            covariance += deviation.transpose() * deviation / n as f64;
+        }
+    }
+    let floor = FLOOR * (covariance.trace() / d as f64).max(f64::MIN_POSITIVE.sqrt());
+    covariance + DMatrix::identity(d, d) * floor
+}
+
+/// Starts and ends of the jumps.
+struct Ends {
+    start: DVector<f64>,
+    end_height_m: [f64; 2],
+    landing_height_m: f64,
+}
+
+impl Ends {
+    fn of(training: &Dataset, chosen: &[(usize, &Cut)]) -> Self {
+        let scale = &training.scaling.state;
+        let mut ends = Self {
+            start: DVector::zeros(scale.len()),
+            end_height_m: [f64::INFINITY, f64::NEG_INFINITY],
+            landing_height_m: f64::INFINITY,
+        };
+        for &(jump, cut) in chosen {
+            let x = &training.jumps[jump].x;
+            ends.start += x.column(0).component_div(scale) / chosen.len() as f64;
+            let heights = x.row(BODY_Z) / scale[BODY_Z];
+            let last = heights[heights.len() - 1];
+            let [least, most] = ends.end_height_m;
+            ends.end_height_m = [least.min(last), most.max(last)];
+            let landing = heights.columns_range(cut.landing()..);
+            ends.landing_height_m = ends.landing_height_m.min(landing.min());
+        }
+        ends
+    }
+}
+
+/// Standard deviations of `z` and `dz` over the samples of the jumps.
+fn state_std(latent: &[Latent], chosen: &[(usize, &Cut)]) -> DVector<f64> {
+    let stacked = |jump: usize| {
+        let (z, dz) = (&latent[jump].z, &latent[jump].dz);
+        let d = z.nrows();
+        DMatrix::from_fn(2 * d, z.ncols(), |i, j| match i.checked_sub(d) {
+            None => z[(i, j)],
+            Some(i) => dz[(i, j)],
+        })
+    };
+    let all: Vec<DMatrix<f64>> = chosen.iter().map(|&(jump, _)| stacked(jump)).collect();
+    let n = all.iter().map(DMatrix::ncols).sum::<usize>() as f64;
+    let sum = all.iter().map(|part| part.column_sum());
+    let zero = DVector::zeros(all[0].nrows());
+    let mean: DVector<f64> = sum.fold(zero.clone(), |a, b| a + b) / n;
+    let squares = all.iter().flat_map(|part| {
+        let columns = part.column_iter();
+        columns.map(|column| (column - &mean).map(|v| v * v))
+    });
+    let variance: DVector<f64> = squares.fold(zero, |a, b| a + b) / n;
+    variance.map(|v| v.sqrt().max(f64::EPSILON))
+}
+
+/// The value at [`DIGITS`] significant digits.
+fn rounded(value: f64) -> f64 {
+    let text = format!("{value:.*e}", DIGITS - 1);
+    text.parse().expect("a printed number")
+}
+
+/// Features of a goal, as [`JumpPrior::features`].
+fn features(goal: &[GoalRange; GOAL_DIM], of: &[f64; GOAL_DIM]) -> [f64; FEATURE_DIM] {
+    std::array::from_fn(|k| match k.checked_sub(1) {
+        None => 1.0,
+        Some(i) => (of[i] - goal[i].mean) / goal[i].std,
+    })
+}
+
+#[cfg(test)]
+mod tests;

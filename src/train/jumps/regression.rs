@@ -1,0 +1,58 @@
+//! Ridge regression over the goals of the jumps.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{Sampled, features};
+use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange};
+
+/// Ridge on the coefficients of the goal's numbers, which have unit variance; the constant is free.
+const RIDGE: f64 = 3.0;
+
+/// The linear map from the values of all jumps to the coefficients of the features.
+pub struct GoalRegression {
+    /// `FEATURE_DIM x jumps`.
+    solution: DMatrix<f64>,
+}
+
+impl GoalRegression {
+    /// The regression over the goals of these jumps.
+    pub fn of(sampled: &[Sampled], goal: &[GoalRange; GOAL_DIM]) -> Self {
+        Self::of_goals(sampled.iter().map(|jump| &jump.goal), goal)
+    }
+
+    /// The same by the goals alone.
+    pub fn of_goals<'a>(
+        goals: impl Iterator<Item = &'a [f64; GOAL_DIM]>,
+        goal: &[GoalRange; GOAL_DIM],
+    ) -> Self {
+        let columns: Vec<DVector<f64>> = goals
+            .map(|of| DVector::from_column_slice(&features(goal, of)))
+            .collect();
+        let phi = DMatrix::from_columns(&columns);
+        let ridge = DVector::from_fn(FEATURE_DIM, |k, _| if k == 0 { 0.0 } else { RIDGE });
+        let gram = &phi * phi.transpose() + DMatrix::from_diagonal(&ridge);
+        let factor = gram.cholesky().expect("invariant: a constant and a ridge");
+        Self {
+            solution: factor.solve(&phi),
+        }
+    }
+
+    /// Coefficients of one number per jump.
+    pub fn numbers(&self, values: &[f64]) -> [f64; FEATURE_DIM] {
+        let fitted = &self.solution * DVector::from_column_slice(values);
+        std::array::from_fn(|k| fitted[k])
+    }
+
+    /// Coefficients of one table per jump, `n x d` each: `n x (FEATURE_DIM d)`.
+    pub fn table(&self, values: &[&DMatrix<f64>]) -> DMatrix<f64> {
+        let (n, d) = values[0].shape();
+        let mut table = DMatrix::zeros(n, FEATURE_DIM * d);
+        for k in 0..FEATURE_DIM {
+            let mut block = table.columns_mut(k * d, d);
+            for (jump, value) in values.iter().enumerate() {
+                block += *value * self.solution[(k, jump)];
+            }
+        }
+        table
+    }
+}

@@ -1,0 +1,1 @@
+//! Tests of landmarks, prior and deviations on the shipped recordings.
