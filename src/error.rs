@@ -17,6 +17,7 @@ use crate::import::{ImportError, NameError};
 use crate::lower::LowerError;
 use crate::model::ModelError;
 use crate::mpc::MpcError;
+use crate::plan::PlanError;
 use crate::recording::RecordingError;
 use crate::robot::RobotError;
 use crate::sim::SimError;
@@ -72,6 +73,11 @@ pub enum Error {
     Study(#[from] StudyError),
     #[error(transparent)]
     Mpc(#[from] MpcError),
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A plan that nothing should carry out.
+    #[error("no plan to be trusted: {0} (--force writes it all the same)")]
+    Distrusted(String),
     /// A file of settings that cannot be used; the message of its parser names line, key and what was expected.
     #[error("{path}: {message}", path = path.display())]
     Config { path: PathBuf, message: String },
@@ -118,6 +124,8 @@ impl Error {
             | Self::Evaluate(_)
             | Self::Physical(_)
             | Self::Mpc(_)
+            | Self::Plan(_)
+            | Self::Distrusted(_)
             | Self::Config { .. }
             | Self::Exists(_)
             | Self::IsFolder(_)

@@ -59,6 +59,7 @@ pub mod ir;
 pub mod lower;
 pub mod model;
 pub mod mpc;
+pub mod plan;
 pub mod recording;
 pub mod report;
 pub mod robot;

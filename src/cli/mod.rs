@@ -17,6 +17,7 @@ mod inspect_recording;
 mod manual;
 mod mpc;
 mod output;
+mod plan;
 mod prepared_recordings;
 mod report;
 mod simplification;
@@ -98,6 +99,7 @@ fn execute(command: Command) -> Result<(Answer, u8), Error> {
         Command::Compile(arguments) => compile::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Mpc(arguments) => mpc::run(&arguments),
+        Command::Plan(arguments) => plan::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Manual(arguments) => manual::pages(&arguments),
         Command::Completions(arguments) => Ok(manual::completions(&arguments)),

@@ -7,6 +7,7 @@ use super::compile::CompileArguments;
 use super::identify::IdentifyArguments;
 use super::import::ImportArguments;
 use super::manual::{CompletionsArguments, ManualArguments};
+use super::plan::PlanArguments;
 use super::run::{
     DemoArguments, InspectArguments, MpcArguments, ReportArguments, SimulateArguments,
 };
@@ -51,6 +52,8 @@ pub enum Command {
     Simulate(SimulateArguments),
     /// Run the latent-space controller along a recording
     Mpc(MpcArguments),
+    /// Plan a jump that nobody recorded, as a recording
+    Plan(PlanArguments),
     /// Put equations, errors, baselines and the controller's torques on one HTML page
     Report(ReportArguments),
     /// Write man pages, one per command

@@ -15,6 +15,7 @@ mod identify;
 mod import;
 mod manual;
 mod number;
+mod plan;
 mod run;
 mod train;
 
@@ -26,5 +27,6 @@ pub use compile::{
 pub use identify::IdentifyArguments;
 pub use import::{ImportArguments, LibraryArgument};
 pub use manual::{CompletionsArguments, ManualArguments};
+pub use plan::PlanArguments;
 pub use run::{DemoArguments, InspectArguments, MpcArguments, ReportArguments, SimulateArguments};
 pub use train::{Dimensions, PhaseSet, StudyArguments, TrainArguments, TrainSettings, Widths};

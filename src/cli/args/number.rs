@@ -25,3 +25,8 @@ pub(super) fn number<T: FromStr>(
     let parsed = text.parse().ok().filter(is_in_range);
     parsed.ok_or_else(|| format!("expected {expected}"))
 }
+
+/// A finite number.
+pub(super) fn finite(text: &str) -> Result<f64, String> {
+    number(text, |value: &f64| value.is_finite(), "a finite number")
+}

@@ -1,0 +1,124 @@
+//! Affine expressions of a program's variables, and sparse matrices made of them.
+
+use crate::mpc::{Cone, ConeProgram, SparseColumns};
+
+/// `constant + sum of factor times variable`.
+#[derive(Clone, Debug, Default)]
+pub struct Affine {
+    pub terms: Vec<(usize, f64)>,
+    pub constant: f64,
+}
+
+impl Affine {
+    /// A constant.
+    pub fn of(constant: f64) -> Self {
+        let terms = Vec::new();
+        Self { terms, constant }
+    }
+
+    /// Adds `factor` times a variable.
+    pub fn add(&mut self, variable: usize, factor: f64) {
+        if factor != 0.0 {
+            self.terms.push((variable, factor));
+        }
+    }
+
+    /// Adds `factor` times another expression.
+    pub fn add_scaled(&mut self, other: &Affine, factor: f64) {
+        self.constant += factor * other.constant;
+        for &(variable, f) in &other.terms {
+            self.add(variable, factor * f);
+        }
+    }
+
+    /// The value at `y`.
+    pub fn at(&self, y: &[f64]) -> f64 {
+        self.constant + self.terms.iter().map(|&(i, f)| f * y[i]).sum::<f64>()
+    }
+}
+
+/// A program under construction: half the sum of weighted squares, linear costs, rows.
+#[derive(Default)]
+pub struct Builder {
+    cost: Vec<(usize, usize, f64)>,
+    linear: Vec<(usize, f64)>,
+    equal: Vec<Affine>,
+    at_most: Vec<Affine>,
+}
+
+impl Builder {
+    /// Adds `weight/2 (expression)^2` to the cost.
+    pub fn square(&mut self, expression: &Affine, weight: f64) {
+        let mut terms = expression.terms.clone();
+        terms.sort_unstable_by_key(|&(variable, _)| variable);
+        terms.dedup_by(|next, before| {
+            let same = next.0 == before.0;
+            before.1 += if same { next.1 } else { 0.0 };
+            same
+        });
+        for (number, &(i, a)) in terms.iter().enumerate() {
+            self.linear.push((i, weight * a * expression.constant));
+            for &(j, b) in &terms[number..] {
+                self.cost.push((i, j, weight * a * b));
+            }
+        }
+    }
+
+    /// Adds `factor` times a variable to the cost.
+    pub fn linear(&mut self, variable: usize, factor: f64) {
+        self.linear.push((variable, factor));
+    }
+
+    /// Adds the row `expression = 0`.
+    pub fn equal(&mut self, expression: Affine) {
+        self.equal.push(expression);
+    }
+
+    /// Adds the row `expression <= 0`.
+    pub fn at_most(&mut self, expression: Affine) {
+        self.at_most.push(expression);
+    }
+
+    /// The program over so many variables.
+    pub fn program(self, variables: usize) -> ConeProgram {
+        let mut q = vec![0.0; variables];
+        for (variable, factor) in self.linear {
+            q[variable] += factor;
+        }
+        let rows = self.equal.len() + self.at_most.len();
+        let mut entries = Vec::new();
+        let mut b = Vec::with_capacity(rows);
+        for (row, expression) in self.equal.iter().chain(&self.at_most).enumerate() {
+            b.push(-expression.constant);
+            entries.extend(expression.terms.iter().map(|&(col, f)| (row, col, f)));
+        }
+        let mut cones = vec![Cone::Zero(self.equal.len())];
+        if !self.at_most.is_empty() {
+            cones.push(Cone::Nonnegative(self.at_most.len()));
+        }
+        ConeProgram {
+            p: sparse(variables, variables, self.cost),
+            q,
+            a: sparse(rows, variables, entries),
+            b,
+            cones,
+        }
+    }
+}
+
+/// The matrix of `(row, column, value)`, values of one place added.
+fn sparse(rows: usize, columns: usize, mut entries: Vec<(usize, usize, f64)>) -> SparseColumns {
+    entries.sort_unstable_by_key(|&(row, column, _)| (column, row));
+    let places: Vec<(usize, usize)> = entries.iter().map(|&(row, col, _)| (row, col)).collect();
+    let mut matrix = SparseColumns::from_pattern(rows, columns, &places);
+    let values = matrix.values_mut();
+    let (mut at, mut last) = (0, None);
+    for (row, column, value) in entries {
+        if last.is_some_and(|place| place != (row, column)) {
+            at += 1;
+        }
+        values[at] += value;
+        last = Some((row, column));
+    }
+    matrix
+}

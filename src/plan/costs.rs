@@ -1,0 +1,123 @@
+//! The cost of a plan: weighted squares of deviations.
+
+use super::affine::{Affine, Builder};
+use super::feet::foot_place;
+use super::transcribe::Task;
+use crate::robot::Leg;
+
+/// Time that the weights are per, s.
+const TIME_UNIT_S: f64 = 0.01;
+/// The first latent coordinate that counts as posture: the two before it carry the body.
+const FIRST_OF_POSTURE: usize = 2;
+
+/// Adds the cost about an iterate; half the sum of squares each, so that weights are as documented
+/// up to a common factor.
+pub fn add(task: &Task<'_>, y: &[f64], builder: &mut Builder) {
+    each(task, y, &mut |expression, weight| {
+        builder.square(expression, weight)
+    });
+}
+
+/// The cost of a point: the sum of weighted squares.
+pub fn value(task: &Task<'_>, y: &[f64]) -> f64 {
+    let mut total = 0.0;
+    each(task, y, &mut |expression, weight| {
+        total += weight * expression.at(y).powi(2);
+    });
+    total
+}
+
+fn each(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
+    let (d, settings) = (task.layout.latent_dim, task.settings);
+    let share = 1.0 / d as f64;
+    let one = |variable: usize, weight: f64, square: &mut dyn FnMut(&Affine, f64)| {
+        let mut expression = Affine::default();
+        expression.add(variable, 1.0);
+        square(&expression, weight);
+    };
+    for (part, of) in task.seed.parts.iter().enumerate() {
+        let step = of.duration_s / of.intervals() as f64;
+        for node in 0..of.z.len() {
+            let end = node == 0 || node == of.intervals();
+            let time = step / TIME_UNIT_S * if end { 0.5 } else { 1.0 };
+            let at = task.layout.node(part, node);
+            for i in 0..d {
+                if i >= FIRST_OF_POSTURE {
+                    one(at + i, settings.posture * share * time, square);
+                }
+                one(at + d + i, settings.rate * share * time, square);
+                one(at + 2 * d + i, settings.input * share * time, square);
+            }
+            if node < of.intervals() {
+                let next = task.layout.node(part, node + 1);
+                let per_unit = (TIME_UNIT_S / step).powi(2) * step / TIME_UNIT_S;
+                for i in 0..d {
+                    let mut change = Affine::default();
+                    change.add(next + 2 * d + i, 1.0);
+                    change.add(at + 2 * d + i, -1.0);
+                    square(&change, settings.smoothness * share * per_unit);
+                }
+            }
+        }
+        let weight = match part {
+            0 => settings.first_duration,
+            _ => settings.duration[usize::from(!of.is_grounded())],
+        };
+        // A little for every duration keeps the program strictly convex.
+        one(task.layout.duration(part), weight.max(1e-3), square);
+    }
+    feet(task, y, square);
+}
+
+/// Feet on the ground stay where they stand, as far as they do in the prior: along the floor from
+/// the start or from touch-down, above it from the start or from the prior's own height.
+fn feet(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
+    let settings = task.settings;
+    let flight = task.seed.parts.iter().position(|part| !part.is_grounded());
+    for (part, of) in task.seed.parts.iter().enumerate() {
+        let is_landing = flight.is_some_and(|flight| part > flight);
+        let anchor_part = if is_landing { part } else { 0 };
+        if !of.is_grounded() {
+            continue;
+        }
+        let step = of.duration_s / of.intervals() as f64;
+        let down: Vec<Leg> = (Leg::ALL.into_iter())
+            .filter(|leg| of.part.feet[leg.index()])
+            .collect();
+        for &leg in &down {
+            let anchor = moved_foot(task, y, leg, (anchor_part, 0));
+            for node in 0..of.z.len() {
+                if (part, node) == (anchor_part, 0) {
+                    continue;
+                }
+                let foot = moved_foot(task, y, leg, (part, node));
+                for axis in 0..2 {
+                    let mut slip = foot[axis].clone();
+                    if axis == 0 || !is_landing {
+                        slip.add_scaled(&anchor[axis], -1.0);
+                    }
+                    let time = step / TIME_UNIT_S;
+                    let unit = settings.foot_m[axis];
+                    let weight = settings.feet / down.len() as f64 * time / (unit * unit);
+                    square(&slip, weight);
+                }
+            }
+        }
+    }
+}
+
+/// How far a foot is from where it is in the prior, along the floor and above it, m.
+fn moved_foot(task: &Task<'_>, y: &[f64], leg: Leg, (part, node): (usize, usize)) -> [Affine; 2] {
+    let z = task.values(part, node, y).z;
+    let now = foot_place(task.seed, leg, &z);
+    let before = foot_place(task.seed, leg, &task.seed.parts[part].z[node]);
+    std::array::from_fn(|axis| {
+        let mut moved = Affine::of(now.at[axis] - before.at[axis]);
+        for i in 0..task.layout.latent_dim {
+            let slope = now.by_z[(axis, i)];
+            moved.add_scaled(&task.z(part, node, i), slope);
+            moved.constant -= slope * z[i];
+        }
+        moved
+    })
+}

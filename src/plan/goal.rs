@@ -1,0 +1,116 @@
+//! What a jump is to reach.
+
+use nalgebra::DVector;
+
+use super::error::PlanError;
+use crate::model::{GOAL_DIM, JumpPrior};
+
+/// A wanted jump.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Goal {
+    distance_m: f64,
+    apex_m: f64,
+    start: Option<Start>,
+}
+
+/// State and velocity that a jump starts from, 18 each, SI units.
+pub type Start = (DVector<f64>, DVector<f64>);
+
+impl Goal {
+    /// A jump forwards by `distance_m`, during which the body rises `apex_m` above its height at the
+    /// start; from the mean start of the model's training jumps.
+    ///
+    /// # Errors
+    /// [`PlanError::Goal`] for numbers that are not finite, and for an apex that is not above the
+    /// start.
+    pub fn new(distance_m: f64, apex_m: f64) -> Result<Self, PlanError> {
+        let refused = |what, found, expected: &str| {
+            let expected = expected.to_owned();
+            Err(PlanError::Goal {
+                what,
+                found,
+                expected,
+            })
+        };
+        if !distance_m.is_finite() {
+            return refused("distance", distance_m, "a finite number of metres");
+        }
+        if !(apex_m.is_finite() && apex_m > 0.0) {
+            let expected = "a positive number of metres above the height at the start";
+            return refused("apex", apex_m, expected);
+        }
+        Ok(Self {
+            distance_m,
+            apex_m,
+            start: None,
+        })
+    }
+
+    /// The same jump from another state and velocity, 18 each, SI units.
+    #[must_use]
+    pub fn from_start(mut self, x: DVector<f64>, dx: DVector<f64>) -> Self {
+        self.start = Some((x, dx));
+        self
+    }
+
+    /// Distance of the body, m.
+    pub fn distance_m(&self) -> f64 {
+        self.distance_m
+    }
+
+    /// Rise of the body, m.
+    pub fn apex_m(&self) -> f64 {
+        self.apex_m
+    }
+
+    /// State and velocity at the start.
+    pub(super) fn start(&self, prior: &JumpPrior) -> Start {
+        let at_rest = || (prior.start.clone(), DVector::zeros(prior.start.len()));
+        self.start.clone().unwrap_or_else(at_rest)
+    }
+
+    /// Refuses goals that are out of all proportion to the training jumps, so that no time is spent
+    /// on them: farther from their range than `reach` times its width.
+    pub(super) fn check_within(
+        &self,
+        prior: &JumpPrior,
+        start_height_m: f64,
+        reach: f64,
+    ) -> Result<(), PlanError> {
+        let names = ["distance", "apex", "height at the start"];
+        let values = [self.distance_m, self.apex_m, start_height_m];
+        for ((found, range), what) in values.into_iter().zip(&prior.goal).zip(names) {
+            let width = (range.most - range.least).max(0.02);
+            let [least, most] = [range.least - reach * width, range.most + reach * width];
+            if !(least..=most).contains(&found) {
+                let expected = format!(
+                    "{least:.3} to {most:.3} m: the recorded jumps have {:.3} to {:.3} m",
+                    range.least, range.most
+                );
+                return Err(PlanError::Goal {
+                    what,
+                    found,
+                    expected,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The goal inside the ranges of the training jumps less a `share` of them at either end: the
+    /// goal of the trajectory that the plan starts from. A regression over few jumps is not to be
+    /// trusted at its ends.
+    pub(super) fn clipped(
+        &self,
+        prior: &JumpPrior,
+        start_height_m: f64,
+        share: f64,
+    ) -> [f64; GOAL_DIM] {
+        let values = [self.distance_m, self.apex_m, start_height_m];
+        std::array::from_fn(|i| {
+            let range = &prior.goal[i];
+            let inset = share * (range.most - range.least);
+            values[i].clamp(range.least + inset, range.most - inset)
+        })
+    }
+}

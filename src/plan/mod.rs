@@ -1,0 +1,40 @@
+//! Jumps that nobody recorded: a goal in, a trajectory of the model's coordinates out.
+//!
+//! In: a model with landmarks and prior of its training jumps ([`JumpPrior`]), a [`Goal`]. Out: a
+//! [`Plan`], which is a recording that every other part of romc takes, and how far it is from what
+//! was recorded. Read `transcribe` first, which states the program; `seed` makes the trajectory it
+//! starts from, `solve` solves it by sequential convex programs on [`QpSolver`], `motion` samples the
+//! result and checks it between the nodes, `verdict` says whether to trust it.
+//!
+//! [`JumpPrior`]: crate::model::JumpPrior
+//! [`QpSolver`]: crate::mpc::QpSolver
+//!
+//! ```
+//! use romc::plan::Goal;
+//!
+//! assert!(Goal::new(0.35, 0.15).is_ok());
+//! assert!(Goal::new(0.35, -0.1).is_err());
+//! ```
+
+mod affine;
+mod costs;
+mod error;
+mod feet;
+mod goal;
+mod motion;
+mod reach;
+mod seed;
+mod settings;
+mod solve;
+mod transcribe;
+mod verdict;
+
+#[cfg(test)]
+mod tests;
+
+pub use error::PlanError;
+pub use goal::Goal;
+pub use reach::{Reach, ReachPoint, reach};
+pub use settings::PlanSettings;
+pub use solve::{Plan, PlannedPart, plan};
+pub use verdict::Verdict;

@@ -1,0 +1,167 @@
+//! A plan as a recording, and how close it comes to its bounds between the nodes.
+//!
+//! Velocities and inputs are linear between nodes, positions their integral, so that the motion
+//! passes through the nodes of the program. Torques are the lifted input with what the joints take
+//! of the very motion that is written, so that who reads the recording finds the planned input.
+
+use std::path::PathBuf;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::error::PlanError;
+use super::transcribe::Task;
+use crate::recording::Segment;
+use crate::robot::{FOOT_DIM, JOINT_DIM, STATE_DIM};
+
+/// Name of a plan where a recording has that of its file.
+const SOURCE: &str = "plan";
+
+/// How close a motion comes to its bounds, over all its samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Margins {
+    /// Largest torque, as a share of its limit.
+    pub torque_share: f64,
+    /// Farthest that a joint is outside its limits, rad; negative inside.
+    pub beyond_joint_limit_rad: f64,
+    /// Farthest that the lifted force is outside the friction cone, N; negative inside.
+    pub beyond_friction_n: f64,
+    /// Farthest that a foot on the ground leaves its place, along and above the floor, m.
+    pub foot_slip_m: [f64; 2],
+}
+
+/// The motion of a point, a sample every `sample_time_s`, and its margins.
+///
+/// # Errors
+/// [`PlanError::Recording`] if a sample makes no input.
+pub fn motion(
+    task: &Task<'_>,
+    y: &[f64],
+    sample_time_s: f64,
+) -> Result<(Segment, Margins), PlanError> {
+    let durations = (0..task.seed.parts.len()).map(|part| task.duration_s(part, y));
+    let mut ends: Vec<f64> = Vec::new();
+    for duration in durations {
+        ends.push(ends.last().unwrap_or(&0.0) + duration);
+    }
+    let total = ends[ends.len() - 1];
+    let count = (total / sample_time_s).floor() as usize + 1;
+    let mut motion = empty(count);
+    let mut input = DMatrix::zeros(STATE_DIM, count);
+    for sample in 0..count {
+        let time = sample as f64 * sample_time_s;
+        let part = ends.partition_point(|end| *end <= time).min(ends.len() - 1);
+        let start = if part == 0 { 0.0 } else { ends[part - 1] };
+        let at = at(task, y, part, (time - start, ends[part] - start));
+        motion.time_s.push(time);
+        let x = &task.seed.decode * at.z + &task.seed.decode_bias;
+        motion.x.set_column(sample, &x);
+        motion.dx.set_column(sample, &(&task.seed.decode * at.dz));
+        motion.ddx.set_column(sample, &(&task.seed.decode * at.ddz));
+        input.set_column(sample, &(&task.seed.lift * at.u_lat));
+        motion.feet.push(task.seed.parts[part].part.feet);
+    }
+    let torque_nm = input.rows(0, JOINT_DIM) + motion.losses(&task.seed.rule);
+    motion.torque_nm = torque_nm;
+    let margins = margins(task, &motion, &input);
+    Ok((motion, margins))
+}
+
+fn empty(count: usize) -> Segment {
+    Segment {
+        path: PathBuf::from(SOURCE),
+        first_row: 2,
+        row_stride: 1.0,
+        time_s: Vec::with_capacity(count),
+        x: DMatrix::zeros(STATE_DIM, count),
+        dx: DMatrix::zeros(STATE_DIM, count),
+        ddx: DMatrix::zeros(STATE_DIM, count),
+        torque_nm: DMatrix::zeros(JOINT_DIM, count),
+        feet: Vec::with_capacity(count),
+        body_wrench: None,
+    }
+}
+
+struct At {
+    z: DVector<f64>,
+    dz: DVector<f64>,
+    ddz: DVector<f64>,
+    u_lat: DVector<f64>,
+}
+
+/// Values at a time since the start of a part of this duration.
+fn at(task: &Task<'_>, y: &[f64], part: usize, (time_s, duration_s): (f64, f64)) -> At {
+    let of = &task.seed.parts[part];
+    let step = duration_s / of.intervals() as f64;
+    let interval = ((time_s / step) as usize).min(of.intervals() - 1);
+    let since = time_s - interval as f64 * step;
+    let share = since / step;
+    let here = task.values(part, interval, y);
+    let next = task.values(part, interval + 1, y);
+    let ddz = (&next.dz - &here.dz) / step;
+    let drift = &of.drift[interval];
+    At {
+        z: here.z + (&here.dz + drift) * since + &ddz * (0.5 * since * since),
+        dz: here.dz + &ddz * since,
+        u_lat: &here.u_lat + (&next.u_lat - &here.u_lat) * share,
+        ddz,
+    }
+}
+
+fn margins(task: &Task<'_>, motion: &Segment, input: &DMatrix<f64>) -> Margins {
+    let robot = task.seed.rule.robot();
+    let mut margins = Margins {
+        torque_share: 0.0,
+        beyond_joint_limit_rad: f64::NEG_INFINITY,
+        beyond_friction_n: f64::NEG_INFINITY,
+        foot_slip_m: [0.0; 2],
+    };
+    for sample in 0..motion.len() {
+        for joint in 0..JOINT_DIM {
+            let share = motion.torque_nm[(joint, sample)].abs() / robot.torque_limit_nm()[joint];
+            margins.torque_share = margins.torque_share.max(share);
+            let (least, most) = robot.joint_limit_rad()[joint];
+            let angle = motion.x[(joint, sample)];
+            let beyond = (least - angle).max(angle - most);
+            margins.beyond_joint_limit_rad = margins.beyond_joint_limit_rad.max(beyond);
+        }
+        if motion.feet[sample].contains(&true) {
+            let [forwards, up] = [JOINT_DIM, JOINT_DIM + 2].map(|row| input[(row, sample)]);
+            let beyond = forwards.abs() - task.settings.friction * up;
+            margins.beyond_friction_n = margins.beyond_friction_n.max(beyond);
+        }
+    }
+    margins.foot_slip_m = foot_slip(task, motion);
+    margins
+}
+
+/// Farthest that a foot is from where it stood at the start or at touch-down.
+fn foot_slip(task: &Task<'_>, motion: &Segment) -> [f64; 2] {
+    let mut farthest = [0.0_f64; 2];
+    let z_of = |sample: usize| {
+        // The motion is decoded, so that the least-squares inverse of the decoder gives z back.
+        let x = motion.x.column(sample) - &task.seed.decode_bias;
+        let gram = task.seed.decode.tr_mul(&task.seed.decode);
+        let right = task.seed.decode.tr_mul(&x);
+        gram.cholesky().map(|factor| factor.solve(&right))
+    };
+    for leg in crate::robot::Leg::ALL {
+        let mut anchor: Option<[f64; 2]> = None;
+        for sample in 0..motion.len() {
+            if !motion.feet[sample][leg.index()] {
+                anchor = None;
+                continue;
+            }
+            let Some(z) = z_of(sample) else { continue };
+            let place = super::feet::foot_place(task.seed, leg, &z).at;
+            let from = *anchor.get_or_insert(place);
+            for axis in 0..2 {
+                farthest[axis] = farthest[axis].max((place[axis] - from[axis]).abs());
+            }
+        }
+    }
+    debug_assert_eq!(
+        motion.feet.first().map_or(FOOT_DIM, |feet| feet.len()),
+        FOOT_DIM
+    );
+    farthest
+}

@@ -1,0 +1,103 @@
+//! Which distances and heights can be planned.
+
+use super::error::PlanError;
+use super::goal::Goal;
+use super::settings::PlanSettings;
+use super::solve::{Plan, plan};
+use crate::model::ReducedModel;
+
+/// Goals per axis of a map.
+const GRID: [usize; 2] = [13, 9];
+/// How far the map goes beyond the recorded jumps, in widths of their range.
+const BEYOND: f64 = 1.0;
+
+/// A goal of the map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReachPoint {
+    /// Distance and apex, m.
+    pub goal_m: [f64; 2],
+    /// Word of the verdict, or `no plan`.
+    pub status: &'static str,
+    /// Input deviation, if there is a plan.
+    pub input_deviation: Option<f64>,
+    /// Time for it, ms.
+    pub solve_ms: f64,
+}
+
+/// The map of a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reach {
+    /// Distances, m, ascending.
+    pub distances_m: Vec<f64>,
+    /// Apexes, m, ascending.
+    pub apexes_m: Vec<f64>,
+    /// One point per distance and apex, distances of one apex together.
+    pub points: Vec<ReachPoint>,
+}
+
+/// Plans a grid of goals around the training jumps; `done` is told how many of how many.
+///
+/// # Errors
+/// [`PlanError::Model`] for a model without a prior, [`PlanError::Lower`].
+pub fn reach(
+    model: &ReducedModel,
+    settings: &PlanSettings,
+    mut done: impl FnMut(usize, usize),
+) -> Result<Reach, PlanError> {
+    let prior = model.jump_prior()?;
+    let axis = |i: usize| -> Vec<f64> {
+        let range = &prior.goal[i];
+        let width = range.most - range.least;
+        let (least, most) = (range.least - BEYOND * width, range.most + BEYOND * width);
+        let steps = (GRID[i] - 1) as f64;
+        let values =
+            (0..GRID[i]).map(|k| least.max(0.0) + (most - least.max(0.0)) * k as f64 / steps);
+        values.filter(|value| *value > 0.0).collect()
+    };
+    let (distances_m, apexes_m) = (axis(0), axis(1));
+    let total = distances_m.len() * apexes_m.len();
+    let mut points = Vec::with_capacity(total);
+    for &apex in &apexes_m {
+        for &distance in &distances_m {
+            points.push(point(model, [distance, apex], settings)?);
+            done(points.len(), total);
+        }
+    }
+    Ok(Reach {
+        distances_m,
+        apexes_m,
+        points,
+    })
+}
+
+fn point(
+    model: &ReducedModel,
+    goal_m: [f64; 2],
+    settings: &PlanSettings,
+) -> Result<ReachPoint, PlanError> {
+    let clock = std::time::Instant::now();
+    let made: Result<Plan, PlanError> =
+        Goal::new(goal_m[0], goal_m[1]).and_then(|goal| plan(model, &goal, settings));
+    let solve_ms = 1e3 * clock.elapsed().as_secs_f64();
+    Ok(match made {
+        Ok(plan) => ReachPoint {
+            goal_m,
+            status: plan.verdict.word(),
+            input_deviation: Some(plan.input_deviation),
+            solve_ms,
+        },
+        Err(error @ (PlanError::Model(_) | PlanError::Lower(_))) => return Err(error),
+        Err(
+            PlanError::Goal { .. }
+            | PlanError::Unsolved { .. }
+            | PlanError::NotConverged { .. }
+            | PlanError::Control(_)
+            | PlanError::Recording(_),
+        ) => ReachPoint {
+            goal_m,
+            status: "no plan",
+            input_deviation: None,
+            solve_ms,
+        },
+    })
+}

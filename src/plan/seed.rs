@@ -1,0 +1,203 @@
+//! The trajectory that a plan starts from, and the model about it.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::error::PlanError;
+use super::goal::{Goal, Start};
+use super::settings::PlanSettings;
+use crate::lower::CompiledModel;
+use crate::model::{JumpPart, JumpPrior, ReducedModel};
+use crate::robot::{FeetRule, InputRule, STATE_DIM};
+
+/// Position of the body in the state.
+pub const BODY_X: usize = 12;
+/// Height of the body in the state.
+pub const BODY_Z: usize = 14;
+/// Pitch of the body in the state.
+pub const PITCH: usize = 16;
+
+/// Everything that the program of one goal is made of.
+pub struct Seed<'a> {
+    pub prior: &'a JumpPrior,
+    pub rule: InputRule,
+    pub latent_dim: usize,
+    pub goal: Goal,
+    /// Latent position and velocity at the start.
+    pub start: [DVector<f64>; 2],
+    /// `x = decode z + decode_bias`, SI units.
+    pub decode: DMatrix<f64>,
+    pub decode_bias: DVector<f64>,
+    /// `u = lift u_lat`, SI units.
+    pub lift: DMatrix<f64>,
+    pub parts: Vec<SeedPart<'a>>,
+}
+
+/// A part of the prior at the clipped goal; vectors in scaled units, one per node or interval.
+pub struct SeedPart<'a> {
+    pub part: &'a JumpPart,
+    pub duration_s: f64,
+    pub z: Vec<DVector<f64>>,
+    pub dz: Vec<DVector<f64>>,
+    pub u_lat: Vec<DVector<f64>>,
+    /// Mean acceleration over each interval, of which the model explains the changes alone.
+    pub ddz: Vec<DVector<f64>>,
+    /// What a position moves beyond the mean velocity of its ends, per second, over each interval.
+    pub drift: Vec<DVector<f64>>,
+    /// `d ddz / d (zeta, nu, mu)` at each node, in the program's variables, `latent_dim x 3 latent_dim`.
+    pub slope: Vec<DMatrix<f64>>,
+    /// Lower Cholesky factor of the input covariance: `u_lat = prior + root mu`.
+    pub root: DMatrix<f64>,
+}
+
+impl SeedPart<'_> {
+    /// Number of intervals.
+    pub fn intervals(&self) -> usize {
+        self.z.len() - 1
+    }
+
+    /// Whether a foot is on the ground.
+    pub fn is_grounded(&self) -> bool {
+        self.part.feet.contains(&true)
+    }
+}
+
+impl<'a> Seed<'a> {
+    /// The prior of a model at a goal.
+    ///
+    /// # Errors
+    /// [`PlanError::Model`] if the model lacks a prior, [`PlanError::Goal`] for goals out of all
+    /// proportion, [`PlanError::Lower`].
+    pub fn new(
+        model: &'a ReducedModel,
+        goal: &Goal,
+        settings: &PlanSettings,
+    ) -> Result<Self, PlanError> {
+        let prior = model.jump_prior()?;
+        let start: Start = goal.start(prior);
+        let height = start.0[BODY_Z];
+        goal.check_within(prior, height, settings.reach)?;
+        let features = prior.features(goal.clipped(prior, height, settings.inset));
+        let tangent = model.tangent(&start.0)?;
+        let mut dynamics = CompiledModel::new(model)?;
+        let parts = (prior.parts.iter())
+            .map(|part| seed_part(model, prior, part, &features, &mut dynamics))
+            .collect::<Result<_, PlanError>>()?;
+        let zero = DVector::zeros(model.latent_dim());
+        Ok(Self {
+            prior,
+            rule: model.input_rule()?,
+            latent_dim: model.latent_dim(),
+            goal: goal.clone(),
+            start: [model.encode(&start.0)?, &tangent.encode * &start.1],
+            decode: model.decoder_jacobian(&zero)?,
+            decode_bias: model.decode(&zero)?,
+            lift: tangent.lift,
+            parts,
+        })
+    }
+
+    /// A coordinate of the decoded state.
+    pub fn decoded(&self, z: &DVector<f64>) -> [f64; STATE_DIM] {
+        let x = &self.decode * z + &self.decode_bias;
+        std::array::from_fn(|i| x[i])
+    }
+}
+
+fn seed_part<'a>(
+    model: &ReducedModel,
+    prior: &JumpPrior,
+    part: &'a JumpPart,
+    features: &crate::model::GoalFeatures,
+    dynamics: &mut CompiledModel,
+) -> Result<SeedPart<'a>, PlanError> {
+    let table = |rows: &DMatrix<f64>| -> Vec<DVector<f64>> {
+        (0..part.nodes())
+            .map(|node| JumpPart::at(rows, node, features))
+            .collect()
+    };
+    let (z, dz, u_lat) = (table(&part.z), table(&part.dz), table(&part.u_lat));
+    let [least, most] = part.duration_range_s;
+    let duration_s = part.duration(features).clamp(0.5 * least, 2.0 * most);
+    let step = duration_s / (part.nodes() - 1) as f64;
+    let pairs = |rows: &[DVector<f64>], of: fn(&DVector<f64>, &DVector<f64>) -> DVector<f64>| {
+        let pairs = rows.windows(2);
+        pairs.map(|pair| of(&pair[0], &pair[1])).collect::<Vec<_>>()
+    };
+    let mut ddz = pairs(&dz, |a, b| b - a);
+    ddz.iter_mut().for_each(|change| *change /= step);
+    let mean = pairs(&dz, |a, b| (a + b) * 0.5);
+    let mut drift = pairs(&z, |a, b| b - a);
+    for (drift, mean) in drift.iter_mut().zip(&mean) {
+        *drift = &*drift / step - mean;
+    }
+    let root = (part.input_covariance.clone().cholesky())
+        .expect("invariant: checked with the model")
+        .unpack();
+    let d = model.latent_dim();
+    let scales = scales(prior, &root, d);
+    let mut slope = Vec::with_capacity(part.nodes());
+    for node in 0..part.nodes() {
+        let by_latent = match &part.xi {
+            Some(xi) => xi.transpose(),
+            None => {
+                let (mut value, mut jacobian) = (vec![0.0; d], DMatrix::zeros(d, 3 * d));
+                let at = [&z[node], &dz[node], &u_lat[node]].map(|v| v.as_slice());
+                dynamics.jacobian(part.phase, at[0], at[1], at[2], &mut value, &mut jacobian);
+                jacobian
+            }
+        };
+        slope.push(by_latent * &scales);
+    }
+    for (coordinate, acceleration) in falling_freely(model, part.phase)? {
+        slope
+            .iter_mut()
+            .for_each(|m| m.row_mut(coordinate).fill(0.0));
+        ddz.iter_mut().for_each(|v| v[coordinate] = acceleration);
+        drift.iter_mut().for_each(|v| v[coordinate] = 0.0);
+    }
+    Ok(SeedPart {
+        part,
+        duration_s,
+        z,
+        dz,
+        u_lat,
+        ddz,
+        drift,
+        slope,
+        root,
+    })
+}
+
+/// From the program's variables of a node to `(z, dz, u_lat)`: standard deviations, and the root of
+/// the input's covariance.
+fn scales(prior: &JumpPrior, root: &DMatrix<f64>, d: usize) -> DMatrix<f64> {
+    let mut scales = DMatrix::zeros(3 * d, 3 * d);
+    for i in 0..2 * d {
+        scales[(i, i)] = prior.state_std[i];
+    }
+    scales.view_mut((2 * d, 2 * d), (d, d)).copy_from(root);
+    scales
+}
+
+/// Latent coordinates that the model lets fall freely in a phase without contact, with their
+/// constant accelerations: those that alone hold the body's x or z, and whose equation is a constant.
+fn falling_freely(model: &ReducedModel, phase: usize) -> Result<Vec<(usize, f64)>, PlanError> {
+    if model.phases()[phase].feet != FeetRule::None {
+        return Ok(Vec::new());
+    }
+    let encoder = model.encoder()?.weights();
+    let mut falling = Vec::new();
+    for of_body in [BODY_X, BODY_Z] {
+        let column = encoder.column(of_body);
+        let mut holding = (0..column.len()).filter(|&i| column[i] != 0.0);
+        let (Some(coordinate), None) = (holding.next(), holding.next()) else {
+            continue;
+        };
+        let terms = model.active_terms(phase, coordinate)?;
+        if terms.iter().all(|(_, term)| term.text() == "1") {
+            let acceleration = terms.iter().map(|(coefficient, _)| coefficient).sum();
+            falling.push((coordinate, acceleration));
+        }
+    }
+    Ok(falling)
+}

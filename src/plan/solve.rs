@@ -1,0 +1,207 @@
+//! From a goal to a plan: sequential convex programs.
+
+use std::time::Instant;
+
+use super::costs;
+use super::error::PlanError;
+use super::goal::Goal;
+use super::motion::{Margins, motion};
+use super::seed::Seed;
+use super::settings::PlanSettings;
+use super::transcribe::{Bound, Layout, Task};
+use super::verdict::{Findings, Verdict, verdict};
+use crate::model::ReducedModel;
+use crate::mpc::{Outcome, QpSettings, QpSolver, SolverProfile};
+use crate::recording::Segment;
+
+/// Largest violation of an equation that counts as none, in standard deviations.
+const CONVERGED_DEFECT: f64 = 1e-4;
+/// Largest change of a variable from one program to the next that counts as none.
+const CONVERGED_STEP: f64 = 2e-2;
+/// Largest violation of an equation with which a plan may be used at all.
+const USABLE_DEFECT: f64 = 1e-3;
+
+/// A part of a planned jump.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlannedPart {
+    /// Its name.
+    pub name: String,
+    /// Index of the model's phase.
+    pub phase: usize,
+    /// Its duration, s.
+    pub duration_s: f64,
+}
+
+/// A planned jump.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// The goal: distance and rise of the body, m.
+    pub goal_m: [f64; 2],
+    /// What the planned motion reaches, m.
+    pub reached_m: [f64; 2],
+    /// The motion, sampled as the training's recordings.
+    pub motion: Segment,
+    /// The parts in order.
+    pub parts: Vec<PlannedPart>,
+    /// The cost: weighted squares of the deviations from the prior.
+    pub cost: f64,
+    /// Largest Mahalanobis deviation of the latent input from the prior's, per coordinate, in
+    /// standard deviations of the training's inputs.
+    pub input_deviation: f64,
+    /// Expected errors of distance and rise, one standard deviation, m: what the thrusts of jumps
+    /// that the deviations were not fitted to did beside them.
+    pub error_m: [f64; 2],
+    /// How close the motion comes to its bounds, between the nodes too.
+    pub margins: Margins,
+    /// Whether to trust it.
+    pub verdict: Verdict,
+    /// Convex programs solved.
+    pub programs: usize,
+    /// Time that took, ms.
+    pub solve_ms: f64,
+}
+
+/// Plans a jump.
+///
+/// # Errors
+/// [`PlanError`]: a model without a prior, a goal out of all proportion to the training jumps,
+/// programs without a solution. A plan that is not to be trusted is none: its [`Verdict`] says so.
+pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Result<Plan, PlanError> {
+    let clock = Instant::now();
+    let seed = Seed::new(model, goal, settings)?;
+    let task = Task {
+        layout: Layout::new(&seed),
+        seed: &seed,
+        settings,
+    };
+    let (y, programs) = solve(&task)?;
+    let (motion, margins) = motion(&task, &y, model.sample_time_s().unwrap_or(0.002))?;
+    let parts = (seed.parts.iter().enumerate())
+        .map(|(part, of)| PlannedPart {
+            name: of.part.name.clone(),
+            phase: of.part.phase,
+            duration_s: task.duration_s(part, &y),
+        })
+        .collect();
+    let goal_m = [goal.distance_m(), goal.apex_m()];
+    let slack = Bound::ALL.map(|bound| (bound, y[task.layout.slack(bound)]));
+    let input_deviation = input_deviation(&task, &y);
+    let findings = Findings {
+        input_deviation,
+        slack,
+        margins: &margins,
+        outside: outside(&seed, goal_m),
+    };
+    Ok(Plan {
+        goal_m,
+        reached_m: reached(&motion),
+        parts,
+        cost: costs::value(&task, &y),
+        input_deviation,
+        error_m: expected_error(&task, &y),
+        verdict: verdict(settings, &findings),
+        margins,
+        motion,
+        programs,
+        solve_ms: 1e3 * clock.elapsed().as_secs_f64(),
+    })
+}
+
+/// The variables at the end of the programs, and how many there were.
+fn solve(task: &Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
+    let goal = &task.seed.goal;
+    let (distance_m, apex_m) = (goal.distance_m(), goal.apex_m());
+    let settings = QpSettings {
+        profile: SolverProfile::AsShipped,
+        max_iterations: 60,
+        ..QpSettings::default()
+    };
+    let mut y = task.prior_point();
+    for iteration in 1..=task.settings.programs {
+        let mut solver = QpSolver::new(task.program(&y), settings)?;
+        let outcome = solver.solve();
+        let next = solver.solution();
+        let usable = matches!(outcome, Outcome::Solved)
+            || (outcome == Outcome::Inaccurate && solver.residuals().worst() < 1e-3);
+        if !usable || next.iter().any(|value| !value.is_finite()) {
+            return Err(PlanError::Unsolved {
+                distance_m,
+                apex_m,
+                outcome,
+                iteration,
+            });
+        }
+        let pairs = next.iter().zip(&y);
+        let step = pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+        y.copy_from_slice(next);
+        let defect = task.defect(&y);
+        if defect < CONVERGED_DEFECT && step < CONVERGED_STEP {
+            return Ok((y, iteration));
+        }
+        if iteration == task.settings.programs && defect < USABLE_DEFECT {
+            return Ok((y, iteration));
+        }
+    }
+    Err(PlanError::NotConverged {
+        distance_m,
+        apex_m,
+        defect: task.defect(&y),
+        iterations: task.settings.programs,
+    })
+}
+
+/// Largest `|mu| / sqrt(latent_dim)` of a node.
+fn input_deviation(task: &Task<'_>, y: &[f64]) -> f64 {
+    let d = task.layout.latent_dim;
+    let mut most = 0.0_f64;
+    for (part, of) in task.seed.parts.iter().enumerate() {
+        for node in 0..of.z.len() {
+            let at = task.layout.node(part, node) + 2 * d;
+            let square: f64 = y[at..at + d].iter().map(|mu| mu * mu).sum();
+            most = most.max((square / d as f64).sqrt());
+        }
+    }
+    most
+}
+
+/// How far a goal is beyond the training jumps, in widths of their range; zero inside.
+fn outside(seed: &Seed<'_>, goal_m: [f64; 2]) -> [f64; 2] {
+    std::array::from_fn(|i| {
+        let range = &seed.prior.goal[i];
+        let width = (range.most - range.least).max(f64::MIN_POSITIVE);
+        let beyond = (range.least - goal_m[i]).max(goal_m[i] - range.most);
+        beyond.max(0.0) / width
+    })
+}
+
+/// Distance and rise of the body in a motion, m.
+fn reached(motion: &Segment) -> [f64; 2] {
+    let (x, last) = (&motion.x, motion.len() - 1);
+    let height = x.row(super::seed::BODY_Z);
+    [
+        x[(super::seed::BODY_X, last)] - x[(super::seed::BODY_X, 0)],
+        height.max() - height[0],
+    ]
+}
+
+/// What accelerations of the thrust that the deviations do not explain make of distance and rise.
+fn expected_error(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
+    let parts = &task.seed.parts;
+    let flight = parts.iter().position(|part| !part.is_grounded());
+    let Some(flight) = flight.filter(|flight| *flight > 0) else {
+        return [0.0; 2];
+    };
+    let thrust = flight - 1;
+    let duration_s = task.duration_s(thrust, y);
+    let of_latent = &parts[thrust].part.acceleration_std;
+    let speed = |coordinate: usize| {
+        let row = task.seed.decode.row(coordinate);
+        let squares = row.iter().zip(of_latent).map(|(a, std)| (a * std).powi(2));
+        squares.sum::<f64>().sqrt() * duration_s
+    };
+    let up = task.dx(flight, 0, super::seed::BODY_Z).at(y);
+    [
+        speed(super::seed::BODY_X) * task.duration_s(flight, y),
+        speed(super::seed::BODY_Z) * up.abs() / crate::robot::GRAVITY_M_S2,
+    ]
+}

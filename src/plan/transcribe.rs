@@ -1,0 +1,485 @@
+//! The program of a plan about an iterate.
+//!
+//! Every part has `n + 1` nodes. With the prior's trajectory `(z_p, dz_p, u_p)`, variables are
+//! deviations in standard deviations: `z = z_p + sigma zeta`, `dz = dz_p + sigma nu`,
+//! `u_lat = u_p + L mu`, and a duration `T = T_p (1 + 0.15 tau)` per part. Over an interval
+//! `h = T / n`, with a bar for the mean of its ends and `f` the model of deviations:
+//!
+//! ```text
+//! minimise   sum over nodes of h/10 ms (|mu|^2 + posture + rates + smoothness + feet) + durations
+//! subject to z_(k+1)  - z_k  = h (bar dz + drift_k)
+//!            dz_(k+1) - dz_k = h (ddz_k + bar f(zeta, nu, mu))
+//!            z, dz continuous, those measured at the start
+//!            body x at the end, body z + vz |vz| / 2 g in mid-flight, rest and height at the end
+//!            |lift u_lat + losses| <= limit, joints inside their limits, |Fx| <= mu Fz
+//! ```
+//!
+//! `drift_k` and `ddz_k` are such that the prior itself is a trajectory; where the model knows a
+//! coordinate to fall freely, that holds instead. Of this only products with `h`, `vz^2`, the
+//! feet and the losses are not linear: they are linearised about the iterate, or kept from it.
+//! Bounds that are far from active are left out, and looked at again with the result.
+
+use nalgebra::DVector;
+
+use super::affine::{Affine, Builder};
+use super::costs;
+use super::seed::{BODY_X, BODY_Z, PITCH, Seed, SeedPart};
+use super::settings::PlanSettings;
+use crate::mpc::ConeProgram;
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM};
+
+/// Change of a duration that the variable `tau` counts as one.
+pub const DURATION_SHARE: f64 = 0.15;
+/// Bounds on `tau`, and on its change from one program to the next.
+const DURATION_BOUND: f64 = 3.0;
+const DURATION_STEP: f64 = 2.0;
+/// Cost per unit of a bound that is not kept: high enough that only bounds that cannot be kept are not.
+const SLACK_COST: f64 = 2000.0;
+/// Force that rows of the friction cone are divided by, N.
+const FORCE_UNIT_N: f64 = 100.0;
+/// Torques below this share of their limit, joints farther than this from theirs (rad), get no row.
+const FAR_TORQUE: f64 = 0.5;
+const FAR_JOINT_RAD: f64 = 0.3;
+
+/// Bounds whose violation is a variable of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// Torques, as shares of their limits.
+    Torque,
+    /// Joint angles, rad.
+    Joint,
+    /// The friction cone, in 100 N.
+    Friction,
+    /// Heights, m.
+    Height,
+}
+
+impl Bound {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Torque, Self::Joint, Self::Friction, Self::Height];
+}
+
+/// Places of the variables.
+#[derive(Clone, Debug)]
+pub struct Layout {
+    pub latent_dim: usize,
+    first: Vec<usize>,
+    durations: usize,
+    slacks: usize,
+}
+
+impl Layout {
+    /// The layout of a seed's program.
+    pub fn new(seed: &Seed<'_>) -> Self {
+        let d = seed.latent_dim;
+        let mut first = Vec::new();
+        let mut next = 0;
+        for part in &seed.parts {
+            first.push(next);
+            next += 3 * d * part.z.len();
+        }
+        Self {
+            latent_dim: d,
+            durations: next,
+            slacks: next + seed.parts.len(),
+            first,
+        }
+    }
+
+    /// Number of variables.
+    pub fn len(&self) -> usize {
+        self.slacks + Bound::ALL.len()
+    }
+
+    /// First of the `3 latent_dim` variables of a node.
+    pub fn node(&self, part: usize, node: usize) -> usize {
+        self.first[part] + 3 * self.latent_dim * node
+    }
+
+    /// The variable of a part's duration.
+    pub fn duration(&self, part: usize) -> usize {
+        self.durations + part
+    }
+
+    /// The violation of a kind of bounds.
+    pub fn slack(&self, bound: Bound) -> usize {
+        self.slacks + bound as usize
+    }
+}
+
+/// Values of a node at an iterate.
+pub struct NodeValues {
+    pub z: DVector<f64>,
+    pub dz: DVector<f64>,
+    pub u_lat: DVector<f64>,
+}
+
+/// A seed, its layout and the settings.
+pub struct Task<'a> {
+    pub seed: &'a Seed<'a>,
+    pub layout: Layout,
+    pub settings: &'a PlanSettings,
+}
+
+impl Task<'_> {
+    /// Duration of a part at an iterate, s.
+    pub fn duration_s(&self, part: usize, y: &[f64]) -> f64 {
+        let tau = y[self.layout.duration(part)];
+        self.seed.parts[part].duration_s * (1.0 + DURATION_SHARE * tau)
+    }
+
+    /// Values of a node at an iterate.
+    pub fn values(&self, part: usize, node: usize, y: &[f64]) -> NodeValues {
+        let d = self.layout.latent_dim;
+        let of = &self.seed.parts[part];
+        let at = self.layout.node(part, node);
+        let std = &self.seed.prior.state_std;
+        let mu = DVector::from_column_slice(&y[at + 2 * d..at + 3 * d]);
+        NodeValues {
+            z: DVector::from_fn(d, |i, _| of.z[node][i] + std[i] * y[at + i]),
+            dz: DVector::from_fn(d, |i, _| of.dz[node][i] + std[d + i] * y[at + d + i]),
+            u_lat: &of.u_lat[node] + &of.root * mu,
+        }
+    }
+
+    /// Mean acceleration over an interval as an expression.
+    pub fn acceleration(&self, part: usize, interval: usize, i: usize) -> Affine {
+        let of = &self.seed.parts[part];
+        let mut sum = Affine::of(of.ddz[interval][i]);
+        for node in [interval, interval + 1] {
+            let at = self.layout.node(part, node);
+            for (column, slope) in of.slope[node].row(i).iter().enumerate() {
+                sum.add(at + column, 0.5 * slope);
+            }
+        }
+        sum
+    }
+
+    /// Latent position `i` of a node.
+    pub fn z(&self, part: usize, node: usize, i: usize) -> Affine {
+        let mut value = Affine::of(self.seed.parts[part].z[node][i]);
+        value.add(
+            self.layout.node(part, node) + i,
+            self.seed.prior.state_std[i],
+        );
+        value
+    }
+
+    /// Latent velocity `i` of a node.
+    pub fn dz(&self, part: usize, node: usize, i: usize) -> Affine {
+        let d = self.layout.latent_dim;
+        let mut value = Affine::of(self.seed.parts[part].dz[node][i]);
+        let variable = self.layout.node(part, node) + d + i;
+        value.add(variable, self.seed.prior.state_std[d + i]);
+        value
+    }
+
+    /// A coordinate of the decoded state at a node.
+    pub fn x(&self, part: usize, node: usize, coordinate: usize) -> Affine {
+        let mut value = Affine::of(self.seed.decode_bias[coordinate]);
+        for i in 0..self.layout.latent_dim {
+            let factor = self.seed.decode[(coordinate, i)];
+            value.add_scaled(&self.z(part, node, i), factor);
+        }
+        value
+    }
+
+    /// A coordinate of the decoded velocity at a node.
+    pub fn dx(&self, part: usize, node: usize, coordinate: usize) -> Affine {
+        let mut value = Affine::default();
+        for i in 0..self.layout.latent_dim {
+            let factor = self.seed.decode[(coordinate, i)];
+            value.add_scaled(&self.dz(part, node, i), factor);
+        }
+        value
+    }
+
+    /// An entry of the lifted input at a node, SI units.
+    pub fn input(&self, part: usize, node: usize, entry: usize) -> Affine {
+        let of = &self.seed.parts[part];
+        let d = self.layout.latent_dim;
+        let row = self.seed.lift.row(entry);
+        let mut value = Affine::of((row * &of.u_lat[node])[0]);
+        let by_mu = row * &of.root;
+        for (i, factor) in by_mu.iter().enumerate() {
+            value.add(self.layout.node(part, node) + 2 * d + i, *factor);
+        }
+        value
+    }
+
+    /// What the joints take at a node of an iterate, N m.
+    pub fn losses(&self, part: usize, node: usize, y: &[f64]) -> [f64; JOINT_DIM] {
+        let d = self.layout.latent_dim;
+        let of = &self.seed.parts[part];
+        let rates = &self.seed.decode * self.values(part, node, y).dz;
+        let last = of.intervals() - 1;
+        let around = [node.saturating_sub(1).min(last), node.min(last)];
+        let mean = DVector::from_fn(d, |i, _| {
+            let both = around.map(|interval| self.acceleration(part, interval, i).at(y));
+            0.5 * (both[0] + both[1])
+        });
+        let accelerations = &self.seed.decode * mean;
+        let first = |v: &DVector<f64>| std::array::from_fn(|i| v[i]);
+        self.seed
+            .rule
+            .losses(&first(&rates), &first(&accelerations))
+    }
+
+    /// The program about an iterate.
+    pub fn program(&self, y: &[f64]) -> ConeProgram {
+        let mut builder = Builder::default();
+        costs::add(self, y, &mut builder);
+        for part in 0..self.seed.parts.len() {
+            self.equations(part, y, &mut builder);
+            self.bounds(part, y, &mut builder);
+        }
+        self.ends(y, &mut builder);
+        for bound in Bound::ALL {
+            let slack = self.layout.slack(bound);
+            builder.linear(slack, SLACK_COST);
+            let mut positive = Affine::default();
+            positive.add(slack, -1.0);
+            builder.at_most(positive);
+        }
+        builder.program(self.layout.len())
+    }
+
+    /// The part's equations, linearised.
+    fn equations(&self, part: usize, y: &[f64], builder: &mut Builder) {
+        let of = &self.seed.parts[part];
+        let d = self.layout.latent_dim;
+        let step = self.duration_s(part, y) / of.intervals() as f64;
+        for interval in 0..of.intervals() {
+            for i in 0..2 * d {
+                let (mut row, rate) = self.equation(part, interval, i, step);
+                // h = h_0 (1 + share tau): the product with the rate, by its slope at the iterate.
+                let tau = self.layout.duration(part);
+                let by_tau = -of.duration_s / of.intervals() as f64 * DURATION_SHARE * rate.at(y);
+                row.add(tau, by_tau);
+                row.constant -= by_tau * y[tau];
+                builder.equal(scaled(row, self.seed.prior.state_std[i]));
+            }
+        }
+        for sign in [-1.0, 1.0] {
+            let tau = self.layout.duration(part);
+            let bound = DURATION_BOUND.min(sign * y[tau] + DURATION_STEP);
+            let mut row = Affine::of(-bound);
+            row.add(tau, sign);
+            builder.at_most(row);
+        }
+    }
+
+    /// The difference that an equation demands to be zero with a step of `step` s, and the rate that
+    /// the step multiplies; `i` below `latent_dim` is a position, above a velocity.
+    fn equation(&self, part: usize, interval: usize, i: usize, step: f64) -> (Affine, Affine) {
+        let d = self.layout.latent_dim;
+        let [here, next] = [interval, interval + 1];
+        let (rate, mut row) = match i.checked_sub(d) {
+            None => {
+                let mut rate = Affine::of(self.seed.parts[part].drift[interval][i]);
+                rate.add_scaled(&self.dz(part, here, i), 0.5);
+                rate.add_scaled(&self.dz(part, next, i), 0.5);
+                let mut row = self.z(part, next, i);
+                row.add_scaled(&self.z(part, here, i), -1.0);
+                (rate, row)
+            }
+            Some(i) => {
+                let mut row = self.dz(part, next, i);
+                row.add_scaled(&self.dz(part, here, i), -1.0);
+                (self.acceleration(part, interval, i), row)
+            }
+        };
+        row.add_scaled(&rate, -step);
+        (row, rate)
+    }
+
+    /// Largest violation of an equation at a point, in standard deviations of its coordinate.
+    pub fn defect(&self, y: &[f64]) -> f64 {
+        let mut worst = 0.0_f64;
+        for (part, of) in self.seed.parts.iter().enumerate() {
+            let step = self.duration_s(part, y) / of.intervals() as f64;
+            for interval in 0..of.intervals() {
+                for i in 0..2 * self.layout.latent_dim {
+                    let (row, _) = self.equation(part, interval, i, step);
+                    worst = worst.max((row.at(y) / self.seed.prior.state_std[i]).abs());
+                }
+            }
+        }
+        let apex = self.apex(y).at(y) / self.seed.prior.goal[1].std;
+        worst.max(apex.abs())
+    }
+
+    /// Start, borders of the parts, apex, end.
+    fn ends(&self, y: &[f64], builder: &mut Builder) {
+        let d = self.layout.latent_dim;
+        let std = &self.seed.prior.state_std;
+        for i in 0..d {
+            let mut position = self.z(0, 0, i);
+            position.constant -= self.seed.start[0][i];
+            builder.equal(scaled(position, std[i]));
+            let mut velocity = self.dz(0, 0, i);
+            velocity.constant -= self.seed.start[1][i];
+            builder.equal(scaled(velocity, std[d + i]));
+        }
+        for part in 1..self.seed.parts.len() {
+            let last = self.seed.parts[part - 1].intervals();
+            for i in 0..d {
+                let mut position = self.z(part, 0, i);
+                position.add_scaled(&self.z(part - 1, last, i), -1.0);
+                builder.equal(scaled(position, std[i]));
+                let mut velocity = self.dz(part, 0, i);
+                velocity.add_scaled(&self.dz(part - 1, last, i), -1.0);
+                builder.equal(scaled(velocity, std[d + i]));
+            }
+        }
+        builder.equal(scaled(self.apex(y), 0.1));
+        let (part, node) = self.last();
+        let mut distance = self.x(part, node, BODY_X);
+        distance.constant -= self.start_x(BODY_X) + self.seed.goal.distance_m();
+        builder.equal(scaled(distance, 0.1));
+        let speed = self.settings.end_speed_m_s;
+        for coordinate in [BODY_X, BODY_Z] {
+            within(
+                builder,
+                &self.dx(part, node, coordinate),
+                [-speed, speed],
+                None,
+            );
+        }
+        let pitch = self.settings.end_pitch_rad;
+        within(builder, &self.x(part, node, PITCH), [-pitch, pitch], None);
+        let [least, most] = self.seed.prior.end_height_m;
+        let slack = self.settings.height_slack_m;
+        let height = self.layout.slack(Bound::Height);
+        let range = [least - slack, most + slack];
+        within(builder, &self.x(part, node, BODY_Z), range, Some(height));
+    }
+
+    /// The last node.
+    pub fn last(&self) -> (usize, usize) {
+        let part = self.seed.parts.len() - 1;
+        (part, self.seed.parts[part].intervals())
+    }
+
+    /// A coordinate at the start, as the decoder has it.
+    pub fn start_x(&self, coordinate: usize) -> f64 {
+        self.seed.decoded(&self.seed.start[0])[coordinate]
+    }
+
+    /// Height that the body reaches by its height and speed at the node of the apex, less the height
+    /// that is wanted; linear about the iterate.
+    fn apex(&self, y: &[f64]) -> Affine {
+        let parts = self.seed.parts.iter();
+        let flight = parts.into_iter().position(|part| !part.is_grounded());
+        let flight = flight.expect("invariant: checked with the model");
+        let count = self.seed.parts[flight].intervals() as f64;
+        let node = (self.settings.apex_at * count).round() as usize;
+        let mut height = self.x(flight, node, BODY_Z);
+        height.constant -= self.start_x(BODY_Z) + self.seed.goal.apex_m();
+        let speed = self.dx(flight, node, BODY_Z);
+        let now = speed.at(y);
+        height.add_scaled(&speed, now.abs() / GRAVITY_M_S2);
+        height.constant -= 0.5 * now * now.abs() / GRAVITY_M_S2;
+        height
+    }
+
+    /// Torques, joints, friction and heights of a part, as far as they are near their bounds.
+    fn bounds(&self, part: usize, y: &[f64], builder: &mut Builder) {
+        let of = &self.seed.parts[part];
+        let robot = self.seed.rule.robot();
+        let landing = part + 1 == self.seed.parts.len();
+        let [torque, joint, friction, height] = Bound::ALL.map(|b| self.layout.slack(b));
+        for node in 0..of.z.len() {
+            let losses = self.losses(part, node, y);
+            for j in 0..JOINT_DIM {
+                let mut command = self.input(part, node, j);
+                command.constant += losses[j];
+                let command = scaled(command, robot.torque_limit_nm()[j]);
+                let share = self.settings.torque_share;
+                let far = -FAR_TORQUE..FAR_TORQUE;
+                near(builder, &command, y, ([-share, share], far), torque);
+                let (least, most) = robot.joint_limit_rad()[j];
+                let far = least + FAR_JOINT_RAD..most - FAR_JOINT_RAD;
+                near(
+                    builder,
+                    &self.x(part, node, j),
+                    y,
+                    ([least, most], far),
+                    joint,
+                );
+            }
+            if of.is_grounded() {
+                self.friction(part, node, friction, builder);
+            }
+            if landing {
+                let least = self.seed.prior.landing_height_m - self.settings.height_slack_m;
+                let mut low = Affine::of(least);
+                low.add_scaled(&self.x(part, node, BODY_Z), -1.0);
+                low.add(height, -1.0);
+                if low.at(y) > -0.04 {
+                    builder.at_most(low);
+                }
+            }
+        }
+    }
+
+    fn friction(&self, part: usize, node: usize, slack: usize, builder: &mut Builder) {
+        let [forwards, up] = [JOINT_DIM, JOINT_DIM + 2];
+        for sign in [-1.0, 1.0] {
+            let mut row = Affine::of(-self.settings.friction_slack_n / FORCE_UNIT_N);
+            let force = self.input(part, node, forwards);
+            row.add_scaled(&force, sign / FORCE_UNIT_N);
+            let normal = self.input(part, node, up);
+            row.add_scaled(&normal, -self.settings.friction / FORCE_UNIT_N);
+            row.add(slack, -1.0);
+            builder.at_most(row);
+        }
+    }
+
+    /// The variables of the prior itself: all zero.
+    pub fn prior_point(&self) -> Vec<f64> {
+        vec![0.0; self.layout.len()]
+    }
+}
+
+fn scaled(mut expression: Affine, unit: f64) -> Affine {
+    expression.constant /= unit;
+    for (_, factor) in &mut expression.terms {
+        *factor /= unit;
+    }
+    expression
+}
+
+/// Rows that keep an expression in a range, with a violation if there is a variable for it.
+fn within(builder: &mut Builder, value: &Affine, range: [f64; 2], slack: Option<usize>) {
+    for (sign, bound) in [(-1.0, -range[0]), (1.0, range[1])] {
+        let mut row = Affine::of(-bound);
+        row.add_scaled(value, sign);
+        if let Some(slack) = slack {
+            row.add(slack, -1.0);
+        }
+        builder.at_most(row);
+    }
+}
+
+/// The same rows where the expression is not inside `far` at the iterate.
+fn near(
+    builder: &mut Builder,
+    value: &Affine,
+    y: &[f64],
+    (range, far): ([f64; 2], std::ops::Range<f64>),
+    slack: usize,
+) {
+    let now = value.at(y);
+    for (sign, bound, is_near) in [
+        (-1.0, -range[0], now < far.start),
+        (1.0, range[1], now > far.end),
+    ] {
+        if is_near {
+            let mut row = Affine::of(-bound);
+            row.add_scaled(value, sign);
+            row.add(slack, -1.0);
+            builder.at_most(row);
+        }
+    }
+}

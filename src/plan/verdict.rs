@@ -1,0 +1,119 @@
+//! Whether to trust a plan.
+
+use super::motion::Margins;
+use super::settings::PlanSettings;
+use super::transcribe::Bound;
+
+/// Violation of a bound at the nodes that counts as none, in its unit.
+const NO_SLACK: f64 = 2e-3;
+/// Farthest outside a joint's limit between nodes, rad.
+const NO_JOINT: f64 = 2e-3;
+/// Force outside the friction cone between nodes beyond that allowed at them, N.
+const NO_FRICTION_N: f64 = 2.0;
+
+/// What a plan is worth.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Verdict {
+    /// Within what the recordings carry.
+    Trusted,
+    /// Beyond the recordings, with the reasons: it may miss its goal.
+    Extrapolates(Vec<String>),
+    /// Not to be carried out, with the reasons.
+    Refused(Vec<String>),
+}
+
+impl Verdict {
+    /// One word: `trusted`, `extrapolates`, `refused`.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Trusted => "trusted",
+            Self::Extrapolates(_) => "extrapolates",
+            Self::Refused(_) => "refused",
+        }
+    }
+
+    /// The reasons; none for a trusted plan.
+    pub fn reasons(&self) -> &[String] {
+        match self {
+            Self::Trusted => &[],
+            Self::Extrapolates(reasons) | Self::Refused(reasons) => reasons,
+        }
+    }
+}
+
+/// What is known of a plan.
+pub struct Findings<'a> {
+    pub input_deviation: f64,
+    pub slack: [(Bound, f64); 4],
+    pub margins: &'a Margins,
+    /// Widths of the recorded ranges that distance and apex are beyond them.
+    pub outside: [f64; 2],
+}
+
+/// The verdict over the findings.
+pub fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
+    let mut refused = Vec::new();
+    for (bound, slack) in found.slack {
+        if slack > NO_SLACK {
+            refused.push(match bound {
+                Bound::Torque => format!(
+                    "it would take torques {:.0} % beyond the share of the limits that plans may use",
+                    100.0 * slack
+                ),
+                Bound::Joint => format!("joints would leave their limits by {slack:.3} rad"),
+                Bound::Friction => format!(
+                    "the feet would slip: the force leaves the friction cone by {:.0} N",
+                    100.0 * slack
+                ),
+                Bound::Height => format!("the body would be {slack:.3} m too low or high in the landing"),
+            });
+        }
+    }
+    let margins = found.margins;
+    if margins.torque_share > 1.0 {
+        let share = 100.0 * margins.torque_share;
+        refused.push(format!(
+            "torques reach {share:.0} % of their limits between nodes"
+        ));
+    }
+    if margins.beyond_joint_limit_rad > NO_JOINT {
+        let beyond = margins.beyond_joint_limit_rad;
+        refused.push(format!(
+            "a joint is {beyond:.3} rad beyond its limit between nodes"
+        ));
+    }
+    if margins.beyond_friction_n > settings.friction_slack_n + NO_FRICTION_N {
+        let beyond = margins.beyond_friction_n;
+        refused.push(format!(
+            "the force is {beyond:.0} N outside the friction cone between nodes"
+        ));
+    }
+    if found.input_deviation > settings.refuse_deviation {
+        refused.push(format!(
+            "its input is {:.1} standard deviations from what was recorded, more than {}",
+            found.input_deviation, settings.refuse_deviation
+        ));
+    }
+    if !refused.is_empty() {
+        return Verdict::Refused(refused);
+    }
+    let mut reasons = Vec::new();
+    for (what, outside) in ["distance", "apex"].into_iter().zip(found.outside) {
+        if outside > 0.0 {
+            let share = 100.0 * outside;
+            reasons.push(format!(
+                "the {what} is beyond the recorded jumps by {share:.0} % of their range"
+            ));
+        }
+    }
+    if found.input_deviation > settings.warn_deviation {
+        reasons.push(format!(
+            "its input is {:.1} standard deviations from what was recorded",
+            found.input_deviation
+        ));
+    }
+    match reasons.is_empty() {
+        true => Verdict::Trusted,
+        false => Verdict::Extrapolates(reasons),
+    }
+}
