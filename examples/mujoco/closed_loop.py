@@ -18,6 +18,7 @@ from closed_loop_table import missed_aims, summary, table
 from film_strip import render
 from followers import Jump, LatentMpc, Replay, TorquesOnly, WithoutFeedback
 from jump_sets import recorded_floor
+from model_inputs import ModelInputs
 from perturbations import NOMINAL, PERTURBATIONS, Motors, perturbed_simulation
 from recording_format import read_recording, states_of
 from robot_model import RobotModel
@@ -65,13 +66,14 @@ FOLLOWERS = {
 
 @dataclass(frozen=True)
 class Controlled:
-    """A model by name, its generated controller, that of its uninformed copy, and the copy's
-    gains by phase."""
+    """A model by name, its generated controller, that of its uninformed copy, the copy's gains by
+    phase, and the rule of the model's inputs."""
 
     name: str
     crate: pathlib.Path
     uninformed_crate: pathlib.Path
     gains: dict
+    inputs: ModelInputs
 
 
 @dataclass
@@ -238,10 +240,11 @@ def controlled(path, arguments):
     folder = arguments.out_dir / "controllers"
     copy = folder / f"{path.stem}-uninformed.json"
     training = sorted(TRAINING.glob("train_*.csv.gz"))
-    gains = write_uninformed(path, copy, training, RobotModel(ROBOT))
+    inputs = ModelInputs.compiled(path, folder / f"{path.stem}-inputs", arguments.romc)
+    gains = write_uninformed(path, copy, training, inputs.of)
     crate = romc_controller.build(path, folder / path.stem, arguments.romc)
     uninformed_crate = romc_controller.build(copy, folder / copy.stem, arguments.romc)
-    return Controlled(path.stem, crate, uninformed_crate, gains)
+    return Controlled(path.stem, crate, uninformed_crate, gains, inputs)
 
 
 def jumps_in(folder, arguments):
@@ -272,9 +275,9 @@ def read_jump(path):
 
 
 @functools.cache
-def recorded_input(path):
-    """(rows, 18) input of a recorded jump, as `Jump.inputs`."""
-    return read_jump(path).inputs(RobotModel(ROBOT))
+def recorded_input(path, inputs):
+    """(rows, 18) input of a recorded jump by the rule of a model."""
+    return inputs.of(read_jump(path))
 
 
 def run(task):
@@ -335,7 +338,7 @@ def make_controller(follower_name, model, settings, path):
         setattr(chosen, name, kind(number))
     controller = module.Controller(chosen)
     jump = read_jump(path)
-    u = recorded_input(path) if driver.recorded_input else None
+    u = recorded_input(path, model.inputs) if driver.recorded_input else None
     controller.set_reference(jump.time_s, jump.x, jump.dx, u, jump.feet)
     return controller
 

@@ -36,24 +36,6 @@ class Jump:
         row = int((time_s - self.time_s[0]) / CONTROL_STEP_S + 1e-6)
         return min(max(row, 0), len(self.time_s) - 1)
 
-    def inputs(self, robot):
-        """(rows, 18): torques, and force and moment on the trunk of the feet in contact."""
-        rows = zip(self.x, self.torque_nm, self.feet, strict=True)
-        return np.array([np.concatenate([tau, body_wrench(robot, x, tau, c)]) for x, tau, c in rows])
-
-
-def body_wrench(robot, x, torque_nm, feet):
-    """(6,) force and moment that the torques make, trunk axes: sums of F = -J^-T tau and p x F over
-    the feet in contact, p the foot in its own hip frame, as romc has it in `Robot::body_wrench`."""
-    wrench = np.zeros(6)
-    for leg in np.flatnonzero(feet):
-        joints = slice(3 * leg, 3 * leg + 3)
-        jacobian = robot.foot_jacobian(leg, x[joints])
-        force = -np.linalg.solve(jacobian.T, torque_nm[joints])
-        arm = robot.foot_position(leg, x[joints])
-        wrench += np.concatenate([force, np.cross(arm, force)])
-    return wrench
-
 
 class Follower:
     """Feed-forward torque plus joint PD; `plan` is asked every 10 ms for both."""

@@ -17,11 +17,15 @@ from simulation import CONTROL_STEP_S
 DIFFERENCE_SAMPLES = 10
 
 
-def write_uninformed(model_path, output, recordings, robot):
-    """Writes the copy of a model file; returns {phase: g}. Shapes as in the model file."""
+def write_uninformed(model_path, output, recordings, inputs):
+    """Writes the copy of a model file; returns {phase: g}. Shapes as in the model file.
+
+    `inputs` gives the (rows, 18) input of a Jump by the model's rule. The copy keeps the prior of the
+    training jumps, but not how accelerations change about it.
+    """
     model = json.loads(model_path.read_text(encoding="utf-8"))
     latent_dim = model["latent_dim"]
-    samples = [scaled_samples(model_path, model, path, robot) for path in recordings]
+    samples = [scaled_samples(model_path, model, path, inputs) for path in recordings]
     gains = {}
     for phase in model["phases"]:
         chosen = [(ddz[of], u[of]) for ddz, u, feet in samples for of in [in_phase(phase, feet)]]
@@ -31,6 +35,8 @@ def write_uninformed(model_path, output, recordings, robot):
         gains[phase["name"]] = float((ddz * u).sum() / (u * u).sum())
         phase["xi"] = (gains[phase["name"]] * np.eye(latent_dim)).tolist()
     model["library"] = [f"u{k + 1}" for k in range(latent_dim)]
+    for part in model.get("prior", {}).get("parts", []):
+        part.pop("xi", None)
     model["name"] = f"{model['name']}-uninformed"
     model["description"] = "the same maps, ddz = g u_lat in place of the dynamics"
     output.parent.mkdir(parents=True, exist_ok=True)
@@ -38,7 +44,7 @@ def write_uninformed(model_path, output, recordings, robot):
     return gains
 
 
-def scaled_samples(model_path, model, recording, robot):
+def scaled_samples(model_path, model, recording, inputs):
     """(rows, d) ddz, (rows, d) u_lat, (rows, 4) feet of a recording, both scaled."""
     if set(model["encoder"]) != {"weights", "bias"}:
         raise SystemExit(f"{model_path}: the encoder has layers, not one matrix of weights")
@@ -50,7 +56,7 @@ def scaled_samples(model_path, model, recording, robot):
     rows = slice(half, -half)
     span_s = 2 * half * CONTROL_STEP_S
     ddx = (dx[2 * half :] - dx[: -2 * half]) / span_s
-    u = jump.inputs(robot)[rows] * model["scaling"]["input"]
+    u = inputs(jump)[rows] * model["scaling"]["input"]
     ddz = model["scaling"]["state"] * ddx @ encoder.T
     return ddz, u @ np.linalg.pinv(encoder.T).T, feet[rows]
 

@@ -1,0 +1,69 @@
+"""Inputs of a jump by the rule of a model: what its controller takes as `u` of a reference.
+
+The model's own generated C is the rule: `NAME_generalised_input`, compiled with `cc` and called
+through ctypes. It takes off what friction takes of the motors' torques; what the inertia of the
+motors takes is taken off here, as romc does with recordings: from accelerations averaged over 11
+samples of equal contact.
+"""
+
+import ctypes
+import json
+import pathlib
+import subprocess
+from dataclasses import dataclass
+
+import numpy as np
+
+WINDOW = 11
+
+
+@dataclass(frozen=True)
+class ModelInputs:
+    """The rule of a model: its name in C, the compiled library, the motors' inertia (kg m^2)."""
+
+    name: str
+    library: pathlib.Path
+    armature: tuple
+
+    @classmethod
+    def compiled(cls, model_path, folder, romc):
+        """The rule of a model file; its C is compiled into `folder`."""
+        folder.mkdir(parents=True, exist_ok=True)
+        emit = [romc, "compile", model_path, "--emit", "c", "--out-dir", folder, "--force"]
+        subprocess.run([str(part) for part in emit], check=True, stdout=subprocess.DEVNULL)
+        (header,) = folder.glob("*.h")
+        library = folder / f"lib{header.stem}.so"
+        compile_c = ["cc", "-O2", "-shared", "-fPIC", str(header.with_suffix(".c")), "-lm"]
+        subprocess.run([*compile_c, "-o", str(library)], check=True)
+        model = json.loads(pathlib.Path(model_path).read_text(encoding="utf-8"))
+        armature = model.get("actuators", {}).get("armature", [0.0] * 12)
+        return cls(header.stem, library, tuple(armature))
+
+    def of(self, jump):
+        """(rows, 18) input of a jump with `time_s`, `x`, `dx`, `torque_nm` and `feet`."""
+        function = getattr(ctypes.CDLL(str(self.library)), f"{self.name}_generalised_input")
+        function.restype = None
+        pointer = ctypes.POINTER(ctypes.c_double)
+        tau = jump.torque_nm - np.array(self.armature) * smoothed_accelerations(jump)
+        u = np.zeros((len(tau), 18))
+        columns = [np.ascontiguousarray(c, dtype=float) for c in (jump.x, jump.dx, tau, jump.feet)]
+        for row in range(len(u)):
+            arguments = [column[row].ctypes.data_as(pointer) for column in columns]
+            function(*arguments, u[row].ctypes.data_as(pointer))
+        return u
+
+
+def smoothed_accelerations(jump):
+    """(rows, 12) joint accelerations, averaged within stretches of equal contact."""
+    step_s = jump.time_s[1] - jump.time_s[0]
+    rates = jump.dx[:, :12]
+    ddq = np.vstack([np.diff(rates, axis=0), np.zeros((1, 12))]) / step_s
+    ddq[-1] = ddq[-2]
+    down = jump.feet.any(axis=1)
+    borders = [0, *(np.flatnonzero(np.diff(down)) + 1), len(down)]
+    smooth = np.zeros_like(ddq)
+    for start, end in zip(borders, borders[1:]):
+        for row in range(start, end):
+            reach = min(WINDOW // 2, row - start, end - 1 - row)
+            smooth[row] = ddq[row - reach : row + reach + 1].mean(axis=0)
+    return smooth
