@@ -6,31 +6,19 @@ use serde::{Deserialize, Serialize};
 use super::error::{ArtifactError, refused};
 use super::manifest::Rows;
 use super::matrices::{from_rows, to_rows};
-use crate::model::{
-    FEATURE_DIM, GOAL_DIM, GoalRange, JumpPart, JumpPrior, ModelError, Phase, ReducedModel,
-};
+use crate::model::{FEATURE_DIM, GOAL_DIM, JumpPart, JumpPrior, ModelError, Phase, ReducedModel};
 use crate::robot::FOOT_DIM;
 
 /// Where jumps are cut, and what the training jumps were.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LandmarksEntry {
-    distance_m: RangeEntry,
-    apex_m: RangeEntry,
-    start_height_m: RangeEntry,
+    /// Distance, rise at the apex and height at the start of each training jump, m.
+    jumps: Vec<[f64; GOAL_DIM]>,
     start: Vec<f64>,
     end_height_m: [f64; 2],
     landing_height_m: f64,
     parts: Vec<LandmarkEntry>,
-}
-
-#[derive(Clone, Copy, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RangeEntry {
-    mean: f64,
-    std: f64,
-    least: f64,
-    most: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -68,12 +56,6 @@ pub(super) fn entries_of(model: &ReducedModel) -> (Option<LandmarksEntry>, Optio
     let Ok(prior) = model.jump_prior() else {
         return (None, None);
     };
-    let range = |range: GoalRange| RangeEntry {
-        mean: range.mean,
-        std: range.std,
-        least: range.least,
-        most: range.most,
-    };
     let landmark = |part: &JumpPart| LandmarkEntry {
         name: part.name.clone(),
         phase: model.phases()[part.phase].name.clone(),
@@ -89,11 +71,8 @@ pub(super) fn entries_of(model: &ReducedModel) -> (Option<LandmarksEntry>, Optio
         input_covariance: to_rows(&part.input_covariance),
         acceleration_std: part.acceleration_std.as_slice().to_vec(),
     };
-    let [distance_m, apex_m, start_height_m] = prior.goal.map(range);
     let landmarks = LandmarksEntry {
-        distance_m,
-        apex_m,
-        start_height_m,
+        jumps: prior.jumps.clone(),
         start: prior.start.as_slice().to_vec(),
         end_height_m: prior.end_height_m,
         landing_height_m: prior.landing_height_m,
@@ -169,18 +148,8 @@ pub(super) fn prior_of(
             acceleration_std: DVector::from_vec(entry.acceleration_std),
         });
     }
-    let ranges: [RangeEntry; GOAL_DIM] = [
-        landmarks.distance_m,
-        landmarks.apex_m,
-        landmarks.start_height_m,
-    ];
     Ok(Some(JumpPrior {
-        goal: ranges.map(|range| GoalRange {
-            mean: range.mean,
-            std: range.std,
-            least: range.least,
-            most: range.most,
-        }),
+        jumps: landmarks.jumps,
         start: DVector::from_vec(landmarks.start),
         state_std: DVector::from_vec(prior.state_std),
         end_height_m: landmarks.end_height_m,

@@ -35,6 +35,35 @@ pub struct GoalRange {
     pub most: f64,
 }
 
+/// Standard deviation of numbers that hardly differ: they say nothing of how jumps depend on them, m.
+const LEAST_STD_M: f64 = 1e-3;
+
+impl GoalRange {
+    /// Ranges over jumps.
+    pub fn of(jumps: &[[f64; GOAL_DIM]]) -> [Self; GOAL_DIM] {
+        std::array::from_fn(|i| {
+            let values = || jumps.iter().map(|jump| jump[i]);
+            let n = jumps.len().max(1) as f64;
+            let mean = values().sum::<f64>() / n;
+            let square: f64 = values().map(|value| (value - mean).powi(2)).sum();
+            Self {
+                mean,
+                std: (square / n).sqrt().max(LEAST_STD_M),
+                least: values().fold(f64::INFINITY, f64::min),
+                most: values().fold(f64::NEG_INFINITY, f64::max),
+            }
+        })
+    }
+
+    /// Features of a goal in m: one, and its numbers normalised.
+    pub fn features(ranges: &[Self; GOAL_DIM], goal: &[f64; GOAL_DIM]) -> GoalFeatures {
+        std::array::from_fn(|k| match k.checked_sub(1) {
+            None => 1.0,
+            Some(i) => (goal[i] - ranges[i].mean) / ranges[i].std,
+        })
+    }
+}
+
 /// A part of a jump and its prior; `n` nodes, the first and last at its borders.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JumpPart {
@@ -88,8 +117,8 @@ impl JumpPart {
 /// Landmarks and prior of a model's training jumps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JumpPrior {
-    /// Distance, rise at the apex, height at the start.
-    pub goal: [GoalRange; GOAL_DIM],
+    /// What the training jumps reached: distance, rise at the apex, height at the start, m.
+    pub jumps: Vec<[f64; GOAL_DIM]>,
     /// Mean state at the start of the jumps, 18, SI units.
     pub start: DVector<f64>,
     /// Standard deviations of `z`, then of `dz`, over all samples, `2 latent_dim`.
@@ -103,25 +132,23 @@ pub struct JumpPrior {
 }
 
 impl JumpPrior {
+    /// Ranges of distance, rise and height at the start.
+    pub fn ranges(&self) -> [GoalRange; GOAL_DIM] {
+        GoalRange::of(&self.jumps)
+    }
+
     /// Features of a goal in m.
     pub fn features(&self, goal: [f64; GOAL_DIM]) -> GoalFeatures {
-        std::array::from_fn(|k| match k.checked_sub(1) {
-            None => 1.0,
-            Some(i) => (goal[i] - self.goal[i].mean) / self.goal[i].std,
-        })
+        GoalRange::features(&self.ranges(), &goal)
     }
 
     /// Complains unless every table fits the model's dimensions and phases and every number is one.
     pub(super) fn check(&self, d: usize, phases: &[Phase]) -> Result<(), ModelError> {
-        let goals = ["distance", "apex", "start height"];
-        for (range, name) in self.goal.iter().zip(goals) {
-            let ordered = range.least <= range.most && range.std > 0.0;
-            let numbers = [range.mean, range.std, range.least, range.most];
-            if !ordered || numbers.iter().any(|v| !v.is_finite()) {
-                let expected = "finite numbers, a positive std, least up to most";
-                let place = format!("`landmarks.goal`, {name}");
-                return Err(ModelError::invalid(place, format!("{range:?}"), expected));
-            }
+        let numbers = self.jumps.iter().flatten();
+        if self.jumps.len() < 2 || numbers.clone().any(|v| !(v.is_finite() && v.abs() < 1e3)) {
+            let found = format!("{} jumps, or numbers that are none", self.jumps.len());
+            let expected = "2 or more, all numbers below 1000 m";
+            return Err(ModelError::invalid("`landmarks.jumps`", found, expected));
         }
         check_vector("landmarks.start", &self.start, STATE_DIM)?;
         check_vector("prior.state_std", &self.state_std, 2 * d)?;

@@ -79,7 +79,7 @@ impl Goal {
     ) -> Result<(), PlanError> {
         let names = ["distance", "apex", "height at the start"];
         let values = [self.distance_m, self.apex_m, start_height_m];
-        for ((found, range), what) in values.into_iter().zip(&prior.goal).zip(names) {
+        for ((found, range), what) in values.into_iter().zip(prior.ranges()).zip(names) {
             let width = (range.most - range.least).max(0.02);
             let [least, most] = [range.least - reach * width, range.most + reach * width];
             if !(least..=most).contains(&found) {
@@ -108,7 +108,7 @@ impl Goal {
     ) -> [f64; GOAL_DIM] {
         let values = [self.distance_m, self.apex_m, start_height_m];
         std::array::from_fn(|i| {
-            let range = &prior.goal[i];
+            let range = &prior.ranges()[i];
             let inset = share * (range.most - range.least);
             values[i].clamp(range.least + inset, range.most - inset)
         })

@@ -46,7 +46,7 @@ pub fn reach(
 ) -> Result<Reach, PlanError> {
     let prior = model.jump_prior()?;
     let axis = |i: usize| -> Vec<f64> {
-        let range = &prior.goal[i];
+        let range = &prior.ranges()[i];
         let width = range.most - range.least;
         let (least, most) = (range.least - BEYOND * width, range.most + BEYOND * width);
         let steps = (GRID[i] - 1) as f64;

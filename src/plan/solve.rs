@@ -167,7 +167,7 @@ fn input_deviation(task: &Task<'_>, y: &[f64]) -> f64 {
 /// How far a goal is beyond the training jumps, in widths of their range; zero inside.
 fn outside(seed: &Seed<'_>, goal_m: [f64; 2]) -> [f64; 2] {
     std::array::from_fn(|i| {
-        let range = &seed.prior.goal[i];
+        let range = &seed.prior.ranges()[i];
         let width = (range.most - range.least).max(f64::MIN_POSITIVE);
         let beyond = (range.least - goal_m[i]).max(goal_m[i] - range.most);
         beyond.max(0.0) / width

@@ -23,7 +23,7 @@ use nalgebra::DVector;
 
 use super::affine::{Affine, Builder};
 use super::costs;
-use super::seed::{BODY_X, BODY_Z, PITCH, Seed, SeedPart};
+use super::seed::{BODY_X, BODY_Z, PITCH, Seed};
 use super::settings::PlanSettings;
 use crate::mpc::ConeProgram;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM};
@@ -305,7 +305,7 @@ impl Task<'_> {
                 }
             }
         }
-        let apex = self.apex(y).at(y) / self.seed.prior.goal[1].std;
+        let apex = self.apex(y).at(y) / self.seed.prior.ranges()[1].std;
         worst.max(apex.abs())
     }
 

@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::regression::GoalRegression;
-use super::{PartNodes, Sampled, features};
+use super::{PartNodes, Sampled};
 use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange};
 
 /// Ridge relative to the variance of each column.
@@ -92,7 +92,7 @@ impl Fit<'_> {
     /// Variables, one row per interval and `3 d` columns, and accelerations of a jump about a prior.
     fn deviations(&self, prior: &PriorTables, jump: &Sampled) -> (DMatrix<f64>, DMatrix<f64>) {
         let nodes = &jump.parts[self.part];
-        let features = features(self.goal, &jump.goal);
+        let features = GoalRange::features(self.goal, &jump.goal);
         let at = |table: &DMatrix<f64>| {
             let d = table.ncols() / FEATURE_DIM;
             let blocks = features.iter().enumerate();

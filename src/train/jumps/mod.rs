@@ -16,7 +16,7 @@ use super::dataset::Dataset;
 use super::error::TrainError;
 use super::latent::Latent;
 use super::metrics::{BODY_X, BODY_Z};
-use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange, JumpPart, JumpPrior, StateMap};
+use crate::model::{GOAL_DIM, GoalRange, JumpPart, JumpPrior, StateMap};
 use deviations::{Deviations, fit_deviations};
 use landmarks::{Cut, Landmark, commonest_kind};
 use nodes::{PartNodes, intervals, sample};
@@ -72,12 +72,13 @@ pub fn jump_prior(training: &Dataset, encoder: &StateMap) -> Result<Option<JumpP
         .collect();
     let translation = affine.weights().column(BODY_X).into_owned();
     let ends = Ends::of(training, &chosen);
-    let goal = ranges(&sampled);
+    let jumps: Vec<_> = sampled.iter().map(|jump| jump.goal).collect();
+    let goal = GoalRange::of(&jumps);
     Ok(Some(JumpPrior {
         parts: (0..kind.len())
             .map(|part| part_of(&sampled, &goal, &kind[part], part, &translation))
             .collect(),
-        goal,
+        jumps,
         start: ends.start.map(rounded),
         state_std: state_std(&latent, &chosen).map(rounded),
         end_height_m: ends.end_height_m.map(rounded),
@@ -95,23 +96,7 @@ fn goal_of(training: &Dataset, jump: usize) -> [f64; GOAL_DIM] {
         row.max() - row[0],
         row[0],
     ]
-}
-
-fn ranges(sampled: &[Sampled]) -> [GoalRange; GOAL_DIM] {
-    /// Jumps that differ less in a number of the goal say nothing of how they depend on it, m.
-    const LEAST_STD_M: f64 = 1e-3;
-    std::array::from_fn(|i| {
-        let values: Vec<f64> = sampled.iter().map(|jump| jump.goal[i]).collect();
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-        GoalRange {
-            mean: rounded(mean),
-            std: rounded((square / n).sqrt().max(LEAST_STD_M)),
-            least: rounded(values.iter().copied().fold(f64::INFINITY, f64::min)),
-            most: rounded(values.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
-        }
-    })
+    .map(rounded)
 }
 
 fn part_of(
@@ -225,14 +210,6 @@ fn state_std(latent: &[Latent], chosen: &[(usize, &Cut)]) -> DVector<f64> {
 fn rounded(value: f64) -> f64 {
     let text = format!("{value:.*e}", DIGITS - 1);
     text.parse().expect("a printed number")
-}
-
-/// Features of a goal, as [`JumpPrior::features`].
-fn features(goal: &[GoalRange; GOAL_DIM], of: &[f64; GOAL_DIM]) -> [f64; FEATURE_DIM] {
-    std::array::from_fn(|k| match k.checked_sub(1) {
-        None => 1.0,
-        Some(i) => (of[i] - goal[i].mean) / goal[i].std,
-    })
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Sampled, features};
+use super::Sampled;
 use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange};
 
 /// Ridge on the coefficients of the goal's numbers, which have unit variance; the constant is free.
@@ -26,7 +26,7 @@ impl GoalRegression {
         goal: &[GoalRange; GOAL_DIM],
     ) -> Self {
         let columns: Vec<DVector<f64>> = goals
-            .map(|of| DVector::from_column_slice(&features(goal, of)))
+            .map(|of| DVector::from_column_slice(&GoalRange::features(goal, of)))
             .collect();
         let phi = DMatrix::from_columns(&columns);
         let ridge = DVector::from_fn(FEATURE_DIM, |k, _| if k == 0 { 0.0 } else { RIDGE });
