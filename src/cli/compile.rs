@@ -9,12 +9,13 @@ use super::Answer;
 use super::args::{CodeArguments, CompileArguments, EquationArguments, UnitsChoice};
 use super::output::check_output;
 use super::simplification::{self, exact_words};
-use crate::deploy::{self, EmitOptions, Target};
+use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::{EquationForm, Equations, PhaseEquations};
 use crate::files::EmittedFile;
 use crate::files::Overwrite;
+use crate::model::ReducedModel;
 use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
-use crate::{Error, artifact};
+use crate::{Error, artifact, recording};
 
 /// Compiles a model into a folder.
 ///
@@ -38,9 +39,10 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let approximate = simplified.as_ref().map(|_| Equations::in_form(model, form));
     let equations = approximate.as_ref().unwrap_or(&exact);
     let unless_given = (simplified.as_ref()).map_or(Rounding::default(), |s| s.rounding());
+    let plan = planned(arguments, model)?;
     let mut files = emit(
         equations,
-        &arguments.emit,
+        (&arguments.emit, plan),
         &arguments.code,
         &arguments.equations,
         unless_given,
@@ -121,6 +123,34 @@ fn rounding(equations: &EquationArguments, unless_given: Rounding) -> Rounding {
     }
 }
 
+/// The jump of `--plan` with its inputs by the rule of the model: the first segment of the recording.
+///
+/// # Errors
+/// [`Error::Config`] without a controller that would jump it, [`Error::Recording`], [`Error::Model`].
+fn planned(
+    arguments: &CompileArguments,
+    model: &ReducedModel,
+) -> Result<Option<PlannedJump>, Error> {
+    let Some(path) = &arguments.plan else {
+        return Ok(None);
+    };
+    if !arguments.emit.contains(&Target::Controller) {
+        return Err(Error::Config {
+            path: path.clone(),
+            message: "--plan without a target that jumps it; add --emit controller".to_owned(),
+        });
+    }
+    let mut recording = recording::read(path)?;
+    let motion = recording.segments.swap_remove(0);
+    Ok(Some(PlannedJump {
+        u: motion.input(&model.input_rule()?)?,
+        time_s: motion.time_s,
+        x: motion.x,
+        dx: motion.dx,
+        feet: motion.feet,
+    }))
+}
+
 /// The files of the targets, in memory, with the model's digest in their headers; `unless_given` is
 /// how coefficients are printed unless the arguments give it.
 ///
@@ -129,7 +159,7 @@ fn rounding(equations: &EquationArguments, unless_given: Rounding) -> Rounding {
 /// cannot be used.
 pub fn emit(
     model_equations: &Equations<'_>,
-    targets: &[Target],
+    (targets, plan): (&[Target], Option<PlannedJump>),
     code: &CodeArguments,
     equations: &EquationArguments,
     unless_given: Rounding,
@@ -139,6 +169,7 @@ pub fn emit(
         precision: code.precision,
         sines: code.sincos,
         units: code.units.of_interface(),
+        plan,
         print: PrintOptions {
             rounding: rounding(equations, unless_given),
             width_em: equations.width,

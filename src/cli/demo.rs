@@ -64,7 +64,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let targets = [Target::Latex, Target::C, Target::Rust];
     let mut files = compile::emit(
         &Equations::of(&model),
-        &targets,
+        (&targets, None),
         &CodeArguments::default(),
         &EquationArguments::default(),
         Rounding::default(),

@@ -8,12 +8,14 @@ use serde_json::{Map, Value, json};
 
 use super::Answer;
 use super::args::PlanArguments;
-use super::output::{check_output, progress_bar, spinner};
+use super::output::{check_output, names, progress_bar, spinner};
 use super::train_settings::refused;
-use crate::files::Overwrite;
+use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
 use crate::plan::{self, Goal, Plan, PlanSettings, Reach, Verdict};
 use crate::recording::{self, Recording};
+use crate::report::figures::{Figure, figure_files};
+use crate::report::{plan_figures, reach_figure};
 use crate::typeset::{Cell, Table};
 use crate::{Error, artifact};
 
@@ -59,7 +61,32 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
         recording::write(path, &recording)?;
         let _ = writeln!(answer.text, "\nthe plan: {}", path.display());
     }
+    draw(
+        arguments,
+        &plan_figures(&planned, model.robot()?),
+        &mut answer,
+    )?;
     Ok(answer)
+}
+
+/// Writes figures, if a folder for them is given.
+///
+/// # Errors
+/// [`Error::Folder`] for files there that romc did not make.
+fn draw(arguments: &PlanArguments, figures: &[Figure], answer: &mut Answer) -> Result<(), Error> {
+    let Some(folder) = &arguments.figures else {
+        return Ok(());
+    };
+    let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
+    let written = write_files(folder, &files, Overwrite::when_forced(arguments.force))?;
+    let _ = writeln!(
+        answer.text,
+        "{} figures: {}",
+        figures.len(),
+        folder.display()
+    );
+    answer.json["figures"] = names(&written).into();
+    Ok(())
 }
 
 /// The settings of a file, or the defaults.
@@ -187,7 +214,10 @@ fn map(
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
-    Ok(reach_answer(arguments, &reach))
+    let mut answer = reach_answer(arguments, &reach);
+    let figure = reach_figure(&reach, model.jump_prior()?);
+    draw(arguments, &[figure], &mut answer)?;
+    Ok(answer)
 }
 
 fn reach_answer(arguments: &PlanArguments, reach: &Reach) -> Answer {

@@ -4,6 +4,7 @@ use clap::ValueEnum as _;
 
 use super::controller;
 use super::error::EmitError;
+use super::planned::PlannedJump;
 use crate::codegen::script::{matlab, python};
 use crate::codegen::{Precision, SineCosine, Units, c, interface::ModelInterface, rust};
 use crate::equations::Equations;
@@ -61,6 +62,8 @@ pub struct EmitOptions {
     pub sines: SineCosine,
     /// Units of robot coordinates in generated code.
     pub units: Units,
+    /// The jump of a controller's example.
+    pub plan: Option<PlannedJump>,
 }
 
 /// The files of the chosen targets, each with its path below the output folder; a target that is chosen
@@ -99,7 +102,12 @@ pub fn emit(
             Target::Latex => latex::emit(equations, &options.print)?,
             Target::Markdown => markdown::emit(equations, &options.print)?,
             Target::Mathml => mathml::emit(equations, &options.print)?,
-            Target::Controller => controller::emit(equations, &options.lower, &provenance)?,
+            Target::Controller => controller::emit(
+                equations,
+                &options.lower,
+                &provenance,
+                options.plan.as_ref(),
+            )?,
         });
     }
     Ok(files)

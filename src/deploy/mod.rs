@@ -7,6 +7,8 @@
 mod controller;
 mod emit;
 mod error;
+mod planned;
 
 pub use emit::{EmitOptions, Target, emit};
 pub use error::EmitError;
+pub use planned::PlannedJump;

@@ -11,6 +11,7 @@ pub mod figures;
 mod json;
 mod page;
 mod place;
+mod plan;
 mod tables;
 
 pub use complexity::study_figures;
@@ -18,6 +19,7 @@ pub use contents::{AllFigures, Content, all_figures, modelled};
 pub use control::{control_figures, without_statistics};
 pub use json::assessment_json;
 pub use page::{PageOptions, page};
+pub use plan::{plan_figures, reach_figure};
 pub use tables::{
     NamedRun, baseline_table, control_table, coordinate_table, dynamics_table, invariance_table,
     phase_table, run_table, template_rms,

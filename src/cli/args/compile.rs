@@ -31,6 +31,9 @@ pub struct CompileArguments {
     /// Folder for the emitted files
     #[arg(long, value_name = "DIR")]
     pub out_dir: PathBuf,
+    /// A recording that the C example of a generated controller follows, such as `romc plan` makes
+    #[arg(long, value_name = "PLAN.csv")]
+    pub plan: Option<PathBuf>,
     #[command(flatten)]
     pub code: CodeArguments,
     #[command(flatten)]

@@ -15,7 +15,7 @@ use askama::Template;
 use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
 use crate::codegen::{Precision, SineCosine, Units, rust};
-use crate::deploy::EmitError;
+use crate::deploy::{EmitError, PlannedJump};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::lower::LowerOptions;
@@ -80,12 +80,14 @@ templates! {
     Header: "controller/header.askama",
     Readme: "controller/readme.askama",
     ExampleC: "controller/example_c.askama",
+    ExamplePlanC: "controller/example_plan_c.askama",
     ExampleCpp: "controller/example_cpp.askama",
     Binding: "controller/binding_py.askama",
     ExamplePy: "controller/example_py.askama",
 }
 
-/// The crate of a model's controller; `provenance` is the text of each file's first line.
+/// The crate of a model's controller; `provenance` is the text of each file's first line, and `plan`
+/// the jump of its C example.
 ///
 /// # Errors
 /// [`EmitError::Nonlinear`] if encoder or decoder have layers with an activation,
@@ -95,6 +97,7 @@ pub fn emit(
     equations: &Equations<'_>,
     options: &LowerOptions,
     provenance: &str,
+    plan: Option<&PlannedJump>,
 ) -> Result<Vec<EmittedFile>, EmitError> {
     let model = equations.model();
     if !model.is_linear() {
@@ -115,12 +118,15 @@ pub fn emit(
     }
     let text = ControlModelText::new(entries, &plant, format!("// {provenance}"));
     add("src/control_model.rs", tidy(&text.render()?));
-    for (path, text) in project(entries, &plant, provenance)? {
+    for (path, text) in project(entries, &plant, provenance, plan.is_some())? {
         add(&path, text);
     }
     for file in rust::emit(entries, provenance, Precision::Double, SineCosine::Inline)? {
         let path = file.path.replacen(name, "model", 1);
         add(&path, file.contents);
+    }
+    if let Some(plan) = plan {
+        files.extend(plan.files(&format!("{folder}/examples"), name, provenance));
     }
     Ok(files)
 }
@@ -162,6 +168,7 @@ fn project(
     entries: &ModelInterface,
     plant: &ControlModel,
     provenance: &str,
+    jumps_a_plan: bool,
 ) -> Result<Vec<(String, String)>, EmitError> {
     let name = entries.identifier.as_str();
     let lock = Lock::own();
@@ -189,12 +196,16 @@ fn project(
     let (hash, slashes) = (format!("# {provenance}"), format!("// {provenance}"));
     let [hash, slashes] = [hash.as_str(), &slashes];
     let block = &format!("/* {provenance} */");
+    let example_c = match jumps_a_plan {
+        true => ExamplePlanC::text(block, facts)?,
+        false => ExampleC::text(block, facts)?,
+    };
     let templates = [
         ("Cargo.toml", Cargo::text(hash, facts)?),
         ("src/lib.rs", Lib::text(slashes, facts)?),
         ("include/NAME_controller.h", Header::text(block, facts)?),
         ("README.md", Readme::text(provenance, facts)?),
-        ("examples/example.c", ExampleC::text(block, facts)?),
+        ("examples/example.c", example_c),
         ("examples/example.cpp", ExampleCpp::text(slashes, facts)?),
         ("python/NAME_controller.py", Binding::text(hash, facts)?),
         ("python/example.py", ExamplePy::text(hash, facts)?),

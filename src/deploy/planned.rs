@@ -1,0 +1,132 @@
+//! A planned jump as C arrays: what an example of a generated controller jumps.
+
+use std::fmt::Write as _;
+
+use nalgebra::DMatrix;
+
+use crate::files::EmittedFile;
+use crate::robot::{ContactFlags, STATE_DIM};
+
+/// Values on a line of an array.
+const PER_LINE: usize = 6;
+/// Significant digits, beyond those of any sensor.
+const DIGITS: usize = 9;
+
+/// A reference of a controller: samples in columns, SI units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlannedJump {
+    /// Time of each sample, s.
+    pub time_s: Vec<f64>,
+    /// States, 18 x n.
+    pub x: DMatrix<f64>,
+    /// Velocities, 18 x n.
+    pub dx: DMatrix<f64>,
+    /// Inputs by the rule of the model, 18 x n.
+    pub u: DMatrix<f64>,
+    /// Feet on the ground.
+    pub feet: Vec<ContactFlags>,
+}
+
+impl PlannedJump {
+    /// `NAME_plan.h` and `NAME_plan.c` below `folder`, C99; `provenance` is their first line.
+    pub fn files(&self, folder: &str, name: &str, provenance: &str) -> [EmittedFile; 2] {
+        let path = |ending: &str| format!("{folder}/{name}_plan.{ending}");
+        [
+            EmittedFile::new(path("h"), self.header(name, provenance)),
+            EmittedFile::new(path("c"), self.source(name, provenance)),
+        ]
+    }
+
+    fn header(&self, name: &str, provenance: &str) -> String {
+        let upper = name.to_ascii_uppercase();
+        let count = self.time_s.len();
+        format!(
+            "/* {provenance} */\n\
+             /* A planned jump: states, velocities and inputs in SI units, one row per sample. */\n\
+             #ifndef {upper}_PLAN_H\n#define {upper}_PLAN_H\n\n\
+             #include <stdint.h>\n\n\
+             #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
+             enum {{ {upper}_PLAN_COUNT = {count} }};\n\n\
+             extern const double {name}_plan_time_s[{upper}_PLAN_COUNT];\n\
+             extern const double {name}_plan_x[{upper}_PLAN_COUNT][{STATE_DIM}];\n\
+             extern const double {name}_plan_dx[{upper}_PLAN_COUNT][{STATE_DIM}];\n\
+             extern const double {name}_plan_u[{upper}_PLAN_COUNT][{STATE_DIM}];\n\
+             extern const uint8_t {name}_plan_feet[{upper}_PLAN_COUNT][4];\n\n\
+             #ifdef __cplusplus\n}}\n#endif\n\n#endif\n"
+        )
+    }
+
+    fn source(&self, name: &str, provenance: &str) -> String {
+        let upper = name.to_ascii_uppercase();
+        let mut text = format!("/* {provenance} */\n#include \"{name}_plan.h\"\n");
+        let _ = write!(
+            text,
+            "\nconst double {name}_plan_time_s[{upper}_PLAN_COUNT] = {{\n"
+        );
+        push_lines(&mut text, self.time_s.iter().copied());
+        text.push_str("};\n");
+        for (rows, of) in [(&self.x, "x"), (&self.dx, "dx"), (&self.u, "u")] {
+            let _ = write!(
+                text,
+                "\nconst double {name}_plan_{of}[{upper}_PLAN_COUNT][{STATE_DIM}] = {{\n"
+            );
+            for column in rows.column_iter() {
+                text.push_str("    {\n");
+                push_lines(&mut text, column.iter().copied());
+                text.push_str("    },\n");
+            }
+            text.push_str("};\n");
+        }
+        let _ = write!(
+            text,
+            "\nconst uint8_t {name}_plan_feet[{upper}_PLAN_COUNT][4] = {{\n"
+        );
+        for feet in &self.feet {
+            let [a, b, c, d] = feet.map(u8::from);
+            let _ = writeln!(text, "    {{ {a}, {b}, {c}, {d} }},");
+        }
+        text.push_str("};\n");
+        text
+    }
+}
+
+fn push_lines(text: &mut String, values: impl Iterator<Item = f64>) {
+    let values: Vec<String> = values
+        .map(|value| format!("{value:.*e}", DIGITS - 1))
+        .collect();
+    for line in values.chunks(PER_LINE) {
+        let _ = writeln!(text, "    {},", line.join(", "));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_hold_every_sample_and_read_back() {
+        let plan = PlannedJump {
+            time_s: vec![0.0, 0.002],
+            x: DMatrix::from_fn(18, 2, |i, j| 1.0 / (1.0 + i as f64) - j as f64),
+            dx: DMatrix::zeros(18, 2),
+            u: DMatrix::from_element(18, 2, -2.5),
+            feet: vec![[true; 4], [false, true, false, false]],
+        };
+        let [header, source] = plan.files("examples", "hop", "made by a test");
+        assert_eq!(header.path, "examples/hop_plan.h");
+        assert!(header.contents.contains("HOP_PLAN_COUNT = 2"));
+        assert!(source.contents.contains("{ 0, 1, 0, 0 }"));
+        let numbers = source.contents.split([',', '{', '}', '\n', ' ']);
+        let numbers: Vec<f64> = numbers
+            .filter(|w| w.contains('e'))
+            .flat_map(str::parse)
+            .collect();
+        assert_eq!(numbers.len(), 2 + 3 * 36);
+        for (found, expected) in numbers[2..38].iter().zip(plan.x.iter()) {
+            assert!(
+                (found - expected).abs() <= 1e-8 * expected.abs(),
+                "{found} {expected}"
+            );
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! Figures of a planned jump: posture over time, path of the body, torques within their limits,
+//! phases; and of all the jumps that can be planned.
+
+use super::figures::{Figure, LinePlot, Motion, Panel, Role, Series, film_strip, floor_m};
+use crate::model::JumpPrior;
+use crate::plan::{Plan, Reach};
+use crate::robot::{JOINT_DIM, Robot};
+
+/// Body coordinates that are drawn, by place in the state.
+const BODY_X: usize = 12;
+const BODY_Z: usize = 14;
+/// Postures in the film strip.
+const FRAMES: usize = 8;
+/// Half the size of the cross of a recorded jump, m.
+const CROSS_M: f64 = 0.004;
+
+/// The figures of a plan for a robot.
+pub fn plan_figures(plan: &Plan, robot: &Robot) -> Vec<Figure> {
+    let motion = &plan.motion;
+    let goal = format!(
+        "a planned jump of {} m, {} m high",
+        plan.goal_m[0], plan.goal_m[1]
+    );
+    let states = motion.x.column_iter().map(|x| Some(x.into_owned()));
+    let planned = Motion {
+        role: Role::Full,
+        words: "planned".to_owned(),
+        states: states.collect(),
+    };
+    let names = ("plan_posture".to_owned(), format!("Posture in {goal}."));
+    let seen_from = (0.0, floor_m(robot, motion));
+    let strip = (motion.time_s.as_slice(), &[planned][..]);
+    vec![
+        film_strip(robot, names, strip, seen_from, FRAMES),
+        path(plan, &goal),
+        phases(plan, &goal),
+        torques(plan, robot, &goal),
+    ]
+}
+
+fn over_time(plan: &Plan, role: Role, value: impl Fn(usize) -> f64) -> Series {
+    let times = plan.motion.time_s.iter().enumerate();
+    Series {
+        role,
+        points: times
+            .map(|(sample, time)| (*time, Some(value(sample))))
+            .collect(),
+    }
+}
+
+/// Times without a foot on the ground.
+fn flights(plan: &Plan) -> Vec<(f64, f64)> {
+    let mut start = 0.0;
+    let mut flights = Vec::new();
+    let motion = &plan.motion;
+    for part in &plan.parts {
+        let middle = start + 0.5 * part.duration_s;
+        let sample = motion.time_s.partition_point(|time| *time < middle);
+        let sample = sample.min(motion.len() - 1);
+        if motion.feet[sample] == [false; 4] {
+            flights.push((start, start + part.duration_s));
+        }
+        start += part.duration_s;
+    }
+    flights
+}
+
+fn panel(plan: &Plan, title: String, series: Vec<Series>) -> Panel {
+    Panel::Lines(LinePlot {
+        title,
+        series,
+        shaded: flights(plan),
+    })
+}
+
+/// Height over distance of the body.
+fn path(plan: &Plan, goal: &str) -> Figure {
+    let x = &plan.motion.x;
+    let points = (0..plan.motion.len()).map(|k| (x[(BODY_X, k)], Some(x[(BODY_Z, k)])));
+    let body = Series {
+        role: Role::Full,
+        points: points.collect(),
+    };
+    Figure {
+        id: "plan_path".to_owned(),
+        caption: format!("Path of the body in {goal}."),
+        x_label: "body x, m".to_owned(),
+        panel_size: (360.0, 220.0),
+        columns: 1,
+        panels: vec![Panel::lines("body z, m", vec![body])],
+        legend: vec![(Role::Full, "planned".to_owned())],
+    }
+}
+
+/// Body and its speeds over time, the flight shaded, with the borders of the parts.
+fn phases(plan: &Plan, goal: &str) -> Figure {
+    let motion = &plan.motion;
+    let names = Robot::state_names();
+    let panels = [BODY_X, BODY_Z, BODY_Z + 2].into_iter().flat_map(|row| {
+        let position = over_time(plan, Role::Full, |k| motion.x[(row, k)]);
+        let rate = over_time(plan, Role::Full, |k| motion.dx[(row, k)]);
+        let unit = &Robot::state_units()[row];
+        [
+            panel(plan, format!("{}, {unit}", names[row]), vec![position]),
+            panel(
+                plan,
+                format!("rate of {}, {unit}/s", names[row]),
+                vec![rate],
+            ),
+        ]
+    });
+    let mut start = 0.0;
+    let parts = plan.parts.iter().map(|part| {
+        start += part.duration_s;
+        format!("{} to {start:.3} s", part.name)
+    });
+    let parts = parts.collect::<Vec<_>>().join(", ");
+    Figure {
+        columns: 2,
+        ..Figure::over_time(
+            "plan_phases".to_owned(),
+            format!("The body in {goal}: {parts}; the flight is shaded."),
+            panels.collect(),
+            &[(Role::Full, "planned")],
+        )
+    }
+}
+
+/// Torques between their limits.
+fn torques(plan: &Plan, robot: &Robot, goal: &str) -> Figure {
+    let names = Robot::state_names();
+    let panels = (0..JOINT_DIM).map(|joint| {
+        let limit = robot.torque_limit_nm()[joint];
+        let torque = |k: usize| plan.motion.torque_nm[(joint, k)];
+        let lines = vec![
+            over_time(plan, Role::Full, torque),
+            over_time(plan, Role::Limit, |_| limit),
+            over_time(plan, Role::Limit, |_| -limit),
+        ];
+        panel(plan, format!("{}, N m", names[joint]), lines)
+    });
+    Figure::over_time(
+        "plan_torques".to_owned(),
+        format!("Torques of the motors in {goal}, within their limits; the flight is shaded."),
+        panels.collect(),
+        &[(Role::Full, "planned"), (Role::Limit, "limit")],
+    )
+}
+
+/// Distances and apexes that can be planned, with the recorded jumps.
+pub fn reach_figure(reach: &Reach, prior: &JumpPrior) -> Figure {
+    let crosses = prior.jumps.iter().flat_map(|&[distance, apex, _]| {
+        let at = |x: f64, y: f64| (distance + x * CROSS_M, Some(apex + 0.25 * y * CROSS_M));
+        [
+            at(-1.0, -1.0),
+            at(1.0, 1.0),
+            (distance, None),
+            at(-1.0, 1.0),
+            at(1.0, -1.0),
+            (distance, None),
+        ]
+    });
+    let series = vec![
+        Series {
+            role: Role::Recorded,
+            points: crosses.collect(),
+        },
+        border(reach, Role::Full, &["trusted"]),
+        border(reach, Role::Restarted, &["trusted", "extrapolates"]),
+    ];
+    Figure {
+        id: "plan_reach".to_owned(),
+        caption:
+            "Jumps that can be planned: within what was recorded, and beyond it with a warning."
+                .to_owned(),
+        x_label: "distance, m".to_owned(),
+        panel_size: (420.0, 280.0),
+        columns: 1,
+        panels: vec![Panel::lines("apex above the start, m", series)],
+        legend: vec![
+            (Role::Recorded, "recorded".to_owned()),
+            (Role::Full, "within the recordings".to_owned()),
+            (Role::Restarted, "with a warning".to_owned()),
+        ],
+    }
+}
+
+/// The outline of the goals with one of these verdicts: for each apex, the stretch of distances.
+fn border(reach: &Reach, role: Role, words: &[&str]) -> Series {
+    let rows = reach.points.chunks_exact(reach.distances_m.len());
+    let stretches: Vec<[f64; 3]> = rows
+        .zip(&reach.apexes_m)
+        .filter_map(|(row, apex)| {
+            let chosen = || row.iter().filter(|point| words.contains(&point.status));
+            let (first, last) = (chosen().next()?, chosen().next_back()?);
+            Some([first.goal_m[0], last.goal_m[0], *apex])
+        })
+        .collect();
+    let left = stretches
+        .iter()
+        .rev()
+        .map(|[least, _, apex]| (*least, Some(*apex)));
+    let right = stretches.iter().map(|[_, most, apex]| (*most, Some(*apex)));
+    let mut points: Vec<_> = right.chain(left).collect();
+    points.extend(points.first().copied());
+    Series { role, points }
+}
