@@ -14,7 +14,7 @@ import numpy as np
 
 import romc_controller
 from assessment import assess, repetition_faults
-from closed_loop import read_jump
+from closed_loop import named_number, read_jump
 from followers import LatentMpc, Replay
 from model_inputs import ModelInputs
 from perturbations import NOMINAL, PERTURBATIONS, Motors, perturbed_simulation
@@ -144,9 +144,15 @@ def parse_arguments():
     parser.add_argument("--ablations", action="store_true", help="plans by changed models as well")
     parser.add_argument("--nominal", action="store_true", help="no payload, no weak motors")
     parser.add_argument("--settings", type=pathlib.Path, help="weights of the plan, a TOML file")
+    parser.add_argument(
+        "--setting", type=named_number, action="append", metavar="NAME=NUMBER",
+        help="a setting of the controller (default: velocity_weight=0.2)",
+    )
     parser.add_argument("--json", action="store_true", help="print JSON, not the table")
     parser.add_argument("--jobs", type=int, help="runs at a time (default: one per core)")
     arguments = parser.parse_args()
+    if arguments.setting is None:
+        arguments.setting = [("velocity_weight", 0.2)]
     arguments.out_dir, arguments.romc = arguments.out_dir.resolve(), arguments.romc.resolve()
     return arguments
 
@@ -245,7 +251,7 @@ def run(task):
     )
     controller = None
     if method.controller:
-        controller = romc_controller.load(crate).Controller()
+        controller = made_controller(crate, dict(arguments.setting))
         u = inputs.of(reference)
         controller.set_reference(reference.time_s, reference.x, reference.dx, u, reference.feet)
         follower = LatentMpc(controller)
@@ -264,6 +270,15 @@ def run(task):
     outcome.distance_error_m = forwards - goal.distance_m
     outcome.apex_error_m = repeated.apex_rise_m - goal.apex_m
     return outcome
+
+
+def made_controller(crate, settings):
+    """The generated controller with settings that are not its own."""
+    module = romc_controller.load(crate)
+    chosen = module.Library().default_settings()
+    for setting, number in settings.items():
+        setattr(chosen, setting, type(getattr(chosen, setting))(number))
+    return module.Controller(chosen)
 
 
 def ablated(arguments, name):

@@ -153,8 +153,8 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
     let _ = writeln!(
         text,
         "cost {:.3}; largest deviation of the input from the recorded ones: {:.2} standard deviations\n\
-         largest torque {:.0} % of its limit; feet on the ground stay within {:.1} mm along the floor, \
-         {:.1} mm above it\n{} convex programs, {:.0} ms",
+         largest torque {:.0} % of its limit; feet on the ground move {:.1} mm along the floor and \
+         {:.1} mm above it beyond the recorded ones\n{} convex programs, {:.0} ms",
         planned.cost,
         planned.input_deviation,
         100.0 * margins.torque_share,

@@ -107,7 +107,12 @@ fn feet(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
 }
 
 /// How far a foot is from where it is in the prior, along the floor and above it, m.
-fn moved_foot(task: &Task<'_>, y: &[f64], leg: Leg, (part, node): (usize, usize)) -> [Affine; 2] {
+pub fn moved_foot(
+    task: &Task<'_>,
+    y: &[f64],
+    leg: Leg,
+    (part, node): (usize, usize),
+) -> [Affine; 2] {
     let z = task.values(part, node, y).z;
     let now = foot_place(task.seed, leg, &z);
     let before = foot_place(task.seed, leg, &task.seed.parts[part].z[node]);

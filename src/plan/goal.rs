@@ -21,8 +21,8 @@ impl Goal {
     /// start; from the mean start of the model's training jumps.
     ///
     /// # Errors
-    /// [`PlanError::Goal`] for numbers that are not finite, and for an apex that is not above the
-    /// start.
+    /// [`PlanError::Goal`] for numbers that are not finite, a jump that goes nowhere or backwards, and
+    /// an apex that is not above the start.
     pub fn new(distance_m: f64, apex_m: f64) -> Result<Self, PlanError> {
         let refused = |what, found, expected: &str| {
             let expected = expected.to_owned();
@@ -32,8 +32,8 @@ impl Goal {
                 expected,
             })
         };
-        if !distance_m.is_finite() {
-            return refused("distance", distance_m, "a finite number of metres");
+        if !(distance_m.is_finite() && distance_m > 0.0) {
+            return refused("distance", distance_m, "a positive number of metres");
         }
         if !(apex_m.is_finite() && apex_m > 0.0) {
             let expected = "a positive number of metres above the height at the start";

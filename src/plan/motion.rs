@@ -8,10 +8,11 @@ use std::path::PathBuf;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::costs::moved_foot;
 use super::error::PlanError;
 use super::transcribe::Task;
 use crate::recording::Segment;
-use crate::robot::{FOOT_DIM, JOINT_DIM, STATE_DIM};
+use crate::robot::{JOINT_DIM, Leg, STATE_DIM};
 
 /// Name of a plan where a recording has that of its file.
 const SOURCE: &str = "plan";
@@ -25,7 +26,8 @@ pub struct Margins {
     pub beyond_joint_limit_rad: f64,
     /// Farthest that the lifted force is outside the friction cone, N; negative inside.
     pub beyond_friction_n: f64,
-    /// Farthest that a foot on the ground leaves its place, along and above the floor, m.
+    /// Farthest that a foot on the ground moves beyond what it does in the prior, along and above the
+    /// floor, at the nodes, m.
     pub foot_slip_m: [f64; 2],
 }
 
@@ -62,7 +64,7 @@ pub fn motion(
     }
     let torque_nm = input.rows(0, JOINT_DIM) + motion.losses(&task.seed.rule);
     motion.torque_nm = torque_nm;
-    let margins = margins(task, &motion, &input);
+    let margins = margins(task, y, (&motion, &input));
     Ok((motion, margins))
 }
 
@@ -107,7 +109,7 @@ fn at(task: &Task<'_>, y: &[f64], part: usize, (time_s, duration_s): (f64, f64))
     }
 }
 
-fn margins(task: &Task<'_>, motion: &Segment, input: &DMatrix<f64>) -> Margins {
+fn margins(task: &Task<'_>, y: &[f64], (motion, input): (&Segment, &DMatrix<f64>)) -> Margins {
     let robot = task.seed.rule.robot();
     let mut margins = Margins {
         torque_share: 0.0,
@@ -130,38 +132,27 @@ fn margins(task: &Task<'_>, motion: &Segment, input: &DMatrix<f64>) -> Margins {
             margins.beyond_friction_n = margins.beyond_friction_n.max(beyond);
         }
     }
-    margins.foot_slip_m = foot_slip(task, motion);
+    margins.foot_slip_m = foot_slip(task, y);
     margins
 }
 
-/// Farthest that a foot is from where it stood at the start or at touch-down.
-fn foot_slip(task: &Task<'_>, motion: &Segment) -> [f64; 2] {
+/// Farthest that a foot on the ground moves at a node, beyond what it does in the prior: along the
+/// floor from the start or from touch-down, above it.
+fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
     let mut farthest = [0.0_f64; 2];
-    let z_of = |sample: usize| {
-        // The motion is decoded, so that the least-squares inverse of the decoder gives z back.
-        let x = motion.x.column(sample) - &task.seed.decode_bias;
-        let gram = task.seed.decode.tr_mul(&task.seed.decode);
-        let right = task.seed.decode.tr_mul(&x);
-        gram.cholesky().map(|factor| factor.solve(&right))
-    };
-    for leg in crate::robot::Leg::ALL {
-        let mut anchor: Option<[f64; 2]> = None;
-        for sample in 0..motion.len() {
-            if !motion.feet[sample][leg.index()] {
-                anchor = None;
-                continue;
-            }
-            let Some(z) = z_of(sample) else { continue };
-            let place = super::feet::foot_place(task.seed, leg, &z).at;
-            let from = *anchor.get_or_insert(place);
-            for axis in 0..2 {
-                farthest[axis] = farthest[axis].max((place[axis] - from[axis]).abs());
+    let mut landed = false;
+    for (part, of) in task.seed.parts.iter().enumerate() {
+        landed |= !of.is_grounded();
+        let anchor = (if landed { part } else { 0 }, 0);
+        for leg in Leg::ALL.into_iter().filter(|leg| of.part.feet[leg.index()]) {
+            let from = moved_foot(task, y, leg, anchor).map(|moved| moved.at(y));
+            for node in 0..of.z.len() {
+                let moved = moved_foot(task, y, leg, (part, node)).map(|moved| moved.at(y));
+                for axis in 0..2 {
+                    farthest[axis] = farthest[axis].max((moved[axis] - from[axis]).abs());
+                }
             }
         }
     }
-    debug_assert_eq!(
-        motion.feet.first().map_or(FOOT_DIM, |feet| feet.len()),
-        FOOT_DIM
-    );
     farthest
 }

@@ -70,9 +70,9 @@ impl Default for PlanSettings {
             height_slack_m: 0.02,
             apex_at: 0.45,
             programs: 12,
-            warn_deviation: 1.5,
-            refuse_deviation: 3.0,
-            reach: 2.0,
+            warn_deviation: 0.6,
+            refuse_deviation: 1.0,
+            reach: 1.5,
         }
     }
 }

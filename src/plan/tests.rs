@@ -125,6 +125,7 @@ fn absurd_goals_have_reasons_and_no_plan() {
         (-0.3, 0.12),
         (0.3, 1.0),
         (0.3, 1e-9),
+        (0.7, 0.12),
     ] {
         match planned(distance, apex) {
             Err(error) => assert!(!error.to_string().is_empty()),
