@@ -50,6 +50,7 @@ pub(super) fn options(
     set(&mut encoder.coordinates, settings.coordinates);
     encoder.rotate &= !settings.no_rotation;
     set(&mut options.regression.slack, settings.slack);
+    set(&mut options.regression.refinements, settings.refinements);
     set(&mut options.regression.smoothing, settings.moving_average);
     set(&mut options.wrench_frame, settings.wrench_frame);
     if !settings.paper {

@@ -1,8 +1,13 @@
 //! Scores of candidate dynamics: the error of their rollouts on a set of jumps.
 
+use nalgebra::{DMatrix, DVector};
+
 use super::dataset::Dataset;
 use super::latent::Latent;
-use super::rollout::{Candidate, Window, predict, restarted, whole};
+use super::rollout::{Candidate, Change, Window, predict, predict_changed, restarted, whole};
+
+/// Samples between errors that coefficients are refined by.
+const THINNED: usize = 5;
 
 /// Samples to judge candidates on.
 pub struct Judge<'a> {
@@ -39,6 +44,53 @@ impl<'a> Judge<'a> {
             return short;
         }
         short + self.rollout_weight * self.error(candidate, &self.long)
+    }
+
+    /// For the candidate with each of the `changes`, one at a time: errors of 0.1 s predictions and of whole jumps in
+    /// standard deviations, every [`THINNED`]th sample; none if a rollout diverges.
+    pub fn errors(
+        &self,
+        candidate: Candidate<'_>,
+        changes: &[Option<Change>],
+    ) -> Option<Vec<[DVector<f64>; 2]>> {
+        let of_kind = |windows| self.errors_over(candidate, changes, windows);
+        let (short, long) = (of_kind(&self.short), of_kind(&self.long));
+        let pairs = short
+            .into_iter()
+            .zip(long)
+            .map(|(short, long)| [short, long]);
+        let finite =
+            |pair: &[DVector<f64>; 2]| pair.iter().flatten().all(|error| error.is_finite());
+        pairs.map(|pair| finite(&pair).then_some(pair)).collect()
+    }
+
+    fn errors_over(
+        &self,
+        candidate: Candidate<'_>,
+        changes: &[Option<Change>],
+        windows: &[Window],
+    ) -> Vec<DVector<f64>> {
+        let each = changes
+            .iter()
+            .flat_map(|change| vec![*change; windows.len()]);
+        let repeated = windows.repeat(changes.len());
+        let changed: Vec<_> = each.collect();
+        let predictions =
+            predict_changed(candidate, &changed, self.dataset, self.latent, &repeated);
+        let errors_of = |predictions: &[DMatrix<f64>]| {
+            let mut errors = Vec::new();
+            for (window, prediction) in windows.iter().zip(predictions) {
+                let z = &self.latent[window.jump].z;
+                for step in (THINNED - 1..window.steps).step_by(THINNED) {
+                    for (row, scale) in self.inverse_std.iter().enumerate() {
+                        let truth = z[(row, window.start + 1 + step)];
+                        errors.push((prediction[(row, step)] - truth) * scale);
+                    }
+                }
+            }
+            DVector::from_vec(errors)
+        };
+        predictions.chunks(windows.len()).map(errors_of).collect()
     }
 
     fn error(&self, candidate: Candidate<'_>, windows: &[Window]) -> f64 {

@@ -33,6 +33,7 @@ mod oscillator;
 mod overlap;
 mod prune;
 mod random;
+mod refine;
 mod report;
 mod seeds;
 mod smooth;

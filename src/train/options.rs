@@ -228,6 +228,9 @@ pub struct RegressionOptions {
     pub sweeps: usize,
     /// Weight of whole-jump rollouts against predictions of 0.1 s in the validation score.
     pub rollout_weight: f64,
+    /// Steps by which rollouts of the training jumps refine the coefficients chosen; 0 leaves the regression's.
+    #[serde(default)]
+    pub refinements: usize,
 }
 
 impl TrainOptions {
@@ -277,6 +280,7 @@ impl TrainOptions {
             },
             regression: RegressionOptions {
                 smoothing: 1,
+                refinements: 0,
                 ..RegressionOptions::default()
             },
             joint: JointOptions {
@@ -470,6 +474,7 @@ impl Default for RegressionOptions {
             slack: 0.15,
             sweeps: 3,
             rollout_weight: 0.2,
+            refinements: 10,
         }
     }
 }

@@ -12,6 +12,7 @@ use super::latent::Latent;
 use super::options::RegressionOptions;
 use super::progress::Watch;
 use super::prune::Refined;
+use super::refine::{Coefficients, Refiner};
 use super::rollout::Candidate;
 use super::sparse::{Pruning, Regression, active_terms};
 use super::weak_form::{check_terms, windowed_samples};
@@ -73,11 +74,15 @@ pub fn select(
     let candidates = tried.len();
     let best = best_score(&tried)?;
     let limit = (1.0 + options.slack) * best;
-    let mut sparsest: Option<Fitted> = None;
-    for (index, start) in starts(tried, &options.windows, limit)
-        .into_iter()
-        .enumerate()
-    {
+    let training = Judge::new(target.dataset, target.latent, options.rollout_weight);
+    let refiner = Refiner {
+        features,
+        knowledge: target.knowledge,
+        training: &training,
+        judge,
+    };
+    let mut refined = Vec::new();
+    for start in starts(tried, &options.windows, limit, options.sweeps) {
         let Fitted { xi, choice, window } = start;
         let mut pruned = Refined {
             regressions: &regressions[window],
@@ -85,26 +90,27 @@ pub fn select(
             xi,
             score: choice.score,
         };
-        if index < options.sweeps {
+        if options.sweeps > 0 {
             pruned.sweep(features, judge, limit, watch);
         }
-        let active = pruned.xi.iter().map(active_terms).sum();
-        if sparsest
-            .as_ref()
-            .is_none_or(|known| active < known.choice.active)
-        {
-            let choice = Choice {
-                score: pruned.score,
-                active,
-                ..choice
-            };
-            sparsest = Some(Fitted {
-                xi: pruned.xi,
-                choice,
-                window,
-            });
-        }
+        let start = Coefficients {
+            xi: pruned.xi,
+            score: pruned.score,
+        };
+        let Coefficients { xi, score } = refiner.refine(start, options.refinements, watch);
+        let active = xi.iter().map(active_terms).sum();
+        let choice = Choice {
+            score,
+            active,
+            ..choice
+        };
+        refined.push(Fitted { xi, choice, window });
     }
+    let limit = (1.0 + options.slack) * best_score(&refined)?;
+    let within = refined
+        .into_iter()
+        .filter(|fitted| fitted.choice.score <= limit);
+    let sparsest = within.min_by_key(|fitted| fitted.choice.active);
     let Fitted { xi, choice, .. } = sparsest.ok_or(TrainError::NoStableModel { candidates })?;
     Ok(Selected {
         xi,
@@ -265,9 +271,9 @@ fn best_score(tried: &[Fitted]) -> Result<f64, TrainError> {
     }
 }
 
-/// Candidates to prune further: of every window the one with the best score, then all others within the limit, best
-/// first.
-fn starts(tried: Vec<Fitted>, windows: &[usize], limit: f64) -> Vec<Fitted> {
+/// Candidates to prune and refine, at most `count` or one: of every window the one with the best score, then all others
+/// within the limit, best first.
+fn starts(tried: Vec<Fitted>, windows: &[usize], limit: f64, count: usize) -> Vec<Fitted> {
     let mut within: Vec<Fitted> = tried
         .into_iter()
         .filter(|fitted| fitted.choice.score <= limit)
@@ -280,5 +286,6 @@ fn starts(tried: Vec<Fitted>, windows: &[usize], limit: f64) -> Vec<Fitted> {
         .collect();
     let mut ranked: Vec<(bool, Fitted)> = rank.into_iter().zip(within).collect();
     ranked.sort_by_key(|(later, _)| *later);
-    ranked.into_iter().map(|(_, fitted)| fitted).collect()
+    let first = ranked.into_iter().take(count.max(1));
+    first.map(|(_, fitted)| fitted).collect()
 }

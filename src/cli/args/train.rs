@@ -172,6 +172,10 @@ pub struct TrainSettings {
     /// Accepted increase of the validation error for fewer terms, as a share of the least error
     #[arg(long, value_name = "SHARE")]
     pub slack: Option<Finite>,
+    /// Steps by which rollouts of the training jumps refine the chosen coefficients; 0 leaves those of the regression
+    /// (10 unless given, 0 with --paper)
+    #[arg(long, value_name = "STEPS")]
+    pub refinements: Option<usize>,
     /// Highest degree of the polynomial candidate terms
     #[arg(long, value_name = "P")]
     pub degree: Option<u32>,

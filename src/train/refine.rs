@@ -1,0 +1,303 @@
+//! Refining coefficients by what their rollouts predict: Gauss-Newton on the errors of 0.1 s predictions and of whole
+//! jumps, from the coefficients of a regression.
+//!
+//! A regression fits accelerations, each sample for itself, so nothing bounds what its errors add up to. Predictions
+//! of whole jumps do: coefficients under which a phase, or the sequence of phases, runs away predict badly (the
+//! prediction-error method, Ljung, System Identification, 2nd ed. 1999, section 7.2).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::features::Features;
+use super::judge::Judge;
+use super::knowledge::Knowledge;
+use super::progress::Watch;
+use super::rollout::{Candidate, Change};
+
+/// Weight of relative changes of the coefficients, against squared errors that start at 1 for both kinds of windows.
+const PRIOR: f64 = 1e-3;
+/// Relative step of the difference quotients.
+const STEP: f64 = 1e-6;
+/// Dampings tried in one step before it is given up.
+const ATTEMPTS: usize = 6;
+/// Coefficients whose rollouts are computed together.
+const TOGETHER: usize = 16;
+/// Share of the squared errors that a step must lower them by to be followed by another.
+const LEAST_GAIN: f64 = 2e-3;
+
+/// Phase, term and latent coordinate of a coefficient.
+type Place = (usize, usize, usize);
+
+/// Coefficients of all phases, `library_dim x latent_dim` each, and the score that judges them.
+#[derive(Clone, Debug)]
+pub(super) struct Coefficients {
+    pub xi: Vec<DMatrix<f64>>,
+    pub score: f64,
+}
+
+impl Coefficients {
+    fn at(&self, (phase, term, column): Place) -> f64 {
+        self.xi[phase][(term, column)]
+    }
+}
+
+/// What coefficients are refined by.
+pub(super) struct Refiner<'a> {
+    pub features: &'a Features,
+    pub knowledge: &'a [Knowledge],
+    /// Whose errors are lowered.
+    pub training: &'a Judge<'a>,
+    /// Which of the coefficients on the way are kept.
+    pub judge: &'a Judge<'a>,
+}
+
+/// The squared errors about some coefficients: `|r + J s|^2` for relative changes `s`.
+struct Model {
+    residual: DVector<f64>,
+    gram: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl Refiner<'_> {
+    /// Lowers the errors that `training` measures in at most `steps` steps, and gives the coefficients that `judge`
+    /// scores best on the way. Which terms are active does not change, nor do coefficients that are known.
+    pub fn refine(&self, start: Coefficients, steps: usize, watch: &mut Watch<'_>) -> Coefficients {
+        let places = self.free_places(&start.xi);
+        let Some(weights) = self.weights(&start.xi).filter(|_| !places.is_empty()) else {
+            return start;
+        };
+        watch.stage("refining coefficients by rollouts", steps);
+        self.descend(start, &places, weights, steps, watch)
+    }
+
+    /// Levenberg-Marquardt on relative changes; the coefficients that `judge` scores best.
+    fn descend(
+        &self,
+        start: Coefficients,
+        places: &[Place],
+        weights: [f64; 2],
+        steps: usize,
+        watch: &mut Watch<'_>,
+    ) -> Coefficients {
+        let scales = relative(&start, places);
+        let moved = |xi: &[DMatrix<f64>]| {
+            let change =
+                |(at, scale): (&Place, &f64)| (xi[at.0][(at.1, at.2)] - start.at(*at)) / scale;
+            DVector::from_iterator(places.len(), places.iter().zip(&scales).map(change))
+        };
+        let cost = |residual: &DVector<f64>, xi: &[DMatrix<f64>]| {
+            residual.norm_squared() + PRIOR * moved(xi).norm_squared()
+        };
+        let mut best = Coefficients {
+            score: self.score(&start.xi),
+            xi: start.xi.clone(),
+        };
+        let mut current = start.xi.clone();
+        let mut damping = 1e-3;
+        for step in 0..steps {
+            if watch.cancelled() {
+                break;
+            }
+            let Some(model) = self.model(&current, places, &scales, weights) else {
+                break;
+            };
+            let before = cost(&model.residual, &current);
+            let gradient = &model.gradient + moved(&current) * PRIOR;
+            let lower = (0..ATTEMPTS).find_map(|_| {
+                let mut system = model.gram.clone();
+                for i in 0..places.len() {
+                    system[(i, i)] += PRIOR + damping * model.gram[(i, i)];
+                }
+                let change = -system.cholesky()?.solve(&gradient);
+                let mut trial = current.clone();
+                for ((at, scale), change) in places.iter().zip(&scales).zip(change.iter()) {
+                    trial[at.0][(at.1, at.2)] += change * scale;
+                }
+                let residual = self.residual(&trial, weights);
+                let after = residual.map_or(f64::INFINITY, |residual| cost(&residual, &trial));
+                damping *= if after < before { 0.1 } else { 10.0 };
+                (after < before).then_some((trial, after))
+            });
+            let Some((trial, after)) = lower else {
+                break;
+            };
+            let score = self.score(&trial);
+            watch.done(step + 1, format!("score {score:.4}"));
+            if score < best.score {
+                best = Coefficients {
+                    xi: trial.clone(),
+                    score,
+                };
+            }
+            current = trial;
+            if after > (1.0 - LEAST_GAIN) * before {
+                break;
+            }
+        }
+        best
+    }
+
+    fn score(&self, xi: &[DMatrix<f64>]) -> f64 {
+        self.judge.score(Candidate {
+            features: self.features,
+            xi,
+        })
+    }
+
+    /// Errors with each of the changes, weighted and stacked.
+    fn residuals(
+        &self,
+        xi: &[DMatrix<f64>],
+        changes: &[Option<Change>],
+        weights: [f64; 2],
+    ) -> Option<Vec<DVector<f64>>> {
+        let features = self.features;
+        let errors = self.training.errors(Candidate { features, xi }, changes)?;
+        let stacked = errors.into_iter().map(|pair| {
+            let each = pair.iter().zip(weights);
+            let values = each.flat_map(|(errors, weight)| errors.iter().map(move |e| e * weight));
+            DVector::from_vec(values.collect())
+        });
+        Some(stacked.collect())
+    }
+
+    fn residual(&self, xi: &[DMatrix<f64>], weights: [f64; 2]) -> Option<DVector<f64>> {
+        self.residuals(xi, &[None], weights)?.pop()
+    }
+
+    /// Weights under which the squared errors of both kinds of windows are 1; none if a rollout diverges.
+    fn weights(&self, xi: &[DMatrix<f64>]) -> Option<[f64; 2]> {
+        let features = self.features;
+        let errors = self.training.errors(Candidate { features, xi }, &[None])?;
+        let weight = |errors: &DVector<f64>| errors.norm().max(f64::MIN_POSITIVE).recip();
+        errors.first().map(|pair| pair.each_ref().map(weight))
+    }
+
+    /// The squared errors about `xi`; none if a rollout diverges.
+    fn model(
+        &self,
+        xi: &[DMatrix<f64>],
+        places: &[Place],
+        scales: &[f64],
+        weights: [f64; 2],
+    ) -> Option<Model> {
+        let residual = self.residual(xi, weights)?;
+        let mut sensitivity = DMatrix::zeros(residual.len(), places.len());
+        for first in (0..places.len()).step_by(TOGETHER) {
+            let last = (first + TOGETHER).min(places.len());
+            let change = |i: usize| {
+                Some(Change {
+                    place: places[i],
+                    by: STEP * scales[i],
+                })
+            };
+            let changes: Vec<_> = (first..last).map(change).collect();
+            for (column, moved) in (first..last).zip(self.residuals(xi, &changes, weights)?) {
+                sensitivity.set_column(column, &((moved - &residual) / STEP));
+            }
+        }
+        Some(Model {
+            gram: sensitivity.tr_mul(&sensitivity),
+            gradient: sensitivity.tr_mul(&residual),
+            residual,
+        })
+    }
+
+    /// Every coefficient that may change.
+    fn free_places(&self, xi: &[DMatrix<f64>]) -> Vec<Place> {
+        let mut places = Vec::new();
+        for (phase, (xi, knowledge)) in xi.iter().zip(self.knowledge).enumerate() {
+            for column in 0..xi.ncols() {
+                for row in 0..xi.nrows() {
+                    if xi[(row, column)] != 0.0 && knowledge.free[(row, column)] {
+                        places.push((phase, row, column));
+                    }
+                }
+            }
+        }
+        places
+    }
+}
+
+/// Sizes of the coefficients, which relative changes are relative to.
+fn relative(coefficients: &Coefficients, places: &[Place]) -> Vec<f64> {
+    places.iter().map(|&at| coefficients.at(at).abs()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+    use crate::model::{Library, StandardLibrary};
+    use crate::train::oscillator;
+    use crate::train::progress::{Progress, Watch};
+
+    /// Terms 1, z1, z2, dz1, dz2, u1, u2 and the oscillator's coefficients.
+    fn known() -> (Features, Vec<DMatrix<f64>>) {
+        let standard = StandardLibrary {
+            degree: 1,
+            trigonometric: false,
+            inputs: true,
+        };
+        let features = Features::new(&Library::standard(2, standard).expect("small library"));
+        let mut contact = DMatrix::zeros(7, 2);
+        let mut flight = contact.clone();
+        (contact[(1, 0)], contact[(3, 0)], contact[(5, 0)]) = (-40.0, -3.0, 5.0);
+        (contact[(6, 1)], contact[(1, 1)]) = (8.0, -2.0);
+        (flight[(3, 0)], flight[(0, 1)]) = (-0.5, -0.981);
+        (features, vec![contact, flight])
+    }
+
+    fn refined(start: Vec<DMatrix<f64>>, knowledge: &[Knowledge]) -> (f64, Coefficients) {
+        let (dataset, latent) = oscillator::jumps(3);
+        let judge = Judge::new(&dataset, &latent, 0.2);
+        let (features, _) = known();
+        let refiner = Refiner {
+            features: &features,
+            knowledge,
+            training: &judge,
+            judge: &judge,
+        };
+        let before = refiner.score(&start);
+        let start = Coefficients {
+            xi: start,
+            score: before,
+        };
+        let mut nothing = |_: Progress| {};
+        let cancel = AtomicBool::new(false);
+        let mut watch = Watch::new(&mut nothing, &cancel);
+        (before, refiner.refine(start, 20, &mut watch))
+    }
+
+    #[test]
+    fn coefficients_that_are_off_are_brought_back_by_what_they_predict() {
+        let (_, truth) = known();
+        let nothing = vec![Knowledge::nothing(7, 2); 2];
+        let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.2 * c)).collect();
+        let (before, found) = refined(off, &nothing);
+        assert!(found.score < 0.05 * before, "{} of {before}", found.score);
+        for (found, truth) in found.xi.iter().zip(&truth) {
+            for (found, truth) in found.iter().zip(truth.iter()) {
+                assert!(
+                    (found - truth).abs() <= 0.1 * truth.abs(),
+                    "{found} for {truth}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn known_coefficients_stay_and_diverging_ones_are_left_alone() {
+        let (_, truth) = known();
+        let mut knowledge = vec![Knowledge::nothing(7, 2); 2];
+        knowledge[1].free.fill(false);
+        let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();
+        let (_, found) = refined(off.clone(), &knowledge);
+        assert_eq!(found.xi[1], off[1]);
+        assert_ne!(found.xi[0], off[0]);
+        let mut wild = off;
+        wild[0][(1, 0)] = 1e7;
+        let (before, same) = refined(wild.clone(), &knowledge);
+        assert_eq!((same.xi, same.score), (wild, before));
+    }
+}
