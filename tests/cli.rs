@@ -839,11 +839,6 @@ fn shipped_models_come_from_the_command_in_their_provenance() {
             dimension,
             "--method",
             "closed-form",
-            // Those of a first file's schema were learned before there were other axes.
-            "--wrench-frame",
-            "body",
-            "--coordinates",
-            "free",
             "--output",
             &again,
         ]);
