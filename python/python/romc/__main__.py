@@ -1,0 +1,5 @@
+"""`python -m romc`: the command line."""
+
+from romc._command import main
+
+main()

@@ -1,0 +1,64 @@
+"""The errors of the package; all are also `ValueError`."""
+
+from __future__ import annotations
+
+import re
+from typing import Optional, Union
+
+_OPTION = re.compile(r"--([a-z]+(?:-[a-z]+)*)(?: ([\w.,=-]*\w))?")
+
+
+def _in_python(message: str) -> str:
+    """The message with options of the command line as keyword arguments: `--xi-layout X` as `xi_layout="X"`."""
+
+    def argument(match: re.Match[str]) -> str:
+        name, value = match.group(1).replace("-", "_"), match.group(2)
+        name = {"phase": "phases"}.get(name, name)
+        if value is None:
+            return f"{name}="
+        left, equals, right = value.partition("=")
+        if equals and name in ("phases", "map"):
+            return f'{name}={{"{left}": "{right}"}}'
+        return f'{name}="{value}"'
+
+    return _OPTION.sub(argument, message)
+
+
+class RomcError(ValueError):
+    """Anything that romc refuses.
+
+    Attributes that do not apply are `None`:
+
+    - `file`: the file, or the constructor that got the arrays;
+    - `tensor`: the array or the key of the model file, such as `encoder.weight` or `phases[0].xi`;
+    - `row`, `column`: where. For tensors indices from 0, as in NumPy. For recordings the row of the file, from 1
+      with the header (of arrays the sample, from 0), and the column's name.
+    """
+
+    file: Optional[str]
+    tensor: Optional[str]
+    row: Optional[int]
+    column: Optional[Union[int, str]]
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: Optional[str] = None,
+        tensor: Optional[str] = None,
+        row: Optional[int] = None,
+        column: Optional[Union[int, str]] = None,
+    ) -> None:
+        super().__init__(_in_python(message))
+        self.file = file
+        self.tensor = tensor
+        self.row = row
+        self.column = column
+
+
+class ModelError(RomcError):
+    """A model, or a part of one, that cannot be used; `tensor`, `row` and `column` say where."""
+
+
+class RecordingError(RomcError):
+    """A recording or reference that cannot be used; `file`, `row` and `column` say where."""

@@ -1,0 +1,246 @@
+//! The controller, step by step and along recordings.
+
+use std::sync::{Mutex, MutexGuard};
+
+use nalgebra::DMatrix;
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use romc::evaluate::{ReferenceInput, StepRow, along_recording};
+use romc::mpc::{Command, Lift, Measurement, MpcError, MpcSettings, ReferenceSamples};
+use romc::robot::{ContactFlags, FOOT_DIM};
+
+use crate::arrays::into_rows;
+use crate::errors::{bad_reference, choice, python_error};
+use crate::model::Model;
+use crate::recording::{Recording, Segment};
+
+/// Settings of the controller; those not given are the library's.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Settings {
+    horizon: usize,
+    step: f64,
+    lift: String,
+    input_weight: Option<f64>,
+    velocity_weight: Option<f64>,
+    max_iterations: Option<u32>,
+}
+
+impl Settings {
+    fn settings(&self, py: Python<'_>) -> PyResult<MpcSettings> {
+        let lift: Lift = choice(py, "lift", &self.lift)?;
+        let mut settings = MpcSettings {
+            horizon: self.horizon,
+            step_s: self.step,
+            lift,
+            ..MpcSettings::default()
+        };
+        if let Some(weight) = self.input_weight {
+            settings.input_weight = weight;
+        }
+        if let Some(weight) = self.velocity_weight {
+            settings.velocity_weight = weight;
+        }
+        if let Some(iterations) = self.max_iterations {
+            settings.qp.max_iterations = iterations;
+        }
+        Ok(settings)
+    }
+}
+
+/// A controller; threads take turns.
+#[pyclass(frozen, module = "romc._romc")]
+pub struct Controller {
+    controller: Mutex<romc::mpc::Controller>,
+    phases: Vec<String>,
+}
+
+/// What a step returns besides arrays.
+#[derive(IntoPyObject)]
+struct StepResult<'py> {
+    torque: Bound<'py, PyArray1<f64>>,
+    joint_position: Bound<'py, PyArray1<f64>>,
+    joint_velocity: Bound<'py, PyArray1<f64>>,
+    u_lat: Bound<'py, PyArray1<f64>>,
+    status: &'static str,
+    status_code: i32,
+    has_plan: bool,
+    source: &'static str,
+    phase: Option<String>,
+    iterations: u32,
+    solve_us: f64,
+    slack: f64,
+}
+
+#[pymethods]
+impl Controller {
+    #[new]
+    fn new(py: Python<'_>, model: &Model, settings: Settings) -> PyResult<Self> {
+        let settings = settings.settings(py)?;
+        let made = py.detach(|| romc::mpc::Controller::new(&model.data, settings));
+        let phases = model.data.phases().iter();
+        Ok(Controller {
+            controller: Mutex::new(made.map_err(|error| python_error(py, error))?),
+            phases: phases.map(|phase| phase.name.clone()).collect(),
+        })
+    }
+
+    /// Follows a recorded segment, with its inputs within the motors' limits or without any.
+    fn follow(&self, py: Python<'_>, segment: &Segment, input: &str) -> PyResult<()> {
+        let input: ReferenceInput = choice(py, "reference_input", input)?;
+        let segment = segment.data();
+        let taken = py.detach(|| -> Result<(), MpcError> {
+            let mut controller = self.lock();
+            let recorded = match input {
+                ReferenceInput::Recorded => {
+                    Some(segment.input_within_limits(controller.plant().input_rule())?)
+                }
+                ReferenceInput::None => None,
+            };
+            controller.set_reference(ReferenceSamples {
+                time_s: &segment.time_s,
+                x: segment.x.as_slice(),
+                dx: segment.dx.as_slice(),
+                u: recorded.as_ref().map(DMatrix::as_slice),
+                feet: &segment.feet,
+            })?;
+            Ok(())
+        });
+        taken.map_err(|error| python_error(py, error))
+    }
+
+    /// Follows a trajectory of arrays, one row per sample.
+    fn set_reference(
+        &self,
+        py: Python<'_>,
+        t: PyReadonlyArray1<'_, f64>,
+        x: PyReadonlyArray2<'_, f64>,
+        dx: PyReadonlyArray2<'_, f64>,
+        feet: PyReadonlyArray2<'_, bool>,
+        u: Option<PyReadonlyArray2<'_, f64>>,
+    ) -> PyResult<()> {
+        if feet.shape()[1] != FOOT_DIM {
+            let message = format!("`feet`: found {} columns, expected 4", feet.shape()[1]);
+            return Err(bad_reference(py, &message, "feet"));
+        }
+        let (time_s, x, dx) = (t.as_slice()?, x.as_slice()?, dx.as_slice()?);
+        let u = u.as_ref().map(|u| u.as_slice()).transpose()?;
+        let (flags, _) = feet.as_slice()?.as_chunks::<FOOT_DIM>();
+        let taken = py.detach(|| {
+            self.lock().set_reference(ReferenceSamples {
+                time_s,
+                x,
+                dx,
+                u,
+                feet: flags,
+            })
+        });
+        taken.map_err(|error| python_error(py, MpcError::from(error)))
+    }
+
+    /// The command for a measurement. Arrays of the wrong length give a safe command, as everywhere.
+    fn step<'py>(
+        &self,
+        py: Python<'py>,
+        t: f64,
+        x: PyReadonlyArray1<'py, f64>,
+        dx: PyReadonlyArray1<'py, f64>,
+        feet: PyReadonlyArray1<'py, bool>,
+    ) -> PyResult<StepResult<'py>> {
+        let (x, dx, flags) = (x.as_slice()?, dx.as_slice()?, feet.as_slice()?);
+        let Ok(feet) = ContactFlags::try_from(flags) else {
+            let message = format!("`feet`: found {} flags, expected 4", flags.len());
+            return Err(bad_reference(py, &message, "feet"));
+        };
+        let measurement = Measurement {
+            time_s: t,
+            x,
+            dx,
+            feet,
+        };
+        let command: Command = py.detach(|| self.lock().step(measurement));
+        Ok(StepResult {
+            torque: PyArray1::from_slice(py, &command.torque_nm),
+            joint_position: PyArray1::from_slice(py, &command.joint_position_rad),
+            joint_velocity: PyArray1::from_slice(py, &command.joint_velocity_rad_s),
+            u_lat: PyArray1::from_slice(py, &command.u_lat),
+            status: command.status.word(),
+            status_code: command.status.code(),
+            has_plan: command.status.has_plan(),
+            source: command.source.word(),
+            phase: command.phase.map(|phase| self.phases[phase].clone()),
+            iterations: command.iterations,
+            solve_us: command.solve_us,
+            slack: command.slack,
+        })
+    }
+
+    /// Forgets plan and past measurements, but not the reference.
+    fn reset(&self, py: Python<'_>) {
+        py.detach(|| self.lock().reset());
+    }
+
+    /// Runs along a recording; returns the summary as JSON and a dictionary of arrays.
+    fn along<'py>(
+        &self,
+        py: Python<'py>,
+        recording: &Recording,
+        input: &str,
+    ) -> PyResult<(String, Bound<'py, PyDict>)> {
+        let input: ReferenceInput = choice(py, "reference_input", input)?;
+        let recording = &recording.data;
+        let run = py.detach(|| {
+            let mut controller = self.lock();
+            controller.reset();
+            along_recording(&mut controller, recording, input, |_, _| {})
+        });
+        let run = run.map_err(|error| python_error(py, error))?;
+        let summary = serde_json::json!(run.summary).to_string();
+        Ok((summary, self.arrays_of(py, &run.rows)?))
+    }
+}
+
+impl Controller {
+    /// The controller; after a panic in a step it begins anew, as its plan may contradict itself.
+    fn lock(&self) -> MutexGuard<'_, romc::mpc::Controller> {
+        self.controller.lock().unwrap_or_else(|poisoned| {
+            let mut controller = poisoned.into_inner();
+            controller.reset();
+            self.controller.clear_poison();
+            controller
+        })
+    }
+
+    /// One row per step under the names of the command line's table.
+    fn arrays_of<'py>(&self, py: Python<'py>, rows: &[StepRow]) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        let numbers = |of: &dyn Fn(&StepRow) -> &[f64]| {
+            let width = rows.first().map_or(0, |row| of(row).len());
+            let samples = rows.iter().flat_map(|row| of(row).iter().copied());
+            into_rows(py, DMatrix::from_iterator(width, rows.len(), samples))
+        };
+        let list = |of: &dyn Fn(&StepRow) -> f64| PyArray1::from_iter(py, rows.iter().map(of));
+        let words: Vec<&str> = rows.iter().map(|row| row.status.word()).collect();
+        let phases = rows
+            .iter()
+            .map(|row| row.phase.map(|phase| self.phases[phase].as_str()));
+        dict.set_item(
+            "segment",
+            PyArray1::from_iter(py, rows.iter().map(|r| r.segment as i64)),
+        )?;
+        dict.set_item("t", list(&|row| row.time_s))?;
+        dict.set_item("phase", phases.collect::<Vec<_>>())?;
+        dict.set_item("status", words)?;
+        let iterations = rows.iter().map(|row| i64::from(row.iterations));
+        dict.set_item("iterations", PyArray1::from_iter(py, iterations))?;
+        dict.set_item("solve_us", list(&|row| row.solve_us))?;
+        dict.set_item("torque", numbers(&|row| &row.torque_nm))?;
+        dict.set_item("recorded_torque", numbers(&|row| &row.recorded_torque_nm))?;
+        dict.set_item("u", numbers(&|row| &row.input))?;
+        dict.set_item("u_lat", numbers(&|row| &row.u_lat))?;
+        dict.set_item("z", numbers(&|row| &row.z))?;
+        dict.set_item("z_ref", numbers(&|row| &row.z_reference))?;
+        Ok(dict)
+    }
+}

@@ -1,0 +1,180 @@
+//! Equations and code of a model.
+
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use romc::Error;
+use romc::artifact;
+use romc::cli::args::UnitsChoice;
+use romc::deploy::{self, EmitOptions, Target};
+use romc::equations::{EquationForm, Equations};
+use romc::files::{EmittedFile, Overwrite};
+use romc::typeset::latex::tex_cases;
+use romc::typeset::words;
+use romc::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Typeset, TypesetError};
+
+use crate::errors::{choice, python_error};
+use crate::model::Model;
+
+/// Width of the lines of a notebook, in em.
+const NOTEBOOK_EM: f64 = 60.0;
+
+/// The options of `romc compile`, under the same names.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct EmitArguments {
+    digits: Option<usize>,
+    significant: Option<usize>,
+    /// Whether coefficients are printed in full unless digits are given.
+    exact: bool,
+    width: Option<f64>,
+    form: Option<String>,
+    siunitx: bool,
+    as_learned: bool,
+    /// `VARIABLE=NAME` each.
+    rename: Vec<String>,
+    precision: String,
+    units: String,
+    sincos: String,
+}
+
+/// The same as the library takes them.
+struct Emission {
+    form: EquationForm,
+    is_physical: bool,
+    options: EmitOptions,
+}
+
+impl EmitArguments {
+    fn emission(&self, model: &Model, py: Python<'_>) -> PyResult<Emission> {
+        let units: UnitsChoice = choice(py, "units", &self.units)?;
+        let symbols = SymbolTable::parse(&self.rename, model.data.latent_dim());
+        let symbols = symbols.map_err(|error| python_error(py, error))?;
+        let form = self.form.as_deref().map(|name| choice(py, "form", name));
+        let print = PrintOptions {
+            rounding: match (self.digits, self.significant) {
+                (Some(places), _) => Rounding::Decimals(places),
+                (None, Some(digits)) => Rounding::Significant(digits),
+                (None, None) if self.exact => Rounding::Exact,
+                (None, None) => Rounding::default(),
+            },
+            width_em: self.width,
+            symbols,
+            digest: Some(artifact::digest(&model.data).short()),
+            numbers: match self.siunitx {
+                true => NumberStyle::Siunitx,
+                false => NumberStyle::Plain,
+            },
+            form: form.transpose()?.unwrap_or_default(),
+        };
+        Ok(Emission {
+            form: match self.as_learned {
+                true => EquationForm::AsLearned,
+                false => EquationForm::Simplified,
+            },
+            is_physical: units == UnitsChoice::Physical,
+            options: EmitOptions {
+                precision: choice(py, "precision", &self.precision)?,
+                sines: choice(py, "sincos", &self.sincos)?,
+                units: units.of_interface(),
+                print,
+                ..EmitOptions::default()
+            },
+        })
+    }
+}
+
+impl Emission {
+    fn equations<'m>(&self, model: &'m Model) -> Result<Equations<'m>, Error> {
+        let equations = Equations::in_form(&model.data, self.form);
+        match self.is_physical {
+            true => Ok(equations.in_physical_units()?),
+            false => Ok(equations),
+        }
+    }
+}
+
+/// The equations of a phase.
+#[derive(IntoPyObject)]
+pub struct PhaseText {
+    name: String,
+    /// When it holds, in words.
+    feet: String,
+    /// A `cases` environment.
+    latex: String,
+    /// Coefficient and term of each summand of each acceleration.
+    terms: Vec<Vec<(f64, String)>>,
+}
+
+/// Path and text of each file of the targets.
+#[pyfunction]
+pub fn emit(
+    py: Python<'_>,
+    model: &Model,
+    targets: Vec<String>,
+    arguments: EmitArguments,
+) -> PyResult<Vec<(String, String)>> {
+    let targets = targets.iter().map(|name| choice(py, "targets", name));
+    let targets: Vec<Target> = targets.collect::<PyResult<_>>()?;
+    let emission = arguments.emission(model, py)?;
+    let files = py.detach(|| -> Result<Vec<EmittedFile>, Error> {
+        let equations = emission.equations(model)?;
+        Ok(deploy::emit(&equations, &targets, &emission.options)?)
+    });
+    let files = files.map_err(|error| python_error(py, error))?.into_iter();
+    Ok(files.map(|file| (file.path, file.contents)).collect())
+}
+
+/// The equations of each phase, and what rounding did to them.
+#[pyfunction]
+pub fn equations(
+    py: Python<'_>,
+    model: &Model,
+    arguments: EmitArguments,
+) -> PyResult<(Vec<PhaseText>, String)> {
+    let emission = arguments.emission(model, py)?;
+    let made = py.detach(|| -> Result<_, Error> {
+        let equations = emission.equations(model)?;
+        let print = &emission.options.print;
+        let typeset = Typeset::new(&equations, &print.symbols, print.rounding);
+        let typeset = typeset.map_err(TypesetError::from)?;
+        let width_em = print.width_em.unwrap_or(NOTEBOOK_EM);
+        let phases = typeset.systems.iter().zip(equations.phases());
+        let phases = phases
+            .zip(model.data.phases())
+            .map(|((system, phase), rule)| {
+                let summands = |output| {
+                    let summands = phase.summands(&equations, output);
+                    summands
+                        .map(|(xi, term)| (xi, term.text().to_owned()))
+                        .collect()
+                };
+                PhaseText {
+                    name: phase.name.clone(),
+                    feet: words::feet(&rule.feet),
+                    latex: tex_cases(system, width_em),
+                    terms: (0..equations.latent_dim()).map(summands).collect(),
+                }
+            });
+        let rounding = words::rounding(print.rounding, &typeset.rounding);
+        Ok((phases.collect(), rounding))
+    });
+    made.map_err(|error| python_error(py, error))
+}
+
+/// Writes files into a folder, all or none; returns their paths.
+#[pyfunction]
+pub fn write_files(
+    py: Python<'_>,
+    folder: PathBuf,
+    files: Vec<(String, String)>,
+    force: bool,
+) -> PyResult<Vec<PathBuf>> {
+    let files = files.into_iter();
+    let files: Vec<_> = files
+        .map(|(path, text)| EmittedFile::new(path, text))
+        .collect();
+    let overwrite = Overwrite::when_forced(force);
+    let written = py.detach(|| romc::files::write_files(&folder, &files, overwrite));
+    written.map_err(|error| python_error(py, error))
+}

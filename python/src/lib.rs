@@ -1,0 +1,49 @@
+//! The native half of the Python package: what `romc` computes, on NumPy arrays.
+//!
+//! The other half, `python/romc`, has the classes that users see, with their documentation; it turns
+//! whatever they hand in into contiguous arrays and lists, which is all that these functions take.
+//! Long calls let other Python threads run.
+
+mod arrays;
+mod controller;
+mod emission;
+mod errors;
+mod model;
+mod recording;
+mod simplification;
+mod simulation;
+mod tensors;
+
+use std::ffi::OsString;
+
+use pyo3::prelude::*;
+
+/// Runs the command line; returns its exit code.
+#[pyfunction]
+fn run_command(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    py.detach(|| romc::cli::run_with(arguments))
+}
+
+/// The native module of the package.
+#[pymodule]
+fn _romc(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<controller::Controller>()?;
+    module.add_class::<model::Model>()?;
+    module.add_class::<recording::Recording>()?;
+    module.add_class::<recording::Segment>()?;
+    for function in [
+        wrap_pyfunction!(emission::emit, module)?,
+        wrap_pyfunction!(emission::equations, module)?,
+        wrap_pyfunction!(emission::write_files, module)?,
+        wrap_pyfunction!(recording::from_arrays, module)?,
+        wrap_pyfunction!(recording::read, module)?,
+        wrap_pyfunction!(run_command, module)?,
+        wrap_pyfunction!(simplification::simplify, module)?,
+        wrap_pyfunction!(simulation::simulate, module)?,
+        wrap_pyfunction!(tensors::import_tensors, module)?,
+    ] {
+        module.add_function(function)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,224 @@
+import json
+import math
+import pickle
+
+import numpy as np
+import pytest
+import romc
+
+from conftest import JUMPS, MODELS
+
+
+@pytest.fixture(scope="module")
+def parts():
+    """The arrays of a shipped model."""
+    document = json.loads((MODELS / "go1-d6.json").read_text())
+    map_of = lambda part: tuple(np.array(document[part][key]) for key in ("weights", "bias"))
+    return {
+        "encoder": map_of("encoder"),
+        "decoder": map_of("decoder"),
+        "xi": {phase["name"]: np.array(phase["xi"]) for phase in document["phases"]},
+        "scaling": document["scaling"]["state"],
+        "library": romc.Model.load(MODELS / "go1-d6.json").library,
+        "robot": "go1",
+    }
+
+
+def theta_row(library, values):
+    functions = {name: getattr(math, name) for name in ("sin", "cos", "tanh", "exp")}
+    return [eval(term.replace("^", "**"), {**functions, **values}) for term in library]
+
+
+def test_maps_and_accelerations_are_those_of_the_arrays(parts):
+    model = romc.Model.from_arrays(**parts)
+    rng = np.random.default_rng(5)
+    x, dx, u = rng.normal(size=(3, 7, 18))
+    (W, b), (D, c), s = parts["encoder"], parts["decoder"], parts["scaling"]
+    z, dz = model.encode(x), model.encode_velocity(dx)
+    u_lat = model.project_input(u)
+    np.testing.assert_allclose(z, (s * x) @ W.T + b, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(dz, (s * dx) @ W.T, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(u_lat, (s * u) @ np.linalg.pinv(W), rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(model.decode(z), (z @ D.T + c) / s, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(model.lift_input(u_lat), u_lat @ W / s, rtol=1e-12, atol=1e-12)
+    for phase, xi in parts["xi"].items():
+        for row in range(len(z)):
+            kinds = {"z": z[row], "dz": dz[row], "u": u_lat[row]}
+            values = {f"{kind}{i}": v for kind, row_ in kinds.items() for i, v in enumerate(row_, 1)}
+            expected = np.array(theta_row(parts["library"], values)) @ xi
+            found = model.acceleration(phase, z[row], dz[row], u_lat[row])
+            np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
+
+
+def test_model_of_arrays_equals_the_import_of_a_file(parts, command_line, tmp_path):
+    arrays = {f"xi.{phase}": xi for phase, xi in parts["xi"].items()}
+    for part in ("encoder", "decoder"):
+        arrays[f"{part}.weight"], arrays[f"{part}.bias"] = parts[part]
+    np.savez(tmp_path / "net.npz", **arrays)
+    (tmp_path / "terms.json").write_text(json.dumps(parts["library"]))
+    arguments = ["import", "net.npz", "--library", "terms.json", "--scaling", parts["scaling"], "--robot", "go1"]
+    inputs = [JUMPS / "train_01.csv.gz", JUMPS / "train_02.csv.gz"]
+    command_line.json(*arguments, "--inputs-from", *inputs, "--output", "net.json")
+    expected = json.loads((tmp_path / "net.json").read_text())
+    found = romc.Model.from_arrays(**parts, inputs_from=inputs, name="net").to_dict()
+    assert expected.pop("provenance")["format"] == "npz"
+    assert found.pop("provenance")["format"] == "arrays"
+    assert found == expected
+
+
+def test_layouts_and_number_types_make_the_same_model(parts):
+    expected = romc.Model.from_arrays(**parts)
+    turned = {
+        "encoder": (parts["encoder"][0].T, parts["encoder"][1]),
+        "decoder": (np.asfortranarray(parts["decoder"][0]), parts["decoder"][1].tolist()),
+        "xi": {name: xi.T.tolist() for name, xi in parts["xi"].items()},
+    }
+    found = romc.Model.from_arrays(**{**parts, **turned})
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(4, 18))
+    assert np.array_equal(found.encode(x), expected.encode(x))
+    for phase in expected.xi:
+        assert np.array_equal(found.xi[phase], expected.xi[phase])
+    single = romc.Model.from_arrays(**{**parts, "encoder": (parts["encoder"][0].astype(np.float32), None)})
+    weights = parts["encoder"][0].astype(np.float32).astype(np.float64)
+    np.testing.assert_allclose(single.encode(x), parts["scaling"] * x @ weights.T, rtol=1e-13, atol=1e-15)
+
+
+def test_xi_is_a_read_only_view(model):
+    xi = model.xi["contact"]
+    assert xi.shape == (len(model.library), model.latent_dim)
+    assert np.shares_memory(xi, model.xi["contact"])
+    with pytest.raises(ValueError):
+        xi[0, 0] = 1.0
+
+
+def test_rows_of_any_memory_order_are_taken(model, jump):
+    x = np.array(jump.x[:20])
+    expected = model.encode(x)
+    assert np.array_equal(model.encode(np.asfortranarray(x)), expected)
+    assert np.array_equal(model.encode(np.repeat(x, 2, axis=0)[::2]), expected)
+    assert np.array_equal(model.encode(x[3]), expected[3])
+    with pytest.raises(romc.ModelError, match="rows of 17"):
+        model.encode(x[:, :17])
+
+
+def test_faults_of_arrays_name_tensor_and_index(parts):
+    def refusal(**changes):
+        with pytest.raises(romc.ModelError) as caught:
+            romc.Model.from_arrays(**{**parts, **changes})
+        return caught.value
+
+    weights, bias = parts["encoder"]
+    broken = weights.copy()
+    broken[2, 5] = np.inf
+    error = refusal(encoder=(broken, bias))
+    assert (error.tensor, error.row, error.column) == ("encoder.weight", 2, 5)
+    xi = {name: value.copy() for name, value in parts["xi"].items()}
+    xi["flight"][3, 1] = np.nan
+    error = refusal(xi=xi)
+    assert (error.tensor, error.row, error.column) == ("xi.flight", 3, 1)
+    error = refusal(encoder=(weights[:, :17], bias))
+    assert error.tensor == "encoder.weight" and "18" in str(error)
+    error = refusal(decoder=(parts["decoder"][0], parts["decoder"][1][:-1]))
+    assert error.tensor == "decoder.bias"
+    error = refusal(xi={name: value[:-1] for name, value in parts["xi"].items()})
+    assert error.tensor.startswith("xi.")
+    error = refusal(encoder=(weights + 0j, bias))
+    assert error.tensor == "encoder.weight" and "complex" in str(error)
+    error = refusal(encoder=(np.vstack([weights[:-1], weights[:1]]), bias))
+    assert "singular values" in str(error)
+    assert isinstance(error, ValueError)
+
+
+def test_options_are_named_as_arguments(parts):
+    with pytest.raises(romc.ModelError) as caught:
+        romc.Model.from_arrays(**{**parts, "xi": {"jump": parts["xi"]["contact"]}})
+    assert 'phases={"jump": "any"' in str(caught.value) or "phases" in str(caught.value)
+    assert "--" not in str(caught.value)
+    with pytest.raises(romc.RomcError, match="unknown robot"):
+        romc.Model.from_arrays(**{**parts, "robot": "go3"})
+    with pytest.raises(romc.RomcError, match="xi_layout: found"):
+        romc.Model.from_arrays(**parts, xi_layout="sideways")
+
+
+def test_faults_of_a_file_name_tensor_and_index(tmp_path):
+    document = json.loads((MODELS / "go1-d4.json").read_text())
+    document["encoder"]["weights"][3][2] = "much"
+    path = tmp_path / "bad.json"
+    path.write_text(json.dumps(document))
+    with pytest.raises(romc.ModelError) as caught:
+        romc.Model.load(path)
+    assert (caught.value.tensor, caught.value.row, caught.value.column) == ("encoder.weights", 3, 2)
+    assert caught.value.file == str(path)
+    with pytest.raises(romc.ModelError, match="cannot read"):
+        romc.Model.load(tmp_path / "none.json")
+
+
+def test_shorthand_library_has_the_documented_order():
+    library = romc.Library(degree=2, inputs=True)
+    model = romc.Model.from_arrays(xi={"contact": np.ones((7, 1))}, library=library)
+    assert model.library == ["1", "z1", "dz1", "z1^2", "z1*dz1", "dz1^2", "u1"]
+    assert library.shorthand() == "degree=2,inputs"
+    assert model.phases == {"contact": "any"}
+
+
+def test_layers_with_an_activation_are_a_nonlinear_encoder():
+    rng = np.random.default_rng(2)
+    layers = [(rng.normal(size=(8, 18)), rng.normal(size=8)), (rng.normal(size=(2, 8)), np.zeros(2))]
+    model = romc.Model.from_arrays(
+        encoder=layers, activation="tanh", xi={"contact": np.ones((5, 2))}, library=romc.Library(), robot="go1"
+    )
+    x = rng.normal(size=(3, 18))
+    hidden = np.tanh(x @ layers[0][0].T + layers[0][1])
+    np.testing.assert_allclose(model.encode(x), hidden @ layers[1][0].T, rtol=1e-12, atol=1e-12)
+    jacobian = layers[1][0] @ np.diag(1 - hidden[0] ** 2) @ layers[0][0]
+    np.testing.assert_allclose(model.encode_velocity(x[1], x[0]), jacobian @ x[1], rtol=1e-11, atol=1e-11)
+    with pytest.raises(romc.ModelError, match="nonlinear encoder"):
+        model.encode_velocity(x[1])
+
+
+def test_model_is_saved_pickled_and_compared(model, tmp_path):
+    model.save(tmp_path / "m.json")
+    again = romc.Model.load(tmp_path / "m.json")
+    assert again == model and hash(again) == hash(model)
+    assert pickle.loads(pickle.dumps(model)) == model
+    other = romc.Model.load(MODELS / "go1-d6.json")
+    assert other != model
+    with pytest.raises(romc.ModelError, match="there already"):
+        other.save(tmp_path / "m.json")
+    assert "go1-d4" in repr(model) and "4 latent coordinates" in repr(model)
+
+
+def test_latent_model_says_what_it_lacks(jump):
+    model = romc.Model.load(MODELS / "paper-2d.json")
+    with pytest.raises(romc.ModelError) as caught:
+        model.encode(jump.x)
+    assert caught.value.tensor == "encoder"
+    with pytest.raises(romc.ModelError):
+        model.simulate(jump)
+    with pytest.raises(romc.ModelError, match="expected one of contact, flight"):
+        model.acceleration("jump", [0.0, 0.0], [0.0, 0.0], [0.0, 0.0])
+
+
+def test_jax_arrays_are_arrays(parts):
+    jax = pytest.importorskip("jax")
+    encoder = tuple(jax.numpy.asarray(value, dtype=jax.numpy.float32) for value in parts["encoder"])
+    model = romc.Model.from_arrays(**{**parts, "encoder": encoder})
+    expected = tuple(np.asarray(value, dtype=np.float64) for value in encoder)
+    assert model == romc.Model.from_arrays(**{**parts, "encoder": expected})
+
+
+def test_affine_pipeline_of_scikit_learn_is_an_autoencoder(jump):
+    decomposition = pytest.importorskip("sklearn.decomposition")
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    pipeline = make_pipeline(StandardScaler(), decomposition.PCA(3, whiten=True)).fit(jump.x)
+    xi = {"contact": np.ones((7, 3))}
+    model = romc.Model.from_arrays(encoder=pipeline, decoder=pipeline, xi=xi, library=romc.Library(), robot="go1")
+    z = pipeline.transform(jump.x)
+    np.testing.assert_allclose(model.encode(jump.x), z, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(model.decode(z), pipeline.inverse_transform(z), rtol=1e-9, atol=1e-9)
+    kernel = decomposition.KernelPCA(3, kernel="rbf").fit(jump.x)
+    with pytest.raises(romc.ModelError, match="nonlinear KernelPCA"):
+        romc.Model.from_arrays(encoder=kernel, xi=xi, library=romc.Library(), robot="go1")

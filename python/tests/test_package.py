@@ -1,0 +1,68 @@
+"""The command line of the wheel, the examples, the type annotations."""
+
+import pathlib
+import subprocess
+import sys
+import sysconfig
+
+import pytest
+import romc
+
+from conftest import ROOT
+
+EXAMPLES = ROOT / "python" / "examples"
+
+
+def test_console_script_is_the_command_line():
+    script = pathlib.Path(sysconfig.get_path("scripts")) / "romc"
+    version = subprocess.run([script, "--version"], capture_output=True, text=True)
+    assert (version.returncode, version.stdout) == (0, f"romc {romc.__version__}\n")
+    wrong = subprocess.run([script, "compile"], capture_output=True, text=True)
+    assert wrong.returncode == 2 and "Usage" in wrong.stderr
+    failed = subprocess.run([script, "simulate", "none.json", "none.csv"], capture_output=True, text=True)
+    assert failed.returncode == 1 and failed.stderr.startswith("error: none.json")
+    helped = subprocess.run([sys.executable, "-m", "romc", "--help"], capture_output=True, text=True)
+    assert helped.returncode == 0 and "simulate" in helped.stdout
+
+
+def test_quickstart_is_short_and_runs(tmp_path):
+    script = EXAMPLES / "quickstart.py"
+    assert len(script.read_text().splitlines()) <= 25
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert r"\ddot{z}_1" in done.stdout and "solved" in done.stdout
+    assert (tmp_path / "out" / "pca" / "pca.c").is_file()
+
+
+def test_notebook_runs(tmp_path):
+    nbclient = pytest.importorskip("nbclient")
+    nbformat = pytest.importorskip("nbformat")
+    notebook = nbformat.read(EXAMPLES / "jump.ipynb", as_version=4)
+    resources = {"metadata": {"path": str(ROOT)}}
+    nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3", resources=resources).execute()
+    outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
+    assert any("text/latex" in output.get("data", {}) for output in outputs)
+    assert any("image/png" in output.get("data", {}) for output in outputs)
+
+
+def test_annotations_hold():
+    pytest.importorskip("mypy")
+    package = pathlib.Path(romc.__file__).parent
+    assert (package / "py.typed").is_file()
+    configuration = ROOT / "python" / "pyproject.toml"
+    command = [sys.executable, "-m", "mypy", "--config-file", configuration, "--strict", package]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=package.parent)
+    assert done.returncode == 0, done.stdout
+
+
+def test_public_names_are_documented():
+    for name in romc.__all__:
+        value = getattr(romc, name)
+        if name == "__version__":
+            continue
+        assert value.__doc__, name
+        if isinstance(value, type):
+            for member, entry in vars(value).items():
+                if not member.startswith("_") and (callable(entry) or isinstance(entry, property)):
+                    assert entry.__doc__, f"{name}.{member}"

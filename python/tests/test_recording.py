@@ -1,0 +1,139 @@
+import csv
+import gzip
+
+import numpy as np
+import pytest
+import romc
+
+from conftest import JUMPS
+
+PATH = JUMPS / "test_01.csv.gz"
+
+
+def columns(path):
+    """The numbers of a file by column, read without romc."""
+    with gzip.open(path, "rt") as file:
+        text = file.read()
+    separator = ";" if ";" in text.partition("\n")[0] else ","
+    rows = list(csv.reader(text.splitlines(), delimiter=separator))
+    numbers = [[float(cell.replace(",", ".")) for cell in row] for row in rows[1:] if row]
+    return dict(zip(rows[0], np.array(numbers).T))
+
+
+def test_arrays_have_the_bits_of_the_file(jump):
+    file = columns(PATH)
+    assert np.array_equal(jump.t, file["Time"])
+    for index, name in [(0, "fr.hx"), (5, "fl.kn"), (11, "rl.kn")]:
+        assert np.array_equal(jump.x[:, index], file[f"{name} Position"])
+        assert np.array_equal(jump.dx[:, index], file[f"{name} Velocity"])
+        assert np.array_equal(jump.torque[:, index], file[f"{name} Torque"])
+    assert np.array_equal(jump.x[:, 14], file["Body linear Position z"])
+    assert np.array_equal(jump.dx[:, 17], file["Body angular Velocity z"])
+    assert np.array_equal(jump.feet[:, 2], file["rr Foot"] == 1.0)
+    assert jump.x.shape == (len(file["Time"]), 18) and jump.feet.dtype == bool
+
+
+def test_arrays_are_read_only_views_of_one_memory(jump):
+    segment = jump[0]
+    for name in ["t", "x", "dx", "ddx", "torque", "feet"]:
+        array = getattr(segment, name)
+        assert np.shares_memory(array, getattr(jump[0], name)), name
+        assert array.flags.c_contiguous and not array.flags.owndata, name
+        with pytest.raises(ValueError):
+            array[0] = 0
+
+
+def test_arrays_outlive_the_recording():
+    x = romc.read(PATH)[0].x
+    expected = romc.read(PATH).x.copy()
+    assert np.array_equal(x, expected)
+
+
+def test_recording_of_arrays_equals_that_of_the_file(jump):
+    again = romc.Recording.from_arrays(jump.t, jump.x, jump.dx, jump.torque, jump.feet, ddx=jump.ddx)
+    for name in ["t", "x", "dx", "ddx", "torque", "feet"]:
+        assert np.array_equal(getattr(again, name), getattr(jump, name)), name
+    # Lists, single precision and numbers as flags convert.
+    single = romc.Recording.from_arrays(
+        jump.t.tolist(), jump.x.astype(np.float32), jump.dx, jump.torque, jump.feet.astype(int)
+    )
+    assert np.array_equal(single.x, jump.x.astype(np.float32))
+    assert np.array_equal(single.feet, jump.feet)
+
+
+def test_recording_saved_is_read_back(jump, tmp_path):
+    path = tmp_path / "jump.csv.gz"
+    jump.save(path)
+    assert np.array_equal(romc.read(path).dx, jump.dx)
+    with pytest.raises(romc.RomcError, match="already exists"):
+        jump.save(path)
+    jump.save(path, force=True)
+
+
+def test_chained_jumps_are_segments(jump):
+    twice = romc.Recording.from_arrays(
+        np.concatenate([jump.t, jump.t]),
+        *(np.vstack([array, array]) for array in (jump.x, jump.dx, jump.torque, jump.feet)),
+    )
+    assert len(twice) == 2 and len(twice[-1]) == len(jump.t)
+    assert [len(segment) for segment in twice] == [len(jump.t)] * 2
+    with pytest.raises(romc.RecordingError, match="found 2 segments"):
+        twice.x
+    with pytest.raises(IndexError):
+        twice[2]
+
+
+def test_bad_cell_is_named_with_row_and_column(tmp_path):
+    with gzip.open(PATH, "rt") as file:
+        lines = file.read().splitlines()
+    separator = ";" if ";" in lines[0] else ","
+    place = lines[0].split(separator).index("fl.hy Position")
+    cells = lines[6].split(separator)
+    cells[place] = "oops"
+    lines[6] = separator.join(cells)
+    path = tmp_path / "bad.csv"
+    path.write_text("\n".join(lines))
+    with pytest.raises(romc.RecordingError) as caught:
+        romc.read(path)
+    assert (caught.value.row, caught.value.column) == (7, "fl.hy Position")
+    assert caught.value.file == str(path) and "oops" in str(caught.value)
+
+
+def test_number_that_is_not_finite_is_named_with_its_sample(jump):
+    x = jump.x.copy()
+    x[9, 4] = np.nan
+    with pytest.raises(romc.RecordingError) as caught:
+        romc.Recording.from_arrays(jump.t, x, jump.dx, jump.torque, jump.feet)
+    assert (caught.value.row, caught.value.column) == (9, "fl.hy Position")
+
+
+@pytest.mark.parametrize(
+    "name, value",
+    [("x", np.zeros((3, 18))), ("torque", np.zeros((5, 11))), ("feet", np.full((5, 4), 0.5)), ("t", "now")],
+)
+def test_arrays_that_do_not_fit_are_refused(name, value):
+    arrays = {
+        "t": np.arange(5.0),
+        "x": np.zeros((5, 18)),
+        "dx": np.zeros((5, 18)),
+        "torque": np.zeros((5, 12)),
+        "feet": np.ones((5, 4), bool),
+    }
+    with pytest.raises(romc.RecordingError) as caught:
+        romc.Recording.from_arrays(**{**arrays, name: value})
+    assert caught.value.column == name
+
+
+def test_missing_file_is_named(tmp_path):
+    with pytest.raises(romc.RecordingError, match="no such file"):
+        romc.read(tmp_path / "none.csv")
+
+
+def test_inputs_are_torques_and_the_wrench(model, jump):
+    u = jump.inputs(model)
+    assert u.shape == (len(jump.t), 18)
+    assert np.array_equal(jump.inputs("go1")[:, :12], jump.torque)
+    flight = ~jump.feet.any(axis=1)
+    assert flight.any() and not u[flight, 12:].any()
+    with pytest.raises(romc.RomcError, match="unknown robot"):
+        jump.inputs("go3")

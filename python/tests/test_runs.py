@@ -1,0 +1,153 @@
+"""Rollouts and the controller, compared with the command line bit for bit."""
+
+import csv
+import threading
+import time
+
+import numpy as np
+import pytest
+import romc
+
+from conftest import JUMPS, MODELS
+
+PATHS = [JUMPS / "test_01.csv.gz", JUMPS / "test_02.csv.gz"]
+
+
+def table(path):
+    """The columns of a CSV file; empty cells are NaN, words stay words."""
+    rows = list(csv.reader(path.read_text().splitlines()))
+
+    def number(cell):
+        try:
+            return float(cell) if cell else np.nan
+        except ValueError:
+            return cell
+
+    return {name: [number(row[i]) for row in rows[1:]] for i, name in enumerate(rows[0])}
+
+
+@pytest.mark.parametrize("name, restart_every", [("go1-d4", 0.1), ("go1-d6", 0.05)])
+def test_rollouts_are_those_of_the_command_line(name, restart_every, command_line, tmp_path):
+    path = MODELS / f"{name}.json"
+    arguments = ["--restart-every", restart_every, "--output", "run.csv"]
+    answer = command_line.json("simulate", path, *PATHS, *arguments)
+    simulation = romc.Model.load(path).simulate(PATHS, restart_every=restart_every)
+    assert simulation.metrics == answer["rollouts"]
+    columns = table(tmp_path / "run.csv")
+    assert len(simulation.runs) == max(columns["segment"]) + 1
+    for kind, symbol, names in [
+        ("z", "z", [f"z_{i + 1}" for i in range(simulation.runs[0].z.shape[1])]),
+        ("dz", "dz", [f"dz_{i + 1}" for i in range(simulation.runs[0].z.shape[1])]),
+        ("x", "x", list(answer["rollouts"]["full"]["coordinates"])),
+    ]:
+        for suffix in ["", "_full", "_restarted"]:
+            found = np.vstack([getattr(run, kind + suffix) for run in simulation.runs])
+            expected = np.array([columns[name + suffix] for name in names]).T
+            assert np.array_equal(found, expected, equal_nan=True), (symbol, suffix)
+    assert np.array_equal(np.concatenate([run.t for run in simulation.runs]), columns["time"])
+    phases = list(romc.Model.load(path).phases)
+    assert [phases[i] for run in simulation.runs for i in run.phase] == columns["phase"]
+
+
+def test_rms_is_that_of_the_trajectories(model, jump):
+    simulation = model.simulate(jump)
+    [run] = simulation.runs
+    error = run.x_restarted[:, 14] - run.x[:, 14]
+    assert simulation.rms("body.z") == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
+    assert simulation.rms("body.z", "full") >= simulation.rms("body.z")
+
+
+@pytest.mark.parametrize("lift, reference_input", [("transpose", "recorded"), ("consistent", "none")])
+def test_controller_along_a_recording_is_that_of_the_command_line(
+    lift, reference_input, model, command_line, tmp_path
+):
+    arguments = ["--lift", lift, "--reference-input", reference_input, "--output", "mpc.csv"]
+    answer = command_line.json("mpc", MODELS / "go1-d4.json", PATHS[0], *arguments)
+    run = romc.Controller(model, lift=lift).along(PATHS[0], reference_input)
+    [expected] = answer["runs"]
+    untimed = lambda summary: {key: value for key, value in summary.items() if key not in ("recording", "step_us")}
+    assert untimed(run.summary) == untimed(expected)
+    columns = table(tmp_path / "mpc.csv")
+    torques = np.array([column for name, column in columns.items() if name.endswith(" torque")]).T
+    assert np.array_equal(run.torque, torques)
+    assert run.status == columns["status"] and list(run.t) == columns["time"]
+    assert np.array_equal(run.z_ref, np.array([columns[f"z_ref_{i + 1}"] for i in range(4)]).T)
+
+
+def test_steps_are_those_along_the_recording(model, jump):
+    along = romc.Controller(model).along(jump)
+    controller = romc.Controller(model, horizon=20, step=0.01).set_reference(jump)
+    samples = np.searchsorted(jump.t, along.t - 1e-9)
+    for row, sample in enumerate(samples):
+        command = controller.step(jump.t[sample], jump.x[sample], jump.dx[sample], jump.feet[sample])
+        assert np.array_equal(command.torque, along.torque[row]), row
+        assert np.array_equal(command.u_lat, along.u_lat[row]), row
+        assert command.status == along.status[row] and command.has_plan == (command.status_code in range(5))
+    assert set(along.status) <= {"solved", "softened", "contact_early", "contact_late", "contact_unknown"}
+
+
+def test_reference_of_arrays_is_that_of_the_recording(model, jump):
+    recorded = romc.Controller(model).set_reference(jump, reference_input="none")
+    arrays = romc.Controller(model).set_reference(t=jump.t, x=jump.x, dx=jump.dx, feet=jump.feet)
+    measurement = (jump.t[40], jump.x[40], jump.dx[40], jump.feet[40])
+    one, other = recorded.step(*measurement), arrays.step(*measurement)
+    assert one.status == "solved" and np.array_equal(one.torque, other.torque)
+
+
+def test_settings_reach_the_controller(model, jump):
+    def torque(**settings):
+        controller = romc.Controller(model, **settings).set_reference(jump)
+        x = np.array(jump.x[40])
+        x[14] += 0.02
+        return controller.step(jump.t[40], x, jump.dx[40], jump.feet[40]).torque
+
+    default = torque()
+    assert np.array_equal(torque(), default)
+    for settings in [{"horizon": 5}, {"input_weight": 1.0}, {"velocity_weight": 1.0}, {"lift": "consistent"}]:
+        assert not np.array_equal(torque(**settings), default), settings
+    with pytest.raises(romc.RomcError, match="horizon"):
+        romc.Controller(model, horizon=0)
+    with pytest.raises(romc.RomcError, match="lift: found 'up', expected one of transpose, consistent"):
+        romc.Controller(model, lift="up")
+
+
+def test_measurement_that_makes_no_sense_gets_a_safe_command(model, jump):
+    controller = romc.Controller(model)
+    measurement = [jump.t[0], jump.x[0], jump.dx[0], jump.feet[0]]
+    command = controller.step(*measurement)
+    assert (command.status, command.status_code) == ("no_reference", -3)
+    controller.set_reference(jump)
+    broken = np.array(jump.x[0])
+    broken[3] = np.nan
+    command = controller.step(jump.t[0], broken, jump.dx[0], jump.feet[0])
+    assert command.status == "not_finite" and np.all(np.abs(command.torque) <= 35.55)
+    command = controller.step(jump.t[0], jump.x[0][:5], jump.dx[0], jump.feet[0])
+    assert command.status == "wrong_dimension" and not command.has_plan
+    assert controller.step(*measurement).status == "solved"
+
+
+def test_fault_of_a_reference_names_sample_and_array(model, jump):
+    dx = jump.dx.copy()
+    dx[7, 2] = np.inf
+    with pytest.raises(romc.RecordingError) as caught:
+        romc.Controller(model).set_reference(t=jump.t, x=jump.x, dx=dx, feet=jump.feet)
+    assert (caught.value.row, caught.value.column) == (7, "dx")
+    with pytest.raises(romc.RecordingError) as caught:
+        romc.Controller(model).set_reference(t=jump.t, x=jump.x[:-1], dx=jump.dx, feet=jump.feet)
+    assert "x" in str(caught.value)
+
+
+def test_long_calls_let_other_threads_run(model):
+    began = time.perf_counter()
+    model.simulate(PATHS)
+    alone = time.perf_counter() - began
+    done = threading.Event()
+    worker = threading.Thread(target=lambda: (model.simulate(PATHS), done.set()))
+    worker.start()
+    turns = 0
+    while not done.is_set():
+        time.sleep(alone / 50)
+        turns += 1
+    worker.join()
+    # A call that keeps the interpreter lets this loop turn once.
+    assert turns >= 10, f"{turns} turns in a call of {alone:.2f} s"
