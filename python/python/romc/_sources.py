@@ -141,6 +141,7 @@ def _leaves(prefix: str, part: Any) -> Iterator[Tuple[str, Any]]:
 def _torch_layers(part: str, module: Any) -> Tuple[Tensors, Optional[str]]:
     """Layers of a chain in their order, numbered as such, and the activation between them."""
     layers: List[LayerPair] = []
+    names: List[str] = []
     between: List[Tuple[str, str]] = []
     pending: Optional[Tuple[str, str]] = None
     for name, leaf in _leaves(part, module):
@@ -153,6 +154,7 @@ def _torch_layers(part: str, module: Any) -> Tuple[Tensors, Optional[str]]:
                     raise _refused(name, "two linear layers in a row", "an activation between them")
                 between.append(pending)
             layers.append((leaf.weight, leaf.bias))
+            names.append(name)
             pending = None
         elif kind in _ACTIVATIONS and layers and pending is None:
             pending = (name, _activation(name, leaf))
@@ -167,7 +169,20 @@ def _torch_layers(part: str, module: Any) -> Tuple[Tensors, Optional[str]]:
         found = ", ".join(f"{activation} ({name})" for name, activation in between)
         raise _refused(part, found, "one activation between all layers")
     activation = between[0][1] if between else None
-    return map_tensors(part, layers), activation
+    if len(layers) == 1:
+        return _layer(part, layers[0]), activation
+    tensors: Tensors = {}
+    for number, layer in zip(_numbers(names), layers):
+        tensors.update(_layer(f"{part}.{number}", layer))
+    return tensors, activation
+
+
+def _numbers(names: List[str]) -> List[int]:
+    """The modules' own numbers, as in `encoder.2`, where they rise; else 0, 1, ..."""
+    ends = [name.rpartition(".")[2] for name in names]
+    numbers = [int(end) for end in ends if end.isdigit()]
+    is_rising = all(first < second for first, second in zip(numbers, numbers[1:]))
+    return numbers if len(numbers) == len(names) and is_rising else list(range(len(names)))
 
 
 def _activation(name: str, leaf: Any) -> str:

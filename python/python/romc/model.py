@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
@@ -47,7 +48,7 @@ class Model:
         encoder: Any = None,
         decoder: Any = None,
         robot: Optional[str] = None,
-        scaling: Optional[Factors] = 1.0,
+        scaling: Optional[Factors] = None,
         input_scaling: Optional[Factors] = None,
         mean: Any = None,
         std: Any = None,
@@ -70,7 +71,7 @@ class Model:
         - `xi`: coefficients by phase, `(terms, d)` or `(d, terms)`; `mask` has 0 where training switched one off.
         - `library`: the candidate terms in the order of Xi's rows: names such as `["1", "z1", "sin(dz1)", "u1"]`, or
           the shorthand `Library(degree=1, trigonometric=True, inputs=True)`.
-        - `scaling`, `input_scaling`: scaled value = factor x SI value, one number or one per coordinate.
+        - `scaling`, `input_scaling`: scaled value = factor x SI value, one number or one per coordinate; 1 unless given.
         - `mean`, `std`: `(n,)`, of a trainer that took `(x - mean) / std`.
         - `phases`: the feet that select each phase, `any`, `none`, `always` or patterns such as `"0011,0001"` (fr
           fl rr rl), the first match wins; `contact` and `flight` are known.
@@ -87,7 +88,7 @@ class Model:
                 tensors[key] = floats(key, value)
         arguments = _import_arguments(
             library=library,
-            has_map=encoder is not None or decoder is not None,
+            tensors=tensors,
             scaling=scaling,
             input_scaling=input_scaling,
             phases=phases,
@@ -112,7 +113,7 @@ class Model:
         xi: Union[Mapping[str, Any], Any, None] = None,
         map: Optional[Mapping[str, str]] = None,
         robot: Optional[str] = None,
-        scaling: Optional[Factors] = 1.0,
+        scaling: Optional[Factors] = None,
         input_scaling: Optional[Factors] = None,
         mean: Any = None,
         std: Any = None,
@@ -138,7 +139,7 @@ class Model:
                 tensors[key] = floats(key, value)
         arguments = _import_arguments(
             library=library,
-            has_map=True,
+            tensors=tensors,
             scaling=scaling,
             input_scaling=input_scaling,
             phases=phases,
@@ -161,7 +162,7 @@ class Model:
         encoder: Any = None,
         decoder: Any = None,
         robot: Optional[str] = None,
-        scaling: Optional[Factors] = 1.0,
+        scaling: Optional[Factors] = None,
         input_scaling: Optional[Factors] = None,
         mean: Any = None,
         std: Any = None,
@@ -435,7 +436,7 @@ def _factors(name: str, factors: Optional[Factors]) -> List[float]:
 def _import_arguments(
     *,
     library: LibraryLike,
-    has_map: bool,
+    tensors: Mapping[str, Floats],
     scaling: Optional[Factors],
     input_scaling: Optional[Factors],
     phases: Optional[Mapping[str, Union[str, Sequence[str]]]],
@@ -443,14 +444,18 @@ def _import_arguments(
     **others: Any,
 ) -> Dict[str, object]:
     """The options of `romc import`."""
+    # Equations alone have no robot coordinates to scale, and tensors may have the factors.
+    has_map = any(re.search(r"(^|[./])(en|de)coder[._]", name) for name in tensors)
+    has_factors = any(re.search(r"(^|[./])(scaling|std)[._](state|input)$", name) for name in tensors)
+    if scaling is None and has_map and not has_factors:
+        scaling = 1.0
     shorthand = library.shorthand() if isinstance(library, Library) else library
     is_shorthand = isinstance(shorthand, str)
     rules = {name: feet if isinstance(feet, str) else ",".join(feet) for name, feet in (phases or {}).items()}
     arguments: Dict[str, object] = {
         "library": shorthand if is_shorthand else None,
         "terms": None if is_shorthand else [str(term) for term in shorthand],
-        # Equations alone have no robot coordinates to scale.
-        "scaling": _factors("scaling", scaling) if has_map else [],
+        "scaling": _factors("scaling", scaling),
         "input_scaling": _factors("input_scaling", input_scaling),
         "phases": [f"{name}={feet}" for name, feet in rules.items()],
         "map": [f"{part}={tensor}" for part, tensor in (map or {}).items()],
