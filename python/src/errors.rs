@@ -203,6 +203,7 @@ impl Fault {
                 EvaluateError::Lower(error) => Fault::of_lower(error),
                 EvaluateError::Recording(error) => Fault::of_recording(error),
                 EvaluateError::Sim(error) => Fault::of_sim(error),
+                EvaluateError::Control(error) => Fault::of_mpc(error),
             },
             Error::Emit(error) => match error {
                 EmitError::Lower(error) => Fault::of_lower(error),
