@@ -18,6 +18,7 @@ use romc::import::{ImportError, ImportFault};
 use romc::lower::LowerError;
 use romc::model::ModelError;
 use romc::mpc::{ControlError, MpcError};
+use romc::plan::PlanError;
 use romc::recording::RecordingError;
 use romc::sim::SimError;
 use romc::simplify::SimplifyError;
@@ -212,6 +213,11 @@ impl Fault {
                 EmitError::Typeset(_) | EmitError::Codegen(_) | EmitError::Template(_) => {
                     Fault::of(Class::Model)
                 }
+            },
+            Error::Plan(error) => match error {
+                PlanError::Model(error) => Fault::of_model(error),
+                PlanError::Lower(error) => Fault::of_lower(error),
+                _ => Fault::of(Class::Other),
             },
             Error::Simplify(error) => match error {
                 SimplifyError::NoEncoder { .. } => Fault::at_tensor("encoder"),

@@ -9,6 +9,7 @@ mod controller;
 mod emission;
 mod errors;
 mod model;
+mod plan;
 mod recording;
 mod simplification;
 mod simulation;
@@ -36,6 +37,7 @@ fn _romc(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(emission::emit, module)?,
         wrap_pyfunction!(emission::equations, module)?,
         wrap_pyfunction!(emission::write_files, module)?,
+        wrap_pyfunction!(plan::plan, module)?,
         wrap_pyfunction!(recording::from_arrays, module)?,
         wrap_pyfunction!(recording::read, module)?,
         wrap_pyfunction!(run_command, module)?,

@@ -22,6 +22,15 @@ pub struct Recording {
     pub data: Arc<romc::recording::Recording>,
 }
 
+impl Recording {
+    /// A recording that Python holds from now on.
+    pub fn made(recording: romc::recording::Recording) -> Self {
+        Recording {
+            data: Arc::new(recording),
+        }
+    }
+}
+
 #[pymethods]
 impl Recording {
     #[getter]
@@ -151,8 +160,8 @@ impl Segment {
 #[pyfunction]
 pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Recording> {
     let read = py.detach(|| romc::recording::read(&path));
-    let data = Arc::new(read.map_err(|error| python_error(py, error))?);
-    Ok(Recording { data })
+    read.map(Recording::made)
+        .map_err(|error| python_error(py, error))
 }
 
 /// Rows of numbers.
@@ -224,8 +233,7 @@ pub fn from_arrays(py: Python<'_>, name: &str, arrays: Arrays<'_>) -> PyResult<R
         ignored_columns: Vec::new(),
     };
     let checked = py.detach(|| through_the_format(name, &recording, &options));
-    let data = Arc::new(checked.map_err(|error| python_error(py, error))?);
-    Ok(Recording { data })
+    (checked.map(Recording::made)).map_err(|error| python_error(py, error))
 }
 
 /// Row of a file's first sample.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import romc
 
-from conftest import JUMPS, MODELS
+from conftest import JUMPS, MODELS, CommandLine
 
 PATHS = [JUMPS / "test_01.csv.gz", JUMPS / "test_02.csv.gz"]
 
@@ -151,3 +151,35 @@ def test_long_calls_let_other_threads_run(model):
     worker.join()
     # A call that keeps the interpreter lets this loop turn once.
     assert turns >= 10, f"{turns} turns in a call of {alone:.2f} s"
+
+
+@pytest.fixture(scope="module")
+def planner(tmp_path_factory):
+    """A model with landmarks and a prior over goals, trained by the command line."""
+    folder = tmp_path_factory.mktemp("planner")
+    jumps = [sorted(JUMPS.glob(f"{kind}_*.csv.gz")) for kind in ("train", "validation")]
+    arguments = ["--latent-dim", "6", "--actuators", "identify", "--output", "planner.json"]
+    CommandLine(folder).json("train", *jumps[0], "--validation", *jumps[1], *arguments)
+    return folder / "planner.json"
+
+
+def test_plan_is_that_of_the_command_line_and_is_followed(planner, command_line, tmp_path):
+    model = romc.Model.load(planner)
+    answer = command_line.json("plan", planner, "--distance", "0.3", "--apex", "0.15", "--output", "plan.csv")
+    plan = model.plan(distance=0.3, apex=0.15)
+    untimed = {key: value for key, value in plan.summary.items() if key != "solve_ms"}
+    assert untimed == {key: answer[key] for key in untimed}
+    written = romc.read(tmp_path / "plan.csv")
+    for name in ["t", "x", "dx", "torque", "feet"]:
+        assert np.array_equal(getattr(plan, name), getattr(written, name)), name
+    assert plan.x[-1, 12] - plan.x[0, 12] == pytest.approx(0.3, abs=0.02)
+    controller = romc.Controller(model).set_reference(plan)
+    assert controller.step(plan.t[0], plan.x[0], plan.dx[0], plan.feet[0]).has_plan
+    with pytest.raises(romc.RomcError):
+        model.plan(distance=5.0, apex=0.1)
+
+
+def test_model_without_a_prior_says_so():
+    with pytest.raises(romc.ModelError) as caught:
+        romc.Model.load(MODELS / "paper-2d.json").plan(distance=0.3, apex=0.1)
+    assert caught.value.tensor

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::PlanArguments;
@@ -15,7 +15,7 @@ use crate::model::ReducedModel;
 use crate::plan::{self, Goal, Plan, PlanSettings, Reach, Verdict};
 use crate::recording::{self, Recording};
 use crate::report::figures::{Figure, figure_files};
-use crate::report::{plan_figures, reach_figure};
+use crate::report::{plan_figures, plan_json, reach_figure};
 use crate::typeset::{Cell, Table};
 use crate::{Error, artifact};
 
@@ -168,39 +168,26 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
     }
     Answer {
         text,
-        json: plan_json(arguments, planned),
+        json: json_of(arguments, planned),
     }
 }
 
-fn plan_json(arguments: &PlanArguments, planned: &Plan) -> Value {
-    let parts = planned.parts.iter();
-    let durations: Map<String, Value> = parts
-        .map(|part| (part.name.clone(), json!(part.duration_s)))
-        .collect();
-    let margins = &planned.margins;
-    json!({
+/// The object of the documentation.
+fn json_of(arguments: &PlanArguments, planned: &Plan) -> Value {
+    let mut value = json!({
         "command": "plan",
         "model": arguments.model.display().to_string(),
-        "distance_m": planned.reached_m[0],
-        "apex_m": planned.reached_m[1],
-        "goal_m": planned.goal_m,
-        "expected_error_m": { "distance": planned.error_m[0], "apex": planned.error_m[1] },
-        "durations_s": durations,
-        "cost": planned.cost,
-        "input_deviation": planned.input_deviation,
-        "extrapolates": planned.verdict != Verdict::Trusted,
-        "reasons": planned.verdict.reasons(),
-        "margins": {
-            "torque_share": margins.torque_share,
-            "beyond_joint_limit_rad": margins.beyond_joint_limit_rad,
-            "beyond_friction_n": margins.beyond_friction_n,
-            "foot_slip_m": margins.foot_slip_m,
-        },
-        "programs": planned.programs,
-        "solve_ms": planned.solve_ms,
-        "status": planned.verdict.word(),
-        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
-    })
+    });
+    if let (Value::Object(all), Value::Object(plan)) = (&mut value, plan_json(planned)) {
+        all.extend(plan);
+    }
+    value["output"] = json!(
+        arguments
+            .output
+            .as_ref()
+            .map(|path| path.display().to_string())
+    );
+    value
 }
 
 fn map(

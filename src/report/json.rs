@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 use super::tables::template_rms;
 use crate::evaluate::{Assessment, Baseline, CoordinateSums, Fit, LinearisedPhase};
 use crate::model::ReducedModel;
+use crate::plan::{Plan, Verdict};
 
 /// Every metric of an assessment, under the names of the documentation; rms in the units of each coordinate.
 pub fn assessment_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Value {
@@ -84,5 +85,34 @@ fn rollouts_json(
         "diverged": sums.diverged,
         "coordinates": named(sums.fits()),
         "phases": by_phase(model, |index| json!(named(sums.phase_fits(index)))),
+    })
+}
+
+/// A planned jump: goal and what is reached, durations, how far it is from what was recorded.
+pub fn plan_json(planned: &Plan) -> Value {
+    let parts = planned.parts.iter();
+    let durations: Map<String, Value> = parts
+        .map(|part| (part.name.clone(), json!(part.duration_s)))
+        .collect();
+    let margins = &planned.margins;
+    json!({
+        "distance_m": planned.reached_m[0],
+        "apex_m": planned.reached_m[1],
+        "goal_m": planned.goal_m,
+        "expected_error_m": { "distance": planned.error_m[0], "apex": planned.error_m[1] },
+        "durations_s": durations,
+        "cost": planned.cost,
+        "input_deviation": planned.input_deviation,
+        "extrapolates": planned.verdict != Verdict::Trusted,
+        "reasons": planned.verdict.reasons(),
+        "margins": {
+            "torque_share": margins.torque_share,
+            "beyond_joint_limit_rad": margins.beyond_joint_limit_rad,
+            "beyond_friction_n": margins.beyond_friction_n,
+            "foot_slip_m": margins.foot_slip_m,
+        },
+        "programs": planned.programs,
+        "solve_ms": planned.solve_ms,
+        "status": planned.verdict.word(),
     })
 }

@@ -17,7 +17,7 @@ mod tables;
 pub use complexity::study_figures;
 pub use contents::{AllFigures, Content, all_figures, modelled};
 pub use control::{control_figures, without_statistics};
-pub use json::assessment_json;
+pub use json::{assessment_json, plan_json};
 pub use page::{PageOptions, page};
 pub use plan::{plan_figures, reach_figure};
 pub use tables::{

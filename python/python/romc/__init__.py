@@ -16,6 +16,7 @@ from romc.equations import Equations
 from romc.errors import ModelError, RecordingError, RomcError
 from romc.library import Library
 from romc.model import Model, Simplified
+from romc.plan import Plan
 from romc.recording import Recording, Segment, read
 from romc.simulation import Simulation, SimulatedSegment
 
@@ -27,6 +28,7 @@ __all__ = [
     "Library",
     "Model",
     "ModelError",
+    "Plan",
     "Recording",
     "RecordingError",
     "RomcError",

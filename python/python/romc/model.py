@@ -15,7 +15,8 @@ from romc._arrays import Floats, floats, rows
 from romc.equations import Equations
 from romc.errors import ModelError
 from romc.library import Library
-from romc.recording import PathLike, Recordings, natives
+from romc.plan import Plan
+from romc.recording import PathLike, Recording, Recordings, Segment, natives, read
 from romc.simulation import Simulation
 
 LibraryLike = Union[Library, str, Sequence[str]]
@@ -383,6 +384,26 @@ class Model:
         restarted from the recorded state every `restart_every` seconds. Equal to `romc simulate`.
         """
         return Simulation(self._native, natives(recordings), restart_every)
+
+    def plan(
+        self,
+        distance: float,
+        apex: float,
+        *,
+        start: Union[Recording, Segment, PathLike, None] = None,
+        force: bool = False,
+    ) -> Plan:
+        """Plans a jump over `distance` m whose body rises by `apex` m, as `romc plan` does; the model needs landmarks
+        and a prior, which `romc train` writes.
+
+        `start`: a recording whose first sample the jump starts from, else the mean start of the training jumps.
+        Raises `RomcError` with the reasons where there is no plan to be trusted, unless `force`.
+        """
+        if isinstance(start, (str, os.PathLike)):
+            start = read(start)
+        segment = start[0] if isinstance(start, Recording) else start
+        native = None if segment is None else segment._native
+        return Plan(*_romc.plan(self._native, distance, apex, native, force))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Model) and self.digest == other.digest

@@ -1,0 +1,48 @@
+//! Jumps that nobody recorded.
+
+use nalgebra::DMatrix;
+use pyo3::prelude::*;
+use romc::Error;
+use romc::plan::{Goal, PlanSettings, Verdict};
+use romc::report::plan_json;
+
+use crate::errors::python_error;
+use crate::model::Model;
+use crate::recording::{Recording, Segment};
+
+/// Plans a jump; returns it as a recording, and its figures as JSON. A plan that is not to be trusted is
+/// an error unless forced.
+#[pyfunction]
+pub fn plan(
+    py: Python<'_>,
+    model: &Model,
+    distance: f64,
+    apex: f64,
+    start: Option<PyRef<'_, Segment>>,
+    force: bool,
+) -> PyResult<(Recording, String)> {
+    let start = start.map(|start| {
+        let column = |rows: &DMatrix<f64>| rows.column(0).into_owned();
+        (column(&start.data().x), column(&start.data().dx))
+    });
+    let planned = py.detach(|| -> Result<_, Error> {
+        let goal = Goal::new(distance, apex)?;
+        let goal = match start {
+            Some((x, dx)) => goal.from_start(x, dx),
+            None => goal,
+        };
+        let planned = romc::plan::plan(&model.data, &goal, &PlanSettings::default())?;
+        match &planned.verdict {
+            Verdict::Refused(reasons) if !force => Err(Error::Distrusted(reasons.join("; "))),
+            _ => Ok(planned),
+        }
+    });
+    let planned = planned.map_err(|error| python_error(py, error))?;
+    let json = plan_json(&planned).to_string();
+    let recording = romc::recording::Recording {
+        path: "plan".into(),
+        segments: vec![planned.motion],
+        ignored_columns: Vec::new(),
+    };
+    Ok((Recording::made(recording), json))
+}
