@@ -17,7 +17,7 @@ use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::{EmittedFile, Overwrite};
 use crate::model::ReducedModel;
-use crate::report::{Content, assessment_json, baseline_table, control_table, run_table};
+use crate::report::{Content, assessment_json, baseline_table, control_table, failures, run_table};
 use crate::simplify::Tolerance;
 use crate::typeset::Rounding;
 use crate::{Error, artifact, recording};
@@ -98,6 +98,9 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
         control_table(&control[0]),
         run_table(&control[0])
     );
+    for failure in failures(&control[0]) {
+        let _ = writeln!(text, "FAILED along {failure}");
+    }
     let self_test = self_test.words();
     let _ = writeln!(text, "self-test of the emitted C: {self_test}\n");
     let _ = writeln!(text, "made in {}:", arguments.out_dir.display());

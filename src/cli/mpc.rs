@@ -13,7 +13,7 @@ use crate::model::ReducedModel;
 use crate::mpc::{Controller, Lift, MpcSettings};
 use crate::recording::Recording;
 use crate::report::figures::figure_files;
-use crate::report::{NamedRun, control_figures, control_table, run_table};
+use crate::report::{NamedRun, control_figures, control_table, failures, run_table};
 use crate::robot::{JOINT_DIM, Robot};
 use crate::typeset::Table;
 use crate::{Error, artifact};
@@ -116,14 +116,8 @@ fn answer(arguments: &MpcArguments, runs: &[NamedRun], remarks: &[String]) -> An
         control_table(runs),
         run_table(runs)
     );
-    for (path, run) in runs {
-        if let Some(failure) = run
-            .metrics
-            .as_ref()
-            .and_then(|metrics| metrics.failure.as_ref())
-        {
-            let _ = writeln!(text, "FAILED along {}: {failure}", path.display());
-        }
+    for failure in failures(runs) {
+        let _ = writeln!(text, "FAILED along {failure}");
     }
     for remark in remarks {
         let _ = writeln!(text, "note: {remark}");

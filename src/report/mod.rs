@@ -21,6 +21,6 @@ pub use json::{assessment_json, plan_json};
 pub use page::{PageOptions, page};
 pub use plan::{plan_figures, reach_figure};
 pub use tables::{
-    NamedRun, baseline_table, control_table, coordinate_table, dynamics_table, invariance_table,
-    phase_table, run_table, template_rms,
+    NamedRun, baseline_table, control_table, coordinate_table, dynamics_table, failures,
+    invariance_table, phase_table, run_table, template_rms,
 };

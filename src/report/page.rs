@@ -6,8 +6,8 @@ use super::contents::{AllFigures, Content};
 use super::control::without_statistics;
 use super::figures::{Figure, panel_svg};
 use super::tables::{
-    baseline_table, body_rms, control_table, coordinate_table, dynamics_table, invariance_table,
-    phase_table, run_table,
+    baseline_table, body_rms, control_table, coordinate_table, dynamics_table, failures,
+    invariance_table, phase_table, run_table,
 };
 use crate::artifact;
 use crate::equations::Equations;
@@ -174,6 +174,7 @@ fn sections(content: &Content<'_>, figures: &AllFigures, options: &PageOptions) 
             &CONTROL_WORDS,
         )
         .and(without)
+        .and(failures(content.plain))
         .with(
             &figures.control,
             runs.flat_map(|(lift, runs)| {

@@ -202,6 +202,15 @@ fn driven(path: &Path, metrics: &ControlMetrics) -> [Driven; 5] {
     ]
 }
 
+/// Where the model has failed along a recording, a sentence each.
+pub fn failures(runs: &[NamedRun]) -> Vec<String> {
+    let failed = runs.iter().filter_map(|(path, run)| {
+        let failure = run.metrics.as_ref()?.failure.as_ref()?;
+        Some(format!("{}: {failure}", file_name(path)))
+    });
+    failed.collect()
+}
+
 fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default();
     name.to_string_lossy().into_owned()
