@@ -102,7 +102,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
         let _ = writeln!(text, "FAILED along {failure}");
     }
     let self_test = self_test.words();
-    let _ = writeln!(text, "self-test of the emitted C: {self_test}\n");
+    let _ = writeln!(text, "\nself-test of the emitted C: {self_test}\n");
     let _ = writeln!(text, "made in {}:", arguments.out_dir.display());
     for (path, bytes) in &made {
         let name = path.strip_prefix(&arguments.out_dir).unwrap_or(path);
