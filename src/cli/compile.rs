@@ -7,12 +7,11 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::{CodeArguments, CompileArguments, EquationArguments, UnitsChoice};
-use super::output::check_output;
+use super::output::{check_output, names};
 use super::simplification::{self, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::{EquationForm, Equations, PhaseEquations};
-use crate::files::EmittedFile;
-use crate::files::Overwrite;
+use crate::files::{EmittedFile, Overwrite, earlier_files};
 use crate::model::ReducedModel;
 use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
 use crate::{Error, artifact, recording};
@@ -62,13 +61,17 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         artifact::check_place(path, model, overwrite)?;
     }
     let written = write(&arguments.out_dir, &files, overwrite)?;
+    let earlier = earlier_files(&arguments.out_dir, &files)?;
     if let Some(path) = save_model {
         artifact::write_with(path, model, overwrite)?;
     }
     let (summary, certificate) =
         certificate.map_or((String::new(), Value::Null), |(_, s, c)| (s, c));
     Ok(Answer {
-        text: exact_words(&exact) + &summary + &text(arguments, equations, &written),
+        text: exact_words(&exact)
+            + &summary
+            + &text(arguments, equations, &written)
+            + &earlier_in_words(&earlier),
         json: json!({
             "command": "compile",
             "model": arguments.model.display().to_string(),
@@ -79,6 +82,7 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
             "simplification": certificate,
             "saved_model": save_model.map(|path| path.display().to_string()),
             "files": written.iter().map(|(path, bytes)| file_json(path, *bytes)).collect::<Vec<_>>(),
+            "earlier_files": names(&earlier),
         }),
     })
 }
@@ -203,6 +207,19 @@ pub fn write(
     let paths = crate::files::write_files(folder, files, overwrite)?;
     let sizes = files.iter().map(|file| file.contents.len());
     Ok(paths.into_iter().zip(sizes).collect())
+}
+
+/// A note on files of the folder that this run did not write.
+fn earlier_in_words(earlier: &[PathBuf]) -> String {
+    match earlier {
+        [] => String::new(),
+        [file] => format!("\nof an earlier run, not written now: {}\n", file.display()),
+        [file, others @ ..] => format!(
+            "\nof earlier runs, not written now: {} and {} more\n",
+            file.display(),
+            others.len()
+        ),
+    }
 }
 
 fn phases_in_words(equations: &Equations<'_>) -> String {

@@ -25,6 +25,7 @@ mod sin_cos;
 mod sines;
 mod storage;
 mod tables;
+mod test_points;
 mod test_vectors;
 mod translate;
 mod translate_arrays;

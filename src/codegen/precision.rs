@@ -33,6 +33,15 @@ impl Precision {
         }
     }
 
+    /// Whether a number is finite, and well within the range of this precision.
+    pub fn holds(self, value: f64) -> bool {
+        let largest = match self {
+            Self::Double => f64::MAX,
+            Self::Single => f64::from(f32::MAX) / 16.0,
+        };
+        value.abs() <= largest
+    }
+
     /// Whether every constant of the functions is finite in this precision.
     ///
     /// # Errors

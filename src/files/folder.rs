@@ -1,16 +1,19 @@
 //! Putting emitted files into a folder, whole or not at all.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use super::emitted::EmittedFile;
-use super::whole::{Overwrite, beside};
+use sha2::{Digest as _, Sha256};
 
-/// Names the files of the folder that were emitted, one per line.
-const MANIFEST: &str = ".romc-emitted";
+use super::emitted::EmittedFile;
+use super::part::{Part, remove_left_in};
+use super::whole::Overwrite;
+
+/// Lists what romc wrote into the folder.
+const LIST: &str = ".romc-emitted";
 
 /// Why files could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -18,6 +21,12 @@ pub enum FolderError {
     /// The folder holds a file of this name that romc did not make.
     #[error("{path}: not made by romc; move it away or use --force to replace it")]
     Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The folder holds a file that romc made, with other contents.
+    #[error("{path}: changed since romc made it; move it away or use --force to replace it")]
+    Changed {
         /// The file.
         path: PathBuf,
     },
@@ -32,24 +41,27 @@ pub enum FolderError {
     },
 }
 
-/// Refuses a folder that holds files of these names that romc did not make.
+/// Refuses a folder that holds files of these names whose contents romc did not write.
 ///
 /// # Errors
-/// [`FolderError::Foreign`], [`FolderError::Io`].
+/// [`FolderError::Foreign`], [`FolderError::Changed`], [`FolderError::Io`].
 pub fn check_folder<'a>(
     folder: &Path,
     names: impl IntoIterator<Item = &'a str>,
     overwrite: Overwrite,
 ) -> Result<(), FolderError> {
-    let own = emitted_names(folder)?;
-    for name in names {
-        let path = folder.join(name);
-        let is_own = own.contains(name) || overwrite == Overwrite::Replace;
-        if path.symlink_metadata().is_ok() && (path.is_dir() || !is_own) {
-            return Err(FolderError::Foreign { path });
-        }
-    }
-    Ok(())
+    let emitted = Emitted::read(folder)?;
+    names
+        .into_iter()
+        .try_for_each(|name| emitted.check(folder, name, None, overwrite))
+}
+
+/// Files that earlier runs wrote into `folder`, beside `files`, and that are as romc made them.
+///
+/// # Errors
+/// [`FolderError::Io`], [`FolderError::Foreign`] for a list of files that is none.
+pub fn earlier_files(folder: &Path, files: &[EmittedFile]) -> Result<Vec<PathBuf>, FolderError> {
+    Ok(Emitted::read(folder)?.others(folder, files))
 }
 
 /// Writes the files into `folder`, which is made if it does not exist. Every file is first
@@ -57,73 +69,139 @@ pub fn check_folder<'a>(
 /// Files of earlier runs that are no longer emitted stay.
 ///
 /// # Errors
-/// [`FolderError::Foreign`] before anything is written, [`FolderError::Io`].
+/// [`FolderError::Foreign`] and [`FolderError::Changed`] before anything is written, [`FolderError::Io`].
 pub fn write_files(
     folder: &Path,
     files: &[EmittedFile],
     overwrite: Overwrite,
 ) -> Result<Vec<PathBuf>, FolderError> {
-    let names = || files.iter().map(|file| file.path.as_str());
-    check_folder(folder, names(), overwrite)?;
-    let mut staged = Staged::default();
+    let emitted = Emitted::read(folder)?;
     for file in files {
-        staged.add(folder, file)?;
+        emitted.check(folder, &file.path, Some(file), overwrite)?;
     }
+    let mut staged = staged(folder, files)?;
     // The list comes first: after an interruption each finished file is known as ours.
-    list(folder, names())?;
-    for (beside, path) in &staged.0 {
-        fs::rename(beside, path).map_err(|error| io_error(path, error))?;
+    emitted.extend(folder, files)?;
+    for part in &mut staged {
+        let put = part.put();
+        put.map_err(|error| io_error(part.place(), error))?;
     }
-    Ok(staged.0.iter().map(|(_, path)| path.clone()).collect())
+    Ok(staged.iter().map(|part| part.place().to_owned()).collect())
 }
 
-/// The files of a folder that romc made.
-fn emitted_names(folder: &Path) -> Result<BTreeSet<String>, FolderError> {
-    let manifest = folder.join(MANIFEST);
-    match fs::read_to_string(&manifest) {
-        Ok(text) => Ok(text.lines().map(str::to_owned).collect()),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(BTreeSet::new()),
-        Err(error) => Err(io_error(&manifest, error)),
+/// The files that romc wrote into a folder: digests of all contents that each name has had.
+///
+/// A line of the list is a SHA-256 digest, two spaces and a name, as `sha256sum` prints them.
+#[derive(Debug, Default)]
+struct Emitted(BTreeMap<String, BTreeSet<String>>);
+
+impl Emitted {
+    fn read(folder: &Path) -> Result<Self, FolderError> {
+        let list = folder.join(LIST);
+        match list.symlink_metadata() {
+            // Lines that go into somebody else's file would change it.
+            Ok(found) if !found.is_file() => return Err(FolderError::Foreign { path: list }),
+            Ok(_) => {}
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
+            Err(error) => return Err(io_error(&list, error)),
+        }
+        let text = fs::read_to_string(&list).map_err(|error| io_error(&list, error))?;
+        let mut emitted = Self::default();
+        for (digest, name) in text.lines().filter_map(|line| line.split_once("  ")) {
+            let digests = emitted.0.entry(name.to_owned()).or_default();
+            digests.insert(digest.to_owned());
+        }
+        Ok(emitted)
     }
-}
 
-/// Adds names to the list of the folder's files: by appending, so that runs at the same time keep each
-/// other's.
-fn list<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> Result<(), FolderError> {
-    let known = emitted_names(folder)?;
-    let new: String = names
-        .filter(|name| !known.contains(*name))
-        .map(|name| format!("{name}\n"))
-        .collect();
-    let manifest = folder.join(MANIFEST);
-    let opened = OpenOptions::new().append(true).create(true).open(&manifest);
-    opened
-        .and_then(|mut file| file.write_all(new.as_bytes()))
-        .map_err(|error| io_error(&manifest, error))
-}
-
-/// Files beside their places, with these places; what has not been renamed is removed in the end.
-#[derive(Default)]
-struct Staged(Vec<(PathBuf, PathBuf)>);
-
-impl Staged {
-    fn add(&mut self, folder: &Path, file: &EmittedFile) -> Result<(), FolderError> {
-        let path = folder.join(&file.path);
-        let parent = path.parent().unwrap_or(folder);
-        fs::create_dir_all(parent).map_err(|error| io_error(parent, error))?;
-        let beside = beside(&path).map_err(|error| io_error(&path, error))?;
-        self.0.push((beside.clone(), path));
-        fs::write(&beside, &file.contents).map_err(|error| io_error(&beside, error))
-    }
-}
-
-impl Drop for Staged {
-    fn drop(&mut self) {
-        for (beside, _) in &self.0 {
-            // After success there is nothing; after an error, that one is reported.
-            let _ = fs::remove_file(beside);
+    /// Refuses a name that stands for something else than what romc wrote there, or `new` is.
+    fn check(
+        &self,
+        folder: &Path,
+        name: &str,
+        new: Option<&EmittedFile>,
+        overwrite: Overwrite,
+    ) -> Result<(), FolderError> {
+        let path = folder.join(name);
+        let Ok(found) = path.symlink_metadata() else {
+            return Ok(());
+        };
+        if path.is_dir() {
+            return Err(FolderError::Foreign { path });
+        }
+        let is_listed = self.0.contains_key(name);
+        if overwrite == Overwrite::Replace || (found.is_file() && self.is_own(&path, name, new)) {
+            Ok(())
+        } else if is_listed {
+            Err(FolderError::Changed { path })
+        } else {
+            Err(FolderError::Foreign { path })
         }
     }
+
+    /// Whether the contents at `path` are ones that romc wrote under this name, or writes now.
+    fn is_own(&self, path: &Path, name: &str, new: Option<&EmittedFile>) -> bool {
+        let Ok(contents) = fs::read(path) else {
+            return false;
+        };
+        let is_listed = |digests: &BTreeSet<String>| digests.contains(&digest(&contents));
+        new.is_some_and(|new| new.contents.as_bytes() == contents)
+            || self.0.get(name).is_some_and(is_listed)
+    }
+
+    /// Adds files to the list by appending, so that runs at the same time keep each other's lines.
+    fn extend(&self, folder: &Path, files: &[EmittedFile]) -> Result<(), FolderError> {
+        let mut lines = String::new();
+        for file in files {
+            let digest = digest(file.contents.as_bytes());
+            let known = self.0.get(&file.path);
+            if !known.is_some_and(|digests| digests.contains(&digest)) {
+                lines += &format!("{digest}  {}\n", file.path);
+            }
+        }
+        let list = folder.join(LIST);
+        let opened = OpenOptions::new().append(true).create(true).open(&list);
+        opened
+            .and_then(|mut file| file.write_all(lines.as_bytes()))
+            .map_err(|error| io_error(&list, error))
+    }
+
+    /// Files of the list beside `files` that are as romc wrote them.
+    fn others(&self, folder: &Path, files: &[EmittedFile]) -> Vec<PathBuf> {
+        let now: BTreeSet<&str> = files.iter().map(|file| file.path.as_str()).collect();
+        let others = self.0.keys().filter(|name| !now.contains(name.as_str()));
+        others
+            .map(|name| (name, folder.join(name)))
+            .filter(|(name, path)| path.is_file() && self.is_own(path, name, None))
+            .map(|(_, path)| path)
+            .collect()
+    }
+}
+
+/// SHA-256 in hexadecimal digits.
+fn digest(contents: &[u8]) -> String {
+    let bytes = Sha256::digest(contents);
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Files beside their places.
+fn staged(folder: &Path, files: &[EmittedFile]) -> Result<Vec<Part>, FolderError> {
+    let mut parts = Vec::new();
+    let mut tidied = BTreeSet::new();
+    for file in files {
+        let place = folder.join(&file.path);
+        let parent = place.parent().unwrap_or(folder).to_owned();
+        fs::create_dir_all(&parent).map_err(|error| io_error(&parent, error))?;
+        if !tidied.contains(&parent) {
+            remove_left_in(&parent);
+            tidied.insert(parent);
+        }
+        let part = Part::beside(&place).map_err(|error| io_error(&place, error))?;
+        let written = (&part.file).write_all(file.contents.as_bytes());
+        written.map_err(|error| io_error(&place, error))?;
+        parts.push(part);
+    }
+    Ok(parts)
 }
 
 fn io_error(path: &Path, source: io::Error) -> FolderError {
@@ -159,7 +237,7 @@ mod tests {
             .map(|entry| entry.expect("an entry").file_name())
             .collect();
         names.sort();
-        assert_eq!(names, [MANIFEST, "m", "m.c"]);
+        assert_eq!(names, [LIST, "m", "m.c"]);
     }
 
     #[test]
@@ -187,8 +265,8 @@ mod tests {
         };
         write("a.c");
         write("b.c");
-        let own = emitted_names(folder.path()).expect("a list");
-        assert!(own.contains("a.c") && own.contains("b.c"));
+        let own = Emitted::read(folder.path()).expect("a list").0;
+        assert!(own.contains_key("a.c") && own.contains_key("b.c"));
         write("a.c");
     }
 
@@ -203,5 +281,55 @@ mod tests {
         assert!(!folder.path().join("m").exists());
         write_files(folder.path(), &files("new"), Overwrite::Replace).expect("forced");
         assert_eq!(fs::read_to_string(&foreign).expect("replaced"), "new");
+    }
+
+    #[test]
+    fn an_emitted_file_that_was_changed_is_refused_and_kept() {
+        let folder = tempfile::tempdir().expect("a folder");
+        write_files(folder.path(), &files("one"), Overwrite::Refuse).expect("first");
+        let own = folder.path().join("m.c");
+        fs::write(&own, "my own work").expect("written");
+        let found = write_files(folder.path(), &files("two"), Overwrite::Refuse);
+        assert!(matches!(found, Err(FolderError::Changed { path }) if path == own));
+        assert_eq!(fs::read_to_string(&own).expect("kept"), "my own work");
+        let other = folder.path().join("m/src/lib.rs");
+        assert_eq!(fs::read_to_string(other).expect("kept"), "one");
+        let checked = check_folder(folder.path(), ["m.c"], Overwrite::Refuse);
+        assert!(matches!(checked, Err(FolderError::Changed { .. })));
+        // What romc would write anyway is no loss.
+        fs::write(&own, "two").expect("written");
+        write_files(folder.path(), &files("two"), Overwrite::Refuse).expect("the same bytes");
+    }
+
+    #[test]
+    fn files_of_earlier_runs_are_named_unless_changed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let write = |name: &str| {
+            let file = EmittedFile::new(name, "text");
+            write_files(folder.path(), &[file], Overwrite::Refuse).expect("written")
+        };
+        write("old.c");
+        write("mine.c");
+        fs::write(folder.path().join("mine.c"), "changed").expect("written");
+        write("new.c");
+        let now = [EmittedFile::new("new.c", "text")];
+        let earlier = earlier_files(folder.path(), &now).expect("a list");
+        assert_eq!(earlier, [folder.path().join("old.c")]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_in_the_way_are_refused_and_what_they_lead_to_is_kept() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let victim = folder.path().join("victim");
+        fs::write(&victim, "precious").expect("written");
+        for name in [LIST, "m.c"] {
+            let link = folder.path().join(name);
+            std::os::unix::fs::symlink(&victim, &link).expect("a link");
+            let found = write_files(folder.path(), &files("one"), Overwrite::Refuse);
+            assert!(matches!(found, Err(FolderError::Foreign { path }) if path == link));
+            fs::remove_file(link).expect("removed");
+        }
+        assert_eq!(fs::read_to_string(victim).expect("kept"), "precious");
     }
 }

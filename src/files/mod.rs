@@ -1,15 +1,17 @@
 //! Files that appear whole or not at all, and the folders that hold emitted files.
 //!
 //! Imports nothing; every stage that writes goes through here: [`write_whole`] replaces one file in one
-//! step, [`write_files`] puts [`EmittedFile`]s into a folder and lists them there as made by romc. Stages that
+//! step, [`write_files`] puts [`EmittedFile`]s into a folder and lists them there with digests,
+//! so that only what romc wrote is replaced. Stages that
 //! read state the place of a fault with [`Located`].
 
 mod emitted;
 mod folder;
 mod located;
+mod part;
 mod whole;
 
 pub use emitted::EmittedFile;
-pub use folder::{FolderError, check_folder, write_files};
+pub use folder::{FolderError, check_folder, earlier_files, write_files};
 pub use located::{Located, Place};
 pub use whole::{Overwrite, write_whole};

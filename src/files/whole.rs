@@ -1,9 +1,9 @@
 //! One file, written beside its place and then renamed.
 
-use std::ffi::OsString;
-use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use super::part::{Part, remove_left_in};
 
 /// Whether a file that is there already may be replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,39 +32,27 @@ impl Overwrite {
 /// Replaces `path` by what `fill` writes, in one step.
 ///
 /// # Errors
-/// Those of the file system; then `path` is as it was, and nothing is left beside it.
+/// Those of the file system; then `path` is as it was, and nothing is left beside it. What a process that was
+/// killed has left there is removed by the next call.
 pub fn write_whole(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    let beside = beside(path)?;
-    let written = fill_file(&beside, fill).and_then(|()| fs::rename(&beside, path));
-    if written.is_err() {
-        // The first error is the one worth telling; a file that cannot be removed changes nothing.
-        let _ = fs::remove_file(&beside);
-    }
-    written
-}
-
-fn fill_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let mut file = BufWriter::new(File::create(path)?);
+    remove_left_in(match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        Some(_) | None => Path::new("."),
+    });
+    let mut part = Part::beside(path)?;
+    let mut file = BufWriter::new(&part.file);
     fill(&mut file)?;
-    file.into_inner()?.sync_all()
-}
-
-/// A hidden name in the same folder that no other process uses.
-pub(super) fn beside(path: &Path) -> io::Result<PathBuf> {
-    let name = path
-        .file_name()
-        .ok_or_else(|| io::Error::from(io::ErrorKind::InvalidFilename))?;
-    let mut part = OsString::from(".");
-    part.push(name);
-    part.push(format!(".{}.part", std::process::id()));
-    Ok(path.with_file_name(part))
+    file.into_inner()?.sync_all()?;
+    part.put()
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -8,6 +8,7 @@ use crate::codegen::interface::{FunctionSpec, ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::braced;
 use crate::codegen::literal::Literal;
 use crate::codegen::precision::{Precision, rounded_up};
+use crate::codegen::test_points::BatchPoints;
 use crate::codegen::test_vectors::{
     N_POINTS, ParameterVectors, TOLERANCE_F64, batch_tolerance, vectors,
 };
@@ -35,7 +36,10 @@ struct SelfTest<'a> {
 /// The batch of a phase.
 struct Batch<'a> {
     phase: &'a str,
-    /// An angle that the batch meets.
+    /// First elements of the arrays, and an angle that the batch meets.
+    z: String,
+    dz: String,
+    u_lat: String,
     far_angle: String,
     /// Absolute tolerance of single precision.
     tolerance: String,
@@ -49,6 +53,8 @@ struct Test {
     locals: Vec<Local>,
     arguments: String,
     checks: Vec<Check>,
+    /// Whether all results are finite at one of the points.
+    is_defined: bool,
 }
 
 /// A constant array with one row a point.
@@ -82,16 +88,6 @@ pub(super) fn render(
     banner: &str,
 ) -> Result<String, CodegenError> {
     let precision = dialect.precision;
-    let batch = |phase: &'_ PhaseInterface| {
-        let far_angle = phase.far_angle(precision);
-        (
-            format!("{far_angle:?}{}", dialect.suffix()),
-            match precision {
-                Precision::Double => String::new(),
-                Precision::Single => rounded_up(batch_tolerance(phase, far_angle)),
-            },
-        )
-    };
     let test = SelfTest {
         banner,
         name: &entries.identifier,
@@ -108,17 +104,28 @@ pub(super) fn render(
         phases: entries
             .phases
             .iter()
-            .map(|phase| {
-                let (far_angle, tolerance) = batch(phase);
-                Batch {
-                    phase: phase.identifier.as_str(),
-                    far_angle,
-                    tolerance,
-                }
-            })
+            .map(|phase| Batch::new(phase, dialect))
             .collect(),
     };
     Ok(test.render()?)
+}
+
+impl<'a> Batch<'a> {
+    fn new(phase: &'a PhaseInterface, dialect: &CDialect) -> Self {
+        let points = BatchPoints::new(phase, dialect.precision);
+        let number = |value: f64| format!("{value:?}{}", dialect.suffix());
+        Self {
+            phase: phase.identifier.as_str(),
+            z: number(points.z),
+            dz: number(points.dz),
+            u_lat: number(points.u_lat),
+            far_angle: number(points.far_angle),
+            tolerance: match dialect.precision {
+                Precision::Double => String::new(),
+                Precision::Single => rounded_up(batch_tolerance(phase, &points)),
+            },
+        }
+    }
 }
 
 impl Test {
@@ -131,10 +138,13 @@ impl Test {
             locals: Vec::new(),
             arguments: String::new(),
             checks: Vec::new(),
+            is_defined: true,
         };
         let mut arguments = Vec::new();
-        for vectors in vectors(entry, dialect.precision) {
-            arguments.push(test.parameter(dialect, &vectors));
+        let vectors = vectors(entry, dialect.precision);
+        test.is_defined = vectors.defined > 0;
+        for vectors in &vectors.parameters {
+            arguments.push(test.parameter(dialect, vectors));
         }
         test.arguments = arguments.join(", ");
         test
@@ -147,14 +157,21 @@ impl Test {
         if !vectors.before.is_empty() {
             let spell = |value: f64| match Literal::new(value) {
                 Some(literal) => dialect.literal(literal),
-                None => format!("{value:?}"),
+                None => non_finite(value),
             };
             let rows = rows(vectors.len, &vectors.before, &spell);
             self.array(&before, dialect.real(), vectors.len, rows);
         }
         if !vectors.after.is_empty() {
             // What is expected has all digits in either precision.
-            let rows = rows(vectors.len, &vectors.after, &|value| format!("{value:?}"));
+            let rows = rows(
+                vectors.len,
+                &vectors.after,
+                &|value| match value.is_finite() {
+                    true => format!("{value:?}"),
+                    false => non_finite(value),
+                },
+            );
             self.array(&after, "double", vectors.len, rows);
             self.checks.push(Check {
                 name: name.clone(),
@@ -186,6 +203,15 @@ impl Test {
             cols,
             entries: format!("{{{}\n    }}", rows.join(",")),
         });
+    }
+}
+
+/// The macro of math.h for a value that has no literal.
+fn non_finite(value: f64) -> String {
+    match (value.is_nan(), value > 0.0) {
+        (true, _) => "NAN".to_owned(),
+        (false, true) => "INFINITY".to_owned(),
+        (false, false) => "-INFINITY".to_owned(),
     }
 }
 

@@ -9,6 +9,7 @@ use crate::codegen::interface::{FunctionSpec, ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::comment_lines;
 use crate::codegen::literal::Literal;
 use crate::codegen::precision::{Precision, rounded_up};
+use crate::codegen::test_points::BatchPoints;
 use crate::codegen::test_vectors::{ParameterVectors, TOLERANCE_F64, batch_tolerance, vectors};
 
 use super::dialect::RustDialect;
@@ -30,28 +31,30 @@ struct SelfTest<'a> {
 /// The batch of a phase.
 struct Batch<'a> {
     phase: &'a str,
-    /// An angle that the batch meets.
-    far_angle: String,
+    /// First elements of the arrays, and an angle that the batch meets.
+    points: BatchPoints,
     /// Absolute tolerance of single precision.
     tolerance: String,
 }
 
 impl<'a> Batch<'a> {
     fn new(phase: &'a PhaseInterface, precision: Precision) -> Self {
-        let far_angle = phase.far_angle(precision);
+        let points = BatchPoints::new(phase, precision);
         Self {
             phase: phase.identifier.as_str(),
-            far_angle: format!("{far_angle:?}"),
             tolerance: match precision {
                 Precision::Double => String::new(),
-                Precision::Single => rounded_up(batch_tolerance(phase, far_angle)),
+                Precision::Single => rounded_up(batch_tolerance(phase, &points)),
             },
+            points,
         }
     }
 }
 
 struct Test {
     name: String,
+    /// Whether all results are finite at one of the points.
+    is_defined: bool,
     /// Constant arrays with one row a point: name, type, number of columns, rows.
     arrays: Vec<(String, &'static str, usize, Vec<String>)>,
     points: usize,
@@ -90,8 +93,10 @@ pub(super) fn render(
 
 impl Test {
     fn new(dialect: &RustDialect, entry: &FunctionSpec) -> Self {
+        let vectors = vectors(entry, dialect.precision);
         let mut test = Self {
             name: entry.name.clone(),
+            is_defined: vectors.defined > 0,
             arrays: Vec::new(),
             points: crate::codegen::test_vectors::N_POINTS,
             locals: Vec::new(),
@@ -99,8 +104,8 @@ impl Test {
             checks: Vec::new(),
         };
         let mut arguments = Vec::new();
-        for vectors in vectors(entry, dialect.precision) {
-            arguments.push(test.parameter(dialect, &vectors));
+        for vectors in &vectors.parameters {
+            arguments.push(test.parameter(dialect, vectors));
         }
         test.arguments = arguments.join(", ");
         test
@@ -114,7 +119,7 @@ impl Test {
         if !vectors.before.is_empty() {
             let spell = |value: f64| match Literal::new(value) {
                 Some(literal) => dialect.literal(literal),
-                None => format!("{value:?}"),
+                None => non_finite(value),
             };
             let rows = rows(vectors.len, &vectors.before, &spell);
             self.arrays
@@ -122,7 +127,14 @@ impl Test {
         }
         if !vectors.after.is_empty() {
             // What is expected has all digits in either precision.
-            let rows = rows(vectors.len, &vectors.after, &|value| format!("{value:?}"));
+            let rows = rows(
+                vectors.len,
+                &vectors.after,
+                &|value| match value.is_finite() {
+                    true => format!("{value:?}"),
+                    false => non_finite(value),
+                },
+            );
             self.arrays.push((after.clone(), "f64", vectors.len, rows));
             let tolerance = rounded_up(vectors.tolerance_single);
             self.checks.push((name.clone(), after, tolerance));
@@ -140,6 +152,15 @@ impl Test {
                 format!("&mut {name}")
             }
         }
+    }
+}
+
+/// The constant for a value that has no literal.
+fn non_finite(value: f64) -> String {
+    match (value.is_nan(), value > 0.0) {
+        (true, _) => "f64::NAN".to_owned(),
+        (false, true) => "f64::INFINITY".to_owned(),
+        (false, false) => "f64::NEG_INFINITY".to_owned(),
     }
 }
 

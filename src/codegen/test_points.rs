@@ -1,0 +1,196 @@
+//! Points of self-tests, where possible those at which the functions have finite values.
+
+use super::interface::{FunctionSpec, PhaseInterface};
+use super::precision::Precision;
+use crate::ir::Interpreter;
+use crate::robot::JOINT_DIM;
+use crate::robot::joints::LEG_JOINT_DIM;
+
+/// Changes of a point that are tried while some of its results are not finite.
+const MAX_CHANGES: usize = 600;
+
+/// Largest magnitudes of changed elements.
+const REACHES: [f64; 6] = [1.0, 3.0, 0.3, 10.0, 0.1, 0.01];
+
+/// Inputs of a function and what it computes from them.
+#[derive(Clone, Debug)]
+pub struct TestPoint {
+    /// An array per input of the program.
+    pub inputs: Vec<Vec<f64>>,
+    /// An array per output of the program.
+    pub outputs: Vec<Vec<f64>>,
+    /// How many results are not finite in the precision.
+    undefined: usize,
+}
+
+impl TestPoint {
+    fn new(entry: &FunctionSpec, inputs: Vec<Vec<f64>>, precision: Precision) -> Self {
+        let slots = entry.program.outputs().iter();
+        let mut outputs: Vec<Vec<f64>> = slots.map(|slot| vec![0.0; slot.len]).collect();
+        let read: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
+        let mut written: Vec<&mut [f64]> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
+        Interpreter::new(&entry.program).run(&read, &mut written);
+        let values = outputs.iter().flatten();
+        Self {
+            undefined: values.filter(|value| !precision.holds(**value)).count(),
+            inputs,
+            outputs,
+        }
+    }
+
+    /// Whether every result is finite.
+    pub fn is_defined(&self) -> bool {
+        self.undefined == 0
+    }
+}
+
+/// A point between -1 and 1. Where the function is not finite there, points around it are tried: all elements
+/// positive, all drawn again, a few of the best point changed; the best is returned.
+pub fn point(entry: &FunctionSpec, precision: Precision, random: &mut Random) -> TestPoint {
+    let slots = entry.program.inputs().iter();
+    let drawn = slots.map(|slot| match slot.name.as_str() {
+        "h" => vec![precision.nearest(0.002)],
+        name => (0..slot.len)
+            .map(|k| precision.nearest(element(entry, name, k, random.next())))
+            .collect(),
+    });
+    let mut best = TestPoint::new(entry, drawn.collect(), precision);
+    let elements = free_elements(entry);
+    for change in 0..MAX_CHANGES {
+        if best.is_defined() || elements.is_empty() {
+            break;
+        }
+        let reach = REACHES[change / 3 % REACHES.len()];
+        let mut inputs = best.inputs.clone();
+        match change % 3 {
+            0 => (elements.iter())
+                .for_each(|(slot, k)| inputs[*slot][*k] = random.within(reach, precision).abs()),
+            1 => (elements.iter())
+                .for_each(|(slot, k)| inputs[*slot][*k] = random.within(reach, precision)),
+            _ => {
+                for _ in 0..1 + change % 4 {
+                    let (slot, k) = elements[random.below(elements.len())];
+                    inputs[slot][k] = random.within(reach, precision);
+                }
+            }
+        }
+        let changed = TestPoint::new(entry, inputs, precision);
+        if changed.undefined <= best.undefined {
+            best = changed;
+        }
+    }
+    best
+}
+
+/// The elements of inputs that may be any number: slot and position.
+fn free_elements(entry: &FunctionSpec) -> Vec<(usize, usize)> {
+    let slots = entry.program.inputs().iter().enumerate();
+    let is_free = |name: &str| !matches!(name, "h" | "feet");
+    slots
+        .filter(|(_, slot)| is_free(&slot.name))
+        .flat_map(|(position, slot)| (0..slot.len).map(move |k| (position, k)))
+        .collect()
+}
+
+/// Element `k` of an input from a number between -1 and 1: that number, except that the function of the
+/// feet's forces gets knees that are bent and feet on the ground or in the air.
+fn element(entry: &FunctionSpec, slot: &str, k: usize, random: f64) -> f64 {
+    let has_feet = entry.parameters.iter().any(|p| p.name == "feet");
+    match (slot, k % LEG_JOINT_DIM) {
+        ("feet", _) => f64::from(u8::from(random > -0.4)),
+        ("x", joint) if has_feet && k < JOINT_DIM => {
+            let (middle, reach) = [(0.0, 0.4), (0.8, 0.4), (-1.6, 0.5)][joint];
+            middle + reach * random
+        }
+        _ => random,
+    }
+}
+
+/// Points of the batch that self-tests run.
+pub const N_BATCH: usize = 21;
+
+/// The inputs of that batch: element `i` of its arrays is `z + 0.01 (i mod 97)`, `dz - 0.01 (i mod 89)` and
+/// `u_lat + 0.01 (i mod 83)`, except for `far_angle` in point 3 of `z1` and in the last but one of `dz1`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BatchPoints {
+    /// First element of `z`.
+    pub z: f64,
+    /// First element of `dz`.
+    pub dz: f64,
+    /// First element of `u_lat`.
+    pub u_lat: f64,
+    /// An angle beyond the limit of the inline sine, where the accelerations do not overflow there.
+    pub far_angle: f64,
+}
+
+impl BatchPoints {
+    /// Numbers of both signs, or positive ones where the accelerations are finite at more of these.
+    pub fn new(phase: &PhaseInterface, precision: Precision) -> Self {
+        let far_angle = phase.far_angle(precision);
+        let (signed, positive) = ((-0.5, 0.5, -0.3), (0.0625, 0.9375, 0.0625));
+        let [signed, positive] = [signed, positive].map(|(z, dz, u_lat)| Self {
+            z,
+            dz,
+            u_lat,
+            far_angle,
+        });
+        let defined = |points: &Self| {
+            let at = (0..N_BATCH).map(|point| points.at(phase, point, precision));
+            at.filter(TestPoint::is_defined).count()
+        };
+        match defined(&signed) {
+            N_BATCH => signed,
+            count if count >= defined(&positive) => signed,
+            _ => positive,
+        }
+    }
+
+    /// A point of the batch.
+    pub fn at(&self, phase: &PhaseInterface, point: usize, precision: Precision) -> TestPoint {
+        let element = |slot: &str, k: usize| {
+            let i = k * N_BATCH + point;
+            let cycle = |modulus: usize| 0.01 * (i % modulus) as f64;
+            match slot {
+                "z" if i == 3 => self.far_angle,
+                "dz" if i == N_BATCH - 2 => self.far_angle,
+                "z" => self.z + cycle(97),
+                "dz" => self.dz - cycle(89),
+                _ => self.u_lat + cycle(83),
+            }
+        };
+        let slots = phase.dynamics.program.inputs().iter();
+        let inputs = slots.map(|slot| (0..slot.len).map(|k| element(&slot.name, k)).collect());
+        TestPoint::new(&phase.dynamics, inputs.collect(), precision)
+    }
+}
+
+/// Numbers between -1 and 1 with three decimals, the same in every run.
+pub struct Random(u64);
+
+impl Random {
+    /// The numbers of every self-test.
+    pub fn new() -> Self {
+        Self(0x5eed)
+    }
+
+    fn next(&mut self) -> f64 {
+        f64::from(self.bits() % 2001) / 1000.0 - 1.0
+    }
+
+    /// A short decimal up to a magnitude, never 0.
+    fn within(&mut self, reach: f64, precision: Precision) -> f64 {
+        precision.nearest((1e5 * reach * self.next()).round() / 1e5 + 5e-6)
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        self.bits() as usize % count
+    }
+
+    fn bits(&mut self) -> u32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as u32
+    }
+}

@@ -1,0 +1,147 @@
+//! Files that are being written, beside their places.
+
+use std::collections::hash_map::RandomState;
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::hash::{BuildHasher as _, Hasher as _};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// How names of parts end, after a random number in hexadecimal digits.
+const ENDING: &str = ".part";
+
+/// Digits of that number.
+const DIGITS: usize = 16;
+
+/// Names that are tried.
+const MAX_TRIED: usize = 16;
+
+/// A new file with a random, hidden name in the folder of its place; removed in the end unless it was moved there.
+///
+/// A lock shows that its process lives; parts without one are what ended processes have left.
+#[derive(Debug)]
+pub(super) struct Part {
+    /// Open for writing.
+    pub file: File,
+    path: PathBuf,
+    place: PathBuf,
+    is_placed: bool,
+}
+
+impl Part {
+    /// Beside `place`. A link or file of that name that somebody else has put there is never opened.
+    pub fn beside(place: &Path) -> io::Result<Self> {
+        let name = place
+            .file_name()
+            .ok_or_else(|| io::Error::from(io::ErrorKind::InvalidFilename))?;
+        let mut last = None;
+        for _ in 0..MAX_TRIED {
+            let number = RandomState::new().build_hasher().finish();
+            let mut part = OsString::from(".");
+            part.push(name);
+            part.push(format!(".{number:0DIGITS$x}{ENDING}"));
+            let path = place.with_file_name(part);
+            match OpenOptions::new().write(true).create_new(true).open(&path) {
+                Ok(file) => {
+                    let locked = file.try_lock();
+                    // `remove_left_in` of another process may have met it before the lock.
+                    let is_removed = matches!(locked, Err(TryLockError::WouldBlock))
+                        || path.symlink_metadata().is_err();
+                    if !is_removed {
+                        return Ok(Self {
+                            file,
+                            path,
+                            place: place.to_owned(),
+                            is_placed: false,
+                        });
+                    }
+                }
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => last = Some(error),
+                Err(error) => return Err(error),
+            }
+        }
+        Err(last.unwrap_or_else(|| io::ErrorKind::AlreadyExists.into()))
+    }
+
+    /// Moves the file to its place, replacing what is there in one step.
+    pub fn put(&mut self) -> io::Result<()> {
+        fs::rename(&self.path, &self.place)?;
+        self.is_placed = true;
+        Ok(())
+    }
+
+    /// Where it goes.
+    pub fn place(&self) -> &Path {
+        &self.place
+    }
+}
+
+impl Drop for Part {
+    fn drop(&mut self) {
+        if !self.is_placed {
+            // The first error is the one worth reporting.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Removes the parts in a folder whose processes have ended. What cannot be read or removed stays.
+pub(super) fn remove_left_in(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        if is_file && is_part(&entry.file_name().to_string_lossy()) {
+            let path = entry.path();
+            if let Ok(file) = OpenOptions::new().write(true).open(&path)
+                && file.try_lock().is_ok()
+            {
+                let _ = fs::remove_file(&path);
+            }
+        }
+    }
+}
+
+/// `.NAME.0123456789abcdef.part`
+fn is_part(name: &str) -> bool {
+    let inner = name
+        .strip_prefix('.')
+        .and_then(|name| name.strip_suffix(ENDING));
+    let number = inner.and_then(|inner| inner.rsplit_once('.'));
+    number.is_some_and(|(_, digits)| {
+        digits.len() == DIGITS && digits.bytes().all(|byte| byte.is_ascii_hexdigit())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_ended_processes_are_removed_and_others_stay() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let own = folder.path().join(".notes.part");
+        let left = folder.path().join(".m.c.0123456789abcdef.part");
+        for path in [&own, &left] {
+            fs::write(path, "half").expect("written");
+        }
+        let living = Part::beside(&folder.path().join("m.c")).expect("a part");
+        remove_left_in(folder.path());
+        assert!(own.exists() && !left.exists() && living.path.exists());
+        let path = living.path.clone();
+        drop(living);
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn names_of_parts_are_new_every_time_and_known_again() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let place = folder.path().join("m.c");
+        let (one, other) = (Part::beside(&place), Part::beside(&place));
+        let (one, other) = (one.expect("a part"), other.expect("a part"));
+        assert_ne!(one.path, other.path);
+        for part in [&one, &other] {
+            let name = part.path.file_name().expect("a name").to_string_lossy();
+            assert!(is_part(&name), "{name}");
+        }
+        assert!(!is_part(".m.c.123.part") && !is_part("m.c.0123456789abcdef.part"));
+    }
+}
