@@ -125,10 +125,10 @@ fn print(text: &str) -> u8 {
 
 /// Prints an error and its chain of causes to stderr.
 fn print_error(error: &Error) {
-    eprintln!("error: {error}");
+    eprintln!("error: {}", printable(&error.to_string()));
     let mut source = std::error::Error::source(error);
     while let Some(cause) = source {
-        eprintln!("  because: {cause}");
+        eprintln!("  because: {}", printable(&cause.to_string()));
         source = cause.source();
     }
 }

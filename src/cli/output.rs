@@ -1,5 +1,6 @@
 //! Files and progress of every command.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -53,12 +54,42 @@ pub fn read_recordings(paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
     let progress = spinner("reading recordings");
     let read = (paths.iter())
         .map(|path| {
-            progress.set_message(format!("reading {}", path.display()));
+            progress.set_message(printable(&format!("reading {}", path.display())).into_owned());
             Ok(recording::read(path)?)
         })
         .collect();
     progress.finish_and_clear();
     read
+}
+
+/// A text for a terminal: control characters and marks that reverse the direction of writing, as a file's name or
+/// cell may have them, are written out. Line ends and tabs stay.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    escaped(text, |c| c.escape_unicode().to_string())
+}
+
+/// As [`printable`], for one JSON object.
+pub fn printable_json(text: &str) -> Cow<'_, str> {
+    // Those of JSON itself have been escaped, so that all of them are in strings; none is beyond U+FFFF.
+    escaped(text, |c| format!("\\u{:04x}", u32::from(c)))
+}
+
+fn escaped(text: &str, written: impl Fn(char) -> String) -> Cow<'_, str> {
+    let acts = |c: char| {
+        (c.is_control() && !matches!(c, '\n' | '\t'))
+            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    if !text.contains(acts) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match acts(c) {
+            true => out += &written(c),
+            false => out.push(c),
+        }
+    }
+    Cow::Owned(out)
 }
 
 /// Paths as JSON shows them.

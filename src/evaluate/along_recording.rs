@@ -95,7 +95,7 @@ pub struct Run {
 ///
 /// # Errors
 /// Those of [`Controller::set_reference`], [`MpcError::Step`] if the controller's step is shorter
-/// than the recording's, and [`MpcError::Recording`] if the recording's inputs cannot be computed.
+/// than the recording's, [`MpcError::NoStep`] if no segment is as long as one step, and [`MpcError::Recording`] if the recording's inputs cannot be computed.
 pub fn along_recording(
     controller: &mut Controller,
     recording: &Recording,
@@ -119,6 +119,19 @@ pub fn along_recording(
         .map(|segment| control_samples(&segment.time_s, step_s))
         .collect();
     let total = schedules.iter().map(Vec::len).sum();
+    if total == 0 {
+        let duration = |segment: &Segment| segment.time_s[segment.len() - 1] - segment.time_s[0];
+        let durations = recording
+            .segments
+            .iter()
+            .filter(|s| s.len() > 0)
+            .map(duration);
+        return Err(MpcError::NoStep {
+            path: recording.path.clone(),
+            found_s: step_s,
+            longest_s: durations.fold(0.0, f64::max),
+        });
+    }
     let mut rows = Vec::with_capacity(total);
     let mut tally = Tally::default();
     for (number, (segment, schedule)) in recording.segments.iter().zip(&schedules).enumerate() {

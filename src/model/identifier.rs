@@ -53,6 +53,12 @@ pub enum IdentifierError {
         /// The name as an identifier.
         identifier: String,
     },
+    /// Names that are made of it would have two underscores in a row.
+    #[error("`{identifier}` ends with an underscore, expected a letter or digit at the end")]
+    End {
+        /// The name as an identifier.
+        identifier: String,
+    },
     /// It is a keyword.
     #[error("`{identifier}` is a keyword of {language}")]
     Keyword {
@@ -91,6 +97,9 @@ impl Identifier {
         let identifier = name.replace(['-', '.', ' '], "_");
         if identifier.contains("__") {
             return Err(IdentifierError::Reserved { identifier });
+        }
+        if identifier.ends_with('_') {
+            return Err(IdentifierError::End { identifier });
         }
         let lower = identifier.to_ascii_lowercase();
         let listed = |lists: &[(&'static str, &str)]| {
@@ -252,7 +261,8 @@ mod tests {
                 let name = identifier.as_str();
                 assert!(name.starts_with(|c: char| c.is_ascii_alphabetic()));
                 assert!(name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_'));
-                assert!(!name.contains("__") && name.len() <= MAX_IDENTIFIER_LEN);
+                assert!(!name.ends_with('_') && !name.contains("__"));
+                assert!(name.len() <= MAX_IDENTIFIER_LEN);
             }
         }
     }
@@ -276,5 +286,10 @@ mod tests {
             Identifier::from_name("a-_b"),
             Err(IdentifierError::Reserved { .. })
         ));
+        for name in ["a_", "a-", "a.", "a "] {
+            let found = Identifier::from_name(name);
+            let identifier = "a_".to_owned();
+            assert_eq!(found, Err(IdentifierError::End { identifier }), "{name}");
+        }
     }
 }

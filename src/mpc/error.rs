@@ -49,6 +49,16 @@ pub enum MpcError {
         /// Time between samples, s.
         recorded_s: f64,
     },
+    /// A controller whose commands are held for longer than any stretch of the recording.
+    #[error("{}: {longest_s:.3} s without a gap, found a step of {found_s:.3e} s, expected a shorter one or a longer recording", path.display())]
+    NoStep {
+        /// The recording.
+        path: PathBuf,
+        /// Duration of a stage, s.
+        found_s: f64,
+        /// The recording's longest segment, s.
+        longest_s: f64,
+    },
     /// A setting, a reference or the solver.
     #[error(transparent)]
     Control(#[from] ControlError),

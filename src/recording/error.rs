@@ -127,6 +127,9 @@ pub enum RecordingFault {
     /// The file has more samples than this, which is the most that are read.
     #[error("found more than {0} samples, expected shorter recordings")]
     TooManyRows(usize),
+    /// The file has more empty lines than this in a row.
+    #[error("found more than {0} empty lines, expected samples or the end")]
+    TooManyBlankRows(usize),
     /// No pattern of a phase rule matches any sample.
     #[error(
         "feet {feet:?} (fr, fl, rr, rl) match none of the phases {}",

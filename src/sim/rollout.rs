@@ -82,10 +82,29 @@ pub fn rollout(
         partials: DMatrix::zeros(model.latent_dim(), 3 * model.latent_dim()),
     };
     let windows = restart_windows(&recorded.time_s, restart).into_iter();
+    let options = &at_scale(options, recorded);
     Rollout {
         windows: windows
             .map(|samples| roll_window(&mut dynamics, samples, options))
             .collect(),
+    }
+}
+
+/// The options with tolerance and bound moved for a model whose scaled coordinates are far from one, so that
+/// rollouts do not depend on its scale factors.
+fn at_scale(options: &IntegrationOptions, recorded: &LatentSegment) -> IntegrationOptions {
+    /// Largest coordinates between which the options are taken as they are.
+    const USUAL: [f64; 2] = [1e-3, 1e3];
+    match recorded.z.amax() {
+        largest if largest > 0.0 && largest < USUAL[0] => IntegrationOptions {
+            absolute_tolerance: options.absolute_tolerance * (largest / USUAL[0]),
+            ..*options
+        },
+        largest if largest > USUAL[1] => IntegrationOptions {
+            divergence_bound: options.divergence_bound * (largest / USUAL[1]),
+            ..*options
+        },
+        _ => *options,
     }
 }
 

@@ -85,6 +85,12 @@ impl ExprPool {
                 self.sum(&terms)
             }
             Node::Power(base, exponent) => {
+                if let (&Node::Apply(Function::Sqrt, radicand), Some(halves)) =
+                    (self.node(base), self.as_number(exponent))
+                {
+                    let d_radicand = inner(self, radicand);
+                    return self.derivative_of_half_power(base, halves, d_radicand);
+                }
                 let (d_base, d_exponent) = (inner(self, base), inner(self, exponent));
                 self.derivative_of_power(expr, (base, d_base), (exponent, d_exponent))
             }
@@ -115,6 +121,21 @@ impl ExprPool {
             terms.push(self.product(&[power, log, d_exponent]));
         }
         self.sum(&terms)
+    }
+
+    /// `d(sqrt(w)^k) = k/2 sqrt(w)^(k-2) dw`, which has a value where `w` is 0 and `k` above 2; a product with the
+    /// derivative of the root has none.
+    fn derivative_of_half_power(
+        &mut self,
+        root: ExprId,
+        halves: Number,
+        d_radicand: ExprId,
+    ) -> ExprId {
+        let (halves, two) = (self.constant(halves), self.integer(2));
+        let lower = self.sub(halves, two);
+        let lowered = self.pow(root, lower);
+        let product = self.product(&[halves, lowered, d_radicand]);
+        self.scale(Number::HALF, product)
     }
 
     /// `f'(x)` for `f(x) = value`, written with `value` where that saves work.
@@ -179,6 +200,9 @@ mod tests {
             ("sign(x)", "0"),
             ("x^0.3", "0.3/x^0.7"),
             ("x^y", "x^(-1 + y)*y"),
+            ("(x*y)^1.5", "3/2*sqrt(x*y)*y"),
+            ("(x*y)^(5/2)", "5/2*sqrt(x*y)^3*y"),
+            ("(x*y)^(-1/2)", "-1/2*y/sqrt(x*y)^3"),
             ("y^x", "y^x*log(y)"),
             ("sin(x)*cos(x)", "-sin(x)^2 + cos(x)^2"),
         ] {

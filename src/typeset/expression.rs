@@ -280,7 +280,11 @@ impl Layout<'_> {
                 let argument = Box::new(self.signed(argument)?.into_math());
                 Math::Function(function, Some(power), argument)
             }
-            false => Math::Power(Box::new(self.apply(function, argument)?), power),
+            // The power of exp(x) without parentheses could be read as one of x.
+            false => {
+                let applied = self.apply(function, argument)?;
+                Math::Power(Box::new(grouped_function(applied)), power)
+            }
         };
         Ok((FactorKey::Function, math))
     }
@@ -296,13 +300,10 @@ impl Layout<'_> {
             | Math::Slash(..)
             | Math::Power(..)
             | Math::Root(..)
-            | Math::Function(_, Some(_), _) => Math::Group(Box::new(math)),
-            Math::Number(_)
-            | Math::Symbol(_)
-            | Math::Dot
-            | Math::Function(_, None, _)
-            | Math::Absolute(_)
-            | Math::Group(_) => math,
+            | Math::Function(..) => Math::Group(Box::new(math)),
+            Math::Number(_) | Math::Symbol(_) | Math::Dot | Math::Absolute(_) | Math::Group(_) => {
+                math
+            }
         };
         Ok((key, math))
     }
@@ -378,6 +379,14 @@ impl Quotient {
     }
 }
 
+/// A function in parentheses; bars and roots show themselves where they end.
+fn grouped_function(math: Math) -> Math {
+    match math {
+        Math::Function(..) => Math::Group(Box::new(math)),
+        math => math,
+    }
+}
+
 /// A numerator or denominator needs no parentheses of its own.
 fn bare(math: Math) -> Math {
     match math {
@@ -386,10 +395,14 @@ fn bare(math: Math) -> Math {
     }
 }
 
-/// Factors side by side, with a dot where digits or words would run together.
+/// Factors side by side, with a dot where digits or words would run together; dots among the factors, as a
+/// product that is extended has them, are set anew.
 fn product(factors: Vec<Math>) -> Math {
     let mut laid_out: Vec<Math> = Vec::with_capacity(factors.len());
     for factor in factors {
+        if matches!(factor, Math::Dot) {
+            continue;
+        }
         let runs_together = laid_out.last().is_some_and(|before| {
             factor.starts_with_digit() || (ends_with_word(before) && starts_with_word(&factor))
         });
