@@ -56,6 +56,7 @@ pub mod files;
 pub mod identify;
 pub mod import;
 pub mod ir;
+pub mod limits;
 pub mod lower;
 pub mod model;
 pub mod mpc;

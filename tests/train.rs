@@ -250,13 +250,10 @@ fn training_with_a_negative_lift_weight_is_refused() {
     let mut options = TrainOptions::new("m", 2);
     options.encoder.lift_weight = -1.0;
     let error = train_with(&jumps("train", 1), &[], &options).expect_err("negative weight");
-    assert!(matches!(
-        error,
-        TrainError::Option {
-            option: "lift-weight",
-            ..
-        }
-    ));
+    assert!(
+        matches!(&error, TrainError::Range(refusal) if refusal.name == "lift-weight"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -265,7 +262,7 @@ fn training_with_predictions_over_more_than_a_batch_is_refused() {
     options.joint.unroll.window = 20;
     options.check().expect("without a weight it does not count");
     options.joint.weights.bptt = 1.0;
-    for (window, stride) in [(20, 5), (usize::MAX, 5)] {
+    for (window, stride) in [(20, 5), (1000, 1000)] {
         options.joint.unroll.window = window;
         let error = options.check().expect_err("no batch has room");
         let expected = format!("{window} x {stride} with batches of 100");

@@ -35,6 +35,7 @@ use clap::Parser;
 
 use crate::Error;
 use args::{Arguments, Command};
+use output::{printable, printable_json};
 
 /// The result of a command, for people and for programs.
 #[derive(Debug, Clone)]
@@ -64,8 +65,11 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         }
     };
     let printed = execute(arguments.command).map(|(answer, code)| match arguments.json {
-        true => (format!("{}\n", answer.json), code),
-        false => (answer.text, code),
+        true => (
+            format!("{}\n", printable_json(&answer.json.to_string())),
+            code,
+        ),
+        false => (printable(&answer.text).into_owned(), code),
     });
     match printed {
         Ok((text, code)) => match print(&text) {

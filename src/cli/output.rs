@@ -68,6 +68,11 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c.escape_unicode().to_string())
 }
 
+/// Prints a note to stderr.
+pub fn note(text: &str) {
+    eprintln!("note: {}", printable(text));
+}
+
 /// As [`printable`], for one JSON object.
 pub fn printable_json(text: &str) -> Cow<'_, str> {
     // Those of JSON itself have been escaped, so that all of them are in strings; none is beyond U+FFFF.

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::args::{TrainArguments, TrainSettings};
 use super::inspect_recording::{finding_json, mismatch_json};
+use super::output::note;
 use super::train_settings;
 use crate::Error;
 use crate::recording::check::Finding;
@@ -143,19 +144,19 @@ impl RecordedSets {
         for file in files {
             let of_file = findings.iter().filter(|(path, _)| path == file);
             let runs: Vec<&Finding> = of_file.map(|(_, finding)| finding).collect();
-            eprintln!(
-                "note: {}: {} implausible runs of samples, such as {}",
+            note(&format!(
+                "{}: {} implausible runs of samples, such as {}",
                 file.display(),
                 runs.len(),
                 runs[0]
-            );
+            ));
         }
         match self.options.implausible {
             ImplausibleSamples::LeaveOut if left_out > 0 => {
-                eprintln!("note: {left_out} samples are left out");
+                note(&format!("{left_out} samples are left out"));
             }
-            ImplausibleSamples::Keep if !findings.is_empty() => eprintln!(
-                "note: they are used; `romc inspect` lists them, --leave-out-implausible leaves them out"
+            ImplausibleSamples::Keep if !findings.is_empty() => note(
+                "they are used; `romc inspect` lists them, --leave-out-implausible leaves them out",
             ),
             ImplausibleSamples::LeaveOut | ImplausibleSamples::Keep => {}
         }
@@ -192,12 +193,12 @@ fn report_singular(findings: &[(PathBuf, Finding)]) {
     let of_file = findings.chunk_by(|(one, _), (other, _)| one == other);
     for runs in of_file {
         let samples: usize = runs.iter().map(|(_, finding)| finding.samples.len()).sum();
-        eprintln!(
-            "note: {}: {samples} samples of legs on the ground near a singularity, where forces are \
+        note(&format!(
+            "{}: {samples} samples of legs on the ground near a singularity, where forces are \
              damped, from {}",
             runs[0].0.display(),
             runs[0].1
-        );
+        ));
     }
 }
 

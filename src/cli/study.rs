@@ -118,6 +118,7 @@ fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
     };
     settings.paper |= arguments.paper;
     settings.method = arguments.method.or(settings.method);
+    train_settings::check_pairs(&settings)?;
     settings.method = Some(train_settings::method(&settings));
     Ok(settings)
 }

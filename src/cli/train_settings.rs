@@ -9,6 +9,8 @@ use serde_json::{Map, Value};
 use super::actuators;
 use super::args::{PhaseSet, TrainArguments, TrainSettings, Widths};
 use crate::Error;
+use crate::limits::of_training;
+use crate::limits::table::LAYER_WIDTH;
 use crate::model::{Activation, StandardLibrary};
 use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule};
 use crate::train::{
@@ -97,13 +99,45 @@ fn maps(settings: &TrainSettings) -> MapOptions {
     }
 }
 
-/// The method that is asked for; hidden layers are learned by the joint one only.
+/// The method that is asked for: the joint one if a setting is given that it alone knows.
 pub(super) fn method(settings: &TrainSettings) -> Method {
-    let default = match maps(settings).is_linear() {
-        true => Method::ClosedForm,
-        false => Method::Joint,
+    let default = match of_the_joint_method(settings) {
+        None => Method::ClosedForm,
+        Some(_) => Method::Joint,
     };
     settings.method.unwrap_or(default)
+}
+
+/// The first setting that the closed form would ignore.
+fn of_the_joint_method(settings: &TrainSettings) -> Option<&'static str> {
+    let layers = match settings.encoder_layers {
+        Some(_) => "encoder-layers",
+        None => "decoder-layers",
+    };
+    let given = [
+        ("paper", settings.paper),
+        ("epochs", settings.epochs.is_some()),
+        (layers, !maps(settings).is_linear()),
+        ("bptt-weight", settings.bptt_weight.is_some()),
+        ("bptt-window", settings.bptt_window.is_some()),
+        ("bptt-stride", settings.bptt_stride.is_some()),
+        ("bptt-decay", settings.bptt_decay.is_some()),
+        ("bptt-integrator", settings.bptt_integrator.is_some()),
+    ];
+    let given = given.into_iter().find(|(_, is_given)| *is_given);
+    given.map(|(name, _)| name)
+}
+
+/// The first setting of the window of predictions beside its weight.
+fn of_the_window(settings: &TrainSettings) -> Option<&'static str> {
+    let given = [
+        ("bptt-window", settings.bptt_window.is_some()),
+        ("bptt-stride", settings.bptt_stride.is_some()),
+        ("bptt-decay", settings.bptt_decay.is_some()),
+        ("bptt-integrator", settings.bptt_integrator.is_some()),
+    ];
+    let given = given.into_iter().find(|(_, is_given)| *is_given);
+    given.map(|(name, _)| name)
 }
 
 fn library(settings: &TrainSettings, default: LibraryChoice) -> LibraryChoice {
@@ -181,9 +215,9 @@ pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Err
     Ok(settings)
 }
 
-/// Refuses an activation without hidden layers, rows to filter without a filter, and named coordinates where a
+/// Refuses settings that the method does not use, an activation without hidden layers, rows to filter without a filter, and named coordinates where a
 /// method learns others.
-fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
+pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
     let refused = |option, found, expected| {
         Err(Error::Train(TrainError::Option {
             option,
@@ -191,6 +225,21 @@ fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
             expected,
         }))
     };
+    if let (Method::ClosedForm, Some(name)) = (method(settings), of_the_joint_method(settings)) {
+        return refused(
+            name,
+            "set for the closed form, which does not use it".to_owned(),
+            "`--method joint`, or no method",
+        );
+    }
+    let weight = settings.bptt_weight.map_or(0.0, f64::from);
+    if let (Some(name), true) = (of_the_window(settings), weight == 0.0) {
+        return refused(
+            name,
+            "set for a loss without weight".to_owned(),
+            "`--bptt-weight` above 0 beside it",
+        );
+    }
     if let (Some(activation), true) = (settings.activation, maps(settings).is_linear()) {
         return refused(
             "activation",
@@ -248,19 +297,23 @@ pub(super) fn refused(path: &Path, message: &str) -> Error {
 
 /// The checks of clap, for settings that came from a file.
 fn check(settings: &TrainSettings) -> Result<(), String> {
-    /// Counts for which 0 is a value.
-    const MAY_BE_ZERO: [&str; 2] = ["seed", "degree"];
     let given = given(settings);
     for (name, value) in &given {
-        let is_zero = |value: &Value| value.as_u64() == Some(0);
-        if is_zero(value) && !MAY_BE_ZERO.contains(&name.as_str()) {
-            return Err(format!("`{name}` is 0, expected at least 1"));
-        }
-        if value
-            .as_array()
-            .is_some_and(|widths| widths.iter().any(is_zero))
-        {
-            return Err(format!("`{name}` has a 0, expected widths of at least 1"));
+        let numbers = match value {
+            Value::Array(widths) => widths.as_slice(),
+            single => std::slice::from_ref(single),
+        };
+        let range = match value {
+            Value::Array(_) => Some(&LAYER_WIDTH),
+            _ => of_training(name),
+        };
+        for number in numbers.iter().filter_map(Value::as_f64) {
+            if let Some(Err(refusal)) = range.map(|range| range.check(number)) {
+                return Err(format!(
+                    "`{name}` is {}, expected {}",
+                    refusal.found, refusal.expected
+                ));
+            }
         }
     }
     if given.contains_key("terms")

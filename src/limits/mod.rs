@@ -7,3 +7,4 @@ mod range;
 pub mod table;
 
 pub use range::{OutOfRange, Range};
+pub use table::of_training;

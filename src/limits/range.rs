@@ -169,7 +169,11 @@ mod tests {
             ("-1", Err(())),
             ("18446744073709551615", Err(())),
         ] {
-            assert_eq!(COUNT.parse::<usize>(text).map_err(|_| ()), expected, "{text}");
+            assert_eq!(
+                COUNT.parse::<usize>(text).map_err(|_| ()),
+                expected,
+                "{text}"
+            );
         }
         assert!(SHARE.contains(1.0) && SHARE.contains(1e-300));
         for outside in [0.0, 1.0 + 1e-9, f64::NAN, f64::INFINITY, -1.0] {

@@ -56,9 +56,9 @@ pub const MARGIN: Range = Range::real("margin", 0.0, 100.0);
 /// Longest printed line in em.
 pub const WIDTH: Range = Range::real("width", 1.0, 1000.0);
 /// Decimal places of printed coefficients.
-pub const DIGITS: Range = Range::whole("digits", 0, 17);
+pub const DIGITS: Range = Range::whole("digits", 0, 40);
 /// Significant digits of printed coefficients.
-pub const SIGNIFICANT: Range = Range::whole("significant", 1, 17);
+pub const SIGNIFICANT: Range = Range::whole("significant", 1, 40);
 /// Scaled units in one SI unit, of a model from elsewhere.
 pub const SCALING: Range = Range::real("scaling", 1e-9, 1e9);
 /// As [`SCALING`], of the inputs.
@@ -67,7 +67,7 @@ pub const INPUT_SCALING: Range = Range::real("input-scaling", 1e-9, 1e9);
 pub const SAMPLE_TIME: Range = Range::real("sample-time", 1e-6, 1.0);
 
 /// The settings of `romc train`, as flags and in files.
-pub const TRAINING: [Range; 19] = [
+pub static TRAINING: [Range; 18] = [
     LATENT_DIM,
     SEEDS,
     EPOCHS,
@@ -86,11 +86,24 @@ pub const TRAINING: [Range; 19] = [
     TORQUE_SCALING,
     FORCE_SCALING,
     MOMENT_SCALING,
-    LAYER_WIDTH,
 ];
 
 /// The range of a setting of `romc train` by its name.
 pub fn of_training(name: &str) -> Option<&'static Range> {
-    static TABLE: [Range; 19] = TRAINING;
-    TABLE.iter().find(|range| range.name() == name)
+    TRAINING.iter().find(|range| range.name() == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_those_that_the_rooms_keep_themselves() {
+        let ends = |range: Range| range.ends()[1] as usize;
+        assert_eq!(ends(HORIZON), crate::mpc::MAX_HORIZON);
+        assert_eq!(ends(LATENT_DIM), crate::robot::STATE_DIM);
+        assert_eq!(ends(DIGITS), crate::typeset::MOST_DIGITS);
+        assert_eq!(ends(SIGNIFICANT), crate::typeset::MOST_DIGITS);
+        assert_eq!(ends(LAYER_WIDTH), crate::model::MAX_LAYER_WIDTH);
+    }
 }

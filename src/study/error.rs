@@ -14,6 +14,9 @@ pub enum StudyError {
         found: String,
         expected: &'static str,
     },
+    /// More seeds than a study can have.
+    #[error(transparent)]
+    Seeds(#[from] crate::limits::OutOfRange),
     /// A folder holds another study.
     #[error(
         "{path}: belongs to another study ({difference} differ); choose another folder, or repeat the command that made it"

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::StudyError;
+use crate::limits::table::SEEDS;
 use crate::robot::STATE_DIM;
 use crate::train::Method;
 
@@ -57,6 +58,7 @@ impl Plan {
                 "at least one of each",
             );
         }
+        SEEDS.check_count(self.seeds)?;
         match self
             .latent_dims
             .iter()
@@ -130,6 +132,22 @@ mod tests {
             .collect();
         joined.sort();
         assert_eq!(joined, cells);
+    }
+
+    #[test]
+    fn more_seeds_than_can_be_counted_are_refused_before_cells_are_made() {
+        for seeds in [10_001, u32::MAX as usize, usize::MAX] {
+            let plan = Plan {
+                latent_dims: vec![1],
+                seeds,
+                method: Method::ClosedForm,
+                settings: String::new(),
+                recordings: Vec::new(),
+                training: 1,
+                romc: String::new(),
+            };
+            assert!(matches!(plan.check(), Err(StudyError::Seeds(_))), "{seeds}");
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::limits::OutOfRange;
 use crate::model::ModelError;
 use crate::recording::RecordingError;
 use crate::robot::RobotError;
@@ -74,6 +75,9 @@ pub enum TrainError {
         /// Range.
         expected: &'static str,
     },
+    /// A number is outside the range of its setting.
+    #[error(transparent)]
+    Range(#[from] OutOfRange),
     /// Every candidate model left the range of finite numbers on the validation recordings.
     #[error(
         "all {candidates} candidate models diverge on the validation recordings: try another number of latent coordinates or more recordings"

@@ -14,6 +14,7 @@ use super::metrics::{BODY_X, BODY_Z};
 use super::progress::Watch;
 use super::report::Trained;
 use super::sparse::Pruning;
+use crate::limits::table;
 use crate::model::{Activation, Library, MAX_LAYER_WIDTH, MAX_LAYERS, StandardLibrary};
 use crate::recording::PhaseRule;
 use crate::recording::phases::CHATTER_SAMPLES;
@@ -334,13 +335,15 @@ impl TrainOptions {
             least_input_share,
             ..
         } = self.encoder;
-        at_least_zero("lift-weight", lift_weight)?;
-        above_zero("body-weight", body_weight)?;
-        at_least_zero("mask-std", least_std)?;
-        at_least_zero("mask-input-share", least_input_share)?;
+        table::LIFT_WEIGHT.check(lift_weight)?;
+        table::BODY_WEIGHT.check(body_weight)?;
+        table::MASK_STD.check(least_std)?;
+        table::MASK_INPUT_SHARE.check(least_input_share)?;
+        table::SEEDS.check_count(self.n_seeds.max(1))?;
+        table::MOVING_AVERAGE.check_count(self.regression.smoothing)?;
         self.joint.maps.check(self.latent_dim)?;
         self.joint.check_predictions()?;
-        at_least_zero("slack", self.regression.slack)?;
+        table::SLACK.check(self.regression.slack)?;
         at_least_zero("rollout-weight", self.regression.rollout_weight)?;
         for ridge in &self.regression.ridges {
             above_zero("ridge", *ridge)?;
@@ -382,21 +385,16 @@ impl TrainOptions {
 impl JointOptions {
     /// Complains about a window of predictions out of range; one that no batch has room for would count for nothing.
     fn check_predictions(&self) -> Result<(), TrainError> {
-        at_least_zero("bptt-weight", self.weights.bptt)?;
+        table::BPTT_WEIGHT.check(self.weights.bptt)?;
         let Unroll {
             window,
             stride,
             decay,
             ..
         } = self.unroll;
-        above_zero("bptt-window", window as f64)?;
-        above_zero("bptt-stride", stride as f64)?;
-        in_range(
-            "bptt-decay",
-            decay,
-            decay > 0.0 && decay <= 1.0,
-            "above 0 and at most 1",
-        )?;
+        table::BPTT_WINDOW.check_count(window)?;
+        table::BPTT_STRIDE.check_count(stride)?;
+        table::BPTT_DECAY.check(decay)?;
         let reach = window.checked_mul(stride);
         if self.weights.bptt > 0.0 && reach.is_none_or(|reach| reach >= self.batch_rows) {
             return Err(TrainError::Option {
@@ -411,10 +409,11 @@ impl JointOptions {
 
 impl ScaleOptions {
     fn check(&self) -> Result<(), TrainError> {
-        above_zero("state-scaling", self.state)?;
-        above_zero("torque-scaling", self.torque)?;
-        above_zero("force-scaling", self.force)?;
-        above_zero("moment-scaling", self.moment)
+        table::STATE_SCALING.check(self.state)?;
+        table::TORQUE_SCALING.check(self.torque)?;
+        table::FORCE_SCALING.check(self.force)?;
+        table::MOMENT_SCALING.check(self.moment)?;
+        Ok(())
     }
 }
 

@@ -141,6 +141,7 @@ fn is_of_one_seed(error: &TrainError) -> bool {
         | TrainError::PhaseSamples { .. }
         | TrainError::LatentDim { .. }
         | TrainError::Option { .. }
+        | TrainError::Range(_)
         | TrainError::Cancelled
         | TrainError::Recording(_)
         | TrainError::Robot(_) => false,

@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::number::number;
+use super::number::{count, real};
 use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::Target;
+use crate::limits::table::{DIGITS, MARGIN, SIGNIFICANT, WIDTH};
 use crate::simplify::Tolerance;
-use crate::typeset::{Form, MOST_DIGITS};
+use crate::typeset::Form;
 
 /// `romc compile`
 #[derive(Debug, Args)]
@@ -88,16 +89,16 @@ pub struct CodeArguments {
 #[command(next_help_heading = "Printed equations")]
 pub struct EquationArguments {
     /// Decimal places of coefficients; as many as each needs, at least two, unless given
-    #[arg(long, value_name = "N", value_parser = decimal_places, conflicts_with = "significant")]
+    #[arg(long, value_name = "N", value_parser = count(&DIGITS), conflicts_with = "significant")]
     pub digits: Option<usize>,
     /// Significant digits of coefficients
-    #[arg(long, value_name = "N", value_parser = printed_digits)]
+    #[arg(long, value_name = "N", value_parser = count(&SIGNIFICANT))]
     pub significant: Option<usize>,
     /// Another name for a variable, such as z1=x or u2=F_z; may be repeated
     #[arg(long, value_name = "VARIABLE=NAME")]
     pub rename: Vec<String>,
     /// Longest line in em: 32 suits one column, 22 a column of a two-column paper
-    #[arg(long, value_name = "EM", value_parser = positive_width)]
+    #[arg(long, value_name = "EM", value_parser = real(&WIDTH))]
     pub width: Option<f64>,
     /// Arrangement in LaTeX; cases for what fits on a page, align for longer phases, unless given
     #[arg(long, value_enum)]
@@ -133,7 +134,7 @@ pub struct SimplifyArguments {
     #[arg(
         long,
         value_name = "SHARE",
-        value_parser = share,
+        value_parser = real(&MARGIN),
         requires = "domain",
         allow_negative_numbers = true
     )]
@@ -141,24 +142,4 @@ pub struct SimplifyArguments {
     /// Also write the simplified model to this file
     #[arg(long, value_name = "MODEL.json", requires = "domain")]
     pub save_model: Option<PathBuf>,
-}
-
-fn decimal_places(text: &str) -> Result<usize, String> {
-    let expected = format!("a whole number from 0 to {MOST_DIGITS}");
-    number(text, |places| *places <= MOST_DIGITS, &expected)
-}
-
-fn printed_digits(text: &str) -> Result<usize, String> {
-    let expected = format!("a whole number from 1 to {MOST_DIGITS}");
-    number(text, |digits| (1..=MOST_DIGITS).contains(digits), &expected)
-}
-
-fn share(text: &str) -> Result<f64, String> {
-    let is_share = |share: &f64| share.is_finite() && *share >= 0.0;
-    number(text, is_share, "a number of at least 0, such as 0.1")
-}
-
-fn positive_width(text: &str) -> Result<f64, String> {
-    let is_width = |width: &f64| width.is_finite() && *width > 0.0;
-    number(text, is_width, "a positive width in em")
 }

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::number::{at_least_one, positive_seconds};
+use super::number::{count, real};
 use crate::import::{
     Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
 };
+use crate::limits::table::{IMPORTED_LATENT_DIM, INPUT_SCALING, SAMPLE_TIME, SCALING};
 use crate::model::{Activation, StandardLibrary};
 
 /// The candidate terms of an imported model.
@@ -70,20 +71,21 @@ pub struct ImportArguments {
     #[arg(long, value_name = "LIBRARY", value_parser = library_argument)]
     pub library: Option<LibraryArgument>,
     /// Number of latent coordinates d: needed if shapes leave it open
-    #[arg(long, value_name = "D", value_parser = at_least_one)]
+    #[arg(long, value_name = "D", value_parser = count(&IMPORTED_LATENT_DIM))]
     pub latent_dim: Option<usize>,
     /// When a phase holds: any, none, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be
     /// repeated, the first match wins; contact=any and flight=none are known
     #[arg(long, value_name = "NAME=FEET")]
     pub phase: Vec<PhaseRule>,
     /// Scaled value = factor times SI value: one number or one per coordinate, separated by commas
-    #[arg(long, value_name = "FACTOR", value_delimiter = ',')]
+    #[arg(long, value_name = "FACTOR", value_delimiter = ',', value_parser = real(&SCALING))]
     pub scaling: Vec<f64>,
     /// Factors of the inputs, where they differ from --scaling
     #[arg(
         long,
         value_name = "FACTOR",
         value_delimiter = ',',
+        value_parser = real(&INPUT_SCALING),
         requires = "scaling"
     )]
     pub input_scaling: Vec<f64>,
@@ -91,7 +93,7 @@ pub struct ImportArguments {
     #[arg(long)]
     pub robot: Option<String>,
     /// Sampling period of the training recordings
-    #[arg(long, value_name = "SECONDS", value_parser = positive_seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = real(&SAMPLE_TIME))]
     pub sample_time: Option<f64>,
     /// Recordings that give the mean and covariance of the inputs in each phase, by which the
     /// controller weighs inputs. Needs --robot

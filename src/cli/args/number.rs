@@ -1,29 +1,111 @@
-//! Numbers as several commands take them.
+//! Parsers of numbers by their ranges.
 
-use std::str::FromStr;
+use super::train::Finite;
+use crate::limits::Range;
 
-/// A positive, finite number of seconds.
-pub(super) fn positive_seconds(text: &str) -> Result<f64, String> {
-    number(
-        text,
-        |value: &f64| value.is_finite() && *value > 0.0,
-        "a positive number of seconds",
-    )
+/// A whole number in a range.
+pub(super) fn count(range: &'static Range) -> impl Fn(&str) -> Result<usize, String> + Clone {
+    |text| range.parse(text)
 }
 
-/// A whole number of at least 1.
-pub(super) fn at_least_one(text: &str) -> Result<usize, String> {
-    number(text, |value| *value > 0, "a whole number of at least 1")
+/// A number in a range.
+pub(super) fn real(range: &'static Range) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    |text| range.parse(text)
 }
 
-/// A number that is in range, or what was expected.
-pub(super) fn number<T: FromStr>(
-    text: &str,
-    is_in_range: impl Fn(&T) -> bool,
-    expected: &str,
-) -> Result<T, String> {
-    let parsed = text.parse().ok().filter(is_in_range);
-    parsed.ok_or_else(|| format!("expected {expected}"))
+/// As [`real`], as settings hold it.
+pub(super) fn finite(range: &'static Range) -> impl Fn(&str) -> Result<Finite, String> + Clone {
+    |text| range.parse::<f64>(text)?.try_into()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use clap::CommandFactory as _;
+    use clap::error::ErrorKind;
+
+    use crate::cli::args::Arguments;
+    use crate::limits::{Range, table};
+
+    /// Flags that take a number and have no range of the table: any seed will do.
+    const WITHOUT: [&str; 1] = ["seed"];
+
+    /// Ranges by command and flag where it is not the training's.
+    fn range(command: &str, flag: &str) -> Option<Range> {
+        let others = [
+            table::LAMBDA,
+            table::HORIZON,
+            table::STEP,
+            table::RESTART_EVERY,
+            table::MARGIN,
+            table::WIDTH,
+            table::DIGITS,
+            table::SIGNIFICANT,
+            table::SCALING,
+            table::INPUT_SCALING,
+            table::SAMPLE_TIME,
+        ];
+        if (command, flag) == ("import", "latent-dim") {
+            return Some(table::IMPORTED_LATENT_DIM);
+        }
+        let of_training = table::of_training(flag).copied();
+        of_training.or_else(|| others.into_iter().find(|range| range.name() == flag))
+    }
+
+    /// Whether a command refuses the value of a flag as such.
+    fn refuses(command: &str, flag: &str, value: &str) -> bool {
+        let flag = format!("--{flag}={value}");
+        let found = Arguments::command().try_get_matches_from(["romc", command, &flag]);
+        found.is_err_and(|error| error.kind() == ErrorKind::ValueValidation)
+    }
+
+    #[test]
+    fn every_flag_that_takes_a_number_refuses_what_lies_outside_its_range() {
+        let mut met = BTreeSet::new();
+        for command in Arguments::command().get_subcommands() {
+            let name = command.get_name();
+            for flag in command
+                .get_arguments()
+                .filter_map(|argument| argument.get_long())
+            {
+                let takes_numbers = refuses(name, flag, "words")
+                    && ["1", "0.5", "3"]
+                        .iter()
+                        .any(|value| !refuses(name, flag, value))
+                    && !["1%", "1..2", "x=1"]
+                        .iter()
+                        .any(|value| !refuses(name, flag, value));
+                if !takes_numbers || WITHOUT.contains(&flag) {
+                    continue;
+                }
+                let range = range(name, flag);
+                let range = range.unwrap_or_else(|| panic!("--{flag} of {name} has no range"));
+                met.insert(range.name());
+                let [least, most] = range.ends();
+                assert!(!refuses(name, flag, &most.to_string()), "--{flag}={most}");
+                let beyond = if range.is_whole() {
+                    most + 1.0
+                } else {
+                    most * (1.0 + 1e-9)
+                };
+                let below = if range.is_whole() {
+                    least - 1.0
+                } else {
+                    least - 1e-9 * most
+                };
+                for value in [
+                    beyond.to_string(),
+                    below.to_string(),
+                    "NaN".into(),
+                    "1e300".into(),
+                ] {
+                    assert!(refuses(name, flag, &value), "--{flag}={value} of {name}");
+                }
+            }
+        }
+        assert!(met.len() >= 25, "{met:?}");
+    }
 }
 
 /// A finite number.

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
-use super::number::{at_least_one, positive_seconds};
+use super::number::{count, real};
 use crate::evaluate::ReferenceInput;
+use crate::limits::table::{HORIZON, RESTART_EVERY, STEP};
 use crate::mpc::Lift;
 use crate::simplify::Tolerance;
 
@@ -49,7 +50,7 @@ pub struct SimulateArguments {
     #[arg(required = true, value_name = "RECORDING")]
     pub recordings: Vec<PathBuf>,
     /// Time between restarts from the recorded state, in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = positive_seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = real(&RESTART_EVERY))]
     pub restart_every: f64,
     /// Write the trajectories of all rollouts to this CSV file
     #[arg(long, value_name = "FILE.csv")]
@@ -88,10 +89,10 @@ pub struct MpcArguments {
     #[arg(required = true, value_name = "RECORDING")]
     pub recordings: Vec<PathBuf>,
     /// Number of stages
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = at_least_one)]
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = count(&HORIZON))]
     pub horizon: usize,
     /// Length of a stage in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.01, value_parser = positive_seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.01, value_parser = real(&STEP))]
     pub step: f64,
     /// How latent inputs become joint torques
     #[arg(long, value_enum, default_value = "transpose")]
@@ -132,7 +133,7 @@ pub struct ReportArguments {
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,
     /// Time between restarts from the recorded state, in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = positive_seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = real(&RESTART_EVERY))]
     pub restart_every: f64,
     /// List what simplification within this error changes: 1% or 0.05, as in `romc compile`
     #[arg(

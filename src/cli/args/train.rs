@@ -6,7 +6,8 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
-use super::number::at_least_one;
+use super::number::{count, finite, real};
+use crate::limits::table;
 use crate::model::Activation;
 use crate::recording::smoothing::SavitzkyGolay;
 use crate::recording::{Accelerations, SmoothedRows};
@@ -26,11 +27,14 @@ impl FromStr for Widths {
         if text == "linear" {
             return Ok(Self(Vec::new()));
         }
-        let widths = text.split(',').map(|width| at_least_one(width.trim()));
+        let widths = text.split(',').map(|width| table::LAYER_WIDTH.parse(width));
         let widths: Result<Vec<usize>, String> = widths.collect();
-        widths
-            .map(Self)
-            .map_err(|_| format!("found `{text}`, expected widths such as 32,16, or `linear`"))
+        widths.map(Self).map_err(|_| {
+            format!(
+                "found `{text}`, expected widths such as 32,16, or `linear`, each {}",
+                table::LAYER_WIDTH.in_words()
+            )
+        })
     }
 }
 
@@ -47,15 +51,6 @@ impl TryFrom<f64> for Finite {
             true => Ok(Self(value)),
             false => Err(format!("found {value}, expected a finite number")),
         }
-    }
-}
-
-impl FromStr for Finite {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let value: f64 = text.parse().map_err(|_| "expected a number".to_owned())?;
-        value.try_into()
     }
 }
 
@@ -118,7 +113,7 @@ pub struct TrainArguments {
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct TrainSettings {
     /// Number of latent coordinates d
-    #[arg(long, value_name = "D", value_parser = at_least_one, required_unless_present = "config")]
+    #[arg(long, value_name = "D", required_unless_present = "config", value_parser = count(&table::LATENT_DIM))]
     pub latent_dim: Option<usize>,
     /// How to learn (closed-form unless given)
     #[arg(long, value_enum)]
@@ -134,10 +129,10 @@ pub struct TrainSettings {
     #[arg(long)]
     pub seed: Option<u64>,
     /// Seeds to try, counting up from the seed; the best is kept (1 unless given, joint method 3)
-    #[arg(long, value_parser = at_least_one)]
+    #[arg(long, value_parser = count(&table::SEEDS))]
     pub seeds: Option<usize>,
     /// Epochs of a step, refinement not counted (joint method)
-    #[arg(long, value_parser = at_least_one)]
+    #[arg(long, value_parser = count(&table::EPOCHS))]
     pub epochs: Option<usize>,
     /// Widths of the encoder's hidden layers, such as 32,16; a linear layer to z follows (joint method)
     #[arg(long, value_name = "WIDTHS")]
@@ -149,35 +144,35 @@ pub struct TrainSettings {
     #[arg(long, value_enum)]
     pub activation: Option<Activation>,
     /// Weight of the input energy that the latent input does not represent
-    #[arg(long, value_name = "WEIGHT")]
+    #[arg(long, value_name = "WEIGHT", value_parser = finite(&table::LIFT_WEIGHT))]
     pub lift_weight: Option<Finite>,
     /// Weight of body x, y, z in the reconstruction error
-    #[arg(long, value_name = "WEIGHT")]
+    #[arg(long, value_name = "WEIGHT", value_parser = finite(&table::BODY_WEIGHT))]
     pub body_weight: Option<Finite>,
     /// Weight of the loss over a window of predictions, 0 for none (joint method)
-    #[arg(long, value_name = "WEIGHT")]
+    #[arg(long, value_name = "WEIGHT", value_parser = finite(&table::BPTT_WEIGHT))]
     pub bptt_weight: Option<Finite>,
     /// Steps of that window (5 unless given)
-    #[arg(long, value_name = "STEPS", value_parser = at_least_one)]
+    #[arg(long, value_name = "STEPS", value_parser = count(&table::BPTT_WINDOW))]
     pub bptt_window: Option<usize>,
     /// Samples per step of that window (5 unless given: 10 ms at 500 Hz)
-    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
+    #[arg(long, value_name = "SAMPLES", value_parser = count(&table::BPTT_STRIDE))]
     pub bptt_stride: Option<usize>,
     /// Weight of a prediction relative to the previous one (0.9 unless given)
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, value_name = "FACTOR", value_parser = finite(&table::BPTT_DECAY))]
     pub bptt_decay: Option<Finite>,
     /// How predictions are integrated (rk2 unless given)
     #[arg(long, value_enum)]
     pub bptt_integrator: Option<Integrator>,
     /// Accepted increase of the validation error for fewer terms, as a share of the least error
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", value_parser = finite(&table::SLACK))]
     pub slack: Option<Finite>,
     /// Steps by which rollouts of the training jumps refine the chosen coefficients; 0 leaves those of the regression
     /// (10 unless given, 0 with --paper)
     #[arg(long, value_name = "STEPS")]
     pub refinements: Option<usize>,
     /// Highest degree of the polynomial candidate terms
-    #[arg(long, value_name = "P")]
+    #[arg(long, value_name = "P", value_parser = |text: &str| table::DEGREE.parse::<u32>(text))]
     pub degree: Option<u32>,
     /// Add sines and cosines of z and dz to the candidate terms
     #[arg(long)]
@@ -208,13 +203,13 @@ pub struct TrainSettings {
     #[arg(long, value_enum)]
     pub smooth_rows: Option<SmoothedRows>,
     /// Window of the mean over accelerations within each phase (11 unless given, 1 with --paper)
-    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
+    #[arg(long, value_name = "SAMPLES", value_parser = count(&table::MOVING_AVERAGE))]
     pub moving_average: Option<usize>,
     /// Coordinates with a smaller standard deviation (rad or m) are masked unless actuated; 0 for no mask
-    #[arg(long, value_name = "STD")]
+    #[arg(long, value_name = "STD", value_parser = finite(&table::MASK_STD))]
     pub mask_std: Option<Finite>,
     /// Coordinates with a larger share of the input's energy count as actuated
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", value_parser = finite(&table::MASK_INPUT_SHARE))]
     pub mask_input_share: Option<Finite>,
     /// Rows of a linear encoder: named (the centre of mass, then joints and pitch, left and right alike; the dynamics
     /// obey gravity, free fall and the invariances) or free [default: named; free with --paper or hidden layers]
@@ -224,16 +219,16 @@ pub struct TrainSettings {
     #[arg(long)]
     pub no_rotation: bool,
     /// Scaled units of the state in one rad or m (0.1 unless given)
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, value_name = "FACTOR", value_parser = finite(&table::STATE_SCALING))]
     pub state_scaling: Option<Finite>,
     /// Scaled units of joint torques in one N m (0.1 unless given)
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, value_name = "FACTOR", value_parser = finite(&table::TORQUE_SCALING))]
     pub torque_scaling: Option<Finite>,
     /// Scaled units of forces on the body in one N (0.005 unless given, 0.1 with --paper)
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, value_name = "FACTOR", value_parser = finite(&table::FORCE_SCALING))]
     pub force_scaling: Option<Finite>,
     /// Scaled units of moments on the body in one N m (0.02 unless given, 0.05 in the body's axes, 0.1 with --paper)
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, value_name = "FACTOR", value_parser = finite(&table::MOMENT_SCALING))]
     pub moment_scaling: Option<Finite>,
 }
 
@@ -253,7 +248,7 @@ pub struct StudyArguments {
     #[arg(long, value_name = "DIMS", default_value = "1..18", value_parser = dimensions)]
     pub latent_dims: Dimensions,
     /// Seeds per dimension
-    #[arg(long, default_value_t = 5, value_parser = at_least_one)]
+    #[arg(long, default_value_t = 5, value_parser = count(&table::SEEDS))]
     pub seeds: usize,
     /// How to learn (closed-form unless given)
     #[arg(long, value_enum)]
@@ -265,7 +260,7 @@ pub struct StudyArguments {
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
     /// Weight of the complexity in the combined loss 2 E_dec + 2 lambda log |Xi|
-    #[arg(long, default_value_t = crate::evaluate::LAMBDA)]
+    #[arg(long, default_value_t = crate::evaluate::LAMBDA, value_parser = real(&table::LAMBDA))]
     pub lambda: f64,
     /// Compute only this part of the study, such as 3/8
     #[arg(long, value_name = "PART", value_parser = Shard::parse, conflicts_with = "merge")]
