@@ -285,6 +285,13 @@ fn names_that_end_in_an_underscore_are_refused() {
         let error = fails(1, &["inspect", &model]);
         assert!(error.contains("ends with an underscore"), "{error}");
     }
+    // A training refuses its output's name before it begins.
+    let output = folder.path().join("a_.json").display().to_string();
+    let error = fails(
+        1,
+        &["train", JUMP, "--latent-dim", "2", "--output", &output],
+    );
+    assert!(error.contains("ends with an underscore"), "{error}");
 }
 
 #[test]

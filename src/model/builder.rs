@@ -434,6 +434,14 @@ impl ModelBuilder {
     }
 }
 
+/// Refuses a name that a model cannot have, before one is made.
+///
+/// # Errors
+/// [`ModelError::Name`].
+pub fn check_name(name: &str) -> Result<(), ModelError> {
+    identifier_of("model name", name).map(|_| ())
+}
+
 fn identifier_of(what: &str, name: &str) -> Result<Identifier, ModelError> {
     Identifier::from_name(name).map_err(|source| ModelError::Name {
         what: what.to_owned(),

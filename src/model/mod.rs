@@ -57,7 +57,7 @@ mod tests;
 pub use crate::robot::FeetRule;
 pub use activation::Activation;
 pub use affine::AffineMap;
-pub use builder::ModelBuilder;
+pub use builder::{ModelBuilder, check_name};
 pub use coordinate_names::CoordinateNames;
 pub use error::ModelError;
 pub(crate) use evaluation::{Step, Tape};

@@ -15,7 +15,7 @@ use super::progress::Watch;
 use super::report::Trained;
 use super::sparse::Pruning;
 use crate::limits::table;
-use crate::model::{Activation, Library, MAX_LAYER_WIDTH, MAX_LAYERS, StandardLibrary};
+use crate::model::{Activation, Library, MAX_LAYER_WIDTH, MAX_LAYERS, StandardLibrary, check_name};
 use crate::recording::PhaseRule;
 use crate::recording::phases::CHATTER_SAMPLES;
 use crate::robot::{Actuators, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame};
@@ -326,8 +326,10 @@ impl TrainOptions {
     /// Complains about settings outside their range.
     ///
     /// # Errors
-    /// [`TrainError::Option`] naming the first one.
+    /// [`TrainError::Range`] or [`TrainError::Option`] naming the first one, [`TrainError::Model`] for a name that no
+    /// model can have.
     pub fn check(&self) -> Result<(), TrainError> {
+        check_name(&self.name)?;
         let EncoderOptions {
             lift_weight,
             body_weight,
