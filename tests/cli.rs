@@ -1208,13 +1208,11 @@ fn simplified_model_may_be_saved_among_the_emitted_files_and_again() {
 
 #[test]
 fn control_step_shorter_than_the_samples_is_refused() {
-    for step in ["1e-300", "0.001"] {
-        let error = failed(&["mpc", MODEL, JUMP, "--step", step]);
-        assert!(
-            error.contains("test_01.csv.gz") && error.contains("2.000 ms"),
-            "{error}"
-        );
-    }
+    let error = failed(&["mpc", MODEL, JUMP, "--step", "0.001"]);
+    assert!(
+        error.contains("test_01.csv.gz") && error.contains("2.000 ms"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -1298,7 +1296,7 @@ fn sines_of_the_paper_become_linear_over_given_ranges() {
         (&["--tolerance", "1%"][..], "--domain <RECORDING>"),
         (&["--tolerance", "-0.1", "--domain", ranges], "found `-0.1`"),
         (&["--tolerance", "nan", "--domain", ranges], "found `nan`"),
-        (&["--margin", "-1", "--domain", ranges], "of at least 0"),
+        (&["--margin", "-1", "--domain", ranges], "from 0 to 100"),
         (
             &["--margin", "0.5", "--domain", ranges],
             "taken as they are",

@@ -52,7 +52,7 @@ fn with_terms(folder: &Path, name: &str, terms: &[&str]) -> String {
         "schema": "romc-model/1",
         "name": name,
         "latent_dim": 1,
-        "library": { "terms": terms },
+        "library": terms,
         "phases": [{ "name": "contact", "feet": "any", "xi": rows }],
     });
     let path = folder.join("model.json");
@@ -191,8 +191,20 @@ fn numbers_outside_their_ranges_are_refused_on_the_command_line_and_in_files() {
 
 #[test]
 fn a_step_that_no_recording_holds_is_refused() {
-    let error = fails(1, &["mpc", "models/go1-d4.json", JUMP, "--step", "1"]);
-    assert!(error.contains("s without a gap"), "{error}");
+    let folder = tempfile::tempdir().expect("a folder");
+    let jump = Path::new(env!("CARGO_MANIFEST_DIR")).join(JUMP);
+    let recording = romc::recording::read(&jump).expect("a sound recording");
+    let mut text = Vec::new();
+    let options = romc::recording::write::WriteOptions::default();
+    romc::recording::write::write_to(&mut text, &recording, &options).expect("memory");
+    let text = String::from_utf8(text).expect("UTF-8");
+    for (rows, step) in [(101, "0.5"), (3, "0.01")] {
+        let short: Vec<&str> = text.lines().take(rows).collect();
+        let path = folder.path().join("short.csv").display().to_string();
+        fs::write(&path, short.join("\n")).expect("written");
+        let error = fails(1, &["mpc", "models/go1-d4.json", &path, "--step", step]);
+        assert!(error.contains("s without a gap"), "{error}");
+    }
 }
 
 #[test]
@@ -203,19 +215,57 @@ fn settings_that_the_closed_form_would_ignore_are_refused_beside_it() {
     let closed = ["--method", "closed-form"];
     let settings: [&[&str]; 3] = [&["--paper"], &["--bptt-weight", "100"], &["--epochs", "9"]];
     for setting in settings {
-        let error = fails(1, &[&train[..], &closed, setting].concat());
+        let error = fails(2, &[&train[..], &closed, setting].concat());
         let name = setting[0].trim_start_matches('-');
         assert!(
             error.contains(&format!("{name} is set for the closed form")),
             "{error}"
         );
     }
-    let lone = fails(1, &[&train[..], &["--bptt-window", "4"]].concat());
+    let lone = fails(2, &[&train[..], &["--bptt-window", "4"]].concat());
     assert!(
         lone.contains("bptt-window is set for a loss without weight"),
         "{lone}"
     );
     assert!(!Path::new(&model).exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_training_says_so_and_its_model_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("m.json");
+    let mut training = Command::new(env!("CARGO_BIN_EXE_romc"));
+    training.args([
+        "train",
+        JUMP,
+        "--latent-dim",
+        "2",
+        "--epochs",
+        "300000",
+        "--seeds",
+        "2",
+    ]);
+    training.args(["--json", "--output"]).arg(&model);
+    let training = training.current_dir(env!("CARGO_MANIFEST_DIR"));
+    let training = training.stdout(std::process::Stdio::piped());
+    let training = training
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("starts");
+    std::thread::sleep(std::time::Duration::from_secs(3));
+    let stopped = Command::new("kill")
+        .args(["-INT", &training.id().to_string()])
+        .status();
+    assert!(stopped.expect("kill").success());
+    let output = training.wait_with_output().expect("ends");
+    let note = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{note}");
+    assert!(note.contains("note: interrupted"), "{note}");
+    let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(told["interrupted"], true);
+    let model: Value = serde_json::from_slice(&fs::read(model).expect("written")).expect("JSON");
+    assert_eq!(model["provenance"]["interrupted"], true);
 }
 
 #[test]
@@ -400,7 +450,10 @@ fn collect(value: &Value, numbers: &mut Vec<f64>) {
     match value {
         Value::Number(number) => numbers.push(number.as_f64().expect("a number")),
         Value::Array(values) => values.iter().for_each(|value| collect(value, numbers)),
-        Value::Object(entries) => entries.values().for_each(|value| collect(value, numbers)),
+        // The combined loss adds a loss in scaled units to one that has none.
+        Value::Object(entries) => (entries.iter())
+            .filter(|(name, _)| *name != "combined_loss")
+            .for_each(|(_, value)| collect(value, numbers)),
         Value::Null | Value::Bool(_) | Value::String(_) => {}
     }
 }

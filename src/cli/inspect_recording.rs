@@ -29,10 +29,15 @@ pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
     let findings = check(recording, robot);
     let rule = PhaseRule::three_phase().with_min_samples(CHATTER);
     let mut text = format!(
-        "{}: {} samples in {} segments\n",
+        "{}: {} samples in {} {}\n",
         recording.path.display(),
         recording.sample_count(),
-        recording.segments.len()
+        recording.segments.len(),
+        if recording.segments.len() == 1 {
+            "segment"
+        } else {
+            "segments"
+        }
     );
     let mut segments = Vec::new();
     for (index, segment) in recording.segments.iter().enumerate() {

@@ -9,10 +9,11 @@ use serde_json::json;
 use super::Answer;
 use super::actuators::{self, NONE};
 use super::args::{TrainArguments, TrainSettings};
-use super::output::{check_output, names, spinner, stem};
+use super::output::{check_output, names, note, spinner, stem};
 use super::prepared_recordings::{RecordedSets, read_all};
 use super::train_settings;
 use crate::files::Overwrite;
+use crate::model::ReducedModel;
 use crate::robot::Robot;
 use crate::train::{
     Method, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained, Watch,
@@ -62,14 +63,22 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let mut watch = Watch::new(&mut listener, stop_on_interrupt());
     let trained = method.learn(sets, robot, &options, &origin, &mut watch);
     report_findings();
-    let trained = trained?;
+    let mut trained = trained?;
     bar.finish_and_clear();
+    let is_interrupted = INTERRUPTED.load(Ordering::Relaxed);
+    if is_interrupted {
+        trained.model = marked_as_interrupted(trained.model);
+        note(
+            "interrupted: this is the best model so far; its provenance says so, its command does not repeat it",
+        );
+    }
     artifact::write_with(&arguments.output, &trained.model, overwrite)?;
     let tested = match recorded.test.is_empty() {
         true => None,
         false => Some(train::assess(&trained.model, &recorded.test)?),
     };
     let mut answer = answer(arguments, &trained, tested.as_ref());
+    answer.json["interrupted"] = is_interrupted.into();
     answer.json["recordings"] = recorded.findings_json();
     if let (Some(sets), Some(json)) = (&recorded.divided, recorded.json()) {
         answer.json["split"] = json;
@@ -83,8 +92,17 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
 }
 
 /// Becomes true at the first Ctrl-C, so that a training ends with the best so far; the second one ends the process.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// The model with a provenance that says that its training did not come to its end.
+fn marked_as_interrupted(model: ReducedModel) -> ReducedModel {
+    let mut provenance = model.provenance().clone();
+    provenance.insert("interrupted".to_owned(), true.into());
+    let builder = model.into_builder().provenance(provenance);
+    builder.build().expect("the model was sound before")
+}
+
 fn stop_on_interrupt() -> &'static AtomicBool {
-    static INTERRUPTED: AtomicBool = AtomicBool::new(false);
     // Without a handler (there is one already) Ctrl-C ends the process at once, which leaves no half file either.
     let _ = ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {

@@ -1,8 +1,8 @@
 //! Putting emitted files into a folder, whole or not at all.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::OpenOptions;
-use std::io::Write as _;
+use std::fs::{File, OpenOptions};
+use std::io::{Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -86,10 +86,12 @@ pub fn write_files(
         let put = part.put();
         put.map_err(|error| io_error(part.place(), error))?;
     }
+    settle(folder)?;
     Ok(staged.iter().map(|part| part.place().to_owned()).collect())
 }
 
-/// The files that romc wrote into a folder: digests of all contents that each name has had.
+/// The files that romc wrote into a folder: of each name the digest of its contents, and while a run lasts that of the
+/// new ones.
 ///
 /// A line of the list is a SHA-256 digest, two spaces and a name, as `sha256sum` prints them.
 #[derive(Debug, Default)]
@@ -149,7 +151,7 @@ impl Emitted {
             || self.0.get(name).is_some_and(is_listed)
     }
 
-    /// Adds files to the list by appending, so that runs at the same time keep each other's lines.
+    /// Adds files to the list by appending under a lock, so that runs at the same time keep each other's lines.
     fn extend(&self, folder: &Path, files: &[EmittedFile]) -> Result<(), FolderError> {
         let mut lines = String::new();
         for file in files {
@@ -162,7 +164,10 @@ impl Emitted {
         let list = folder.join(LIST);
         let opened = OpenOptions::new().append(true).create(true).open(&list);
         opened
-            .and_then(|mut file| file.write_all(lines.as_bytes()))
+            .and_then(|mut file| {
+                locked(&file)?;
+                file.write_all(lines.as_bytes())
+            })
             .map_err(|error| io_error(&list, error))
     }
 
@@ -175,6 +180,51 @@ impl Emitted {
             .filter(|(name, path)| path.is_file() && self.is_own(path, name, None))
             .map(|(_, path)| path)
             .collect()
+    }
+}
+
+/// Drops earlier digests of files from the list of a folder: of each name the one stays that its file has now, or else
+/// the last. Equal emissions leave equal lists.
+fn settle(folder: &Path) -> Result<(), FolderError> {
+    let list = folder.join(LIST);
+    let mut settle = || {
+        let mut file = OpenOptions::new().read(true).write(true).open(&list)?;
+        locked(&file)?;
+        let mut text = String::new();
+        file.read_to_string(&mut text)?;
+        let mut kept: Vec<(&str, Vec<&str>)> = Vec::new();
+        for (digest, name) in text.lines().filter_map(|line| line.split_once("  ")) {
+            match kept.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, digests)) => digests.push(digest),
+                None => kept.push((name, vec![digest])),
+            }
+        }
+        let mut settled = String::new();
+        for (name, digests) in kept {
+            let last = digests[digests.len() - 1];
+            let now = (digests.len() > 1)
+                .then(|| fs::read(folder.join(name)).ok())
+                .flatten()
+                .map(|contents| digest(&contents));
+            let of_now = digests.iter().find(|known| Some(**known) == now.as_deref());
+            settled += &format!("{}  {name}\n", of_now.unwrap_or(&last));
+        }
+        if settled != text {
+            file.set_len(0)?;
+            file.rewind()?;
+            file.write_all(settled.as_bytes())?;
+        }
+        Ok(())
+    };
+    settle().map_err(|error| io_error(&list, error))
+}
+
+/// Waits for the lock of the list, which ends with the file; where the file system has none, runs at the same time
+/// may lose each other's lines, and a file is then refused as changed.
+fn locked(file: &File) -> io::Result<()> {
+    match file.lock() {
+        Err(error) if error.kind() != io::ErrorKind::Unsupported => Err(error),
+        _ => Ok(()),
     }
 }
 

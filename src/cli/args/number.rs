@@ -49,6 +49,9 @@ mod tests {
         if (command, flag) == ("import", "latent-dim") {
             return Some(table::IMPORTED_LATENT_DIM);
         }
+        if flag.ends_with("-layers") {
+            return Some(table::LAYER_WIDTH);
+        }
         let of_training = table::of_training(flag).copied();
         of_training.or_else(|| others.into_iter().find(|range| range.name() == flag))
     }
