@@ -130,7 +130,7 @@ impl RecordedSets {
             left_out,
         } = self.notes();
         for (file, mismatch) in &mismatches {
-            eprintln!("note: {}: {mismatch}", file.display());
+            note(&format!("{}: {mismatch}", file.display()));
         }
         let (findings, singular): (Vec<_>, Vec<_>) =
             (findings.into_iter()).partition(|(_, finding)| finding.kind.can_be_left_out());

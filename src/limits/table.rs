@@ -66,6 +66,11 @@ pub const INPUT_SCALING: Range = Range::real("input-scaling", 1e-9, 1e9);
 /// Sampling period of training recordings in seconds.
 pub const SAMPLE_TIME: Range = Range::real("sample-time", 1e-6, 1.0);
 
+/// Distance of the body in a planned jump, m.
+pub const DISTANCE: Range = Range::real("distance", -1000.0, 1000.0);
+/// Rise of the body in a planned jump, m.
+pub const APEX: Range = Range::real("apex", -1000.0, 1000.0);
+
 /// The settings of `romc train`, as flags and in files.
 pub static TRAINING: [Range; 18] = [
     LATENT_DIM,

@@ -45,6 +45,8 @@ mod tests {
             table::SCALING,
             table::INPUT_SCALING,
             table::SAMPLE_TIME,
+            table::DISTANCE,
+            table::APEX,
         ];
         if (command, flag) == ("import", "latent-dim") {
             return Some(table::IMPORTED_LATENT_DIM);

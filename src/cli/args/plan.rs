@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::number::finite;
+use super::number::real;
+use crate::limits::table::{APEX, DISTANCE};
 
 /// `romc plan`
 #[derive(Debug, Args)]
@@ -22,7 +23,7 @@ pub struct PlanArguments {
     #[arg(
         long,
         value_name = "M",
-        value_parser = finite,
+        value_parser = real(&DISTANCE),
         allow_negative_numbers = true,
         required_unless_present = "reach"
     )]
@@ -31,7 +32,7 @@ pub struct PlanArguments {
     #[arg(
         long,
         value_name = "M",
-        value_parser = finite,
+        value_parser = real(&APEX),
         allow_negative_numbers = true,
         required_unless_present = "reach"
     )]
