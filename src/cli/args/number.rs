@@ -112,8 +112,3 @@ mod tests {
         assert!(met.len() >= 25, "{met:?}");
     }
 }
-
-/// A finite number.
-pub(super) fn finite(text: &str) -> Result<f64, String> {
-    number(text, |value: &f64| value.is_finite(), "a finite number")
-}
