@@ -146,13 +146,13 @@ def parse_arguments():
     parser.add_argument("--settings", type=pathlib.Path, help="weights of the plan, a TOML file")
     parser.add_argument(
         "--setting", type=named_number, action="append", metavar="NAME=NUMBER",
-        help="a setting of the controller (default: velocity_weight=0.2)",
+        help="a setting of the controller (default: velocity_weight=0.15)",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, not the table")
     parser.add_argument("--jobs", type=int, help="runs at a time (default: one per core)")
     arguments = parser.parse_args()
     if arguments.setting is None:
-        arguments.setting = [("velocity_weight", 0.2)]
+        arguments.setting = [("velocity_weight", 0.15)]
     arguments.out_dir, arguments.romc = arguments.out_dir.resolve(), arguments.romc.resolve()
     return arguments
 
@@ -203,7 +203,7 @@ def start_of(goal):
 def planned(arguments, models, source, goal):
     """The plan of a model for a goal: (Jump, answer of romc); None without a plan."""
     name = "".join(c if c.isalnum() else "_" for c in f"{source}-{goal.name}")
-    output = arguments.out_dir / "plans" / f"{name}.csv"
+    output = arguments.out_dir / "plans" / f"{name}.csv.gz"
     output.parent.mkdir(exist_ok=True)
     command = [arguments.romc, "plan", models[source], "--distance", goal.distance_m]
     command += ["--apex", goal.apex_m, "--start", start_of(goal), "--output", output]

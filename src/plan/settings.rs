@@ -69,7 +69,7 @@ impl Default for PlanSettings {
             end_pitch_rad: 0.06,
             height_slack_m: 0.02,
             apex_at: 0.45,
-            programs: 12,
+            programs: 8,
             warn_deviation: 0.6,
             refuse_deviation: 1.0,
             reach: 1.5,
