@@ -10,7 +10,7 @@ use crate::robot::{JOINT_DIM, Robot};
 const BODY_X: usize = 12;
 const BODY_Z: usize = 14;
 /// Postures in the film strip.
-const FRAMES: usize = 10;
+const FRAMES: usize = 8;
 /// Half the size of the cross of a recorded jump, m.
 const CROSS_M: f64 = 0.004;
 
