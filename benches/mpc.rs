@@ -75,6 +75,10 @@ fn controller(
     controller
 }
 
+fn conic(controller: &Controller) -> &QpSolver {
+    controller.solver().expect("clarabel is what solves")
+}
+
 /// The recorded state, pushed forwards, down and into a pitch that change slowly.
 fn pushed(segment: &Segment, sample: usize) -> ([f64; 18], [f64; 18]) {
     let mut x: [f64; 18] = std::array::from_fn(|i| segment.x[(i, sample)]);
@@ -151,13 +155,13 @@ fn compare(model: &romc::model::ReducedModel, segments: &[Segment]) {
                     .push(timed(|| step(&mut ours, segment, sample, &mut command)));
                 steps += 1;
                 at_limit += usize::from(touches_a_limit(&ours, &command));
-                let (setup, solve, cost) = by_default(ours.solver().program());
+                let (setup, solve, cost) = by_default(conic(&ours).program());
                 times.setup.push(setup);
                 times.solve.push(solve);
                 times
                     .all_rows
                     .push(by_default(with_all.solver().program()).1);
-                let found = cost_of(ours.solver().program(), ours.solver().solution());
+                let found = cost_of(conic(&ours).program(), conic(&ours).solution());
                 disagreements += usize::from((found - cost).abs() > 1e-4 * cost.abs().max(1.0));
             }
         }
@@ -261,7 +265,7 @@ fn dump(model: &romc::model::ReducedModel, segments: &[Segment], path: &Path) {
         let mut command = Command::zeros(model.latent_dim());
         for sample in (0..segment.len() - 5).step_by(5) {
             step(&mut controller, segment, sample, &mut command);
-            let program = controller.solver().program();
+            let program = conic(&controller).program();
             let equalities = program.cones.first().map_or(0, |cone| cone.dim());
             let matrix = |matrix: &romc::mpc::SparseColumns| {
                 serde_json::json!({
@@ -273,7 +277,7 @@ fn dump(model: &romc::model::ReducedModel, segments: &[Segment], path: &Path) {
             };
             let problem = serde_json::json!({
                 "P": matrix(&program.p), "q": program.q, "A": matrix(&program.a), "b": program.b,
-                "equalities": equalities, "solution": controller.solver().solution(),
+                "equalities": equalities, "solution": conic(&controller).solution(),
             });
             writeln!(out, "{problem}").expect("the disk has room");
         }

@@ -66,6 +66,7 @@ pub mod report;
 pub mod robot;
 pub mod sim;
 pub mod simplify;
+pub mod solver;
 pub mod study;
 pub mod symbolic;
 pub mod train;

@@ -30,6 +30,7 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
         horizon: arguments.horizon,
         step_s: arguments.step,
         lift: arguments.lift,
+        solver: arguments.solver,
         ..MpcSettings::default()
     };
     let recordings = read_recordings(&arguments.recordings)?;

@@ -3,6 +3,7 @@
 use clap::ValueEnum as _;
 
 use super::controller;
+use super::controller_c;
 use super::error::EmitError;
 use super::planned::PlannedJump;
 use crate::codegen::script::{matlab, python};
@@ -34,6 +35,8 @@ pub enum Target {
     Matlab,
     /// The controller as a crate with a C interface
     Controller,
+    /// The controller in C99 alone: one source file beside the model's
+    ControllerC,
 }
 
 impl Target {
@@ -108,6 +111,7 @@ pub fn emit(
                 &provenance,
                 options.plan.as_ref(),
             )?,
+            Target::ControllerC => controller_c::emit(equations, options, &provenance)?,
         });
     }
     Ok(files)

@@ -3,6 +3,8 @@
 use crate::codegen::CodegenError;
 use crate::lower::LowerError;
 use crate::mpc::MpcError;
+use crate::recording::RecordingError;
+use crate::robot::RobotError;
 use crate::typeset::TypesetError;
 
 /// Why the files of a target could not be made from a model.
@@ -29,6 +31,12 @@ pub enum EmitError {
         /// Name of the model.
         model: String,
     },
+    /// The embedded jump cannot be read.
+    #[error("the recorded jump of the example cannot be read")]
+    Jump(#[from] RecordingError),
+    /// The embedded jump has a posture without ground reaction forces.
+    #[error("the recorded jump of the example has a posture without forces")]
+    JumpInput(#[from] RobotError),
     /// A template failed to render.
     #[error("a template failed")]
     Template(#[from] askama::Error),

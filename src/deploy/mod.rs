@@ -5,6 +5,7 @@
 //! `mpc/online` and `robot` and the model's numbers. Read `emit` first.
 
 mod controller;
+mod controller_c;
 mod emit;
 mod error;
 mod planned;

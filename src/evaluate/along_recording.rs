@@ -19,6 +19,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use std::time::Instant;
+
 use super::control::{Summary, Tally};
 use super::control_metrics::ControlMetrics;
 use super::torque::{Comparison, exceeds, is_plausible};
@@ -141,6 +143,10 @@ pub fn along_recording(
         let input = segment.input_within_limits(controller.plant().input_rule())?;
         set_reference(controller, segment, reference_input, input.as_slice())?;
         for &sample in schedule {
+            let started = Instant::now();
+            controller.prepare(segment.time_s[sample]);
+            let preparation_us = started.elapsed().as_secs_f64() * 1e6;
+            tally.preparations_us.push(preparation_us);
             rows.push(one_step(controller, segment, number, sample, &mut tally));
             progress(rows.len(), total);
         }

@@ -29,6 +29,9 @@ pub struct Summary {
     pub failed: usize,
     /// Wall times of the steps.
     pub step_us: StepTimes,
+    /// Wall times of the preparations between steps, which no command waits for:
+    /// [`Controller::prepare`](crate::mpc::Controller::prepare).
+    pub prepare_us: StepTimes,
     /// Agreement of commanded and recorded torques, see [`Comparison::r2`].
     pub torque_r2: ByContact,
     /// The same for torques that the lift alone makes of projected recorded inputs, at every sample;
@@ -58,6 +61,7 @@ pub(super) struct Tally {
     softened: usize,
     failed: usize,
     times_us: Vec<f64>,
+    pub(super) preparations_us: Vec<f64>,
     inconsistency: (f64, usize),
     pub(super) torque: Comparison,
     pub(super) lift: Comparison,
@@ -99,6 +103,7 @@ impl Tally {
 
     pub(super) fn summary(mut self) -> Summary {
         self.times_us.sort_by(f64::total_cmp);
+        self.preparations_us.sort_by(f64::total_cmp);
         let (sum, count) = self.inconsistency;
         Summary {
             steps: self.times_us.len(),
@@ -106,6 +111,7 @@ impl Tally {
             softened: self.softened,
             failed: self.failed,
             step_us: step_times(&self.times_us),
+            prepare_us: step_times(&self.preparations_us),
             torque_r2: self.torque.r2(),
             lift_r2: self.lift.r2(),
             torque_rms_nm: self.torque.rms(),

@@ -31,7 +31,7 @@ pub mod wrench;
 
 mod error;
 
-pub use actuators::Actuators;
+pub use actuators::{Actuators, DRY_SPEED_RAD_S};
 pub use error::RobotError;
 pub use feet::FeetRule;
 pub use input_rule::{InputRule, WrenchFrame};

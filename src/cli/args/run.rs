@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use super::number::{count, real};
 use crate::evaluate::ReferenceInput;
 use crate::limits::table::{HORIZON, RESTART_EVERY, STEP};
-use crate::mpc::Lift;
+use crate::mpc::{Lift, Solver};
 use crate::simplify::Tolerance;
 
 /// `romc demo`
@@ -76,6 +76,21 @@ impl ValueEnum for Lift {
     }
 }
 
+impl ValueEnum for Solver {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Clarabel, Self::Riccati]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(match self {
+            Self::Clarabel => PossibleValue::new("clarabel").help("General interior point"),
+            Self::Riccati => PossibleValue::new("riccati").help(
+                "Gains prepared ahead where no limit is active, else an interior point stage by stage",
+            ),
+        })
+    }
+}
+
 /// `romc mpc`
 #[derive(Debug, Args)]
 #[command(
@@ -100,6 +115,9 @@ pub struct MpcArguments {
     /// Where the input reference comes from
     #[arg(long, value_enum, default_value = "recorded")]
     pub reference_input: ReferenceInput,
+    /// What solves the quadratic program of a step
+    #[arg(long, value_enum, default_value = "clarabel")]
+    pub solver: Solver,
     /// Write one row per control step to this CSV file
     #[arg(long, value_name = "FILE.csv")]
     pub output: Option<PathBuf>,

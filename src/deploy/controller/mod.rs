@@ -132,7 +132,7 @@ pub fn emit(
 }
 
 /// How the controller's inputs come from torques, for the header's first comment.
-fn input_in_words(rule: &InputRule, name: &str) -> String {
+pub(super) fn input_in_words(rule: &InputRule, name: &str) -> String {
     let torques = match rule.actuators() {
         None => "its torques are those of the motors",
         Some(_) => {
@@ -221,14 +221,14 @@ fn project(
 }
 
 /// Every code of the interface with its text.
-fn texts() -> impl Iterator<Item = (i32, String)> {
+pub(super) fn texts() -> impl Iterator<Item = (i32, String)> {
     TEXTS
         .iter()
         .map(|(code, text)| (*code, text.to_string_lossy().into_owned()))
 }
 
 /// The name of a code: the words of its text before the colon.
-fn constant(text: &str) -> String {
+pub(super) fn constant(text: &str) -> String {
     let word = text.split(':').next().unwrap_or(text);
     word.to_ascii_uppercase().replace(' ', "_")
 }

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, SVector};
 use super::command::{Command, Source, Status};
 use super::control_model::ControlModel;
 use super::dynamics::LatentDynamics;
+use super::engine::Engine;
 use super::error::ControlError;
 use super::fallback::Memory;
 use super::horizon::{Contact, Horizon, StageInputs};
@@ -15,13 +16,13 @@ use super::plan::Plan;
 use super::problem::{ROW_MARGIN, StageRows, row_selection};
 use super::qp::{Outcome, QpSolver};
 use super::reference::{Reference, ReferenceSamples};
-use super::settings::{Lift, MissingInput, MpcSettings, RowSelection};
-use super::transcribe::{StepData, Transcription, Weights};
+use super::settings::{Lift, Linearisation, MissingInput, MpcSettings, RowSelection};
+use super::transcribe::{StepData, Weights};
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
 /// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the
 /// rows that were left out may hide.
-const SOFTENED_FROM: f64 = 1.05 * ROW_MARGIN;
+pub const SOFTENED_FROM: f64 = 1.05 * ROW_MARGIN;
 /// Lifted force, N, below which its inconsistency means nothing.
 const SMALL_FORCE_N: f64 = 1.0;
 
@@ -39,10 +40,10 @@ pub struct Controller {
     local: Option<ControlModel>,
     dynamics: Box<dyn LatentDynamics>,
     pub(super) settings: MpcSettings,
-    /// Rows for any reference; the transcription has those that matter near the present one.
+    /// Rows for any reference, and those that matter near the present one.
     rows: StageRows,
-    transcription: Transcription,
-    solver: QpSolver,
+    near_rows: StageRows,
+    engine: Engine,
     input_cholesky: Vec<DMatrix<f64>>,
     horizon: Horizon,
     consistent: Option<ConsistentLift>,
@@ -81,21 +82,21 @@ impl Controller {
         let d = plant.latent_dim();
         let rows = StageRows::new(&plant, &settings);
         let horizon = Horizon::new(d, settings.horizon, rows.friction.clone());
-        let (transcription, program) = Transcription::new(d, settings.horizon, rows.clone());
+        let engine = Engine::new(d, &rows, None, &settings)?;
         let consistent = match settings.lift {
             Lift::Transpose => None,
             Lift::Consistent => Some(ConsistentLift::new(&plant, &settings)?),
         };
         Ok(Self {
             dynamics,
-            solver: QpSolver::new(program, settings.qp)?,
+            engine,
             input_cholesky: input_cholesky(&plant),
             plan: Plan::new(d, settings.horizon, settings.step_s),
             posture: vec![0.0; 2 * d],
             memory: Memory::new(d),
             reference: None,
+            near_rows: rows.clone(),
             rows,
-            transcription,
             horizon,
             consistent,
             local: None,
@@ -138,12 +139,12 @@ impl Controller {
 
     /// The rows of each stage that were found to matter.
     pub fn stage_rows(&self) -> &StageRows {
-        self.transcription.rows()
+        &self.near_rows
     }
 
-    /// The solver with the program of the last step.
-    pub fn solver(&self) -> &QpSolver {
-        &self.solver
+    /// The conic solver with the program of the last step, if that is what solves it.
+    pub fn solver(&self) -> Option<&QpSolver> {
+        self.engine.conic()
     }
 
     /// The last good plan.
@@ -193,10 +194,8 @@ impl Controller {
             RowSelection::All => self.rows.clone(),
             RowSelection::Needed => self.rows.clone().near(&reference),
         };
-        let (transcription, mut program) = Transcription::new(d, self.settings.horizon, rows);
-        transcription.write_cost(&weights, &mut program);
-        self.solver = QpSolver::new(program, self.settings.qp)?;
-        self.transcription = transcription;
+        self.engine = Engine::new(d, &rows, Some(&weights), &self.settings)?;
+        self.near_rows = rows;
         self.reference = Some(reference);
         self.reset();
         Ok(())
@@ -244,7 +243,42 @@ impl Controller {
     pub fn reset(&mut self) {
         self.plan.clear();
         self.horizon.forget();
+        self.engine.forget();
         self.memory = Memory::new(self.plant.latent_dim());
+    }
+
+    /// Prepares the step at a time ahead, for the feet that the reference has on the ground then: its
+    /// stages are linearised and, with the Riccati solver, its gains computed. The step then does not
+    /// have to; its command is the same to the bit either way. To be called while nothing waits for a
+    /// command, if at all. Does nothing without a reference, or about the last plan.
+    pub fn prepare(&mut self, time_s: f64) {
+        let Some(reference) = &self.reference else {
+            return;
+        };
+        if self.settings.linearisation == Linearisation::LastPlan || !time_s.is_finite() {
+            return;
+        }
+        let inputs = StageInputs {
+            plant: &self.plant,
+            settings: &self.settings,
+            reference,
+            plan: &self.plan,
+            rows: &self.near_rows,
+        };
+        let middle_s = time_s + 0.5 * self.settings.step_s;
+        let feet = reference.feet_at(middle_s);
+        let dynamics = self.dynamics.as_mut();
+        self.horizon.prepare(&inputs, dynamics, time_s, feet);
+        let last = self.settings.horizon - 1;
+        let step = StepData {
+            stages: self.horizon.stages(),
+            last_position: &self.horizon.end(last)[..self.plant.latent_dim()],
+            measured: &self.memory.measured,
+            last_input: &self.memory.input,
+            deviation: reference.deviation(),
+            input_cholesky: &self.input_cholesky,
+        };
+        self.engine.prepare(&step, &self.horizon);
     }
 
     /// Like [`Controller::step_into`], with a command of its own.
@@ -321,7 +355,7 @@ impl Controller {
             settings: &self.settings,
             reference,
             plan: &self.plan,
-            rows: self.transcription.rows(),
+            rows: &self.near_rows,
         };
         let (time_s, feet) = (measurement.time_s, measurement.feet);
         let contact = self
@@ -336,9 +370,9 @@ impl Controller {
             deviation: reference.deviation(),
             input_cholesky: &self.input_cholesky,
         };
-        self.transcription.write(&step, self.solver.program_mut());
-        let outcome = self.solver.solve();
-        command.iterations = self.solver.iterations();
+        self.engine.prepare(&step, &self.horizon);
+        let (outcome, iterations) = self.engine.solve(&step);
+        command.iterations = iterations;
         match outcome {
             Outcome::Solved => {}
             Outcome::Inaccurate => return Status::Inaccurate,
@@ -346,21 +380,14 @@ impl Controller {
             Outcome::IterationCap => return Status::IterationCap,
             Outcome::Unbounded | Outcome::NumericalFailure => return Status::NumericalFailure,
         }
-        let solution = self.solver.solution();
         let phase = step.stages[0].phase;
         self.plan
             .begin(measurement.time_s, phase, &self.memory.measured);
         for stage in 0..=last {
-            self.transcription
-                .input(stage, solution, &step, self.plan.input_mut(stage));
+            self.engine.input(stage, &step, self.plan.input_mut(stage));
             let end = self.horizon.end(stage);
-            self.transcription.state(
-                stage,
-                solution,
-                end,
-                reference.deviation(),
-                self.plan.end_mut(stage),
-            );
+            self.engine
+                .state(stage, &step, end, self.plan.end_mut(stage));
         }
         command.slack = self.largest_violation();
         self.memory.stance = Some(StanceState {

@@ -83,6 +83,14 @@ pub enum ControlError {
         /// Feet in contact there.
         feet: ContactFlags,
     },
+    /// The structured solver is not compiled for a latent dimension.
+    #[error("the Riccati solver takes up to {largest} latent coordinates, the model has {found}")]
+    StructuredDim {
+        /// The model's.
+        found: usize,
+        /// The most that it takes.
+        largest: usize,
+    },
     /// The conic solver refused the problem it was handed.
     #[error("the conic solver refused the problem: {reason}")]
     Solver {

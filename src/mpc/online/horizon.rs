@@ -32,6 +32,9 @@ pub struct Horizon {
     /// Reference state at the end of each stage.
     ends: Vec<Vec<f64>>,
     phases: Vec<usize>,
+    /// Stages by which the last preparation moved on, and those that it made.
+    shift: usize,
+    is_new: Vec<bool>,
     lineariser: Lineariser,
     nominal: StageModel,
     friction: Option<BodyFriction>,
@@ -63,6 +66,8 @@ impl Horizon {
             made_for: vec![None; length],
             ends: vec![vec![0.0; 2 * latent_dim]; length],
             phases: vec![0; length],
+            shift: 0,
+            is_new: vec![true; length],
             lineariser: Lineariser::new(latent_dim),
             nominal: StageModel::zeros(latent_dim),
             friction,
@@ -77,6 +82,16 @@ impl Horizon {
     /// The stages of the last preparation.
     pub fn stages(&self) -> &[Stage] {
         &self.stages
+    }
+
+    /// By how many stages the last preparation moved on.
+    pub fn shift(&self) -> usize {
+        self.shift
+    }
+
+    /// Whether the last preparation made each stage anew.
+    pub fn is_new(&self) -> &[bool] {
+        &self.is_new
     }
 
     /// Reference state at the end of a stage.
@@ -99,6 +114,7 @@ impl Horizon {
             let is_made = self.made_for[index]
                 .is_some_and(|made| (made - start_s).abs() < TIME_TOLERANCE_S)
                 && self.stages[index].phase == self.phases[index];
+            self.is_new[index] = !is_made;
             if !is_made {
                 self.make_reference(inputs, index, start_s);
                 self.linearise(inputs, dynamics, index, start_s);
@@ -155,6 +171,7 @@ impl Horizon {
 
     /// Moves stages that the last step made for the instants of this one to their new places.
     fn reuse(&mut self, settings: &MpcSettings, time_s: f64) {
+        self.shift = 0;
         let Some(first) = self.made_for.first().copied().flatten() else {
             return;
         };
@@ -163,6 +180,7 @@ impl Horizon {
         let is_whole = (passed - shift).abs() * settings.step_s < TIME_TOLERANCE_S;
         if is_whole && shift >= 1.0 && shift < self.stages.len() as f64 {
             let shift = shift as usize;
+            self.shift = shift;
             self.stages.rotate_left(shift);
             self.made_for.rotate_left(shift);
             self.ends.rotate_left(shift);

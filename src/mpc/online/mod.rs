@@ -2,13 +2,14 @@
 //!
 //! In: a [`ControlModel`] (plain numbers), [`LatentDynamics`], a reference, measurements. Out: commands.
 //! Nothing here knows of models, programs or recordings: besides nalgebra and clarabel these files
-//! import [`robot`](crate::robot) alone, because `romc compile --emit controller` emits this very
+//! import [`robot`](crate::robot) and [`solver`](crate::solver) alone, because `romc compile --emit controller` emits this very
 //! folder. Read `problem` first.
 
 mod command;
 mod control_model;
 mod controller;
 mod dynamics;
+mod engine;
 mod error;
 pub mod estimate;
 mod fallback;
@@ -25,7 +26,17 @@ mod qp;
 mod reference;
 mod settings;
 mod sparse;
+mod structured;
 mod transcribe;
+
+/// Numbers that the controller in C shares, which are no settings.
+pub mod shared {
+    pub use super::controller::SOFTENED_FROM;
+    pub use super::problem::STATE_REACH;
+    pub use super::reference::{DEVIATION_FLOOR, STILL_SHARE, STILL_TIME_S};
+    pub use super::structured::TOLERANCE;
+    pub use super::transcribe::SLACK_PRICE;
+}
 
 pub use command::{Command, Source, Status};
 pub use control_model::{ControlModel, ControlModelParts, ControlPhase};
@@ -40,6 +51,7 @@ pub use qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, Solver
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{
     Drift, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput, MpcSettings,
-    RowSelection,
+    RowSelection, Solver,
 };
 pub use sparse::SparseColumns;
+pub use structured::MAX_STRUCTURED_DIM;

@@ -51,7 +51,7 @@ use crate::robot::{JOINT_DIM, WrenchFrame};
 const GRAVITY: f64 = 9.81;
 
 /// Distance from the reference, in its standard deviations, within which joint limits matter.
-const STATE_REACH: f64 = 4.0;
+pub const STATE_REACH: f64 = 4.0;
 
 /// Distance from the mean training input, in standard deviations, within which limits matter.
 const INPUT_REACH: f64 = 10.0;

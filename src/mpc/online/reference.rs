@@ -32,9 +32,8 @@ pub struct Reference {
     time_s: Vec<f64>,
     /// `(z, dz)` a sample.
     state: Vec<f64>,
-    /// Integral of the latent input from the first sample on, by the trapezoidal rule.
-    input_integral: Option<Vec<f64>>,
-    input_ends: [Vec<f64>; 2],
+    /// Latent input of each sample.
+    input: Option<Vec<f64>>,
     feet: Vec<ContactFlags>,
     /// Roll and pitch, one pair per sample.
     attitude: Vec<[f64; 2]>,
@@ -44,11 +43,11 @@ pub struct Reference {
 }
 
 /// Smallest standard deviation against the largest of the same kind.
-const DEVIATION_FLOOR: f64 = 1e-2;
+pub const DEVIATION_FLOOR: f64 = 1e-2;
 /// Share of a joint's half range within which a trajectory stands still.
-const STILL_SHARE: f64 = 0.02;
+pub const STILL_SHARE: f64 = 0.02;
 /// Time in which one that stands still might cover that, s.
-const STILL_TIME_S: f64 = 0.1;
+pub const STILL_TIME_S: f64 = 0.1;
 
 impl Reference {
     /// Encodes a trajectory.
@@ -72,8 +71,7 @@ impl Reference {
             latent_dim: d,
             deviation: deviations(&state, &still_deviations(plant)),
             state,
-            input_integral: None,
-            input_ends: [vec![0.0; d], vec![0.0; d]],
+            input: None,
             time_s: samples.time_s.to_vec(),
             feet: samples.feet.to_vec(),
             attitude: samples
@@ -87,7 +85,7 @@ impl Reference {
             },
         };
         if let Some(u) = samples.u {
-            reference.take_input(&project_all(plant, samples.x, u));
+            reference.input = Some(project_all(plant, samples.x, u));
         }
         Ok(reference)
     }
@@ -109,19 +107,12 @@ impl Reference {
             state: &self.state,
             phase: &phase,
         };
-        let input = estimate_input(plant, dynamics, &motion);
-        self.take_input(&input);
-    }
-
-    fn take_input(&mut self, input: &[f64]) {
-        let d = self.latent_dim;
-        self.input_ends = [input[..d].to_vec(), input[input.len() - d..].to_vec()];
-        self.input_integral = Some(integrate(&self.time_s, input, d));
+        self.input = Some(estimate_input(plant, dynamics, &motion));
     }
 
     /// Whether the trajectory has an input, its own or an estimate.
     pub fn has_input(&self) -> bool {
-        self.input_integral.is_some()
+        self.input.is_some()
     }
 
     /// First and last time, s.
@@ -176,15 +167,35 @@ impl Reference {
         }))
     }
 
-    /// Writes the mean latent input over `[time_s, time_s + duration_s]` into `out`; false if the
-    /// trajectory has no input.
+    /// Writes the mean latent input over `[time_s, time_s + duration_s]` into `out`, false if the
+    /// trajectory has no input: between two samples their mean, beyond the ends the end's.
     pub fn mean_input(&self, time_s: f64, duration_s: f64, out: &mut [f64]) -> bool {
-        let Some(integral) = &self.input_integral else {
+        let Some(input) = &self.input else {
             return false;
         };
+        let d = self.latent_dim;
+        let end_s = time_s + duration_s;
+        let (first_s, last_s) = self.time_range_s();
         out.fill(0.0);
-        self.add_integral(integral, time_s + duration_s, 1.0, out);
-        self.add_integral(integral, time_s, -1.0, out);
+        let before_s = first_s.min(end_s) - time_s;
+        if before_s > 0.0 {
+            add_scaled(before_s, &input[..d], out);
+        }
+        let mut sample = self.locate(time_s).0;
+        while sample + 1 < self.time_s.len() && self.time_s[sample] < end_s {
+            let from_s = self.time_s[sample].max(time_s);
+            let span_s = self.time_s[sample + 1].min(end_s) - from_s;
+            if span_s > 0.0 {
+                let half_s = 0.5 * span_s;
+                add_scaled(half_s, &input[sample * d..][..d], out);
+                add_scaled(half_s, &input[(sample + 1) * d..][..d], out);
+            }
+            sample += 1;
+        }
+        let after_s = end_s - last_s.max(time_s);
+        if after_s > 0.0 {
+            add_scaled(after_s, &input[input.len() - d..], out);
+        }
         for out in out.iter_mut() {
             *out /= duration_s;
         }
@@ -199,27 +210,6 @@ impl Reference {
     /// Roll and pitch, rad, of the last sample at or before the time.
     pub fn attitude_at(&self, time_s: f64) -> [f64; 2] {
         self.attitude[self.locate(time_s).0]
-    }
-
-    /// `out += sign · ∫ u` from the first sample to `time_s`.
-    fn add_integral(&self, integral: &[f64], time_s: f64, sign: f64, out: &mut [f64]) {
-        let d = self.latent_dim;
-        let (first, last) = self.time_range_s();
-        let (before, share) = self.locate(time_s);
-        let at = |sample: usize| &integral[sample * d..(sample + 1) * d];
-        for (coordinate, out) in out.iter_mut().enumerate() {
-            *out += sign
-                * if time_s <= first {
-                    (time_s - first) * self.input_ends[0][coordinate]
-                } else if before + 1 == self.time_s.len() {
-                    at(before)[coordinate] + (time_s - last) * self.input_ends[1][coordinate]
-                } else {
-                    // Linear in between: exact at samples, and the mean over a held input spans
-                    // several of them.
-                    at(before)[coordinate]
-                        + share * (at(before + 1)[coordinate] - at(before)[coordinate])
-                };
-        }
     }
 
     /// The last sample at or before a time and how far the time is on the way to the next one.
@@ -255,16 +245,11 @@ fn project_all(plant: &ControlModel, x: &[f64], u: &[f64]) -> Vec<f64> {
     latent
 }
 
-fn integrate(time_s: &[f64], values: &[f64], width: usize) -> Vec<f64> {
-    let mut integral = vec![0.0; values.len()];
-    for sample in 1..time_s.len() {
-        let half_step = 0.5 * (time_s[sample] - time_s[sample - 1]);
-        for column in 0..width {
-            let (here, before) = (sample * width + column, (sample - 1) * width + column);
-            integral[here] = integral[before] + half_step * (values[here] + values[before]);
-        }
+/// `out += scale · values`.
+fn add_scaled(scale: f64, values: &[f64], out: &mut [f64]) {
+    for (out, value) in out.iter_mut().zip(values) {
+        *out += scale * value;
     }
-    integral
 }
 
 /// Scale of `(z, dz)` for a trajectory that stands still: the change of each latent alone that

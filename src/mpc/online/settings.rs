@@ -55,6 +55,17 @@ pub enum RowSelection {
     All,
 }
 
+/// What solves the quadratic program of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Solver {
+    /// clarabel, for all rows and cones.
+    Clarabel,
+    /// The structured [`solver`](crate::solver): Riccati's recursion where no row is active, else an
+    /// interior point of it; for at most [`MAX_STRUCTURED_DIM`](super::MAX_STRUCTURED_DIM) latent
+    /// coordinates, friction pyramids inside the cones, and without a limit on torque rates.
+    Riccati,
+}
+
 /// What the controller does while it has no plan to trust.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FallbackSettings {
@@ -121,7 +132,9 @@ pub struct MpcSettings {
     pub torque_rate_nm_s: Option<f64>,
     /// Which rows of the constraints are kept.
     pub rows: RowSelection,
-    /// The conic solver.
+    /// What solves the program of a step; the consistent lift's own cones are clarabel's.
+    pub solver: Solver,
+    /// The conic solver, and cap and accepted residual of the structured one.
     pub qp: QpSettings,
     /// What happens without a plan.
     pub fallback: FallbackSettings,
@@ -145,6 +158,7 @@ impl Default for MpcSettings {
             lift_prior_weight: 1e-3,
             torque_rate_nm_s: None,
             rows: RowSelection::Needed,
+            solver: Solver::Clarabel,
             qp: QpSettings::default(),
             fallback: FallbackSettings::default(),
         }
@@ -198,6 +212,13 @@ impl MpcSettings {
                 name: "fallback.damping_nm_s",
                 found: damping,
                 expected: "zero or a positive number",
+            });
+        }
+        if let (Solver::Riccati, Some(found)) = (self.solver, self.torque_rate_nm_s) {
+            return Err(ControlError::Setting {
+                name: "torque_rate_nm_s",
+                found,
+                expected: "none with the Riccati solver",
             });
         }
         Ok(())

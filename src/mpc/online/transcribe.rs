@@ -14,7 +14,7 @@ use crate::robot::JOINT_DIM;
 
 /// Price of a slack in the program; the whole cost is scaled to it. The solver starts with all
 /// multipliers near one and needs two iterations more if it has to bring them to 100.
-const SLACK_PRICE: f64 = 10.0;
+pub const SLACK_PRICE: f64 = 10.0;
 
 /// One stage as the transcription sees it, in latent units.
 #[derive(Debug, Clone)]
@@ -144,11 +144,6 @@ impl Transcription {
             cones,
         };
         (transcription, program)
-    }
-
-    /// The rows of each stage.
-    pub fn rows(&self) -> &StageRows {
-        &self.layout.rows
     }
 
     /// Writes the cost, which does not change from step to step.

@@ -38,7 +38,7 @@ pub(super) fn guarded<T>(action: impl FnOnce() -> Result<T, ControlError>) -> Re
 fn code_of(error: &ControlError) -> i32 {
     match error {
         ControlError::Shape { .. } => INTERNAL,
-        ControlError::Setting { .. } => BAD_SETTING,
+        ControlError::Setting { .. } | ControlError::StructuredDim { .. } => BAD_SETTING,
         ControlError::ReferenceLen { .. } | ControlError::ReferenceShape { .. } => {
             Status::WrongDimension.code()
         }

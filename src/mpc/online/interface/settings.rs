@@ -1,7 +1,7 @@
 //! The controller's settings as C has them.
 
 use super::super::error::ControlError;
-use super::super::settings::{Lift, Linearisation, MpcSettings};
+use super::super::settings::{Lift, Linearisation, MpcSettings, Solver};
 
 /// Settings as C has them; zero friction of the body and zero rate leave both free.
 #[repr(C)]
@@ -15,6 +15,8 @@ pub struct Settings {
     pub lift: i32,
     /// 0 about the reference, 1 about the last plan.
     pub linearisation: i32,
+    /// 0 clarabel, 1 Riccati.
+    pub solver: i32,
     /// Duration of a stage, s.
     pub step_s: f64,
     /// Weight of the input deviation.
@@ -48,6 +50,10 @@ impl Default for Settings {
             linearisation: match settings.linearisation {
                 Linearisation::Reference => 0,
                 Linearisation::LastPlan => 1,
+            },
+            solver: match settings.solver {
+                Solver::Clarabel => 0,
+                Solver::Riccati => 1,
             },
             step_s: settings.step_s,
             input_weight: settings.input_weight,
@@ -90,6 +96,11 @@ impl Settings {
                     let expected = "0 (the reference) or 1 (the last plan)";
                     return Err(refuse("linearisation", found, expected));
                 }
+            },
+            solver: match self.solver {
+                0 => Solver::Clarabel,
+                1 => Solver::Riccati,
+                found => return Err(refuse("solver", found, "0 (clarabel) or 1 (Riccati)")),
             },
             input_weight: self.input_weight,
             velocity_weight: self.velocity_weight,

@@ -1,0 +1,177 @@
+//! The controller in C99 alone: `NAME-controller-c/`.
+//!
+//! In: a complete linear model. Out: the model's equations as `--emit c` makes them, and beside them
+//! the controller: reference, horizon, structured solver, commands and fallbacks in one file, with
+//! the operations of `mpc/online` and `solver` in their order, so that both give the same bits. Read
+//! `templates/controller_c/source.askama` first.
+
+mod jump;
+mod numbers;
+mod selftest;
+mod source;
+
+use askama::Template;
+
+use crate::codegen::line_wrapping::tidy;
+use crate::codegen::{Precision, Units, c, interface::ModelInterface};
+use crate::deploy::EmitError;
+use crate::deploy::controller::{constant, input_in_words, texts};
+use crate::deploy::emit::EmitOptions;
+use crate::equations::Equations;
+use crate::files::EmittedFile;
+use crate::mpc::interface::Settings;
+use crate::mpc::problem::StageRows;
+use crate::mpc::{ControlModel, MpcSettings};
+use crate::robot::{Robot, STATE_DIM};
+use jump::Jump;
+use source::Source;
+
+/// Rows of the friction pyramid and of the slack.
+const OTHER_ROWS: usize = 5;
+
+/// What all files take from model and robot.
+struct Facts<'a> {
+    banner: String,
+    model: &'a str,
+    name: &'a str,
+    upper: String,
+    robot: &'a str,
+    latent_dim: usize,
+    state_dim: usize,
+    state_names: String,
+    input_names: String,
+    input_is: String,
+    real: &'static str,
+    /// Suffix of libm's functions.
+    f: &'static str,
+    codes: Vec<(String, i32)>,
+    defaults: Settings,
+    max_rows: usize,
+    n_phases: usize,
+    n_torque_stored: usize,
+    n_joint_stored: usize,
+}
+
+/// Templates of whole files, each a struct of the [`Facts`].
+macro_rules! templates {
+    ($($template:ident: $path:tt),* $(,)?) => {$(
+        #[derive(Template)]
+        #[template(path = $path, config = "templates/askama.toml")]
+        struct $template<'a> {
+            facts: &'a Facts<'a>,
+        }
+
+        impl<'a> std::ops::Deref for $template<'a> {
+            type Target = Facts<'a>;
+
+            fn deref(&self) -> &Facts<'a> {
+                self.facts
+            }
+        }
+    )*};
+}
+
+templates! {
+    Header: "controller_c/header.askama",
+    Cmake: "controller_c/cmake.askama",
+    Readme: "controller_c/readme.askama",
+    Example: "controller_c/example.askama",
+    RobotHeader: "controller_c/robot.askama",
+}
+
+/// The files of a model's controller in C; `provenance` is the text of each file's first line.
+///
+/// # Errors
+/// [`EmitError::Nonlinear`] if encoder or decoder have layers with an activation,
+/// [`EmitError::Control`] if the model lacks something that control needs, [`EmitError::Lower`],
+/// [`EmitError::Codegen`] and [`EmitError::Template`].
+pub fn emit(
+    equations: &Equations<'_>,
+    options: &EmitOptions,
+    provenance: &str,
+) -> Result<Vec<EmittedFile>, EmitError> {
+    let model = equations.model();
+    if !model.is_linear() {
+        return Err(EmitError::Nonlinear {
+            model: model.name().to_owned(),
+        });
+    }
+    let plant = ControlModel::new(model)?;
+    let rows = StageRows::new(&plant, &MpcSettings::default());
+    let mut entries = ModelInterface::new(equations, &options.lower, Units::Si)?;
+    options.precision.check(&entries)?;
+    if options.precision == Precision::Single {
+        entries.state_bounds();
+    }
+    let name = entries.identifier.clone();
+    let folder = format!("{name}-controller-c");
+    let mut files = Vec::new();
+    for file in c::emit(&entries, provenance, options.precision, options.sines)? {
+        if !file.path.ends_with("CMakeLists.txt") {
+            let path = format!("{folder}/{}", file.path);
+            files.push(EmittedFile::new(path, file.contents));
+        }
+    }
+    let facts = &facts(&entries, &plant, &rows, options.precision, provenance);
+    let source = Source::new(facts, &entries, &plant, &rows, options.precision);
+    let jump = Jump::shipped()?;
+    let texts = [
+        ("NAME_controller.h", Header { facts }.render()?),
+        ("NAME_controller.c", source.render()?),
+        ("NAME_jump.h", jump.header(facts, options.precision)),
+        (
+            "NAME_controller_selftest.c",
+            selftest::text(facts, model, &jump, options.precision)?,
+        ),
+        ("NAME_robot.h", RobotHeader { facts }.render()?),
+        ("NAME_example.c", Example { facts }.render()?),
+        (
+            "CMakeLists.txt",
+            format!("# {provenance}\n{}", Cmake { facts }.render()?),
+        ),
+        ("README.md", Readme { facts }.render()?),
+    ];
+    for (path, text) in texts {
+        let path = format!("{folder}/{}", path.replace("NAME", &name));
+        files.push(EmittedFile::new(path, tidy(&text)));
+    }
+    Ok(files)
+}
+
+fn facts<'a>(
+    entries: &'a ModelInterface,
+    plant: &'a ControlModel,
+    rows: &StageRows,
+    precision: Precision,
+    provenance: &str,
+) -> Facts<'a> {
+    let name = entries.identifier.as_str();
+    Facts {
+        banner: format!("/* {provenance} */"),
+        model: &entries.name,
+        name,
+        upper: name.to_ascii_uppercase(),
+        robot: plant.robot().name(),
+        latent_dim: plant.latent_dim(),
+        state_dim: STATE_DIM,
+        state_names: Robot::state_names().join(" "),
+        input_names: Robot::input_names().join(" "),
+        input_is: input_in_words(plant.input_rule(), name),
+        real: match precision {
+            Precision::Double => "double",
+            Precision::Single => "float",
+        },
+        f: match precision {
+            Precision::Double => "",
+            Precision::Single => "f",
+        },
+        codes: texts()
+            .map(|(code, text)| (constant(&text), code))
+            .collect(),
+        defaults: Settings::default(),
+        max_rows: rows.torque.len() + rows.joint.len() + OTHER_ROWS,
+        n_phases: plant.phases().len(),
+        n_torque_stored: rows.torque.len().max(1),
+        n_joint_stored: rows.joint.len().max(1),
+    }
+}

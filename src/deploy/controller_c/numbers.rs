@@ -1,0 +1,56 @@
+//! Numbers as initialisers of C.
+
+use crate::codegen::Precision;
+
+/// Numbers per line.
+const WIDTH: usize = 6;
+
+/// Writes numbers of one precision.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Numbers(pub Precision);
+
+impl Numbers {
+    /// One number, with a suffix in single precision.
+    pub(super) fn one(self, value: f64) -> String {
+        match self.0 {
+            Precision::Double => format!("{value:?}"),
+            Precision::Single => format!("{:?}f", value as f32),
+        }
+    }
+
+    /// `{1.0, 2.0}`; one zero if there are none, as C has no empty arrays.
+    pub(super) fn vector(self, values: impl IntoIterator<Item = f64>) -> String {
+        list(values.into_iter().map(|value| self.one(value)), "0")
+    }
+
+    /// Rows of vectors; one row of zeros if there are none.
+    pub(super) fn matrix<R: IntoIterator<Item = f64>>(
+        self,
+        rows: impl IntoIterator<Item = R>,
+    ) -> String {
+        nested(rows.into_iter().map(|row| self.vector(row)))
+    }
+}
+
+/// An initialiser of initialisers, one per line.
+pub(super) fn nested(rows: impl IntoIterator<Item = String>) -> String {
+    let rows: Vec<String> = rows.into_iter().collect();
+    match rows.is_empty() {
+        true => "{{0}}".to_owned(),
+        false => format!("{{\n    {},\n}}", rows.join(",\n    ")),
+    }
+}
+
+/// An initialiser of integers.
+pub(super) fn integers(values: impl IntoIterator<Item = i64>) -> String {
+    list(values.into_iter().map(|value| value.to_string()), "0")
+}
+
+fn list(values: impl Iterator<Item = String>, empty: &str) -> String {
+    let values: Vec<String> = values.collect();
+    if values.is_empty() {
+        return format!("{{{empty}}}");
+    }
+    let lines: Vec<String> = values.chunks(WIDTH).map(|line| line.join(", ")).collect();
+    format!("{{{}}}", lines.join(",\n     "))
+}

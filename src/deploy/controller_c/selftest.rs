@@ -1,0 +1,121 @@
+//! Steps of romc's own controller that the one in C has to repeat.
+
+use std::ops::Deref;
+
+use askama::Template;
+
+use super::Facts;
+use super::jump::Jump;
+use super::numbers::{Numbers, integers};
+use crate::codegen::Precision;
+use crate::deploy::EmitError;
+use crate::model::ReducedModel;
+use crate::mpc::{Controller, Measurement, MpcError, MpcSettings, ReferenceSamples, Solver};
+use crate::robot::{InputRule, JOINT_DIM, STATE_DIM};
+
+/// Steps of the self-test.
+const STEPS: usize = 120;
+/// How far measurements are pushed off the jump, times -2 to 2: height (m), pitch (rad), vertical
+/// velocity (m/s).
+const PUSH: [f64; 3] = [0.02, 0.06, 0.3];
+/// Largest difference of a torque, N m, by precision.
+const TOLERANCE_NM: [f64; 2] = [1e-6, 0.1];
+
+/// `NAME_controller_selftest.c`.
+#[derive(Template)]
+#[template(
+    path = "controller_c/selftest.askama",
+    config = "templates/askama.toml"
+)]
+struct SelfTest<'a> {
+    facts: &'a Facts<'a>,
+    steps: usize,
+    torques: String,
+    statuses: String,
+    push_z: f64,
+    push_pitch: f64,
+    push_dz: f64,
+    tolerance: f64,
+}
+
+impl<'a> Deref for SelfTest<'a> {
+    type Target = Facts<'a>;
+
+    fn deref(&self) -> &Facts<'a> {
+        self.facts
+    }
+}
+
+/// The self-test of a model's controller along a jump.
+///
+/// # Errors
+/// [`EmitError::Control`] if the model cannot be controlled along it.
+pub(super) fn text(
+    facts: &Facts<'_>,
+    model: &ReducedModel,
+    jump: &Jump,
+    precision: Precision,
+) -> Result<String, EmitError> {
+    let settings = MpcSettings {
+        solver: Solver::Riccati,
+        ..MpcSettings::default()
+    };
+    let mut controller = Controller::new(model, settings)?;
+    let u = inputs(controller.plant().input_rule(), jump)?;
+    let reference = ReferenceSamples {
+        time_s: &jump.time_s,
+        x: &jump.x.concat(),
+        dx: &jump.dx.concat(),
+        u: Some(&u),
+        feet: &jump.feet,
+    };
+    controller
+        .set_reference(reference)
+        .map_err(MpcError::from)?;
+    let steps = STEPS.min(jump.time_s.len());
+    let commands: Vec<_> = (0..steps)
+        .map(|k| {
+            let (mut x, mut dx) = (jump.x[k].clone(), jump.dx[k].clone());
+            let push = (k / 8 % 5) as f64 - 2.0;
+            x[14] += PUSH[0] * push;
+            x[16] += PUSH[1] * push;
+            dx[14] += PUSH[2] * push;
+            controller.step(Measurement {
+                time_s: jump.time_s[k],
+                x: &x,
+                dx: &dx,
+                feet: jump.feet[k],
+            })
+        })
+        .collect();
+    let text = SelfTest {
+        facts,
+        steps,
+        torques: Numbers(Precision::Double).matrix(commands.iter().map(|c| c.torque_nm)),
+        statuses: integers(commands.iter().map(|c| i64::from(c.status.code()))),
+        push_z: PUSH[0],
+        push_pitch: PUSH[1],
+        push_dz: PUSH[2],
+        tolerance: match precision {
+            Precision::Double => TOLERANCE_NM[0],
+            Precision::Single => TOLERANCE_NM[1],
+        },
+    };
+    Ok(text.render()?)
+}
+
+/// Inputs of all samples as the generated `generalised_input` makes them, without what the inertia of
+/// the motors takes.
+fn inputs(rule: &InputRule, jump: &Jump) -> Result<Vec<f64>, EmitError> {
+    let mut u = Vec::with_capacity(jump.time_s.len() * STATE_DIM);
+    for (k, torque) in jump.torque_nm.iter().enumerate() {
+        let x: [f64; STATE_DIM] = std::array::from_fn(|i| jump.x[k][i]);
+        let dq = std::array::from_fn(|joint| jump.dx[k][joint]);
+        let losses = rule.losses(&dq, &[0.0; JOINT_DIM]);
+        let net: [f64; JOINT_DIM] = std::array::from_fn(|joint| torque[joint] - losses[joint]);
+        let wrench = rule.wrench(&x, &net, jump.feet[k])?;
+        u.extend(net);
+        u.extend(wrench.iter());
+    }
+    Ok(u)
+}

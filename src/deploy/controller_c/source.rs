@@ -1,0 +1,208 @@
+//! `NAME_controller.c`.
+
+use askama::Template;
+
+use super::Facts;
+use super::numbers::{Numbers, integers, nested};
+use crate::codegen::Precision;
+use crate::codegen::interface::ModelInterface;
+use crate::deploy::controller::texts;
+use crate::mpc::interface::Settings;
+use crate::mpc::problem::{Row, StageRows};
+use crate::mpc::shared::{
+    DEVIATION_FLOOR, SLACK_PRICE, SOFTENED_FROM, STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
+};
+use crate::mpc::{ControlModel, FallbackSettings, MpcSettings};
+use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
+use crate::solver;
+
+/// Complementarity and residual in single precision, at which rounding ends the progress.
+const SINGLE: (f64, f64) = (1e-5, 1e-3);
+
+/// `NAME_controller.c`.
+#[derive(Template)]
+#[template(path = "controller_c/source.askama", config = "templates/askama.toml")]
+pub(super) struct Source<'a> {
+    banner: &'a str,
+    name: &'a str,
+    upper: &'a str,
+    real: &'static str,
+    f: &'static str,
+    n_phases: usize,
+    n_torque: usize,
+    n_joint: usize,
+    max_nnz: usize,
+    has_actuators: bool,
+    is_body_frame: bool,
+    solver: SolverNumbers,
+    reference: ReferenceNumbers,
+    fallback: FallbackSettings,
+    softened_from: f64,
+    defaults: Settings,
+    texts: Vec<(i32, String)>,
+    encoder: String,
+    encoder_bias: String,
+    decoder: String,
+    decoder_bias: String,
+    lift: String,
+    force: String,
+    projection: String,
+    phase_of_feet: String,
+    is_grounded: String,
+    input_mean: String,
+    input_root: String,
+    torque_rows: String,
+    torque_bound: String,
+    torque_per_loss: String,
+    torque_joint: String,
+    joint_rows: String,
+    joint_bound: String,
+    joint_lower: String,
+    joint_upper: String,
+    torque_limit: String,
+    viscous: String,
+    dry: String,
+    armature: String,
+    dry_speed_rad_s: f64,
+    phases: Vec<PhaseNames<'a>>,
+}
+
+struct PhaseNames<'a> {
+    identifier: &'a str,
+    upper: String,
+    nnz: usize,
+}
+
+struct SolverNumbers {
+    slack_price: String,
+    tolerance: String,
+    accepted_residual: String,
+    to_the_boundary: String,
+    warm: (String, String),
+    cold: (String, String),
+    short_step: String,
+    sqrt_half: String,
+}
+
+struct ReferenceNumbers {
+    still_share: f64,
+    still_time_s: f64,
+    deviation_floor: f64,
+    state_reach: f64,
+}
+
+impl<'a> Source<'a> {
+    pub(super) fn new(
+        facts: &'a Facts<'a>,
+        entries: &'a ModelInterface,
+        plant: &ControlModel,
+        rows: &StageRows,
+        precision: Precision,
+    ) -> Self {
+        let numbers = Numbers(precision);
+        let (parts, robot) = (plant.parts(), plant.robot());
+        let matrix = |matrix: &nalgebra::DMatrix<f64>, count: usize| {
+            numbers.matrix((0..count).map(|i| (0..matrix.ncols()).map(move |j| matrix[(i, j)])))
+        };
+        let row_matrix = |rows: &[Row]| numbers.matrix(rows.iter().map(|row| row.row.clone()));
+        let limits = robot.joint_limit_rad();
+        let weight_n = robot.mass_kg() * GRAVITY_M_S2;
+        let losses = |index: usize| match plant.input_rule().actuators() {
+            Some(actuators) => numbers.vector(*actuators.named()[index].1),
+            None => String::new(),
+        };
+        let phases = plant.phases();
+        let mpc = MpcSettings::default();
+        Self {
+            banner: &facts.banner,
+            name: facts.name,
+            upper: &facts.upper,
+            real: facts.real,
+            f: facts.f,
+            n_phases: facts.n_phases,
+            n_torque: rows.torque.len(),
+            n_joint: rows.joint.len(),
+            max_nnz: (entries.phases.iter())
+                .map(|phase| phase.pattern.len())
+                .fold(1, usize::max),
+            has_actuators: plant.input_rule().actuators().is_some(),
+            is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
+            solver: SolverNumbers::new(precision, mpc.qp.accepted_residual),
+            reference: ReferenceNumbers {
+                still_share: STILL_SHARE,
+                still_time_s: STILL_TIME_S,
+                deviation_floor: DEVIATION_FLOOR,
+                state_reach: STATE_REACH,
+            },
+            fallback: mpc.fallback,
+            softened_from: SOFTENED_FROM,
+            defaults: Settings::default(),
+            texts: texts().collect(),
+            encoder: matrix(&parts.encoder, facts.latent_dim),
+            encoder_bias: numbers.vector(parts.encoder_bias.iter().copied()),
+            decoder: matrix(&parts.decoder, JOINT_DIM),
+            decoder_bias: numbers.vector(parts.decoder_bias.iter().take(JOINT_DIM).copied()),
+            lift: matrix(&parts.lift, JOINT_DIM),
+            force: numbers.matrix((0..3).map(|axis| {
+                let row = parts.lift.row(JOINT_DIM + axis);
+                row.iter().map(|entry| entry / weight_n).collect::<Vec<_>>()
+            })),
+            projection: matrix(&parts.projection, facts.latent_dim),
+            phase_of_feet: integers(
+                (parts.phase_of_feet.iter()).map(|phase| phase.map_or(-1, |phase| phase as i64)),
+            ),
+            is_grounded: integers(phases.iter().map(|phase| i64::from(phase.is_grounded))),
+            input_mean: numbers.matrix(
+                phases
+                    .iter()
+                    .map(|phase| phase.latent_mean.iter().copied().collect::<Vec<_>>()),
+            ),
+            input_root: nested(
+                phases
+                    .iter()
+                    .map(|phase| matrix(&phase.latent_root, facts.latent_dim)),
+            ),
+            torque_rows: row_matrix(&rows.torque),
+            torque_bound: numbers.vector(rows.torque.iter().map(|row| row.bound)),
+            torque_per_loss: numbers.vector(rows.torque.iter().map(|row| row.per_loss)),
+            torque_joint: integers(rows.torque.iter().map(|row| row.joint as i64)),
+            joint_rows: row_matrix(&rows.joint),
+            joint_bound: numbers.vector(rows.joint.iter().map(|row| row.bound)),
+            joint_lower: numbers.vector(limits.iter().map(|limit| limit.0)),
+            joint_upper: numbers.vector(limits.iter().map(|limit| limit.1)),
+            torque_limit: numbers.vector(robot.torque_limit_nm().iter().copied()),
+            viscous: losses(0),
+            dry: losses(1),
+            armature: losses(2),
+            dry_speed_rad_s: DRY_SPEED_RAD_S,
+            phases: (entries.phases.iter())
+                .map(|phase| PhaseNames {
+                    identifier: &phase.identifier,
+                    upper: format!("{}_{}", facts.upper, phase.identifier.to_ascii_uppercase()),
+                    nnz: phase.pattern.len(),
+                })
+                .collect(),
+        }
+    }
+}
+
+impl SolverNumbers {
+    fn new(precision: Precision, accepted_residual: f64) -> Self {
+        let (tolerance, accepted) = match precision {
+            Precision::Double => (TOLERANCE, accepted_residual),
+            Precision::Single => SINGLE,
+        };
+        let one = |value: f64| format!("{value:?}");
+        let pair = |(slack, product)| (one(slack), one(product));
+        Self {
+            slack_price: one(SLACK_PRICE),
+            tolerance: one(tolerance),
+            accepted_residual: one(accepted),
+            to_the_boundary: one(solver::TO_THE_BOUNDARY),
+            warm: pair(solver::WARM),
+            cold: pair(solver::COLD),
+            short_step: one(solver::SHORT_STEP),
+            sqrt_half: one(std::f64::consts::FRAC_1_SQRT_2),
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! What solves the program of a step: clarabel, or the structured solver.
+
+use super::error::ControlError;
+use super::horizon::Horizon;
+use super::problem::StageRows;
+use super::qp::{Outcome, QpSolver};
+use super::settings::{MpcSettings, Solver};
+use super::structured::{MAX_STRUCTURED_DIM, StageValues, StructuredProgram, structured_program};
+use super::transcribe::{StepData, Transcription, Weights};
+
+/// A solver with the program of the present horizon.
+#[derive(Debug)]
+pub(super) enum Engine {
+    /// The conic program as a whole.
+    Conic {
+        transcription: Transcription,
+        solver: Box<QpSolver>,
+    },
+    /// Stage by stage.
+    Structured {
+        program: Box<dyn StructuredProgram>,
+        /// Whether its gains are those of its stages; solves with active rows overwrite them.
+        has_gains: bool,
+        /// Scaled measurement.
+        start: Vec<f64>,
+    },
+}
+
+impl Engine {
+    /// A solver for a problem with these rows; without weights it is one that nothing is asked of yet.
+    ///
+    /// # Errors
+    /// [`ControlError::Solver`] if clarabel refuses the problem, [`ControlError::Setting`] if the
+    /// structured solver is not compiled for the latent dimension.
+    pub(super) fn new(
+        latent_dim: usize,
+        rows: &StageRows,
+        weights: Option<&Weights<'_>>,
+        settings: &MpcSettings,
+    ) -> Result<Self, ControlError> {
+        match settings.solver {
+            Solver::Clarabel => {
+                let (transcription, mut program) =
+                    Transcription::new(latent_dim, settings.horizon, rows.clone());
+                if let Some(weights) = weights {
+                    transcription.write_cost(weights, &mut program);
+                }
+                let solver = Box::new(QpSolver::new(program, settings.qp)?);
+                Ok(Self::Conic {
+                    transcription,
+                    solver,
+                })
+            }
+            Solver::Riccati => {
+                let ones = vec![1.0; 2 * latent_dim];
+                let neutral = Weights {
+                    state: &ones,
+                    terminal: 1.0,
+                    input: 1.0,
+                    joint_penalty: 1.0,
+                };
+                let weights = weights.unwrap_or(&neutral);
+                let program = structured_program(latent_dim, rows, weights, settings);
+                let program = program.ok_or(ControlError::StructuredDim {
+                    found: latent_dim,
+                    largest: MAX_STRUCTURED_DIM,
+                })?;
+                Ok(Self::Structured {
+                    program,
+                    has_gains: false,
+                    start: vec![0.0; 2 * latent_dim],
+                })
+            }
+        }
+    }
+
+    /// clarabel, if it is what solves.
+    pub(super) fn conic(&self) -> Option<&QpSolver> {
+        match self {
+            Self::Conic { solver, .. } => Some(solver),
+            Self::Structured { .. } => None,
+        }
+    }
+
+    /// Forgets the last solution.
+    pub(super) fn forget(&mut self) {
+        if let Self::Structured {
+            program, has_gains, ..
+        } = self
+        {
+            program.forget();
+            *has_gains = false;
+        }
+    }
+
+    /// Takes over what the horizon's last preparation changed, as far as it does not depend on the
+    /// measurement.
+    pub(super) fn prepare(&mut self, step: &StepData<'_>, horizon: &Horizon) {
+        let Self::Structured {
+            program, has_gains, ..
+        } = self
+        else {
+            return;
+        };
+        for _ in 0..horizon.shift() {
+            program.shift();
+        }
+        let new = horizon.is_new();
+        if horizon.shift() > 0 || new.contains(&true) {
+            *has_gains = false;
+        }
+        for (index, stage) in step
+            .stages
+            .iter()
+            .enumerate()
+            .filter(|(index, _)| new[*index])
+        {
+            program.write(
+                index,
+                &StageValues {
+                    data: stage,
+                    end: horizon.end(index),
+                    deviation: step.deviation,
+                    input_cholesky: &step.input_cholesky[stage.phase],
+                },
+            );
+        }
+        if !*has_gains {
+            *has_gains = program.prepare();
+        }
+    }
+
+    /// Solves the prepared program from the measurement; how it ended, and iterations.
+    pub(super) fn solve(&mut self, step: &StepData<'_>) -> (Outcome, u32) {
+        match self {
+            Self::Conic {
+                transcription,
+                solver,
+            } => {
+                transcription.write(step, solver.program_mut());
+                (solver.solve(), solver.iterations())
+            }
+            Self::Structured {
+                program,
+                has_gains,
+                start,
+            } => {
+                if !*has_gains {
+                    return (Outcome::NumericalFailure, 0);
+                }
+                let reference = &step.stages[0].state;
+                for (index, start) in start.iter_mut().enumerate() {
+                    *start = (step.measured[index] - reference[index]) / step.deviation[index];
+                }
+                let (outcome, iterations) = program.solve(start);
+                *has_gains = iterations == 0;
+                (outcome, iterations)
+            }
+        }
+    }
+
+    /// Latent input of a stage in the solution.
+    pub(super) fn input(&self, index: usize, step: &StepData<'_>, out: &mut [f64]) {
+        match self {
+            Self::Conic {
+                transcription,
+                solver,
+            } => transcription.input(index, solver.solution(), step, out),
+            Self::Structured { program, .. } => {
+                let (stage, scaled) = (&step.stages[index], program.input(index));
+                let root = &step.input_cholesky[stage.phase];
+                for (row, out) in out.iter_mut().enumerate() {
+                    let mut sum = 0.0;
+                    for (col, scaled) in scaled[..=row].iter().enumerate() {
+                        sum += root[(row, col)] * scaled;
+                    }
+                    *out = stage.input[row] + sum;
+                }
+            }
+        }
+    }
+
+    /// Latent state at a stage's end in the solution, with `reference` the reference state there.
+    pub(super) fn state(
+        &self,
+        index: usize,
+        step: &StepData<'_>,
+        reference: &[f64],
+        out: &mut [f64],
+    ) {
+        match self {
+            Self::Conic {
+                transcription,
+                solver,
+            } => {
+                transcription.state(index, solver.solution(), reference, step.deviation, out);
+            }
+            Self::Structured { program, .. } => {
+                let scaled = program.state(index);
+                for (row, out) in out.iter_mut().enumerate() {
+                    *out = reference[row] + step.deviation[row] * scaled[row];
+                }
+            }
+        }
+    }
+}

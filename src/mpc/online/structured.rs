@@ -1,0 +1,275 @@
+//! The optimal control problem for the structured [`solver`](crate::solver).
+//!
+//! The same numbers as [`transcribe`](super::transcribe) writes for clarabel, stage by stage and
+//! without the zeros in between: unknowns are the scaled inputs `û_k`, the states `x̂_{k+1}` that follow
+//! from them, and the slacks. A friction cone becomes the pyramid `|F_x|, |F_y| <= μ F_z / √2` inside it.
+
+use std::fmt::Debug;
+
+use super::problem::StageRows;
+use super::qp::Outcome;
+use super::settings::MpcSettings;
+use super::transcribe::{SLACK_PRICE, Stage as StageData, Weights};
+use crate::solver::{self, Cost, Program, RowMatrices, Settings, Shape, Stage};
+
+/// Complementarity and violation of rows at which iterations end.
+pub const TOLERANCE: f64 = 1e-9;
+/// Rows of a friction pyramid.
+const PYRAMID_ROWS: usize = 4;
+/// Most latent coordinates that the solver is compiled for.
+pub const MAX_STRUCTURED_DIM: usize = 8;
+
+/// One stage's numbers, in latent units.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StageValues<'a> {
+    /// Dynamics, reference and rows of its own.
+    pub data: &'a StageData,
+    /// Reference state at its end, `2 latent_dim`.
+    pub end: &'a [f64],
+    /// Scale `σ` of the states.
+    pub deviation: &'a [f64],
+    /// Scale `C_p` of the inputs in its phase.
+    pub input_cholesky: &'a nalgebra::DMatrix<f64>,
+}
+
+/// The horizon's program for one latent dimension or another.
+pub(super) trait StructuredProgram: Debug + Send {
+    /// Moves the horizon on by a stage; the last has to be written then.
+    fn shift(&mut self);
+
+    /// Overwrites a stage.
+    fn write(&mut self, stage: usize, values: &StageValues<'_>);
+
+    /// Forgets the last solution.
+    fn forget(&mut self);
+
+    /// Gains of all stages, for the next [`StructuredProgram::solve`]; false if there are none.
+    fn prepare(&mut self) -> bool;
+
+    /// Solves from a scaled state; the iterations that it took.
+    fn solve(&mut self, x0: &[f64]) -> (Outcome, u32);
+
+    /// Scaled input of a stage.
+    fn input(&self, stage: usize) -> &[f64];
+
+    /// Scaled state at a stage's end.
+    fn state(&self, stage: usize) -> &[f64];
+}
+
+/// A program, or none for a latent dimension above [`MAX_STRUCTURED_DIM`].
+pub(super) fn structured_program(
+    latent_dim: usize,
+    rows: &StageRows,
+    weights: &Weights<'_>,
+    settings: &MpcSettings,
+) -> Option<Box<dyn StructuredProgram>> {
+    macro_rules! of_dimension {
+        ($($dim:literal),*) => {
+            match latent_dim {
+                $($dim => Some(Box::new(Horizon::<{ 2 * $dim }, $dim>::new(rows, weights, settings))),)*
+                _ => None,
+            }
+        };
+    }
+    of_dimension!(1, 2, 3, 4, 5, 6, 7, 8)
+}
+
+/// Memory of a program; `NX` is twice `NU`.
+#[derive(Debug)]
+struct Horizon<const NX: usize, const NU: usize> {
+    stages: Vec<Stage<f64, NX, NU>>,
+    memory: Vec<f64>,
+    /// Rows on the inputs, those of a stage one after the other; the same for the states.
+    input_rows: Vec<[f64; NU]>,
+    soft_rows: Vec<[f64; NU]>,
+    rows: StageRows,
+    first: usize,
+    shape: Shape,
+    cost: Cost<f64, NX, NU>,
+    settings: Settings<f64>,
+    /// Whether the stages hold a solution, to start from.
+    is_warm: bool,
+}
+
+impl<const NX: usize, const NU: usize> Horizon<NX, NU> {
+    fn new(rows: &StageRows, weights: &Weights<'_>, settings: &MpcSettings) -> Self {
+        let horizon = settings.horizon;
+        let pyramid = rows.friction.as_ref().map_or(0, |_| PYRAMID_ROWS);
+        let shape = Shape {
+            input: rows.torque.len() + pyramid,
+            soft: rows.joint.len(),
+            ..Shape::default()
+        };
+        let scale = SLACK_PRICE / weights.joint_penalty;
+        let state = std::array::from_fn(|i| scale * weights.state[i]);
+        let stage = |index: usize| {
+            let mut stage = Stage::zeros();
+            stage.input_rows = index * shape.input;
+            stage.soft_rows = index * shape.soft;
+            stage
+        };
+        Self {
+            stages: (0..horizon).map(stage).collect(),
+            memory: vec![0.0; horizon * shape.memory()],
+            input_rows: vec![[0.0; NU]; horizon * shape.input],
+            soft_rows: vec![[0.0; NU]; horizon * shape.soft],
+            rows: rows.clone(),
+            first: 0,
+            shape,
+            cost: Cost {
+                state,
+                terminal: state.map(|weight| weights.terminal * weight),
+                input: [scale * weights.input; NU],
+                slack: SLACK_PRICE,
+            },
+            settings: Settings {
+                max_iterations: settings.qp.max_iterations,
+                tolerance: TOLERANCE,
+                accepted_residual: settings.qp.accepted_residual,
+            },
+            is_warm: false,
+        }
+    }
+
+    fn program(&mut self) -> Program<'_, f64, NX, NU> {
+        Program {
+            stages: &mut self.stages,
+            rows: &mut self.memory,
+            first: self.first,
+            shape: self.shape,
+            matrices: RowMatrices {
+                input: &self.input_rows,
+                soft: &self.soft_rows,
+                hard: &[],
+            },
+            cost: self.cost,
+        }
+    }
+
+    fn place(&self, stage: usize) -> usize {
+        (self.first + stage) % self.stages.len()
+    }
+
+    fn write_dynamics(&mut self, place: usize, values: &StageValues<'_>) {
+        let (model, deviation) = (&values.data.model, values.deviation);
+        let stage = &mut self.stages[place];
+        for row in 0..NX {
+            let scale = 1.0 / deviation[row];
+            for col in 0..NU {
+                let mut sum = 0.0;
+                for k in col..NU {
+                    sum += model.b[(row, k)] * values.input_cholesky[(k, col)];
+                }
+                stage.b[row][col] = scale * sum;
+            }
+            for col in 0..NX {
+                stage.a[row][col] = scale * model.a[(row, col)] * deviation[col];
+            }
+            stage.c[row] = scale * values.data.defect[row];
+        }
+    }
+
+    fn write_rows(&mut self, place: usize, values: &StageValues<'_>) {
+        let StageValues {
+            data,
+            end,
+            deviation,
+            input_cholesky,
+        } = *values;
+        let own = data.rows.as_ref().unwrap_or(&self.rows);
+        let (count, memory) = (self.shape.rows(), self.shape.memory());
+        let bounds = &mut self.memory[place * memory..][..count];
+        let matrix = &mut self.input_rows[place * self.shape.input..][..self.shape.input];
+        for (number, row) in own.torque.iter().enumerate() {
+            let (scaled, at_reference) = scaled(&row.row, input_cholesky, &data.input);
+            matrix[number] = scaled;
+            bounds[number] = row.bound - row.per_loss * data.losses_nm[row.joint] - at_reference;
+        }
+        if self.rows.friction.is_some() {
+            let pull = std::f64::consts::FRAC_1_SQRT_2;
+            for side in 0..PYRAMID_ROWS {
+                let (axis, sign) = (1 + side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });
+                let row: [f64; NU] = std::array::from_fn(|j| {
+                    sign * data.force[axis * NU + j] - pull * data.force[j]
+                });
+                let (scaled, at_reference) = scaled(&row, input_cholesky, &data.input);
+                let number = own.torque.len() + side;
+                matrix[number] = scaled;
+                // Without contact nothing is asked for.
+                let is_free = row.iter().all(|entry| *entry == 0.0);
+                bounds[number] = if is_free { 1.0 } else { -at_reference };
+            }
+        }
+        let matrix = &mut self.soft_rows[place * self.shape.soft..][..self.shape.soft];
+        let bounds = &mut bounds[self.shape.input..];
+        for (number, row) in own.joint.iter().enumerate() {
+            let mut at_reference = 0.0;
+            for j in 0..NU {
+                matrix[number][j] = row.row[j] * deviation[j];
+                at_reference += row.row[j] * end[j];
+            }
+            bounds[number] = row.bound - at_reference;
+        }
+    }
+}
+
+/// `row C` for a lower triangular `C`, and `row · input`.
+fn scaled<const NU: usize>(
+    row: &[f64],
+    root: &nalgebra::DMatrix<f64>,
+    input: &[f64],
+) -> ([f64; NU], f64) {
+    let mut out = [0.0; NU];
+    let mut at_reference = 0.0;
+    for col in 0..NU {
+        for k in col..NU {
+            out[col] += row[k] * root[(k, col)];
+        }
+        at_reference += row[col] * input[col];
+    }
+    (out, at_reference)
+}
+
+impl<const NX: usize, const NU: usize> StructuredProgram for Horizon<NX, NU> {
+    fn shift(&mut self) {
+        let mut program = self.program();
+        program.shift();
+        self.first = program.first;
+    }
+
+    fn write(&mut self, stage: usize, values: &StageValues<'_>) {
+        let place = self.place(stage);
+        self.write_dynamics(place, values);
+        self.write_rows(place, values);
+    }
+
+    fn forget(&mut self) {
+        self.is_warm = false;
+    }
+
+    fn prepare(&mut self) -> bool {
+        self.program().prepare()
+    }
+
+    fn solve(&mut self, x0: &[f64]) -> (Outcome, u32) {
+        let x0 = std::array::from_fn(|i| x0[i]);
+        let (is_warm, settings) = (self.is_warm, self.settings);
+        let report = self.program().solve(&x0, is_warm, &settings);
+        let outcome = match report.outcome {
+            solver::Outcome::Solved => Outcome::Solved,
+            solver::Outcome::Inaccurate => Outcome::Inaccurate,
+            solver::Outcome::IterationCap => Outcome::IterationCap,
+            solver::Outcome::NumericalFailure => Outcome::NumericalFailure,
+        };
+        self.is_warm = outcome == Outcome::Solved;
+        (outcome, report.iterations)
+    }
+
+    fn input(&self, stage: usize) -> &[f64] {
+        &self.stages[self.place(stage)].v
+    }
+
+    fn state(&self, stage: usize) -> &[f64] {
+        &self.stages[self.place(stage)].x
+    }
+}

@@ -1,0 +1,217 @@
+//! The linear-quadratic optimum over the stages: Riccati's recursion and its passes of vectors.
+//!
+//! With `V_k(x) = ½ xᵀ P_k x + p_kᵀ x` the cost from the end of stage `k - 1` on, a stage is eliminated by
+//!
+//! ```text
+//! H = [ R + Bᵀ P B   Bᵀ P A ]        K = H_vv⁻¹ H_vx,   v = −K x − H_vv⁻¹ h
+//!     [ Aᵀ P B       Aᵀ P A ]        P ← H_xx − H_xv K + Q
+//! ```
+//!
+//! All loops have a fixed number of turns and a fixed order of additions: the generated C has the same.
+
+use super::problem::Stage;
+use super::scalar::Real;
+
+/// `P` of one stage's end to `P` of its beginning, without the costs there; gain and factor of the
+/// stage are overwritten. False if the input's Hessian is not positive definite.
+#[inline(always)]
+pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
+    stage: &mut Stage<T, NX, NU>,
+    p: &mut [[T; NX]; NX],
+    mut hvv: [[T; NU]; NU],
+) -> bool {
+    let (a, b) = (&stage.a, &stage.b);
+    let mut pa = [[T::ZERO; NX]; NX];
+    let mut pb = [[T::ZERO; NU]; NX];
+    for i in 0..NX {
+        for k in 0..NX {
+            let factor = p[i][k];
+            for j in 0..NX {
+                pa[i][j] += factor * a[k][j];
+            }
+            for j in 0..NU {
+                pb[i][j] += factor * b[k][j];
+            }
+        }
+    }
+    let mut hvx = [[T::ZERO; NX]; NU];
+    for k in 0..NX {
+        for i in 0..NU {
+            let factor = b[k][i];
+            for j in 0..NX {
+                hvx[i][j] += factor * pa[k][j];
+            }
+            for j in 0..NU {
+                hvv[i][j] += factor * pb[k][j];
+            }
+        }
+    }
+    if !factorise(&hvv, &mut stage.factor) {
+        return false;
+    }
+    // Y = L⁻¹ H_vx, Z = D⁻¹ Y; P = H_xx − Yᵀ Z; K = L⁻ᵀ Z.
+    let factor = &stage.factor;
+    let mut y = hvx;
+    for i in 1..NU {
+        for k in 0..i {
+            let entry = factor[i][k];
+            for j in 0..NX {
+                y[i][j] = y[i][j] - entry * y[k][j];
+            }
+        }
+    }
+    let mut z = y;
+    for i in 0..NU {
+        for j in 0..NX {
+            z[i][j] = factor[i][i] * y[i][j];
+        }
+    }
+    let mut next = [[T::ZERO; NX]; NX];
+    for i in 0..NX {
+        for k in 0..NX {
+            let entry = a[k][i];
+            for j in 0..NX {
+                next[i][j] += entry * pa[k][j];
+            }
+        }
+        for k in 0..NU {
+            let entry = y[k][i];
+            for j in 0..NX {
+                next[i][j] = next[i][j] - entry * z[k][j];
+            }
+        }
+    }
+    for i in 0..NX {
+        for j in 0..i {
+            next[j][i] = next[i][j];
+        }
+    }
+    *p = next;
+    for i in (0..NU).rev() {
+        for k in i + 1..NU {
+            let entry = factor[k][i];
+            for j in 0..NX {
+                z[i][j] = z[i][j] - entry * z[k][j];
+            }
+        }
+    }
+    stage.gain = z;
+    true
+}
+
+/// `L D Lᵀ` of a symmetric matrix, of which the lower triangle is read; false if it is not positive
+/// definite.
+#[inline(always)]
+fn factorise<T: Real, const NU: usize>(matrix: &[[T; NU]; NU], factor: &mut [[T; NU]; NU]) -> bool {
+    for j in 0..NU {
+        let mut pivot = matrix[j][j];
+        let mut scaled = [T::ZERO; NU];
+        for k in 0..j {
+            // The inverse of D is what is kept: L_jk D_k is the entry before its division.
+            scaled[k] = factor[k][j];
+            pivot = pivot - factor[j][k] * scaled[k];
+        }
+        if !(pivot > T::ZERO && pivot.is_finite_number()) {
+            return false;
+        }
+        let inverse = T::ONE / pivot;
+        factor[j][j] = inverse;
+        for i in j + 1..NU {
+            let mut entry = matrix[i][j];
+            for k in 0..j {
+                entry = entry - factor[i][k] * scaled[k];
+            }
+            factor[j][i] = entry;
+            factor[i][j] = entry * inverse;
+        }
+    }
+    true
+}
+
+/// `H_vv⁻¹ h` by a factor of [`factorise`].
+#[inline(always)]
+pub(super) fn solve_factored<T: Real, const NU: usize>(
+    factor: &[[T; NU]; NU],
+    mut h: [T; NU],
+) -> [T; NU] {
+    for i in 1..NU {
+        for k in 0..i {
+            h[i] = h[i] - factor[i][k] * h[k];
+        }
+    }
+    for i in 0..NU {
+        h[i] = h[i] * factor[i][i];
+    }
+    for i in (0..NU).rev() {
+        for k in i + 1..NU {
+            h[i] = h[i] - factor[k][i] * h[k];
+        }
+    }
+    h
+}
+
+/// `out += Mᵀ y`.
+#[inline(always)]
+pub(super) fn add_transposed<T: Real, const ROWS: usize, const COLS: usize>(
+    matrix: &[[T; COLS]; ROWS],
+    y: &[T; ROWS],
+    out: &mut [T; COLS],
+) {
+    for k in 0..ROWS {
+        for j in 0..COLS {
+            out[j] += matrix[k][j] * y[k];
+        }
+    }
+}
+
+/// `out + M x`, each row summed in the order of its entries.
+#[inline(always)]
+pub(super) fn plus_product<T: Real, const ROWS: usize, const COLS: usize>(
+    matrix: &[[T; COLS]; ROWS],
+    x: &[T; COLS],
+    mut out: [T; ROWS],
+) -> [T; ROWS] {
+    for i in 0..ROWS {
+        for j in 0..COLS {
+            out[i] += matrix[i][j] * x[j];
+        }
+    }
+    out
+}
+
+/// Gradient pass of one stage: from `p` at its end, with the cost's gradient there added already, to
+/// `p` at its beginning; the stage's constant part of the input is overwritten.
+#[inline(always)]
+pub(super) fn pull<T: Real, const NX: usize, const NU: usize>(
+    stage: &mut Stage<T, NX, NU>,
+    p: &mut [T; NX],
+    mut h: [T; NU],
+) {
+    add_transposed(&stage.b, p, &mut h);
+    stage.feed = solve_factored(&stage.factor, h);
+    let mut next = [T::ZERO; NX];
+    add_transposed(&stage.a, p, &mut next);
+    for k in 0..NU {
+        for j in 0..NX {
+            next[j] = next[j] - stage.gain[k][j] * h[k];
+        }
+    }
+    *p = next;
+}
+
+/// Input of a stage from the state at its beginning: `−feed − K x`.
+#[inline(always)]
+pub(super) fn answer<T: Real, const NX: usize, const NU: usize>(
+    stage: &Stage<T, NX, NU>,
+    x: &[T; NX],
+) -> [T; NU] {
+    let mut v = [T::ZERO; NU];
+    for i in 0..NU {
+        let mut sum = stage.feed[i];
+        for j in 0..NX {
+            sum += stage.gain[i][j] * x[j];
+        }
+        v[i] = -sum;
+    }
+    v
+}

@@ -1,0 +1,75 @@
+//! The numbers that the solver computes with.
+
+use core::fmt::Debug;
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// `f64` or `f32`: what the solver needs of a number, all of it in `core`.
+pub trait Real:
+    Copy
+    + Debug
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + Send
+    + 'static
+{
+    /// Zero.
+    const ZERO: Self;
+    /// One.
+    const ONE: Self;
+
+    /// The nearest number of this type.
+    fn of(value: f64) -> Self;
+
+    /// The same in double precision.
+    fn wide(self) -> f64;
+
+    /// Its magnitude.
+    fn magnitude(self) -> Self {
+        if self < Self::ZERO { -self } else { self }
+    }
+
+    /// The larger of two; not a number if the other is not.
+    fn or_larger(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    /// Whether it is neither infinite nor not a number.
+    fn is_finite_number(self) -> bool {
+        // Infinity less itself is not a number, and no such number equals itself.
+        #[allow(clippy::eq_op)]
+        let difference = self - self;
+        difference == Self::ZERO
+    }
+}
+
+impl Real for f64 {
+    const ZERO: Self = 0.0;
+    const ONE: Self = 1.0;
+
+    fn of(value: f64) -> Self {
+        value
+    }
+
+    fn wide(self) -> f64 {
+        self
+    }
+}
+
+impl Real for f32 {
+    const ZERO: Self = 0.0;
+    const ONE: Self = 1.0;
+
+    fn of(value: f64) -> Self {
+        value as f32
+    }
+
+    fn wide(self) -> f64 {
+        f64::from(self)
+    }
+}
