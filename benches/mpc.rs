@@ -13,13 +13,16 @@
 
 use std::io::Write;
 use std::path::Path;
-use std::time::Instant;
 
 use romc::mpc::{
     Command, ConeProgram, Controller, Lift, Measurement, MpcSettings, Outcome, QpSettings,
     QpSolver, ReferenceSamples, RowSelection, SolverProfile,
 };
 use romc::recording::Segment;
+
+#[path = "shared/clock.rs"]
+mod clock;
+use clock::{percentile, timed};
 
 const MODEL: &str = "models/go1-d4.json";
 const RECORDINGS: [&str; 3] = ["test_01", "test_02", "test_03"];
@@ -284,43 +287,6 @@ fn dump(model: &romc::model::ReducedModel, segments: &[Segment], path: &Path) {
     }
 }
 
-/// CPU time of this thread in µs spent in `work`, wall time where there is no such clock.
-fn timed(work: impl FnOnce()) -> f64 {
-    let (cpu, wall) = (cpu_ns(), Instant::now());
-    work();
-    let wall_us = wall.elapsed().as_secs_f64() * 1e6;
-    match (cpu, cpu_ns()) {
-        (Some(before), Some(after)) if after > before => (after - before) as f64 * 1e-3,
-        _ => wall_us,
-    }
-}
-
-/// Nanoseconds that this thread has run.
-#[cfg(all(target_os = "linux", target_pointer_width = "64"))]
-fn cpu_ns() -> Option<u64> {
-    #[repr(C)]
-    struct Timespec {
-        seconds: i64,
-        nanoseconds: i64,
-    }
-    unsafe extern "C" {
-        fn clock_gettime(clock: i32, time: *mut Timespec) -> i32;
-    }
-    const CLOCK_THREAD_CPUTIME_ID: i32 = 3;
-    let mut time = Timespec {
-        seconds: 0,
-        nanoseconds: 0,
-    };
-    // SAFETY: the C library's own function, with a timespec of the layout that 64-bit Linux has.
-    let result = unsafe { clock_gettime(CLOCK_THREAD_CPUTIME_ID, &mut time) };
-    (result == 0).then_some(time.seconds as u64 * 1_000_000_000 + time.nanoseconds as u64)
-}
-
-#[cfg(not(all(target_os = "linux", target_pointer_width = "64")))]
-fn cpu_ns() -> Option<u64> {
-    None
-}
-
 fn resident_kib() -> u64 {
     let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = text.lines().find(|line| line.starts_with("VmRSS:"));
@@ -328,22 +294,10 @@ fn resident_kib() -> u64 {
         .unwrap_or(0)
 }
 
-fn sorted(values: &[f64]) -> Vec<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted
-}
-
 fn median(values: &[f64]) -> f64 {
-    sorted(values)[values.len() / 2]
+    percentile(values, 0.5)
 }
 
 fn both(values: &[f64]) -> String {
-    let sorted = sorted(values);
-    let rank = (0.99 * sorted.len() as f64).ceil() as usize;
-    format!(
-        "{:.0} / {:.0}",
-        sorted[sorted.len() / 2],
-        sorted[rank.max(1) - 1]
-    )
+    format!("{:.0} / {:.0}", median(values), percentile(values, 0.99))
 }

@@ -15,5 +15,7 @@ mod qp;
 mod random;
 #[path = "mpc/recordings.rs"]
 mod recordings;
+#[path = "mpc/riccati.rs"]
+mod riccati;
 #[path = "mpc/synthetic.rs"]
 mod synthetic;

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from PIL import Image
 
+import c_controller
 import romc_controller
 from assessment import assess, longest_flight, repetition_faults
 from closed_loop_table import missed_aims, summary, table
@@ -178,6 +179,12 @@ def parse_arguments():
         type=int,
         help="runs per condition, each with other random numbers (default: 3; --quick: 1)",
     )
+    parser.add_argument(
+        "--controller",
+        choices=["crate", "c"],
+        default="crate",
+        help="drive with the generated crate, or with the controller in C99",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object, not the table")
     parser.add_argument(
         "--setting",
@@ -242,8 +249,9 @@ def controlled(path, arguments):
     training = sorted(TRAINING.glob("train_*.csv.gz"))
     inputs = ModelInputs.compiled(path, folder / f"{path.stem}-inputs", arguments.romc)
     gains = write_uninformed(path, copy, training, inputs.of)
-    crate = romc_controller.build(path, folder / path.stem, arguments.romc)
-    uninformed_crate = romc_controller.build(copy, folder / copy.stem, arguments.romc)
+    kind = c_controller if arguments.controller == "c" else romc_controller
+    crate = kind.build(path, folder / path.stem, arguments.romc)
+    uninformed_crate = kind.build(copy, folder / copy.stem, arguments.romc)
     return Controlled(path.stem, crate, uninformed_crate, gains, inputs)
 
 
@@ -331,7 +339,8 @@ def make_controller(follower_name, model, settings, path):
     driver = FOLLOWERS[follower_name]
     if not driver.model:
         return None
-    module = romc_controller.load(model.uninformed_crate if driver.uninformed else model.crate)
+    crate = model.uninformed_crate if driver.uninformed else model.crate
+    module = c_controller.load(crate) if crate.name.endswith("-c") else romc_controller.load(crate)
     chosen = module.Library().default_settings()
     for name, number in settings.items():
         kind = type(getattr(chosen, name))

@@ -108,8 +108,9 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                     };
                 }
                 iterations += 1;
+                // Where rounding ends the progress the residuals decide what the point is worth.
                 let Some(length) = self.step(complementarity) else {
-                    return self.broken(iterations);
+                    break;
                 };
                 if may_restart && length < T::of(SHORT_STEP) {
                     self.centre(COLD);

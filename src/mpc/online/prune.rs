@@ -32,6 +32,18 @@ pub(super) fn needed_rows(rows: Vec<Row>, margin: f64) -> Vec<Row> {
         .collect()
 }
 
+/// Positions of the rows `row · v <= bound` that do not follow from the others to within `margin`.
+pub fn needed_rows_of(rows: &[(Vec<f64>, f64)], margin: f64) -> Vec<usize> {
+    let numbered = rows.iter().enumerate().map(|(number, (row, bound))| Row {
+        joint: number,
+        row: row.clone(),
+        bound: *bound,
+        per_loss: 0.0,
+    });
+    let kept = needed_rows(numbered.collect(), margin);
+    kept.into_iter().map(|row| row.joint).collect()
+}
+
 /// Whether the rows kept besides `index` imply it to within `margin`.
 fn is_implied(rows: &[Row], is_kept: &[bool], index: usize, margin: f64) -> bool {
     let size = rows[index]

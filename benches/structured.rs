@@ -1,0 +1,406 @@
+//! The structured solver on problems from a file, against clarabel at 1e-9.
+//!
+//! ```text
+//! cargo bench --bench structured -- FILE.bin... [--times FILE.txt] [--slack PRICE]
+//! ```
+//!
+//! A file holds one closed loop of an MPC in latent coordinates, little-endian: int32 `d, N, T, 0`;
+//! float64 lift of torques and forces (`d x 18`), decoder of joints (`12 x d`) and its bias (12), lower
+//! and upper joint limits (12 each), torque limits (12), friction, weights of positions, velocities and
+//! inputs (`d` each), factor on the last state's; then for each of `T` steps `x0 (2d)`, reference
+//! `((N+1) x 2d)`, `A (N x 2d x 2d)`, `B (N x 2d x d)`, `c (N x 2d)`, a guess of states and inputs
+//! (`(N+1) x 2d`, `N x d`), the solution's (the same) and its cost. `benches/mpc_solvers/stages.py`
+//! makes such files, and runs PIQP on them beside this program.
+//!
+//! Rows that the others imply are left out first, by linear programs; each step starts from the last
+//! step's solution, and its time has all that depends on the step in it: writing, gains, solve.
+
+use std::io::Write as _;
+
+use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, SparseColumns, needed_rows_of};
+use romc::solver::{Cost, Outcome, Program, RowMatrices, Settings, Shape, Stage};
+
+#[path = "shared/clock.rs"]
+mod clock;
+
+/// Weight of the robot, N, by which rows of forces are divided.
+const WEIGHT_N: f64 = 118.0;
+
+/// Reads numbers of a file one after the other.
+struct Reader {
+    values: Vec<f64>,
+    at: usize,
+}
+
+impl Reader {
+    fn take(&mut self, count: usize) -> Vec<f64> {
+        self.at += count;
+        self.values[self.at - count..self.at].to_vec()
+    }
+}
+
+/// What all steps of a file share.
+struct Loop<const NU: usize> {
+    horizon: usize,
+    input_rows: Vec<([f64; NU], f64)>,
+    joint_rows: Vec<([f64; NU], f64)>,
+    state_weight: Vec<f64>,
+    input_weight: Vec<f64>,
+    terminal: f64,
+}
+
+/// One step's numbers.
+struct Step {
+    x0: Vec<f64>,
+    reference: Vec<f64>,
+    a: Vec<f64>,
+    b: Vec<f64>,
+    c: Vec<f64>,
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut times = None;
+    let mut files = Vec::new();
+    let mut rest = arguments.iter();
+    while let Some(argument) = rest.next() {
+        match argument.as_str() {
+            "--times" => times = rest.next().cloned(),
+            "--bench" => {}
+            file => files.push(file.to_owned()),
+        }
+    }
+    if files.is_empty() {
+        println!("usage: cargo bench --bench structured -- FILE.bin... [--times FILE.txt]");
+    }
+    let mut lines = String::new();
+    for file in files {
+        let bytes = std::fs::read(&file).unwrap_or_else(|error| panic!("{file}: {error}"));
+        let head = |k: usize| i32::from_le_bytes(bytes[4 * k..][..4].try_into().expect("4 bytes"));
+        let (horizon, ticks) = (head(1) as usize, head(2) as usize);
+        let values = bytes[16..]
+            .chunks_exact(8)
+            .map(|chunk| f64::from_le_bytes(chunk.try_into().expect("8 bytes")))
+            .collect();
+        let reader = Reader { values, at: 0 };
+        let all = match head(0) {
+            2 => run::<4, 2>(reader, horizon, ticks),
+            4 => run::<8, 4>(reader, horizon, ticks),
+            6 => run::<12, 6>(reader, horizon, ticks),
+            d => panic!("{file}: {d} latent coordinates, expected 2, 4 or 6"),
+        };
+        println!("{file}: {}", all.1);
+        for time in all.0 {
+            lines += &format!("{time}\n");
+        }
+    }
+    if let Some(path) = times {
+        let mut file = std::fs::File::create(path).expect("the file can be made");
+        file.write_all(lines.as_bytes()).expect("the disk has room");
+    }
+}
+
+fn read_loop<const NU: usize>(reader: &mut Reader, horizon: usize) -> Loop<NU> {
+    let (lift, decoder, bias) = (reader.take(NU * 18), reader.take(12 * NU), reader.take(12));
+    let (low, high, torque) = (reader.take(12), reader.take(12), reader.take(12));
+    let friction = reader.take(1)[0];
+    let mut state_weight = reader.take(NU);
+    state_weight.extend(reader.take(NU));
+    let (input_weight, terminal) = (reader.take(NU), reader.take(1)[0]);
+    let (mut input_rows, mut joint_rows) = (Vec::new(), Vec::new());
+    for joint in 0..12 {
+        let half = 0.5 * (high[joint] - low[joint]);
+        for (sign, limit) in [(1.0, high[joint]), (-1.0, low[joint])] {
+            let row = std::array::from_fn(|j| sign * lift[18 * j + joint] / torque[joint]);
+            input_rows.push((row, 1.0));
+            let row = std::array::from_fn(|j| sign * decoder[NU * joint + j] / half);
+            joint_rows.push((row, sign * (limit - bias[joint]) / half));
+        }
+    }
+    for axis in [12, 13] {
+        for sign in [1.0, -1.0] {
+            let entry = |j: usize| sign * lift[18 * j + axis] - friction * lift[18 * j + 14];
+            input_rows.push((std::array::from_fn(|j| entry(j) / WEIGHT_N), 0.0));
+        }
+    }
+    Loop {
+        horizon,
+        input_rows: needed(input_rows),
+        joint_rows: needed(joint_rows),
+        state_weight,
+        input_weight,
+        terminal,
+    }
+}
+
+/// The rows without those that the others imply.
+fn needed<const NU: usize>(rows: Vec<([f64; NU], f64)>) -> Vec<([f64; NU], f64)> {
+    let all: Vec<(Vec<f64>, f64)> = rows.iter().map(|(row, b)| (row.to_vec(), *b)).collect();
+    let kept = needed_rows_of(&all, 0.0);
+    kept.into_iter().map(|index| rows[index]).collect()
+}
+
+fn read_step<const NX: usize, const NU: usize>(reader: &mut Reader, horizon: usize) -> Step {
+    let step = Step {
+        x0: reader.take(NX),
+        reference: reader.take((horizon + 1) * NX),
+        a: reader.take(horizon * NX * NX),
+        b: reader.take(horizon * NX * NU),
+        c: reader.take(horizon * NX),
+    };
+    // A guess, a solution, its cost: of another solver.
+    reader.take(2 * ((horizon + 1) * NX + horizon * NU) + 1);
+    step
+}
+
+/// Solves all steps; times in us, and a line about them.
+fn run<const NX: usize, const NU: usize>(
+    mut reader: Reader,
+    horizon: usize,
+    ticks: usize,
+) -> (Vec<f64>, String) {
+    let shared: Loop<NU> = read_loop(&mut reader, horizon);
+    let rows = |rows: &[([f64; NU], f64)]| rows.iter().map(|(row, _)| *row).collect::<Vec<_>>();
+    let (input, hard) = (rows(&shared.input_rows), rows(&shared.joint_rows));
+    let shape = Shape {
+        input: input.len(),
+        hard: hard.len(),
+        ..Shape::default()
+    };
+    let state: [f64; NX] = std::array::from_fn(|i| 2.0 * shared.state_weight[i]);
+    let cost = Cost {
+        state,
+        terminal: state.map(|weight| shared.terminal * weight),
+        input: std::array::from_fn(|j| 2.0 * shared.input_weight[j]),
+        slack: 0.0,
+    };
+    let mut stages = vec![Stage::<f64, NX, NU>::zeros(); horizon];
+    let mut memory = vec![0.0; horizon * shape.memory()];
+    let settings = Settings {
+        max_iterations: 60,
+        tolerance: 1e-8,
+        accepted_residual: 2e-5,
+    };
+    let mut reference = Conic::new::<NX, NU>(&shared);
+    let (mut first, mut times, mut iterations) = (0, Vec::new(), Vec::new());
+    let (mut off, mut cost_off, mut unsolved) = (0.0_f64, 0.0_f64, 0);
+    for tick in 0..ticks {
+        let step = read_step::<NX, NU>(&mut reader, horizon);
+        let mut program = Program {
+            stages: &mut stages,
+            rows: &mut memory,
+            first,
+            shape,
+            matrices: RowMatrices {
+                input: &input,
+                soft: &[],
+                hard: &hard,
+            },
+            cost,
+        };
+        let mut report = None;
+        times.push(clock::timed(|| {
+            if tick > 0 {
+                program.shift();
+            }
+            write(&mut program, &shared, &step);
+            program.prepare();
+            let x0 = std::array::from_fn(|i| step.x0[i] - step.reference[i]);
+            report = Some(program.solve(&x0, tick > 0, &settings));
+        }));
+        let report = report.expect("solved or not");
+        iterations.push(f64::from(report.iterations));
+        unsolved += usize::from(report.outcome != Outcome::Solved);
+        let solution = reference.solve::<NX, NU>(&shared, &step);
+        for k in 0..horizon {
+            let stage = &program.stages[program.at(k)];
+            for (found, expected) in stage.v.iter().zip(&solution[k * (NX + NU)..]) {
+                off = off.max((found - expected).abs());
+            }
+        }
+        let value = |part: &dyn Fn(usize, usize) -> f64| -> f64 {
+            let weight = |k: usize, i: usize| match (i < NU, k + 1 == horizon) {
+                (true, _) => cost.input[i],
+                (false, true) => cost.terminal[i - NU],
+                (false, false) => cost.state[i - NU],
+            };
+            (0..horizon)
+                .flat_map(|k| (0..NU + NX).map(move |i| (k, i)))
+                .map(|(k, i)| 0.5 * weight(k, i) * part(k, i).powi(2))
+                .sum()
+        };
+        let ours = value(&|k, i| {
+            let stage = &program.stages[program.at(k)];
+            if i < NU { stage.v[i] } else { stage.x[i - NU] }
+        });
+        let theirs = value(&|k, i| solution[k * (NX + NU) + i]);
+        cost_off = cost_off.max((ours - theirs).abs() / theirs.abs().max(1.0));
+        first = program.first;
+    }
+    let line = format!(
+        "d {NU}, N {horizon}, {} + {} rows a stage: median {:.1} us, 99 % {:.1} us; iterations {} / {} / {}; \
+         inputs within {off:.1e}, cost within {cost_off:.1e} of clarabel's at 1e-9; {unsolved} of {ticks} unsolved",
+        shape.input,
+        shape.hard,
+        clock::percentile(&times, 0.5),
+        clock::percentile(&times, 0.99),
+        clock::percentile(&iterations, 0.5),
+        clock::percentile(&iterations, 0.99),
+        clock::percentile(&iterations, 1.0),
+    );
+    (times, line)
+}
+
+fn write<const NX: usize, const NU: usize>(
+    program: &mut Program<'_, f64, NX, NU>,
+    shared: &Loop<NU>,
+    step: &Step,
+) {
+    for k in 0..shared.horizon {
+        let place = program.at(k);
+        let stage = &mut program.stages[place];
+        for i in 0..NX {
+            stage.a[i].copy_from_slice(&step.a[(k * NX + i) * NX..][..NX]);
+            stage.b[i].copy_from_slice(&step.b[(k * NX + i) * NU..][..NU]);
+            stage.c[i] = defect::<NX>(step, k, i);
+        }
+        let bounds = program.bounds_mut(k);
+        let (inputs, joints) = bounds.split_at_mut(shared.input_rows.len());
+        for (bound, (_, limit)) in inputs.iter_mut().zip(&shared.input_rows) {
+            *bound = *limit;
+        }
+        for (bound, (row, limit)) in joints.iter_mut().zip(&shared.joint_rows) {
+            *bound = limit - at_reference::<NX, NU>(step, k, row);
+        }
+    }
+}
+
+/// What the dynamics leave at the reference.
+fn defect<const NX: usize>(step: &Step, k: usize, i: usize) -> f64 {
+    let row = &step.a[(k * NX + i) * NX..][..NX];
+    let moved: f64 = (0..NX).map(|j| row[j] * step.reference[k * NX + j]).sum();
+    moved + step.c[k * NX + i] - step.reference[(k + 1) * NX + i]
+}
+
+fn at_reference<const NX: usize, const NU: usize>(step: &Step, k: usize, row: &[f64; NU]) -> f64 {
+    (0..NU)
+        .map(|j| row[j] * step.reference[(k + 1) * NX + j])
+        .sum()
+}
+
+/// The same program for clarabel: unknowns `v_0, x_1, v_1, x_2, ...`.
+struct Conic {
+    solver: QpSolver,
+}
+
+impl Conic {
+    fn new<const NX: usize, const NU: usize>(shared: &Loop<NU>) -> Self {
+        let (width, horizon) = (NX + NU, shared.horizon);
+        let (n, equalities) = (width * horizon, NX * horizon);
+        let rows = shared.input_rows.len() + shared.joint_rows.len();
+        let mut entries = Vec::new();
+        for k in 0..horizon {
+            for i in 0..NX {
+                let row = k * NX + i;
+                entries.extend((0..NU).map(|j| (row, k * width + j)));
+                entries.push((row, k * width + NU + i));
+                if k > 0 {
+                    entries.extend((0..NX).map(|j| (row, (k - 1) * width + NU + j)));
+                }
+            }
+            for number in 0..rows {
+                let offset = if number < shared.input_rows.len() {
+                    0
+                } else {
+                    NU
+                };
+                let row = equalities + k * rows + number;
+                entries.extend((0..NU).map(|j| (row, k * width + offset + j)));
+            }
+        }
+        let m = equalities + rows * horizon;
+        let mut a = SparseColumns::from_pattern(m, n, &entries);
+        let diagonal: Vec<(usize, usize)> = (0..n).map(|i| (i, i)).collect();
+        let mut p = SparseColumns::from_pattern(n, n, &diagonal);
+        for k in 0..horizon {
+            let factor = if k + 1 == horizon {
+                shared.terminal
+            } else {
+                1.0
+            };
+            for j in 0..NU {
+                let at = k * width + j;
+                p.set(at, at, 2.0 * shared.input_weight[j]);
+            }
+            for i in 0..NX {
+                let at = k * width + NU + i;
+                p.set(at, at, 2.0 * factor * shared.state_weight[i]);
+                a.set(k * NX + i, at, -1.0);
+            }
+            let all = shared.input_rows.iter().chain(&shared.joint_rows);
+            for (number, (row, _)) in all.enumerate() {
+                let offset = if number < shared.input_rows.len() {
+                    0
+                } else {
+                    NU
+                };
+                for (j, entry) in row.iter().enumerate() {
+                    let at = equalities + k * rows + number;
+                    a.set(at, k * width + offset + j, *entry);
+                }
+            }
+        }
+        let program = ConeProgram {
+            p,
+            q: vec![0.0; n],
+            a,
+            b: vec![0.0; m],
+            cones: vec![Cone::Zero(equalities), Cone::Nonnegative(rows * horizon)],
+        };
+        let settings = QpSettings {
+            tolerance: 1e-9,
+            max_iterations: 200,
+            ..QpSettings::default()
+        };
+        let solver = QpSolver::new(program, settings).expect("a sound program");
+        Self { solver }
+    }
+
+    fn solve<const NX: usize, const NU: usize>(
+        &mut self,
+        shared: &Loop<NU>,
+        step: &Step,
+    ) -> Vec<f64> {
+        let width = NX + NU;
+        let rows = shared.input_rows.len() + shared.joint_rows.len();
+        let program = self.solver.program_mut();
+        for k in 0..shared.horizon {
+            for i in 0..NX {
+                let row = k * NX + i;
+                let mut right = -defect::<NX>(step, k, i);
+                for j in 0..NU {
+                    program.a.set(row, k * width + j, step.b[row * NU + j]);
+                }
+                for j in 0..NX {
+                    let entry = step.a[row * NX + j];
+                    if k == 0 {
+                        right -= entry * (step.x0[j] - step.reference[j]);
+                    } else {
+                        program.a.set(row, (k - 1) * width + NU + j, entry);
+                    }
+                }
+                program.b[row] = right;
+            }
+            let first = NX * shared.horizon + k * rows;
+            for (number, (_, limit)) in shared.input_rows.iter().enumerate() {
+                program.b[first + number] = *limit;
+            }
+            for (number, (row, limit)) in shared.joint_rows.iter().enumerate() {
+                program.b[first + shared.input_rows.len() + number] =
+                    limit - at_reference::<NX, NU>(step, k, row);
+            }
+        }
+        self.solver.solve();
+        self.solver.solution().to_vec()
+    }
+}

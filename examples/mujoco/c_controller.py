@@ -1,0 +1,123 @@
+"""The controller in C99 of a model: emitted, compiled by the system's C compiler, and loaded through ctypes with the names of
+the crate's Python binding."""
+
+import ctypes
+import json
+import subprocess
+import types
+
+
+def build(model, folder, romc):
+    """Emits and compiles the controller of a model file; returns its folder."""
+    emit = [romc, "compile", model, "--emit", "controller-c", "--out-dir", folder]
+    subprocess.run([str(part) for part in emit], check=True, stdout=subprocess.DEVNULL)
+    (header,) = folder.glob("*-controller-c/*_controller.h")
+    crate, name = header.parent, header.stem.removesuffix("_controller")
+    sources = [f"{name}_controller.c", f"{name}.c"]
+    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC"]
+    subprocess.run(["cc", *flags, *sources, "-lm", "-o", "libcontroller.so"], check=True, cwd=crate)
+    with open(model, encoding="utf-8") as file:
+        dimension = json.load(file)["latent_dim"]
+    (crate / "binding.json").write_text(json.dumps({"name": name, "latent_dim": dimension}))
+    return crate
+
+
+def load(crate):
+    """What the crate's own Python module has: `Library().default_settings()` and `Controller(settings)`."""
+    facts = json.loads((crate / "binding.json").read_text())
+    library = ctypes.CDLL(str(crate / "libcontroller.so"))
+    prefix, number = facts["name"] + "_controller_", ctypes.c_double
+
+    class Settings(ctypes.Structure):
+        _fields_ = [
+            (name, ctypes.c_int32)
+            for name in ("horizon", "max_iterations", "lift", "linearisation")
+        ] + [
+            (name, number)
+            for name in (
+                "step_s", "input_weight", "velocity_weight", "terminal_weight", "joint_penalty",
+                "body_friction",
+            )
+        ]  # fmt: skip
+
+    class Command(ctypes.Structure):
+        _fields_ = [
+            ("torque", number * 12),
+            ("joint_position", number * 12),
+            ("joint_velocity", number * 12),
+            ("u_lat", number * facts["latent_dim"]),
+            ("status", ctypes.c_int32),
+            ("iterations", ctypes.c_int32),
+        ]
+        solve_us = 0.0
+
+    def function(name, result, *arguments):
+        found = getattr(library, prefix + name)
+        found.restype, found.argtypes = result, arguments
+        return found
+
+    default_settings = function("settings_default", Settings)
+    pointer = ctypes.c_void_p
+    init = function("init", ctypes.c_int, pointer, ctypes.POINTER(Settings))
+    set_reference = function(
+        "set_reference", ctypes.c_int, pointer, ctypes.c_size_t, *[pointer] * 5
+    )
+    step = function(
+        "step", ctypes.c_int, pointer, number, pointer, pointer, pointer, ctypes.POINTER(Command)
+    )
+    status_text = function("status_text", ctypes.c_char_p, ctypes.c_int32)
+
+    class Controller:
+        """One controller; it keeps the arrays of its reference."""
+
+        def __init__(self, settings):
+            # The size that the header states is its own secret here: more than any model needs.
+            self._memory = ctypes.create_string_buffer(1 << 22)
+            self._check(init(self._memory, ctypes.byref(settings)))
+            self._reference = None
+
+        def set_reference(self, time_s, x, dx, u, feet):
+            arrays = [_array(values, number) for values in (time_s, x, dx)]
+            arrays.append(None if u is None else _array(u, number))
+            arrays.append(_array([[1 if down else 0 for down in row] for row in feet], ctypes.c_uint8))
+            self._check(set_reference(self._memory, len(time_s), *arrays))
+            self._reference = arrays
+
+        def step(self, time_s, x, dx, feet):
+            command = Command()
+            state = [_array(values, number) for values in (x, dx)]
+            down = _array([1 if down else 0 for down in feet], ctypes.c_uint8)
+            step(self._memory, time_s, *state, down, ctypes.byref(command))
+            return command
+
+        def status_text(self, status):
+            return status_text(status).decode()
+
+        def close(self):
+            self._memory = None
+
+        @staticmethod
+        def _check(status):
+            if status != 0:
+                raise ValueError(status_text(status).decode())
+
+    class Library:
+        """The library of the module."""
+
+        def __init__(self):
+            self.default_settings = default_settings
+
+    return types.SimpleNamespace(Library=Library, Controller=Controller)
+
+
+def _array(values, kind):
+    """A C array of rows or of a flat sequence."""
+    flat = list(values.ravel()) if hasattr(values, "ravel") else _flat(values)
+    return (kind * len(flat))(*flat)
+
+
+def _flat(values):
+    flat = []
+    for value in values:
+        flat.extend(_flat(value) if hasattr(value, "__len__") else [value])
+    return flat

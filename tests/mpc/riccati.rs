@@ -1,0 +1,292 @@
+//! The structured solver against clarabel.
+
+use romc::evaluate::{ReferenceInput, along_recording};
+use romc::mpc::{
+    Cone, ConeProgram, Controller, MpcSettings, Outcome, QpSettings, QpSolver, Solver,
+    SparseColumns,
+};
+use romc::solver::{self, Cost, Program, Real, RowMatrices, Settings, Shape, Stage};
+
+use crate::random::Random;
+
+const HORIZON: usize = 12;
+const NX: usize = 6;
+const NU: usize = 3;
+const SHAPE: Shape = Shape {
+    input: 5,
+    soft: 3,
+    hard: 2,
+    hard_offset: 3,
+};
+const ROWS: usize = 11;
+const WIDTH: usize = NX + NU + 1;
+
+/// A random program, in double precision.
+struct RandomProgram {
+    a: Vec<[[f64; NX]; NX]>,
+    b: Vec<[[f64; NU]; NX]>,
+    c: Vec<[f64; NX]>,
+    input: Vec<[f64; NU]>,
+    soft: Vec<[f64; NU]>,
+    hard: Vec<[f64; NU]>,
+    bounds: Vec<f64>,
+    x0: [f64; NX],
+    state: [f64; NX],
+    weight: [f64; NU],
+}
+
+const PRICE: f64 = 8.0;
+
+impl RandomProgram {
+    fn new(random: &mut Random, tightness: f64) -> Self {
+        let row = |random: &mut Random| std::array::from_fn::<f64, NU, _>(|_| random.signed());
+        let rows = |count: usize, random: &mut Random| (0..count).map(|_| row(random)).collect();
+        let stages = 0..HORIZON;
+        let near_one = |i: usize, j: usize, random: &mut Random| {
+            0.12 * random.signed() + if i == j { 0.95 } else { 0.0 }
+        };
+        let mut bounds = Vec::new();
+        for _ in 0..HORIZON {
+            for kind in 0..ROWS {
+                // The slack's own row is kept at zero; hard rows stay loose enough to be kept.
+                let scale = match kind {
+                    8 => 0.0,
+                    9.. => 2.0 + 2.0 / tightness,
+                    _ => 1.0 / tightness,
+                };
+                bounds.push(scale * (0.3 + random.signed().abs()));
+            }
+        }
+        Self {
+            a: (stages.clone())
+                .map(|_| std::array::from_fn(|i| std::array::from_fn(|j| near_one(i, j, random))))
+                .collect(),
+            b: (stages.clone())
+                .map(|_| std::array::from_fn(|_| row(random)))
+                .collect(),
+            c: stages
+                .map(|_| std::array::from_fn(|_| 0.1 * random.signed()))
+                .collect(),
+            input: rows(SHAPE.input * HORIZON, random),
+            soft: rows(SHAPE.soft, random),
+            hard: rows(SHAPE.hard * HORIZON, random),
+            bounds,
+            x0: std::array::from_fn(|_| 2.0 * random.signed()),
+            state: std::array::from_fn(|_| 0.5 + random.signed().abs()),
+            weight: std::array::from_fn(|_| 0.1 + random.signed().abs()),
+        }
+    }
+
+    /// Solves with the structured solver; inputs of all stages and the report.
+    fn structured<T: Real>(&self, tolerance: f64, accepted: f64) -> (Vec<f64>, solver::Report<T>) {
+        let to = |value: f64| T::of(value);
+        let all = |rows: &[[f64; NU]]| rows.iter().map(|row| row.map(to)).collect::<Vec<_>>();
+        let (input, soft, hard) = (all(&self.input), all(&self.soft), all(&self.hard));
+        let mut stages = vec![Stage::<T, NX, NU>::zeros(); HORIZON];
+        let mut memory = vec![T::ZERO; HORIZON * SHAPE.memory()];
+        let state = self.state.map(to);
+        let mut program = Program {
+            stages: &mut stages,
+            rows: &mut memory,
+            first: 5,
+            shape: SHAPE,
+            matrices: RowMatrices {
+                input: &input,
+                soft: &soft,
+                hard: &hard,
+            },
+            cost: Cost {
+                state,
+                terminal: self.state.map(|weight| to(3.0 * weight)),
+                input: self.weight.map(to),
+                slack: to(PRICE),
+            },
+        };
+        for k in 0..HORIZON {
+            let place = program.at(k);
+            let stage = &mut program.stages[place];
+            stage.a = self.a[k].map(|row| row.map(to));
+            stage.b = self.b[k].map(|row| row.map(to));
+            stage.c = self.c[k].map(to);
+            stage.input_rows = k * SHAPE.input;
+            stage.hard_rows = k * SHAPE.hard;
+            let bounds = self.bounds[k * ROWS..][..ROWS].iter().copied().map(to);
+            program
+                .bounds_mut(k)
+                .iter_mut()
+                .zip(bounds)
+                .for_each(|(out, bound)| *out = bound);
+        }
+        assert!(program.prepare());
+        let settings = Settings {
+            max_iterations: 60,
+            tolerance: to(tolerance),
+            accepted_residual: to(accepted),
+        };
+        let report = program.solve(&self.x0.map(to), false, &settings);
+        let inputs = (0..HORIZON)
+            .flat_map(|k| program.stages[program.at(k)].v.map(Real::wide))
+            .collect();
+        (inputs, report)
+    }
+
+    /// Solves with clarabel: unknowns `v_0, x_1, t_1, v_1, ...`.
+    fn conic(&self) -> Vec<f64> {
+        let equalities = NX * HORIZON;
+        let (n, m) = (WIDTH * HORIZON, (NX + ROWS) * HORIZON);
+        let mut entries = Vec::new();
+        let mut add = |row: usize, col: usize, value: f64| entries.push((row, col, value));
+        let mut b = vec![0.0; m];
+        for k in 0..HORIZON {
+            for i in 0..NX {
+                let row = k * NX + i;
+                (0..NU).for_each(|j| add(row, k * WIDTH + j, self.b[k][i][j]));
+                add(row, k * WIDTH + NU + i, -1.0);
+                b[row] = -self.c[k][i];
+                for j in 0..NX {
+                    if k == 0 {
+                        b[row] -= self.a[0][i][j] * self.x0[j];
+                    } else {
+                        add(row, (k - 1) * WIDTH + NU + j, self.a[k][i][j]);
+                    }
+                }
+            }
+            for number in 0..ROWS {
+                let row = equalities + k * ROWS + number;
+                b[row] = self.bounds[k * ROWS + number];
+                let (first, values) = match number {
+                    0..5 => (0, self.input[k * SHAPE.input + number]),
+                    5..8 => (NU, self.soft[number - 5]),
+                    8 => (NU, [0.0; NU]),
+                    _ => (
+                        NU + SHAPE.hard_offset,
+                        self.hard[k * SHAPE.hard + number - 9],
+                    ),
+                };
+                (0..NU).for_each(|j| add(row, k * WIDTH + first + j, values[j]));
+                if (5..9).contains(&number) {
+                    add(row, k * WIDTH + NU + NX, -1.0);
+                }
+            }
+        }
+        let places: Vec<(usize, usize)> = entries.iter().map(|entry| (entry.0, entry.1)).collect();
+        let mut a = SparseColumns::from_pattern(m, n, &places);
+        entries
+            .iter()
+            .for_each(|entry| a.set(entry.0, entry.1, entry.2));
+        let diagonal: Vec<(usize, usize)> = (0..n).map(|i| (i, i)).collect();
+        let mut p = SparseColumns::from_pattern(n, n, &diagonal);
+        let mut q = vec![0.0; n];
+        for k in 0..HORIZON {
+            let factor = if k + 1 == HORIZON { 3.0 } else { 1.0 };
+            (0..NU).for_each(|j| p.set(k * WIDTH + j, k * WIDTH + j, self.weight[j]));
+            for i in 0..NX {
+                let at = k * WIDTH + NU + i;
+                p.set(at, at, factor * self.state[i]);
+            }
+            q[k * WIDTH + NU + NX] = PRICE;
+        }
+        let program = ConeProgram {
+            p,
+            q,
+            a,
+            b,
+            cones: vec![Cone::Zero(equalities), Cone::Nonnegative(ROWS * HORIZON)],
+        };
+        let settings = QpSettings {
+            tolerance: 1e-10,
+            max_iterations: 200,
+            accepted_residual: 1e-7,
+            ..QpSettings::default()
+        };
+        let mut solver = QpSolver::new(program, settings).expect("a sound program");
+        assert_eq!(solver.solve(), Outcome::Solved);
+        (0..HORIZON)
+            .flat_map(|k| solver.solution()[k * WIDTH..][..NU].to_vec())
+            .collect()
+    }
+}
+
+#[test]
+fn riccati_finds_clarabels_optimum_of_random_programs_in_both_precisions() {
+    let mut random = Random::new(11);
+    let (mut worst, mut worst_single, mut without, mut most) = (0.0_f64, 0.0_f64, 0, 0);
+    for number in 0..60 {
+        let tightness = [0.02, 1.0, 2.0, 4.0][number % 4];
+        let program = RandomProgram::new(&mut random, tightness);
+        let expected = program.conic();
+        let size = expected.iter().fold(1.0_f64, |size, v| size.max(v.abs()));
+        let off = |found: &[f64]| {
+            let pairs = found.iter().zip(&expected);
+            pairs.fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs())) / size
+        };
+        let (found, report) = program.structured::<f64>(1e-11, 1e-7);
+        assert_eq!(
+            report.outcome,
+            solver::Outcome::Solved,
+            "{number}: {report:?}"
+        );
+        without += usize::from(report.iterations == 0);
+        most = most.max(report.iterations);
+        worst = worst.max(off(&found));
+        let (found, report) = program.structured::<f32>(1e-5, 1e-3);
+        assert_eq!(
+            report.outcome,
+            solver::Outcome::Solved,
+            "{number}: {report:?}"
+        );
+        worst_single = worst_single.max(off(&found));
+    }
+    println!(
+        "f64 {worst:.1e}, f32 {worst_single:.1e}, {without} of 60 without iterations, at most {most}"
+    );
+    assert!(
+        worst < 2e-5 && worst_single < 2e-2,
+        "{worst:e} {worst_single:e}"
+    );
+    assert!((5..55).contains(&without) && most <= 30, "{without} {most}");
+}
+
+#[test]
+fn riccati_commands_clarabels_torques_along_recordings_and_prepares_ahead() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    for name in ["go1-d4", "go1-d6"] {
+        let model =
+            romc::artifact::read(&root.join(format!("models/{name}.json"))).expect("shipped");
+        let path = root.join("examples/recordings/go1/test_02.csv.gz");
+        let recording = romc::recording::read(&path).expect("shipped");
+        let runs = [Solver::Clarabel, Solver::Riccati].map(|solver| {
+            let mut settings = MpcSettings {
+                solver,
+                ..MpcSettings::default()
+            };
+            settings.qp.tolerance = 1e-9;
+            let mut controller = Controller::new(&model, settings).expect("complete");
+            let input = ReferenceInput::Recorded;
+            along_recording(&mut controller, &recording, input, |_, _| {}).expect("sound")
+        });
+        let [conic, structured] = &runs;
+        assert_eq!(conic.rows.len(), structured.rows.len());
+        for (a, b) in conic.rows.iter().zip(&structured.rows) {
+            assert_eq!((a.status, b.iterations), (b.status, 0));
+            for (a, b) in a.torque_nm.iter().zip(b.torque_nm) {
+                assert!(
+                    (a - b).abs() < 1e-6,
+                    "{name} at {}: {a} {b}",
+                    conic.rows[0].time_s
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn riccati_refuses_a_limit_on_rates_by_name() {
+    let settings = MpcSettings {
+        solver: Solver::Riccati,
+        torque_rate_nm_s: Some(100.0),
+        ..MpcSettings::default()
+    };
+    let refused = settings.check().expect_err("no rates").to_string();
+    assert!(refused.contains("torque_rate_nm_s"), "{refused}");
+}
