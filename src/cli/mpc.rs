@@ -161,6 +161,7 @@ pub fn run_json((path, run): &NamedRun) -> Value {
         "friction_violations": summary.friction_violations,
         "implausible_steps": summary.implausible,
         "step_us": summary.step_us,
+        "prepare_us": summary.prepare_us,
         "lift": {
             "torque_r2": summary.lift_r2,
             "commanded_torque_r2": summary.torque_r2,
