@@ -17,7 +17,7 @@ use crate::robot::{InputRule, JOINT_DIM, STATE_DIM};
 const STEPS: usize = 120;
 /// How far measurements are pushed off the jump, times -2 to 2: height (m), pitch (rad), vertical
 /// velocity (m/s).
-const PUSH: [f64; 3] = [0.02, 0.06, 0.3];
+const PUSH: [f64; 3] = [0.05, 0.15, 0.9];
 /// Largest difference of a torque, N m, by precision.
 const TOLERANCE_NM: [f64; 2] = [1e-6, 0.1];
 
