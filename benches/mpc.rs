@@ -163,7 +163,7 @@ fn compare(model: &romc::model::ReducedModel, segments: &[Segment]) {
                 times.solve.push(solve);
                 times
                     .all_rows
-                    .push(by_default(with_all.solver().program()).1);
+                    .push(by_default(conic(&with_all).program()).1);
                 let found = cost_of(conic(&ours).program(), conic(&ours).solution());
                 disagreements += usize::from((found - cost).abs() > 1e-4 * cost.abs().max(1.0));
             }
