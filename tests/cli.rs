@@ -188,10 +188,32 @@ fn report_is_one_page_without_requests_and_its_figures_are_files() {
         "ASLIP, fitted constants",
         "Copy LaTeX",
         "romc simulate",
+        "body.y, body.roll and body.yaw are not modelled",
+        "body.yaw, rad (not modelled)",
+        "class=\"film\"",
     ] {
         assert!(html.contains(part), "{part}");
     }
-    for id in ["encoder", "joints_1", "body_1", "aslip_1", "torques_1"] {
+    assert!(!html.contains("{\"path\""), "JSON in the page");
+    let reasons = value["reasons"].to_string();
+    assert!(
+        reasons.contains("Its training saw none of them."),
+        "{reasons}"
+    );
+    assert!(
+        value["verdict"]
+            .as_str()
+            .expect("words")
+            .starts_with("Good")
+    );
+    for id in [
+        "encoder",
+        "motion_1",
+        "joints_1",
+        "body_1",
+        "aslip_1",
+        "torques_1",
+    ] {
         for kind in ["svg", "pdf", "csv"] {
             let file = Path::new(&figures).join(format!("{id}.{kind}"));
             assert!(file.is_file(), "{}", file.display());

@@ -287,7 +287,7 @@ fn rounding_to_zero_is_told_with_the_term() {
     );
     assert!(text.contains(r"\ddot{z}_1 = 0.75z_1"), "{text}");
     assert!(
-        text.contains("The largest rounding error is 4.9e-3"),
+        text.contains("The largest rounding error is 0.0049, of the term 0.0049 u1 of ddz1"),
         "{text}"
     );
     assert!(text.contains("1 of 2 terms round to zero"), "{text}");
@@ -391,15 +391,82 @@ fn equations_of_width_22_fit_a_column_of_a_two_column_paper() {
         let stem = model.identifier();
         // Columns of 252 pt as in IEEE conference papers.
         let paper = format!(
-            "\\documentclass[10pt,twocolumn]{{article}}\n\\usepackage{{amsmath}}\n\
+            "\\documentclass[10pt,twocolumn]{{article}}\n\\usepackage{{amsmath,booktabs}}\n\
              \\usepackage[textwidth=516pt,columnsep=12pt]{{geometry}}\n\\begin{{document}}\n\
              The model for the contact phase is described by\n\\input{{{stem}}}\n\
-             \\end{{document}}\n"
+             \\input{{{stem}-nomenclature}}\n\\input{{{stem}-table}}\n\\end{{document}}\n"
         );
         files.push(EmittedFile::new("column.tex", paper));
         println!("{}", path.display());
         typeset_document(&files, "column");
+        typeset(&files, stem.as_str());
     }
+}
+
+#[test]
+fn table_is_divided_where_its_column_ends_and_no_earlier() {
+    let model = model("go1-d4.json");
+    let parts = |width_em: f64| {
+        let options = PrintOptions {
+            width_em: Some(width_em),
+            ..PrintOptions::default()
+        };
+        let files = latex::emit(&Equations::as_learned(&model), &options).unwrap();
+        equations(&files, "go1_d4-table.tex")
+    };
+    let wide = parts(60.0);
+    assert_eq!(wide.matches(r"\begin{tabular}").count(), 1, "{wide}");
+    assert!(wide.contains(r"\label{tab:go1-d4}"), "{wide}");
+    assert!(!wide.contains("tab:go1-d4:1"), "{wide}");
+    let narrow = parts(22.0);
+    let n_parts = narrow.matches(r"\begin{tabular}").count();
+    assert!((2..=4).contains(&n_parts), "{narrow}");
+    assert!(
+        narrow.contains("% Labels:\n%   tab:go1-d4\n%   tab:go1-d4:1\n"),
+        "{narrow}"
+    );
+    assert!(
+        narrow.contains(&format!(r"\label{{tab:go1-d4:{n_parts}}}")),
+        "{narrow}"
+    );
+    // a column of numbers each at the least
+    assert_eq!(parts(1.0).matches(r"\begin{tabular}").count(), 8);
+}
+
+#[test]
+fn whole_numbers_are_exact_unless_the_model_is_rounded_itself() {
+    let text = |xi: &[f64], rounding: Rounding| {
+        let library =
+            Library::from_terms(1, &["1".into(), "z1".into(), "sin(dz1)".into()]).unwrap();
+        let model = ReducedModel::builder("whole", library)
+            .phase(Phase {
+                name: "contact".into(),
+                feet: FeetRule::Any,
+                xi: DMatrix::from_column_slice(3, 1, xi),
+            })
+            .build()
+            .unwrap();
+        let options = PrintOptions {
+            rounding,
+            ..PrintOptions::default()
+        };
+        let files = latex::emit(&Equations::as_learned(&model), &options).unwrap();
+        let text = equations(&files, "whole.tex");
+        let start = text.find(r"\ddot{z}_1").unwrap();
+        text[start..].lines().next().unwrap().to_owned()
+    };
+    let default = Rounding::default();
+    let learned = text(&[0.123456, 2.0, -1.0], default);
+    assert_eq!(learned, r"\ddot{z}_1 = 0.12 + 2z_1 - \sin(\dot{z}_1)");
+    // as printed in a paper: two decimals throughout, so that 1.00 is a rounded one
+    let printed = text(&[0.29, -1.22, -1.0], default);
+    assert_eq!(
+        printed,
+        r"\ddot{z}_1 = 0.29 - 1.22z_1 - 1.00\sin(\dot{z}_1)"
+    );
+    let asked = text(&[0.123456, 2.0, -1.0], Rounding::Decimals(2));
+    assert_eq!(asked, r"\ddot{z}_1 = 0.12 + 2.00z_1 - 1.00\sin(\dot{z}_1)");
+    assert_eq!(text(&[1.0, 2.0, 0.0], default), r"\ddot{z}_1 = 1 + 2z_1");
 }
 
 #[test]

@@ -1,10 +1,14 @@
 // Opens a report in headless Chromium at desktop and phone width, light and dark, and fails on
 // anything that a reader would trip over: an error, a request to elsewhere, a page wider than the
-// screen, a serious fault that axe-core finds, a button that does not copy.
+// screen or higher than seven of them, too many sheets of paper, anything that axe-core finds, an
+// animation that does not play, a button that does not copy.
 //
-//   npm install && node check_page.mjs REPORT.html [SCREENSHOT_DIR]
+//   npm install && node check_page.mjs REPORT.html [SCREENSHOT_DIR [PICTURE_DIR]]
+//
+// SCREENSHOT_DIR gets the whole page in each form, PICTURE_DIR the parts that the documentation shows.
 import { createRequire } from "node:module";
 import { resolve } from "node:path";
+import { writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 
 // packages are those of the current folder, so that none need to be installed beside this file
@@ -12,11 +16,13 @@ const require = createRequire(resolve("package.json"));
 const puppeteer = require("puppeteer-core");
 const axe = require.resolve("axe-core/axe.min.js");
 
-const [file, screenshots] = process.argv.slice(2);
+const [file, screenshots, pictures] = process.argv.slice(2);
 if (!file) {
-  console.error("usage: node check_page.mjs REPORT.html [SCREENSHOT_DIR]");
+  console.error("usage: node check_page.mjs REPORT.html [SCREENSHOT_DIR [PICTURE_DIR]]");
   process.exit(2);
 }
+/** Highest page as it opens at 1280 px, and most sheets of A4. */
+const MOST_PX = 6000, MOST_SHEETS = 8;
 const browser = await puppeteer.launch({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
   args: ["--no-sandbox", "--disable-gpu"],
@@ -33,15 +39,32 @@ for (const width of [1280, 390]) {
     await page.setViewport({ width, height: 900, isMobile: width < 600, hasTouch: width < 600 });
     await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: theme }]);
     await page.goto(pathToFileURL(file).href);
-    const wide = await page.evaluate(() => document.documentElement.scrollWidth - window.innerWidth);
+    const [wide, height] = await page.evaluate(() => {
+      const { scrollWidth, scrollHeight } = document.documentElement;
+      return [scrollWidth - window.innerWidth, scrollHeight];
+    });
+    console.log(`${where}: ${height} px high`);
     if (wide > 0) fault(`${wide} px wider than the screen`);
+    if (width === 1280 && height > MOST_PX) fault(`${height} px high, at most ${MOST_PX}`);
     if (screenshots) await page.screenshot({ path: `${screenshots}/report-${width}-${theme}.png`, fullPage: true });
+    if (pictures) await picture(page, width, theme);
     await page.addScriptTag({ path: axe });
-    const { violations } = await page.evaluate(() => axe.run());
-    for (const { id, impact, help, nodes } of violations) {
-      const text = `axe ${impact}: ${id}: ${help} (${nodes.length}, first ${nodes[0].target})`;
-      if (impact === "serious" || impact === "critical") fault(text);
-      else console.log(`${where}: ${text}`);
+    const check = async (state) => {
+      const { violations } = await page.evaluate(() => axe.run());
+      for (const { id, impact, help, nodes } of violations) {
+        fault(`axe ${impact}, ${state}: ${id}: ${help} (${nodes.length}, first ${nodes[0].target})`);
+      }
+    };
+    await check("as opened");
+    await film(page, fault);
+    if (width === 1280 && theme === "light") await print(page, fault);
+    await page.evaluate(() => document.querySelectorAll("details").forEach((details) => { details.open = true; }));
+    await check("all unfolded");
+    if (width === 1280) {
+      const cut = await page.evaluate(() => [...document.querySelectorAll(".scroll")]
+        .filter((region) => region.scrollWidth > region.clientWidth + 1)
+        .map((region) => `${region.ariaLabel}: ${region.scrollWidth - region.clientWidth} px`));
+      cut.forEach((text) => fault(`wider than the page: ${text}`));
     }
     await page.click("button[data-copy]");
     await page.waitForFunction(() => document.querySelector("button[data-copy]").textContent !== "Copy LaTeX", { timeout: 2000 })
@@ -51,5 +74,50 @@ for (const width of [1280, 390]) {
 }
 await browser.close();
 faults.forEach((text) => console.error(text));
-console.log(faults.length ? `${faults.length} faults` : "no fault at 1280 and 390 px, light and dark");
+console.log(faults.length ? `${faults.length} faults` : "no fault at 1280 and 390 px, light, dark and printed");
 process.exit(faults.length ? 1 : 0);
+
+/** The first screen, and the first jump on a dark one. */
+async function picture(page, width, theme) {
+  const name = { "1280-light": "top", "1280-dark": "jump", "390-light": "phone" }[`${width}-${theme}`];
+  if (!name) return;
+  const y = name === "jump" ? await page.$eval("#jumps", (part) => part.getBoundingClientRect().top + window.scrollY) : 0;
+  const clip = { x: 0, y, width, height: width === 390 ? 844 : 1100 };
+  await page.screenshot({ path: `${pictures}/report-${name}.png`, clip, captureBeyondViewport: true });
+}
+
+/** The animation plays, and its slider sets the instant. */
+async function film(page, fault) {
+  const points = () => page.$eval(".film svg g polyline", (line) => line.getAttribute("points"));
+  const before = await points();
+  await page.$eval(".film input", (slider) => {
+    slider.value = 0;
+    slider.dispatchEvent(new Event("input"));
+  });
+  const first = await points();
+  if (first === before) fault("the slider does not move the robot");
+  await page.click(".film button");
+  await page.waitForFunction((old) => document.querySelector(".film svg g polyline").getAttribute("points") !== old,
+    { timeout: 3000 }, first).catch(() => fault("the animation does not play"));
+  await page.click(".film button");
+}
+
+/** The page on paper: few sheets, nothing beyond their edge. */
+async function print(page, fault) {
+  const pdf = Buffer.from(await page.pdf({ format: "A4", preferCSSPageSize: true }));
+  const sheets = pdf.toString("latin1").match(/\/Type\s*\/Page\b(?!s)/g)?.length ?? 0;
+  console.log(`printed: ${sheets} sheets`);
+  if (sheets < 1 || sheets > MOST_SHEETS) fault(`printed on ${sheets} sheets, at most ${MOST_SHEETS}`);
+  if (screenshots) writeFileSync(`${screenshots}/report.pdf`, pdf);
+  await page.emulateMediaType("print");
+  const cut = await page.evaluate(() => {
+    const sheet = document.body;
+    sheet.style.width = "186mm";
+    const edge = sheet.getBoundingClientRect().right + 1;
+    const beyond = [...document.querySelectorAll("table, math, svg, p, pre")].filter((part) => part.getBoundingClientRect().right > edge);
+    sheet.style.width = "";
+    return beyond.map((part) => `${part.tagName} ${part.textContent.slice(0, 30)}`);
+  });
+  cut.forEach((text) => fault(`printed beyond the edge: ${text}`));
+  await page.emulateMediaType("screen");
+}

@@ -3,7 +3,7 @@
 //! Model and recordings are part of the binary, so that the demo runs anywhere.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::json;
@@ -19,6 +19,7 @@ use crate::files::{EmittedFile, Overwrite};
 use crate::model::ReducedModel;
 use crate::report::{Content, assessment_json, baseline_table, control_table, failures, run_table};
 use crate::simplify::Tolerance;
+use crate::train::sha256;
 use crate::typeset::Rounding;
 use crate::{Error, artifact, recording};
 
@@ -76,12 +77,15 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let commands = mpc_command::command_table(&model, &control[0]).csv();
     files.push(EmittedFile::new("commands.csv", commands));
     progress.set_message("drawing the report");
+    let digests = JUMPS.map(|(name, bytes)| (PathBuf::from(name), sha256(bytes)));
     let content = Content {
         model: &model,
         assessment: &evaluation,
         plain: &control[0],
         consistent: &control[1],
         study: None,
+        plan: None,
+        digests: &digests,
     };
     let report = report::page_of(&content, REPORT_TOLERANCE, vec!["romc demo".to_owned()])?;
     files.push(EmittedFile::new("report.html", report.page));

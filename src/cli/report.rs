@@ -15,10 +15,13 @@ use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
 use crate::recording::Recording;
 use crate::report::figures::figure_files;
-use crate::report::{Content, PageOptions, all_figures, page, without_statistics};
+use crate::report::{
+    Content, PageOptions, Verdict, all_figures, page, verdict, without_statistics,
+};
 use crate::simplify::Tolerance;
 use crate::study::{Store, Summary};
-use crate::{Error, artifact};
+use crate::train::sha256;
+use crate::{Error, artifact, recording};
 
 /// Writes the page, and the figures if a folder for them is given.
 ///
@@ -33,7 +36,16 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         None => None,
         Some(folder) => Some(Summary::of(&Store::open(folder)?.cells()?, LAMBDA)),
     };
-    let made = make(&model, &recordings, study.as_ref(), arguments)?;
+    let plan = match &arguments.plan {
+        None => None,
+        Some(path) => Some(recording::read(path)?),
+    };
+    let made = make(
+        &model,
+        &recordings,
+        (study.as_ref(), plan.as_ref()),
+        arguments,
+    )?;
     // The figures come first: files that romc did not make are refused with nothing written.
     let written = match &arguments.figures {
         Some(folder) => write_files(folder, &made.files, overwrite)?,
@@ -41,7 +53,9 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     };
     write_file(&arguments.output, made.page.as_bytes(), overwrite)?;
     let mut text = format!(
-        "{}: {} kB, {} figures\n",
+        "{}\n{}\n\n{}: {} kB, {} figures\n",
+        made.verdict.headline,
+        made.verdict.sentences.join("\n"),
         arguments.output.display(),
         made.page.len() / 1000,
         made.n_figures
@@ -64,6 +78,8 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
             "model": arguments.model.display().to_string(),
             "output": arguments.output.display().to_string(),
             "bytes": made.page.len(),
+            "verdict": made.verdict.headline,
+            "reasons": made.verdict.sentences,
             "figures": names(&written),
             "remarks": made.remarks,
         }),
@@ -74,6 +90,8 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
 pub struct Made {
     /// The page.
     pub page: String,
+    /// Its first words.
+    pub verdict: Verdict,
     /// Every figure as SVG, PDF and CSV.
     pub files: Vec<EmittedFile>,
     /// Number of figures.
@@ -89,7 +107,7 @@ pub struct Made {
 fn make(
     model: &ReducedModel,
     recordings: &[Recording],
-    study: Option<&Summary>,
+    (study, plan): (Option<&Summary>, Option<&Recording>),
     arguments: &ReportArguments,
 ) -> Result<Made, Error> {
     let progress = spinner("rolling the model out");
@@ -101,12 +119,18 @@ fn make(
         false => [Vec::new(), Vec::new()],
     };
     progress.set_message("drawing");
+    let paths = recordings.iter().map(|recording| &recording.path);
+    let digests: Vec<(PathBuf, String)> = paths
+        .filter_map(|path| Some((path.clone(), sha256(&std::fs::read(path).ok()?))))
+        .collect();
     let content = Content {
         model,
         assessment: &assessment,
         plain: &plain,
         consistent: &consistent,
         study,
+        plan: plan.and_then(|recording| recording.segments.first()),
+        digests: &digests,
     };
     let made = page_of(
         &content,
@@ -139,8 +163,10 @@ pub fn page_of(
         ],
         changes: ladder.changes.captioned(changes),
     };
+    let verdict = verdict(content)?;
     Ok(Made {
-        page: page(content, &figures, &options)?,
+        page: page(content, verdict.clone(), &figures, &options)?,
+        verdict,
         files: figures.iter().flat_map(figure_files).collect(),
         n_figures: figures.iter().count(),
         remarks: content.assessment.remarks.clone(),
@@ -162,10 +188,12 @@ fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
         .as_deref()
         .map(|folder| format!(" --study {}", quoted(folder)));
     let study = study.unwrap_or_default();
+    let plan = arguments.plan.as_deref();
+    let plan = plan.map_or(String::new(), |path| format!(" --plan {}", quoted(path)));
     let tolerance = arguments.tolerance;
     let mut commands = vec![
         format!(
-            "romc report {model} {recordings} --restart-every {every} --tolerance {tolerance}{study} --output {}",
+            "romc report {model} {recordings} --restart-every {every} --tolerance {tolerance}{study}{plan} --output {}",
             quoted(&arguments.output)
         ),
         format!("romc simulate {model} {recordings} --restart-every {every}"),

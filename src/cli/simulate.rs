@@ -15,6 +15,7 @@ use crate::report::{
     assessment_json, baseline_table, coordinate_table, dynamics_table, phase_table,
 };
 use crate::typeset::significant;
+use crate::typeset::words::counted;
 use crate::{Error, artifact};
 
 /// Rolls the model out over every segment of every recording.
@@ -30,10 +31,10 @@ pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     let assessment = Assessment::over(&model, &recordings, arguments.restart_every)?;
     progress.finish_and_clear();
     let mut text = format!(
-        "{} over {} segments of {} recordings\n\n{}",
+        "{} over {} of {}\n\n{}",
         arguments.model.display(),
-        assessment.runs.len(),
-        recordings.len(),
+        counted(assessment.runs.len(), "segment"),
+        counted(recordings.len(), "recording"),
         metrics_text(&model, &assessment)
     );
     if let Some(path) = &arguments.output {
@@ -54,7 +55,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
 
 /// All metrics of an assessment as text.
 fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
-    let mut text = format!("{}\n", coordinate_table(assessment));
+    let mut text = format!("{}\n", coordinate_table(model, assessment));
     for (kind, sums) in [
         ("full", &assessment.full),
         ("restarted", &assessment.restarted),

@@ -21,12 +21,16 @@ impl Place {
         }
     }
 
-    /// One segment of a recording.
-    pub fn of_segment(index: usize, run: &SegmentRun<'_>) -> Self {
+    /// One segment of a recording, perhaps of several.
+    pub fn of_segment(index: usize, run: &SegmentRun<'_>, is_one_of_several: bool) -> Self {
         let (path, row) = (&run.segment.path, run.segment.first_row);
+        let mut words = stem(path);
+        if is_one_of_several {
+            words.push_str(&format!(", from row {row}"));
+        }
         Self {
             suffix: (index + 1).to_string(),
-            words: format!("{}, from row {row}", stem(path)),
+            words,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::jump::modelled;
 use crate::evaluate::{
     AslipSums, Assessment, ByContact, ControlMetrics, CoordinateSums, Fit, FitSums, Invariance,
     LinearisedPhase, PredictionError, Run,
@@ -29,28 +30,50 @@ fn coordinates(assessment: &Assessment<'_>) -> Table {
     table
 }
 
-/// Fit of every coordinate, whole and restarted.
-pub fn coordinate_table(assessment: &Assessment<'_>) -> Table {
+/// Fit of every coordinate, whole and restarted; a coordinate that no latent one takes in is marked.
+pub fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     let every = format!("restarted every {} s", assessment.restart_every_s);
     let mut table = coordinates(assessment);
-    for (title, sums) in [
-        ("full rms", &assessment.full),
-        (&every, &assessment.restarted),
+    let first = assessment.runs.first();
+    let modelled = first.and_then(|run| modelled(model, run.segment.x.column(0).into_owned()).ok());
+    let is_modelled = |row: usize| modelled.as_ref().is_none_or(|modelled| modelled[row]);
+    for (title, coefficient, sums) in [
+        ("full rms", "full R^2", &assessment.full),
+        (&every, "restarted R^2", &assessment.restarted),
     ] {
         let fits = sums.fits();
         table.column(title, "", fits.iter().copied().map(rms));
-        table.column("R^2", "", fits.iter().copied().map(r2));
+        let cells = fits
+            .iter()
+            .copied()
+            .enumerate()
+            .map(|(row, fit)| match is_modelled(row) {
+                true => r2(fit),
+                false => "not modelled".into(),
+            });
+        table.column(coefficient, "", cells);
     }
     table
+}
+
+/// Fit of every coordinate, and its restarted residuals in each phase.
+pub fn error_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
+    let mut table = coordinate_table(model, assessment);
+    add_phases(&mut table, model, assessment);
+    table
+}
+
+fn add_phases(table: &mut Table, model: &ReducedModel, assessment: &Assessment<'_>) {
+    for (index, phase) in model.phases().iter().enumerate() {
+        let fits = assessment.restarted.phase_fits(index);
+        table.column(&phase.name, "", fits.into_iter().map(rms));
+    }
 }
 
 /// Restarted residuals of every coordinate, one column per phase.
 pub fn phase_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     let mut table = coordinates(assessment);
-    for (index, phase) in model.phases().iter().enumerate() {
-        let fits = assessment.restarted.phase_fits(index);
-        table.column(&phase.name, "", fits.into_iter().map(rms));
-    }
+    add_phases(&mut table, model, assessment);
     table
 }
 
@@ -154,16 +177,16 @@ pub fn control_table(runs: &[NamedRun]) -> Table {
         .column("x one stage ahead", "mm", |row| {
             millimetres(row.prediction.map(|error| error.body_x_m))
         })
-        .column("z", "mm", |row| {
+        .column("z one stage ahead", "mm", |row| {
             millimetres(row.prediction.map(|error| error.body_z_m))
         })
-        .column("joints", "rad", |row| {
+        .column("joints one stage ahead", "rad", |row| {
             row.prediction.map(|error| error.joints_rad)
         })
         .column("own input: torque R^2 contact", "", |row| {
             row.torque_r2.contact
         })
-        .column("flight", "", |row| row.torque_r2.flight)
+        .column("torque R^2 flight", "", |row| row.torque_r2.flight)
         .column("off after a push", "mm", |row| {
             millimetres(row.recovery_rms_m)
         })
@@ -227,12 +250,16 @@ pub fn run_table(runs: &[NamedRun]) -> Table {
         .column("softened", "", |(_, run)| run.softened)
         .column("failed", "", |(_, run)| run.failed)
         .column("lift R^2 contact", "", |(_, run)| run.lift_r2.contact)
-        .column("flight", "", |(_, run)| run.lift_r2.flight)
+        .column("lift R^2 flight", "", |(_, run)| run.lift_r2.flight)
         .column("limit violations", "", |(_, run)| run.limit_violations)
         .column("friction violations", "", |(_, run)| {
             run.friction_violations
         })
-        .column("median", "us", |(_, run)| format!("{:.0}", run.step_us.p50))
-        .column("p99", "us", |(_, run)| format!("{:.0}", run.step_us.p99))
+        .column("step, median", "us", |(_, run)| {
+            format!("{:.0}", run.step_us.p50)
+        })
+        .column("step, p99", "us", |(_, run)| {
+            format!("{:.0}", run.step_us.p99)
+        })
         .table()
 }

@@ -67,7 +67,8 @@ impl Origin {
     }
 }
 
-fn sha256(bytes: &[u8]) -> String {
+/// SHA-256 of a file's bytes, with the name of the algorithm in front, as provenances have it.
+pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes)
         .iter()
         .fold(String::from("sha256:"), |text, byte| {

@@ -40,7 +40,7 @@ mod smooth;
 mod split;
 mod task;
 
-pub use assemble::{Origin, SourceFile};
+pub use assemble::{Origin, SourceFile, sha256};
 pub use closed_form::closed_form;
 pub use data_sets::Recordings;
 pub use dataset::{MIN_SAMPLES, ScaleOptions};

@@ -31,17 +31,6 @@ impl Default for Rounding {
     }
 }
 
-impl Rounding {
-    /// Whether a coefficient of exactly one is left out before its term:
-    /// fixed decimals keep it, as the paper's `1.00 sin` does.
-    pub fn omits_one(self) -> bool {
-        match self {
-            Rounding::Adaptive { .. } | Rounding::Decimals(_) => false,
-            Rounding::Significant(_) | Rounding::Exact => true,
-        }
-    }
-}
-
 /// A decimal number in print: sign, digits and perhaps a power of ten.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decimal {

@@ -24,6 +24,8 @@ pub struct Equation {
     pub left: Symbol,
     /// Coefficient and candidate term, one entry each.
     pub terms: Vec<Signed>,
+    /// Whether small terms were left out, so that the sides are nearly equal.
+    pub is_approximate: bool,
 }
 
 /// Every candidate term that is printed somewhere, with its coefficients.
@@ -74,7 +76,7 @@ impl Typeset {
             system,
             symbols,
             terms: terms(system, symbols)?,
-            rounder: Rounder::new(rounding),
+            rounder: Rounder::new(rounding, coefficients(system)),
         };
         let systems = system
             .phases()
@@ -88,6 +90,15 @@ impl Typeset {
             rounding: layout.rounder.into_report(),
         })
     }
+}
+
+/// Every coefficient of all equations.
+pub(super) fn coefficients(system: &Equations<'_>) -> impl Iterator<Item = f64> {
+    let summands = system
+        .phases()
+        .iter()
+        .flat_map(|phase| phase.ddz.iter().flatten());
+    summands.map(|summand| summand.coefficient)
 }
 
 struct Layout<'a> {

@@ -7,24 +7,20 @@ use super::equations::{EquationSystem, Typeset};
 use super::error::TypesetError;
 use super::options::PrintOptions;
 use super::tree::{Math, Symbol};
-use super::words;
+use super::words::{self, Spelling};
 use crate::equations::{Equations, Unit};
 
 /// Longest line of an equation unless chosen, in em.
 const WIDTH_EM: f64 = 44.0;
 
 /// How a page spells text and mathematics.
-pub(super) trait Markup {
-    /// Text from outside, so that it shows as it is.
-    fn text(text: &str) -> String;
+pub(super) trait Markup: Spelling {
     /// The equations of a phase.
     fn system(system: &EquationSystem, width_em: f64) -> String;
-    /// A number within a line or cell.
-    fn number(number: &Decimal) -> String;
     /// The head of a column: an acceleration of a phase, with its unit where that is physical.
     fn head(symbol: &Symbol, phase: &str, unit: Option<Unit>) -> String;
     /// The head of a row: a candidate term, with its unit where that is physical.
-    fn term(term: &Math, unit: Option<Unit>) -> String;
+    fn row_head(term: &Math, unit: Option<Unit>) -> String;
 }
 
 /// A page for a template, all parts in the page's markup.
@@ -81,13 +77,13 @@ impl Page {
                     math: M::system(system, width_em),
                 })
                 .collect(),
-            rounding: M::text(&words::rounding(options.rounding, &typeset.rounding)),
+            rounding: words::rounding::<M>(options.rounding, &typeset.rounding),
             heads: columns
                 .map(|(column, (phase, symbol))| M::head(symbol, phase, unit(column)))
                 .collect(),
             rows: (table.rows.iter())
                 .map(|row| RowView {
-                    term: M::term(&row.term.clone().into_math(), row.unit),
+                    term: M::row_head(&row.term.clone().into_math(), row.unit),
                     cells: row.coefficients.iter().map(cell).collect(),
                 })
                 .collect(),

@@ -7,7 +7,7 @@ use crate::equations::Equations;
 use crate::model::AffineMap;
 
 use super::decimal::{Decimal, Rounding};
-use super::equations::{Equation, EquationSystem};
+use super::equations::{Equation, EquationSystem, coefficients};
 use super::error::RobotTypesetError;
 use super::expression::terms;
 use super::rounder::{Rounder, RoundingReport};
@@ -56,7 +56,7 @@ impl RobotTypeset {
         let coordinates = coordinate_symbols(&state.names);
         let terms = terms(system, symbols)?;
         let (encoder, negligible_weights) = encoder(map, &factors, symbols, &coordinates)?;
-        let mut rounder = Rounder::new(rounding);
+        let mut rounder = Rounder::new(rounding, coefficients(system));
         let mut systems = Vec::new();
         for (index, phase) in system.phases().iter().enumerate() {
             let xi = &system.coefficients(index);
@@ -106,7 +106,7 @@ fn encoder(
         .iter()
         .map(|symbol| Signed::plus(Math::Symbol(symbol.clone())))
         .collect();
-    let mut rounder = Rounder::new(Rounding::Significant(3));
+    let mut rounder = Rounder::new(Rounding::Significant(3), std::iter::empty());
     let mut left_out = 0;
     let mut equations = Vec::new();
     for row in 0..encoder.output_dim() {
@@ -124,10 +124,11 @@ fn encoder(
         }
         let smallest = NEGLIGIBLE * weights.amax();
         let is_printed = |weight: f64| weight.abs() >= smallest && weight != 0.0;
-        left_out += weights
+        let absent = weights
             .iter()
             .filter(|w| **w != 0.0 && !is_printed(**w))
             .count();
+        left_out += absent;
         let bias = std::iter::once((encoder.bias()[row], "1", &one));
         let entries = weights
             .iter()
@@ -135,7 +136,10 @@ fn encoder(
             .filter(|(weight, _)| is_printed(**weight))
             .map(|(weight, term)| (*weight, "", term));
         let left = symbols.symbol(Quantity::Position, row + 1);
-        equations.push(rounder.equation(left, ("encoder", ""), bias.chain(entries)));
+        equations.push(Equation {
+            is_approximate: absent > 0,
+            ..rounder.equation(left, ("encoder", ""), bias.chain(entries))
+        });
     }
     Ok((equations, left_out))
 }

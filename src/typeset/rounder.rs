@@ -16,6 +16,10 @@ pub struct Place {
     pub term: String,
     /// The coefficient in full.
     pub coefficient: f64,
+    /// The left side of its equation.
+    pub left: Symbol,
+    /// The term, laid out.
+    pub math: Signed,
 }
 
 /// What rounding for print changed.
@@ -34,20 +38,64 @@ pub struct RoundingReport {
 /// Makes equations out of coefficients and terms, and keeps the record.
 pub(super) struct Rounder {
     rounding: Rounding,
+    /// Whether whole numbers are printed as such, and one is left out before a term.
+    is_exact: bool,
     report: RoundingReport,
 }
 
+/// Share of the coefficients that need every decimal from which a model counts as rounded to them.
+const ROUNDED_SHARE: f64 = 0.6;
+
+/// Whether a whole number among `coefficients` is one exactly: not where it could as well be a
+/// rounded one, because digits were asked for or because the model itself was rounded.
+fn are_whole_exact(rounding: Rounding, coefficients: impl Iterator<Item = f64>) -> bool {
+    let decimals = match rounding {
+        Rounding::Significant(_) | Rounding::Exact => return true,
+        Rounding::Decimals(_) => return false,
+        Rounding::Adaptive { decimals, .. } => decimals,
+    };
+    let needs = |value: f64| {
+        let text = Decimal::exact(value);
+        let after = text
+            .digits()
+            .split_once('.')
+            .map_or(0, |(_, after)| after.len());
+        if text.exponent().is_some() {
+            usize::MAX
+        } else {
+            after
+        }
+    };
+    let (mut count, mut all) = (0, 0);
+    for coefficient in coefficients.filter(|value| *value != 0.0) {
+        match needs(coefficient) {
+            more if more > decimals => return true,
+            needed => {
+                count += 1;
+                all += usize::from(needed == decimals);
+            }
+        }
+    }
+    (all as f64) < ROUNDED_SHARE * f64::from(count)
+}
+
 impl Rounder {
-    pub(super) fn new(rounding: Rounding) -> Self {
+    /// For a model with these coefficients, which may be in any order.
+    pub(super) fn new(rounding: Rounding, coefficients: impl Iterator<Item = f64>) -> Self {
         Self {
             rounding,
+            is_exact: are_whole_exact(rounding, coefficients),
             report: RoundingReport::default(),
         }
     }
 
     /// A coefficient as it is printed.
     pub(super) fn round(&self, coefficient: f64) -> Decimal {
-        Decimal::rounded(coefficient, self.rounding)
+        let is_adaptive = matches!(self.rounding, Rounding::Adaptive { .. });
+        match is_adaptive && self.is_exact && coefficient.fract() == 0.0 {
+            true => Decimal::rounded(coefficient, Rounding::Exact),
+            false => Decimal::rounded(coefficient, self.rounding),
+        }
     }
 
     /// `left = sum of coefficient * term`; each entry carries its term also as text, and
@@ -65,6 +113,8 @@ impl Rounder {
                 output: output.to_owned(),
                 term: text.to_owned(),
                 coefficient,
+                left: left.clone(),
+                math: term.clone(),
             };
             let printed = self.round(coefficient);
             let report = &mut self.report;
@@ -80,14 +130,18 @@ impl Rounder {
             }
             report.largest_relative = report.largest_relative.max(error / coefficient.abs());
             // Only a true one: a rounded 1.00 says how well it is known.
-            let leading = if coefficient.abs() == 1.0 && self.rounding.omits_one() {
+            let leading = if coefficient.abs() == 1.0 && self.is_exact {
                 Leading::Omitted
             } else {
                 Leading::Printed
             };
             terms.push(with_coefficient(&printed, leading, term.clone()));
         }
-        Equation { left, terms }
+        Equation {
+            left,
+            terms,
+            is_approximate: false,
+        }
     }
 
     pub(super) fn into_report(self) -> RoundingReport {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::mathml::HtmlText;
+use super::mathml::HtmlProse;
 
 /// A number with four significant digits; `diverged` for one that is not finite.
 pub fn significant(value: f64) -> String {
@@ -148,6 +148,33 @@ impl Table {
         self.rows.is_empty()
     }
 
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The same cells with a row for each column but the first, whose cells become the titles.
+    pub fn transposed(&self) -> Self {
+        let header = self.header();
+        let corner = header.first().cloned().unwrap_or_default();
+        let titles = self
+            .rows
+            .iter()
+            .map(|row| row.first().cloned().unwrap_or_default());
+        let mut table = Self {
+            caption: self.caption.clone(),
+            ..Self::new(std::iter::once(corner).chain(titles))
+        };
+        for (column, title) in header.into_iter().enumerate().skip(1) {
+            let cells = self
+                .rows
+                .iter()
+                .map(|row| row.get(column).cloned().unwrap_or_default());
+            table.row(std::iter::once(title).chain(cells));
+        }
+        table
+    }
+
     /// Titles of the columns: names, with units after a comma.
     fn header(&self) -> Vec<String> {
         let title = |(name, unit): &(String, String)| match unit.as_str() {
@@ -172,14 +199,14 @@ impl Table {
     pub fn html(&self) -> String {
         let caption = match self.caption.as_str() {
             "" => String::new(),
-            caption => format!("<caption>{}</caption>\n", HtmlText(caption)),
+            caption => format!("<caption>{}</caption>\n", HtmlProse(caption)),
         };
         let header: String = (self.header().iter())
-            .map(|title| format!("<th scope=\"col\">{}</th>", HtmlText(title)))
+            .map(|title| format!("<th scope=\"col\">{}</th>", HtmlProse(title)))
             .collect();
         let cell = |(column, cell): (usize, &String)| match column {
-            0 => format!("<th scope=\"row\">{}</th>", HtmlText(cell)),
-            _ => format!("<td>{}</td>", HtmlText(cell)),
+            0 => format!("<th scope=\"row\">{}</th>", HtmlProse(cell)),
+            _ => format!("<td>{}</td>", HtmlProse(cell)),
         };
         let rows: String = (self.rows.iter())
             .map(|row| row.iter().enumerate().map(cell).collect::<String>())

@@ -1,42 +1,159 @@
-//! Sentences that every printed form of a model carries, as plain text.
+//! Sentences that every printed form of a model carries, in a spelling that the form chooses.
 
 use crate::model::FeetRule;
+use crate::robot::ContactFlags;
 
-use super::decimal::Rounding;
-use super::rounder::RoundingReport;
-use super::table::rounded_up;
+use super::decimal::{Decimal, Rounding};
+use super::rounder::{Place, RoundingReport};
+use super::table::{rounded, rounded_up};
+use super::tree::{Math, Signed, Symbol};
 
 /// Names of the feet in the order of contact flags.
 const FEET: [&str; 4] = ["fr", "fl", "rr", "rl"];
 
-/// When a phase holds, as plain text.
-pub fn feet(rule: &FeetRule) -> String {
-    match rule {
-        FeetRule::Any => "at least one foot on the ground".to_owned(),
-        FeetRule::None => "no foot on the ground".to_owned(),
-        FeetRule::Patterns(patterns) => {
-            let patterns: Vec<String> = patterns
-                .iter()
-                .map(|pattern| {
-                    let feet: Vec<&str> = FEET
-                        .iter()
-                        .zip(pattern)
-                        .filter_map(|(name, on)| on.then_some(*name))
-                        .collect();
-                    if feet.is_empty() {
-                        "none".to_owned()
-                    } else {
-                        feet.join(" ")
-                    }
-                })
-                .collect();
-            format!("feet on the ground: {}", patterns.join(", or "))
+/// How a sentence spells words from outside and mathematics.
+pub trait Spelling {
+    /// Text, so that it shows as it is.
+    fn text(text: &str) -> String;
+    /// A number within a line or cell.
+    fn number(number: &Decimal) -> String;
+    /// A candidate term within a line, which `text` spells in the library's syntax.
+    fn term(math: &Math, text: &str) -> String;
+    /// The left side of an equation within a line, which `text` names.
+    fn left(symbol: &Symbol, text: &str) -> String;
+}
+
+/// The spelling of comments and terminals.
+#[derive(Clone, Copy, Debug)]
+pub struct Plain;
+
+impl Spelling for Plain {
+    fn text(text: &str) -> String {
+        text.to_owned()
+    }
+
+    fn number(number: &Decimal) -> String {
+        let sign = if number.is_negative() { "-" } else { "" };
+        let power = number
+            .exponent()
+            .map_or(String::new(), |power| format!("e{power}"));
+        format!("{sign}{}{power}", number.digits())
+    }
+
+    fn term(_: &Math, text: &str) -> String {
+        text.to_owned()
+    }
+
+    fn left(_: &Symbol, text: &str) -> String {
+        text.to_owned()
+    }
+}
+
+/// `1 jump`, `2 jumps`: a count before the noun that it counts.
+pub fn counted(count: usize, noun: &str) -> String {
+    match count {
+        1 => format!("1 {noun}"),
+        _ => format!("{count} {noun}s"),
+    }
+}
+
+/// How many feet of a pair are on the ground.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Pair {
+    Any,
+    None,
+    AtLeastOne,
+    One,
+    Both,
+}
+
+impl Pair {
+    const ALL: [Self; 5] = [
+        Self::Any,
+        Self::None,
+        Self::AtLeastOne,
+        Self::One,
+        Self::Both,
+    ];
+
+    fn holds(self, feet: [bool; 2]) -> bool {
+        let count = feet.into_iter().filter(|down| *down).count();
+        match self {
+            Self::Any => true,
+            Self::None => count == 0,
+            Self::AtLeastOne => count > 0,
+            Self::One => count == 1,
+            Self::Both => count == 2,
+        }
+    }
+
+    /// Words for a front or rear pair; none where it does not matter.
+    fn words(self, name: &str) -> Option<String> {
+        match self {
+            Self::Any => None,
+            Self::None => Some(format!("no {name} foot")),
+            Self::AtLeastOne => Some(format!("a {name} foot")),
+            Self::One => Some(format!("one {name} foot alone")),
+            Self::Both => Some(format!("both {name} feet")),
         }
     }
 }
 
-/// How coefficients were rounded and what it changed, in one line of plain text.
-pub fn rounding(rule: Rounding, report: &RoundingReport) -> String {
+/// When a phase holds, as plain text: `a front foot on the ground`.
+pub fn feet(rule: &FeetRule) -> String {
+    match rule {
+        FeetRule::Any => "at least one foot on the ground".to_owned(),
+        FeetRule::None => "no foot on the ground".to_owned(),
+        FeetRule::Patterns(patterns) => format!("{} on the ground", pairs(patterns)),
+    }
+}
+
+/// Patterns of feet by front and rear pair where that says the same, one by one otherwise.
+fn pairs(patterns: &[ContactFlags]) -> String {
+    let is_meant = |front: Pair, rear: Pair| {
+        (0..16u8).all(|bits| {
+            let feet: ContactFlags = std::array::from_fn(|foot| bits >> foot & 1 == 1);
+            let holds = front.holds([feet[0], feet[1]]) && rear.holds([feet[2], feet[3]]);
+            holds == patterns.contains(&feet)
+        })
+    };
+    let all = Pair::ALL
+        .into_iter()
+        .flat_map(|front| Pair::ALL.map(|rear| (front, rear)));
+    match all.into_iter().find(|&(front, rear)| is_meant(front, rear)) {
+        Some((Pair::Both, Pair::Both)) => "all four feet".to_owned(),
+        Some((Pair::None, Pair::None)) => "no foot".to_owned(),
+        Some((Pair::Any, Pair::Any)) => "any feet or none".to_owned(),
+        Some((front, rear)) => {
+            let mut words: Vec<String> = [front.words("front"), rear.words("rear")]
+                .into_iter()
+                .flatten()
+                .collect();
+            // what is there comes before what is not
+            words.sort_by_key(|words| words.starts_with("no "));
+            words.join(" and ")
+        }
+        None => patterns
+            .iter()
+            .map(by_name)
+            .collect::<Vec<_>>()
+            .join(", or "),
+    }
+}
+
+/// The feet of one pattern by name.
+fn by_name(pattern: &ContactFlags) -> String {
+    let feet = FEET.iter().zip(pattern).filter(|(_, down)| **down);
+    let feet: Vec<&str> = feet.map(|(name, _)| *name).collect();
+    match feet.as_slice() {
+        [] => "no foot".to_owned(),
+        [foot] => format!("{foot} alone"),
+        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
+    }
+}
+
+/// How coefficients were rounded and what it changed, in a few sentences.
+pub fn rounding<S: Spelling>(rule: Rounding, report: &RoundingReport) -> String {
     let rule = match rule {
         Rounding::Adaptive {
             decimals,
@@ -49,16 +166,18 @@ pub fn rounding(rule: Rounding, report: &RoundingReport) -> String {
         Rounding::Significant(digits) => format!("Coefficients have {digits} significant digits."),
         Rounding::Exact => "Coefficients are printed in full.".to_owned(),
     };
+    let rule = S::text(&rule);
     let error = match &report.largest {
         None => "No coefficient is changed by rounding.".to_owned(),
         Some((error, place)) => format!(
-            "The largest rounding error is {} ({}, {}: {} * {}), the largest relative one {}.",
-            at_most(*error),
-            place.phase,
-            place.output,
-            place.coefficient,
-            place.term,
-            at_most(report.largest_relative)
+            "The largest rounding error is {}, of the term {} of {} in phase {}; no printed \
+             coefficient is off by more than {}{}",
+            S::number(&at_most(*error)),
+            summand::<S>(place),
+            S::left(&place.left, &place.output),
+            S::text(&place.phase),
+            S::number(&at_most(100.0 * report.largest_relative)),
+            S::text(" %.")
         ),
     };
     let dropped = match report.dropped.len() {
@@ -71,7 +190,61 @@ pub fn rounding(rule: Rounding, report: &RoundingReport) -> String {
     format!("{rule} {error}{dropped}")
 }
 
+/// A coefficient with more digits than are printed, before its term.
+fn summand<S: Spelling>(place: &Place) -> String {
+    let coefficient = Decimal::exact(rounded(place.coefficient, 6));
+    let number = S::number(&coefficient);
+    match &place.math {
+        Signed {
+            math: Math::Number(one),
+            ..
+        } if one.is_one() => number,
+        term => format!(
+            "{number} {}",
+            S::term(&term.clone().into_math(), &place.term)
+        ),
+    }
+}
+
 /// Two significant digits that are not below `error`, but for its own last bits.
-fn at_most(error: f64) -> String {
-    format!("{:.1e}", rounded_up(error * (1.0 - 1e-9), 2))
+fn at_most(error: f64) -> Decimal {
+    Decimal::rounded(
+        rounded_up(error * (1.0 - 1e-9), 2),
+        Rounding::Significant(2),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(patterns: &[[u8; 4]]) -> String {
+        let flags = |pattern: &[u8; 4]| pattern.map(|foot| foot == 1);
+        feet(&FeetRule::Patterns(patterns.iter().map(flags).collect()))
+    }
+
+    #[test]
+    fn patterns_read_as_pairs_where_they_are_pairs() {
+        let mut front = Vec::new();
+        for bits in 0..16u8 {
+            let feet: [u8; 4] = std::array::from_fn(|foot| bits >> foot & 1);
+            if feet[0] + feet[1] > 0 {
+                front.push(feet);
+            }
+        }
+        assert_eq!(words(&front), "a front foot on the ground");
+        assert_ne!(words(&front[1..]), "a front foot on the ground");
+        let rear = [[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 1, 1]];
+        assert_eq!(words(&rear), "a rear foot and no front foot on the ground");
+        assert_eq!(
+            words(&[[1, 1, 0, 0]]),
+            "both front feet and no rear foot on the ground"
+        );
+        assert_eq!(words(&[[1, 1, 1, 1]]), "all four feet on the ground");
+        assert_eq!(words(&[[0; 4]]), "no foot on the ground");
+        let trot = [[1, 0, 0, 1], [0, 1, 1, 0]];
+        assert_eq!(words(&trot), "fr and rl, or fl and rr on the ground");
+        let alone = [[1, 0, 0, 0], [1, 1, 1, 0]];
+        assert_eq!(words(&alone), "fr alone, or fr, fl and rr on the ground");
+    }
 }

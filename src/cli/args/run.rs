@@ -150,6 +150,9 @@ pub struct ReportArguments {
     /// Also write each figure as SVG, PDF and CSV into this folder
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,
+    /// The plan that the first jump follows, as `romc plan` writes it: drawn beside that jump
+    #[arg(long, value_name = "PLAN.csv")]
+    pub plan: Option<PathBuf>,
     /// Time between restarts from the recorded state, in seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = real(&RESTART_EVERY))]
     pub restart_every: f64,

@@ -1,7 +1,7 @@
 //! From a panel to marks on a plane; y grows downwards, lengths are points.
 
 use super::figure::{Figure, HeatMap, LinePlot, Panel, Role, StickPlot};
-use super::ticks::{padded, ticks};
+use super::ticks::{number, padded, ticks};
 
 /// Space left of the axes, for their numbers.
 const LEFT: f64 = 38.0;
@@ -214,14 +214,14 @@ fn draw_axes(axes: &Axes, x_label: &str, marks: &mut Vec<Mark>) {
     for value in values {
         let y = axes.y_at(value);
         marks.push(Mark::Rule([LEFT, y, right, y], Paint::Grid));
-        let text = format!("{value:.places$}");
+        let text = number(value, places);
         marks.push(Mark::Text(LEFT - 4.0, y + 3.0, Anchor::End, text));
     }
     let (values, places) = ticks(axes.x.0, axes.x.1, 4);
     for value in values {
         let x = axes.x_at(value);
         marks.push(Mark::Rule([x, bottom, x, bottom + 3.0], Paint::Axis));
-        let text = format!("{value:.places$}");
+        let text = number(value, places);
         marks.push(Mark::Text(x, bottom + 12.0, Anchor::Middle, text));
     }
     marks.push(Mark::Rule([LEFT, bottom, right, bottom], Paint::Axis));
@@ -238,12 +238,7 @@ fn draw_heat(map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec<Mark> {
         height / map.rows.len().max(1) as f64,
     );
     let largest = map.values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-    let mut marks = vec![Mark::Text(
-        left,
-        TOP - 6.0,
-        Anchor::Start,
-        map.title.clone(),
-    )];
+    let mut marks = heat_scale(&map.title, left, largest);
     for (row, name) in map.rows.iter().enumerate() {
         let y = TOP + row as f64 * cell.1;
         let middle = y + 0.5 * cell.1 + 3.0;
@@ -269,6 +264,25 @@ fn draw_heat(map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec<Mark> {
         Anchor::End,
         label,
     ));
+    marks
+}
+
+/// The title, and the shades from zero to the largest magnitude.
+fn heat_scale(title: &str, left: f64, largest: f64) -> Vec<Mark> {
+    const SHADES: usize = 6;
+    const CELL: f64 = 9.0;
+    let text = |x: f64, anchor, words: String| Mark::Text(x, TOP - 6.0, anchor, words);
+    let bar = left + 0.62 * FONT * title.chars().count() as f64 + 16.0;
+    let mut marks = vec![
+        text(left, Anchor::Start, title.to_owned()),
+        text(bar - 3.0, Anchor::End, number(0.0, 0)),
+    ];
+    marks.extend((0..SHADES).map(|shade| {
+        let corner = [bar + CELL * shade as f64, TOP - 14.0, CELL, CELL];
+        Mark::Rectangle(corner, Paint::Heat(shade as f64 / (SHADES - 1) as f64))
+    }));
+    let end = bar + CELL * SHADES as f64 + 3.0;
+    marks.push(text(end, Anchor::Start, number(largest, 2)));
     marks
 }
 

@@ -115,6 +115,7 @@ fn width(text: &str) -> f64 {
         '0'..='9' => 0.556,
         '.' | ',' | ' ' | 'i' | 'l' | 'j' | 't' | 'f' => 0.278,
         '-' | '(' | ')' | 'r' => 0.333,
+        '\u{2212}' | '\u{2080}'..='\u{2089}' => 0.556,
         'm' | 'M' | 'W' => 0.85,
         'A'..='Z' => 0.68,
         _ => 0.53,
@@ -122,13 +123,18 @@ fn width(text: &str) -> f64 {
     FONT * text.chars().map(of).sum::<f64>()
 }
 
-/// A text between parentheses; letters outside Latin-1 become question marks.
+/// A text between parentheses; a minus becomes a dash of its width, indices stand on the line, and other letters outside
+/// Latin-1 become question marks.
 fn escaped(text: &str) -> String {
     let mut out = String::new();
     for letter in text.chars() {
         match letter {
             '(' | ')' | '\\' => out.extend(['\\', letter]),
             ' '..='~' => out.push(letter),
+            '\u{2212}' => out.push_str("\\226"),
+            '\u{2080}'..='\u{2089}' => {
+                out.extend(char::from_digit(u32::from(letter) - 0x2080, 10));
+            }
             _ => match u8::try_from(u32::from(letter)) {
                 Ok(byte) if byte >= 0xA0 => {
                     let _ = write!(out, "\\{byte:03o}");
@@ -147,6 +153,7 @@ mod tests {
     #[test]
     fn text_of_a_file_is_escaped() {
         assert_eq!(escaped("d²(z)\\"), "d\\262\\(z\\)\\\\");
+        assert_eq!(escaped("\u{2212}1 z\u{2081}"), "\\2261 z1");
         assert_eq!(escaped("λ"), "?");
     }
 

@@ -119,6 +119,33 @@ impl Motion {
         }
     }
 
+    /// A plan at the times of the jump that follows it, from where that jump begins; none after the plan's end.
+    pub fn planned(plan: &Segment, followed: &Segment) -> Self {
+        let (starts, times) = ([plan, followed].map(|s| s.time_s.first()), &followed.time_s);
+        let state = |time: f64| {
+            let [Some(plan_start), Some(start)] = starts else {
+                return None;
+            };
+            let since = time - start + plan_start;
+            let after = plan.time_s.partition_point(|&planned| planned < since);
+            let sample = match after {
+                0 => 0,
+                _ if after == plan.len() && since > plan.time_s[after - 1] + 1e-9 => return None,
+                _ => after.min(plan.len() - 1),
+            };
+            let mut x = plan.x.column(sample).into_owned();
+            for axis in [JOINT_DIM, JOINT_DIM + 1] {
+                x[axis] += followed.x[(axis, 0)] - plan.x[(axis, 0)];
+            }
+            Some(x)
+        };
+        Self {
+            role: Role::Restarted,
+            words: "planned".to_owned(),
+            states: times.iter().map(|&time| state(time)).collect(),
+        }
+    }
+
     /// The robot at each time, for drawing.
     pub fn sticks(&self, robot: &Robot, heading_rad: f64) -> Vec<Option<Sticks>> {
         let sticks = |x: &DVector<f64>| Sticks::of(robot, x.as_slice(), heading_rad);
@@ -244,6 +271,33 @@ mod tests {
         {
             assert!((a.0 - b.0).abs() < 1e-12 && (a.1 - b.1).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn plan_starts_where_the_jump_does_and_ends_by_itself() {
+        let segment = |n: usize, step_s: f64, from_m: f64| Segment {
+            path: "plan.csv".into(),
+            first_row: 2,
+            row_stride: 1.0,
+            time_s: (0..n).map(|k| 5.0 * from_m + step_s * k as f64).collect(),
+            x: nalgebra::DMatrix::from_fn(STATE_DIM, n, |row, k| match row {
+                JOINT_DIM => from_m + step_s * k as f64,
+                _ => 0.0,
+            }),
+            dx: nalgebra::DMatrix::zeros(STATE_DIM, n),
+            ddx: nalgebra::DMatrix::zeros(STATE_DIM, n),
+            torque_nm: nalgebra::DMatrix::zeros(JOINT_DIM, n),
+            feet: vec![[true; FOOT_DIM]; n],
+            body_wrench: None,
+        };
+        let (plan, jump) = (segment(101, 0.01, 3.0), segment(601, 0.002, 1.0));
+        let planned = Motion::planned(&plan, &jump);
+        assert_eq!(planned.states.len(), jump.len());
+        let forward = |k: usize| planned.states[k].as_ref().map(|x| x[JOINT_DIM]);
+        assert!((forward(0).unwrap() - 1.0).abs() < 1e-12);
+        assert!((forward(250).unwrap() - 1.5).abs() < 1e-9);
+        assert!((forward(500).unwrap() - 2.0).abs() < 1e-9);
+        assert_eq!(forward(501), None);
     }
 
     #[test]

@@ -19,6 +19,20 @@ pub fn ticks(low: f64, high: f64, count: usize) -> (Vec<f64>, usize) {
     (values, places)
 }
 
+/// A value along an axis or in a title, with so many decimal places and a minus of the width of a plus.
+pub fn number(value: f64, places: usize) -> String {
+    format!("{value:.places$}").replace('-', "\u{2212}")
+}
+
+/// An index below the line.
+pub fn subscript(index: usize) -> String {
+    let below = |digit: char| match digit.to_digit(10) {
+        Some(value) => char::from_u32(0x2080 + value).unwrap_or(digit),
+        None => digit,
+    };
+    index.to_string().chars().map(below).collect()
+}
+
 /// The range of values with a margin; a range around a constant.
 pub fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values
@@ -48,6 +62,12 @@ mod tests {
         let (values, places) = ticks(0.301, 0.309, 3);
         assert_eq!(places, 3);
         assert!(values.iter().all(|v| (0.301..=0.309).contains(v)));
+    }
+
+    #[test]
+    fn numbers_and_indices_use_the_signs_of_print() {
+        assert_eq!(number(-0.25, 1), "\u{2212}0.2");
+        assert_eq!(format!("z{}", subscript(10)), "z\u{2081}\u{2080}");
     }
 
     #[test]

@@ -6,13 +6,15 @@ use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::model::ReducedModel;
 use crate::typeset::TypesetError;
+use crate::typeset::words::{self, Plain, Spelling};
 use crate::typeset::{
-    EquationSystem, NumberStyle, PrintOptions, RobotTypeset, RoundingReport, Typeset, rendered,
-    words,
+    Decimal, EquationSystem, Form, Math, NumberStyle, PrintOptions, RobotTypeset, RoundingReport,
+    Symbol, Typeset, rendered,
 };
 
 use super::escape::{CommentText, TexText, label};
 use super::lines;
+use super::math::{TexMath, TexNumber, TexSymbol};
 use super::nomenclature::{self, Entry};
 use super::table::{self, TableBlock};
 
@@ -24,10 +26,11 @@ use super::table::{self, TableBlock};
 /// - `NAME-nomenclature.tex`: what the symbols mean;
 /// - `NAME-robot.tex`, if the model has encoder and decoder: what the latent coordinates
 ///   are made of, and the accelerations of the robot, in SI units;
-/// - `NAME-preview.tex`: a document that shows them all.
+/// - `NAME-preview.tex`: a document that shows them all, in two columns where the width asked for is
+///   at most [`TWO_COLUMNS_EM`].
 ///
 /// The first lines of `NAME.tex` say how coefficients were rounded, the largest
-/// error that this made, and which terms vanished by it.
+/// error that this made, and which terms vanished by it. Files with labels list them.
 ///
 /// # Errors
 /// [`TypesetError`] if a candidate term has a variable without a symbol.
@@ -39,15 +42,24 @@ pub fn emit(
     let typeset = Typeset::new(system, &options.symbols, options.rounding)?;
     let stem = model.identifier().as_str();
     let header = Header { model, options };
+    let systems = phases(model, &typeset.systems, "", options);
     let equations = EquationsFile {
-        header: header.equations(&typeset.rounding),
-        systems: phases(model, &typeset.systems, "", options),
+        header: header.equations(&typeset.rounding) + &labels(&systems),
+        systems,
     };
-    let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?
-        .map(|robot| robot_equations(model, &robot, system.latent_units().is_some(), &header));
+    let is_physical = system.latent_units().is_some();
+    let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?;
+    let negligible = robot.as_ref().map_or(0, |robot| robot.negligible_weights);
+    let robot = robot.map(|robot| robot_equations(model, &robot, is_physical, &header));
+    let fit = Fit::to(options.width_em);
+    let blocks = table::blocks(&typeset.table, model.name(), options.numbers, &fit);
+    let packages = match blocks.iter().any(|block| block.long) {
+        true => "Needs booktabs and longtable.",
+        false => "Needs booktabs.",
+    };
     let coefficients = Table {
-        header: header.short("Needs booktabs and, for more than 40 terms, longtable."),
-        blocks: table::blocks(&typeset.table, model.name(), options.numbers),
+        header: header.short(packages) + &label_list(blocks.iter().flat_map(TableBlock::labels)),
+        blocks,
     };
     let nomenclature = Nomenclature {
         header: header.short("A table as wide as the line; needs amsmath."),
@@ -58,10 +70,28 @@ pub fn emit(
         name: TexText(model.name()).to_string(),
         description: TexText(model.description()).to_string(),
         stem: stem.to_owned(),
-        phases: equations.systems.iter().map(System::sentence).collect(),
-        rounding: TexText(&words::rounding(options.rounding, &typeset.rounding)).to_string(),
+        phases: (equations.systems.iter().enumerate())
+            .map(|(place, system)| {
+                (
+                    system.introduction(),
+                    model.phase_identifier(place).to_string(),
+                )
+            })
+            .collect(),
+        rounding: words::rounding::<Tex>(options.rounding, &typeset.rounding),
         siunitx: options.numbers == NumberStyle::Siunitx,
-        has_robot: robot.is_some(),
+        two_columns: fit.is_narrow,
+        robot: (robot.iter().flat_map(|robot| &robot.systems))
+            .map(System::sentence)
+            .collect(),
+        latent: match is_physical {
+            true => "latent coordinates and inputs have the units of the list of symbols",
+            false => {
+                "latent coordinates and inputs are scaled: those of the equations above, without a unit, \
+                 accelerations per second squared"
+            }
+        },
+        negligible,
     };
     let mut files = vec![file(format!("{stem}.tex"), &equations)?];
     files.extend(phase_files(model, &equations, &header)?);
@@ -85,7 +115,8 @@ fn phase_files(
     let stem = model.identifier();
     let one_phase = |(place, system): (usize, &System)| {
         let one = EquationsFile {
-            header: header.short("One phase of the equations, with the same label."),
+            header: header.short("One phase of the equations, with the same label.")
+                + &labels(std::slice::from_ref(system)),
             systems: vec![system.clone()],
         };
         file(
@@ -112,29 +143,109 @@ struct EquationsFile {
     systems: Vec<System>,
 }
 
+/// Widest column, in em, for which previews have two.
+pub const TWO_COLUMNS_EM: f64 = 26.0;
+
+/// Equations, tables and lists that are fitted to a column.
+pub(super) struct Fit {
+    /// Width of the column, in em.
+    pub width_em: f64,
+    /// Whether it is one of two, in which no table can break across pages.
+    pub is_narrow: bool,
+}
+
+impl Fit {
+    fn to(width_em: Option<f64>) -> Self {
+        let width_em = width_em.unwrap_or(lines::WIDTH_EM);
+        Self {
+            width_em,
+            is_narrow: width_em <= TWO_COLUMNS_EM,
+        }
+    }
+}
+
+/// Running text of LaTeX.
+struct Tex;
+
+impl Spelling for Tex {
+    fn text(text: &str) -> String {
+        TexText(text).to_string()
+    }
+
+    fn number(number: &Decimal) -> String {
+        let numbers = NumberStyle::Plain;
+        format!("${}$", TexNumber { number, numbers })
+    }
+
+    fn term(math: &Math, _: &str) -> String {
+        let numbers = NumberStyle::Plain;
+        format!("${}$", TexMath { math, numbers })
+    }
+
+    fn left(symbol: &Symbol, _: &str) -> String {
+        format!("${}$", TexSymbol(symbol))
+    }
+}
+
 /// One system of equations in the template.
 #[derive(Clone)]
 struct System {
     /// What it is, in a comment.
     comment: String,
+    /// Name of its phase, escaped for the running text; none for equations of no phase.
+    phase: Option<String>,
     /// When it holds, escaped for the running text.
     condition: String,
     label: String,
     aligned: bool,
     lines: Vec<String>,
+    /// Number of its equations.
+    count: usize,
 }
 
 impl System {
-    /// The number of its equation and when that holds.
+    /// What stands before the equations.
+    fn introduction(&self) -> String {
+        let phase = self.phase.as_deref().unwrap_or_default();
+        format!(r"Phase \emph{{{phase}}}, with {}:", self.condition)
+    }
+
+    /// The numbers of its equations and when they hold.
     fn sentence(&self) -> String {
         let label = &self.label;
-        let number = if self.aligned {
-            format!(r"Equations \eqref{{{label}:1}} and on")
-        } else {
-            format!(r"Equation \eqref{{{label}}}")
+        let number = match (self.aligned, self.count) {
+            (true, 2..) => format!(
+                r"equations \eqref{{{label}:1}} to \eqref{{{label}:{}}}",
+                self.count
+            ),
+            (true, _) => format!(r"equation \eqref{{{label}:1}}"),
+            (false, _) => format!(r"equation \eqref{{{label}}}"),
         };
-        format!("{number}: {}.", self.condition)
+        match &self.phase {
+            Some(phase) => format!(r"phase \emph{{{phase}}}, with {}: {number}", self.condition),
+            None => format!("{}: {number}", self.condition),
+        }
     }
+
+    /// What `\ref` and `\eqref` can name.
+    fn labels(&self) -> String {
+        let label = &self.label;
+        match (self.aligned, self.count) {
+            (true, 2..) => format!("{label}:1 to {label}:{}", self.count),
+            (true, _) => format!("{label}:1"),
+            (false, _) => label.clone(),
+        }
+    }
+}
+
+/// Comment lines that list labels, each line after a line end.
+fn label_list(labels: impl IntoIterator<Item = String>) -> String {
+    let lines = labels.into_iter().map(|label| format!("\n%   {label}"));
+    format!("\n% Labels:{}", lines.collect::<String>())
+}
+
+fn labels(systems: &[System]) -> String {
+    label_list(systems.iter().map(System::labels))
 }
 
 #[derive(Template)]
@@ -170,10 +281,16 @@ struct Preview {
     name: String,
     description: String,
     stem: String,
-    phases: Vec<String>,
+    /// Introduction and identifier of each phase.
+    phases: Vec<(String, String)>,
     rounding: String,
     siunitx: bool,
-    has_robot: bool,
+    two_columns: bool,
+    /// What each system of the robot's equations is; none for a model without a robot.
+    robot: Vec<String>,
+    /// Units of the latent quantities.
+    latent: &'static str,
+    negligible: usize,
 }
 
 /// The systems of a model's phases; `part` tells their labels from those of another file.
@@ -190,12 +307,18 @@ fn phases(
             let label = format!("eq:{}{part}:{}", label(model.name()), label(&system.phase));
             let block = lines::block(system, &label, options);
             let feet = words::feet(&phase.feet);
+            let tall = match options.form == Form::Cases && block.lines.len() > lines::CASES_LINES {
+                true => " Taller than a page as cases: align breaks across pages.",
+                false => "",
+            };
             System {
-                comment: format!("Phase {}: {feet}.", CommentText(&system.phase)),
-                condition: format!("{}, {feet}", TexText(&system.phase)),
+                comment: format!("Phase {}: {feet}.{tall}", CommentText(&system.phase)),
+                phase: Some(TexText(&system.phase).to_string()),
+                condition: feet,
                 aligned: block.aligned,
                 lines: block.lines,
                 label,
+                count: system.equations.len(),
             }
         })
         .collect()
@@ -220,10 +343,12 @@ fn robot_equations(
              their row are left out.",
             robot.negligible_weights
         ),
-        condition: String::new(),
+        phase: None,
+        condition: "latent coordinates".to_owned(),
         aligned: block.aligned,
         lines: block.lines,
         label,
+        count: robot.encoder.len(),
     }];
     systems.extend(phases(model, &robot.systems, "-robot", header.options));
     let latent = match is_physical {
@@ -234,7 +359,11 @@ fn robot_equations(
         "Robot coordinates q in SI units (rad, m); z, u as in the latent equations{latent}."
     );
     EquationsFile {
-        header: format!("{}\n% {note}", header.equations(&robot.rounding)),
+        header: format!(
+            "{}\n% {note}{}",
+            header.equations(&robot.rounding),
+            labels(&systems)
+        ),
         systems,
     }
 }
@@ -263,7 +392,8 @@ impl Header<'_> {
         };
         let mut header = self.short(&format!("For \\input; needs {packages}."));
         header.push_str("\n% ");
-        header.push_str(&CommentText(&words::rounding(self.options.rounding, report)).to_string());
+        let rounding = words::rounding::<Plain>(self.options.rounding, report);
+        header.push_str(&CommentText(&rounding).to_string());
         for place in &report.dropped {
             let (phase, term) = (CommentText(&place.phase), CommentText(&place.term));
             header.push_str(&format!(

@@ -7,14 +7,14 @@ use crate::typeset::{
 use super::math::{TexMath, TexSymbol, TexTerms};
 
 /// Longest line unless chosen, in em.
-const WIDTH_EM: f64 = 32.0;
+pub(super) const WIDTH_EM: f64 = 32.0;
 /// What a continued line is set in by, in em: `\qquad` and the empty group
 /// before its sign.
 const INDENT: f64 = 2.3;
 /// What the brace of `cases` takes of the line, in em.
 const BRACE: f64 = 1.0;
-/// Lines from which [`Form::Automatic`] prefers an environment that breaks across pages.
-const CASES_LINES: usize = 30;
+/// Lines from which [`Form::Automatic`] prefers an environment that breaks across pages: no page holds many more.
+pub(super) const CASES_LINES: usize = 30;
 
 /// The lines of one phase and whether they are for `align`.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,15 +27,27 @@ pub(super) struct Block {
 
 /// Spells the equations of one phase; `label` is the stem of its labels.
 pub(super) fn block(system: &EquationSystem, label: &str, options: &PrintOptions) -> Block {
-    let sides: Vec<Vec<String>> = (system.equations.iter())
-        .map(|equation| right_sides(equation, options))
-        .collect();
-    let count: usize = sides.iter().map(Vec::len).sum();
+    let all = |start: Start| -> Vec<Vec<String>> {
+        let equations = system.equations.iter();
+        let sides = equations.map(|equation| right_sides(equation, start, options));
+        sides.collect()
+    };
+    let lines_of = |sides: &[Vec<String>]| sides.iter().map(Vec::len).sum::<usize>();
+    let in_cases = all(Start::Brace);
     let aligned = match options.form {
-        Form::Automatic => count > CASES_LINES,
+        Form::Automatic => lines_of(&in_cases) > CASES_LINES,
         Form::Cases => false,
         Form::Align => true,
     };
+    let widest = system
+        .equations
+        .iter()
+        .map(|equation| symbol_width(&equation.left));
+    let sides = match aligned {
+        true => all(Start::Aligned(widest.fold(0.0, f64::max))),
+        false => in_cases,
+    };
+    let count = lines_of(&sides);
     // the equations of the phase stand apart if one of them is broken
     let is_spaced = count > sides.len();
     let mut lines = Vec::with_capacity(count);
@@ -63,16 +75,28 @@ pub fn tex_cases(system: &EquationSystem, width_em: f64) -> String {
     format!("\\begin{{cases}}\n  {lines}\n\\end{{cases}}")
 }
 
+/// Where the lines of an equation start.
+#[derive(Clone, Copy)]
+enum Start {
+    /// Behind a brace, at the equation's own left side.
+    Brace,
+    /// Behind the widest left side, in em, continued lines too.
+    Aligned(f64),
+}
+
 /// The right side of an equation, one entry per line.
-fn right_sides(equation: &Equation, options: &PrintOptions) -> Vec<String> {
+fn right_sides(equation: &Equation, start: Start, options: &PrintOptions) -> Vec<String> {
     let numbers = options.numbers;
     if equation.terms.is_empty() {
         let math = &equation.right();
         return vec![TexMath { math, numbers }.to_string()];
     }
-    let available = options.width_em.unwrap_or(WIDTH_EM) - BRACE;
-    let first = symbol_width(&equation.left) + EQUALS;
-    let lines = break_lines(&equation.terms, available, first, INDENT).into_iter();
+    let width = options.width_em.unwrap_or(WIDTH_EM);
+    let (available, first, continued) = match start {
+        Start::Brace => (width - BRACE, symbol_width(&equation.left) + EQUALS, INDENT),
+        Start::Aligned(left) => (width, left + EQUALS, left + INDENT),
+    };
+    let lines = break_lines(&equation.terms, available, first, continued).into_iter();
     let side = |(line, terms)| TexTerms {
         terms,
         numbers,
@@ -96,7 +120,7 @@ fn cases_line(
     // `cases` sets its lines in text style, in which fractions shrink.
     let style = if is_tall { r"\displaystyle " } else { "" };
     let start = match line {
-        0 => format!("{} = ", TexSymbol(&equation.left)),
+        0 => format!("{} {} ", TexSymbol(&equation.left), relation(equation)),
         _ => r"\qquad ".to_owned(),
     };
     let end = match ends {
@@ -108,6 +132,13 @@ fn cases_line(
     format!("{style}{start}{side}{end}")
 }
 
+fn relation(equation: &Equation) -> &'static str {
+    match equation.is_approximate {
+        true => r"\approx",
+        false => "=",
+    }
+}
+
 /// One line of `align`; the last of an equation has its label.
 fn align_line(
     equation: &Equation,
@@ -117,7 +148,7 @@ fn align_line(
     label: &str,
 ) -> String {
     let start = match line {
-        0 => format!("{} &= ", TexSymbol(&equation.left)),
+        0 => format!("{} &{} ", TexSymbol(&equation.left), relation(equation)),
         _ => r"&\qquad ".to_owned(),
     };
     let end = match ends {

@@ -1,24 +1,27 @@
 //! The coefficients as booktabs tables.
 
-use crate::typeset::{CoefficientRow, CoefficientTable, Decimal, NumberStyle};
+use crate::typeset::{CoefficientRow, CoefficientTable, Decimal, NumberStyle, width};
 
+use super::document::Fit;
 use super::escape::{TexText, label};
 use super::math::{TexMath, TexNumber, TexSymbol, TexUnit};
 
-/// Most columns of numbers side by side.
-const WIDEST: usize = 8;
-/// Rows from which a table breaks across pages.
+/// Space around a column, in em: twice LaTeX's `\tabcolsep` at 10 pt.
+const COLUMN_SPACE_EM: f64 = 1.2;
+/// Width of a unit beside a term, in em.
+const UNIT_EM: f64 = 5.0;
+/// Rows from which a table breaks across pages, or is cut where it cannot.
 const LONGEST: usize = 40;
 
-/// One table of at most [`WIDEST`] columns.
+/// One table no wider than its column of text.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TableBlock {
     /// Column specification.
     pub columns: String,
     /// Caption, escaped.
     pub caption: String,
-    /// Label.
-    pub label: String,
+    /// Labels: its own, and for the first that of the whole.
+    pub labels: Vec<String>,
     /// Row of phase names over the columns.
     pub phases: String,
     /// Rules below the phase names.
@@ -31,47 +34,94 @@ pub(super) struct TableBlock {
     pub long: bool,
 }
 
-/// Cuts the table into blocks that fit on a page. Phases share a block when
-/// all of them fit, and stay apart otherwise.
+impl TableBlock {
+    /// What `\ref` can name.
+    pub fn labels(&self) -> Vec<String> {
+        self.labels.clone()
+    }
+}
+
+/// Cuts the table into blocks that fit into a column of text. Phases share a block when
+/// all of them fit, and stay apart otherwise. In one of two columns no table breaks across pages:
+/// there long ones are cut between rows, too.
 pub(super) fn blocks(
     table: &CoefficientTable,
     model_name: &str,
     numbers: NumberStyle,
+    fit: &Fit,
 ) -> Vec<TableBlock> {
-    let mut groups: Vec<Vec<usize>> = Vec::new();
-    let all_fit = table.columns.len() <= WIDEST;
-    for column in 0..table.columns.len() {
-        let fits = groups.last().is_some_and(|group: &Vec<usize>| {
-            let same_phase = table.columns[group[0]].0 == table.columns[column].0;
-            group.len() < WIDEST && (all_fit || same_phase)
-        });
-        match groups.last_mut() {
-            Some(group) if fits => group.push(column),
-            _ => groups.push(vec![column]),
-        }
-    }
-    let count = groups.len();
+    let cuts: Vec<(Vec<usize>, Vec<&CoefficientRow>)> = (groups(table, fit.width_em).into_iter())
+        .flat_map(|columns| {
+            let is_shown = |row: &&CoefficientRow| {
+                columns
+                    .iter()
+                    .any(|&column| row.coefficients[column].is_some())
+            };
+            let rows: Vec<&CoefficientRow> = table.rows.iter().filter(is_shown).collect();
+            let at_once = match fit.is_narrow {
+                true => LONGEST,
+                false => rows.len().max(1),
+            };
+            let parts: Vec<_> = rows.chunks(at_once).map(<[_]>::to_vec).collect();
+            parts.into_iter().map(move |rows| (columns.clone(), rows))
+        })
+        .collect();
+    let count = cuts.len();
     let units = match table.units {
         Some(_) => ". The unit of a coefficient is that of its column over that of its term",
         None => "",
     };
-    let block = |(place, columns): (usize, &Vec<usize>)| {
+    let name = TexText(model_name);
+    let stem = format!("tab:{}", label(model_name));
+    let block = |(place, (columns, rows)): (usize, &(Vec<usize>, Vec<&CoefficientRow>))| {
         let part = match count {
             1 => String::new(),
             _ => format!(", part {} of {count}", place + 1),
         };
-        let name = TexText(model_name);
+        let whole = (place == 0).then(|| stem.clone());
+        let own = (count > 1).then(|| format!("{stem}:{}", place + 1));
         let layout = Layout {
             table,
             columns,
             numbers,
         };
         layout.block(
+            rows,
             format!(r"Coefficients of \texttt{{{name}}}{part}{units}"),
-            format!("tab:{}:{}", label(model_name), place + 1),
+            whole.into_iter().chain(own).collect(),
         )
     };
-    groups.iter().enumerate().map(block).collect()
+    cuts.iter().enumerate().map(block).collect()
+}
+
+/// Columns that stand side by side.
+fn groups(table: &CoefficientTable, width_em: f64) -> Vec<Vec<usize>> {
+    let terms = table.rows.iter().map(|row| {
+        let unit = row.unit.map_or(0.0, |_| UNIT_EM);
+        width(&row.term.clone().into_math()) + unit
+    });
+    let terms = terms.fold(0.0, f64::max) + COLUMN_SPACE_EM;
+    let widths: Vec<f64> = (0..table.columns.len())
+        .map(|column| {
+            let cells = table.rows.iter().map(|row| &row.coefficients[column]);
+            let head = table.units.as_ref().map_or(1.0, |_| UNIT_EM);
+            ColumnWidth::of(cells).em().max(head) + COLUMN_SPACE_EM
+        })
+        .collect();
+    let all_fit = terms + widths.iter().sum::<f64>() <= width_em;
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for column in 0..table.columns.len() {
+        let fits = groups.last().is_some_and(|group: &Vec<usize>| {
+            let same_phase = table.columns[group[0]].0 == table.columns[column].0;
+            let taken: f64 = group.iter().map(|&column| widths[column]).sum();
+            all_fit || same_phase && terms + taken + widths[column] <= width_em
+        });
+        match groups.last_mut() {
+            Some(group) if fits => group.push(column),
+            _ => groups.push(vec![column]),
+        }
+    }
+    groups
 }
 
 struct Layout<'a> {
@@ -81,13 +131,7 @@ struct Layout<'a> {
 }
 
 impl Layout<'_> {
-    fn block(&self, caption: String, label: String) -> TableBlock {
-        let rows: Vec<&CoefficientRow> = self
-            .table
-            .rows
-            .iter()
-            .filter(|row| self.columns.iter().any(|&c| row.coefficients[c].is_some()))
-            .collect();
+    fn block(&self, rows: &[&CoefficientRow], caption: String, labels: Vec<String>) -> TableBlock {
         let (phases, rules) = self.phase_heads();
         let widths: Vec<ColumnWidth> = self
             .columns
@@ -98,7 +142,7 @@ impl Layout<'_> {
         TableBlock {
             columns: format!("l{columns}"),
             caption,
-            label,
+            labels,
             phases,
             rules,
             heads: self.heads(),
@@ -207,6 +251,7 @@ struct ColumnWidth {
     decimals: usize,
     exponent: usize,
     negative_exponent: bool,
+    negative: bool,
 }
 
 impl ColumnWidth {
@@ -214,6 +259,7 @@ impl ColumnWidth {
         let mut width = Self::default();
         for number in numbers.flatten() {
             let (integers, decimals) = places(number.digits());
+            width.negative |= number.is_negative();
             width.integers = width.integers.max(integers);
             width.decimals = width.decimals.max(decimals);
             if let Some(exponent) = number.exponent() {
@@ -223,6 +269,19 @@ impl ColumnWidth {
             }
         }
         width
+    }
+
+    /// Estimated width in print, in em of Computer Modern.
+    fn em(&self) -> f64 {
+        let digits = |count: usize| 0.5 * count as f64;
+        let sign = if self.negative { 0.778 } else { 0.0 };
+        let point = if self.decimals > 0 { 0.278 } else { 0.0 };
+        let power = match self.exponent {
+            0 => 0.0,
+            // a cross with its spaces, 10, and small digits above
+            count => 2.222 + 0.7 * (0.778 + digits(count)),
+        };
+        sign + digits(self.integers + self.decimals) + point + power
     }
 
     /// In the form of siunitx, room for a minus included: `-2.2` or `-1.1e-2`.

@@ -6,6 +6,7 @@ use crate::equations::{Equations, Unit};
 use crate::files::EmittedFile;
 use crate::typeset::latex::{TexMath, TexNumber, TexSymbol, TexUnit, tex_cases};
 use crate::typeset::page::{Markup, Page, rendered};
+use crate::typeset::words::Spelling;
 use crate::typeset::{
     Decimal, EquationSystem, Math, NumberStyle, PrintOptions, Symbol, TypesetError,
 };
@@ -36,18 +37,29 @@ const NUMBERS: NumberStyle = NumberStyle::Plain;
 
 struct Markdown;
 
-impl Markup for Markdown {
+impl Spelling for Markdown {
     fn text(text: &str) -> String {
         MarkdownText(text).to_string()
     }
 
-    fn system(system: &EquationSystem, width_em: f64) -> String {
-        tex_cases(system, width_em)
-    }
-
     fn number(number: &Decimal) -> String {
         let numbers = NUMBERS;
-        format!(" $`{}`$", TexNumber { number, numbers })
+        format!("$`{}`$", TexNumber { number, numbers })
+    }
+
+    fn term(math: &Math, _: &str) -> String {
+        let numbers = NUMBERS;
+        format!("$`{}`$", TexMath { math, numbers })
+    }
+
+    fn left(symbol: &Symbol, _: &str) -> String {
+        format!("$`{}`$", TexSymbol(symbol))
+    }
+}
+
+impl Markup for Markdown {
+    fn system(system: &EquationSystem, width_em: f64) -> String {
+        tex_cases(system, width_em)
     }
 
     fn head(symbol: &Symbol, phase: &str, unit: Option<Unit>) -> String {
@@ -55,9 +67,8 @@ impl Markup for Markdown {
         format!("$`{symbol}`$ {phase}{}", after_comma(unit))
     }
 
-    fn term(math: &Math, unit: Option<Unit>) -> String {
-        let numbers = NUMBERS;
-        format!("$`{}`${}", TexMath { math, numbers }, after_comma(unit))
+    fn row_head(math: &Math, unit: Option<Unit>) -> String {
+        format!("{}{}", Self::term(math, ""), after_comma(unit))
     }
 }
 

@@ -7,7 +7,9 @@
 mod escape;
 mod math;
 mod page;
+mod prose;
 
 pub use escape::HtmlText;
 pub use math::{Mathml, MathmlNumber, MathmlSymbol, MathmlTerms};
-pub use page::{emit, system};
+pub use page::{Html, emit, system};
+pub use prose::HtmlProse;

@@ -6,6 +6,7 @@ use crate::equations::{Equations, Unit};
 use crate::files::EmittedFile;
 use crate::typeset::latex::tex_cases;
 use crate::typeset::page::{Markup, Page, rendered};
+use crate::typeset::words::Spelling;
 use crate::typeset::{
     Decimal, EQUALS, EquationSystem, Math, PrintOptions, Symbol, TypesetError, break_lines,
     symbol_width,
@@ -26,7 +27,8 @@ pub fn system(system: &EquationSystem, width_em: f64) -> String {
         let left = MathmlSymbol(&equation.left);
         let first = symbol_width(&equation.left) + EQUALS;
         let lines = break_lines(&equation.terms, width_em, first, INDENT);
-        let mut head = format!("{left}<mo>=</mo>");
+        let relation = if equation.is_approximate { "≈" } else { "=" };
+        let mut head = format!("{left}<mo>{relation}</mo>");
         if lines.is_empty() {
             let zero = equation.right();
             rows.push_str(&row(&head, &Mathml(&zero).to_string(), 0.0));
@@ -80,19 +82,31 @@ struct Document {
     page: Page,
 }
 
-struct Html;
+/// Text and mathematics for the content of an element.
+#[derive(Clone, Copy, Debug)]
+pub struct Html;
 
-impl Markup for Html {
+impl Spelling for Html {
     fn text(text: &str) -> String {
         HtmlText(text).to_string()
     }
 
-    fn system(equations: &EquationSystem, width_em: f64) -> String {
-        system(equations, width_em)
-    }
-
     fn number(number: &Decimal) -> String {
         format!("<math>{}</math>", MathmlNumber(number))
+    }
+
+    fn term(math: &Math, _: &str) -> String {
+        format!("<math>{}</math>", Mathml(math))
+    }
+
+    fn left(symbol: &Symbol, _: &str) -> String {
+        format!("<math>{}</math>", MathmlSymbol(symbol))
+    }
+}
+
+impl Markup for Html {
+    fn system(equations: &EquationSystem, width_em: f64) -> String {
+        system(equations, width_em)
     }
 
     fn head(symbol: &Symbol, phase: &str, unit: Option<Unit>) -> String {
@@ -101,7 +115,7 @@ impl Markup for Html {
         format!("<math>{symbol}</math><br><small>{phase}{unit}</small>")
     }
 
-    fn term(term: &Math, unit: Option<Unit>) -> String {
+    fn row_head(term: &Math, unit: Option<Unit>) -> String {
         let unit = unit.map(|unit| format!("<small>, {unit}</small>"));
         format!("<math>{}</math>{}", Mathml(term), unit.unwrap_or_default())
     }

@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# Makes pictures for docs/pages.md: printed pages of the shipped models in one and two columns, and the report in
+# Chromium. Run from the root of the repository; needs pdflatex, pdftoppm, chromium and npm, and target/release/romc.
+#
+#   examples/report/pictures.sh [FOLDER]      (target/pictures unless given)
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+romc=$PWD/target/release/romc
+folder=${1:-target/pictures}
+mkdir -p "$folder"
+folder=$(cd "$folder" && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+for model in paper-2d go1-d2 go1-d4 go2-async-d4; do
+  for columns in one two; do
+    width=(); [ "$columns" = one ] || width=(--width 22)
+    "$romc" compile "models/$model.json" --emit latex "${width[@]}" --out-dir "$work/$model-$columns" >/dev/null
+    stem=${model//-/_}
+    (cd "$work/$model-$columns" && for _ in 1 2; do
+      pdflatex -interaction=nonstopmode -halt-on-error "$stem-preview.tex" >log.txt || { tail -20 log.txt; exit 1; }
+    done)
+    # a table or equation that leaves its column by more than a hair of 1 pt
+    if grep -E '^Overfull \\[hv]box \(([2-9]|[0-9]{2,})\.?[0-9]*pt' "$work/$model-$columns/$stem-preview.log"; then
+      echo "$model in $columns column(s): too wide" >&2
+      exit 1
+    fi
+    pdftoppm -r 64 -gray -png -f 1 -l 1 -singlefile "$work/$model-$columns/$stem-preview.pdf" "$folder/$model-$columns"
+    echo "$folder/$model-$columns.png: page 1 of $(pdfinfo "$work/$model-$columns/$stem-preview.pdf" | awk '/^Pages/ { print $2 }')"
+  done
+done
+
+"$romc" report models/go1-d4.json examples/recordings/go1/test_*.csv.gz --output "$work/report.html" >/dev/null
+cp examples/report/package.json "$work"
+(cd "$work" && npm install --silent --no-audit --no-fund && mkdir shots \
+  && node "$OLDPWD/examples/report/check_page.mjs" report.html shots "$folder")
+pdftoppm -r 60 -png -f 1 -l 1 -singlefile "$work/shots/report.pdf" "$folder/report-printed"

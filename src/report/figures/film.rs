@@ -1,0 +1,188 @@
+//! Stick figures in motion: one drawing for a page, and the lines of each instant for the page's script.
+
+use std::fmt::Write as _;
+
+use super::figure::Role;
+use super::sticks::{Extent, Motion, Sticks};
+use crate::robot::Robot;
+use crate::typeset::mathml::HtmlText;
+
+/// Instants of an animation at most.
+const MOST_FRAMES: usize = 72;
+
+/// An animation: the drawing at its first instant in sight, and the lines of every instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Film {
+    /// An `svg` element with a `g` for each motion, which holds a polyline for each of [`Sticks::NAMES`].
+    pub svg: String,
+    /// JSON: `{"time": [s], "lines": [[motion][instant]]}` with the points of all lines of a motion at an instant, joined
+    /// by semicolons as `polyline` takes them; empty where there is no prediction.
+    pub frames: String,
+    /// The instant that the drawing shows: the highest point of the first motion.
+    pub shown: usize,
+    /// Number of instants.
+    pub count: usize,
+    /// Time of the instant that is shown, from the first sample, in s.
+    pub shown_s: f64,
+    /// What each line means.
+    pub legend: Vec<(Role, String)>,
+}
+
+/// Points of all lines in mm, y downwards.
+fn points(sticks: &Sticks) -> Vec<String> {
+    let point = |&(forward, up): &(f64, f64)| format!("{:.0},{:.0}", 1e3 * forward, -1e3 * up);
+    let line = |line: &Vec<(f64, f64)>| line.iter().map(point).collect::<Vec<_>>().join(" ");
+    sticks.lines.iter().map(line).collect()
+}
+
+/// Middle of the trunk: forward and up, in m.
+fn middle(sticks: &Sticks) -> (f64, f64) {
+    let trunk = &sticks.lines[0];
+    (
+        0.5 * (trunk[0].0 + trunk[2].0),
+        0.5 * (trunk[0].1 + trunk[2].1),
+    )
+}
+
+/// The animation of `motions` over `time_s`, seen from the right of a robot that looks along `heading_rad`.
+pub fn film(
+    robot: &Robot,
+    (time_s, motions): (&[f64], &[Motion]),
+    (heading_rad, floor_m): (f64, f64),
+) -> Film {
+    let stride = time_s.len().div_ceil(MOST_FRAMES).max(1);
+    let chosen: Vec<usize> = (0..time_s.len()).step_by(stride).collect();
+    let sticks: Vec<Vec<Option<Sticks>>> = (motions.iter())
+        .map(|motion| {
+            let all = motion.sticks(robot, heading_rad);
+            (chosen.iter())
+                .map(|&sample| all.get(sample).cloned().flatten())
+                .collect()
+        })
+        .collect();
+    let height = |sticks: &Option<Sticks>| sticks.as_ref().map_or(f64::MIN, |s| middle(s).1);
+    let first = sticks.first().map_or(&[][..], Vec::as_slice);
+    let shown = (0..first.len())
+        .max_by(|&a, &b| height(&first[a]).total_cmp(&height(&first[b])))
+        .unwrap_or(0);
+    let extent = Extent::around(sticks.iter().flatten().flatten(), floor_m);
+    let start_s = time_s.first().copied().unwrap_or(0.0);
+    let times: Vec<f64> = (chosen.iter())
+        .map(|&sample| (1e3 * (time_s[sample] - start_s)).round() / 1e3)
+        .collect();
+    let lines: Vec<Vec<String>> = (sticks.iter())
+        .map(|motion| {
+            let joined = |sticks: &Option<Sticks>| {
+                sticks
+                    .as_ref()
+                    .map_or(String::new(), |s| points(s).join(";"))
+            };
+            motion.iter().map(joined).collect()
+        })
+        .collect();
+    let roles: Vec<Role> = motions.iter().map(|motion| motion.role).collect();
+    Film {
+        svg: svg(&roles, &sticks, shown, extent, floor_m),
+        frames: serde_json::json!({ "time": times, "lines": lines }).to_string(),
+        shown,
+        count: chosen.len(),
+        shown_s: times.get(shown).copied().unwrap_or(0.0),
+        legend: (motions.iter())
+            .map(|motion| (motion.role, motion.words.clone()))
+            .collect(),
+    }
+}
+
+fn svg(
+    roles: &[Role],
+    sticks: &[Vec<Option<Sticks>>],
+    shown: usize,
+    extent: Extent,
+    floor_m: f64,
+) -> String {
+    let (x, z) = (extent.forward_m, extent.up_m);
+    let millimetres = |value: f64| (1e3 * value).round();
+    let (left, top) = (millimetres(x.0), -millimetres(z.1));
+    let (width, height) = (millimetres(x.1 - x.0), millimetres(z.1 - z.0));
+    let floor = -millimetres(floor_m);
+    let mut text = format!(
+        "<svg class=\"sticks\" viewBox=\"{left} {top} {width} {height}\" role=\"img\" aria-label=\"{}\">\
+         <line class=\"floor\" x1=\"{left}\" y1=\"{floor}\" x2=\"{}\" y2=\"{floor}\"/>",
+        HtmlText("The robot from its right, recorded and predicted"),
+        left + width
+    );
+    for (role, motion) in roles.iter().zip(sticks) {
+        let path: Vec<String> = (motion.iter().flatten())
+            .map(|sticks| {
+                let (forward, up) = middle(sticks);
+                format!("{:.0},{:.0}", 1e3 * forward, -1e3 * up)
+            })
+            .collect();
+        let path = path.join(" ");
+        let _ = write!(
+            text,
+            "<polyline class=\"{} path\" points=\"{path}\"/>",
+            role.class()
+        );
+    }
+    for (role, motion) in roles.iter().zip(sticks) {
+        let _ = write!(text, "<g class=\"{}\">", role.class());
+        let now = motion
+            .get(shown)
+            .and_then(Option::as_ref)
+            .map(points)
+            .unwrap_or_default();
+        for line in 0..Sticks::NAMES.len() {
+            let points = now.get(line).map_or("", String::as_str);
+            let _ = write!(text, "<polyline points=\"{points}\"/>");
+        }
+        text.push_str("</g>");
+    }
+    text + "</svg>"
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::*;
+    use crate::robot::STATE_DIM;
+
+    #[test]
+    fn film_has_every_instant_and_shows_the_highest() {
+        let state = |height: f64| {
+            let mut x = DVector::zeros(STATE_DIM);
+            x[14] = height;
+            Some(x)
+        };
+        let heights: Vec<f64> = (0..201)
+            .map(|k| 0.3 - (f64::from(k) - 120.0).powi(2) / 1e5)
+            .collect();
+        let recorded = Motion {
+            role: Role::Recorded,
+            words: "recorded".to_owned(),
+            states: heights.iter().map(|&height| state(height)).collect(),
+        };
+        let mut predicted = recorded.clone();
+        predicted.role = Role::Full;
+        predicted.states[150..].fill(None);
+        let time_s: Vec<f64> = (0..201).map(|k| 1.0 + 0.002 * f64::from(k)).collect();
+        let robot = Robot::by_name("go1").unwrap();
+        let motions = [recorded, predicted];
+        let film = film(robot, (&time_s, &motions), (0.0, 0.0));
+        assert!(film.count <= MOST_FRAMES && film.count > MOST_FRAMES / 2);
+        assert!((film.shown_s - 0.24).abs() < 0.003, "{}", film.shown_s);
+        let frames: serde_json::Value = serde_json::from_str(&film.frames).unwrap();
+        assert_eq!(frames["time"].as_array().unwrap().len(), film.count);
+        let last = |motion: usize| frames["lines"][motion][film.count - 1].as_str().unwrap();
+        assert_eq!(last(0).split(';').count(), Sticks::NAMES.len());
+        assert_eq!(last(1), "");
+        // the drawing holds the lines of the instant that it shows
+        let shown = frames["lines"][0][film.shown].as_str().unwrap();
+        assert!(
+            shown
+                .split(';')
+                .all(|line| film.svg.contains(&format!("\"{line}\"")))
+        );
+    }
+}

@@ -1,0 +1,289 @@
+//! The figures of one jump: recorded beside predicted, pendulums, robots as sticks.
+
+use nalgebra::DVector;
+
+use super::figures::{
+    Figure, Film, LinePlot, Motion, Panel, Role, Series, film, film_strip, floor_m, subscript,
+};
+use super::place::Place;
+use crate::evaluate::{Assessment, FitSums, SegmentRun};
+use crate::model::{ModelError, ReducedModel};
+use crate::recording::Segment;
+use crate::robot::{JOINT_DIM, STATE_DIM};
+use crate::sim::Rollout;
+
+/// Instants of a film strip.
+const FRAMES: usize = 10;
+
+/// Yaw at the first sample, in rad.
+pub(super) fn heading_rad(segment: &Segment) -> f64 {
+    segment.x[(STATE_DIM - 1, 0)]
+}
+
+/// Whether each coordinate of the robot enters a latent one at the state `x` (18).
+///
+/// # Errors
+/// [`ModelError`] for a model without encoder.
+pub fn modelled(model: &ReducedModel, x: DVector<f64>) -> Result<Vec<bool>, ModelError> {
+    let weights = model.encoder_jacobian(&x)?;
+    let columns = weights.column_iter();
+    Ok(columns.map(|column| column.amax() != 0.0).collect())
+}
+
+/// A value of every sample; none where a rollout did not arrive.
+type Samples = Vec<Option<DVector<f64>>>;
+
+/// One segment of a recording beside its rollouts.
+pub(super) struct Jump<'a> {
+    pub model: &'a ReducedModel,
+    pub assessment: &'a Assessment<'a>,
+    pub run: &'a SegmentRun<'a>,
+    pub place: Place,
+}
+
+impl Jump<'_> {
+    /// The robot as it moved and as the model predicts it over the whole jump, as a strip and as an animation; none for a
+    /// model without a robot.
+    pub fn motion(&self, plan: Option<&Segment>) -> Result<Option<(Figure, Film)>, ModelError> {
+        let Ok(robot) = self.model.robot() else {
+            return Ok(None);
+        };
+        let segment = self.run.segment;
+        let mut motions = Vec::from(self.motions()?);
+        motions.extend(plan.map(|plan| Motion::planned(plan, segment)));
+        let caption = match plan {
+            Some(_) => "planned, recorded, and predicted over the whole jump",
+            None => "recorded, and predicted over the whole jump",
+        };
+        let names = (
+            format!("motion_{}", self.place.suffix),
+            format!("{}: {caption}.", self.place.words),
+        );
+        let from = (heading_rad(segment), floor_m(robot, segment));
+        let motions = (segment.time_s.as_slice(), motions.as_slice());
+        Ok(Some((
+            film_strip(robot, names, motions, from, FRAMES),
+            film(robot, motions, from),
+        )))
+    }
+
+    /// What was recorded, and the rollout over the whole jump; coordinates that the model does not
+    /// encode stay as recorded.
+    fn motions(&self) -> Result<[Motion; 2], ModelError> {
+        let recorded = &self.run.segment.x;
+        let modelled = modelled(self.model, recorded.column(0).into_owned())?;
+        let mut states = self.decoded(&self.run.full)?;
+        for (sample, state) in states.iter_mut().enumerate() {
+            let Some(state) = state else { continue };
+            for row in (0..STATE_DIM).filter(|&row| !modelled[row]) {
+                state[row] = recorded[(row, sample)];
+            }
+        }
+        let predicted = Motion {
+            role: Role::Full,
+            words: "model, whole jump".to_owned(),
+            states,
+        };
+        Ok([Motion::recorded(self.run.segment), predicted])
+    }
+
+    /// A function's value at every predicted sample.
+    fn predicted(
+        &self,
+        rollout: &Rollout,
+        value: impl Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>, ModelError>,
+    ) -> Result<Samples, ModelError> {
+        let states = rollout
+            .states(self.run.latent.len())
+            .into_iter()
+            .enumerate();
+        states
+            .map(|(sample, state)| state.map(|(z, dz)| value(sample, &z, &dz)).transpose())
+            .collect()
+    }
+
+    /// Coordinates of the robot along a rollout.
+    fn decoded(&self, rollout: &Rollout) -> Result<Samples, ModelError> {
+        self.predicted(rollout, |_, z, _| self.model.decode(z))
+    }
+
+    fn series(&self, role: Role, value: impl Fn(usize) -> Option<f64>) -> Series {
+        let times = self.run.latent.time_s.iter().enumerate();
+        Series {
+            role,
+            points: times.map(|(k, &time)| (time, value(k))).collect(),
+        }
+    }
+
+    /// Lines over the samples; flight is shaded.
+    fn panel(&self, title: String, series: Vec<Series>) -> Panel {
+        Panel::Lines(LinePlot {
+            title,
+            series,
+            shaded: self.flights(),
+        })
+    }
+
+    /// Times without a foot down.
+    fn flights(&self) -> Vec<(f64, f64)> {
+        let time = &self.run.segment.time_s;
+        let mut spans: Vec<(f64, f64)> = Vec::new();
+        let mut airborne = false;
+        for (sample, feet) in self.run.segment.feet.iter().enumerate() {
+            let in_air = !feet.contains(&true);
+            match (spans.last_mut(), in_air, airborne) {
+                (Some(span), true, true) => span.1 = time[sample],
+                (_, true, _) => spans.push((time[sample], time[sample])),
+                (_, false, _) => {}
+            }
+            airborne = in_air;
+        }
+        spans
+    }
+
+    /// A figure of rollouts beside the recording; `id` gets the number of the jump.
+    fn rollout_figure(&self, id: &str, caption: String, panels: Vec<Panel>) -> Figure {
+        let every = self.assessment.restart_every_s;
+        let restarted = format!("model, restarted every {every} s");
+        let legend = [
+            (Role::Recorded, "recorded"),
+            (Role::Full, "model, whole jump"),
+            (Role::Restarted, &restarted),
+        ];
+        let id = format!("{id}_{}", self.place.suffix);
+        Figure::over_time(id, caption, panels, &legend)
+    }
+
+    /// A recorded line with the two of the rollouts.
+    fn beside_rollouts(
+        &self,
+        title: String,
+        recorded: impl Fn(usize) -> f64,
+        [full, restarted]: [&Samples; 2],
+        row: usize,
+    ) -> Panel {
+        let of = |samples: &Samples, k: usize| samples[k].as_ref().map(|values| values[row]);
+        let series = vec![
+            self.series(Role::Recorded, |k| Some(recorded(k))),
+            self.series(Role::Full, |k| of(full, k)),
+            self.series(Role::Restarted, |k| of(restarted, k)),
+        ];
+        self.panel(title, series)
+    }
+
+    /// Figures 7, 13 and 14 of the paper: joints, then body.
+    pub fn coordinates(&self) -> Result<[Figure; 2], ModelError> {
+        let (names, units) = (&self.assessment.names, &self.assessment.units);
+        let full = self.decoded(&self.run.full)?;
+        let restarted = self.decoded(&self.run.restarted)?;
+        let modelled = modelled(self.model, self.run.segment.x.column(0).into_owned())?;
+        let panel = |row: usize| {
+            let recorded = |k| self.run.segment.x[(row, k)];
+            let title = format!("{}, {}", names[row], units[row]);
+            match modelled[row] {
+                true => self.beside_rollouts(title, recorded, [&full, &restarted], row),
+                false => {
+                    let line = self.series(Role::Recorded, |k| Some(recorded(k)));
+                    self.panel(format!("{title} (not modelled)"), vec![line])
+                }
+            }
+        };
+        let figure = |id: &str, what: &str, rows: std::ops::Range<usize>| {
+            let caption = format!(
+                "{what} of {}: recorded, and decoded from the model's rollouts. Grey: flight.",
+                self.place.words
+            );
+            self.rollout_figure(id, caption, rows.map(panel).collect())
+        };
+        let body = JOINT_DIM..names.len();
+        Ok([
+            figure("joints", "Joint angles", 0..JOINT_DIM),
+            figure("body", "Body position and orientation", body),
+        ])
+    }
+
+    /// Figure 12 of the paper.
+    pub fn accelerations(&self) -> Result<Figure, ModelError> {
+        let latent = &self.run.latent;
+        let ddz = |k: usize, z: &DVector<f64>, dz: &DVector<f64>| {
+            let u_lat = latent.u_lat.column(k).into_owned();
+            self.model.ddz(latent.phase[k], z, dz, &u_lat)
+        };
+        let full = self.predicted(&self.run.full, ddz)?;
+        let restarted = self.predicted(&self.run.restarted, ddz)?;
+        let panel = |row: usize| {
+            let title = format!("d²z{}/dt²", subscript(row + 1));
+            let recorded = |k| latent.ddz[(row, k)];
+            self.beside_rollouts(title, recorded, [&full, &restarted], row)
+        };
+        let caption = format!(
+            "Latent accelerations of {} (scaled units): encoded from the recording, and by the model along its rollouts.",
+            self.place.words
+        );
+        let panels = (0..self.model.latent_dim()).map(panel).collect();
+        Ok(self.rollout_figure("latent_accelerations", caption, panels))
+    }
+
+    /// Figure 8 of the paper, with the fitted pendulum beside the published one.
+    pub fn baselines(&self) -> Result<Figure, ModelError> {
+        let run = self.run;
+        let full = self.decoded(&run.full)?;
+        let roles = [Role::Baseline, Role::SecondBaseline];
+        let panel = |row: usize, axis: usize, title: &str| {
+            let mut lines = vec![
+                self.series(Role::Recorded, |k| Some(run.segment.x[(row, k)])),
+                self.series(Role::Full, |k| full[k].as_ref().map(|x| x[row])),
+            ];
+            lines.extend(
+                roles
+                    .into_iter()
+                    .zip(&run.baselines)
+                    .map(|(role, rollout)| {
+                        let position =
+                            |k: usize| rollout.position_m[k].map(|position| position[axis]);
+                        self.series(role, position)
+                    }),
+            );
+            self.panel(title.to_owned(), lines)
+        };
+        let mut legend = vec![
+            (Role::Recorded, "recorded"),
+            (Role::Full, "model, whole jump"),
+        ];
+        let names = self.assessment.baselines.iter().map(|b| b.name);
+        legend.extend(roles.into_iter().zip(names));
+        let caption = format!(
+            "Body position of {}: the learned model and the pendulum under the same recorded forces.",
+            self.place.words
+        );
+        let panels = vec![
+            panel(JOINT_DIM, 0, "body.x, m"),
+            panel(JOINT_DIM + 2, 1, "body.z, m"),
+        ];
+        Ok(Figure {
+            panel_size: (360.0, 180.0),
+            columns: 2,
+            ..Figure::over_time(
+                format!("aslip_{}", self.place.suffix),
+                caption,
+                panels,
+                &legend,
+            )
+        })
+    }
+
+    /// Root mean square errors of body x and z over the whole jump, in m; none where the rollout arrives nowhere.
+    pub fn body_rms_m(&self) -> Result<[Option<f64>; 2], ModelError> {
+        let predicted = self.decoded(&self.run.full)?;
+        let of = |row: usize| {
+            let mut sums = FitSums::default();
+            for (sample, state) in predicted.iter().enumerate() {
+                if let Some(state) = state {
+                    sums.add(self.run.segment.x[(row, sample)], state[row]);
+                }
+            }
+            sums.fit().map(|fit| fit.rms)
+        };
+        Ok([JOINT_DIM, JOINT_DIM + 2].map(of))
+    }
+}

@@ -1,0 +1,240 @@
+//! Sections below the equations: words, tables and figures about one thing each, and the tiles at the top.
+
+use super::contents::{AllFigures, Content};
+use super::control::without_statistics;
+use super::figures::Figure;
+use super::page::{FigureView, PageOptions, figure_view, prose};
+use super::tables::{
+    baseline_table, body_rms, control_table, dynamics_table, error_table, failures,
+    invariance_table, run_table,
+};
+use crate::evaluate::{Baseline, CoordinateSums, Invariance};
+use crate::typeset::{Table, rounded, significant};
+
+/// A section in the template, escaped.
+pub(super) struct Section {
+    pub id: &'static str,
+    pub title: &'static str,
+    pub paragraphs: Vec<String>,
+    pub tables: Vec<Table>,
+    /// Tables whose captions are the summaries that unfold them.
+    pub folded: Vec<Table>,
+    pub figures: Vec<FigureView>,
+}
+
+impl Section {
+    fn new(id: &'static str, title: &'static str, paragraphs: &[&str]) -> Self {
+        Self {
+            id,
+            title,
+            paragraphs: paragraphs.iter().map(|text| prose(text)).collect(),
+            tables: Vec::new(),
+            folded: Vec::new(),
+            figures: Vec::new(),
+        }
+    }
+
+    /// Adds paragraphs.
+    fn and(mut self, notes: impl IntoIterator<Item = String>) -> Self {
+        self.paragraphs
+            .extend(notes.into_iter().map(|note| prose(&note)));
+        self
+    }
+
+    /// Adds figures and tables.
+    fn with(self, figures: &[Figure], tables: impl IntoIterator<Item = Table>) -> Self {
+        Self {
+            tables: tables.into_iter().collect(),
+            figures: figures.iter().map(figure_view).collect(),
+            ..self
+        }
+    }
+
+    /// Adds tables that are folded away.
+    fn folding(mut self, tables: impl IntoIterator<Item = Table>) -> Self {
+        self.folded
+            .extend(tables.into_iter().filter(|table| !table.is_empty()));
+        self
+    }
+}
+
+/// The numbers at the top of the page, each with its name.
+pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
+    let Content {
+        model, assessment, ..
+    } = content;
+    let every = assessment.restart_every_s;
+    let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
+    let errors = |sums: &CoordinateSums| {
+        let [x, z] = body_rms(assessment, sums)
+            .map(|rms| rms.map_or("-".to_owned(), |rms| rounded(1e3 * rms, 2).to_string()));
+        format!("{x}, {z} mm")
+    };
+    let tile = |name: &str, value: String| (name.to_owned(), value);
+    vec![
+        tile("latent coordinates", model.latent_dim().to_string()),
+        tile(
+            "active terms, all phases",
+            assessment.active_terms.to_string(),
+        ),
+        tile(
+            "body x, z: rms error over whole jumps",
+            errors(&assessment.full),
+        ),
+        tile(
+            &format!("body x, z: rms error, restarted every {every} s"),
+            errors(&assessment.restarted),
+        ),
+        tile(
+            "torque R² of the plain lift, contact",
+            shown(assessment.lift.torque_r2().contact),
+        ),
+        tile(
+            "combined loss of accuracy and size, L_mod",
+            shown(assessment.combined_loss()),
+        ),
+    ]
+}
+
+/// The sections below the jumps, in their order.
+pub(super) fn sections(
+    content: &Content<'_>,
+    figures: &AllFigures,
+    options: &PageOptions,
+) -> Vec<Section> {
+    let Content {
+        model, assessment, ..
+    } = *content;
+    let every = assessment.restart_every_s;
+    let by_phase = format!(
+        "Root mean square errors over whole jumps and restarted every {every} s; on the right those of each phase, restarted"
+    );
+    let mut sections = vec![
+        Section::new("coordinates", "Errors of every coordinate", &[])
+            .with(&[], [error_table(model, assessment).captioned(by_phase)]),
+        Section::new(
+            "stability",
+            "Phases, stability and inputs",
+            &[DYNAMICS_WORDS],
+        )
+        .with(
+            &[],
+            std::iter::once(dynamics_table(model, assessment).captioned("Each phase of the model"))
+                .chain(Invariance::of(model).ok().as_ref().map(invariance_table)),
+        ),
+        beside_pendulum(content),
+        control(content),
+        Section::new(
+            "latent",
+            "Composition of the latent coordinates",
+            &[ENCODER_WORDS],
+        )
+        .with(&figures.encoder, []),
+        simplification(options),
+        Section::new("study", "How many latent coordinates", &[STUDY_WORDS])
+            .with(&figures.study, []),
+    ];
+    sections.retain(|section| match section.id {
+        "simplification" => !section.folded.is_empty(),
+        "study" => !section.figures.is_empty(),
+        _ => true,
+    });
+    sections
+}
+
+fn beside_pendulum(content: &Content<'_>) -> Section {
+    let assessment = content.assessment;
+    let baselines = assessment.baselines.iter();
+    let constants = baselines.map(|b| format!("{}: {}.", b.name, b.template.constants()));
+    let is_springless = |b: &Baseline| b.template.stiffness_n_m == 0.0;
+    let springless =
+        (assessment.baselines.iter().any(is_springless)).then(|| SPRINGLESS.to_owned());
+    let table = baseline_table(assessment).captioned("Body position: the model and the pendulum");
+    Section::new("aslip", "Beside the pendulum", &[BASELINE_WORDS])
+        .and(constants)
+        .and(springless)
+        .with(&[], [table])
+}
+
+fn control(content: &Content<'_>) -> Section {
+    let without = (content.consistent.is_empty())
+        .then(|| without_statistics(content.model))
+        .flatten()
+        .map(|phase| {
+            format!(
+                "The controller did not run: the model has no input statistics of phase {phase}, \
+                 which weigh its inputs. romc import --inputs-from takes them from recordings."
+            )
+        });
+    let runs = [
+        (PLAIN, content.plain),
+        ("Consistent lift", content.consistent),
+    ];
+    let runs = runs.into_iter().filter(|(_, runs)| !runs.is_empty());
+    let [plain, shown] =
+        [content.plain, content.consistent].map(|runs| Some(runs).filter(|runs| !runs.is_empty()));
+    Section::new(
+        "control",
+        "The controller along the recordings",
+        &CONTROL_WORDS,
+    )
+    .and(without)
+    .and(failures(content.plain))
+    .with(
+        &[],
+        shown.map(|runs| {
+            control_table(runs).captioned("Consistent lift: the model and its baselines")
+        }),
+    )
+    .folding(
+        plain.map(|runs| {
+            control_table(runs).captioned(format!("{PLAIN}: the model and its baselines"))
+        }),
+    )
+    .folding(runs.map(|(lift, runs)| {
+        let words = "the solver's work, and what the lift makes of recorded inputs";
+        upright(run_table(runs)).captioned(format!("{lift}: {words}"))
+    }))
+}
+
+const PLAIN: &str = "Plain lift, u = W_e^T u_lat";
+
+/// Most rows for which a table of runs is turned, so that each is a column.
+const MOST_RUNS: usize = 6;
+
+/// Few runs with many figures each: a column per run, so that the table is no wider than the page.
+fn upright(table: Table) -> Table {
+    match table.len() <= MOST_RUNS {
+        true => table.transposed(),
+        false => table,
+    }
+}
+
+fn simplification(options: &PageOptions) -> Section {
+    let tables = options.simplification.iter().cloned();
+    Section::new(
+        "simplification",
+        "How far the equations can be simplified",
+        &SIMPLIFICATION_WORDS,
+    )
+    .folding(tables)
+    .folding([options.changes.clone()])
+}
+
+const ENCODER_WORDS: &str = "The darker a cell (the brighter on a dark screen), the more of that coordinate the latent one takes.";
+const DYNAMICS_WORDS: &str = "Eigenvalues belong to each phase's linearisation at its mean state: a positive real part means that small deviations grow at that rate. The input gain is the matrix by which latent inputs accelerate the latent coordinates; its rank counts singular values above 1 % of the largest.";
+const BASELINE_WORDS: &str = "The actuated spring-loaded inverted pendulum under the same forces, with the published constants and with the constants that fit the accelerations of these very recordings best.";
+const CONTROL_WORDS: [&str; 3] = [
+    "At each control step the controller sees the recorded state and plans along the recording. Its commands are not fed back to a robot: these are the commands that it would have given in the states that the robot really had. With the recorded input as reference they are the lifted recorded input whatever the dynamics are, so that the torques in the figures show what the lift is worth.",
+    "What the dynamics are worth is in the tables: predictions one stage ahead with the recorded input; torques where the controller has to find its input itself; and how far the body is off in the 0.2 s after a push of 0.1 m/s, where the commands act on a body with the robot's mass and feet that stay where they stand.",
+    "The model that knows nothing has the same encoder and decoder and ddz = g u for dynamics, with g fitted to this very recording. Feedback off is the same controller, given the recorded state after the push; replay is the recorded torques.",
+];
+
+const SIMPLIFICATION_WORDS: [&str; 2] = [
+    "Terms are dropped, coefficients shortened and nearly linear functions made linear, as long as no acceleration ddz of a phase can be off by more than the tolerance anywhere in its domain: the smallest box around the recorded latent states and inputs of the phase, a tenth of each range wider on both sides.",
+    "The certified error is proven by interval arithmetic for every point of that box. The measured errors are those at the recorded samples. Nothing is proven outside the box, so rollouts stand beside.",
+];
+
+const STUDY_WORDS: &str = "One model for every latent dimension and seed, judged on recordings that were not trained on. With more coordinates the decoder errs less and the equations grow.";
+
+const SPRINGLESS: &str = "Where k_s is 0, a spring that pushes away would have fitted best: it is left out, and that pendulum is a mass under the recorded forces alone, which falls where these do not carry it.";

@@ -1,0 +1,389 @@
+//! A report's first words: which robot and recordings, whether the model saw them, how good it is and for what.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::contents::{Content, jumps};
+use super::jump::modelled;
+use super::tables::{body_rms, template_rms};
+use crate::evaluate::{CoordinateSums, Fit};
+use crate::model::{ModelError, ReducedModel};
+use crate::typeset::words::counted;
+use crate::typeset::{Table, rounded};
+
+/// Coefficient of determination from which a coordinate is predicted closely.
+const CLOSE: f64 = 0.9;
+/// Coefficient of determination from which a coordinate is predicted roughly.
+const ROUGH: f64 = 0.5;
+/// The same for predictions that start again and again from the recorded state: a standstill explains most of those.
+const CLOSE_RESTARTED: f64 = 0.99;
+
+/// How well body x and z are predicted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Grade {
+    /// Worse than [`ROUGH`], or not at all.
+    Poor,
+    /// Between the two.
+    Rough,
+    /// At least [`CLOSE`].
+    Close,
+}
+
+/// An assessment in words.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verdict {
+    /// One line: how good, and for what.
+    pub headline: String,
+    /// Sentences that give the reasons.
+    pub sentences: Vec<String>,
+    /// The jumps: where from, how long, seen in training or not, errors.
+    pub recordings: Table,
+}
+
+/// Whether a model was made with a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Seen {
+    Yes,
+    No,
+    /// The model file does not name its recordings.
+    Unknown,
+}
+
+/// The assessment in words.
+///
+/// # Errors
+/// [`ModelError`] for a model without encoder or decoder.
+pub fn verdict(content: &Content<'_>) -> Result<Verdict, ModelError> {
+    let Content {
+        model, assessment, ..
+    } = *content;
+    let [whole, short] = [
+        grade(content, &assessment.full, CLOSE),
+        grade(content, &assessment.restarted, CLOSE_RESTARTED),
+    ];
+    let is_doubtful = !assessment.remarks.is_empty();
+    let mut sentences = vec![subject(content)?, compared(content)];
+    sentences.push(errors(content));
+    sentences.extend(beside_pendulum(content));
+    sentences.extend(commands(content));
+    Ok(Verdict {
+        headline: headline(whole, short, is_doubtful).to_owned(),
+        sentences,
+        recordings: recordings(content)?,
+    })
+}
+
+/// The worse of body x and z.
+fn grade(content: &Content<'_>, sums: &CoordinateSums, close: f64) -> Grade {
+    let of = |name| match content.assessment.fit(sums, name) {
+        Some(Fit { r2: Some(r2), .. }) if r2 >= close => Grade::Close,
+        Some(Fit { r2: Some(r2), .. }) if r2 >= ROUGH => Grade::Rough,
+        Some(_) | None => Grade::Poor,
+    };
+    of("body.x").min(of("body.z"))
+}
+
+fn headline(whole: Grade, short: Grade, is_doubtful: bool) -> &'static str {
+    if is_doubtful {
+        return "Do not rely on it here: the notes below say what is wrong with these recordings or with the model on them.";
+    }
+    match (short, whole) {
+        (Grade::Close, Grade::Close) => {
+            "Good: fit for control over short horizons, and for predicting whole jumps."
+        }
+        (Grade::Close, Grade::Rough) => {
+            "Good over short horizons, as control needs them; rough over whole jumps."
+        }
+        (Grade::Close, Grade::Poor) => {
+            "Good over short horizons, as control needs them; unfit for predicting whole jumps."
+        }
+        (Grade::Rough, _) => {
+            "Rough: fit for interpretation; control needs feedback at a high rate."
+        }
+        (Grade::Poor, _) => "Poor: it does not predict these jumps.",
+    }
+}
+
+/// What the model is.
+fn subject(content: &Content<'_>) -> Result<String, ModelError> {
+    let Content {
+        model, assessment, ..
+    } = *content;
+    let robot = model.robot().map_or("a robot", |robot| robot.name());
+    let n = assessment.names.len();
+    let phases: Vec<&str> = model
+        .phases()
+        .iter()
+        .map(|phase| phase.name.as_str())
+        .collect();
+    let first = assessment.runs.first();
+    let modelled = match first {
+        Some(run) => modelled(model, run.segment.x.column(0).into_owned())?,
+        None => vec![true; n],
+    };
+    let names = assessment.names.iter().zip(modelled);
+    let absent: Vec<&str> = names
+        .filter(|(_, is)| !is)
+        .map(|(name, _)| name.as_str())
+        .collect();
+    let absent = match absent.is_empty() {
+        true => String::new(),
+        false => format!(
+            " {} not modelled: no latent coordinate takes them in, and errors there say nothing about the dynamics.",
+            listed(&absent, "is", "are")
+        ),
+    };
+    Ok(format!(
+        "The model reduces the {n} coordinates of {robot} to {} latent ones, with {} active terms in {}.{absent}",
+        model.latent_dim(),
+        assessment.active_terms,
+        counted(phases.len(), "phase") + &format!(" ({})", phases.join(", ")),
+    ))
+}
+
+/// `a, b and c are`.
+fn listed(names: &[&str], one: &str, several: &str) -> String {
+    match names {
+        [] => String::new(),
+        [name] => format!("{name} {one}"),
+        [rest @ .., last] => format!("{} and {last} {several}", rest.join(", ")),
+    }
+}
+
+/// The digests of the recordings that a model was made with.
+fn known_digests(model: &ReducedModel) -> BTreeSet<&str> {
+    let recordings = model
+        .provenance()
+        .get("recordings")
+        .and_then(|value| value.as_array());
+    let entries = recordings.into_iter().flatten();
+    entries
+        .filter_map(|entry| entry.get("digest")?.as_str())
+        .filter(|text| !text.is_empty())
+        .collect()
+}
+
+fn seen(content: &Content<'_>, known: &BTreeSet<&str>, path: &Path) -> Seen {
+    let digest = content.digests.iter().find(|(of, _)| of == path);
+    match digest {
+        Some((_, digest)) if known.contains(digest.as_str()) => Seen::Yes,
+        Some(_) if !known.is_empty() => Seen::No,
+        Some(_) | None => Seen::Unknown,
+    }
+}
+
+const FLATTERS: &str = "which flatters the figures below";
+
+/// What it is compared with.
+fn compared(content: &Content<'_>) -> String {
+    let runs = &content.assessment.runs;
+    let seconds: f64 = runs.iter().map(|run| run.segment.duration_s()).sum();
+    let known = known_digests(content.model);
+    let paths: BTreeSet<&Path> = runs.iter().map(|run| run.segment.path.as_path()).collect();
+    let is = |what: Seen| {
+        paths
+            .iter()
+            .filter(|path| seen(content, &known, path) == what)
+            .count()
+    };
+    let training = match (is(Seen::Yes), is(Seen::No)) {
+        (0, 0) => "The model file does not say which recordings it was made with.".to_owned(),
+        (0, 1) if paths.len() == 1 => "Its training did not see it.".to_owned(),
+        (0, _) => "Its training saw none of them.".to_owned(),
+        (1, 0) if paths.len() == 1 => format!("Its training saw it, {FLATTERS}."),
+        (yes, 0) if yes == paths.len() => format!("Its training saw all of them, {FLATTERS}."),
+        (yes, _) => format!(
+            "Its training saw {yes} of the {}, {FLATTERS}.",
+            counted(paths.len(), "recording")
+        ),
+    };
+    format!(
+        "It is compared with {} of {}, {seconds:.1} s in all. {training}",
+        counted(runs.len(), "jump"),
+        counted(paths.len(), "recording"),
+    )
+}
+
+/// Millimetres with two digits.
+fn millimetres(metres: f64) -> String {
+    format!("{} mm", rounded(1e3 * metres, 2))
+}
+
+fn pair([x, z]: [Option<f64>; 2]) -> String {
+    let shown = |value: Option<f64>| value.map_or("nowhere predicted".to_owned(), millimetres);
+    format!("{} in body.x and {} in body.z", shown(x), shown(z))
+}
+
+/// Errors over whole jumps and between restarts.
+fn errors(content: &Content<'_>) -> String {
+    let assessment = content.assessment;
+    let [whole, short] =
+        [&assessment.full, &assessment.restarted].map(|sums| pair(body_rms(assessment, sums)));
+    let diverged = assessment
+        .runs
+        .iter()
+        .filter(|run| run.full.diverged_at_s().is_some())
+        .count();
+    let diverged = match diverged {
+        0 => String::new(),
+        _ => format!(" The rollout diverges in {}.", counted(diverged, "jump")),
+    };
+    format!(
+        "Driven by the recorded torques and contacts over whole jumps, its error is {whole} (root mean square); started \
+         again every {} s from the recorded state, {short}.{diverged}",
+        assessment.restart_every_s
+    )
+}
+
+/// How it compares with the better of the template models over whole jumps.
+fn beside_pendulum(content: &Content<'_>) -> Option<String> {
+    let assessment = content.assessment;
+    let own = body_rms(assessment, &assessment.full);
+    let templates = assessment
+        .baselines
+        .iter()
+        .map(|baseline| template_rms(&baseline.full));
+    let best = templates.fold([None, None], |best: [Option<f64>; 2], rms| {
+        [0, 1].map(|axis| match (best[axis], rms[axis]) {
+            (Some(best), Some(rms)) => Some(f64::min(best, rms)),
+            (best, rms) => best.or(rms),
+        })
+    });
+    let words = |axis: usize, name: &str| -> Option<String> {
+        let ratio = best[axis]? / own[axis]?;
+        let words = match ratio >= 1.0 {
+            true => format!("{} times closer in {name}", rounded(ratio, 2)),
+            false => format!("{} times further off in {name}", rounded(1.0 / ratio, 2)),
+        };
+        (ratio.is_finite() && ratio > 0.0).then_some(words)
+    };
+    let words: Vec<String> = [words(0, "body.x"), words(1, "body.z")]
+        .into_iter()
+        .flatten()
+        .collect();
+    (!words.is_empty()).then(|| {
+        format!(
+            "Beside the better of two spring-loaded pendulums under the same forces it is {}.",
+            words.join(" and ")
+        )
+    })
+}
+
+/// What the dynamics are worth to the controller: recovery from a push beside the same controller without feedback, and
+/// what became of its steps.
+fn commands(content: &Content<'_>) -> Option<String> {
+    let [mut steps, mut solved, mut violations] = [0; 3];
+    let mut recoveries = Vec::new();
+    for (_, run) in content.consistent {
+        steps += run.summary.steps;
+        solved += run.summary.solved;
+        violations += run.summary.limit_violations;
+        let metrics = run.metrics.as_ref();
+        recoveries.extend(metrics.and_then(|metrics| {
+            let off = metrics.baseline.feedback_off.recovery_rms_m?;
+            Some([metrics.recovery_rms_m?, off])
+        }));
+    }
+    let mean = |which: usize| {
+        let sum: f64 = recoveries.iter().map(|pair: &[f64; 2]| pair[which]).sum();
+        sum / recoveries.len() as f64
+    };
+    let recovery = match recoveries.is_empty() {
+        true => String::new(),
+        false => format!(
+            " After a push of 0.1 m/s the body stays off by {} on average, and by {} with feedback off.",
+            millimetres(mean(0)),
+            millimetres(mean(1))
+        ),
+    };
+    (steps > 0).then(|| {
+        let limits = match violations {
+            0 => "none of its commands leaves the torque limits".to_owned(),
+            _ => format!("{} beyond the torque limits", counted(violations, "command")),
+        };
+        format!(
+            "Along these recordings the latent controller solves {solved} of {steps} steps, and {limits}.{recovery}"
+        )
+    })
+}
+
+/// One row per jump.
+fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
+    let known = known_digests(content.model);
+    let mut rows = Vec::new();
+    for jump in jumps(content) {
+        let segment = jump.run.segment;
+        let rms = jump.body_rms_m()?;
+        rows.push((jump.place.words, segment, rms));
+    }
+    let body = |row: usize| {
+        content
+            .assessment
+            .names
+            .iter()
+            .position(|n| n == ["body.x", "body.z"][row])
+    };
+    let [x, z] = [body(0), body(1)];
+    let moved = |row: Option<usize>, of: fn(&[f64]) -> f64, segment: &crate::recording::Segment| {
+        row.map(|row| {
+            let values: Vec<f64> = segment.x.row(row).iter().copied().collect();
+            format!("{:.2}", of(&values)).replace("-0.00", "0.00")
+        })
+    };
+    let travelled = |values: &[f64]| values[values.len() - 1] - values[0];
+    let risen = |values: &[f64]| values.iter().copied().fold(f64::MIN, f64::max) - values[0];
+    let shown = |rms: Option<f64>| rms.map(|rms| rounded(1e3 * rms, 2).to_string());
+    let table = Table::of(rows)
+        .column("recording", "", |(words, ..)| words.clone())
+        .column("seen in training", "", |(_, segment, _)| {
+            match seen(content, &known, &segment.path) {
+                Seen::Yes => "yes",
+                Seen::No => "no",
+                Seen::Unknown => "unknown",
+            }
+        })
+        .column("duration", "s", |(_, segment, _)| {
+            format!("{:.2}", segment.duration_s())
+        })
+        .column("forward", "m", |(_, segment, _)| {
+            moved(x, travelled, segment)
+        })
+        .column("rise of the body", "m", |(_, segment, _)| {
+            moved(z, risen, segment)
+        })
+        .column("body.x rms, whole jump", "mm", |(.., rms)| shown(rms[0]))
+        .column("body.z rms, whole jump", "mm", |(.., rms)| shown(rms[1]))
+        .table();
+    Ok(table)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headline_needs_both_horizons_to_be_good() {
+        let good = headline(Grade::Close, Grade::Close, false);
+        assert!(good.starts_with("Good: fit for control"));
+        for (whole, short) in [
+            (Grade::Poor, Grade::Close),
+            (Grade::Rough, Grade::Close),
+            (Grade::Close, Grade::Rough),
+            (Grade::Close, Grade::Poor),
+        ] {
+            assert_ne!(headline(whole, short, false), good);
+        }
+        assert!(headline(Grade::Close, Grade::Close, true).starts_with("Do not rely"));
+        assert!(headline(Grade::Close, Grade::Poor, false).starts_with("Poor"));
+    }
+
+    #[test]
+    fn lists_and_counts_read_as_english() {
+        assert_eq!(listed(&["a", "b", "c"], "is", "are"), "a, b and c are");
+        assert_eq!(listed(&["a"], "is", "are"), "a is");
+        assert_eq!(
+            (counted(1, "jump"), counted(2, "jump")),
+            ("1 jump".to_owned(), "2 jumps".to_owned())
+        );
+    }
+}

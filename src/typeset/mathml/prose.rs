@@ -1,0 +1,109 @@
+//! Running text with the few symbols that romc's own sentences and tables use, as mathematics.
+
+use std::fmt;
+
+use crate::typeset::{SymbolTable, Variable};
+
+use super::escape::HtmlText;
+use super::math::MathmlSymbol;
+
+/// Symbols other than the model's variables: how text spells them, and how MathML does.
+const SYMBOLS: [(&str, &str); 14] = [
+    ("R^2", "<msup><mi>R</mi><mn>2</mn></msup>"),
+    ("R²", "<msup><mi>R</mi><mn>2</mn></msup>"),
+    ("W_e", "<msub><mi>W</mi><mi>e</mi></msub>"),
+    ("W_e^T", "<msubsup><mi>W</mi><mi>e</mi><mi>T</mi></msubsup>"),
+    ("W_eᵀ", "<msubsup><mi>W</mi><mi>e</mi><mi>T</mi></msubsup>"),
+    ("u_lat", "<msub><mi>u</mi><mtext>lat</mtext></msub>"),
+    ("L_mod", "<msub><mi>L</mi><mtext>mod</mtext></msub>"),
+    ("E_dec", "<msub><mi>E</mi><mtext>dec</mtext></msub>"),
+    ("k_s", "<msub><mi>k</mi><mi>s</mi></msub>"),
+    ("l_0", "<msub><mi>l</mi><mn>0</mn></msub>"),
+    ("ddz", "<mover><mi>z</mi><mo>\u{a8}</mo></mover>"),
+    ("dz", "<mover><mi>z</mi><mo>\u{2d9}</mo></mover>"),
+    ("|Xi|", "<mrow><mo>|</mo><mi>Ξ</mi><mo>|</mo></mrow>"),
+    ("lambda", "<mi>λ</mi>"),
+];
+
+/// Text for the content of an element: known symbols become `math` elements, a hyphen before a digit a minus, `s^2` a raised
+/// digit, `us` microseconds, a lone hyphen a dash.
+///
+/// ```
+/// use romc::typeset::mathml::HtmlProse;
+/// let html = HtmlProse("R^2 below -0.5, m/s^2").to_string();
+/// assert!(html.starts_with("<math><msup>") && html.ends_with("below \u{2212}0.5, m/s²"));
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct HtmlProse<'a>(pub &'a str);
+
+impl fmt::Display for HtmlProse<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0 == "-" {
+            return f.write_str("–");
+        }
+        let mut rest = self.0;
+        let mut before = ' ';
+        while let Some(letter) = rest.chars().next() {
+            let is_word = |c: char| c.is_alphanumeric() || "_^|".contains(c);
+            let length = match is_word(letter) {
+                true => rest.find(|c: char| !is_word(c)).unwrap_or(rest.len()),
+                false => letter.len_utf8(),
+            };
+            let (word, after) = rest.split_at(length);
+            let is_minus = letter == '-'
+                && after.starts_with(|c: char| c.is_ascii_digit())
+                && (before.is_whitespace() || before == '(');
+            match mathematics(word) {
+                Some(math) if !".-".contains(before) && !is_name(after) => {
+                    write!(f, "<math>{math}</math>")?;
+                }
+                Some(_) | None if is_minus => f.write_str("\u{2212}")?,
+                Some(_) | None => match word {
+                    "s^2" => f.write_str("s²")?,
+                    "us" => f.write_str("µs")?,
+                    _ => HtmlText(word).fmt(f)?,
+                },
+            }
+            before = word.chars().next_back().unwrap_or(' ');
+            rest = after;
+        }
+        Ok(())
+    }
+}
+
+/// Whether a word goes on as the name of a file or coordinate.
+fn is_name(after: &str) -> bool {
+    let mut letters = after.chars();
+    let joined = letters.next().is_some_and(|c| ".-".contains(c));
+    joined && letters.next().is_some_and(char::is_alphanumeric)
+}
+
+fn mathematics(word: &str) -> Option<String> {
+    if let Some((_, math)) = SYMBOLS.iter().find(|(text, _)| *text == word) {
+        return Some((*math).to_owned());
+    }
+    let Variable { quantity, index } = Variable::parse(word)?;
+    let symbol = SymbolTable::default().symbol(quantity, index);
+    Some(MathmlSymbol(&symbol).to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn symbols_become_mathematics_and_names_stay() {
+        let html = |text: &str| HtmlProse(text).to_string();
+        assert!(html("torque R^2 contact").contains("<math><msup>"));
+        assert!(html("W_e^T u_lat").matches("<math>").count() == 2);
+        assert!(html("ddz3").contains("<mover>"));
+        for name in [
+            "test_01", "go1-d4", "a.z1", "z1.csv", "body.x", "u-1", "k_spring",
+        ] {
+            assert_eq!(html(name), name);
+        }
+        assert_eq!(html("-"), "–");
+        assert_eq!(html("-0.346"), "\u{2212}0.346");
+        assert_eq!(html("1-2 <b>"), "1-2 &lt;b&gt;");
+    }
+}
