@@ -54,9 +54,7 @@ enum Seen {
 /// # Errors
 /// [`ModelError`] for a model without encoder or decoder.
 pub fn verdict(content: &Content<'_>) -> Result<Verdict, ModelError> {
-    let Content {
-        model, assessment, ..
-    } = *content;
+    let assessment = content.assessment;
     let [whole, short] = [
         grade(content, &assessment.full, CLOSE),
         grade(content, &assessment.restarted, CLOSE_RESTARTED),
