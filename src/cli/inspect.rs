@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::InspectArguments;
-use super::{inspect_model, inspect_recording};
+use super::{inspect_model, inspect_recording, robot};
 use crate::robot::Robot;
 use crate::{Error, artifact, recording};
 
@@ -15,7 +15,7 @@ use crate::{Error, artifact, recording};
 /// # Errors
 /// Whatever reading the file refuses.
 pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
-    let robot = Robot::by_name(&arguments.robot)?;
+    let robot = robot::chosen(&arguments.robot)?;
     let answers = (arguments.files.iter())
         .map(|path| inspect(path, robot))
         .collect::<Result<Vec<_>, _>>()?;
@@ -28,10 +28,7 @@ pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
 }
 
 fn inspect(path: &Path, robot: &Robot) -> Result<Answer, Error> {
-    if path
-        .extension()
-        .is_some_and(|extension| extension == "json")
-    {
+    if artifact::is_standard_input(path) || path.extension().is_some_and(|e| e == "json") {
         inspect_model::describe(path, &artifact::read(path)?)
     } else {
         inspect_recording::describe(&recording::read(path)?, robot)
