@@ -1,4 +1,4 @@
-//! Training without descent over the dynamics: encoder, decoder and Xi one after the other, in about a second.
+//! Training without descent over the dynamics: encoder, decoder and Xi one after the other, in seconds.
 
 use super::assemble::Origin;
 use super::data_sets::Recordings;
