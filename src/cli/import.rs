@@ -1,7 +1,6 @@
 //! `romc import`: a model trained elsewhere in, a model file out.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use nalgebra::DVector;
 use serde_json::json;
@@ -27,7 +26,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(Some(&arguments.output), overwrite)?;
     let imported = import(&arguments.file, &options(arguments)?)?;
-    let model = with_inputs(imported.model, &arguments.inputs_from)?;
+    let model = with_inputs(imported.model, arguments)?;
     artifact::write_with(&arguments.output, &model, overwrite)?;
     let mut text = describe(&imported.report);
     let _ = writeln!(
@@ -52,11 +51,11 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
 }
 
 /// The model with the input statistics of recordings, in the phases that they have samples of.
-fn with_inputs(model: ReducedModel, recordings: &[PathBuf]) -> Result<ReducedModel, Error> {
-    if recordings.is_empty() {
+fn with_inputs(model: ReducedModel, arguments: &ImportArguments) -> Result<ReducedModel, Error> {
+    if arguments.inputs_from.is_empty() {
         return Ok(model);
     }
-    let recordings = read_recordings(recordings)?;
+    let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
     let segments: Vec<_> = recordings.iter().flat_map(|r| &r.segments).collect();
     let statistics = input_statistics(&model, &segments)?;
     let names: Vec<String> = model.phases().iter().map(|p| p.name.clone()).collect();

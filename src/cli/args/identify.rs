@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::reading::ReadingArguments;
+
 /// `romc identify`
 #[derive(Debug, Args)]
 #[command(
@@ -25,4 +27,6 @@ pub struct IdentifyArguments {
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }

@@ -16,6 +16,7 @@ mod import;
 mod manual;
 mod number;
 mod plan;
+mod reading;
 mod run;
 mod train;
 
@@ -28,5 +29,6 @@ pub use identify::IdentifyArguments;
 pub use import::{ImportArguments, LibraryArgument};
 pub use manual::{CompletionsArguments, ManualArguments};
 pub use plan::PlanArguments;
+pub use reading::ReadingArguments;
 pub use run::{DemoArguments, InspectArguments, MpcArguments, ReportArguments, SimulateArguments};
 pub use train::{Dimensions, PhaseSet, StudyArguments, TrainArguments, TrainSettings, Widths};

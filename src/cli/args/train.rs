@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::number::{count, finite, real};
 use crate::limits::table;
+use super::reading::ReadingArguments;
 use crate::model::Activation;
 use crate::recording::smoothing::SavitzkyGolay;
 use crate::recording::{Accelerations, SmoothedRows};
@@ -106,6 +107,8 @@ pub struct TrainArguments {
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }
 
 /// Settings of `romc train`; what is not given keeps the default of the method.
@@ -274,6 +277,8 @@ pub struct StudyArguments {
     /// Replace tables and figures of these names that romc did not make
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }
 
 /// Latent dimensions of a study, ascending.
