@@ -20,6 +20,12 @@ pub enum RecordingFault {
     /// The file does not exist.
     #[error("no such file")]
     Missing,
+    /// A damaged MCAP file, or one that packs its chunks in another way.
+    #[error("no MCAP file that can be read: {0}")]
+    Mcap(String),
+    /// An MCAP file without a topic of numbers; the first reason in brackets, or nothing.
+    #[error("found no topic of ROS messages with numbers{0}")]
+    NoTopic(String),
     /// A folder, which only a map of columns makes a recording of.
     #[error(
         "found a folder, expected a file, or `--columns` with a map that names the folder's files"

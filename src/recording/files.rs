@@ -5,12 +5,20 @@ use std::sync::mpsc::sync_channel;
 use std::sync::{Arc, OnceLock};
 
 use super::check::{Finding, check};
-use super::condition::{ConditionOptions, Conditioned, ImplausibleSamples, conditioned};
+use super::condition::{
+    ConditionOptions, Conditioned, ImplausibleSamples, SmoothedRows, conditioned,
+};
 use super::error::RecordingError;
 use super::mismatch::{Mismatch, mismatches};
 use super::reader::{Reader, Reading, ReadingNotes};
-use super::segment::Recording;
+use super::segment::{Recording, Segment};
+use super::smoothing::SavitzkyGolay;
 use crate::robot::Robot;
+
+/// Half the window over which rows of late samples are smoothed, in s.
+const HALF_SMOOTHING_S: f64 = 0.015;
+/// Degree of the polynomials that smooth them.
+const SMOOTHING_ORDER: usize = 3;
 
 /// Recordings, held in memory or read from their files again each time.
 #[derive(Clone, Debug)]
@@ -193,6 +201,43 @@ impl RecordingFiles {
         })
     }
 
+    /// The steps for one recording: where times were rebuilt, which is where samples came late or were lost, rows are
+    /// smoothed unless a filter is asked for.
+    fn options_for(
+        &self,
+        reading: &mut Reading,
+        recording: &Recording,
+    ) -> Result<ConditionOptions, RecordingError> {
+        let mut options = self.options.clone();
+        let rebuilt = reading
+            .mended
+            .iter()
+            .any(|mended| mended.elapsed_ratio.is_some());
+        let step_s = recording
+            .segments
+            .iter()
+            .map(Segment::mean_step_s)
+            .fold(0.0, f64::max);
+        let half = (HALF_SMOOTHING_S / step_s).round();
+        let window = if half.is_finite() {
+            2 * half as usize + 1
+        } else {
+            1
+        };
+        let fits = recording
+            .segments
+            .iter()
+            .all(|segment| segment.len() >= window);
+        if options.smoothing.is_none() && rebuilt && window > SMOOTHING_ORDER && fits {
+            let filter = SavitzkyGolay::new(window, SMOOTHING_ORDER)?;
+            options.smoothing = Some((filter, SmoothedRows::All));
+            reading.notes.push(format!(
+                "rows are smoothed (--smooth {window},{SMOOTHING_ORDER} --smooth-rows all)"
+            ));
+        }
+        Ok(options)
+    }
+
     /// The recordings of one file, and its reading without samples. Checks that only report are made once.
     fn read(&self, file: &RecordingFile) -> Result<Ready, RecordingError> {
         let mut reading = self.reader.read(&file.path)?;
@@ -202,6 +247,7 @@ impl RecordingFiles {
             ignored_columns: Vec::new(),
         };
         let recording = std::mem::replace(&mut reading.recording, empty);
+        let options = self.options_for(&mut reading, &recording)?;
         let keeps = self.options.implausible == ImplausibleSamples::Keep;
         let is_first = self.notes.get().is_none();
         let ready = chosen(file, recording).into_iter().map(|recording| {
@@ -215,7 +261,7 @@ impl RecordingFiles {
             };
             Ok::<_, RecordingError>(Conditioned {
                 mismatches: unlike,
-                ..conditioned(recording, findings, &self.options)?
+                ..conditioned(recording, findings, &options)?
             })
         });
         Ok((ready.collect::<Result<_, _>>()?, reading))

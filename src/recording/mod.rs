@@ -55,7 +55,7 @@ mod segments;
 mod table;
 
 pub use self::csv::{read, read_from_bytes};
-pub use self::write::{WriteOptions, write, write_with};
+pub use self::write::{WriteOptions, write, write_inputs_with, write_mcap, write_with};
 pub use condition::{
     Accelerations, ConditionOptions, Conditioned, ImplausibleSamples, SmoothedRows, condition,
 };

@@ -9,9 +9,11 @@ use serde::{Deserialize, Serialize};
 use super::clock::{Timed, timed};
 use super::csv;
 use super::error::{RecordingError, RecordingFault};
+use super::foreign::guess::guess_of;
 use super::foreign::map::ColumnMap;
-use super::foreign::{Assembled, assemble, read_texts};
+use super::foreign::{Assembled, assemble, read_mcap, read_texts};
 use super::segment::Recording;
+use crate::robot::Robot;
 
 /// What becomes of clocks that disagree with the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]
@@ -80,8 +82,10 @@ impl Reader {
             mut recording,
             notes,
         } = match &self.map {
+            Some(map) if is_mcap(path) => assemble(path, &read_mcap(path)?, map)?,
             Some(map) => assemble(path, &read_texts(path, map)?, map)?,
             None if path.is_dir() => return Err(RecordingFault::Folder.of(path)),
+            None if is_mcap(path) => by_guess(path)?,
             None => Assembled {
                 recording: csv::read(path)?,
                 notes: Vec::new(),
@@ -101,6 +105,24 @@ impl Reader {
             mended,
         })
     }
+}
+
+/// Whether a file is an MCAP log by its name.
+pub(super) fn is_mcap(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"))
+}
+
+/// An MCAP file by the names of its topics and fields.
+fn by_guess(path: &Path) -> Result<Assembled, RecordingError> {
+    let logs = read_mcap(path)?;
+    let robot = Robot::by_name("go1").expect("a known robot");
+    let text = guess_of(path, &logs, robot)?.text;
+    let map = ColumnMap::parse(&format!("{}: the guessed map", path.display()), &text)?;
+    let mut assembled = assemble(path, &logs, &map)?;
+    let note = "topics are taken by their names (`romc inspect --guess` prints the map)";
+    assembled.notes.push(note.to_owned());
+    Ok(assembled)
 }
 
 impl Mended {

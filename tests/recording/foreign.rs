@@ -372,6 +372,31 @@ fn cases(folder: &Path, s: &Segment) -> Vec<Case> {
          [body.angular_velocity]\nfile = \"body.txt\"\ncolumns = [10, \"11..12\"]\n\
          [feet]\nfile = \"body.txt\"\ncolumns = \"13..16\"\n";
     add("bare", own, bare.to_owned());
+
+    // ROS 2 messages.
+    let path = folder.join("jump.mcap");
+    recording::write_mcap(&path, s, None).unwrap();
+    let joint = |key: &str, field: &str| {
+        format!(
+            "[joint.{key}]\ntopic = \"/joint_states\"\ncolumns = \"{field}[{{leg}}.{{joint}}]\"\n"
+        )
+    };
+    let odometry = |key: &str, field: &str, more: &str| {
+        format!("[body.{key}]\ntopic = \"/odom\"\ncolumns = \"{field}.{{axis}}\"\n{more}")
+    };
+    let messages = [
+        joint("position", "position"),
+        joint("velocity", "velocity"),
+        joint("torque", "effort"),
+        odometry("position", "pose.pose.position", ""),
+        odometry("velocity", "twist.twist.linear", "frame = \"body\"\n"),
+        odometry("angular_velocity", "twist.twist.angular", "frame = \"body\"\n"),
+        "[body.orientation]\ntopic = \"/odom\"\norder = \"wxyz\"\ncolumns = [\"pose.pose.orientation.w\", \
+         \"pose.pose.orientation.x\", \"pose.pose.orientation.y\", \"pose.pose.orientation.z\"]\n"
+            .to_owned(),
+        "[feet]\ntopic = \"/foot_contacts\"\ncolumns = \"position[{leg}]\"\n".to_owned(),
+    ];
+    add("mcap", path, messages.concat());
     out
 }
 
@@ -457,7 +482,10 @@ fn guessed_maps_of_seven_logs_give_the_recording() {
         }
     }
     // The map of `signs` needs the offset of the thighs and the legs' order, which no number shows.
-    assert_eq!(found, ["names", "units", "wxyz", "xyzw", "tabs", "forces"]);
+    assert_eq!(
+        found,
+        ["names", "units", "wxyz", "xyzw", "tabs", "forces", "mcap"]
+    );
 }
 
 /// A motion that is known at all times: value and rate of coordinate `i` of 18.
@@ -635,6 +663,49 @@ fn wrong_maps_name_the_key_the_column_and_what_there_is() {
 }
 
 #[test]
+fn files_with_late_samples_are_smoothed_unless_told_otherwise() {
+    use romc::recording::{ConditionOptions, RecordingError, RecordingFile, RecordingFiles};
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fast.csv");
+    let mut jump = jump();
+    jump.time_s.iter_mut().for_each(|time| *time /= 1.15);
+    let recording = Recording {
+        path: path.clone(),
+        segments: vec![jump],
+        ignored_columns: Vec::new(),
+    };
+    recording::write(&path, &recording).unwrap();
+    let lines = |clocks| {
+        let file = RecordingFile {
+            path: path.clone(),
+            segments: None,
+        };
+        let go1 = Robot::by_name("go1").unwrap();
+        let files = RecordingFiles::new(vec![file], go1, ConditionOptions::default());
+        let files = files.read_by(Reader::new(None, clocks));
+        let mut all = Vec::new();
+        let kept = files.for_each(|recording| {
+            all.push(recording);
+            Ok::<_, RecordingError>(())
+        });
+        kept.unwrap();
+        (all.remove(0), files.notes().reading.lines())
+    };
+    let (smoothed, notes) = lines(Clocks::Repaired);
+    assert!(
+        notes.iter().any(|note| note.contains("rows are smoothed")),
+        "{notes:?}"
+    );
+    let raw = Reader::new(None, Clocks::Repaired)
+        .read(&path)
+        .unwrap()
+        .recording;
+    assert_ne!(smoothed.segments[0].ddx, raw.segments[0].ddx);
+    let (kept, notes) = lines(Clocks::Recorded);
+    assert_eq!((kept, notes.len()), (recording::read(&path).unwrap(), 0));
+}
+
+#[test]
 fn repaired_clocks_leave_shipped_recordings_as_they_are() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/recordings");
     let reader = Reader::new(None, Clocks::Repaired);
@@ -704,4 +775,34 @@ fn published_a1_files_by_the_map_of_the_documentation_are_the_jump() {
     }
     let times = found.time_s.iter().zip(&expected.time_s);
     assert!(times.into_iter().all(|(a, b)| (a - b).abs() < 1e-9));
+}
+
+#[test]
+fn mcap_files_are_read_without_a_map_and_damaged_ones_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("jump.mcap");
+    let jump = jump();
+    let inputs = DMatrix::from_fn(18, jump.len(), |i, k| (i * k) as f64);
+    recording::write_mcap(&path, &jump, Some(&inputs)).unwrap();
+    let reading = Reader::new(None, Clocks::Recorded).read(&path).unwrap();
+    let (state, velocity, contact) = difference(&reading.recording, &jump);
+    assert!(
+        state < 1e-9 && velocity < 1e-9 && contact,
+        "{state} {velocity}"
+    );
+    assert!(
+        reading
+            .notes
+            .iter()
+            .any(|note| note.contains("by their names"))
+    );
+    let bytes = fs::read(&path).unwrap();
+    for end in [0, 7, 100, bytes.len() / 2, bytes.len() - 9] {
+        fs::write(&path, &bytes[..end]).unwrap();
+        let error = Reader::default().read(&path).unwrap_err();
+        assert!(
+            matches!(error.kind, RecordingFault::Mcap(_)),
+            "{end}: {error}"
+        );
+    }
 }

@@ -11,6 +11,7 @@
 mod check;
 mod command;
 mod compile;
+mod convert;
 mod identify;
 mod import;
 mod manual;
@@ -25,6 +26,7 @@ pub use command::{Arguments, Command};
 pub use compile::{
     CodeArguments, CompileArguments, EquationArguments, SimplifyArguments, UnitsChoice,
 };
+pub use convert::ConvertArguments;
 pub use identify::IdentifyArguments;
 pub use import::{ImportArguments, LibraryArgument};
 pub use manual::{CompletionsArguments, ManualArguments};

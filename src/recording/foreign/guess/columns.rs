@@ -32,7 +32,9 @@ pub(super) fn groups(logs: &[Log]) -> Vec<Group> {
     let mut families: Vec<(usize, Vec<(usize, Reading)>)> = Vec::new();
     for (index, log) in logs.iter().enumerate() {
         for (column, channel) in log.columns.iter().enumerate() {
-            let Some(reading) = read(&channel.name) else {
+            // What a column alone does not say its topic may: `/foot_contacts` of `position[fr]`.
+            let in_topic = || read(&format!("{} {}", log.name, channel.name));
+            let Some(reading) = read(&channel.name).or_else(in_topic) else {
                 continue;
             };
             let same = |(own, members): &&mut (usize, Vec<(usize, Reading)>)| {
@@ -47,6 +49,9 @@ pub(super) fn groups(logs: &[Log]) -> Vec<Group> {
                 None => families.push((index, vec![(column, reading)])),
             }
         }
+    }
+    for (_, members) in &mut families {
+        lists_of_three(members);
     }
     let mut out = Vec::new();
     for quantity in Quantity::ALL {
@@ -78,6 +83,23 @@ pub(super) fn groups(logs: &[Log]) -> Vec<Group> {
         out.extend(chosen.map(|(_, group)| group));
     }
     out
+}
+
+/// Lists of three counted positions or velocities are the trunk's.
+fn lists_of_three(members: &mut [(usize, Reading)]) {
+    let trunk = match members[0].1.quantity {
+        Quantity::JointPosition => Quantity::BodyPosition,
+        Quantity::JointVelocity => Quantity::BodyVelocity,
+        _ => return,
+    };
+    let counted = members
+        .iter()
+        .all(|(_, reading)| reading.is_counted && reading.element < 3);
+    if counted && members.len() == 3 {
+        members
+            .iter_mut()
+            .for_each(|(_, reading)| reading.quantity = trunk);
+    }
 }
 
 /// The column that counts time, its unit by name or by the distance of samples.

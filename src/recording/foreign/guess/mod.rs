@@ -9,8 +9,10 @@ use super::assemble::assemble;
 use super::elements::Quantity;
 use super::log::Log;
 use super::map::{ColumnMap, TextFormat};
+use super::mcap::read_mcap;
 use super::text::read_text;
 use crate::recording::error::{RecordingError, RecordingFault};
+use crate::recording::reader::is_mcap;
 use crate::robot::Robot;
 
 mod columns;
@@ -31,12 +33,15 @@ pub struct Guess {
     pub outcome: Result<usize, String>,
 }
 
-/// Guesses the map of a text file.
+/// Guesses the map of a text or MCAP file.
 ///
 /// # Errors
 /// [`RecordingError`] for a file that is no table, or whose columns have no names.
 pub fn guess(path: &Path, robot: &Robot) -> Result<Guess, RecordingError> {
-    let logs = vec![read_text(path, String::new(), &TextFormat::default())?];
+    let logs = match is_mcap(path) {
+        true => read_mcap(path)?,
+        false => vec![read_text(path, String::new(), &TextFormat::default())?],
+    };
     guess_of(path, &logs, robot)
 }
 

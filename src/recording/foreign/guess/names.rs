@@ -183,6 +183,9 @@ pub(super) fn read(name: &str) -> Option<Reading> {
         words.iter().find_map(of)
     };
     let has = |known: &[&str]| words.iter().any(|word| is_one(word, known));
+    if has(&["covariance"]) {
+        return None;
+    }
     let (leg, joint) = (place(&LEGS), joint(&words));
     let number = words
         .iter()
@@ -217,7 +220,7 @@ pub(super) fn read(name: &str) -> Option<Reading> {
     };
     if has(FEET) || (has(&["force", "forces"]) && axis.is_none()) {
         let element = leg.or(number.filter(|n| *n < 4));
-        let is_place = axis.is_some_and(|axis| axis != 2) || has(&["position", "pos", "velocity"]);
+        let is_place = axis.is_some_and(|axis| axis != 2 || has(&["position", "pos", "velocity"]));
         return match element {
             Some(element) if !is_place => reading(Quantity::Feet, element, false, leg.is_none()),
             Some(_) | None => None,
