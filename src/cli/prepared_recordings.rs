@@ -179,6 +179,7 @@ impl RecordedSets {
             findings,
             mismatches,
             left_out,
+            ..
         } = self.notes();
         let mismatches = mismatches.iter().map(|(file, mismatch)| {
             let mut value = mismatch_json(mismatch);

@@ -10,7 +10,7 @@
 //! unit = "deg"
 //! ```
 //!
-//! `docs/recordings.md` describes every key.
+//! `docs/logs.md` describes every key.
 
 use std::collections::BTreeMap;
 use std::path::Path;
