@@ -177,6 +177,7 @@ impl Definition {
                 Count::Any => cursor.length()?,
             };
             let is_list = field.count != Count::One;
+            let is_named = field.count == Count::Any && !matches!(field.kind, Kind::Message(_));
             if field.kind == Kind::Text && is_list && field.name.starts_with("name") {
                 names.clear();
                 for _ in 0..count {
@@ -192,7 +193,10 @@ impl Definition {
                     }
                     path.push_str(&field.name);
                     if is_list {
-                        match names.get(entry).filter(|_| names.len() == count) {
+                        match names
+                            .get(entry)
+                            .filter(|_| is_named && names.len() == count)
+                        {
                             Some(name) => path.push_str(&format!("[{name}]")),
                             None => path.push_str(&format!("[{entry}]")),
                         }

@@ -71,7 +71,10 @@ impl Draft {
             let columns: Vec<String> = (group.columns.iter())
                 .map(|column| quoted(&logs[group.log].columns[*column].name))
                 .collect();
-            let rows: Vec<String> = columns.chunks(3).map(|row| row.join(", ")).collect();
+            let rows: Vec<String> = columns
+                .chunks(if columns.len() == 4 { 4 } else { 3 })
+                .map(|row| row.join(", "))
+                .collect();
             match rows.len() {
                 1 => lines.push(format!("columns = [{}]", rows[0])),
                 _ => lines.push(format!("columns = [\n    {},\n]", rows.join(",\n    "))),
@@ -287,7 +290,7 @@ impl Source<'_> {
             let most = ANGLE.iter().map(|(unit, _)| *unit);
             let most = most.max_by_key(|unit| units.iter().filter(|own| own == &unit).count());
             let unit = most.filter(|_| !units.is_empty()).unwrap_or(unit);
-            let why = "   # as the positions change";
+            let why = "   # by the change of the positions";
             out.of.push((Quantity::JointVelocity, unit, why.to_owned()));
             out.signs.push((Quantity::JointVelocity, own));
         }
@@ -421,7 +424,10 @@ impl Source<'_> {
 
 /// Unit, sign and axes of a velocity of the trunk.
 fn velocity_lines(scale: Scale, axes: Axes, of: &str) -> Vec<String> {
-    let mut lines = vec![format!("unit = \"{}\"   # as {of} change", scale.unit)];
+    let mut lines = vec![format!(
+        "unit = \"{}\"   # by the change of {of}",
+        scale.unit
+    )];
     if scale.sign < 0.0 {
         lines.push("sign = -1".to_owned());
     }
