@@ -10,8 +10,8 @@ use super::super::elements::Quantity;
 use super::super::log::Log;
 use super::columns::{Clock, Group};
 use super::evidence::{Axes, Scale, angular, linear, reach, real_is_last, scale, slopes};
+use super::first_map::{raw, times_s};
 use super::names::unit;
-use super::{raw, times_s};
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot};
 
 const ANGLE: [(&str, f64); 3] = [
