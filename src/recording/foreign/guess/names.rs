@@ -64,6 +64,9 @@ const QUATERNION: &[&str] = &[
     "rot",
     "q",
 ];
+const PLACE: &[&str] = &[
+    "position", "pos", "com", "base", "body", "trunk", "torso", "pose", "odom",
+];
 const FEET: &[&str] = &[
     "foot", "feet", "contact", "contacts", "grf", "touch", "stance", "toe",
 ];
@@ -298,7 +301,8 @@ fn body(
         (false, _) if has(&["q"]) => {
             return reading(Quantity::Orientation, element + 1, true, counted);
         }
-        (false, _) => Quantity::BodyPosition,
+        (false, _) if has(PLACE) || words.len() == 1 => Quantity::BodyPosition,
+        (false, _) => return None,
     };
     reading(quantity, element, false, counted)
 }
@@ -396,6 +400,7 @@ mod tests {
     #[test]
     fn read_other_columns_say_nothing() {
         for name in [
+            "wireless_remote[0]",
             "temperature",
             "FR_foot_position_x",
             "battery",

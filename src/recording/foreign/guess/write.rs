@@ -80,6 +80,7 @@ impl Draft {
                 _ => lines.push(format!("columns = [\n    {},\n]", rows.join(",\n    "))),
             }
             match group.quantity {
+                Quantity::JointAcceleration if !source.is_acceleration(group, &trunk) => continue,
                 Quantity::JointPosition
                 | Quantity::JointVelocity
                 | Quantity::JointTorque
@@ -407,6 +408,7 @@ impl Source<'_> {
     /// Whether a column called acceleration is one: the derivative of its velocity, not what an IMU feels.
     fn is_acceleration(&self, group: &Group, trunk: &Trunk) -> bool {
         let velocity = match group.quantity {
+            Quantity::JointAcceleration => Quantity::JointVelocity,
             Quantity::BodyAcceleration => Quantity::BodyVelocity,
             _ => Quantity::AngularVelocity,
         };
