@@ -6,6 +6,8 @@ use clap::Args;
 
 use super::number::real;
 use crate::limits::table::{APEX, DISTANCE};
+use super::number::finite;
+use super::reading::ReadingArguments;
 
 /// `romc plan`
 #[derive(Debug, Args)]
@@ -55,4 +57,6 @@ pub struct PlanArguments {
     /// Write a plan that is not to be trusted, and replace existing files
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }
