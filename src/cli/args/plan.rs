@@ -5,9 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::number::real;
-use crate::limits::table::{APEX, DISTANCE};
-use super::number::finite;
 use super::reading::ReadingArguments;
+use crate::limits::table::{APEX, DISTANCE};
 
 /// `romc plan`
 #[derive(Debug, Args)]

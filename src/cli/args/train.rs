@@ -7,8 +7,8 @@ use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
 use super::number::{count, finite, real};
-use crate::limits::table;
 use super::reading::ReadingArguments;
+use crate::limits::table;
 use crate::model::Activation;
 use crate::recording::smoothing::SavitzkyGolay;
 use crate::recording::{Accelerations, SmoothedRows};
