@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use nalgebra::{DMatrix, DVector, SVector};
 
 use romc::files::Place;
-use romc::identify::clock::timed;
+use romc::recording::clock::timed;
 use romc::identify::equations::{BODY_ROWS, JOINT_ROWS, SampleEquations, joint_unknowns};
 use romc::identify::motion::Motion;
 use romc::identify::parameters::{
