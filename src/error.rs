@@ -20,6 +20,7 @@ use crate::mpc::MpcError;
 use crate::plan::PlanError;
 use crate::recording::RecordingError;
 use crate::robot::RobotError;
+use crate::robot_file::{RobotFileError, RobotFileFault};
 use crate::sim::SimError;
 use crate::simplify::SimplifyError;
 use crate::study::StudyError;
@@ -33,6 +34,8 @@ use crate::typeset::TypesetError;
 pub enum Error {
     #[error(transparent)]
     Robot(#[from] RobotError),
+    #[error(transparent)]
+    RobotFile(#[from] RobotFileError),
     #[error(transparent)]
     Recording(#[from] RecordingError),
     #[error(transparent)]
@@ -87,6 +90,9 @@ pub enum Error {
     /// A map is guessed of one log at a time.
     #[error("found {0} files, expected one log to guess a map of")]
     OneLog(usize),
+    /// An imported model that does not fit the recordings given with it.
+    #[error("{file}: {fault}; --unchecked writes the model all the same", file = file.display())]
+    Mismatch { file: PathBuf, fault: String },
     /// A file that romc would have to replace.
     #[error("{0}: already exists; pass --force to replace it, or choose another name")]
     Exists(PathBuf),
@@ -109,6 +115,10 @@ impl Error {
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Robot(error) => matches!(error, RobotError::UnknownRobot { .. }),
+            Self::RobotFile(error) => {
+                matches!(error.kind, RobotFileFault::Unknown(_))
+                    || matches!(error.place, Place::Option(_))
+            }
             Self::Import(error) => matches!(error.place, Place::Option(_)),
             Self::Train(error) => matches!(error, TrainError::Option { .. }),
             Self::Simplify(error) => {
@@ -137,6 +147,7 @@ impl Error {
             | Self::Plan(_)
             | Self::Distrusted(_)
             | Self::Config { .. }
+            | Self::Mismatch { .. }
             | Self::Exists(_)
             | Self::IsFolder(_)
             | Self::NoFolder { .. }

@@ -64,6 +64,7 @@ pub mod plan;
 pub mod recording;
 pub mod report;
 pub mod robot;
+pub mod robot_file;
 pub mod sim;
 pub mod simplify;
 pub mod solver;

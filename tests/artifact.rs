@@ -280,17 +280,17 @@ fn layers_that_are_wrong_are_refused_at_their_place() {
         change(&mut value);
         read_value(&value).expect_err("refused").to_string()
     };
-    let message = changed(&|v| v["encoder"]["layers"][0]["activation"] = json!("gelu"));
+    let message = changed(&|v| v["encoder"]["layers"][0]["activation"] = json!("selu"));
     assert!(message.contains("file.json"), "{message}");
     let found = read_value(&{
         let mut value = with_layers();
-        value["encoder"]["layers"][0]["activation"] = json!("gelu");
+        value["encoder"]["layers"][0]["activation"] = json!("selu");
         value
     });
     match found.map_err(|error| error.kind) {
         Err(ArtifactFault::Model(source)) => {
             let [_, found, expected] = parts_of(*source);
-            assert_eq!(found, "\"gelu\"");
+            assert_eq!(found, "\"selu\"");
             assert!(expected.contains("elu, tanh"), "{expected}");
         }
         other => panic!("{other:?}"),

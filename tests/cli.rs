@@ -1336,3 +1336,50 @@ fn sines_of_the_paper_become_linear_over_given_ranges() {
         assert!(error.contains(told), "{error}");
     }
 }
+
+/// The handler is there once recordings are read, which takes as long as the machine is slow: a signal
+/// before ends the process, and the next attempt waits longer.
+#[cfg(unix)]
+#[test]
+fn training_that_is_interrupted_says_so_in_text_exit_code_and_provenance() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let model = folder.path().join("cut-short.json");
+    for seconds in [4, 10, 25, 60] {
+        let training = Command::new(env!("CARGO_BIN_EXE_romc"))
+            .args([
+                "train",
+                "examples/recordings/go1/train_01.csv.gz",
+                "--latent-dim",
+                "2",
+            ])
+            .args([
+                "--method", "joint", "--epochs", "1000000", "--force", "--output",
+            ])
+            .arg(&model)
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .expect("the binary runs");
+        std::thread::sleep(std::time::Duration::from_secs(seconds));
+        let signal = Command::new("kill")
+            .args(["-INT", &training.id().to_string()])
+            .status();
+        assert!(
+            signal.expect("kill runs").success(),
+            "the training still runs"
+        );
+        let output = training.wait_with_output().expect("it ends");
+        if output.status.code().is_none() {
+            continue;
+        }
+        let (said, wrong) = (text(&output.stdout), text(&output.stderr));
+        assert_eq!(output.status.code(), Some(130), "{said}{wrong}");
+        assert!(said.contains("interrupted by Ctrl-C"), "{said}");
+        let value: Value =
+            serde_json::from_slice(&fs::read(&model).expect("a model")).expect("JSON");
+        assert_eq!(value["provenance"]["interrupted"], true);
+        return;
+    }
+    panic!("no training lived to be interrupted");
+}

@@ -232,7 +232,7 @@ fn generated_code_with_tables_equals_the_interpreter() {
 
 #[test]
 fn generated_maps_of_nonlinear_models_equal_the_interpreter() {
-    let models = (0..5).map(models::random_nonlinear).collect();
+    let models = (0..8).map(models::random_nonlinear).collect();
     let cases = [Case::new(models, 50, Form::Automatic)];
     check_all("nonlinear", &cases, |_| Build::all());
     let workshop = cases[0].workshop();

@@ -260,7 +260,7 @@ fn an_interrupted_training_says_so_and_its_model_too() {
     assert!(stopped.expect("kill").success());
     let output = training.wait_with_output().expect("ends");
     let note = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{note}");
+    assert_eq!(output.status.code(), Some(130), "{note}");
     assert!(note.contains("note: interrupted"), "{note}");
     let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(told["interrupted"], true);

@@ -17,3 +17,5 @@ mod hostile;
 mod round_trip;
 #[path = "import/store.rs"]
 mod store;
+#[path = "import/trained.rs"]
+mod trained;

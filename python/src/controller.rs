@@ -139,7 +139,7 @@ impl Controller {
         taken.map_err(|error| python_error(py, MpcError::from(error)))
     }
 
-    /// The command for a measurement. Arrays of the wrong length give a safe command, as everywhere.
+    /// The command for a measurement. Arrays of the wrong length give a safe command.
     fn step<'py>(
         &self,
         py: Python<'py>,

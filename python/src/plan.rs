@@ -10,8 +10,8 @@ use crate::errors::python_error;
 use crate::model::Model;
 use crate::recording::{Recording, Segment};
 
-/// Plans a jump; returns it as a recording, and its figures as JSON. A plan that is not to be trusted is
-/// an error unless forced.
+/// Plans a jump; returns it as a recording, and its figures as JSON. A plan that is not to be trusted
+/// is an error unless forced.
 #[pyfunction]
 pub fn plan(
     py: Python<'_>,

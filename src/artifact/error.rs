@@ -8,6 +8,7 @@ use thiserror::Error;
 use super::manifest::{SCHEMA, SCHEMA_2};
 use crate::files::{Located, Place};
 use crate::model::ModelError;
+use crate::robot_file::RobotFileError;
 
 /// A fault and its place in a model file.
 pub type ArtifactError = Located<ArtifactFault>;
@@ -55,6 +56,9 @@ pub enum ArtifactFault {
         /// The length of the other rows, or the one that the model needs.
         expected: usize,
     },
+    /// The robot that the file describes is none.
+    #[error("{0}")]
+    Robot(RobotFileError),
     /// The parts do not make a model.
     #[error("not a usable model")]
     Model(#[source] Box<ModelError>),

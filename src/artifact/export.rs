@@ -2,12 +2,13 @@
 
 use super::jump_prior::entries_of;
 use super::manifest::{
-    LayerEntry, LibraryEntry, Manifest, MapEntry, Pairs, PhaseEntry, SCHEMA, SCHEMA_2,
+    LayerEntry, LibraryEntry, Manifest, MapEntry, Pairs, PhaseEntry, RobotValue, SCHEMA, SCHEMA_2,
     StatisticsEntry,
 };
 use super::matrices::to_rows;
 use crate::model::{InputStatistics, Library, LibrarySource, Phase, ReducedModel, StateMap};
-use crate::robot::WrenchFrame;
+use crate::robot::{Robot, WrenchFrame};
+use crate::robot_file::RobotEntry;
 
 /// The content of the model file.
 pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
@@ -22,9 +23,10 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
     let actuators = model.actuators().cloned();
     let frame = model.wrench_frame();
     let wrench_frame = (frame != WrenchFrame::Body).then_some(frame);
+    let robot = model.robot().ok().map(robot_value);
     let (landmarks, prior) = entries_of(model);
-    let schema = match (&actuators, wrench_frame, &prior) {
-        (None, None, None) => SCHEMA,
+    let schema = match (&actuators, wrench_frame, &prior, &robot) {
+        (None, None, None, None | Some(RobotValue::Name(_))) => SCHEMA,
         _ => SCHEMA_2,
     };
     Manifest {
@@ -40,13 +42,20 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
         library: library_entry(model.library()),
         phases: model.phases().iter().map(phase_entry).collect(),
         input_statistics: Pairs(statistics.collect()),
-        robot: model.robot().ok().map(|robot| robot.name().to_owned()),
+        robot,
         actuators,
         wrench_frame,
         sample_time_s: model.sample_time_s().ok(),
         landmarks,
         prior,
         provenance: model.provenance().clone(),
+    }
+}
+
+fn robot_value(robot: &Robot) -> RobotValue {
+    match Robot::by_name(robot.name()) {
+        Ok(_) => RobotValue::Name(robot.name().to_owned()),
+        Err(_) => RobotValue::Entry(RobotEntry::of(robot)),
     }
 }
 

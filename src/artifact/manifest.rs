@@ -15,11 +15,12 @@ use serde_json::{Map, Value};
 use super::jump_prior::{LandmarksEntry, PriorEntry};
 use crate::model::{Activation, CoordinateNames, FeetRule, ScaleFactors, Scaling, StandardLibrary};
 use crate::robot::{Actuators, JOINT_DIM, WrenchFrame};
+use crate::robot_file::RobotEntry;
 
 /// Name and version of the format of a model without the keys of [`SCHEMA_2`].
 pub const SCHEMA: &str = "romc-model/1";
 
-/// The format with `actuators`, `wrench_frame`, `landmarks` and `prior`.
+/// The format with `actuators`, `wrench_frame`, `landmarks`, `prior` and a `robot` that is described.
 pub const SCHEMA_2: &str = "romc-model/2";
 
 /// Rows of a matrix.
@@ -49,7 +50,7 @@ pub(super) struct Manifest {
     #[serde(default, skip_serializing_if = "Pairs::is_empty")]
     pub input_statistics: Pairs<StatisticsEntry>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub robot: Option<String>,
+    pub robot: Option<RobotValue>,
     #[serde(
         default,
         deserialize_with = "present",
@@ -78,6 +79,33 @@ pub(super) struct Manifest {
     pub prior: Option<PriorEntry>,
     #[serde(default, skip_serializing_if = "Map::is_empty")]
     pub provenance: Map<String, Value>,
+}
+
+/// A robot of romc's own by its name, or any by its description.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub(super) enum RobotValue {
+    Name(String),
+    Entry(RobotEntry),
+}
+
+impl<'de> Deserialize<'de> for RobotValue {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Robot;
+        impl<'de> Visitor<'de> for Robot {
+            type Value = RobotValue;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a robot, or an object that describes one")
+            }
+            fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<RobotValue, E> {
+                Ok(RobotValue::Name(name.to_owned()))
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<RobotValue, A::Error> {
+                RobotEntry::deserialize(MapAccessDeserializer::new(map)).map(RobotValue::Entry)
+            }
+        }
+        deserializer.deserialize_any(Robot)
+    }
 }
 
 /// Only the schema; everything else is passed over.

@@ -1,7 +1,8 @@
 //! The model file, `romc-model/1` and `romc-model/2`.
 //!
-//! The second adds `actuators` and `wrench_frame`, how the model's inputs come from torques, and
-//! `landmarks` and `prior` of the training jumps, for planning; a model without them is written as the first.
+//! The second adds `actuators` and `wrench_frame`, how the model's inputs come from torques, `landmarks` and `prior`
+//! of the training jumps, for planning, and robots that are described in the file; a model without them is written as the
+//! first.
 //!
 //! What enters: a path or bytes; what leaves: a checked [`ReducedModel`], or an error which names
 //! file, tensor, index, what was found and what was expected. The other way, [`write()`] makes files
@@ -44,5 +45,5 @@ mod write;
 pub use digest::{Digest, digest};
 pub use error::{ArtifactError, ArtifactFault, describe};
 pub use manifest::{SCHEMA, SCHEMA_2};
-pub use read::{MAX_FILE_BYTES, read, read_from_bytes};
+pub use read::{MAX_FILE_BYTES, is_standard_input, read, read_from_bytes};
 pub use write::{check_place, to_text, write, write_with};

@@ -1,7 +1,7 @@
 //! From bytes to a checked model.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::Path;
 
 use nalgebra::DVector;
@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::error::{ArtifactError, ArtifactFault, refused};
 use super::jump_prior::prior_of;
 use super::manifest::{
-    LibraryEntry, Manifest, MapEntry, PhaseEntry, Rows, SCHEMA, SCHEMA_2, SchemaProbe,
+    LibraryEntry, Manifest, MapEntry, PhaseEntry, RobotValue, Rows, SCHEMA, SCHEMA_2, SchemaProbe,
     StatisticsEntry,
 };
 use super::matrices::from_rows;
@@ -23,16 +23,28 @@ use crate::robot::{Robot, STATE_DIM};
 /// Largest model file; all of the largest model fits.
 pub const MAX_FILE_BYTES: u64 = 32 << 20;
 
-/// Reads and checks a model file.
+/// Whether the path stands for standard input: `-`.
+pub fn is_standard_input(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// Reads and checks a model file, or standard input for the path `-`.
 ///
 /// # Errors
 /// [`ArtifactError`], of any kind but [`ArtifactFault::Exists`].
 pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
-    let name = path.display().to_string();
+    let name = match is_standard_input(path) {
+        true => "standard input".to_owned(),
+        false => path.display().to_string(),
+    };
     let mut bytes = Vec::new();
+    let source: io::Result<Box<dyn Read>> = match is_standard_input(path) {
+        true => Ok(Box::new(io::stdin().lock())),
+        false => File::open(path).map(|file| Box::new(file) as Box<dyn Read>),
+    };
     // One byte more than allowed distinguishes a file that is too large from one that just fits.
-    File::open(path)
-        .and_then(|file| file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
+    source
+        .and_then(|source| source.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
         .map_err(|source| {
             let action = "read";
             ArtifactFault::Io { action, source }.of(&name)
@@ -56,6 +68,10 @@ pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, Artifac
             ("wrench_frame", manifest.wrench_frame.is_some()),
             ("landmarks", manifest.landmarks.is_some()),
             ("prior", manifest.prior.is_some()),
+            (
+                "robot",
+                matches!(manifest.robot, Some(RobotValue::Entry(_))),
+            ),
         ];
         if let Some((key, _)) = later.into_iter().find(|(_, there)| *there) {
             return Err(ArtifactFault::LaterKey { key }.of(file));
@@ -129,8 +145,16 @@ fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactErro
     let mut builder = ReducedModel::builder(manifest.name, library)
         .description(manifest.description)
         .provenance(manifest.provenance);
-    let robot = manifest.robot.as_deref().map(Robot::by_name).transpose();
-    let robot = robot.map_err(|source| refused(file, source))?;
+    let robot = match &manifest.robot {
+        None => None,
+        Some(RobotValue::Name(name)) => {
+            Some(Robot::by_name(name).map_err(|source| refused(file, source))?)
+        }
+        Some(RobotValue::Entry(entry)) => {
+            let robot = entry.robot("robot");
+            Some(robot.map_err(|source| ArtifactFault::Robot(source).of(file))?)
+        }
+    };
     let known_dim = robot
         .map(|_| STATE_DIM)
         .or(manifest.state.as_ref().map(|state| state.names.len()));

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::IdentifyArguments;
 use super::output::{check_output, read_with, reader, spinner, write_file};
+use super::robot;
 use crate::Error;
 use crate::files::Overwrite;
 use crate::identify::{Identification, PerKind, identify};
@@ -22,7 +23,7 @@ use crate::typeset::{Table, significant};
 pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(arguments.output.as_deref(), overwrite)?;
-    let robot = Robot::by_name(&arguments.robot)?;
+    let robot = robot::chosen(&arguments.robot)?;
     let recordings = read_with(
         &reader(&arguments.reading, Clocks::Recorded)?,
         &arguments.recordings,

@@ -7,13 +7,16 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::{ImportArguments, LibraryArgument};
+use super::import_check;
 use super::output::{check_output, read_recordings, stem};
+use super::robot;
+use crate::evaluate::RoundTrip;
 use crate::files::Overwrite;
 use crate::import::{
     Chosen, ImportOptions, ImportReport, LibraryChoice, SymbolNames, import, read_terms,
 };
 use crate::model::{ReducedModel, ScaleFactors, Scaling};
-use crate::robot::Robot;
+use crate::recording::Segment;
 use crate::sim::input_statistics;
 use crate::typeset::Table;
 use crate::{Error, artifact};
@@ -26,9 +29,15 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(Some(&arguments.output), overwrite)?;
     let imported = import(&arguments.file, &options(arguments)?)?;
-    let model = with_inputs(imported.model, arguments)?;
+    let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
+    let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
+    let model = with_inputs(imported.model, &segments)?;
+    let check = checked(&model, &segments, arguments)?;
     artifact::write_with(&arguments.output, &model, overwrite)?;
     let mut text = describe(&imported.report);
+    if let Some(check) = &check {
+        text.push_str(&import_check::describe(check));
+    }
     let _ = writeln!(
         text,
         "{}: model `{}`",
@@ -46,18 +55,17 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
             "name": model.name(),
             "digest": artifact::digest(&model).to_string(),
             "report": imported.report,
+            "check": check.as_ref().map(import_check::json),
         }),
     })
 }
 
 /// The model with the input statistics of recordings, in the phases that they have samples of.
-fn with_inputs(model: ReducedModel, arguments: &ImportArguments) -> Result<ReducedModel, Error> {
-    if arguments.inputs_from.is_empty() {
+fn with_inputs(model: ReducedModel, segments: &[&Segment]) -> Result<ReducedModel, Error> {
+    if segments.is_empty() {
         return Ok(model);
     }
-    let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
-    let segments: Vec<_> = recordings.iter().flat_map(|r| &r.segments).collect();
-    let statistics = input_statistics(&model, &segments)?;
+    let statistics = input_statistics(&model, segments)?;
     let names: Vec<String> = model.phases().iter().map(|p| p.name.clone()).collect();
     let mut builder = model.into_builder();
     for (name, statistics) in names.into_iter().zip(statistics) {
@@ -66,6 +74,29 @@ fn with_inputs(model: ReducedModel, arguments: &ImportArguments) -> Result<Reduc
         }
     }
     Ok(builder.build()?)
+}
+
+/// Compares the model with the recordings, if there are any and it has both maps; refuses one that
+/// misses them.
+fn checked(
+    model: &ReducedModel,
+    segments: &[&Segment],
+    arguments: &ImportArguments,
+) -> Result<Option<RoundTrip>, Error> {
+    let has_maps = model.encoder_map().is_ok() && model.decoder_map().is_ok();
+    if segments.is_empty() || !has_maps {
+        return Ok(None);
+    }
+    let check = RoundTrip::of(model, segments)?;
+    match import_check::fault(&check) {
+        Some(fault) if import_check::is_refused(&check) && !arguments.unchecked => {
+            Err(Error::Mismatch {
+                file: arguments.file.clone(),
+                fault,
+            })
+        }
+        _ => Ok(Some(check)),
+    }
 }
 
 /// Commands that cannot use a model, and the option that mends it.
@@ -104,7 +135,10 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
         latent_dim: arguments.latent_dim,
         phases: arguments.phase.clone(),
         scaling: scaling(arguments),
-        robot: arguments.robot.as_deref().map(Robot::by_name).transpose()?,
+        input_scaling: (arguments.scaling.is_empty() && !arguments.input_scaling.is_empty())
+            .then(|| factors(&arguments.input_scaling)),
+        order: arguments.order.clone(),
+        robot: arguments.robot.as_deref().map(robot::chosen).transpose()?,
         sample_time_s: arguments.sample_time,
     })
 }
@@ -117,11 +151,14 @@ fn library(arguments: &ImportArguments) -> Result<Option<LibraryChoice>, Error> 
     })
 }
 
-fn scaling(arguments: &ImportArguments) -> Option<Scaling> {
-    let factors = |given: &[f64]| match given {
+fn factors(given: &[f64]) -> ScaleFactors {
+    match given {
         [factor] => ScaleFactors::Uniform(*factor),
         list => ScaleFactors::PerCoordinate(DVector::from_column_slice(list)),
-    };
+    }
+}
+
+fn scaling(arguments: &ImportArguments) -> Option<Scaling> {
     let state = arguments.scaling.as_slice();
     let input = match arguments.input_scaling.as_slice() {
         [] => state,

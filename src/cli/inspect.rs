@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::InspectArguments;
 use super::output::{check_output, reader, write_file};
-use super::{inspect_model, inspect_recording};
+use super::{inspect_model, inspect_recording, robot};
 use crate::files::Overwrite;
 use crate::recording::foreign::guess::guess;
 use crate::recording::{Clocks, Reader};
@@ -19,7 +19,7 @@ use crate::{Error, artifact};
 /// # Errors
 /// Whatever reading the file refuses.
 pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
-    let robot = Robot::by_name(&arguments.robot)?;
+    let robot = robot::chosen(&arguments.robot)?;
     if arguments.guess {
         return guessed(arguments, robot);
     }
@@ -70,10 +70,7 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
 }
 
 fn inspect(path: &Path, robot: &Robot, reader: &Reader) -> Result<Answer, Error> {
-    if path
-        .extension()
-        .is_some_and(|extension| extension == "json")
-    {
+    if artifact::is_standard_input(path) || path.extension().is_some_and(|e| e == "json") {
         inspect_model::describe(path, &artifact::read(path)?)
     } else {
         inspect_recording::describe(&reader.read(path)?, robot)

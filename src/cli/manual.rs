@@ -63,7 +63,11 @@ pub fn completions(arguments: &CompletionsArguments) -> Answer {
     let mut script = Vec::new();
     let mut command = Arguments::command();
     clap_complete::generate(arguments.shell, &mut command, "romc", &mut script);
-    let text = String::from_utf8_lossy(&script).into_owned();
+    // Where names are offered that may also be files, bash offers both.
+    let robots = crate::robot::Robot::known_names().join(" ");
+    let names = format!("compgen -W \"{robots}\"");
+    let text =
+        String::from_utf8_lossy(&script).replace(&names, &format!("compgen -f -W \"{robots}\""));
     Answer {
         json: json!({
             "command": "completions",

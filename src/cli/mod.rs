@@ -12,6 +12,7 @@ mod convert;
 mod demo;
 mod identify;
 mod import;
+mod import_check;
 mod inspect;
 mod inspect_model;
 mod inspect_recording;
@@ -21,6 +22,7 @@ mod output;
 mod plan;
 mod prepared_recordings;
 mod report;
+mod robot;
 mod simplification;
 mod simulate;
 mod study;
@@ -91,17 +93,19 @@ const DONE: u8 = 0;
 const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 
-/// Runs a command; the exit code of one that ran is 0, or 1 for files that `check` finds different.
+/// Runs a command; the exit code of one that ran is 0, 1 for files that `check` finds different, or
+/// 130 for a training that Ctrl-C cut short.
 fn execute(command: Command) -> Result<(Answer, u8), Error> {
     let answer = match command {
         Command::Check(arguments) => return check::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
-        Command::Train(arguments) => train::run(&arguments),
+        Command::Train(arguments) => return train::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
+        Command::Robot(arguments) => robot::run(&arguments),
         Command::Compile(arguments) => compile::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Mpc(arguments) => mpc::run(&arguments),

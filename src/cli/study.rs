@@ -9,13 +9,13 @@ use super::actuators;
 use super::args::{StudyArguments, TrainSettings};
 use super::output::spinner;
 use super::prepared_recordings::{RecordedSets, read_all, reader_for};
+use super::robot;
 use super::train_settings;
 use crate::Error;
 use crate::files::{EmittedFile, Overwrite, check_folder, write_files};
 use crate::recording::Recording;
 use crate::report::figures::figure_files;
 use crate::report::study_figures;
-use crate::robot::Robot;
 use crate::study::{self, Plan, Shard, Spread, Store, Summary, cell_table};
 use crate::train::{Origin, TrainOptions};
 use crate::typeset::{Cell, Table, significant};
@@ -61,7 +61,7 @@ fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
 
 fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let mut settings = settings(arguments)?;
-    let robot = Robot::by_name(settings.robot.as_deref().unwrap_or("go1"))?;
+    let robot = robot::chosen(settings.robot.as_deref().unwrap_or("go1"))?;
     let recorded = RecordedSets::whole(
         [&arguments.recordings, &arguments.validation, &[]],
         &settings,

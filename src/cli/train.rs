@@ -11,10 +11,10 @@ use super::actuators::{self, NONE};
 use super::args::{TrainArguments, TrainSettings};
 use super::output::{check_output, names, note, spinner, stem};
 use super::prepared_recordings::{RecordedSets, read_all};
+use super::robot;
 use super::train_settings;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
-use crate::robot::Robot;
 use crate::train::{
     Method, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained, Watch,
 };
@@ -25,7 +25,7 @@ use crate::{Error, artifact, train};
 ///
 /// # Errors
 /// Whatever reading or training refuses; [`Error::Exists`] for the model file.
-pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
+pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(Some(&arguments.output), overwrite)?;
     let settings = train_settings::effective(arguments)?;
@@ -33,7 +33,7 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         .latent_dim
         .expect("checked by clap, or with the file");
     let method = train_settings::method(&settings);
-    let robot = Robot::by_name(settings.robot.as_deref().unwrap_or("go1"))?;
+    let robot = robot::chosen(settings.robot.as_deref().unwrap_or("go1"))?;
     let mut options = train_settings::options(&settings, latent_dim, model_name(arguments))?;
     let recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
     if settings.actuators.as_deref() == Some(actuators::IDENTIFIED) {
@@ -88,8 +88,19 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
             "\nof the jumps {training} were for training, {validation} for validation, {test} for test"
         );
     }
-    Ok(answer)
+    if !is_interrupted {
+        return Ok((answer, 0));
+    }
+    let _ = writeln!(
+        answer.text,
+        "\ninterrupted by Ctrl-C: the model is the best until then, and the command in its provenance, which says so, \
+         does not give it again"
+    );
+    Ok((answer, INTERRUPTED_CODE))
 }
+
+/// Exit code of a process that Ctrl-C ended: 128 and the number of the signal.
+const INTERRUPTED_CODE: u8 = 130;
 
 /// Becomes true at the first Ctrl-C, so that a training ends with the best so far; the second one ends the process.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
@@ -106,7 +117,7 @@ fn stop_on_interrupt() -> &'static AtomicBool {
     // Without a handler (there is one already) Ctrl-C ends the process at once, which leaves no half file either.
     let _ = ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
+            std::process::exit(INTERRUPTED_CODE.into());
         }
     });
     &INTERRUPTED

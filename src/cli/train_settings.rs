@@ -327,7 +327,10 @@ fn check(settings: &TrainSettings) -> Result<(), String> {
         );
     }
     if settings.activation == Some(Activation::Linear) {
-        return Err("`activation` is linear, expected elu, tanh or sigmoid".to_owned());
+        return Err(
+            "`activation` is linear, expected elu, tanh, sigmoid, relu, gelu, silu or softplus"
+                .to_owned(),
+        );
     }
     Ok(())
 }

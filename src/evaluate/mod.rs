@@ -20,6 +20,7 @@ mod metrics;
 mod prediction;
 mod recovery;
 mod remarks;
+mod round_trip;
 mod torque;
 mod uninformed;
 
@@ -39,4 +40,5 @@ pub use linearised::{LinearisedPhase, RANK_THRESHOLD, linearise_phases};
 pub use metrics::{Fit, FitSums};
 pub use prediction::PredictionError;
 pub use remarks::remarks;
+pub use round_trip::{AccelerationSlip, RoundTrip, Slip};
 pub use torque::{ByContact, Comparison, is_plausible};

@@ -187,7 +187,7 @@ impl Emitted {
 /// the last. Equal emissions leave equal lists.
 fn settle(folder: &Path) -> Result<(), FolderError> {
     let list = folder.join(LIST);
-    let mut settle = || {
+    let settle = || {
         let mut file = OpenOptions::new().read(true).write(true).open(&list)?;
         locked(&file)?;
         let mut text = String::new();

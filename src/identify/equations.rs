@@ -88,7 +88,7 @@ impl SampleEquations {
                 let of = |m: &DMatrix<f64>| m.fixed_view::<3, 1>(first, sample).into_owned();
                 let state = LegSample {
                     frame: motion.legs[sample][leg.index()],
-                    abduction: motion.attitude[sample].column(0).into_owned(),
+                    abduction: motion.legs[sample][leg.index()].abduction,
                     trunk_rate: motion.trunk_rate[sample],
                     rate: of(&segment.dx),
                     acceleration: of(&motion.coordinates),
@@ -99,7 +99,7 @@ impl SampleEquations {
                 body.add_moments(&motion.leg(leg, sample));
                 if segment.feet[sample][leg.index()] {
                     let q = leg.of_joints(&segment.joints(sample));
-                    let posture = robot.geometry().manipulability(&q);
+                    let posture = robot.geometry(leg).manipulability(&q);
                     match robot.foot_force_map(leg, &q) {
                         Ok(map) if posture >= LEAST_MANIPULABILITY => {
                             body.add_foot(&state, &(motion.attitude[sample] * map));
@@ -244,7 +244,8 @@ fn own_torques(
     sample: usize,
     gravity_m_s2: f64,
 ) -> [Vector3<f64>; OWN.len()] {
-    let geometry = robot.geometry();
+    let links = robot.geometry(leg).links();
+    let [side_m, thigh_m] = [links.hip.norm(), links.thigh.norm()];
     let (frame, second) = (&motion.legs[sample][leg.index()], motion.leg(leg, sample));
     let hip = robot.hip_position(leg);
     let trunk = motion.body(sample)
@@ -252,10 +253,10 @@ fn own_torques(
         + (0..3).fold(Vector3::zeros(), |sum, axis| {
             sum + hip[axis] * motion.trunk_axis(axis, sample)
         });
-    let plane = trunk + geometry.hip_m * second.side;
-    let knee = plane + geometry.thigh_m * second.thigh;
-    let abduction = motion.attitude[sample].column(0).into_owned();
-    let (side, thigh) = (geometry.hip_m * frame.side, geometry.thigh_m * frame.thigh);
+    let plane = trunk + side_m * second.side;
+    let knee = plane + thigh_m * second.thigh;
+    let abduction = frame.abduction;
+    let (side, thigh) = (side_m * frame.side, thigh_m * frame.thigh);
     // Moments about the joint of flexion and about the knee of a first moment along `direction`.
     let torques = |flexion: Vector3<f64>, knee: Vector3<f64>, force: Vector3<f64>| {
         Vector3::new(

@@ -4,7 +4,6 @@ use thiserror::Error;
 
 use crate::files::Located;
 use crate::recording::RecordingError;
-use crate::robot::RobotError;
 
 /// Why recordings do not say what the robot is, or a file does not.
 #[derive(Debug, Error)]
@@ -74,7 +73,4 @@ pub enum IdentifyFault {
         /// The values accepted.
         expected: &'static str,
     },
-    /// No robot of that name is registered.
-    #[error(transparent)]
-    Robot(RobotError),
 }

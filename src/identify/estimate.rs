@@ -18,7 +18,7 @@ use super::windows::{Group, Windows};
 use crate::recording::check::check;
 use crate::recording::clock::{Timed, timed};
 use crate::recording::{Recording, Segment};
-use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Robot};
+use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 
 /// Fewest samples with feet on the ground.
 const LEAST_CONTACT_SAMPLES: usize = 100;
@@ -52,7 +52,7 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
         let timed = timed.collect::<Result<Vec<_>, _>>()?;
         notes.extend(mended(&recording.path, &timed));
         segments.extend(timed.into_iter().map(|timed| Prepared {
-            motion: Motion::of(&timed.segment),
+            motion: Motion::of(&timed.segment, robot),
             segment: timed.segment,
             lost: timed.lost,
         }));
@@ -185,7 +185,7 @@ impl State {
     /// One fit; whether it changed nothing that matters.
     fn improve(&mut self, windows: &Windows, robot: &Robot) -> Result<bool, IdentifyError> {
         const LEAST_ROUNDS: usize = 6;
-        let priors = priors(robot.geometry(), self.mass_kg, &self.losses);
+        let priors = priors(robot.geometry(Leg::FrontLeft), self.mass_kg, &self.losses);
         let solved = self.iteration.step(&windows.rows, &priors, self.mass_kg);
         let estimate = solved.and(self.iteration.estimate).unwrap_or_default();
         let inverse = estimate[INVERSE_MASS];
@@ -218,7 +218,7 @@ impl State {
         windows: &Windows,
         notes: Vec<String>,
     ) -> Result<Identification, IdentifyError> {
-        let priors = priors(robot.geometry(), self.mass_kg, &self.losses);
+        let priors = priors(robot.geometry(Leg::FrontLeft), self.mass_kg, &self.losses);
         let estimate = self.iteration.estimate.unwrap_or_default();
         // When within a step a torque acts is not recorded: uniform over it.
         let longest_step =

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::error::{IdentifyError, IdentifyFault};
 use super::identification::{Fit, Identification, Legs, PerKind};
 use crate::files::{Located, Place};
-use crate::robot::{JOINT_NAMES, Robot};
+use crate::robot::JOINT_NAMES;
 
 impl Identification {
     /// The file's text: SI units, `[actuators]` in the order of the state's joints.
@@ -84,10 +84,6 @@ impl Identification {
             let fault = IdentifyFault::Syntax(error.message().to_owned());
             at(file, place, fault)
         })?;
-        if let Err(error) = Robot::by_name(&found.robot) {
-            let place = Place::Entry("robot".into());
-            return Err(at(file, place, IdentifyFault::Robot(error)));
-        }
         found.require_plausible(file)?;
         Ok(found)
     }

@@ -4,15 +4,17 @@
 //! `R = Rz Ry Rx`. Velocities of directions follow from the recorded rates; accelerations are
 //! differences of velocities, those of the recording included, so that all carry the same errors.
 
-use nalgebra::{DMatrix, Matrix3, Rotation3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Rotation3, Unit, Vector3};
 
 use crate::recording::Segment;
 use crate::recording::preprocess::differences;
-use crate::robot::{JOINT_DIM, Leg};
+use crate::robot::{JOINT_DIM, Leg, LegLinks, Robot};
 
 /// Directions of one leg in the world, unit vectors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LegFrame {
+    /// Axis of abduction.
+    pub abduction: Vector3<f64>,
     /// From the axis of abduction to the plane of the leg.
     pub side: Vector3<f64>,
     /// From hip to knee.
@@ -63,8 +65,9 @@ const TRUNK_ROWS: usize = 9;
 const LEG_ROWS: usize = 15;
 
 impl Motion {
-    /// The motion of a segment of at least two samples.
-    pub fn of(segment: &Segment) -> Self {
+    /// The motion of a robot's segment of at least two samples.
+    pub fn of(segment: &Segment, robot: &Robot) -> Self {
+        let links = Leg::ALL.map(|leg| robot.geometry(leg).links());
         let n = segment.len();
         let mut motion = Self {
             attitude: Vec::with_capacity(n),
@@ -98,7 +101,7 @@ impl Motion {
                 let q = leg.of_joints(&segment.joints(sample));
                 let first = 3 * leg.index();
                 let dq: [f64; 3] = std::array::from_fn(|i| segment.dx[(first + i, sample)]);
-                let (frame, velocities) = leg_frame(&attitude, &rate, leg, &q, &dq);
+                let (frame, velocities) = leg_frame(&attitude, &rate, &links[leg.index()], &q, &dq);
                 for (place, velocity) in velocities.into_iter().enumerate() {
                     put(TRUNK_ROWS + LEG_ROWS * leg.index() + 3 * place, velocity);
                 }
@@ -148,23 +151,27 @@ impl Motion {
 fn leg_frame(
     attitude: &Matrix3<f64>,
     rate: &Vector3<f64>,
-    leg: Leg,
+    links: &LegLinks,
     q: &[f64; 3],
     dq: &[f64; 3],
 ) -> (LegFrame, [Vector3<f64>; 5]) {
-    let turn = |axis, angle| Rotation3::from_axis_angle(&axis, angle).into_inner();
-    let hip = attitude * turn(Vector3::x_axis(), q[0]);
-    let thigh = hip * turn(Vector3::y_axis(), q[1]);
-    let calf = thigh * turn(Vector3::y_axis(), q[2]);
+    let turn =
+        |axis, angle| Rotation3::from_axis_angle(&Unit::new_unchecked(axis), angle).into_inner();
+    let hip = attitude * turn(links.abduction, q[0]);
+    let thigh = hip * turn(links.flexion, q[1]);
+    let calf = thigh * turn(links.flexion, q[2]);
+    let [along_hip, along_thigh, along_calf] = [links.hip, links.thigh, links.calf]
+        .map(|link| link.try_normalize(0.0).unwrap_or_default());
     let frame = LegFrame {
-        side: leg.side() * hip.column(1),
-        thigh: -thigh.column(2),
-        calf: -calf.column(2),
-        thigh_front: thigh.column(0).into_owned(),
-        calf_front: calf.column(0).into_owned(),
-        flexion: hip.column(1).into_owned(),
+        abduction: attitude * links.abduction,
+        side: hip * along_hip,
+        thigh: thigh * along_thigh,
+        calf: calf * along_calf,
+        thigh_front: thigh * along_thigh.cross(&links.flexion),
+        calf_front: calf * along_calf.cross(&links.flexion),
+        flexion: hip * links.flexion,
     };
-    let hip_rate = rate + attitude.column(0) * dq[0];
+    let hip_rate = rate + frame.abduction * dq[0];
     let thigh_rate = hip_rate + frame.flexion * dq[1];
     let calf_rate = thigh_rate + frame.flexion * dq[2];
     let velocities = [

@@ -71,6 +71,8 @@ pub struct Prior {
 
 /// Share of the robot's mass in the moving part of one leg, by order of magnitude.
 const LEG_SHARE: f64 = 0.13;
+/// Least distance of a leg from its axis of abduction that counts, over the thigh's length.
+const LEAST_SIDE: f64 = 0.1;
 /// Second moment of a uniform rod over length times first moment.
 const ROD: f64 = 2.0 / 3.0;
 /// Deviation of a hip's loss from that of the thigh joint of the same leg, relative.
@@ -80,7 +82,7 @@ const SMALLEST_LOSS: [(usize, f64); 3] = [(VISCOUS, 0.05), (DRY, 0.05), (ARMATUR
 
 /// What is known of any quadruped of this size and mass (kg). `losses` are present estimates, SI.
 pub fn priors(geometry: &LegGeometry, mass_kg: f64, losses: &[f64; PARAMETER_DIM]) -> Vec<Prior> {
-    let (thigh, calf) = (geometry.thigh_m, geometry.calf_m);
+    let [thigh, calf] = geometry.lengths();
     let leg = LEG_SHARE * mass_kg;
     let single = |index: usize, deviation: f64| Prior {
         terms: vec![(index, 1.0)],
@@ -93,7 +95,10 @@ pub fn priors(geometry: &LegGeometry, mass_kg: f64, losses: &[f64; PARAMETER_DIM
     let mut priors = vec![
         single(TRUNK_FORWARD, 0.07 * (thigh + calf) * mass_kg),
         single(TRUNK_UP, 0.07 * (thigh + calf) * mass_kg),
-        single(LEG_SIDE, leg * geometry.hip_m),
+        single(
+            LEG_SIDE,
+            leg * geometry.links().hip.norm().max(LEAST_SIDE * thigh),
+        ),
         single(THIGH, leg * thigh),
         single(THIGH_SECOND, leg * thigh * thigh),
         single(CALF, leg * calf),

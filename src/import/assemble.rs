@@ -1,6 +1,7 @@
 //! From assigned tensors to the parts of a model.
 
 mod maps;
+mod units;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,7 +13,7 @@ use super::report::{Layout, Note, ReadEquation, UnusedTensor, UsedTensor};
 use super::role::Role;
 use super::tensors::{Array, Element, TensorFile};
 use crate::files::Place;
-use crate::model::{InputStatistics, Library, Phase, ScaleFactors, Scaling, StateMap};
+use crate::model::{InputStatistics, Library, Phase, Scaling, StateMap};
 use crate::robot::STATE_DIM;
 
 /// The parts of a model that a file has.
@@ -63,7 +64,7 @@ pub(super) fn parts(
     let (encoder, decoder) = assembly.maps()?;
     let (library, phases) = assembly.coefficients()?;
     let statistics = assembly.statistics()?;
-    let parts = Parts {
+    let mut parts = Parts {
         library,
         phases,
         encoder,
@@ -71,6 +72,8 @@ pub(super) fn parts(
         scaling: assembly.scaling()?,
         statistics,
     };
+    assembly.fold_mean(&mut parts)?;
+    assembly.sort(&mut parts)?;
     let mut notes = assembly.notes;
     let unused = assignment.unused.iter().map(|info| UnusedTensor {
         tensor: info.name.clone(),
@@ -243,7 +246,11 @@ impl<'a> Assembly<'a, '_> {
         let fitting: Vec<_> = ways.into_iter().filter(fits).collect();
         let option = "--xi-layout terms-by-latent (one row per term) or --xi-layout latent-by-terms \
                       (one row per latent coordinate)";
-        let expected = || self.expected_xi(choice);
+        let expected = || match assigned.info.shape.len() {
+            3 => "one tensor per phase: in Python, {\"xi.contact\": Xi[0], \"xi.flight\": Xi[1]}"
+                .to_owned(),
+            _ => self.expected_xi(choice),
+        };
         let (layout, (terms, latent)) = self.only_way(assigned, &fitting, expected, option)?;
         let array = self.read(assigned)?;
         let matrix = match layout {
@@ -321,27 +328,5 @@ impl<'a> Assembly<'a, '_> {
             all.push((rule.name.clone(), InputStatistics { mean, covariance }));
         }
         Ok(all)
-    }
-
-    /// Scale factors from tensors, or as given.
-    fn scaling(&mut self) -> Result<Option<Scaling>, ImportError> {
-        let Some((state, input)) = self.pair(&Role::StateScaling, &Role::InputScaling)? else {
-            return Ok(self.options.scaling.clone());
-        };
-        if self.options.scaling.is_some() {
-            let found = "factors here and in tensors";
-            return Err(ImportError::option("--scaling", found, "one of the two"));
-        }
-        let (state, input) = (self.factors(state)?, self.factors(input)?);
-        Ok(Some(Scaling { state, input }))
-    }
-
-    fn factors(&mut self, assigned: &Assigned<'_>) -> Result<ScaleFactors, ImportError> {
-        let count: usize = assigned.info.shape.iter().product();
-        if count == 1 {
-            return Ok(ScaleFactors::Uniform(self.list(assigned, 1)?[0]));
-        }
-        let dim = self.known.state.unwrap_or(count);
-        Ok(ScaleFactors::PerCoordinate(self.list(assigned, dim)?))
     }
 }

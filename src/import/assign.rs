@@ -3,7 +3,7 @@
 use super::error::ImportError;
 use super::options::{ImportOptions, PhaseRule, no_feet};
 use super::report::Chosen;
-use super::role::Role;
+use super::role::{ONLY_PHASE, Role};
 use super::tensors::{TensorFile, TensorInfo};
 use crate::files::Place;
 
@@ -67,7 +67,11 @@ fn named<'f>(
     mapped: &[Assigned<'_>],
 ) -> Result<Vec<Assigned<'f>>, ImportError> {
     let is_settled = |role: &Role| match role {
-        Role::StateScaling | Role::InputScaling if options.scaling.is_some() => true,
+        Role::StateScaling | Role::InputScaling | Role::StateStd | Role::InputStd
+            if options.scaling.is_some() =>
+        {
+            true
+        }
         _ => mapped.iter().any(|assigned| match (&assigned.role, role) {
             (Role::Weights(a, _), Role::Weights(b, _)) => a == b,
             (a, b) => a == b,
@@ -77,7 +81,9 @@ fn named<'f>(
     for info in tensors.infos() {
         let is_free = mapped.iter().all(|a| a.info.name != info.name);
         let role = Role::of_name(&info.name).filter(|role| is_free && !is_settled(role));
-        let Some(role) = role else { continue };
+        let Some(role) = role.map(|role| renamed(role, options)) else {
+            continue;
+        };
         if let Some(earlier) = named.iter().find(|assigned| assigned.role == role) {
             let (a, b) = (earlier.info.describe(), info.describe());
             let found = format!("{a}, {b} for {role}");
@@ -93,6 +99,14 @@ fn named<'f>(
         named.push(Assigned { role, info, chosen });
     }
     Ok(named)
+}
+
+/// Coefficients without a phase belong to the only one there is.
+fn renamed(role: Role, options: &ImportOptions) -> Role {
+    match (role, options.phases.as_slice()) {
+        (Role::Xi(phase), [only]) if phase == ONLY_PHASE => Role::Xi(only.name.clone()),
+        (role, _) => role,
+    }
 }
 
 /// The tensors of `--map`.

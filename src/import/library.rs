@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::error::ImportError;
 use super::options::{LibraryChoice, standard_text};
+use super::pysindy;
 use crate::files::{Located, Place};
 use crate::model::{Library, LibraryError, StandardLibrary};
 
@@ -25,7 +26,9 @@ pub(super) fn dim(choice: &LibraryChoice, latent_dim: usize) -> Option<usize> {
 pub(super) fn build(choice: &LibraryChoice, latent_dim: usize) -> Result<Library, LibraryError> {
     match choice {
         LibraryChoice::Standard(standard) => Library::standard(latent_dim, *standard),
-        LibraryChoice::Terms(terms) => Library::from_terms(latent_dim, terms),
+        LibraryChoice::Terms(terms) => {
+            Library::from_terms(latent_dim, &pysindy::readable(terms, latent_dim))
+        }
     }
 }
 

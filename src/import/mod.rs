@@ -36,6 +36,7 @@ mod library;
 mod memory;
 mod npz;
 mod options;
+mod pysindy;
 mod report;
 mod role;
 mod run;

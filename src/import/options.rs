@@ -9,9 +9,9 @@ use serde::Serialize;
 use super::error::ImportError;
 use super::latex::SymbolNames;
 use super::report::Note;
-use super::role::Mapping;
+use super::role::{Mapping, ONLY_PHASE};
 use crate::files::Place;
-use crate::model::{Activation, FeetRule, Scaling, StandardLibrary};
+use crate::model::{Activation, CoordinateOrder, FeetRule, ScaleFactors, Scaling, StandardLibrary};
 use crate::robot::{ContactFlags, Robot};
 
 /// The kinds of files that can be imported.
@@ -161,7 +161,7 @@ impl FromStr for PhaseRule {
 
     fn from_str(text: &str) -> Result<Self, ImportError> {
         let refused = || {
-            let expected = "NAME=any, NAME=none, or NAME= and foot patterns in the order fr fl rr \
+            let expected = "NAME=any, NAME=none, NAME=always, or NAME= and foot patterns in the order fr fl rr \
                             rl, such as rear=0011,0001";
             ImportError::option("--phase", format!("{text:?}"), expected)
         };
@@ -169,6 +169,7 @@ impl FromStr for PhaseRule {
         let feet = match feet.trim() {
             "any" => FeetRule::Any,
             "none" => FeetRule::None,
+            "always" => FeetRule::always(),
             patterns => FeetRule::Patterns(
                 (patterns.split(','))
                     .map(|pattern| parse_pattern(pattern.trim()).ok_or_else(refused))
@@ -218,8 +219,12 @@ pub struct ImportOptions {
     pub latent_dim: Option<usize>,
     /// The phases in the order in which they are tried; `contact` and `flight` are known.
     pub phases: Vec<PhaseRule>,
-    /// Scale factors; needed with an encoder or decoder.
+    /// Scale factors; needed with an encoder or decoder, unless tensors have them.
     pub scaling: Option<Scaling>,
+    /// Factors of the inputs, where tensors have those of the states alone.
+    pub input_scaling: Option<ScaleFactors>,
+    /// The order of coordinates in the file, if it is not that of the robot; needs the robot.
+    pub order: Option<CoordinateOrder>,
     /// The robot whose 18 coordinates the encoder takes.
     pub robot: Option<&'static Robot>,
     /// Sampling period of the training recordings, s.
@@ -236,6 +241,7 @@ impl ImportOptions {
             }
             "contact" => Some(FeetRule::Any),
             "flight" => Some(FeetRule::None),
+            ONLY_PHASE => Some(FeetRule::always()),
             _ => None,
         }
     }
@@ -252,7 +258,7 @@ impl ImportOptions {
 /// A phase without a rule; `found` is what belongs to it.
 pub(super) fn no_feet(file: &str, phase: &str, found: &str) -> ImportError {
     let expected = format!(
-        "--phase {phase}=FEET (any, none, or patterns such as 0011 in the order fr fl rr rl)"
+        "--phase {phase}=any (or none, always, or patterns such as 0011 in the order fr fl rr rl)"
     );
     ImportError::at(
         file,

@@ -133,6 +133,13 @@ pub enum Note {
     },
     /// Encoder and decoder are stored in different ways.
     MixedWeights,
+    /// A mean that the training took off states went into the biases.
+    FoldedMean,
+    /// Coordinates were brought into romc's order.
+    Sorted {
+        /// Their order in the file.
+        order: String,
+    },
     /// A mask switched coefficients off.
     Masked {
         /// The phase.
@@ -167,6 +174,15 @@ impl fmt::Display for Note {
                 "encoder and decoder are stored in different ways, one for row and one for column \
                  vectors",
             ),
+            Note::FoldedMean => {
+                f.write_str("the mean of the training's states went into the biases")
+            }
+            Note::Sorted { order } => {
+                write!(
+                    f,
+                    "coordinates were in the order {order}; the model has romc's"
+                )
+            }
             Note::Masked { phase, count } => {
                 write!(
                     f,

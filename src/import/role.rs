@@ -43,11 +43,21 @@ pub enum Role {
     StateScaling,
     /// `s_u`, one factor per input coordinate.
     InputScaling,
+    /// Mean of the training's states, SI units, taken off before they were scaled.
+    StateMean,
+    /// Standard deviations by which the training divided states: `1 / s_x`.
+    StateStd,
+    /// Standard deviations by which the training divided inputs: `1 / s_u`.
+    InputStd,
 }
+
+/// The phase of coefficients whose name has none.
+pub(super) const ONLY_PHASE: &str = "always";
 
 const EXPECTED: &str = "encoder.weight, encoder.bias, decoder.weight, decoder.bias (of a layer \
                         encoder.0.weight and so on), xi.PHASE, mask.PHASE, input_mean.PHASE, \
-                        input_covariance.PHASE, scaling.state or scaling.input";
+                        input_covariance.PHASE, scaling.state, scaling.input, mean.state, std.state \
+                        or std.input";
 
 impl fmt::Display for Role {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -62,6 +72,9 @@ impl fmt::Display for Role {
             Role::InputCovariance(phase) => write!(f, "input_covariance.{phase}"),
             Role::StateScaling => f.write_str("scaling.state"),
             Role::InputScaling => f.write_str("scaling.input"),
+            Role::StateMean => f.write_str("mean.state"),
+            Role::StateStd => f.write_str("std.state"),
+            Role::InputStd => f.write_str("std.input"),
         }
     }
 }
@@ -85,16 +98,27 @@ fn after<'t>(head: &str, text: &'t str) -> Option<&'t str> {
 fn read_role(text: &str) -> Option<Role> {
     let phase = |head: &str| after(head, text).map(str::to_owned);
     let of_phase = (phase("xi").map(Role::Xi))
+        .or_else(|| phase("sindy_coefficients").map(Role::Xi))
         .or_else(|| phase("mask").map(Role::Mask))
         .or_else(|| phase("input_mean").map(Role::InputMean))
         .or_else(|| phase("input_covariance").map(Role::InputCovariance));
     if of_phase.is_some() {
         return of_phase;
     }
-    match after("scaling", text) {
-        Some("state") => return Some(Role::StateScaling),
-        Some("input") => return Some(Role::InputScaling),
+    match text {
+        "xi" | "Xi" | "sindy_coefficients" => return Some(Role::Xi(ONLY_PHASE.to_owned())),
         _ => {}
+    }
+    for (head, state, input) in [
+        ("scaling", Role::StateScaling, Some(Role::InputScaling)),
+        ("std", Role::StateStd, Some(Role::InputStd)),
+        ("mean", Role::StateMean, None),
+    ] {
+        match after(head, text) {
+            Some("state") => return Some(state),
+            Some("input") if input.is_some() => return input,
+            _ => {}
+        }
     }
     let (part, tail) = [Part::Encoder, Part::Decoder]
         .into_iter()
@@ -127,7 +151,13 @@ impl Role {
             | Role::Mask(phase)
             | Role::InputMean(phase)
             | Role::InputCovariance(phase) => Some(phase),
-            Role::Weights(..) | Role::Bias(..) | Role::StateScaling | Role::InputScaling => None,
+            Role::Weights(..)
+            | Role::Bias(..)
+            | Role::StateScaling
+            | Role::InputScaling
+            | Role::StateMean
+            | Role::StateStd
+            | Role::InputStd => None,
         }
     }
 }
@@ -176,6 +206,9 @@ mod tests {
             "input_covariance.contact",
             "scaling.state",
             "scaling.input",
+            "mean.state",
+            "std.state",
+            "std.input",
         ] {
             let role: Role = text.parse().expect("the name of a part");
             assert_eq!(role.to_string(), text);
@@ -190,11 +223,15 @@ mod tests {
             ("module.encoder.weight", Some("encoder.weight")),
             ("net/decoder.2.bias", Some("decoder.2.bias")),
             ("model.xi.rear.stance", Some("xi.rear.stance")),
+            ("autoencoder.sindy_coefficients.contact", Some("xi.contact")),
+            ("Xi", Some("xi.always")),
+            ("net.sindy_coefficients", Some("xi.always")),
+            ("normalizer.mean_state", Some("mean.state")),
+            ("mean.input", None),
             ("W_e", None),
             ("encoder.weight.mean", None),
             ("encoder.running_mean", None),
             ("myencoder.weight", None),
-            ("xi", None),
             ("xi.", None),
             ("", None),
         ] {

@@ -8,7 +8,9 @@
 use super::error::LowerError;
 use super::solve::pinv_times;
 use crate::ir::{Binary, Program, ProgramBuilder, Table, Unary, ValueId};
-use crate::model::{Activation, ReducedModel, StateMap};
+use crate::model::{
+    Activation, DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, ReducedModel, StateMap, TAIL,
+};
 
 /// `z = E(s_x x)`.
 pub(super) fn encode(model: &ReducedModel) -> Result<Program, LowerError> {
@@ -247,39 +249,195 @@ fn factors_of(index: usize, factors: &[f64]) -> Option<&[f64]> {
 
 /// `phi(a)` and, unless it is one everywhere, `phi'(a)`.
 ///
-/// elu without a branch: with `min(a, 0) = (a - |a|)/2`, exact in floating point, its slope is
-/// `e = exp(min(a, 0))` and its value `max(a, 0) + (e - 1)`.
+/// Without branches: `min(a, 0) = (a - |a|)/2` and `max(a, 0) = (a + |a|)/2` are exact in floating
+/// point, so that elu has the slope `e = exp(min(a, 0))` and the value `max(a, 0) + (e - 1)`.
 fn activation(
     builder: &mut ProgramBuilder,
     activation: Activation,
     a: ValueId,
 ) -> (ValueId, Option<ValueId>) {
-    let one = builder.constant(1.0);
-    match activation {
-        Activation::Linear => (a, None),
+    if activation == Activation::Linear {
+        return (a, None);
+    }
+    let mut steps = Steps(builder);
+    let (value, slope) = match activation {
+        Activation::Linear => unreachable!("returned above"),
         Activation::Elu => {
-            let magnitude = builder.unary(Unary::Abs, a);
-            let half = builder.constant(0.5);
-            let below = builder.binary(Binary::Sub, a, magnitude);
-            let below = builder.binary(Binary::Mul, half, below);
-            let above = builder.binary(Binary::Add, a, magnitude);
-            let above = builder.binary(Binary::Mul, half, above);
-            let slope = builder.unary(Unary::Exp, below);
-            let shifted = builder.binary(Binary::Sub, slope, one);
-            (builder.binary(Binary::Add, above, shifted), Some(slope))
+            let below = steps.negative_part(a);
+            let above = steps.positive_part(a);
+            let slope = steps.0.unary(Unary::Exp, below);
+            let shifted = steps.minus(slope, 1.0);
+            (steps.add(above, shifted), slope)
         }
         Activation::Tanh => {
-            let value = builder.unary(Unary::Tanh, a);
-            let square = builder.binary(Binary::Mul, value, value);
-            (value, Some(builder.binary(Binary::Sub, one, square)))
+            let value = steps.0.unary(Unary::Tanh, a);
+            let square = steps.mul(value, value);
+            (value, steps.one_minus(square))
         }
-        Activation::Sigmoid => {
-            let negative = builder.unary(Unary::Neg, a);
-            let e = builder.unary(Unary::Exp, negative);
-            let sum = builder.binary(Binary::Add, one, e);
-            let value = builder.binary(Binary::Div, one, sum);
-            let rest = builder.binary(Binary::Sub, one, value);
-            (value, Some(builder.binary(Binary::Mul, value, rest)))
+        Activation::Sigmoid => steps.sigmoid(a),
+        Activation::Relu => {
+            let sign = steps.0.unary(Unary::Sign, a);
+            (steps.positive_part(a), steps.positive_part(sign))
+        }
+        Activation::Gelu => steps.gelu(a),
+        Activation::GeluTanh => steps.gelu_tanh(a),
+        Activation::Silu => {
+            let (s, slope) = steps.sigmoid(a);
+            let bend = steps.mul(a, slope);
+            (steps.mul(a, s), steps.add(s, bend))
+        }
+        Activation::Softplus => {
+            let magnitude = steps.0.unary(Unary::Abs, a);
+            let below = steps.0.unary(Unary::Neg, magnitude);
+            let e = steps.0.unary(Unary::Exp, below);
+            let sum = steps.plus(e, 1.0);
+            let log = steps.0.unary(Unary::Log, sum);
+            let above = steps.positive_part(a);
+            let (s, _) = steps.sigmoid(a);
+            (steps.add(above, log), s)
+        }
+    };
+    (value, Some(slope))
+}
+
+/// The builder, with operations by name.
+struct Steps<'b>(&'b mut ProgramBuilder);
+
+impl Steps<'_> {
+    fn add(&mut self, a: ValueId, b: ValueId) -> ValueId {
+        self.0.binary(Binary::Add, a, b)
+    }
+
+    fn mul(&mut self, a: ValueId, b: ValueId) -> ValueId {
+        self.0.binary(Binary::Mul, a, b)
+    }
+
+    fn plus(&mut self, a: ValueId, number: f64) -> ValueId {
+        let number = self.0.constant(number);
+        self.add(number, a)
+    }
+
+    fn minus(&mut self, a: ValueId, number: f64) -> ValueId {
+        let number = self.0.constant(number);
+        self.0.binary(Binary::Sub, a, number)
+    }
+
+    fn one_minus(&mut self, a: ValueId) -> ValueId {
+        let one = self.0.constant(1.0);
+        self.0.binary(Binary::Sub, one, a)
+    }
+
+    fn times(&mut self, number: f64, a: ValueId) -> ValueId {
+        let number = self.0.constant(number);
+        self.mul(number, a)
+    }
+
+    fn negative_part(&mut self, a: ValueId) -> ValueId {
+        let magnitude = self.0.unary(Unary::Abs, a);
+        let twice = self.0.binary(Binary::Sub, a, magnitude);
+        self.times(0.5, twice)
+    }
+
+    fn positive_part(&mut self, a: ValueId) -> ValueId {
+        let magnitude = self.0.unary(Unary::Abs, a);
+        let twice = self.add(a, magnitude);
+        self.times(0.5, twice)
+    }
+
+    /// `1 / (1 + exp(-a))` and its slope.
+    fn sigmoid(&mut self, a: ValueId) -> (ValueId, ValueId) {
+        let negative = self.0.unary(Unary::Neg, a);
+        let e = self.0.unary(Unary::Exp, negative);
+        let sum = self.plus(e, 1.0);
+        let one = self.0.constant(1.0);
+        let value = self.0.binary(Binary::Div, one, sum);
+        let rest = self.one_minus(value);
+        (value, self.mul(value, rest))
+    }
+
+    /// `a Phi(a)` and `Phi(a) + a phi(a)`, as in `model/normal.rs`.
+    fn gelu(&mut self, a: ValueId) -> (ValueId, ValueId) {
+        let magnitude = self.0.unary(Unary::Abs, a);
+        let x = self.times(std::f64::consts::FRAC_1_SQRT_2, magnitude);
+        let below = self.plus(x, 2.0);
+        let two = self.0.constant(2.0);
+        let t = self.0.binary(Binary::Div, two, below);
+        let twice = self.times(2.0, t);
+        let w = self.minus(twice, 1.0);
+        let twice_w = self.times(2.0, w);
+        // Clenshaw's recurrence from its second step, before which both sums are zero.
+        let mut last = self.0.constant(0.0);
+        let mut next = self.0.constant(TAIL[TAIL.len() - 1]);
+        for &coefficient in TAIL[1..TAIL.len() - 1].iter().rev() {
+            let product = self.mul(twice_w, next);
+            let rest = self.0.binary(Binary::Sub, product, last);
+            (next, last) = (self.plus(rest, coefficient), next);
+        }
+        let product = self.mul(w, next);
+        let rest = self.0.binary(Binary::Sub, product, last);
+        let q = self.plus(rest, TAIL[0]);
+        let square = self.mul(a, a);
+        let exponent = self.times(-0.5, square);
+        let e = self.0.unary(Unary::Exp, exponent);
+        let half_t = self.times(0.5, t);
+        let share = self.mul(half_t, q);
+        let tail = self.mul(share, e);
+        // (1 + sign)/2 - sign tail: the tail below zero, one minus it above, a half at zero.
+        let sign = self.0.unary(Unary::Sign, a);
+        let above = self.plus(sign, 1.0);
+        let above = self.times(0.5, above);
+        let signed = self.mul(sign, tail);
+        let cumulative = self.0.binary(Binary::Sub, above, signed);
+        let density = self.times(DENSITY_AT_ZERO, e);
+        let bend = self.mul(a, density);
+        (self.mul(a, cumulative), self.add(cumulative, bend))
+    }
+
+    /// `a h` with `h = (1 + tanh(r (a + c a^3)))/2`, and `h + a r (1 + 3 c a^2) (1 - tanh^2)/2`.
+    fn gelu_tanh(&mut self, a: ValueId) -> (ValueId, ValueId) {
+        let square = self.mul(a, a);
+        let cubic = self.times(GELU_RATE * GELU_CUBIC, square);
+        let rate = self.plus(cubic, GELU_RATE);
+        let argument = self.mul(a, rate);
+        let t = self.0.unary(Unary::Tanh, argument);
+        let sum = self.plus(t, 1.0);
+        let half = self.times(0.5, sum);
+        let slope = self.times(3.0, cubic);
+        let slope = self.plus(slope, GELU_RATE);
+        let t_square = self.mul(t, t);
+        let rest = self.one_minus(t_square);
+        let bend = self.mul(slope, rest);
+        let half_a = self.times(0.5, a);
+        let bend = self.mul(half_a, bend);
+        (self.mul(a, half), self.add(half, bend))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ir::Interpreter;
+
+    #[test]
+    fn lowered_activations_have_the_values_and_slopes_of_the_model() {
+        for phi in Activation::ALL {
+            let mut builder = ProgramBuilder::new("phi");
+            let a = builder.input("a", 1);
+            let (value, slope) = activation(&mut builder, phi, a[0]);
+            let slope = slope.unwrap_or_else(|| builder.constant(1.0));
+            builder.output("y", &[value, slope]);
+            let program = builder.finish().expect("a program");
+            for a in [-30.0, -6.0, -0.7, -1e-9, 0.0, 0.3, 2.5, 9.0, 400.0] {
+                let mut found = [0.0; 2];
+                Interpreter::new(&program).run(&[&[a]], &mut [&mut found]);
+                for (found, expected) in found.into_iter().zip([phi.value(a), phi.slope(a)]) {
+                    let bound = 4e-15 * (1.0 + expected.abs());
+                    assert!(
+                        (found - expected).abs() <= bound,
+                        "{phi} at {a}: {found} {expected}"
+                    );
+                }
+            }
         }
     }
 }

@@ -15,7 +15,8 @@
 //! det = up c_fwd - fwd c_up
 //! ```
 //!
-//! where `1 / d` of both divisors is `d / max(d^2, least^2)`, see
+//! for a leg of the usual shape; `chain.rs` has that of any other. `1 / d` of both divisors is
+//! `d / max(d^2, least^2)`, see
 //! [`LegGeometry::least_levers`](crate::robot::LegGeometry::least_levers).
 
 use super::error::LowerError;
@@ -24,7 +25,7 @@ use crate::model::ReducedModel;
 use crate::robot::actuators::DRY_SPEED_RAD_S;
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::{
-    BODY_DIM, FOOT_DIM, InputRule, JOINT_DIM, Leg, LegGeometry, STATE_DIM, WrenchFrame,
+    BODY_DIM, FOOT_DIM, InputRule, JOINT_DIM, Leg, LegGeometry, PlanarLeg, STATE_DIM, WrenchFrame,
 };
 
 /// `u = [net; F; M]` with the torques at the links `net` and the force and moment of the feet on the
@@ -93,10 +94,15 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
         })
         .collect();
     let joint = |kind: usize| (0..FOOT_DIM).map(move |leg| LEG_JOINT_DIM * leg + kind);
-    // Abductions, then flexions, then the angles of the calves: flexion plus knee.
+    // Abductions, then flexions, then of planar legs the angles of the calves, flexion plus knee, of
+    // others those of the knees.
     let mut angles: Vec<ValueId> = joint(0).chain(joint(1)).map(|k| x[k]).collect();
-    for k in joint(1) {
-        angles.push(builder.binary(Binary::Add, x[k], x[k + 1]));
+    for leg in Leg::ALL {
+        let k = LEG_JOINT_DIM * leg.index() + 1;
+        angles.push(match robot.geometry(leg) {
+            LegGeometry::Planar(_) => builder.binary(Binary::Add, x[k], x[k + 1]),
+            LegGeometry::Chain(_) => x[k + 1],
+        });
     }
     let frame = rule.wrench_frame();
     if frame == WrenchFrame::World {
@@ -109,13 +115,20 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
         .map(|leg| {
             let k = leg.index();
             let at = |group: usize| (sines[FOOT_DIM * group + k], cosines[FOOT_DIM * group + k]);
-            let angles = LegAngles {
-                abduction: at(0),
-                thigh: at(1),
-                calf: at(2),
-            };
             let torques = std::array::from_fn(|i| net[LEG_JOINT_DIM * k + i]);
-            let wrench = steps.leg_wrench(robot.geometry(), leg.side(), angles, torques, feet[k]);
+            let wrench = match robot.geometry(leg) {
+                LegGeometry::Planar(planar) => {
+                    let angles = LegAngles {
+                        abduction: at(0),
+                        thigh: at(1),
+                        calf: at(2),
+                    };
+                    steps.leg_wrench(planar, angles, torques, feet[k])
+                }
+                LegGeometry::Chain(chain) => {
+                    steps.chain_wrench(chain, [at(0), at(1), at(2)], torques, feet[k])
+                }
+            };
             match frame {
                 WrenchFrame::Body => wrench,
                 WrenchFrame::World => steps.about_body(robot.hip_position(leg).into(), wrench),
@@ -151,7 +164,7 @@ struct LegAngles {
 }
 
 /// The builder, with operations by name.
-struct Steps<'b>(&'b mut ProgramBuilder);
+pub(super) struct Steps<'b>(pub(super) &'b mut ProgramBuilder);
 
 impl Steps<'_> {
     fn add(&mut self, a: ValueId, b: ValueId) -> ValueId {
@@ -162,7 +175,7 @@ impl Steps<'_> {
         self.0.binary(Binary::Sub, a, b)
     }
 
-    fn mul(&mut self, a: ValueId, b: ValueId) -> ValueId {
+    pub(super) fn mul(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.0.binary(Binary::Mul, a, b)
     }
 
@@ -221,7 +234,7 @@ impl Steps<'_> {
     }
 
     /// `numerator / divisor`, with `divisor / max(divisor^2, least^2)` for the reciprocal.
-    fn damped(&mut self, numerator: ValueId, divisor: ValueId, least: f64) -> ValueId {
+    pub(super) fn damped(&mut self, numerator: ValueId, divisor: ValueId, least: f64) -> ValueId {
         let (square, floor) = (self.mul(divisor, divisor), self.0.constant(least * least));
         let (sum, difference) = (self.add(square, floor), self.sub(square, floor));
         let difference = self.0.unary(Unary::Abs, difference);
@@ -280,8 +293,7 @@ impl Steps<'_> {
     /// Force and moment of one leg about its hip, in axes parallel to the body's.
     fn leg_wrench(
         &mut self,
-        geometry: &LegGeometry,
-        side: f64,
+        geometry: &PlanarLeg,
         angles: LegAngles,
         torques: [ValueId; LEG_JOINT_DIM],
         foot: ValueId,
@@ -299,7 +311,7 @@ impl Steps<'_> {
         let [least_det, least_up] = geometry.least_levers();
 
         let [tau_0, tau_1, tau_2] = torques.map(|torque| self.mul(foot, torque));
-        let hip = self.0.constant(side * geometry.hip_m);
+        let hip = self.0.constant(geometry.hip_m);
         let across = self.minor((fwd, tau_2), (calf_forward, tau_1));
         let f_x = self.damped(across, det, least_det);
         let along = self.minor((calf_up, tau_1), (up, tau_2));

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::error::ModelError;
+use super::normal::{normal_cumulative, normal_density};
 
 /// What a layer applies to each of its units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, clap::ValueEnum, Serialize, Deserialize)]
@@ -21,11 +22,36 @@ pub enum Activation {
     Tanh,
     /// 1 / (1 + exp(-a))
     Sigmoid,
+    /// max(a, 0); its slope at zero is 0
+    Relu,
+    /// a Phi(a) with the normal distribution Phi, as torch.nn.GELU()
+    Gelu,
+    /// a (1 + tanh(sqrt(2/pi) (a + 0.044715 a^3))) / 2
+    GeluTanh,
+    /// a / (1 + exp(-a)), also named swish
+    Silu,
+    /// log(1 + exp(a))
+    Softplus,
 }
+
+/// sqrt(2/pi), of [`Activation::GeluTanh`].
+pub const GELU_RATE: f64 = 0.797_884_560_802_865_4;
+/// Of [`Activation::GeluTanh`].
+pub const GELU_CUBIC: f64 = 0.044_715;
 
 impl Activation {
     /// All activations, in the order in which they are listed.
-    pub const ALL: [Activation; 4] = [Self::Linear, Self::Elu, Self::Tanh, Self::Sigmoid];
+    pub const ALL: [Activation; 9] = [
+        Self::Linear,
+        Self::Elu,
+        Self::Tanh,
+        Self::Sigmoid,
+        Self::Relu,
+        Self::Gelu,
+        Self::GeluTanh,
+        Self::Silu,
+        Self::Softplus,
+    ];
 
     /// The name in model files and on the command line.
     pub fn name(self) -> &'static str {
@@ -34,6 +60,11 @@ impl Activation {
             Self::Elu => "elu",
             Self::Tanh => "tanh",
             Self::Sigmoid => "sigmoid",
+            Self::Relu => "relu",
+            Self::Gelu => "gelu",
+            Self::GeluTanh => "gelu-tanh",
+            Self::Silu => "silu",
+            Self::Softplus => "softplus",
         }
     }
 
@@ -45,6 +76,10 @@ impl Activation {
             Self::Elu => a.exp_m1(),
             Self::Tanh => a.tanh(),
             Self::Sigmoid => sigmoid(a),
+            Self::Relu => a.max(0.0),
+            Self::Gelu => a * normal_cumulative(a),
+            Self::GeluTanh | Self::Silu => self.jet(a)[0],
+            Self::Softplus => a.max(0.0) + (1.0 + (-a.abs()).exp()).ln(),
         }
     }
 
@@ -56,6 +91,9 @@ impl Activation {
             Self::Elu => a.exp(),
             Self::Tanh => 1.0 - a.tanh() * a.tanh(),
             Self::Sigmoid => sigmoid(a) * (1.0 - sigmoid(a)),
+            Self::Relu => f64::from(u8::from(a > 0.0)),
+            Self::Gelu | Self::GeluTanh | Self::Silu => self.jet(a)[1],
+            Self::Softplus => sigmoid(a),
         }
     }
 
@@ -81,6 +119,33 @@ impl Activation {
                 let third = slope * (1.0 - 6.0 * slope);
                 [s, slope, slope * (1.0 - 2.0 * s), third]
             }
+            Self::Relu => [self.value(a), self.slope(a), 0.0, 0.0],
+            Self::Gelu => {
+                let (cumulative, density) = (normal_cumulative(a), normal_density(a));
+                // Far out the density is zero, and the powers of a before it need not be finite.
+                let far = |factor: f64| if density > 0.0 { density * factor } else { 0.0 };
+                let slope = cumulative + far(a);
+                [
+                    a * cumulative,
+                    slope,
+                    far(2.0 - a * a),
+                    far(a * (a * a - 4.0)),
+                ]
+            }
+            Self::GeluTanh => gelu_tanh(a),
+            Self::Silu => {
+                let [s, first, second, third] = Self::Sigmoid.jet(a);
+                [
+                    a * s,
+                    s + a * first,
+                    2.0 * first + a * second,
+                    3.0 * second + a * third,
+                ]
+            }
+            Self::Softplus => {
+                let [s, first, second, _] = Self::Sigmoid.jet(a);
+                [self.value(a), s, first, second]
+            }
         }
     }
 
@@ -95,12 +160,46 @@ impl Activation {
                 let s = sigmoid(a);
                 s * (1.0 - s) * (1.0 - 2.0 * s)
             }
+            Self::Relu => 0.0,
+            Self::Gelu | Self::GeluTanh | Self::Silu | Self::Softplus => self.jet(a)[2],
         }
     }
 }
 
 fn sigmoid(a: f64) -> f64 {
     1.0 / (1.0 + (-a).exp())
+}
+
+/// Value and three derivatives of [`Activation::GeluTanh`].
+fn gelu_tanh(a: f64) -> [f64; 4] {
+    // Where tanh is one to the last bit; further out its argument's powers would only overflow.
+    if a.abs() > 10.0 {
+        return match a > 0.0 {
+            true => [a, 1.0, 0.0, 0.0],
+            false => [0.0; 4],
+        };
+    }
+    let cubic = GELU_RATE * GELU_CUBIC;
+    let argument = [
+        GELU_RATE * (a + GELU_CUBIC * a * a * a),
+        GELU_RATE + 3.0 * cubic * a * a,
+        6.0 * cubic * a,
+        6.0 * cubic,
+    ];
+    let t = argument[0].tanh();
+    let rest = 1.0 - t * t;
+    let first = rest * argument[1];
+    let bend = argument[2] - 2.0 * t * argument[1] * argument[1];
+    let second = rest * bend;
+    let bend_rate =
+        argument[3] - 2.0 * first * argument[1] * argument[1] - 4.0 * t * argument[1] * argument[2];
+    let third = rest * bend_rate - 2.0 * t * first * bend;
+    [
+        0.5 * a * (1.0 + t),
+        0.5 * (1.0 + t) + 0.5 * a * first,
+        first + 0.5 * a * second,
+        1.5 * second + 0.5 * a * third,
+    ]
 }
 
 impl fmt::Display for Activation {
@@ -171,7 +270,47 @@ mod tests {
         for phi in Activation::ALL {
             assert_eq!(phi.name().parse(), Ok(phi));
         }
-        let refused = "gelu".parse::<Activation>().unwrap_err();
-        assert!(refused.to_string().contains("linear, elu, tanh, sigmoid"));
+        let refused = "selu".parse::<Activation>().unwrap_err();
+        assert!(
+            refused
+                .to_string()
+                .contains("linear, elu, tanh, sigmoid, relu")
+        );
+    }
+
+    #[test]
+    fn values_are_those_of_pytorch() {
+        // SciPy 1.16 by the formulas of torch.nn; its softplus is a itself beyond 20.
+        for (phi, below, above) in [
+            (Activation::Relu, 0.0, 0.7),
+            (
+                Activation::Gelu,
+                -0.015_524_163_314_440_398,
+                0.530_625_443_433_843_9,
+            ),
+            (
+                Activation::GeluTanh,
+                -0.015_084_266_089_998_577,
+                0.530_570_134_705_116_7,
+            ),
+            (
+                Activation::Silu,
+                -0.189_645_450_053_108_87,
+                0.467_731_440_517_716_26,
+            ),
+            (
+                Activation::Softplus,
+                0.078_889_734_292_549_63,
+                1.103_186_048_885_458,
+            ),
+        ] {
+            for (a, expected) in [(-2.5, below), (0.7, above)] {
+                assert!(
+                    (phi.value(a) - expected).abs() < 1e-15,
+                    "{phi} at {a}: {}",
+                    phi.value(a)
+                );
+            }
+        }
     }
 }

@@ -42,6 +42,8 @@ mod identifier;
 mod jump_prior;
 mod library;
 mod maps;
+mod normal;
+mod order;
 mod phase;
 mod projection;
 mod rom;
@@ -55,7 +57,7 @@ mod tangent;
 mod tests;
 
 pub use crate::robot::FeetRule;
-pub use activation::Activation;
+pub use activation::{Activation, GELU_CUBIC, GELU_RATE};
 pub use affine::AffineMap;
 pub use builder::{ModelBuilder, check_name};
 pub use coordinate_names::CoordinateNames;
@@ -67,6 +69,8 @@ pub use library::{
     CandidateTerm, LatentVariable, Library, LibraryError, LibrarySource, MAX_LATENT_DIM,
     MAX_LIBRARY_DIM, MAX_TERM_LEN, TermId,
 };
+pub(crate) use normal::{DENSITY_AT_ZERO, TAIL};
+pub use order::CoordinateOrder;
 pub use phase::Phase;
 pub use projection::RANK_TOLERANCE;
 pub use rom::ReducedModel;

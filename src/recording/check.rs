@@ -275,7 +275,7 @@ impl Scan<'_> {
                 let column = Column::Position(first + joint);
                 self.column(Implausible::NearSingular, column, |j| {
                     let q = leg.of_joints(&segment.joints(j));
-                    let value = robot.geometry().spans(&q)[span];
+                    let value = robot.geometry(leg).spans(&q)[span];
                     (segment.feet[j][leg.index()] && value < least).then_some((value, least))
                 });
             }

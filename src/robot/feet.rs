@@ -15,12 +15,16 @@ pub enum FeetRule {
     Patterns(Vec<ContactFlags>),
 }
 
+/// Number of patterns of four feet.
+const N_PATTERNS: usize = 16;
+
 impl fmt::Display for FeetRule {
-    /// `any`, `none`, or patterns such as `0011,0001`.
+    /// `any`, `none`, `always`, or patterns such as `0011,0001`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let patterns = match self {
             FeetRule::Any => return f.write_str("any"),
             FeetRule::None => return f.write_str("none"),
+            FeetRule::Patterns(_) if self.is_always() => return f.write_str("always"),
             FeetRule::Patterns(patterns) => patterns,
         };
         let digits = |feet: &ContactFlags| feet.map(|down| if down { "1" } else { "0" }).concat();
@@ -29,6 +33,26 @@ impl fmt::Display for FeetRule {
 }
 
 impl FeetRule {
+    /// The rule of a phase that holds whatever the feet do: all patterns.
+    ///
+    /// ```
+    /// use romc::robot::FeetRule;
+    ///
+    /// let always = FeetRule::always();
+    /// assert!(always.matches([false; 4]) && always.matches([true, false, false, true]));
+    /// assert_eq!(always.to_string(), "always");
+    /// ```
+    pub fn always() -> Self {
+        let patterns =
+            (0..N_PATTERNS).map(|code| std::array::from_fn(|foot| (code >> foot) & 1 == 1));
+        FeetRule::Patterns(patterns.collect())
+    }
+
+    /// Whether it is the rule of all patterns, each in it once.
+    pub fn is_always(&self) -> bool {
+        matches!(self, FeetRule::Patterns(patterns) if patterns.len() == N_PATTERNS)
+    }
+
     /// Whether the rule names this pattern.
     ///
     /// ```

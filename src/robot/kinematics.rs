@@ -1,4 +1,4 @@
-//! One leg: hip abduction about x, hip flexion and knee about y.
+//! One leg of the usual shape: hip abduction about x, hip flexion and knee about y.
 //!
 //! The hip frame has its origin in the leg's hip joint and axes parallel to
 //! the body's: x forward, y left, z up. A positive flexion swings the thigh
@@ -6,9 +6,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::joints::Leg;
-
-/// Smallest `|det J|`, divided by [`LegGeometry::volume_m3`], at which torques
+/// Smallest `|det J|`, divided by [`LegGeometry::volume_m3`](super::LegGeometry::volume_m3), at which torques
 /// still give a foot force: a knee about 1e-3 rad from full extension.
 pub const SINGULAR_BOUND: f64 = 1e-3;
 
@@ -22,8 +20,8 @@ pub const LEAST_HEIGHT: f64 = 0.12;
 
 /// Link lengths of a leg.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LegGeometry {
-    /// Distance from the hip's abduction axis to the plane of the leg, in m.
+pub struct PlanarLeg {
+    /// From the hip's abduction axis to the plane of the leg, along y, in m: negative on the right.
     pub hip_m: f64,
     /// From hip flexion to knee, in m.
     pub thigh_m: f64,
@@ -33,14 +31,14 @@ pub struct LegGeometry {
     pub foot_forward_m: f64,
 }
 
-impl LegGeometry {
+impl PlanarLeg {
     /// Foot position in the hip frame, in m, at `q` = abduction, flexion, knee.
     ///
-    /// With `h` the signed hip offset and `r` the height of the foot in the
+    /// With `h` the hip offset and `r` the height of the foot in the
     /// plane of the leg, `p = (p_x, h cos hx - r sin hx, h sin hx + r cos hx)`.
-    pub fn foot_position(&self, leg: Leg, q: &[f64; 3]) -> Vector3<f64> {
+    pub fn foot_position(&self, q: &[f64; 3]) -> Vector3<f64> {
         let plane = self.in_plane(q);
-        let hip = leg.side() * self.hip_m;
+        let hip = self.hip_m;
         let (sin, cos) = q[0].sin_cos();
         Vector3::new(
             plane.forward,
@@ -50,9 +48,9 @@ impl LegGeometry {
     }
 
     /// Jacobian of [`Self::foot_position`]: `J[i][j] = d p_i / d q_j`, in m.
-    pub fn foot_jacobian(&self, leg: Leg, q: &[f64; 3]) -> Matrix3<f64> {
+    pub fn foot_jacobian(&self, q: &[f64; 3]) -> Matrix3<f64> {
         let plane = self.in_plane(q);
-        let hip = leg.side() * self.hip_m;
+        let hip = self.hip_m;
         let (sin, cos) = q[0].sin_cos();
         // d(forward)/d(flexion) = up, d(up)/d(flexion) = -forward; the knee
         // moves only the calf's share of both.
@@ -99,7 +97,7 @@ impl LegGeometry {
     /// Of both divisors `1 / d` becomes `d / max(d^2, least^2)`: equal outside, continuous, and at
     /// most `1 / least`, with [`LEAST_SPAN`] thigh calf for `det` and [`LEAST_HEIGHT`] (thigh + calf)
     /// for `up`.
-    pub(super) fn damped_force_map(&self, leg: Leg, q: &[f64; 3]) -> Option<Matrix3<f64>> {
+    pub(super) fn damped_force_map(&self, q: &[f64; 3]) -> Option<Matrix3<f64>> {
         let plane = self.in_plane(q);
         let det = plane.up * plane.calf_forward - plane.forward * plane.calf_up;
         let [least_det, least_up] = self.least_levers();
@@ -108,7 +106,7 @@ impl LegGeometry {
         }
         let reciprocal = |d: f64, least: f64| d / (d * d).max(least * least);
         let (of_det, of_up) = (reciprocal(det, least_det), reciprocal(plane.up, least_up));
-        let hip = leg.side() * self.hip_m;
+        let hip = self.hip_m;
         let along_x = Vector3::new(0.0, -plane.calf_forward, plane.forward) * of_det;
         let along_e = Vector3::new(0.0, plane.calf_up, -plane.up) * of_det;
         let along_n = (Vector3::x() - along_e * hip) * of_up;
@@ -168,13 +166,17 @@ struct InPlane {
 mod tests {
     use super::*;
 
-    const LEG: LegGeometry = LegGeometry {
+    const LEG: PlanarLeg = PlanarLeg {
         hip_m: 0.08,
         thigh_m: 0.213,
         calf_m: 0.21,
         foot_forward_m: 0.0,
     };
-    const BENT: LegGeometry = LegGeometry {
+    const RIGHT: PlanarLeg = PlanarLeg {
+        hip_m: -0.08,
+        ..LEG
+    };
+    const BENT: PlanarLeg = PlanarLeg {
         foot_forward_m: -0.03,
         ..LEG
     };
@@ -193,23 +195,23 @@ mod tests {
 
     #[test]
     fn foot_position_stretched_leg_hangs_below_hip_offset() {
-        let p = LEG.foot_position(Leg::FrontLeft, &[0.0; 3]);
+        let p = LEG.foot_position(&[0.0; 3]);
         assert!((p - Vector3::new(0.0, 0.08, -0.423)).norm() < 1e-15);
-        let p = LEG.foot_position(Leg::RearRight, &[0.0; 3]);
+        let p = RIGHT.foot_position(&[0.0; 3]);
         assert!((p - Vector3::new(0.0, -0.08, -0.423)).norm() < 1e-15);
     }
 
     #[test]
     fn foot_position_thigh_turned_back_by_a_right_angle_points_backwards() {
         let quarter = std::f64::consts::FRAC_PI_2;
-        let p = LEG.foot_position(Leg::FrontLeft, &[0.0, quarter, -quarter]);
+        let p = LEG.foot_position(&[0.0, quarter, -quarter]);
         assert!((p - Vector3::new(-0.213, 0.08, -0.21)).norm() < 1e-15);
     }
 
     #[test]
     fn foot_position_abduction_keeps_distance_to_the_hip() {
-        let plain = LEG.foot_position(Leg::FrontLeft, &[0.0, 0.4, -1.0]);
-        let turned = LEG.foot_position(Leg::FrontLeft, &[0.7, 0.4, -1.0]);
+        let plain = LEG.foot_position(&[0.0, 0.4, -1.0]);
+        let turned = LEG.foot_position(&[0.7, 0.4, -1.0]);
         assert!((plain.norm() - turned.norm()).abs() < 1e-15);
         // Abduction of a left leg lifts its foot outwards.
         assert!(turned.y > plain.y && turned.z > plain.z);
@@ -218,21 +220,17 @@ mod tests {
     #[test]
     fn foot_jacobian_agrees_with_central_differences() {
         let step = 1e-6;
-        for (leg, geometry) in Leg::ALL
-            .into_iter()
-            .flat_map(|leg| [(leg, LEG), (leg, BENT)])
-        {
+        for geometry in [LEG, RIGHT, BENT] {
             for q in postures() {
-                let exact = geometry.foot_jacobian(leg, &q);
+                let exact = geometry.foot_jacobian(&q);
                 for joint in 0..3 {
                     let (mut lower, mut upper) = (q, q);
                     lower[joint] -= step;
                     upper[joint] += step;
-                    let slope = (geometry.foot_position(leg, &upper)
-                        - geometry.foot_position(leg, &lower))
+                    let slope = (geometry.foot_position(&upper) - geometry.foot_position(&lower))
                         / (2.0 * step);
                     let error = (exact.column(joint) - slope).norm();
-                    assert!(error < 1e-9, "{leg} {q:?} joint {joint}: {error:e}");
+                    assert!(error < 1e-9, "{q:?} joint {joint}: {error:e}");
                 }
             }
         }
@@ -240,12 +238,9 @@ mod tests {
 
     #[test]
     fn manipulability_is_the_normalised_determinant() {
-        for (leg, geometry) in Leg::ALL
-            .into_iter()
-            .flat_map(|leg| [(leg, LEG), (leg, BENT)])
-        {
+        for geometry in [LEG, RIGHT, BENT] {
             for q in postures() {
-                let determinant = geometry.foot_jacobian(leg, &q).determinant();
+                let determinant = geometry.foot_jacobian(&q).determinant();
                 let expected = determinant.abs() / geometry.volume_m3();
                 assert!(
                     (geometry.manipulability(&q) - expected).abs() < 1e-13,

@@ -1,11 +1,11 @@
-//! Joints, legs, geometry and limits of the quadrupeds that romc knows.
+//! Joints, legs, geometry and limits of quadrupeds.
 //!
 //! Enters: joint angles, joint torques and contact flags. Leaves: foot
 //! positions, leg Jacobians, the force and moment that the legs put on the
 //! body (equations 4 to 8, 22 and 23), and the limits a command has to keep.
-//! Read [`joints`] for names and order first, then [`kinematics`] for one leg,
+//! Read [`joints`] for names and order first, then [`kinematics`] and [`chain`] for one leg,
 //! [`wrench`] for all four and [`input_rule`] for the inputs of a model;
-//! [`registry`] holds the robots themselves.
+//! `crate::robot_file` reads robots from files; generated controllers hold these sources.
 //!
 //! ```
 //! use romc::robot::{Leg, Robot};
@@ -22,7 +22,9 @@
 //! ```
 
 pub mod actuators;
+pub mod chain;
 pub mod feet;
+pub mod geometry;
 pub mod input_rule;
 pub mod joints;
 pub mod kinematics;
@@ -32,12 +34,14 @@ pub mod wrench;
 mod error;
 
 pub use actuators::{Actuators, DRY_SPEED_RAD_S};
+pub use chain::ChainLeg;
 pub use error::RobotError;
 pub use feet::FeetRule;
+pub use geometry::{LegGeometry, LegLinks};
 pub use input_rule::{InputRule, WrenchFrame};
 pub use joints::{
     BODY_DIM, BODY_NAMES, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Leg,
     STATE_DIM,
 };
-pub use kinematics::LegGeometry;
+pub use kinematics::PlanarLeg;
 pub use registry::Robot;

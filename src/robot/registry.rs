@@ -1,138 +1,30 @@
-//! The robots that romc knows: geometry, mass and limits of each.
+//! One robot: geometry, mass and limits.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::error::RobotError;
+use super::geometry::LegGeometry;
 use super::joints::{
     BODY_NAMES, FOOT_DIM, JOINT_DIM, JOINT_NAMES, LEG_JOINT_DIM, Leg, STATE_DIM, WRENCH_NAMES,
 };
-use super::kinematics::LegGeometry;
 
-/// A quadruped with three joints a leg: abduction, flexion, knee.
+/// A quadruped with three joints per leg: abduction, flexion, knee.
+///
+/// `crate::robot_file` reads and checks robots; arrays are in the order of the state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Robot {
-    pub(super) name: &'static str,
-    pub(super) mass_kg: f64,
-    pub(super) geometry: LegGeometry,
-    pub(super) hip_position_m: [[f64; 3]; FOOT_DIM],
-    pub(super) torque_limit_nm: [f64; JOINT_DIM],
-    pub(super) joint_limit_rad: [(f64, f64); JOINT_DIM],
-    pub(super) joint_speed_limit_rad_s: [f64; JOINT_DIM],
-}
-
-/// Every registered robot, by name.
-static ROBOTS: [Robot; 3] = [GO1, GO2, A1];
-
-/// Unitree Go1: link lengths, effort, speed and position limits of the maker's
-/// URDF; the mass is that of body and legs together.
-const GO1: Robot = Robot {
-    name: "go1",
-    mass_kg: 12.01,
-    geometry: LegGeometry {
-        hip_m: 0.08,
-        thigh_m: 0.213,
-        calf_m: 0.213,
-        foot_forward_m: 0.0,
-    },
-    hip_position_m: hips(0.1881, 0.04675),
-    torque_limit_nm: each_leg([23.7, 23.7, 35.55]),
-    joint_limit_rad: each_leg([(-0.863, 0.863), (-0.686, 4.501), (-2.818, -0.888)]),
-    joint_speed_limit_rad_s: each_leg([30.1, 30.1, 20.06]),
-};
-
-/// Unitree Go2: the maker's geometry and limits; its rear thighs swing further
-/// back than the front ones.
-const GO2: Robot = Robot {
-    name: "go2",
-    mass_kg: 15.21,
-    geometry: LegGeometry {
-        hip_m: 0.0955,
-        thigh_m: 0.213,
-        calf_m: 0.213,
-        foot_forward_m: -0.002,
-    },
-    hip_position_m: hips(0.1934, 0.0465),
-    torque_limit_nm: each_leg([23.7, 23.7, 45.43]),
-    joint_limit_rad: front_and_rear(
-        [
-            degrees(-60.0, 60.0),
-            degrees(-90.0, 200.0),
-            degrees(-156.0, -48.0),
-        ],
-        [
-            degrees(-60.0, 60.0),
-            degrees(-30.0, 260.0),
-            degrees(-156.0, -48.0),
-        ],
-    ),
-    joint_speed_limit_rad_s: each_leg([30.1, 30.1, 15.7]),
-};
-
-/// Unitree A1: the maker's geometry, limits and sum of masses.
-const A1: Robot = Robot {
-    name: "a1",
-    mass_kg: 12.78,
-    geometry: LegGeometry {
-        hip_m: 0.0838,
-        thigh_m: 0.2,
-        calf_m: 0.2,
-        foot_forward_m: 0.0,
-    },
-    hip_position_m: hips(0.1805, 0.047),
-    torque_limit_nm: each_leg([33.5; 3]),
-    joint_limit_rad: each_leg([
-        degrees(-46.0, 46.0),
-        degrees(-60.0, 240.0),
-        degrees(-154.5, -52.5),
-    ]),
-    joint_speed_limit_rad_s: each_leg([21.0; 3]),
-};
-
-/// The same three values for every leg.
-const fn each_leg<T: Copy>(leg: [T; LEG_JOINT_DIM]) -> [T; JOINT_DIM] {
-    front_and_rear(leg, leg)
-}
-
-/// Three values for each front leg and three for each rear leg.
-const fn front_and_rear<T: Copy>(
-    front: [T; LEG_JOINT_DIM],
-    rear: [T; LEG_JOINT_DIM],
-) -> [T; JOINT_DIM] {
-    let ([a, b, c], [d, e, f]) = (front, rear);
-    [a, b, c, a, b, c, d, e, f, d, e, f]
-}
-
-/// A range given in degrees, in rad.
-const fn degrees(low: f64, high: f64) -> (f64, f64) {
-    (low.to_radians(), high.to_radians())
-}
-
-/// Hips symmetric about the body's centre.
-const fn hips(x: f64, y: f64) -> [[f64; 3]; FOOT_DIM] {
-    [[x, -y, 0.0], [x, y, 0.0], [-x, -y, 0.0], [-x, y, 0.0]]
+    pub(crate) name: &'static str,
+    pub(crate) mass_kg: f64,
+    pub(crate) legs: [LegGeometry; FOOT_DIM],
+    pub(crate) hip_position_m: [[f64; 3]; FOOT_DIM],
+    /// Its maker's names.
+    pub(crate) joint_names: [&'static str; JOINT_DIM],
+    pub(crate) torque_limit_nm: [f64; JOINT_DIM],
+    pub(crate) joint_limit_rad: [(f64, f64); JOINT_DIM],
+    pub(crate) joint_speed_limit_rad_s: [f64; JOINT_DIM],
 }
 
 impl Robot {
-    /// The robot registered under `name`, such as `go1`.
-    ///
-    /// # Errors
-    /// [`RobotError::UnknownRobot`], which lists the known names.
-    pub fn by_name(name: &str) -> Result<&'static Robot, RobotError> {
-        ROBOTS
-            .iter()
-            .find(|robot| robot.name == name)
-            .ok_or_else(|| RobotError::UnknownRobot {
-                found: name.to_owned(),
-                known: Self::known_names().join(", "),
-            })
-    }
-
-    /// Names that [`Robot::by_name`] accepts.
-    pub fn known_names() -> Vec<&'static str> {
-        ROBOTS.iter().map(|robot| robot.name).collect()
-    }
-
-    /// Name in the registry.
+    /// Its name, in model files and on the command line.
     pub fn name(&self) -> &str {
         self.name
     }
@@ -142,9 +34,29 @@ impl Robot {
         self.mass_kg
     }
 
-    /// Link lengths of each leg.
-    pub fn geometry(&self) -> &LegGeometry {
-        &self.geometry
+    /// Shape of a leg.
+    pub fn geometry(&self, leg: Leg) -> &LegGeometry {
+        &self.legs[leg.index()]
+    }
+
+    /// The maker's names of the joints.
+    pub fn joint_names(&self) -> &[&'static str; JOINT_DIM] {
+        &self.joint_names
+    }
+
+    /// How a joint's angle on the left, mirrored, reads on the right: 1 where both turn alike in a
+    /// mirrored motion (the usual flexions), -1 where they turn against each other (abductions
+    /// about the same axis).
+    pub fn mirror_sign(&self, joint: usize) -> f64 {
+        let of_pair = |leg: Leg| self.geometry(leg).chain().axes[joint % LEG_JOINT_DIM];
+        let (left, right) = match joint / LEG_JOINT_DIM < 2 {
+            true => (of_pair(Leg::FrontLeft), of_pair(Leg::FrontRight)),
+            false => (of_pair(Leg::RearLeft), of_pair(Leg::RearRight)),
+        };
+        // A turn's axis mirrored at the plane y = 0.
+        let mirrored = [-left[0], left[1], -left[2]];
+        let along: f64 = mirrored.iter().zip(&right).map(|(a, b)| a * b).sum();
+        if along < 0.0 { -1.0 } else { 1.0 }
     }
 
     /// Origin of a leg's hip frame in the body frame, in m.
@@ -167,14 +79,14 @@ impl Robot {
         &self.joint_speed_limit_rad_s
     }
 
-    /// Foot position of a leg in its hip frame, in m.
+    /// Foot position of a leg from its first joint, along the body's axes, in m.
     pub fn foot_position(&self, leg: Leg, q: &[f64; 3]) -> Vector3<f64> {
-        self.geometry.foot_position(leg, q)
+        self.geometry(leg).foot_position(q)
     }
 
     /// Jacobian of [`Robot::foot_position`] by the leg's joint angles, in m.
     pub fn foot_jacobian(&self, leg: Leg, q: &[f64; 3]) -> Matrix3<f64> {
-        self.geometry.foot_jacobian(leg, q)
+        self.geometry(leg).foot_jacobian(q)
     }
 
     /// Names of the state: joints `fr.hx` to `rl.kn`, then `body.x` to
@@ -210,6 +122,18 @@ fn joined(joints: &[&str; JOINT_DIM], body: &[&str; 6]) -> [String; STATE_DIM] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::RobotError;
+
+    #[test]
+    fn mirrored_joints_of_known_robots_are_abductions_against_and_flexions_alike() {
+        for name in Robot::known_names() {
+            let robot = Robot::by_name(name).unwrap();
+            let signs: Vec<f64> = (0..JOINT_DIM)
+                .map(|joint| robot.mirror_sign(joint))
+                .collect();
+            assert_eq!(signs, [-1.0, 1.0, 1.0].repeat(4), "{name}");
+        }
+    }
 
     #[test]
     fn by_name_unknown_robot_lists_the_known_ones() {
@@ -249,7 +173,12 @@ mod tests {
                 let stand = [0.0, 0.8, -1.5][joint % 3];
                 assert!(*low < stand && stand < *high, "{name} joint {joint}");
             }
-            assert!(robot.geometry().manipulability(&[0.0, 0.8, -1.5]) > 0.3);
+            assert!(
+                robot
+                    .geometry(Leg::RearLeft)
+                    .manipulability(&[0.0, 0.8, -1.5])
+                    > 0.3
+            );
             assert!(robot.torque_limit_nm().iter().all(|limit| *limit > 0.0));
         }
     }

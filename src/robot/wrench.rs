@@ -47,7 +47,7 @@ impl Robot {
             determinant,
             bound: SINGULAR_BOUND,
         };
-        let determinant = self.geometry().manipulability(q);
+        let determinant = self.geometry(leg).manipulability(q);
         if determinant < SINGULAR_BOUND {
             return Err(singular(determinant));
         }
@@ -69,7 +69,7 @@ impl Robot {
     /// [`RobotError::NotFinite`] for NaN or infinite joint angles.
     pub fn damped_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
-        match self.geometry().damped_force_map(leg, q) {
+        match self.geometry(leg).damped_force_map(q) {
             Some(map) => Ok(map),
             None => self.foot_force_map(leg, q),
         }
@@ -273,7 +273,7 @@ mod tests {
         let stretch = |t: f64| [0.1, 0.5, -0.6 * (1.0 - t)];
         let swing = |t: f64| [0.1, 1.6 + 1.6 * t, -2.6];
         let paths: [&dyn Fn(f64) -> [f64; 3]; 2] = [&stretch, &swing];
-        let geometry = go1().geometry();
+        let geometry = go1().geometry(Leg::RearLeft);
         for (path, singular) in paths.into_iter().zip([0, 1]) {
             let mut nearest = f64::INFINITY;
             let mut before = go1().damped_force_map(Leg::RearLeft, &path(0.0)).unwrap();

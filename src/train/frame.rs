@@ -6,7 +6,7 @@ use super::dataset::{Dataset, Jump, Rates};
 use super::error::TrainError;
 use super::metrics::{BODY_X, BODY_Z};
 use super::options::Coordinates;
-use crate::robot::{FeetRule, GRAVITY_M_S2, JOINT_DIM, Leg, STATE_DIM};
+use crate::robot::{FeetRule, GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
 
 /// Pitch of the body among the 18 coordinates.
 const PITCH: usize = 16;
@@ -50,6 +50,7 @@ impl Frame {
         active: &[usize],
         latent_dim: usize,
         coordinates: Coordinates,
+        robot: &Robot,
     ) -> Result<Self, TrainError> {
         if coordinates == Coordinates::Free {
             return Ok(Self::plain(active));
@@ -61,11 +62,11 @@ impl Frame {
         };
         let single = body.iter().chain(&[PITCH]).filter(|i| active.contains(i));
         let mut free: Vec<DVector<f64>> = single.map(|&i| unit(i)).collect();
-        free.extend(mirrored_joints(active));
+        free.extend(mirrored_joints(active, robot));
         Ok(Self {
             held: match latent_dim {
                 0 | 1 => DMatrix::zeros(STATE_DIM, 0),
-                _ => centre_of_mass(training)?,
+                _ => centre_of_mass(training, robot)?,
             },
             free: match free.is_empty() {
                 true => DMatrix::zeros(STATE_DIM, 0),
@@ -92,8 +93,8 @@ impl Frame {
 }
 
 /// Directions of left and right joints that a mirror leaves alone, of the pairs with a joint among `active`:
-/// abductions turn the other way on the other side.
-fn mirrored_joints(active: &[usize]) -> Vec<DVector<f64>> {
+/// abductions mostly turn the other way on the other side.
+fn mirrored_joints(active: &[usize], robot: &Robot) -> Vec<DVector<f64>> {
     let pairs = [
         (Leg::FrontRight, Leg::FrontLeft),
         (Leg::RearRight, Leg::RearLeft),
@@ -104,7 +105,7 @@ fn mirrored_joints(active: &[usize]) -> Vec<DVector<f64>> {
         for joint in 0..joints_of_leg {
             let [a, b] = [right, left].map(|leg| joints_of_leg * leg.index() + joint);
             if active.contains(&a) || active.contains(&b) {
-                let sign = if joint == 0 { -1.0 } else { 1.0 };
+                let sign = robot.mirror_sign(b);
                 directions.push((unit(a) + unit(b) * sign) * std::f64::consts::FRAC_1_SQRT_2);
             }
         }
@@ -118,9 +119,9 @@ fn mirrored_joints(active: &[usize]) -> Vec<DVector<f64>> {
 /// Nothing pushes the robot in flight, so its centre of mass falls freely: `ddx + c_x^T ddq = 0` and
 /// `ddz + c_z^T ddq = -g`. The regression of the body's accelerations on those of the joints (mirrored, ridge) over
 /// all flights therefore tells the part `c` that the legs have in the centre of mass, to first order in `q`.
-fn centre_of_mass(training: &Dataset) -> Result<DMatrix<f64>, TrainError> {
+fn centre_of_mass(training: &Dataset, robot: &Robot) -> Result<DMatrix<f64>, TrainError> {
     let all: Vec<usize> = (0..JOINT_DIM).collect();
-    let joints = DMatrix::from_columns(&mirrored_joints(&all));
+    let joints = DMatrix::from_columns(&mirrored_joints(&all, robot));
     let mut body = DMatrix::from_columns(&[unit(BODY_X), unit(BODY_Z)]);
     let mut accelerations = Vec::new();
     training
@@ -193,12 +194,16 @@ mod tests {
     use crate::robot::{InputRule, Robot};
     use crate::train::TrainOptions;
 
+    fn robot() -> &'static Robot {
+        Robot::by_name("go1").expect("a known robot")
+    }
+
     fn go1(name: &str) -> Dataset {
         let path = format!("examples/recordings/go1/{name}.csv.gz");
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
         let jump = crate::recording::read(&path).expect("a shipped recording");
         let options = TrainOptions::new("test", 4);
-        let rule = InputRule::published(Robot::by_name("go1").unwrap());
+        let rule = InputRule::published(robot());
         let scaling = options.scaling.factors();
         let jumps: [Recording; 1] = [jump];
         Dataset::new(&jumps[..], &rule, &options.phases, &scaling, 11).expect("a jump")
@@ -222,7 +227,7 @@ mod tests {
 
     #[test]
     fn centre_of_mass_learned_from_one_jump_falls_freely_in_another_where_the_body_does_not() {
-        let rows = centre_of_mass(&go1("train_01")).expect("held in memory");
+        let rows = centre_of_mass(&go1("train_01"), robot()).expect("held in memory");
         let other = go1("test_02");
         let (mean, spread) = in_flight(&other, rows.column(1).into_owned());
         assert!(
@@ -239,7 +244,8 @@ mod tests {
     fn named_rows_say_nothing_of_sideways_motion_and_are_the_same_mirrored() {
         let dataset = go1("train_01");
         let active: Vec<usize> = (0..STATE_DIM).collect();
-        let frame = Frame::new(&dataset, &active, 6, Coordinates::Named).expect("in memory");
+        let frame =
+            Frame::new(&dataset, &active, 6, Coordinates::Named, robot()).expect("in memory");
         let (y, roll, yaw) = (13, 15, 17);
         for rows in [&frame.held, &frame.free] {
             for sideways in [y, roll, yaw] {

@@ -41,7 +41,13 @@ impl<'a> Task<'a> {
         let least_std = options.encoder.least_std * options.scaling.state;
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
         let coordinates = options.coordinates();
-        let frame = Frame::new(&sets.training, &active, options.latent_dim, coordinates)?;
+        let frame = Frame::new(
+            &sets.training,
+            &active,
+            options.latent_dim,
+            coordinates,
+            robot,
+        )?;
         if options.latent_dim == 0 || options.latent_dim > frame.dim() {
             return Err(TrainError::LatentDim {
                 requested: options.latent_dim,

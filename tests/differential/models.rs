@@ -149,14 +149,17 @@ pub fn random_nonlinear(seed: u64) -> ReducedModel {
 
 /// One of the shapes of networks: one curved layer, hidden layers, a curved last layer.
 fn random_map(random: &mut Random, shape: usize, from: usize, to: usize) -> StateMap {
-    use Activation::{Elu, Linear, Sigmoid, Tanh};
+    use Activation::{Elu, Gelu, GeluTanh, Linear, Relu, Sigmoid, Silu, Softplus, Tanh};
     let activations: &[Activation] = [
         &[Elu, Linear][..],
         &[Tanh, Sigmoid, Linear],
         &[Sigmoid, Tanh],
         &[Elu, Elu, Linear],
         &[Tanh],
-    ][shape % 5];
+        &[Relu, Silu, Linear],
+        &[Gelu, Linear],
+        &[GeluTanh, Softplus, Linear],
+    ][shape % 8];
     let mut layers = Vec::new();
     let mut cols = from;
     for (index, &activation) in activations.iter().enumerate() {
@@ -164,7 +167,9 @@ fn random_map(random: &mut Random, shape: usize, from: usize, to: usize) -> Stat
         let rows = if is_last {
             to
         } else {
-            from.max(to) + random.below(9)
+            // Half of relu's units are at rest.
+            let share = if activation == Relu { 3 } else { 1 };
+            share * from.max(to) + random.below(9)
         };
         // About unit variance of each sum, so that no unit saturates.
         let size = 1.7 / (cols as f64).sqrt();

@@ -81,7 +81,6 @@ fn command_with_wrong_usage_ends_with_two() {
         ["--map", "foo=bar"],
         ["--phase", "contact"],
         ["--library", "degree=x"],
-        ["--input-scaling", "0.1"],
     ] {
         let arguments = [&["import", "a.npz", "--output", "a.json"][..], &wrong].concat();
         assert_eq!(

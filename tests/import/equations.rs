@@ -186,8 +186,8 @@ fn equations_that_do_not_fit_the_options_are_refused() {
     let message = refusal("[stance]\nddz1 = 1\n", base.clone());
     assert_eq!(
         message,
-        "eq.txt: found equations (line 1) of phase `stance`, expected --phase stance=FEET (any, \
-         none, or patterns such as 0011 in the order fr fl rr rl)"
+        "eq.txt: found equations (line 1) of phase `stance`, expected --phase stance=any (or \
+         none, always, or patterns such as 0011 in the order fr fl rr rl)"
     );
     let library = LibraryChoice::Standard(StandardLibrary::default());
     let given = ImportOptions {

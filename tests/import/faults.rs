@@ -197,8 +197,8 @@ fn import_of_a_deeper_network_names_its_layers() {
     assert_eq!(
         message(deeper, |_| {}),
         "m.safetensors: found `encoder.0.weight` (64 x 5), `encoder.2.weight` (2 x 64), the layers \
-         of a deeper encoder, expected one linear layer, or --activation elu, tanh or sigmoid to say \
-         what is between them"
+         of a deeper encoder, expected one linear layer, or --activation NAME (elu, relu, gelu, silu, \
+         softplus, tanh, sigmoid) to say what is between them"
     );
 }
 

@@ -50,9 +50,9 @@ class Command:
 class ControlRun:
     """A controller's steps along a recording, which does not feel the commands.
 
-    `summary` has the run's figures under the names of `romc mpc --json`. The arrays have one row per step: `t` (s), `torque` and
-    `recorded_torque` `(n, 12)` (N m), `u` `(n, 18)`, `u_lat`, `z`, `z_ref` `(n, d)`, `solve_us`, `segment`; `phase`
-    and `status` are lists of words.
+    `summary` has counts, times and agreement of the steps themselves. The arrays have one row per step: `t` (s),
+    `torque` and `recorded_torque` `(n, 12)` (N m), `u` `(n, 18)`, `u_lat`, `z`, `z_ref` `(n, d)`, `solve_us`,
+    `iterations`, `segment`; `phase` and `status` are lists of words.
     """
 
     summary: Dict[str, Any]

@@ -72,7 +72,7 @@ class Model:
         - `xi`: coefficients by phase, `(terms, d)` or `(d, terms)`; `mask` has 0 where training switched one off.
         - `library`: the candidate terms in the order of Xi's rows: names such as `["1", "z1", "sin(dz1)", "u1"]`, or
           the shorthand `Library(degree=1, trigonometric=True, inputs=True)`.
-        - `scaling`, `input_scaling`: scaled value = factor x SI value, one number or one per coordinate; 1 unless given.
+        - `scaling`, `input_scaling`: scaled value = factor x SI value, one number or one per coordinate; 1 if left out.
         - `mean`, `std`: `(n,)`, of a trainer that took `(x - mean) / std`.
         - `phases`: the feet that select each phase, `any`, `none`, `always` or patterns such as `"0011,0001"` (fr
           fl rr rl), the first match wins; `contact` and `flight` are known.

@@ -9,6 +9,7 @@ use super::identify::IdentifyArguments;
 use super::import::ImportArguments;
 use super::manual::{CompletionsArguments, ManualArguments};
 use super::plan::PlanArguments;
+use super::robot::RobotArguments;
 use super::run::{
     DemoArguments, InspectArguments, MpcArguments, ReportArguments, SimulateArguments,
 };
@@ -47,6 +48,8 @@ pub enum Command {
     Study(StudyArguments),
     /// Take over a model trained elsewhere: safetensors, npz, PySINDy, equations as text
     Import(ImportArguments),
+    /// Show a robot, or what a TOML or URDF file says of one
+    Robot(RobotArguments),
     /// Prove that two models, equation files or LaTeX papers say the same, or show where they differ
     Check(CheckArguments),
     /// Compile a model to equations, code (C, Rust, Python, MATLAB) or a controller

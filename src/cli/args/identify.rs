@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::robot::RobotParser;
 use clap::Args;
 
 use super::reading::ReadingArguments;
@@ -18,8 +19,8 @@ pub struct IdentifyArguments {
     /// Recordings of one robot
     #[arg(required = true, value_name = "RECORDING")]
     pub recordings: Vec<PathBuf>,
-    /// Robot whose geometry and limits count
-    #[arg(long, value_name = "NAME")]
+    /// Robot whose geometry and limits count: go1, go2, a1, or a .toml or .urdf file
+    #[arg(long, value_name = "ROBOT", value_parser = RobotParser, hide_possible_values = true)]
     pub robot: String,
     /// Write losses of the twelve joints, gravity, mass, standard errors to this file
     #[arg(long, value_name = "ACTUATORS.toml")]

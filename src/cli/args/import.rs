@@ -6,11 +6,12 @@ use clap::Args;
 
 use super::number::{count, real};
 use super::reading::ReadingArguments;
+use super::robot::RobotParser;
 use crate::import::{
     Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
 };
 use crate::limits::table::{IMPORTED_LATENT_DIM, INPUT_SCALING, SAMPLE_TIME, SCALING};
-use crate::model::{Activation, StandardLibrary};
+use crate::model::{Activation, CoordinateOrder, StandardLibrary};
 
 /// The candidate terms of an imported model.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,8 +34,8 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
 #[derive(Debug, Args)]
 #[command(
     after_help = "Tensors are found by the names of the parts, encoder.weight, encoder.bias, decoder.weight,\n\
-                  decoder.bias, xi.PHASE, mask.PHASE, input_mean.PHASE, input_covariance.PHASE, scaling.state,\n\
-                  scaling.input, alone or behind names of modules (net.encoder.0.weight), with dots or\n\
+                  decoder.bias, xi.PHASE (or sindy_coefficients.PHASE), mask.PHASE, input_mean.PHASE,\n\
+                  input_covariance.PHASE, scaling.state, scaling.input, mean.state, std.state, std.input, alone or behind names of modules (net.encoder.0.weight), with dots or\n\
                   underscores (xi_contact); --map names the others. Statistics are of u in SI units: 18 numbers\n\
                   and 18 x 18. The part and layout of each tensor are printed.\n\n\
                   Examples:\n  \
@@ -59,7 +60,7 @@ pub struct ImportArguments {
     /// How weights are stored: needed for square ones only
     #[arg(long, value_enum)]
     pub weights: Option<WeightVectors>,
-    /// What is between the layers of an encoder or decoder that has several: elu, tanh, sigmoid
+    /// What is between the layers of an encoder or decoder that has several
     #[arg(long, value_name = "NAME")]
     pub activation: Option<Activation>,
     /// How coefficients are stored: needed if their shape fits both ways
@@ -74,32 +75,34 @@ pub struct ImportArguments {
     /// Number of latent coordinates d: needed if shapes leave it open
     #[arg(long, value_name = "D", value_parser = count(&IMPORTED_LATENT_DIM))]
     pub latent_dim: Option<usize>,
-    /// When a phase holds: any, none, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be
-    /// repeated, the first match wins; contact=any and flight=none are known
+    /// When a phase holds: any, none, always, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be
+    /// repeated, the first match wins; contact=any, flight=none and always=always are known
     #[arg(long, value_name = "NAME=FEET")]
     pub phase: Vec<PhaseRule>,
     /// Scaled value = factor times SI value: one number or one per coordinate, separated by commas
     #[arg(long, value_name = "FACTOR", value_delimiter = ',', value_parser = real(&SCALING))]
     pub scaling: Vec<f64>,
-    /// Factors of the inputs, where they differ from --scaling
-    #[arg(
-        long,
-        value_name = "FACTOR",
-        value_delimiter = ',',
-        value_parser = real(&INPUT_SCALING),
-        requires = "scaling"
-    )]
+    /// Factors of the inputs, where they differ from --scaling or a tensor has those of the states alone
+    #[arg(long, value_name = "FACTOR", value_delimiter = ',', value_parser = real(&INPUT_SCALING))]
     pub input_scaling: Vec<f64>,
-    /// Robot whose 18 coordinates the encoder takes
-    #[arg(long)]
+    /// Robot whose 18 coordinates the encoder takes: go1, go2, a1, or a .toml or .urdf file
+    #[arg(long, value_name = "ROBOT", value_parser = RobotParser, hide_possible_values = true)]
     pub robot: Option<String>,
+    /// Order of the 18 coordinates (and inputs) in the file, as names or groups: body,fl,fr,rl,rr or
+    /// hx,hy,kn,body; romc's own is fr,fl,rr,rl,body
+    #[arg(long, value_name = "NAMES", requires = "robot")]
+    pub order: Option<CoordinateOrder>,
     /// Sampling period of the training recordings
     #[arg(long, value_name = "SECONDS", value_parser = real(&SAMPLE_TIME))]
     pub sample_time: Option<f64>,
     /// Recordings that give the mean and covariance of the inputs in each phase, by which the
-    /// controller weighs inputs. Needs --robot
+    /// controller weighs inputs, and that the model is compared with: a model that misses them is not
+    /// written. Needs --robot
     #[arg(long, value_name = "RECORDING", num_args = 1.., requires = "robot")]
     pub inputs_from: Vec<PathBuf>,
+    /// Write the model even if it misses the recordings of --inputs-from
+    #[arg(long, requires = "inputs_from")]
+    pub unchecked: bool,
     /// Name of the model; the output file's stem unless given
     #[arg(long)]
     pub name: Option<String>,

@@ -18,6 +18,7 @@ mod manual;
 mod number;
 mod plan;
 mod reading;
+mod robot;
 mod run;
 mod train;
 
@@ -32,5 +33,6 @@ pub use import::{ImportArguments, LibraryArgument};
 pub use manual::{CompletionsArguments, ManualArguments};
 pub use plan::PlanArguments;
 pub use reading::ReadingArguments;
+pub use robot::{RobotArguments, RobotParser};
 pub use run::{DemoArguments, InspectArguments, MpcArguments, ReportArguments, SimulateArguments};
 pub use train::{Dimensions, PhaseSet, StudyArguments, TrainArguments, TrainSettings, Widths};

@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::number::{count, real};
 use super::reading::ReadingArguments;
+use super::robot::RobotParser;
 use crate::evaluate::ReferenceInput;
 use crate::limits::table::{HORIZON, RESTART_EVERY, STEP};
 use crate::mpc::{Lift, Solver};
@@ -33,8 +34,8 @@ pub struct InspectArguments {
     /// Models (`.json`) and recordings (`.csv`, `.csv.gz`)
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// Robot whose limits the recordings are compared with
-    #[arg(long, default_value = "go1")]
+    /// Robot whose limits the recordings are compared with: go1, go2, a1, or a .toml or .urdf file
+    #[arg(long, value_name = "ROBOT", default_value = "go1", value_parser = RobotParser, hide_possible_values = true)]
     pub robot: String,
     /// Write a first map of an unknown log for --columns, from its names and numbers
     #[arg(long, conflicts_with = "columns")]

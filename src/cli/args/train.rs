@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::number::{count, finite, real};
 use super::reading::ReadingArguments;
+use super::robot::RobotParser;
 use crate::limits::table;
 use crate::model::Activation;
 use crate::recording::smoothing::SavitzkyGolay;
@@ -121,8 +122,8 @@ pub struct TrainSettings {
     /// How to learn (closed-form unless given)
     #[arg(long, value_enum)]
     pub method: Option<Method>,
-    /// Robot that made the recordings (go1 unless given)
-    #[arg(long)]
+    /// Robot that made the recordings: go1 (unless given), go2, a1, or a .toml or .urdf file
+    #[arg(long, value_name = "ROBOT", value_parser = RobotParser, hide_possible_values = true)]
     pub robot: Option<String>,
     /// Train exactly as published: motor torques, forces in the body's axes, one scale, no mask, no lift loss,
     /// Xi from ones (joint method)

@@ -6,7 +6,7 @@ use nalgebra::storage::RawStorage;
 
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::{ControlModel, ControlPhase};
-use crate::robot::{STATE_DIM, WrenchFrame};
+use crate::robot::{Leg, LegGeometry, Robot, STATE_DIM, WrenchFrame};
 
 /// Numbers per line.
 const WIDTH: usize = 5;
@@ -21,7 +21,8 @@ pub struct ControlModelText<'a> {
     banner: String,
     model: &'a str,
     name: &'a str,
-    robot: &'a str,
+    robot: String,
+    leg_types: &'static str,
     frame: &'static str,
     /// Names and values of the actuators' arrays.
     actuators: Vec<(&'static str, String)>,
@@ -84,7 +85,8 @@ impl<'a> ControlModelText<'a> {
             banner,
             model: &entries.name,
             name: &entries.identifier,
-            robot: plant.robot().name(),
+            robot: robot_text(plant.robot()),
+            leg_types: leg_types(plant.robot()),
             frame: match rule.wrench_frame() {
                 WrenchFrame::Body => "Body",
                 WrenchFrame::World => "World",
@@ -107,6 +109,39 @@ impl<'a> ControlModelText<'a> {
                 .collect(),
         }
     }
+}
+
+/// The names that the robot's text needs beside `LegGeometry`.
+fn leg_types(robot: &Robot) -> &'static str {
+    let is_planar = |leg: Leg| matches!(robot.geometry(leg), LegGeometry::Planar(_));
+    match Leg::ALL.map(is_planar) {
+        [true, true, true, true] => "PlanarLeg",
+        [false, false, false, false] => "ChainLeg",
+        _ => "ChainLeg, PlanarLeg",
+    }
+}
+
+/// A robot as a Rust expression: the debug form of structs, arrays, texts and numbers is one.
+fn robot_text(robot: &Robot) -> String {
+    let legs: Vec<String> = Leg::ALL
+        .map(|leg| format!("        {:?},\n", robot.geometry(leg)))
+        .into();
+    let hips = Leg::ALL.map(|leg| <[f64; 3]>::from(robot.hip_position(leg)));
+    let fields = [
+        ("name", format!("{:?}", robot.name())),
+        ("mass_kg", format!("{:?}", robot.mass_kg())),
+        ("legs", format!("[\n{}    ]", legs.concat())),
+        ("hip_position_m", format!("{hips:?}")),
+        ("joint_names", format!("{:?}", robot.joint_names())),
+        ("torque_limit_nm", format!("{:?}", robot.torque_limit_nm())),
+        ("joint_limit_rad", format!("{:?}", robot.joint_limit_rad())),
+        (
+            "joint_speed_limit_rad_s",
+            format!("{:?}", robot.joint_speed_limit_rad_s()),
+        ),
+    ];
+    let fields = fields.map(|(name, value)| format!("    {name}: {value},\n"));
+    format!("Robot {{\n{}}}", fields.concat())
 }
 
 impl<'a> PhaseNumbers<'a> {

@@ -21,7 +21,7 @@ use crate::files::EmittedFile;
 use crate::lower::LowerOptions;
 use crate::mpc::ControlModel;
 use crate::mpc::interface::{Settings, TEXTS};
-use crate::robot::{InputRule, Robot, STATE_DIM, WrenchFrame};
+use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
 use control_model::ControlModelText;
 use lock::Lock;
 
@@ -35,6 +35,7 @@ struct Facts<'a> {
     state_dim: usize,
     state_names: String,
     input_names: String,
+    joint_names: String,
     /// How `u` comes from torques, lines of a comment.
     input_is: String,
     /// Constant and value of every code.
@@ -181,13 +182,14 @@ fn project(
         state_dim: STATE_DIM,
         state_names: Robot::state_names().join(" "),
         input_names: Robot::input_names().join(" "),
+        joint_names: plant.robot().joint_names().join(" "),
         input_is: input_in_words(plant.input_rule(), name),
         codes: texts()
             .map(|(code, text)| (constant(&text), code))
             .collect(),
         texts: texts().collect(),
         defaults: Settings::default(),
-        link_m: format!("{:?}", plant.robot().geometry().thigh_m),
+        link_m: format!("{:?}", plant.robot().geometry(Leg::FrontRight).lengths()[0]),
         rust_version: env!("CARGO_PKG_RUST_VERSION"),
         clarabel: lock.version("clarabel"),
         nalgebra: lock.version("nalgebra"),

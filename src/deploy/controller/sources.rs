@@ -16,7 +16,7 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 42] = sources![
+const SOURCES: [(&str, &str); 44] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
@@ -46,8 +46,10 @@ const SOURCES: [(&str, &str); 42] = sources![
     "mpc/online/structured.rs",
     "mpc/online/transcribe.rs",
     "robot/actuators.rs",
+    "robot/chain.rs",
     "robot/error.rs",
     "robot/feet.rs",
+    "robot/geometry.rs",
     "robot/input_rule.rs",
     "robot/joints.rs",
     "robot/kinematics.rs",

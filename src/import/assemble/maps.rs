@@ -60,8 +60,8 @@ impl<'a> Assembly<'a, '_> {
             let found = format!("{}, the layers of a deeper {name}", texts.join(", "));
             let expected = match is_mixed {
                 true => format!("numbers for all of them, or one with --map {name}.weight=TENSOR"),
-                false => "one linear layer, or --activation elu, tanh or sigmoid to say what is \
-                          between them"
+                false => "one linear layer, or --activation NAME (elu, relu, gelu, silu, softplus, tanh, \
+                          sigmoid) to say what is between them"
                     .to_owned(),
             };
             return Err(ImportError::at(

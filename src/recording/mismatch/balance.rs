@@ -1,6 +1,6 @@
 //! Forces against weight and acceleration, falling in flight, hips' torques against the side they hold.
 
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Unit, Vector3};
 
 use super::stance::median;
 use super::weight_n;
@@ -106,10 +106,15 @@ impl Sums {
             };
             let force = map * Vector3::from(tau);
             sum += force;
-            // The axis of abduction leaves the hip's torque this lever on the force along the leg.
-            let along = force.dot(&Vector3::new(0.0, q[0].sin(), -q[0].cos()));
-            if along.abs() > LEAST_FORCE * weight_n(robot.mass_kg()) {
-                let lever = leg.side() * robot.geometry().hip_m * along;
+            // A force in the plane of the leg leaves the hip's torque this much: its lever is the
+            // distance of the plane from the axis of abduction.
+            let links = robot.geometry(leg).links();
+            let axis = Unit::new_normalize(links.abduction);
+            let normal = Rotation3::from_axis_angle(&axis, q[0]) * links.flexion;
+            let in_plane = force - normal * normal.dot(&force);
+            let lever = -robot.foot_jacobian(leg, &q).column(0).dot(&in_plane);
+            let least = LEAST_FORCE * weight_n(robot.mass_kg()) * links.hip.norm();
+            if lever.abs() > least {
                 let (product, square) = &mut self.hips[leg.index()];
                 *product += tau[0] * lever;
                 *square += lever * lever;

@@ -5,7 +5,7 @@ use nalgebra::{DVector, Vector3};
 use super::figure::{Figure, Panel, Role, StickPlot};
 use crate::recording::Segment;
 use crate::robot::input_rule::rotation;
-use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, LegGeometry, Robot, STATE_DIM};
+use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
 
 /// Half the height of the box that stands for a trunk, in m.
 const TRUNK_HALF_HEIGHT_M: f64 = 0.05;
@@ -39,11 +39,6 @@ impl Sticks {
             let point = origin + turn * in_body;
             (point.x * cos + point.y * sin, point.z)
         };
-        let thigh_alone = LegGeometry {
-            calf_m: 0.0,
-            foot_forward_m: 0.0,
-            ..robot.geometry().clone()
-        };
         let [front, rear] = [Leg::FrontRight, Leg::RearRight].map(|leg| robot.hip_position(leg).x);
         let corner = |x: f64, z: f64| seen(Vector3::new(x, 0.0, z * TRUNK_HALF_HEIGHT_M));
         let trunk = vec![
@@ -55,7 +50,7 @@ impl Sticks {
         ];
         let leg = |leg: Leg| {
             let (hip, q) = (robot.hip_position(leg), leg.of_joints(&joints));
-            let knee = thigh_alone.foot_position(leg, &q);
+            let knee = robot.geometry(leg).knee_position(&q);
             let foot = robot.foot_position(leg, &q);
             vec![seen(hip), seen(hip + knee), seen(hip + foot)]
         };
@@ -245,9 +240,7 @@ mod tests {
         assert_eq!(sticks.lines.len(), Sticks::NAMES.len());
         let length = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).hypot(a.1 - b.1);
         for (leg, line) in Leg::ALL.into_iter().zip(&sticks.lines[1..]) {
-            let LegGeometry {
-                thigh_m, calf_m, ..
-            } = *robot.geometry();
+            let [thigh_m, calf_m] = robot.geometry(leg).lengths();
             assert!((length(line[0], line[1]) - thigh_m).abs() < 1e-12);
             assert!((length(line[1], line[2]) - calf_m).abs() < 1e-12);
             let hip = robot.hip_position(leg);

@@ -165,9 +165,7 @@ fn layers(encoder: &StateMap) -> Entry {
         let width = layer.map.output_dim();
         match layer.activation {
             Activation::Linear => width.to_string(),
-            Activation::Elu | Activation::Tanh | Activation::Sigmoid => {
-                format!("{width} ({})", layer.activation)
-            }
+            activation => format!("{width} ({activation})"),
         }
     });
     let (inputs, widths) = (encoder.input_dim(), widths.collect::<Vec<_>>().join(", "));

@@ -1,0 +1,116 @@
+"""Pinocchio's kinematics of the robots in this folder, for romc's tests to be compared with.
+
+    python reference.py --check     # what ../../tests/fixtures/robots/reference.json holds
+    python reference.py --write     # makes it
+
+TOML files are built joint by joint in Pinocchio, URDF files are read by Pinocchio itself. Feet are
+in the body's frame; Jacobians are by the leg's three joints, in the body's axes.
+"""
+
+import argparse
+import json
+import pathlib
+import tomllib
+
+import numpy as np
+import pinocchio as pin
+
+HERE = pathlib.Path(__file__).resolve().parent
+REFERENCE = HERE.parent.parent / "tests" / "fixtures" / "robots" / "reference.json"
+AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
+POSTURES = 25
+# Joints of each leg from the trunk to the foot, and the link of the foot.
+HARE = {
+    leg: ([f"{leg}_swing", f"{leg}_thigh", f"{leg}_shin"], f"{leg}_paw")
+    for leg in ("ne", "nw", "se", "sw")
+}
+
+
+def described(path):
+    """(model, [(joint names, foot frame)]) of a TOML file, legs in the file's order."""
+    entry = tomllib.loads(path.read_text())
+    model = pin.Model()
+    legs = []
+    for index, leg in enumerate(entry["leg"]):
+        parent = 0
+        for joint in leg["joint"]:
+            axis = joint["axis"]
+            if isinstance(axis, str):
+                sign = -1.0 if axis.startswith("-") else 1.0
+                axis = sign * np.array(AXES[axis[-1]], float)
+            turns = pin.JointModelRevoluteUnaligned(np.array(axis) / np.linalg.norm(axis))
+            place = pin.SE3(np.eye(3), np.array(joint["at"], float))
+            parent = model.addJoint(parent, turns, place, joint["name"])
+        foot = pin.SE3(np.eye(3), np.array(leg["foot"], float))
+        name = f"foot{index}"
+        model.addFrame(pin.Frame(name, parent, 0, foot, pin.FrameType.OP_FRAME))
+        legs.append(([joint["name"] for joint in leg["joint"]], name))
+    return model, legs
+
+
+def read(path):
+    if path.suffix == ".toml":
+        return described(path)
+    return pin.buildModelFromUrdf(str(path)), list(HARE.values())
+
+
+def sample(path, random):
+    """Random postures: angles by joint name, and foot and Jacobian of each leg."""
+    model, legs = read(path)
+    data = model.createData()
+    rows = []
+    for _ in range(POSTURES):
+        angles = {name: random.uniform(-2.5, 2.5) for names, _ in legs for name in names}
+        q = pin.neutral(model)
+        for name, angle in angles.items():
+            joint = model.joints[model.getJointId(name)]
+            if joint.nq == 1:
+                q[joint.idx_q] = angle
+            else:  # a joint without end is kept as cosine and sine
+                q[joint.idx_q : joint.idx_q + 2] = np.cos(angle), np.sin(angle)
+        pin.framesForwardKinematics(model, data, q)
+        pin.computeJointJacobians(model, data, q)
+        found = []
+        for names, frame in legs:
+            number = model.getFrameId(frame)
+            jacobian = pin.getFrameJacobian(model, data, number, pin.LOCAL_WORLD_ALIGNED)
+            columns = [model.joints[model.getJointId(name)].idx_v for name in names]
+            found.append(
+                {
+                    "joints": names,
+                    "angles": [angles[name] for name in names],
+                    "foot": data.oMf[number].translation.tolist(),
+                    "jacobian": jacobian[:3, columns].tolist(),
+                }
+            )
+        rows.append(found)
+    return rows
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    kind = parser.add_mutually_exclusive_group(required=True)
+    kind.add_argument("--write", action="store_true")
+    kind.add_argument("--check", action="store_true")
+    arguments = parser.parse_args()
+    random = np.random.default_rng(7)
+    names = ("solo12.toml", "anymal_c.toml", "hare.urdf")
+    found = {name: sample(HERE / name, random) for name in names}
+    if arguments.write:
+        REFERENCE.write_text(json.dumps(found) + "\n")
+        return
+    stored = json.loads(REFERENCE.read_text())
+    for name, rows in found.items():
+        worst = 0.0
+        for row, other in zip(rows, stored[name], strict=True):
+            for leg, kept in zip(row, other, strict=True):
+                for key in ("angles", "foot", "jacobian"):
+                    difference = np.abs(np.array(leg[key]) - np.array(kept[key])).max()
+                    worst = max(worst, difference)
+        print(f"{name}: {POSTURES} postures, stored values off by at most {worst:.1e}")
+        if worst > 1e-12:
+            raise SystemExit(f"{name}: the stored values are not Pinocchio's; --write them again")
+
+
+if __name__ == "__main__":
+    main()

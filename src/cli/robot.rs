@@ -1,0 +1,104 @@
+//! `--robot` of every command, and `romc robot`: what a robot's file says.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde_json::json;
+
+use super::Answer;
+use super::args::RobotArguments;
+use super::output::{check_output, write_file};
+use crate::Error;
+use crate::files::Overwrite;
+use crate::robot::{JOINT_NAMES, Leg, Robot};
+use crate::robot_file::{self, RobotEntry};
+use crate::typeset::Table;
+
+/// The robot of `--robot`; of a file, how its joints were matched goes to stderr.
+///
+/// # Errors
+/// [`Error::RobotFile`].
+pub fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
+    let robot = robot_file::find(name_or_file)?;
+    if Robot::by_name(name_or_file).is_err() {
+        eprintln!("{name_or_file}: robot {}, {}", robot.name(), matched(robot));
+    }
+    Ok(robot)
+}
+
+/// Which of the robot's joints each leg has.
+fn matched(robot: &Robot) -> String {
+    let legs = Leg::ALL.map(|leg| {
+        let first = 3 * leg.index();
+        format!(
+            "{leg} = {}",
+            robot.joint_names()[first..first + 3].join(" ")
+        )
+    });
+    legs.join(", ")
+}
+
+/// Shows a robot, and writes its TOML.
+///
+/// # Errors
+/// [`Error::RobotFile`], [`Error::Exists`] for the file to write.
+pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
+    let overwrite = Overwrite::when_forced(arguments.force);
+    check_output(arguments.output.as_deref(), overwrite)?;
+    let robot = match arguments.feet.as_slice() {
+        [] => robot_file::find(&arguments.robot)?,
+        feet => robot_file::read(Path::new(&arguments.robot), feet)?,
+    };
+    let mut text = format!("{}: {} kg\n\n", robot.name(), number(robot.mass_kg()));
+    let joints: Vec<usize> = (0..JOINT_NAMES.len()).collect();
+    let geometry = |joint: usize| robot.geometry(Leg::ALL[joint / 3]).chain();
+    let table = Table::of(&joints)
+        .column("romc", "", |&&joint| JOINT_NAMES[joint])
+        .column("joint", "", |&&joint| robot.joint_names()[joint])
+        .column("at", "m", |&&joint| match joint % 3 {
+            0 => vector(robot.hip_position(Leg::ALL[joint / 3]).into()),
+            _ => vector(geometry(joint).links[joint % 3 - 1]),
+        })
+        .column("axis", "", |&&joint| {
+            vector(geometry(joint).axes[joint % 3])
+        })
+        .column("lowest", "rad", |&&joint| {
+            number(robot.joint_limit_rad()[joint].0)
+        })
+        .column("highest", "rad", |&&joint| {
+            number(robot.joint_limit_rad()[joint].1)
+        })
+        .column("torque", "N m", |&&joint| {
+            number(robot.torque_limit_nm()[joint])
+        })
+        .column("speed", "rad/s", |&&joint| {
+            number(robot.joint_speed_limit_rad_s()[joint])
+        })
+        .table();
+    let _ = writeln!(text, "{table}");
+    for leg in Leg::ALL {
+        let foot = vector(robot.geometry(leg).chain().links[2]);
+        let _ = writeln!(text, "foot {leg}: {foot} m from its last joint");
+    }
+    if let Some(path) = &arguments.output {
+        write_file(path, robot_file::to_toml(robot).as_bytes(), overwrite)?;
+        let _ = writeln!(text, "\n{}: the robot", path.display());
+    }
+    Ok(Answer {
+        text,
+        json: json!({
+            "command": "robot",
+            "robot": RobotEntry::of(robot),
+            "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+        }),
+    })
+}
+
+fn vector(vector: [f64; 3]) -> String {
+    vector.map(number).join(" ")
+}
+
+fn number(value: f64) -> String {
+    let text = format!("{value:.6}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}

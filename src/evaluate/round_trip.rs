@@ -1,0 +1,296 @@
+//! Whether a model made elsewhere fits recordings: what its maps and equations miss before anything
+//! is integrated, and which usual slip explains it.
+
+use nalgebra::DVector;
+
+use super::coordinates::PointwiseSums;
+use super::error::EvaluateError;
+use super::metrics::FitSums;
+use crate::model::{CoordinateOrder, ModelError, ReducedModel, StateMap};
+use crate::recording::Segment;
+use crate::robot::STATE_DIM;
+use crate::sim::LatentSegment;
+
+/// Samples by which slips are looked for, spread over all recordings.
+const SAMPLES: usize = 240;
+/// Relative error beyond which maps do not fit: that of an answer that never changes.
+const LARGEST_ERROR: f64 = 1.0;
+/// How many times smaller the error has to get for a slip to explain it.
+const EXPLAINED: f64 = 4.0;
+/// R^2 of latent accelerations at which a slip explains that they were worse than none.
+const GOOD_R2: f64 = 0.2;
+/// How much larger than the smallest an error may be for an earlier slip to be taken: left and right
+/// differ little.
+const ALIKE: f64 = 1.5;
+/// Relative error that needs no explanation.
+const SMALL_ERROR: f64 = 0.02;
+
+/// A model on recordings, sample by sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoundTrip {
+    /// Mean square of `decode(encode(x)) - x` over the mean square of the deviation of `x` from its
+    /// mean, all coordinates in the model's scaled units.
+    pub error: f64,
+    /// The slip under which `error` is smallest, if it explains the error.
+    pub slip: Option<(Slip, f64)>,
+    /// Name of each phase and R^2 of its latent accelerations; none without samples of it.
+    pub acceleration_r2: Vec<(String, Option<f64>)>,
+    /// R^2 of the latent accelerations of all phases; none without samples.
+    pub all_acceleration_r2: Option<f64>,
+    /// What makes that better than zero, where it is not, and how good.
+    pub acceleration_slip: Option<(AccelerationSlip, f64)>,
+}
+
+/// What spoils latent accelerations alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum AccelerationSlip {
+    /// All inputs have to be multiplied by this.
+    InputFactor(f64),
+    /// The mean of the training has to be taken off states; the maps hide it where they reproduce it.
+    Centred,
+}
+
+/// What a foreign model is easily given wrong.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Slip {
+    /// The coordinates are in another order.
+    Order(CoordinateOrder),
+    /// Scaled values are `factor x` in all coordinates.
+    Factor(f64),
+    /// The mean of the training was subtracted before the factors.
+    Centred,
+    /// Scaled values are `(x - mean) / standard deviation`.
+    Standardised,
+    /// Both the order and the mean, or the order and `(x - mean) / standard deviation`.
+    Both(CoordinateOrder, Box<Slip>),
+}
+
+impl RoundTrip {
+    /// Looks at a model along recordings.
+    ///
+    /// # Errors
+    /// [`EvaluateError`] for a model without maps or robot, or inputs that cannot be computed.
+    pub fn of(model: &ReducedModel, segments: &[&Segment]) -> Result<Self, EvaluateError> {
+        let samples = Samples::new(model, segments)?;
+        let error = samples.error(&samples.given())?;
+        let best = samples.best_slip()?;
+        let is_explained = |found: f64| error > SMALL_ERROR && EXPLAINED * found < error;
+        let still = DVector::zeros(STATE_DIM);
+        let (acceleration_r2, all) = accelerations(model, segments, 1.0, &still)?;
+        let acceleration_slip = match all {
+            Some(r2) if r2 < 0.0 => acceleration_slip(model, segments, &samples.mean)?,
+            _ => None,
+        };
+        Ok(Self {
+            error,
+            slip: best.filter(|(_, found)| is_explained(*found)),
+            acceleration_r2,
+            all_acceleration_r2: all,
+            acceleration_slip,
+        })
+    }
+
+    /// Whether the maps fit the recordings.
+    pub fn maps_fit(&self) -> bool {
+        self.error <= LARGEST_ERROR && self.slip.is_none()
+    }
+
+    /// Whether the equations say more of the latent accelerations than a constant.
+    pub fn equations_fit(&self) -> bool {
+        self.all_acceleration_r2.is_none_or(|r2| r2 >= 0.0)
+    }
+}
+
+/// How file coordinates follow from recorded ones: `y_k = factor_k (x_order(k) - mean_order(k))`.
+struct Reading {
+    order: [usize; STATE_DIM],
+    factors: DVector<f64>,
+    mean: DVector<f64>,
+}
+
+struct Samples<'m> {
+    encoder: &'m StateMap,
+    decoder: &'m StateMap,
+    factors: DVector<f64>,
+    x: Vec<DVector<f64>>,
+    mean: DVector<f64>,
+    deviation: DVector<f64>,
+}
+
+impl<'m> Samples<'m> {
+    fn new(model: &'m ReducedModel, segments: &[&Segment]) -> Result<Self, EvaluateError> {
+        let total: usize = segments.iter().map(|segment| segment.len()).sum();
+        let every = total.div_ceil(SAMPLES).max(1);
+        let columns = segments.iter().flat_map(|segment| segment.x.column_iter());
+        let x: Vec<DVector<f64>> = columns.step_by(every).map(|x| x.into_owned()).collect();
+        let count = x.len().max(1) as f64;
+        let mean = x.iter().sum::<DVector<f64>>() / count;
+        let squares = x.iter().map(|x| (x - &mean).map(|v| v * v));
+        let deviation = (squares.sum::<DVector<f64>>() / count).map(f64::sqrt);
+        Ok(Self {
+            encoder: model.encoder_map()?,
+            decoder: model.decoder_map()?,
+            factors: model.state_factors()?,
+            x,
+            mean,
+            deviation,
+        })
+    }
+
+    fn given(&self) -> Reading {
+        Reading {
+            order: std::array::from_fn(|k| k),
+            factors: self.factors.clone(),
+            mean: DVector::zeros(STATE_DIM),
+        }
+    }
+
+    fn with(&self, slip: &Slip) -> Reading {
+        let given = self.given();
+        match slip {
+            Slip::Order(order) => Reading {
+                order: *order.places(),
+                ..given
+            },
+            Slip::Factor(factor) => {
+                let factors = DVector::repeat(STATE_DIM, *factor);
+                Reading { factors, ..given }
+            }
+            Slip::Centred => Reading {
+                mean: self.mean.clone(),
+                ..given
+            },
+            Slip::Standardised => Reading {
+                factors: self.deviation.map(|v| 1.0 / v.max(1e-9)),
+                mean: self.mean.clone(),
+                ..given
+            },
+            Slip::Both(order, slip) => {
+                let reading = self.with(slip);
+                let factors = match **slip {
+                    // Factors of coordinates, not of places.
+                    Slip::Standardised => {
+                        DVector::from_fn(STATE_DIM, |k, _| reading.factors[order.places()[k]])
+                    }
+                    _ => reading.factors,
+                };
+                Reading {
+                    order: *order.places(),
+                    factors,
+                    mean: reading.mean,
+                }
+            }
+        }
+    }
+
+    /// Mean square of the round trip's residual over that of the deviation.
+    fn error(&self, reading: &Reading) -> Result<f64, ModelError> {
+        let mut sums = vec![FitSums::default(); STATE_DIM];
+        for x in &self.x {
+            let y = DVector::from_fn(STATE_DIM, |k, _| {
+                let from = reading.order[k];
+                reading.factors[k] * (x[from] - reading.mean[from])
+            });
+            let back = self.decoder.apply(&self.encoder.apply(&y)?)?;
+            for ((sums, &y), &back) in sums.iter_mut().zip(&y).zip(&back) {
+                sums.add(y, back);
+            }
+        }
+        let mut total = FitSums::default();
+        sums.iter().for_each(|sums| total.merge_keeping_means(sums));
+        let r2 = total.fit().and_then(|fit| fit.r2);
+        Ok(r2.map_or(0.0, |r2| 1.0 - r2))
+    }
+
+    /// The slip with the smallest error; two at once only where one is not enough.
+    fn best_slip(&self) -> Result<Option<(Slip, f64)>, ModelError> {
+        let orders = CoordinateOrder::common();
+        let factors = [1.0, 0.1, 10.0, 0.01, 100.0].map(Slip::Factor);
+        let one = (orders.iter().cloned().map(Slip::Order))
+            .chain(factors)
+            .chain([Slip::Centred, Slip::Standardised]);
+        let best = self.best_of(one)?;
+        if best
+            .as_ref()
+            .is_some_and(|(_, error)| *error < SMALL_ERROR * EXPLAINED)
+        {
+            return Ok(best);
+        }
+        let two = orders.into_iter().flat_map(|order| {
+            let both = |slip| Slip::Both(order.clone(), Box::new(slip));
+            [both(Slip::Centred), both(Slip::Standardised)]
+        });
+        let two = self.best_of(two)?;
+        let error_of = |found: &Option<(Slip, f64)>| found.as_ref().map_or(f64::MAX, |f| f.1);
+        Ok(match EXPLAINED * error_of(&two) < error_of(&best) {
+            true => two,
+            false => best,
+        })
+    }
+
+    fn best_of(
+        &self,
+        slips: impl Iterator<Item = Slip>,
+    ) -> Result<Option<(Slip, f64)>, ModelError> {
+        let mut found: Vec<(Slip, f64)> = Vec::new();
+        for slip in slips {
+            let error = self.error(&self.with(&slip))?;
+            found.push((slip, error));
+        }
+        let least = found
+            .iter()
+            .map(|(_, error)| *error)
+            .fold(f64::INFINITY, f64::min);
+        Ok(found.into_iter().find(|(_, error)| *error <= ALIKE * least))
+    }
+}
+
+type Accelerations = (Vec<(String, Option<f64>)>, Option<f64>);
+
+/// R^2 of the latent accelerations with all inputs multiplied by a factor and a mean taken off `x`.
+fn accelerations(
+    model: &ReducedModel,
+    segments: &[&Segment],
+    input_factor: f64,
+    mean: &DVector<f64>,
+) -> Result<Accelerations, EvaluateError> {
+    let mut sums = PointwiseSums::new(model);
+    for segment in segments {
+        let mut latent = LatentSegment::encode(model, segment)?;
+        latent.u_lat *= input_factor;
+        for (x, mut z) in segment.x.column_iter().zip(latent.z.column_iter_mut()) {
+            z.copy_from(&model.encode(&(x - mean))?);
+        }
+        sums.add(model, segment, &latent)?;
+    }
+    let r2 = |sums: &FitSums| sums.fit().and_then(|fit| fit.r2);
+    let names = model.phases().iter().map(|phase| phase.name.clone());
+    let mut all = FitSums::default();
+    sums.acceleration
+        .iter()
+        .for_each(|phase| all.merge_keeping_means(phase));
+    Ok((
+        names.zip(sums.acceleration.iter().map(r2)).collect(),
+        r2(&all),
+    ))
+}
+
+/// The slip with the best latent accelerations, if it makes them any good.
+fn acceleration_slip(
+    model: &ReducedModel,
+    segments: &[&Segment],
+    mean: &DVector<f64>,
+) -> Result<Option<(AccelerationSlip, f64)>, EvaluateError> {
+    let still = &DVector::zeros(STATE_DIM);
+    let factors = [0.001, 0.01, 0.1, 10.0, 100.0, 1000.0];
+    let slips = factors.map(|factor| (AccelerationSlip::InputFactor(factor), factor, still));
+    let centred = (AccelerationSlip::Centred, 1.0, mean);
+    let mut best: Option<(AccelerationSlip, f64)> = None;
+    for (slip, factor, mean) in slips.into_iter().chain([centred]) {
+        let (_, r2) = accelerations(model, segments, factor, mean)?;
+        if let Some(r2) = r2.filter(|r2| best.is_none_or(|(_, known)| *r2 > known)) {
+            best = Some((slip, r2));
+        }
+    }
+    Ok(best.filter(|(_, r2)| *r2 > GOOD_R2))
+}

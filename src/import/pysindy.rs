@@ -1,0 +1,144 @@
+//! Candidate terms as PySINDy and its relatives name them: `z1 z2`, `sin(1 z1)`, `x0 u0`, `z1**2`.
+
+/// A list of terms in romc's grammar; terms that are in it already stay as they are.
+///
+/// Operands with a space between them are multiplied. Where a list has PySINDy's own names `x0`,
+/// `x1`, ..., these are the latent coordinates and then their velocities, and `u0` is `u1`.
+pub(super) fn readable(terms: &[String], latent_dim: usize) -> Vec<String> {
+    let is_counted_from_zero = terms
+        .iter()
+        .flat_map(|term| tokens(term))
+        .any(|token| matches!(token.strip_prefix('x'), Some(digits) if is_number(digits)));
+    let name = |token: &str| match (is_counted_from_zero, number_after_first(token)) {
+        (true, Some(('x', k))) if k < latent_dim => format!("z{}", k + 1),
+        (true, Some(('x', k))) if k < 2 * latent_dim => format!("dz{}", k - latent_dim + 1),
+        (true, Some(('u', k))) => format!("u{}", k + 1),
+        _ => token.to_owned(),
+    };
+    terms
+        .iter()
+        .map(|term| readable_term(term, &name))
+        .collect()
+}
+
+fn readable_term(term: &str, name: &dyn Fn(&str) -> String) -> String {
+    let mut text = String::with_capacity(term.len());
+    let mut before: Option<&str> = None;
+    for token in tokens(term) {
+        if token.trim().is_empty() {
+            text.push_str(token);
+            continue;
+        }
+        let is_separate = text.ends_with(char::is_whitespace);
+        if before.is_some_and(ends_operand) && is_separate && starts_operand(token) {
+            text.truncate(text.trim_end().len());
+            text.push('*');
+        }
+        match token {
+            "**" => text.push('^'),
+            _ => text.push_str(&name(token)),
+        }
+        before = Some(token);
+    }
+    text
+}
+
+fn ends_operand(token: &str) -> bool {
+    token == ")" || is_word(token)
+}
+
+fn starts_operand(token: &str) -> bool {
+    token == "(" || is_word(token)
+}
+
+fn is_word(token: &str) -> bool {
+    token.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.')
+}
+
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// `('x', 12)` of `x12`.
+fn number_after_first(token: &str) -> Option<(char, usize)> {
+    let first = token.chars().next()?;
+    let digits = &token[first.len_utf8()..];
+    is_number(digits)
+        .then(|| digits.parse().ok())
+        .flatten()
+        .map(|number| (first, number))
+}
+
+/// Words (names and numbers), runs of white space, `**`, and single characters.
+fn tokens(text: &str) -> impl Iterator<Item = &str> {
+    let mut rest = text;
+    std::iter::from_fn(move || {
+        let first = rest.chars().next()?;
+        let run =
+            |belongs: &dyn Fn(char) -> bool| rest.find(|c: char| !belongs(c)).unwrap_or(rest.len());
+        let length = match first {
+            _ if first.is_ascii_alphabetic() || first == '_' => {
+                run(&|c| c.is_ascii_alphanumeric() || c == '_')
+            }
+            _ if first.is_ascii_digit() || first == '.' => number_length(rest),
+            _ if first.is_whitespace() => run(&char::is_whitespace),
+            '*' if rest.starts_with("**") => 2,
+            _ => first.len_utf8(),
+        };
+        let (token, after) = rest.split_at(length);
+        rest = after;
+        Some(token)
+    })
+}
+
+/// Bytes of the number that a text begins with, its exponent included.
+fn number_length(text: &str) -> usize {
+    let digits = |from: usize| {
+        let rest = &text[from..];
+        from + rest
+            .find(|c: char| !c.is_ascii_digit() && c != '.')
+            .unwrap_or(rest.len())
+    };
+    let end = digits(0);
+    let exponent = text[end..]
+        .strip_prefix(['e', 'E'])
+        .map(|rest| end + 1 + usize::from(rest.starts_with(['+', '-'])));
+    match exponent {
+        Some(start) if text[start..].starts_with(|c: char| c.is_ascii_digit()) => digits(start),
+        _ => end,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(terms: &[&str]) -> Vec<String> {
+        let terms: Vec<String> = terms.iter().map(|term| (*term).to_owned()).collect();
+        readable(&terms, 2)
+    }
+
+    #[test]
+    fn names_of_pysindy_are_products() {
+        for (name, expected) in [
+            ("1", "1"),
+            ("z1 z2", "z1*z2"),
+            ("z1^2 dz1", "z1^2*dz1"),
+            ("sin(1 z1)", "sin(1*z1)"),
+            ("z1 sin(2 dz1)  cos(1 z2)", "z1*sin(2*dz1)*cos(1*z2)"),
+            ("z1**2", "z1^2"),
+            ("1e-3 z1", "1e-3*z1"),
+            ("2.5E+2 z1", "2.5E+2*z1"),
+            ("z1 - 0.5 * z2", "z1 - 0.5 * z2"),
+            ("tanh(z1)*(1 + u1)", "tanh(z1)*(1 + u1)"),
+        ] {
+            assert_eq!(read(&[name]), [expected]);
+        }
+    }
+
+    #[test]
+    fn names_that_count_from_zero_are_those_of_the_latent_coordinates() {
+        let read = read(&["x0", "x1 x3", "sin(1 x2)", "u1", "exp(x0)"]);
+        assert_eq!(read, ["z1", "z2*dz2", "sin(1*dz1)", "u2", "exp(z1)"]);
+    }
+}

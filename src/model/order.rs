@@ -1,0 +1,199 @@
+//! Orders in which other programs keep the coordinates of a robot.
+
+use std::fmt;
+use std::str::FromStr;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::error::ModelError;
+use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::{BODY_DIM, BODY_NAMES, FOOT_DIM, JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM};
+
+const KINDS: [&str; LEG_JOINT_DIM] = ["hx", "hy", "kn"];
+
+/// An order of the 18 coordinates of a robot and, alike, of its inputs.
+///
+/// Written as names separated by commas: coordinates (`fr.hx`, `body.z`), or groups of them in
+/// romc's order: a leg (`fr`), a kind of joint over the legs fr fl rr rl (`kn`), `joints`, `body`.
+/// Forces and moments stand where their coordinates of the body do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CoordinateOrder {
+    text: String,
+    /// For each place the coordinate that is there, as an index into romc's order.
+    places: [usize; STATE_DIM],
+}
+
+impl CoordinateOrder {
+    /// For each place the coordinate that is there, as an index into romc's order.
+    pub fn places(&self) -> &[usize; STATE_DIM] {
+        &self.places
+    }
+
+    /// A vector in this order, brought into romc's.
+    ///
+    /// # Panics
+    /// If the vector does not have 18 entries.
+    pub fn sorted(&self, vector: &DVector<f64>) -> DVector<f64> {
+        let mut sorted = vector.clone();
+        for (place, &coordinate) in self.places.iter().enumerate() {
+            sorted[coordinate] = vector[place];
+        }
+        sorted
+    }
+
+    /// A matrix whose rows are in this order, with its rows in romc's.
+    ///
+    /// # Panics
+    /// If the matrix does not have 18 rows.
+    pub fn sorted_rows(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut sorted = matrix.clone();
+        for (place, &coordinate) in self.places.iter().enumerate() {
+            sorted.set_row(coordinate, &matrix.row(place));
+        }
+        sorted
+    }
+
+    /// The orders that are common: body first or last, legs in any order, joints by leg or by kind;
+    /// first those in which legs go in pairs from the front.
+    pub fn common() -> Vec<Self> {
+        let mut orders = Vec::new();
+        for legs in leg_orders() {
+            let names: Vec<&str> = legs.iter().map(|leg| leg.short_name()).collect();
+            let by_leg = names.join(",");
+            let each = |kind: &&str| -> Vec<String> {
+                names.iter().map(|leg| format!("{leg}.{kind}")).collect()
+            };
+            let by_kind: Vec<String> = match legs == Leg::ALL {
+                true => KINDS.map(str::to_owned).to_vec(),
+                false => KINDS.iter().flat_map(each).collect(),
+            };
+            for joints in [by_leg, by_kind.join(",")] {
+                for text in [format!("{joints},body"), format!("body,{joints}")] {
+                    orders.push(text.parse().expect("every coordinate is there once"));
+                }
+            }
+        }
+        orders
+    }
+}
+
+/// The 24 orders of the legs.
+fn leg_orders() -> Vec<[Leg; FOOT_DIM]> {
+    let mut orders = Vec::new();
+    for code in 0..FOOT_DIM.pow(4) {
+        let digit = |place: u32| code / FOOT_DIM.pow(place) % FOOT_DIM;
+        let order: [usize; FOOT_DIM] = std::array::from_fn(|k| digit(k as u32));
+        if (0..FOOT_DIM).all(|leg| order.contains(&leg)) {
+            orders.push(order.map(|leg| Leg::ALL[leg]));
+        }
+    }
+    // Pairs from the front first, then pairs of a side, then all others.
+    orders.sort_by_key(|order| {
+        let is_same = |a: usize, b: usize, of: fn(Leg) -> bool| of(order[a]) == of(order[b]);
+        let is_left = |leg: Leg| leg.side() > 0.0;
+        match (is_same(0, 1, Leg::is_front), is_same(0, 1, is_left)) {
+            (true, _) => (0, !order[0].is_front()),
+            (_, true) => (1, is_left(order[0])),
+            _ => (2, false),
+        }
+    });
+    orders
+}
+
+/// The coordinates of a name.
+fn group(name: &str) -> Option<Vec<usize>> {
+    let joints = 0..JOINT_DIM;
+    if let Some(leg) = Leg::ALL.iter().find(|leg| leg.short_name() == name) {
+        let first = LEG_JOINT_DIM * leg.index();
+        return Some((first..first + LEG_JOINT_DIM).collect());
+    }
+    if let Some(kind) = KINDS.iter().position(|kind| *kind == name) {
+        return Some(
+            joints
+                .filter(|joint| joint % LEG_JOINT_DIM == kind)
+                .collect(),
+        );
+    }
+    let single = (JOINT_NAMES.iter().chain(&BODY_NAMES)).position(|known| *known == name);
+    match name {
+        "joints" => Some(joints.collect()),
+        "body" => Some((JOINT_DIM..JOINT_DIM + BODY_DIM).collect()),
+        _ => single.map(|index| vec![index]),
+    }
+}
+
+impl FromStr for CoordinateOrder {
+    type Err = ModelError;
+
+    fn from_str(text: &str) -> Result<Self, ModelError> {
+        let refused = |found: String| {
+            let expected = "each of the 18 coordinates once, as names (fr.hx, body.z) or groups \
+                            (fr, hx, joints, body), separated by commas";
+            ModelError::invalid("order of coordinates", found, expected)
+        };
+        let name_of = |index: usize| match index.checked_sub(JOINT_DIM) {
+            None => JOINT_NAMES[index],
+            Some(body) => BODY_NAMES[body],
+        };
+        let mut found: Vec<usize> = Vec::with_capacity(STATE_DIM);
+        for name in text.split(',').map(str::trim) {
+            let group = group(name).ok_or_else(|| refused(format!("{name:?}")))?;
+            if let Some(&twice) = group.iter().find(|index| found.contains(index)) {
+                return Err(refused(format!("`{}` twice", name_of(twice))));
+            }
+            found.extend(group);
+        }
+        let places = <[usize; STATE_DIM]>::try_from(found).map_err(|found| {
+            let missing = (0..STATE_DIM).find(|index| !found.contains(index));
+            refused(format!("no `{}`", missing.map_or("", name_of)))
+        })?;
+        let text = text.to_owned();
+        Ok(Self { text, places })
+    }
+}
+
+impl fmt::Display for CoordinateOrder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn order_by_names_and_groups_sorts_into_that_of_romc() {
+        let order: CoordinateOrder = "body, fl,fr,rl.kn,rl.hy,rl.hx,rr".parse().unwrap();
+        assert_eq!(order.places()[..9], [12, 13, 14, 15, 16, 17, 3, 4, 5]);
+        assert_eq!(order.places()[12..15], [11, 10, 9]);
+        let foreign = DVector::from_fn(18, |place, _| order.places()[place] as f64);
+        let sorted = order.sorted(&foreign);
+        assert_eq!(sorted, DVector::from_fn(18, |index, _| index as f64));
+        let columns = DMatrix::from_columns(&[foreign.clone(), foreign]);
+        assert_eq!(order.sorted_rows(&columns).column(1), sorted);
+        let by_kind: CoordinateOrder = "kn,hx,hy,body".parse().unwrap();
+        assert_eq!(by_kind.places()[..5], [2, 5, 8, 11, 0]);
+    }
+
+    #[test]
+    fn order_with_a_coordinate_twice_or_missing_or_unknown_is_refused() {
+        for (text, said) in [
+            ("body,fr,fl,rr", "no `rl.hx`"),
+            ("body,joints,fr.kn", "`fr.kn` twice"),
+            ("body,legs", "\"legs\""),
+            ("", "\"\""),
+        ] {
+            let error = text.parse::<CoordinateOrder>().unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
+    }
+
+    #[test]
+    fn common_orders_are_all_different() {
+        let mut orders: Vec<_> = CoordinateOrder::common().iter().map(|o| o.places).collect();
+        orders.sort_unstable();
+        orders.dedup();
+        assert_eq!(orders.len(), 96);
+    }
+}

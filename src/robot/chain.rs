@@ -1,0 +1,233 @@
+//! One leg of three joints with any axes: a chain of rotations and links.
+//!
+//! At the zero posture the axes `a_0, a_1, a_2` and the links `l_1` (first to second joint), `l_2`
+//! (second to third) and `l_3` (third to foot) are given along the body's axes. With the turn
+//! `R_i = R(a_i, q_i)` of each joint the foot is at `p = R_0 (l_1 + R_1 (l_2 + R_2 l_3))` from the
+//! first joint. The last two axes are parallel: both joints move the foot in one plane.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::kinematics::{LEAST_HEIGHT, LEAST_SPAN};
+
+/// Axes and links of a leg at its zero posture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChainLeg {
+    /// Unit vectors of the joints' axes, from the trunk to the foot.
+    pub axes: [[f64; 3]; 3],
+    /// From each joint to the next and from the last to the foot, in m.
+    pub links: [[f64; 3]; 3],
+}
+
+/// Where the foot is and how each joint moves it.
+struct Moved {
+    foot: Vector3<f64>,
+    /// Velocity of the foot per joint velocity.
+    columns: [Vector3<f64>; 3],
+    /// Axis of the second joint: the normal of the plane in which the last two move the foot.
+    normal: Vector3<f64>,
+}
+
+impl ChainLeg {
+    /// Foot position from the first joint, in m, at joint angles `q` in rad.
+    pub fn foot_position(&self, q: &[f64; 3]) -> Vector3<f64> {
+        self.moved(q).foot
+    }
+
+    /// Jacobian of [`Self::foot_position`]: column `j` is `axis_j x (foot - joint_j)`, in m.
+    pub fn foot_jacobian(&self, q: &[f64; 3]) -> Matrix3<f64> {
+        Matrix3::from_columns(&self.moved(q).columns)
+    }
+
+    fn moved(&self, q: &[f64; 3]) -> Moved {
+        let [first, second, third] = self.axes.map(Vector3::from);
+        let [hip, thigh, calf] = self.links.map(Vector3::from);
+        let turned = |joint: usize, vector: Vector3<f64>| {
+            let axis = Vector3::from(self.axes[joint]);
+            let (sin, cos) = q[joint].sin_cos();
+            vector * cos + axis.cross(&vector) * sin + axis * (axis.dot(&vector) * (1.0 - cos))
+        };
+        let beyond_knee = turned(0, turned(1, turned(2, calf)));
+        let beyond_second = turned(0, turned(1, thigh)) + beyond_knee;
+        let foot = turned(0, hip) + beyond_second;
+        let normal = turned(0, second);
+        let knee_axis = turned(0, turned(1, third));
+        Moved {
+            foot,
+            columns: [
+                first.cross(&foot),
+                normal.cross(&beyond_second),
+                knee_axis.cross(&beyond_knee),
+            ],
+            normal,
+        }
+    }
+
+    /// Lengths of thigh and calf across the second joint's axis, in m.
+    pub fn lengths(&self) -> [f64; 2] {
+        let axis = Vector3::from(self.axes[1]);
+        [1, 2].map(|link: usize| axis.cross(&Vector3::from(self.links[link])).norm())
+    }
+
+    /// Area that thigh and calf span, with its sign, in m^2, and lever of the first joint along the
+    /// normal of their plane, in m; their product is `det J`.
+    fn levers(moved: &Moved) -> [f64; 2] {
+        let [first, second, third] = &moved.columns;
+        [
+            second.cross(third).dot(&moved.normal),
+            first.dot(&moved.normal),
+        ]
+    }
+
+    /// As [`Self::levers`] over their largest values, absolute.
+    pub fn spans(&self, q: &[f64; 3]) -> [f64; 2] {
+        let ([area, lever], [thigh, calf]) = (Self::levers(&self.moved(q)), self.lengths());
+        [area.abs() / (thigh * calf), lever.abs() / (thigh + calf)]
+    }
+
+    /// Below which area (m^2) and lever (m) are damped.
+    pub fn least_levers(&self) -> [f64; 2] {
+        let [thigh, calf] = self.lengths();
+        [LEAST_SPAN * thigh * calf, LEAST_HEIGHT * (thigh + calf)]
+    }
+
+    /// `-J^-T` with levers that are never shorter than the damping lets them be, or none where
+    /// neither is that short.
+    ///
+    /// With the columns `c_j` of the Jacobian, the normal `n`, the area `A = (c_1 x c_2) . n` and the
+    /// lever `u = c_0 . n` the columns of `J^-T` are
+    ///
+    /// ```text
+    /// n / u
+    /// (c_2 x n) / A + n (n . (c_2 x c_0)) / (A u)
+    /// (n x c_1) / A + n (n . (c_0 x c_1)) / (A u)
+    /// ```
+    ///
+    /// in which `1 / d` of both becomes `d / max(d^2, least^2)`.
+    pub(super) fn damped_force_map(&self, q: &[f64; 3]) -> Option<Matrix3<f64>> {
+        let moved = self.moved(q);
+        let [area, lever] = Self::levers(&moved);
+        let [least_area, least_lever] = self.least_levers();
+        if area.abs() >= least_area && lever.abs() >= least_lever {
+            return None;
+        }
+        let reciprocal = |d: f64, least: f64| d / (d * d).max(least * least);
+        let (of_area, of_lever) = (reciprocal(area, least_area), reciprocal(lever, least_lever));
+        let ([first, second, third], normal) = (&moved.columns, moved.normal);
+        let column = |in_plane: Vector3<f64>, share: f64| {
+            -(in_plane * of_area + normal * (share * of_area * of_lever))
+        };
+        Some(Matrix3::from_columns(&[
+            -normal * of_lever,
+            column(third.cross(&normal), normal.dot(&third.cross(first))),
+            column(normal.cross(second), normal.dot(&first.cross(second))),
+        ]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::kinematics::PlanarLeg;
+
+    const PLANAR: PlanarLeg = PlanarLeg {
+        hip_m: -0.08,
+        thigh_m: 0.213,
+        calf_m: 0.2,
+        foot_forward_m: -0.02,
+    };
+
+    fn of_planar(leg: PlanarLeg) -> ChainLeg {
+        ChainLeg {
+            axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+            links: [
+                [0.0, leg.hip_m, 0.0],
+                [0.0, 0.0, -leg.thigh_m],
+                [leg.foot_forward_m, 0.0, -leg.calf_m],
+            ],
+        }
+    }
+
+    /// Tilted axes, the last two parallel, links in all directions.
+    fn odd() -> ChainLeg {
+        let bend = Vector3::new(0.1, -0.9, 0.3).normalize();
+        ChainLeg {
+            axes: [
+                Vector3::new(0.8, 0.1, -0.4).normalize().into(),
+                bend.into(),
+                bend.into(),
+            ],
+            links: [[0.06, 0.09, -0.01], [0.02, 0.1, -0.28], [0.08, 0.01, -0.3]],
+        }
+    }
+
+    fn postures() -> Vec<[f64; 3]> {
+        let mut out = Vec::new();
+        for first in [-0.8, 0.0, 0.6] {
+            for second in [-0.6, 0.3, 1.2] {
+                for third in [-2.7, -1.5, -0.9, -0.05, 0.4] {
+                    out.push([first, second, third]);
+                }
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn chain_of_planar_links_is_the_planar_leg_damping_included() {
+        let chain = of_planar(PLANAR);
+        let mut damped = 0;
+        for q in postures() {
+            assert!((chain.foot_position(&q) - PLANAR.foot_position(&q)).norm() < 1e-15);
+            assert!((chain.foot_jacobian(&q) - PLANAR.foot_jacobian(&q)).norm() < 1e-15);
+            // Lengths of a bent foot count as the calf's, a little more than along the calf.
+            let bent = PlanarLeg {
+                foot_forward_m: 0.0,
+                ..PLANAR
+            };
+            match (
+                of_planar(bent).damped_force_map(&q),
+                bent.damped_force_map(&q),
+            ) {
+                (None, None) => {}
+                (Some(a), Some(b)) => {
+                    assert!((a - b).norm() < 1e-11 * b.norm(), "{q:?}: {a} {b}");
+                    damped += 1;
+                }
+                (a, b) => panic!("{q:?}: {a:?} {b:?}"),
+            }
+        }
+        assert!(damped > 5);
+    }
+
+    #[test]
+    fn jacobian_agrees_with_central_differences() {
+        let (chain, step) = (odd(), 1e-6);
+        for q in postures() {
+            let exact = chain.foot_jacobian(&q);
+            for joint in 0..3 {
+                let (mut lower, mut upper) = (q, q);
+                lower[joint] -= step;
+                upper[joint] += step;
+                let moved = chain.foot_position(&upper) - chain.foot_position(&lower);
+                let error = (exact.column(joint) - moved / (2.0 * step)).norm();
+                assert!(error < 1e-9, "{q:?} joint {joint}: {error:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn damping_begins_where_the_exact_inverse_ends() {
+        let chain = odd();
+        let exact = |q: &[f64; 3]| -chain.foot_jacobian(q).transpose().try_inverse().unwrap();
+        // From bent to stretched: the first damped posture is still almost undamped.
+        let mut last = None;
+        for k in 0..4000 {
+            let q = [0.2, 0.3, -1.5 + 1.2 * f64::from(k) / 4000.0];
+            if let Some(damped) = chain.damped_force_map(&q) {
+                last = Some((damped - exact(&q)).norm() / damped.norm());
+                break;
+            }
+        }
+        assert!(last.is_some_and(|change| change < 0.02), "{last:?}");
+    }
+}

@@ -1,0 +1,145 @@
+//! The grammar of a robot: of the TOML file, and of `robot` in a model file.
+
+use serde::{Deserialize, Serialize};
+
+use crate::robot::{Leg, Robot};
+
+/// A robot as files describe it, its legs in any order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotEntry {
+    /// Its name.
+    pub name: String,
+    /// Mass of body and legs, kg.
+    pub mass_kg: f64,
+    /// The four legs.
+    pub leg: Vec<LegEntry>,
+}
+
+/// A leg.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LegEntry {
+    /// Its three joints, from the trunk to the foot.
+    pub joint: Vec<JointEntry>,
+    /// From the last joint to the foot at the zero posture, m, along the body's axes.
+    pub foot: [f64; 3],
+}
+
+/// A joint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointEntry {
+    /// The maker's name.
+    pub name: String,
+    /// From the joint before, the first from the body's origin, at the zero posture, m.
+    pub at: [f64; 3],
+    /// Axis at the zero posture, along the body's axes.
+    pub axis: Axis,
+    /// -1 where recorded angles count against the axis.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub sign: f64,
+    /// Recorded angle at the zero posture, rad.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub offset_rad: f64,
+    /// Lowest and highest recorded angle, rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits_rad: Option<[f64; 2]>,
+    /// The same in degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits_deg: Option<[f64; 2]>,
+    /// Largest torque, N m.
+    pub torque_nm: f64,
+    /// Largest speed, rad/s.
+    pub speed_rad_s: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+/// `"x"`, `"-y"` and so on, or a vector of any length.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Axis {
+    /// By name.
+    Name(String),
+    /// By its components.
+    Vector([f64; 3]),
+}
+
+/// The six axes that have names.
+const NAMED: [(&str, [f64; 3]); 6] = [
+    ("x", [1.0, 0.0, 0.0]),
+    ("y", [0.0, 1.0, 0.0]),
+    ("z", [0.0, 0.0, 1.0]),
+    ("-x", [-1.0, 0.0, 0.0]),
+    ("-y", [0.0, -1.0, 0.0]),
+    ("-z", [0.0, 0.0, -1.0]),
+];
+
+impl Axis {
+    /// The axis of a vector, by name where it has one.
+    pub fn of(vector: [f64; 3]) -> Self {
+        let named = NAMED.iter().find(|(_, known)| *known == vector);
+        named.map_or(Axis::Vector(vector), |(name, _)| {
+            Axis::Name((*name).to_owned())
+        })
+    }
+
+    /// The components as given; none for an unknown name.
+    pub fn vector(&self) -> Option<[f64; 3]> {
+        match self {
+            Axis::Vector(vector) => Some(*vector),
+            Axis::Name(name) => {
+                let known = NAMED.iter().find(|(known, _)| known == name);
+                known.map(|(_, vector)| *vector)
+            }
+        }
+    }
+}
+
+impl RobotEntry {
+    /// The entry that gives this robot again, bit for bit: signs and offsets are in its axes and
+    /// links.
+    pub fn of(robot: &Robot) -> Self {
+        let leg = Leg::ALL.map(|leg| {
+            let chain = robot.geometry(leg).chain();
+            let joint = (0..chain.axes.len()).map(|index| {
+                let joint = chain.axes.len() * leg.index() + index;
+                let (low, high) = robot.joint_limit_rad()[joint];
+                JointEntry {
+                    name: robot.joint_names()[joint].to_owned(),
+                    at: match index {
+                        0 => robot.hip_position(leg).into(),
+                        _ => chain.links[index - 1],
+                    },
+                    axis: Axis::of(chain.axes[index]),
+                    sign: 1.0,
+                    offset_rad: 0.0,
+                    limits_rad: Some([low, high]),
+                    limits_deg: None,
+                    torque_nm: robot.torque_limit_nm()[joint],
+                    speed_rad_s: robot.joint_speed_limit_rad_s()[joint],
+                }
+            });
+            LegEntry {
+                joint: joint.collect(),
+                foot: chain.links[2],
+            }
+        });
+        Self {
+            name: robot.name().to_owned(),
+            mass_kg: robot.mass_kg(),
+            leg: leg.to_vec(),
+        }
+    }
+}

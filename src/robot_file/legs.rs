@@ -1,0 +1,279 @@
+//! From an entry to a checked robot.
+
+use nalgebra::{Rotation3, Unit, Vector3};
+
+use super::entry::{JointEntry, LegEntry, RobotEntry};
+use super::error::RobotFileError;
+use super::registry::{keep, word};
+use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::{ChainLeg, FOOT_DIM, JOINT_DIM, Leg, LegGeometry, Robot};
+
+/// Longest name of a robot or joint.
+const MAX_NAME_LEN: usize = 80;
+/// Largest length of a link, m.
+const MAX_LINK_M: f64 = 10.0;
+/// Smallest length of thigh and calf, m.
+const MIN_LINK_M: f64 = 1e-3;
+/// Largest sine of the angle between the axes of a leg's last two joints.
+const MAX_TILT: f64 = 1e-3;
+/// Smallest sine of the angle between the first axis and the second.
+const MIN_ABDUCTION: f64 = 0.1;
+
+/// A place in the file, and the means to complain of it.
+struct Reader<'f> {
+    file: &'f str,
+}
+
+/// The robot of an entry; equal robots are one.
+///
+/// # Errors
+/// [`RobotFileError`] with the entry that is wrong, or a name that is another robot's.
+pub(super) fn robot(file: &str, entry: &RobotEntry) -> Result<&'static Robot, RobotFileError> {
+    let robot = build(file, entry)?;
+    match Robot::by_name(&entry.name) {
+        Ok(known) if *known != robot => {
+            let found = format!("{:?} with other numbers than romc's own robot", entry.name);
+            Err(RobotFileError::at(file, "name", found, "another name"))
+        }
+        Ok(_) | Err(_) => Ok(keep(robot)),
+    }
+}
+
+/// The same, whatever its name.
+pub(super) fn build(file: &str, entry: &RobotEntry) -> Result<Robot, RobotFileError> {
+    let reader = Reader { file };
+    reader.name("name", &entry.name)?;
+    reader.positive("mass_kg", entry.mass_kg)?;
+    if entry.leg.len() != FOOT_DIM {
+        let found = format!("{} legs", entry.leg.len());
+        let expected = "four: models, inputs and controllers are those of quadrupeds";
+        return Err(RobotFileError::at(file, "leg", found, expected));
+    }
+    let places = reader.places(&entry.leg)?;
+    let mut robot = Robot {
+        name: word(&entry.name),
+        mass_kg: entry.mass_kg,
+        legs: [LegGeometry::Chain(ChainLeg {
+            axes: [[0.0; 3]; 3],
+            links: [[0.0; 3]; 3],
+        }); FOOT_DIM],
+        hip_position_m: [[0.0; 3]; FOOT_DIM],
+        joint_names: [""; JOINT_DIM],
+        torque_limit_nm: [0.0; JOINT_DIM],
+        joint_limit_rad: [(0.0, 0.0); JOINT_DIM],
+        joint_speed_limit_rad_s: [0.0; JOINT_DIM],
+    };
+    let mut names: Vec<&str> = Vec::with_capacity(JOINT_DIM);
+    for (index, (leg, entry)) in places.iter().zip(&entry.leg).enumerate() {
+        let (k, place) = (leg.index(), format!("leg[{index}]"));
+        robot.legs[k] = LegGeometry::of_chain(reader.chain(&place, entry)?);
+        robot.hip_position_m[k] = entry.joint[0].at;
+        for (offset, joint) in entry.joint.iter().enumerate() {
+            let place = format!("{place}.joint[{offset}]");
+            let at = LEG_JOINT_DIM * k + offset;
+            reader.name(&format!("{place}.name"), &joint.name)?;
+            if names.contains(&joint.name.as_str()) {
+                let found = format!("{:?} a second time", joint.name);
+                let entry = format!("{place}.name");
+                return Err(RobotFileError::at(file, entry, found, "each name once"));
+            }
+            names.push(&joint.name);
+            robot.joint_names[at] = word(&joint.name);
+            robot.joint_limit_rad[at] = reader.limits(&place, joint)?;
+            robot.torque_limit_nm[at] =
+                reader.positive(&format!("{place}.torque_nm"), joint.torque_nm)?;
+            robot.joint_speed_limit_rad_s[at] =
+                reader.positive(&format!("{place}.speed_rad_s"), joint.speed_rad_s)?;
+        }
+    }
+    Ok(robot)
+}
+
+impl Reader<'_> {
+    fn name(&self, place: &str, name: &str) -> Result<(), RobotFileError> {
+        let is_fine = !name.trim().is_empty()
+            && name.len() <= MAX_NAME_LEN
+            && !name.chars().any(char::is_control)
+            // Generated headers list names in comments.
+            && !name.contains("*/");
+        match is_fine {
+            true => Ok(()),
+            false => {
+                let expected = format!("a name of at most {MAX_NAME_LEN} bytes on one line");
+                Err(RobotFileError::at(
+                    self.file,
+                    place,
+                    format!("{name:?}"),
+                    expected,
+                ))
+            }
+        }
+    }
+
+    fn positive(&self, place: &str, value: f64) -> Result<f64, RobotFileError> {
+        match value.is_finite() && value > 0.0 {
+            true => Ok(value),
+            false => {
+                let expected = "a finite number above 0";
+                Err(RobotFileError::at(
+                    self.file,
+                    place,
+                    value.to_string(),
+                    expected,
+                ))
+            }
+        }
+    }
+
+    fn vector(&self, place: &str, vector: [f64; 3]) -> Result<[f64; 3], RobotFileError> {
+        match vector.iter().all(|v| v.abs() <= MAX_LINK_M) {
+            true => Ok(vector),
+            false => {
+                let expected = format!("three lengths of at most {MAX_LINK_M} m");
+                Err(RobotFileError::at(
+                    self.file,
+                    place,
+                    format!("{vector:?}"),
+                    expected,
+                ))
+            }
+        }
+    }
+
+    fn limits(&self, place: &str, joint: &JointEntry) -> Result<(f64, f64), RobotFileError> {
+        let (key, [low, high]) = match (joint.limits_rad, joint.limits_deg) {
+            (Some(limits), None) => ("limits_rad", limits),
+            (None, Some(limits)) => ("limits_deg", limits.map(f64::to_radians)),
+            (found, _) => {
+                let found = if found.is_some() { "both" } else { "neither" };
+                let expected = "one of limits_rad and limits_deg";
+                return Err(RobotFileError::at(self.file, place, found, expected));
+            }
+        };
+        match low.is_finite() && high.is_finite() && low < high {
+            true => Ok((low, high)),
+            false => {
+                let found = format!("{low} to {high}");
+                let place = format!("{place}.{key}");
+                Err(RobotFileError::at(
+                    self.file,
+                    place,
+                    found,
+                    "the lower limit first",
+                ))
+            }
+        }
+    }
+
+    /// Which leg each entry is, by where its first joint stands.
+    fn places(&self, legs: &[LegEntry]) -> Result<[Leg; FOOT_DIM], RobotFileError> {
+        for (index, leg) in legs.iter().enumerate() {
+            if leg.joint.len() != LEG_JOINT_DIM {
+                let found = format!("{} joints", leg.joint.len());
+                let place = format!("leg[{index}].joint");
+                let expected = "three, from the trunk to the foot";
+                return Err(RobotFileError::at(self.file, place, found, expected));
+            }
+        }
+        let hips: Vec<[f64; 3]> = legs.iter().map(|leg| leg.joint[0].at).collect();
+        let middle =
+            |axis: usize| hips.iter().map(|hip| hip[axis]).sum::<f64>() / hips.len() as f64;
+        let (x, y) = (middle(0), middle(1));
+        let leg_at = |hip: &[f64; 3]| match (hip[0] > x, hip[1] > y) {
+            (true, false) => Leg::FrontRight,
+            (true, true) => Leg::FrontLeft,
+            (false, false) => Leg::RearRight,
+            (false, true) => Leg::RearLeft,
+        };
+        let found: Vec<Leg> = hips.iter().map(leg_at).collect();
+        let is_one_each = Leg::ALL.iter().all(|leg| found.contains(leg));
+        match <[Leg; FOOT_DIM]>::try_from(found) {
+            Ok(found) if is_one_each => Ok(found),
+            _ => {
+                let hips: Vec<String> = hips
+                    .iter()
+                    .map(|hip| format!("({}, {})", hip[0], hip[1]))
+                    .collect();
+                let found = format!("first joints at (x, y) = {} m", hips.join(", "));
+                let expected = "one at each corner of the trunk: x forward, y left";
+                Err(RobotFileError::at(self.file, "leg", found, expected))
+            }
+        }
+    }
+
+    fn axis(&self, place: &str, joint: &JointEntry) -> Result<Vector3<f64>, RobotFileError> {
+        let place = || format!("{place}.axis");
+        let Some(given) = joint.axis.vector() else {
+            let found = format!("{:?}", joint.axis);
+            let expected = "\"x\", \"y\", \"z\", \"-x\", \"-y\", \"-z\" or three numbers";
+            return Err(RobotFileError::at(self.file, place(), found, expected));
+        };
+        let vector = Vector3::from(given);
+        let norm = vector.norm();
+        if !(norm.is_finite() && norm > 1e-6) {
+            let found = format!("{given:?}");
+            return Err(RobotFileError::at(self.file, place(), found, "a direction"));
+        }
+        if joint.sign.abs() != 1.0 || !joint.offset_rad.is_finite() {
+            let found = format!("sign {} and offset_rad {}", joint.sign, joint.offset_rad);
+            let expected = "sign 1 or -1, offset_rad finite";
+            return Err(RobotFileError::at(self.file, place(), found, expected));
+        }
+        // What is a unit vector already stays as it is, to the last bit.
+        let unit = match (norm - 1.0).abs() < 1e-12 {
+            true => vector,
+            false => vector / norm,
+        };
+        // No -0.0, so that the usual axes are recognised.
+        Ok((unit * joint.sign).map(|v| v + 0.0))
+    }
+
+    fn chain(&self, place: &str, leg: &LegEntry) -> Result<ChainLeg, RobotFileError> {
+        let mut axes = [Vector3::zeros(); LEG_JOINT_DIM];
+        for (offset, joint) in leg.joint.iter().enumerate() {
+            let place = format!("{place}.joint[{offset}]");
+            axes[offset] = self.axis(&place, joint)?;
+            self.vector(&format!("{place}.at"), joint.at)?;
+        }
+        self.vector(&format!("{place}.foot"), leg.foot)?;
+        let mut links = [leg.joint[1].at, leg.joint[2].at, leg.foot].map(Vector3::from);
+        // At the recorded zero each joint is turned back by its offset.
+        for joint in (0..LEG_JOINT_DIM).rev() {
+            let offset = leg.joint[joint].offset_rad;
+            if offset != 0.0 {
+                let turn = Rotation3::from_axis_angle(&Unit::new_unchecked(axes[joint]), -offset);
+                for later in joint..LEG_JOINT_DIM {
+                    links[later] = turn * links[later];
+                    if later > joint {
+                        axes[later] = turn * axes[later];
+                    }
+                }
+            }
+        }
+        let chain = ChainLeg {
+            axes: axes.map(Into::into),
+            links: links.map(|link| link.map(|v| v + 0.0).into()),
+        };
+        let names = |a: usize, b: usize| {
+            let [a, b] = [a, b].map(|joint| leg.joint[joint].name.as_str());
+            format!("the axes of {a} and {b}")
+        };
+        if axes[1].cross(&axes[2]).norm() > MAX_TILT {
+            let found = format!("{} in different directions", names(1, 2));
+            let expected = "a leg whose last two joints turn about parallel axes";
+            return Err(RobotFileError::at(self.file, place, found, expected));
+        }
+        if axes[0].cross(&axes[1]).norm() < MIN_ABDUCTION {
+            let found = format!("{} almost parallel", names(0, 1));
+            let expected = "a first joint that moves the plane of the leg";
+            return Err(RobotFileError::at(self.file, place, found, expected));
+        }
+        let lengths = chain.lengths();
+        if lengths.iter().any(|length| *length < MIN_LINK_M) {
+            let found = format!("thigh and calf of {} and {} m", lengths[0], lengths[1]);
+            let expected = "lengths across the axes of the last two joints";
+            return Err(RobotFileError::at(self.file, place, found, expected));
+        }
+        Ok(chain)
+    }
+}

@@ -1,0 +1,35 @@
+//! Robots from files: TOML, URDF, the object in a model file; and those that romc brings.
+//!
+//! What enters: a name, or the path or text of a file. What leaves: a checked [`Robot`] with its legs
+//! in romc's order, or file, place, what was found and what was expected. Legs are matched by where
+//! their first joints stand, joints by their order from the trunk.
+//! Read `entry.rs` first, the grammar; `legs.rs` makes a robot of it, `urdf.rs` finds the legs of a
+//! tree. `docs/robots.md` describes the file.
+//!
+//! ```
+//! use romc::robot::{Leg, Robot};
+//! use romc::robot_file;
+//!
+//! let own = robot_file::find("go1")?;
+//! let text = robot_file::to_toml(own).replace("\"go1\"", "\"lighter\"").replace("12.01", "9.5");
+//! let lighter = robot_file::from_toml("lighter.toml", &text)?;
+//! assert_eq!((lighter.name(), lighter.mass_kg()), ("lighter", 9.5));
+//! let q = [0.1, 0.7, -1.4];
+//! assert_eq!(lighter.foot_position(Leg::RearLeft, &q), own.foot_position(Leg::RearLeft, &q));
+//! # Ok::<(), romc::robot_file::RobotFileError>(())
+//! ```
+//!
+//! [`Robot`]: crate::robot::Robot
+
+mod entry;
+mod error;
+mod legs;
+mod print;
+mod read;
+mod registry;
+mod urdf;
+
+pub use entry::RobotEntry;
+pub use error::{RobotFileError, RobotFileFault};
+pub use print::to_toml;
+pub use read::{find, from_toml, from_urdf, read};

@@ -1,0 +1,69 @@
+//! The robots that romc brings, and those that were read.
+
+use std::collections::BTreeSet;
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+use super::{legs, read};
+use crate::robot::{Robot, RobotError};
+
+/// Name and file of each robot that romc brings.
+const KNOWN: [(&str, &str); 3] = [
+    ("go1", include_str!("known/go1.toml")),
+    ("go2", include_str!("known/go2.toml")),
+    ("a1", include_str!("known/a1.toml")),
+];
+
+impl Robot {
+    /// The robot of romc's own that is named so, such as `go1`.
+    ///
+    /// # Errors
+    /// [`RobotError::UnknownRobot`], which lists the known names.
+    pub fn by_name(name: &str) -> Result<&'static Robot, RobotError> {
+        static ROBOTS: [OnceLock<&'static Robot>; KNOWN.len()] =
+            [const { OnceLock::new() }; KNOWN.len()];
+        let position = KNOWN.iter().position(|(known, _)| *known == name);
+        let Some(position) = position else {
+            return Err(RobotError::UnknownRobot {
+                found: name.to_owned(),
+                known: Self::known_names().join(", "),
+            });
+        };
+        if let Some(robot) = ROBOTS[position].get() {
+            return Ok(robot);
+        }
+        let (file, text) = KNOWN[position];
+        let entry = read::entry_of_toml(file, text);
+        let robot = entry.and_then(|entry| legs::build(file, &entry));
+        let robot = robot.expect("a file of romc's own, read by a test");
+        Ok(ROBOTS[position].get_or_init(|| keep(robot)))
+    }
+
+    /// Names that [`Robot::by_name`] accepts.
+    pub fn known_names() -> Vec<&'static str> {
+        KNOWN.iter().map(|(name, _)| *name).collect()
+    }
+}
+
+/// The one robot that is equal to this one: robots live as long as the process, each once.
+pub(super) fn keep(robot: Robot) -> &'static Robot {
+    static KEPT: Mutex<Vec<&'static Robot>> = Mutex::new(Vec::new());
+    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(same) = kept.iter().find(|known| ***known == robot) {
+        return same;
+    }
+    let robot: &'static Robot = Box::leak(Box::new(robot));
+    kept.push(robot);
+    robot
+}
+
+/// A name as robots hold it.
+pub(super) fn word(text: &str) -> &'static str {
+    static WORDS: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
+    let mut words = WORDS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(same) = words.get(text) {
+        return same;
+    }
+    let text: &'static str = Box::leak(text.to_owned().into_boxed_str());
+    words.insert(text);
+    text
+}

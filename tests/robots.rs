@@ -1,0 +1,402 @@
+//! Robots from files: kinematics beside Pinocchio's, what is said of other trees, models that carry
+//! their robot.
+//!
+//! `fixtures/robots/reference.json` holds Pinocchio's values, made and checked by
+//! `examples/robots/reference.py`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use nalgebra::{Matrix3, Vector3};
+use romc::artifact;
+use romc::lower;
+use romc::model::{Library, ReducedModel};
+use romc::robot::{InputRule, Leg, LegGeometry, Robot, WrenchFrame};
+use romc::robot_file;
+use serde_json::Value;
+
+const FILES: [&str; 3] = ["solo12.toml", "anymal_c.toml", "hare.urdf"];
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn file(name: &str) -> PathBuf {
+    root().join("examples/robots").join(name)
+}
+
+fn robot(name: &str) -> &'static Robot {
+    robot_file::read(&file(name), &[]).expect("an example")
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    let numbers = value.as_array().expect("a list").iter();
+    numbers
+        .map(|number| number.as_f64().expect("a number"))
+        .collect()
+}
+
+#[test]
+fn feet_and_jacobians_are_those_of_pinocchio() {
+    let text = fs::read_to_string(root().join("tests/fixtures/robots/reference.json"));
+    let reference: Value = serde_json::from_str(&text.expect("checked in")).expect("JSON");
+    for name in FILES {
+        let robot = robot(name);
+        let mut legs = 0;
+        for posture in reference[name].as_array().expect("postures") {
+            for entry in posture.as_array().expect("legs") {
+                let first = entry["joints"][0].as_str().expect("a name");
+                let place = robot.joint_names().iter().position(|joint| *joint == first);
+                let leg = Leg::ALL[place.expect("a first joint") / 3];
+                let names: Vec<&str> = (0..3)
+                    .map(|k| entry["joints"][k].as_str().expect("a name"))
+                    .collect();
+                assert_eq!(
+                    robot.joint_names()[3 * leg.index()..3 * leg.index() + 3],
+                    names[..]
+                );
+                let q: [f64; 3] = numbers(&entry["angles"]).try_into().expect("three angles");
+                let foot = robot.hip_position(leg) + robot.foot_position(leg, &q);
+                let expected = Vector3::from_vec(numbers(&entry["foot"]));
+                assert!(
+                    (foot - expected).amax() < 1e-9,
+                    "{name} {leg} {q:?}: {foot} {expected}"
+                );
+                let rows = entry["jacobian"]
+                    .as_array()
+                    .expect("rows")
+                    .iter()
+                    .flat_map(numbers);
+                let expected = Matrix3::from_row_iterator(rows);
+                let found = robot.foot_jacobian(leg, &q);
+                assert!(
+                    (found - expected).amax() < 1e-9,
+                    "{name} {leg}: {found} {expected}"
+                );
+                legs += 1;
+            }
+        }
+        assert_eq!(legs, 100, "{name}");
+    }
+}
+
+#[test]
+fn legs_are_matched_by_where_they_stand() {
+    for (name, front_right) in [
+        ("solo12.toml", "FR_HAA"),
+        ("anymal_c.toml", "RF_HAA"),
+        ("hare.urdf", "ne_swing"),
+    ] {
+        assert_eq!(robot(name).joint_names()[0], front_right);
+    }
+    // Thighs of the hare turn about y on the left and about -y on the right: mirrored motions of
+    // them read with opposite signs.
+    let signs: Vec<f64> = (0..6)
+        .map(|joint| robot("hare.urdf").mirror_sign(joint))
+        .collect();
+    assert_eq!(signs, [1.0, -1.0, -1.0, 1.0, -1.0, -1.0]);
+    let signs: Vec<f64> = (0..3)
+        .map(|joint| robot("solo12.toml").mirror_sign(joint))
+        .collect();
+    assert_eq!(signs, [-1.0, 1.0, 1.0]);
+}
+
+#[test]
+fn robot_of_a_urdf_comes_back_from_its_own_toml_bit_for_bit() {
+    let hare = robot("hare.urdf");
+    let again = robot_file::from_toml("hare.toml", &robot_file::to_toml(hare)).expect("its text");
+    assert!(std::ptr::eq(again, hare));
+    assert!((hare.mass_kg() - 11.6).abs() < 1e-12);
+    let turned = hare.joint_limit_rad()[8];
+    assert!(
+        turned.0 < -6.0 && turned.1 > 6.0,
+        "se_shin turns without end: {turned:?}"
+    );
+}
+
+/// A latent model on a robot.
+fn model_on(robot: &'static Robot) -> ReducedModel {
+    let library = Library::from_terms(1, &["z1".to_owned()]).expect("a term");
+    let builder = ReducedModel::builder("m", library).robot(robot);
+    let phase = romc::model::Phase {
+        name: "contact".to_owned(),
+        feet: romc::robot::FeetRule::Any,
+        xi: nalgebra::DMatrix::from_element(1, 1, -1.0),
+    };
+    builder.phase(phase).build().expect("a model")
+}
+
+#[test]
+fn model_file_carries_its_robot() {
+    for name in FILES {
+        let model = model_on(robot(name));
+        let text = artifact::to_text(&model);
+        assert!(text.contains("\"romc-model/2\""), "{text}");
+        let again = artifact::read_from_bytes("m.json", text.as_bytes()).expect("a model");
+        assert!(std::ptr::eq(again.robot().expect("a robot"), robot(name)));
+        assert_eq!(artifact::to_text(&again), text);
+        let first = text.replacen("romc-model/2", "romc-model/1", 1);
+        let error = artifact::read_from_bytes("m.json", first.as_bytes()).unwrap_err();
+        assert!(
+            error.to_string().contains("`robot`: found in a file of"),
+            "{error}"
+        );
+        let wrong = text.replacen("\"mass_kg\": ", "\"mass_kg\": -", 1);
+        let error = artifact::read_from_bytes("m.json", wrong.as_bytes()).unwrap_err();
+        assert!(
+            error.to_string().contains("robot: mass_kg: found -"),
+            "{error}"
+        );
+    }
+    let text = artifact::to_text(&model_on(Robot::by_name("go2").expect("known")));
+    assert!(
+        text.contains("\"robot\": \"go2\"") && text.contains("romc-model/1"),
+        "{text}"
+    );
+}
+
+#[test]
+fn generalised_input_of_any_robot_is_that_of_its_rule() {
+    let mut random = 1_u64;
+    let mut between = |low: f64, high: f64| {
+        random = random
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        low + (high - low) * ((random >> 11) as f64 / (1_u64 << 53) as f64)
+    };
+    for name in FILES {
+        let robot = robot(name);
+        assert!(
+            Leg::ALL
+                .iter()
+                .all(|leg| matches!(robot.geometry(*leg), LegGeometry::Chain(_)))
+        );
+        for frame in WrenchFrame::ALL {
+            let model = over_robot(robot, frame);
+            let program = lower::generalised_input(&model)
+                .expect("lowers")
+                .expect("a robot");
+            let mut interpreter = romc::ir::Interpreter::new(&program);
+            let mut damped = 0;
+            for _ in 0..300 {
+                let x: [f64; 18] = std::array::from_fn(|_| between(-2.0, 2.0));
+                let tau: [f64; 12] = std::array::from_fn(|_| between(-20.0, 20.0));
+                let feet: [bool; 4] = std::array::from_fn(|_| between(0.0, 1.0) < 0.6);
+                let joints: [f64; 12] = std::array::from_fn(|k| x[k]);
+                damped += usize::from(Leg::ALL.iter().any(|leg| {
+                    let spans = robot.geometry(*leg).spans(&leg.of_joints(&joints));
+                    feet[leg.index()] && (spans[0] < 0.3 || spans[1] < 0.12)
+                }));
+                let rule = InputRule::new(robot, None, frame);
+                let expected = rule.wrench(&x, &tau, feet).expect("finite");
+                let mut u = [0.0; 18];
+                let feet = feet.map(|foot| f64::from(u8::from(foot)));
+                interpreter.run(&[&x, &[0.0; 18], &tau, &feet], &mut [&mut u]);
+                for (found, expected) in u[12..].iter().zip(&expected) {
+                    let bound = 1e-9 * (1.0 + expected.abs());
+                    assert!(
+                        (found - expected).abs() < bound,
+                        "{name}: {found} {expected}"
+                    );
+                }
+            }
+            assert!(damped > 20, "{name}: {damped} damped postures");
+        }
+    }
+}
+
+/// A model over the 18 coordinates of a robot.
+fn over_robot(robot: &'static Robot, frame: WrenchFrame) -> ReducedModel {
+    use romc::model::{AffineMap, ScaleFactors, Scaling, StateMap};
+    let weights = nalgebra::DMatrix::from_fn(1, 18, |_, k| 0.1 + 0.01 * k as f64);
+    let encoder = AffineMap::new("encoder", weights, nalgebra::DVector::zeros(1)).expect("fits");
+    model_on(robot)
+        .into_builder()
+        .encoder(StateMap::from(encoder))
+        .scaling(Scaling {
+            state: ScaleFactors::Uniform(1.0),
+            input: ScaleFactors::Uniform(1.0),
+        })
+        .wrench_frame(frame)
+        .build()
+        .expect("a model")
+}
+
+/// A URDF of limbs with these numbers of joints, all about x, then y.
+fn tree(limbs: &[usize]) -> String {
+    let mut text = "<robot name=\"t\"><link name=\"base\"/>".to_owned();
+    for (limb, joints) in limbs.iter().enumerate() {
+        let mut parent = "base".to_owned();
+        for joint in 0..*joints {
+            let child = format!("l{limb}_{joint}");
+            let axis = if joint == 0 { "1 0 0" } else { "0 1 0" };
+            text += &format!(
+                "<link name=\"{child}\"/><joint name=\"j{limb}_{joint}\" type=\"revolute\">\
+                 <parent link=\"{parent}\"/><child link=\"{child}\"/>\
+                 <origin xyz=\"{} 0 -0.2\"/><axis xyz=\"{axis}\"/>\
+                 <limit lower=\"-1\" upper=\"1\" effort=\"9\" velocity=\"9\"/></joint>",
+                limb as f64
+            );
+            parent = child;
+        }
+    }
+    text + "</robot>"
+}
+
+#[test]
+fn trees_of_other_robots_are_told_apart() {
+    for (limbs, said) in [
+        (
+            vec![6, 6],
+            "found 2 limbs on `base`: j0_0 (6 joints), j1_0 (6 joints), expected four legs",
+        ),
+        (vec![3; 6], "found 6 limbs on `base`"),
+        (vec![], "found 0 limbs on `base`, expected four legs"),
+        (vec![4; 4], "--feet"),
+        (
+            vec![3; 4],
+            "link `l0_2` beyond joint `j0_2`: found no link on a fixed joint",
+        ),
+    ] {
+        let error = robot_file::from_urdf("t.urdf", &tree(&limbs), &[])
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.starts_with("t.urdf: ") && error.contains(said),
+            "{error}"
+        );
+    }
+    let hare = fs::read_to_string(file("hare.urdf")).expect("an example");
+    for (from, to, said) in [
+        (
+            " effort=\"30\"",
+            "",
+            "joint `nw_shin`, <limit>, effort: found nothing",
+        ),
+        (
+            "<link name=\"nw_paw\"/>",
+            "<link name=\"nw_paw\">",
+            "t.urdf:",
+        ),
+        (
+            "type=\"revolute\"><parent link=\"ne_mount\"/>",
+            "type=\"prismatic\"><parent link=\"ne_mount\"/>",
+            "type \"prismatic\"",
+        ),
+    ] {
+        assert!(hare.contains(from), "{from}");
+        let wrong = hare.replace(from, to);
+        let error = robot_file::from_urdf("t.urdf", &wrong, &[])
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(said), "{error}");
+    }
+}
+
+fn romc(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_romc"));
+    command
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .expect("the binary runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[test]
+fn command_shows_a_robot_and_writes_its_toml() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let urdf = file("hare.urdf").display().to_string();
+    let done = romc(folder.path(), &["robot", &urdf, "--output", "hare.toml"]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    assert!(text(&done.stdout).contains("ne_swing"));
+    let written = robot_file::read(&folder.path().join("hare.toml"), &[]).expect("its TOML");
+    assert!(std::ptr::eq(written, robot("hare.urdf")));
+    let feet = "se_paw,nw_paw,sw_paw,ne_paw";
+    let named = romc(folder.path(), &["robot", &urdf, "--feet", feet, "--json"]);
+    let json: Value = serde_json::from_slice(&named.stdout).expect("one object");
+    assert_eq!(json["robot"]["leg"][0]["joint"][2]["name"], "ne_shin");
+    for (arguments, code, said) in [
+        (
+            vec!["robot", "spot"],
+            2,
+            "unknown robot `spot`; known: go1, go2, a1, or a file",
+        ),
+        (
+            vec!["robot", "none.toml"],
+            1,
+            "none.toml: cannot read the robot",
+        ),
+        (
+            vec!["robot", &urdf, "--feet", "skull,nw_paw,sw_paw,ne_paw"],
+            1,
+            "found 1 joints (neck)",
+        ),
+    ] {
+        let failed = romc(folder.path(), &arguments);
+        assert_eq!(failed.status.code(), Some(code), "{arguments:?}");
+        assert!(
+            text(&failed.stderr).contains(said),
+            "{}",
+            text(&failed.stderr)
+        );
+    }
+}
+
+#[test]
+fn models_are_read_from_standard_input() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let model = fs::File::open(root().join("models/paper-2d.json")).expect("shipped");
+    let done = Command::new(env!("CARGO_BIN_EXE_romc"))
+        .current_dir(folder.path())
+        .args(["compile", "-", "--emit", "latex", "--out-dir", "out"])
+        .stdin(model)
+        .output()
+        .expect("the binary runs");
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    assert!(
+        folder.path().join("out/paper-2d.tex").exists()
+            || folder.path().join("out/paper_2d.tex").exists()
+    );
+    let failed = Command::new(env!("CARGO_BIN_EXE_romc"))
+        .args(["inspect", "-"])
+        .stdin(std::process::Stdio::null())
+        .output()
+        .expect("the binary runs");
+    assert_eq!(failed.status.code(), Some(1));
+    assert!(
+        text(&failed.stderr).contains("standard input: at"),
+        "{}",
+        text(&failed.stderr)
+    );
+}
+
+#[test]
+fn completions_offer_targets_and_robots() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let script = text(&romc(folder.path(), &["completions", "bash"]).stdout);
+    assert!(script.contains("compgen -f -W \"go1 go2 a1\""));
+    let emit = script.split("--emit)").nth(1).expect("the option");
+    let offered = emit.lines().nth(1).expect("a line");
+    assert!(
+        offered.contains("latex") && offered.contains("controller"),
+        "{offered}"
+    );
+}
+
+/// A joint's name ends no comment of the header that lists it.
+#[test]
+fn names_that_would_end_a_comment_are_refused() {
+    let text = robot_file::to_toml(robot("solo12.toml")).replace("FL_HAA", "FL*/HAA");
+    let error = robot_file::from_toml("r.toml", &text)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("leg[1].joint[0].name: found \"FL*/HAA\""),
+        "{error}"
+    );
+}
