@@ -84,6 +84,12 @@ pub enum Error {
     /// A file of settings that cannot be used; the message of its parser names line, key and what was expected.
     #[error("{path}: {message}", path = path.display())]
     Config { path: PathBuf, message: String },
+    /// An MCAP file holds one stretch of time.
+    #[error("found {0} segments, expected one for an MCAP file")]
+    OneSegment(usize),
+    /// A map is guessed of one log at a time.
+    #[error("found {0} files, expected one log to guess a map of")]
+    OneLog(usize),
     /// An imported model that does not fit the recordings given with it.
     #[error("{file}: {fault}; --unchecked writes the model all the same", file = file.display())]
     Mismatch { file: PathBuf, fault: String },
@@ -119,7 +125,11 @@ impl Error {
                 matches!(error, SimplifyError::NoSamples | SimplifyError::Margin)
             }
             // Exit code 1 of `check` says that two files differ.
-            Self::Rename(_) | Self::Name(_) | Self::Check(_) => true,
+            Self::Rename(_)
+            | Self::Name(_)
+            | Self::Check(_)
+            | Self::OneLog(_)
+            | Self::OneSegment(_) => true,
             Self::Recording(_)
             | Self::Identify(_)
             | Self::Model(_)

@@ -6,11 +6,12 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::IdentifyArguments;
-use super::output::{check_output, read_recordings, spinner, write_file};
+use super::output::{check_output, read_with, reader, spinner, write_file};
 use super::robot;
 use crate::Error;
 use crate::files::Overwrite;
 use crate::identify::{Identification, PerKind, identify};
+use crate::recording::Clocks;
 use crate::robot::Robot;
 use crate::typeset::{Table, significant};
 
@@ -23,7 +24,10 @@ pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(arguments.output.as_deref(), overwrite)?;
     let robot = robot::chosen(&arguments.robot)?;
-    let recordings = read_recordings(&arguments.recordings)?;
+    let recordings = read_with(
+        &reader(&arguments.reading, Clocks::Recorded)?,
+        &arguments.recordings,
+    )?;
     let progress = spinner("identifying");
     let found = identify(&recordings, robot);
     progress.finish_and_clear();

@@ -29,7 +29,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(Some(&arguments.output), overwrite)?;
     let imported = import(&arguments.file, &options(arguments)?)?;
-    let recordings = read_recordings(&arguments.inputs_from)?;
+    let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
     let model = with_inputs(imported.model, &segments)?;
     let check = checked(&model, &segments, arguments)?;

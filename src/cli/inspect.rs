@@ -6,9 +6,13 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::InspectArguments;
+use super::output::{check_output, reader, write_file};
 use super::{inspect_model, inspect_recording, robot};
+use crate::files::Overwrite;
+use crate::recording::foreign::guess::guess;
+use crate::recording::{Clocks, Reader};
 use crate::robot::Robot;
-use crate::{Error, artifact, recording};
+use crate::{Error, artifact};
 
 /// Inspects each file: those that end in `.json` as models, all others as recordings.
 ///
@@ -16,8 +20,12 @@ use crate::{Error, artifact, recording};
 /// Whatever reading the file refuses.
 pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     let robot = robot::chosen(&arguments.robot)?;
+    if arguments.guess {
+        return guessed(arguments, robot);
+    }
+    let reader = reader(&arguments.reading, Clocks::Recorded)?;
     let answers = (arguments.files.iter())
-        .map(|path| inspect(path, robot))
+        .map(|path| inspect(path, robot, &reader))
         .collect::<Result<Vec<_>, _>>()?;
     let texts: Vec<String> = answers.iter().map(|answer| answer.text.clone()).collect();
     let files: Vec<Value> = answers.into_iter().map(|answer| answer.json).collect();
@@ -27,10 +35,44 @@ pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     })
 }
 
-fn inspect(path: &Path, robot: &Robot) -> Result<Answer, Error> {
+/// A first map of one log.
+fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error> {
+    let [log] = &arguments.files[..] else {
+        return Err(Error::OneLog(arguments.files.len()));
+    };
+    let overwrite = Overwrite::when_forced(arguments.force);
+    check_output(arguments.output.as_deref(), overwrite)?;
+    let guess = guess(log, robot)?;
+    let outcome = match &guess.outcome {
+        Ok(samples) => format!("read by this map, the log has {samples} samples"),
+        Err(reason) => format!("read by this map: {reason}"),
+    };
+    let mut text = guess.text.clone();
+    match &arguments.output {
+        Some(path) => {
+            write_file(path, guess.text.as_bytes(), overwrite)?;
+            text = format!("{}: a first map; {outcome}\n", path.display());
+        }
+        None => eprintln!("note: {outcome}"),
+    }
+    Ok(Answer {
+        text,
+        json: json!({
+            "command": "inspect",
+            "file": log.display().to_string(),
+            "map": guess.text,
+            "missing": guess.missing,
+            "samples": guess.outcome.as_ref().ok(),
+            "refused": guess.outcome.as_ref().err(),
+            "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+        }),
+    })
+}
+
+fn inspect(path: &Path, robot: &Robot, reader: &Reader) -> Result<Answer, Error> {
     if artifact::is_standard_input(path) || path.extension().is_some_and(|e| e == "json") {
         inspect_model::describe(path, &artifact::read(path)?)
     } else {
-        inspect_recording::describe(&recording::read(path)?, robot)
+        inspect_recording::describe(&reader.read(path)?, robot)
     }
 }

@@ -10,7 +10,7 @@ use super::Answer;
 use crate::Error;
 use crate::recording::check::{Finding, check};
 use crate::recording::mismatch::{Figures, Mismatch, mismatches};
-use crate::recording::{PhaseRule, PhaseSpan, Recording, Segment, Stance};
+use crate::recording::{PhaseRule, PhaseSpan, Reading, ReadingNotes, Recording, Segment, Stance};
 use crate::robot::{JOINT_DIM, Robot};
 use crate::typeset::{Cell, Table, significant};
 
@@ -25,7 +25,11 @@ const FINDINGS_SHOWN: usize = 12;
 ///
 /// # Errors
 /// [`Error::Recording`] if no phase rule covers the feet.
-pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
+pub fn describe(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
+    let recording = &reading.recording;
+    let mut notes = ReadingNotes::default();
+    notes.add(reading);
+    let notes = notes.lines();
     let findings = check(recording, robot);
     let rule = PhaseRule::three_phase().with_min_samples(CHATTER);
     let mut text = format!(
@@ -56,6 +60,9 @@ pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
         let names = recording.ignored_columns.join("`, `");
         let _ = writeln!(text, "  columns not read: `{names}`");
     }
+    for note in &notes {
+        let _ = writeln!(text, "  {note}");
+    }
     text.push_str("  # a front foot is down, = only rear feet are, blank: flight\n\n");
     let ranges = ranges(recording);
     let _ = writeln!(text, "{}", range_table(&ranges));
@@ -75,6 +82,7 @@ pub fn describe(recording: &Recording, robot: &Robot) -> Result<Answer, Error> {
             "file": recording.path.display().to_string(),
             "samples": recording.sample_count(),
             "segments": segments,
+            "notes": notes,
             "ranges": ranges,
             "ignored_columns": recording.ignored_columns,
             "figures": Figures::of(recording, robot),

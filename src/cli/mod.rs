@@ -8,6 +8,7 @@ mod actuators;
 pub mod args;
 mod check;
 mod compile;
+mod convert;
 mod demo;
 mod identify;
 mod import;
@@ -101,6 +102,7 @@ fn execute(command: Command) -> Result<(Answer, u8), Error> {
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Train(arguments) => return train::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
         Command::Robot(arguments) => robot::run(&arguments),

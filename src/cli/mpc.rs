@@ -33,7 +33,7 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
         solver: arguments.solver,
         ..MpcSettings::default()
     };
-    let recordings = read_recordings(&arguments.recordings)?;
+    let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
     let remarks = remarks(&model, &recordings)?;
     let mut answer = answer(arguments, &runs, &remarks);

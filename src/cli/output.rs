@@ -6,9 +6,10 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::args::ReadingArguments;
 use crate::Error;
 use crate::files::{Overwrite, write_whole};
-use crate::recording::{self, Recording};
+use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording};
 
 /// Refuses an output that could not be written, before long work begins.
 ///
@@ -46,19 +47,46 @@ pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<
     })
 }
 
-/// Reads recordings, showing which.
+/// The reader that the arguments ask for, with this treatment of clocks unless they name another.
+///
+/// # Errors
+/// [`Error::Recording`] for the map of columns.
+pub fn reader(arguments: &ReadingArguments, clocks: Clocks) -> Result<Reader, Error> {
+    let map = arguments.columns.as_deref().map(ColumnMap::read);
+    Ok(Reader::new(
+        map.transpose()?,
+        arguments.clock.unwrap_or(clocks),
+    ))
+}
+
+/// Reads recordings, showing which; what reading did besides goes to stderr.
+///
+/// # Errors
+/// [`Error::Recording`] for the map of columns, and the first that cannot be read.
+pub fn read_recordings(
+    paths: &[PathBuf],
+    arguments: &ReadingArguments,
+) -> Result<Vec<Recording>, Error> {
+    read_with(&reader(arguments, Clocks::Repaired)?, paths)
+}
+
+/// [`read_recordings`] by a reader.
 ///
 /// # Errors
 /// [`Error::Recording`] for the first that cannot be read.
-pub fn read_recordings(paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
+pub fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
     let progress = spinner("reading recordings");
+    let mut notes = ReadingNotes::default();
     let read = (paths.iter())
         .map(|path| {
             progress.set_message(printable(&format!("reading {}", path.display())).into_owned());
-            Ok(recording::read(path)?)
+            let reading = reader.read(path)?;
+            notes.add(&reading);
+            Ok(reading.recording)
         })
         .collect();
     progress.finish_and_clear();
+    report_reading(&notes);
     read
 }
 
@@ -95,6 +123,11 @@ fn escaped(text: &str, written: impl Fn(char) -> String) -> Cow<'_, str> {
         }
     }
     Cow::Owned(out)
+}
+
+/// Reports on stderr what reading did besides reading.
+pub fn report_reading(notes: &ReadingNotes) {
+    notes.lines().iter().for_each(|line| note(line));
 }
 
 /// Paths as JSON shows them.

@@ -7,13 +7,13 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::args::PlanArguments;
-use super::output::{check_output, names, progress_bar, spinner};
+use super::args::{PlanArguments, ReadingArguments};
+use super::output::{check_output, names, progress_bar, reader, spinner};
 use super::train_settings::refused;
 use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
 use crate::plan::{self, Goal, Plan, PlanSettings, Reach, Verdict};
-use crate::recording::{self, Recording};
+use crate::recording::{self, Clocks, Recording};
 use crate::report::figures::{Figure, figure_files};
 use crate::report::{plan_figures, plan_json, reach_figure};
 use crate::typeset::{Cell, Table};
@@ -35,7 +35,12 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     let (Some(distance), Some(apex)) = (arguments.distance, arguments.apex) else {
         unreachable!("clap asks for both without --reach");
     };
-    let goal = goal(distance, apex, arguments.start.as_deref())?;
+    let goal = goal(
+        distance,
+        apex,
+        arguments.start.as_deref(),
+        &arguments.reading,
+    )?;
     let bar = spinner("planning");
     let planned = plan::plan(&model, &goal, &settings);
     bar.finish_and_clear();
@@ -113,10 +118,15 @@ fn settings(path: Option<&Path>) -> Result<PlanSettings, Error> {
 ///
 /// # Errors
 /// [`Error::Plan`] for numbers that no jump has, [`Error::Recording`] for the start.
-fn goal(distance_m: f64, apex_m: f64, start: Option<&Path>) -> Result<Goal, Error> {
+fn goal(
+    distance_m: f64,
+    apex_m: f64,
+    start: Option<&Path>,
+    reading: &ReadingArguments,
+) -> Result<Goal, Error> {
     let goal = Goal::new(distance_m, apex_m)?;
     let Some(path) = start else { return Ok(goal) };
-    let recording = recording::read(path)?;
+    let recording = reader(reading, Clocks::Recorded)?.read(path)?.recording;
     let first = &recording.segments[0];
     let column = |rows: &nalgebra::DMatrix<f64>| rows.column(0).into_owned();
     Ok(goal.from_start(column(&first.x), column(&first.dx)))

@@ -5,15 +5,15 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use super::args::{TrainArguments, TrainSettings};
+use super::args::{ReadingArguments, TrainArguments, TrainSettings};
 use super::inspect_recording::{finding_json, mismatch_json};
-use super::output::note;
+use super::output::{note, reader, report_reading};
 use super::train_settings;
 use crate::Error;
 use crate::recording::check::Finding;
 use crate::recording::files::Notes;
 use crate::recording::{
-    self, ConditionOptions, ImplausibleSamples, Recording, RecordingError, RecordingFile,
+    Clocks, ConditionOptions, ImplausibleSamples, Reader, Recording, RecordingError, RecordingFile,
     RecordingFiles,
 };
 use crate::robot::Robot;
@@ -46,15 +46,16 @@ impl RecordedSets {
         robot: &'static Robot,
         seed: u64,
     ) -> Result<Self, Error> {
+        let reader = reader_for(&arguments.reading, settings)?;
         let Some(split) = arguments.split else {
             let paths = [
                 &arguments.recordings[..],
                 &arguments.validation,
                 &arguments.test,
             ];
-            return Ok(Self::whole(paths, settings, robot));
+            return Ok(Self::whole(paths, settings, robot, reader));
         };
-        let jumps = jumps_of(&arguments.recordings)?;
+        let jumps = jumps_of(&arguments.recordings, &reader)?;
         let sets = split.of(jumps.len(), seed)?;
         let sets = sets.map(|set| -> Vec<Place> {
             let places = set.into_iter().map(|jump| jumps[jump].clone());
@@ -63,28 +64,36 @@ impl RecordedSets {
         let files = sets.each_ref().map(|set| chosen_segments(set));
         Ok(Self {
             divided: Some(sets),
-            ..Self::of_files(files, settings, robot)
+            ..Self::of_files(files, settings, robot, reader)
         })
     }
 
     /// Whole files for training, validation and test.
-    pub fn whole(paths: [&[PathBuf]; 3], settings: &TrainSettings, robot: &'static Robot) -> Self {
+    pub fn whole(
+        paths: [&[PathBuf]; 3],
+        settings: &TrainSettings,
+        robot: &'static Robot,
+        reader: Reader,
+    ) -> Self {
         let whole = |path: &PathBuf| RecordingFile {
             path: path.clone(),
             segments: None,
         };
         let files = paths.map(|paths| paths.iter().map(whole).collect());
-        Self::of_files(files, settings, robot)
+        Self::of_files(files, settings, robot, reader)
     }
 
     fn of_files(
         files: [Vec<RecordingFile>; 3],
         settings: &TrainSettings,
         robot: &'static Robot,
+        reader: Reader,
     ) -> Self {
         let options = train_settings::conditioning(settings);
-        let [training, validation, test] =
-            files.map(|files| Arc::new(RecordingFiles::new(files, robot, options.clone())));
+        let [training, validation, test] = files.map(|files| {
+            let files = RecordingFiles::new(files, robot, options.clone());
+            Arc::new(files.read_by(reader.clone()))
+        });
         Self {
             training,
             validation,
@@ -124,10 +133,12 @@ impl RecordedSets {
 
     /// Reports on stderr which files have implausible samples, and what became of them.
     pub fn report_findings(&self) {
+        report_reading(&self.training.notes().reading);
         let Notes {
             findings,
             mismatches,
             left_out,
+            ..
         } = self.notes();
         for (file, mismatch) in &mismatches {
             note(&format!("{}: {mismatch}", file.display()));
@@ -168,6 +179,7 @@ impl RecordedSets {
             findings,
             mismatches,
             left_out,
+            ..
         } = self.notes();
         let mismatches = mismatches.iter().map(|(file, mismatch)| {
             let mut value = mismatch_json(mismatch);
@@ -215,11 +227,23 @@ pub fn read_all(files: &RecordingFiles) -> Result<Vec<Recording>, Error> {
     Ok(all)
 }
 
+/// The reader of a training: clocks are repaired unless told otherwise, or to train as published.
+///
+/// # Errors
+/// [`Error::Recording`] for the map of columns.
+pub fn reader_for(arguments: &ReadingArguments, settings: &TrainSettings) -> Result<Reader, Error> {
+    let clocks = match settings.paper {
+        true => Clocks::Recorded,
+        false => Clocks::Repaired,
+    };
+    reader(arguments, clocks)
+}
+
 /// Every jump of these files.
-fn jumps_of(paths: &[PathBuf]) -> Result<Vec<Place>, Error> {
+fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<Place>, Error> {
     let mut jumps = Vec::new();
     for path in paths {
-        let recording = recording::read(path)?;
+        let recording = reader.read(path)?.recording;
         let segments = recording.segments.iter().enumerate();
         jumps.extend(segments.map(|(index, segment)| (path.clone(), index, segment.first_row)));
     }

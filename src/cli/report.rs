@@ -31,7 +31,7 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(Some(&arguments.output), overwrite)?;
     let model = artifact::read(&arguments.model)?;
-    let recordings = read_recordings(&arguments.recordings)?;
+    let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let study = match &arguments.study {
         None => None,
         Some(folder) => Some(Summary::of(&Store::open(folder)?.cells()?, LAMBDA)),

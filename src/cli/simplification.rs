@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::args::SimplifyArguments;
+use super::args::{ReadingArguments, SimplifyArguments};
 use super::output::{names, read_recordings, spinner};
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
@@ -42,10 +42,15 @@ impl Basis {
         model: &ReducedModel,
         files: &[PathBuf],
         margin: Option<f64>,
+        reading: &ReadingArguments,
     ) -> Result<Self, Error> {
         let is_table = |path: &&PathBuf| path.extension().is_some_and(|end| end == "toml");
         match files.iter().find(is_table) {
-            None => Self::of(model, read_recordings(files)?, margin.unwrap_or(MARGIN)),
+            None => Self::of(
+                model,
+                read_recordings(files, reading)?,
+                margin.unwrap_or(MARGIN),
+            ),
             Some(path) if files.len() > 1 => Err(SimplifyError::DomainFile {
                 path: path.clone(),
                 message: "one .toml file of ranges, or recordings, but not both".to_owned(),
@@ -134,7 +139,12 @@ pub fn run(
         return Ok(None);
     }
     let progress = spinner("simplifying");
-    let basis = Basis::read(model, &arguments.domain, arguments.margin)?;
+    let basis = Basis::read(
+        model,
+        &arguments.domain,
+        arguments.margin,
+        &arguments.reading,
+    )?;
     let tolerance = arguments.tolerance.unwrap_or(Tolerance::Absolute(0.0));
     let Simplified {
         model: simplified,

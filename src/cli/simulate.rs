@@ -26,7 +26,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(arguments.output.as_deref(), overwrite)?;
     let model = artifact::read(&arguments.model)?;
-    let recordings = read_recordings(&arguments.recordings)?;
+    let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let progress = spinner("simulating");
     let assessment = Assessment::over(&model, &recordings, arguments.restart_every)?;
     progress.finish_and_clear();

@@ -8,7 +8,7 @@ use super::Answer;
 use super::actuators;
 use super::args::{StudyArguments, TrainSettings};
 use super::output::spinner;
-use super::prepared_recordings::{RecordedSets, read_all};
+use super::prepared_recordings::{RecordedSets, read_all, reader_for};
 use super::robot;
 use super::train_settings;
 use crate::Error;
@@ -66,6 +66,7 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
         [&arguments.recordings, &arguments.validation, &[]],
         &settings,
         robot,
+        reader_for(&arguments.reading, &settings)?,
     );
     let training = read_all(&recorded.training)?;
     let validation = read_all(&recorded.validation)?;

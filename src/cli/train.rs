@@ -153,6 +153,7 @@ fn command_line(
         ..settings.clone()
     };
     line += &train_settings::as_flags(&settings);
+    line += &arguments.reading.as_flags();
     let _ = write!(line, " --output {}", arguments.output.display());
     line
 }

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::clock::{Timed, timed};
 use super::equations::SampleEquations;
 use super::error::IdentifyError;
 use super::fit::{Estimate, Iteration, explained, force_alone};
@@ -17,6 +16,7 @@ use super::parameters::{
 };
 use super::windows::{Group, Windows};
 use crate::recording::check::check;
+use crate::recording::clock::{Timed, timed};
 use crate::recording::{Recording, Segment};
 use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 

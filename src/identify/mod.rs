@@ -1,8 +1,8 @@
 //! What recordings say of the robot: gravity, mass, the joints' losses, the legs' own inertia.
 //!
 //! Enters: recordings and the robot's geometry. Leaves: an [`Identification`], each value with its
-//! standard error, and the file that keeps it. [`clock`] mends segments whose time stamps disagree
-//! with their motion, [`motion`] has the directions of the links and their accelerations,
+//! standard error, and the file that keeps it. [`clock`](crate::recording::clock) mends segments whose time
+//! stamps disagree with their motion, [`motion`] has the directions of the links and their accelerations,
 //! [`equations`] the linear equations that these obey at every sample, [`windows`] their averages
 //! over short windows, [`fit`] the weighted least squares, [`estimate`] the loop around it,
 //! [`file`](mod@file) the result on disk. Read [`estimate`] first;
@@ -20,7 +20,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod clock;
 pub mod equations;
 pub mod estimate;
 pub mod file;

@@ -147,7 +147,8 @@ impl Layout {
     }
 }
 
-fn folded(name: &str) -> String {
+/// A name without capitals and runs of blanks.
+pub(super) fn folded(name: &str) -> String {
     name.split_whitespace()
         .collect::<Vec<_>>()
         .join(" ")

@@ -1,6 +1,6 @@
 //! Reader of the recordings' CSV format.
 //!
-//! `;` with decimal comma or point, or `,` with decimal point, found from the
+//! `;` or tabs with decimal comma or point, or `,` with decimal point, found from the
 //! header; columns by name in any order; gzip found from the first two bytes.
 //! Memory is bounded by the samples kept: lines and rows have a limit.
 
@@ -19,7 +19,7 @@ use super::table::Table;
 /// Most empty lines at the start or the end of a file; compressed, billions would fit into a small one.
 const MAX_BLANK_ROWS: usize = 10_000;
 
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// Reads a recording, plain or gzip.
 ///
@@ -108,7 +108,8 @@ fn read_header<R: BufRead>(
             check_blank(path, first, row)?;
             if !line.trim().is_empty() {
                 return Err(
-                    RecordingFault::delimiter("", "`;` or `,` in a header").at(path, row - 1)
+                    RecordingFault::delimiter("", "`;`, a tab or `,` in a header")
+                        .at(path, row - 1),
                 );
             }
         }
@@ -116,10 +117,12 @@ fn read_header<R: BufRead>(
     }
     let delimiter = if line.contains(';') {
         ';'
+    } else if line.contains('\t') {
+        '\t'
     } else if line.contains(',') {
         ','
     } else {
-        return Err(RecordingFault::delimiter(line, "`;` or `,`").at(path, row));
+        return Err(RecordingFault::delimiter(line, "`;`, a tab or `,`").at(path, row));
     };
     let mut names = Vec::new();
     split_cells::<RecordingError>(line, delimiter, |cell| {

@@ -20,6 +20,22 @@ pub enum RecordingFault {
     /// The file does not exist.
     #[error("no such file")]
     Missing,
+    /// A damaged MCAP file, or one that packs its chunks in another way.
+    #[error("no MCAP file that can be read: {0}")]
+    Mcap(String),
+    /// An MCAP file without a topic of numbers; the first reason in brackets, or nothing.
+    #[error("found no topic of ROS messages with numbers{0}")]
+    NoTopic(String),
+    /// A folder, which only a map of columns makes a recording of.
+    #[error(
+        "found a folder, expected a file, or `--columns` with a map that names the folder's files"
+    )]
+    Folder,
+    /// Columns without names, of which nothing can be guessed.
+    #[error(
+        "found columns without names, of which no map can be guessed; a map counts them from 1"
+    )]
+    Unnamed,
     /// The file cannot be opened, read or written.
     #[error("cannot {action}")]
     Io {
@@ -47,9 +63,10 @@ pub enum RecordingFault {
     },
     /// Columns that the format requires are absent.
     #[error(
-        "missing {}; the header starts with {}",
+        "missing {}; the header starts with {}{}",
         listed(columns, 8),
-        listed(found, 3)
+        listed(found, 3),
+        foreign_hint(columns)
     )]
     MissingColumns {
         /// Their names, in the order of the format.
@@ -76,6 +93,33 @@ pub enum RecordingFault {
         /// A likely reason, or nothing.
         hint: &'static str,
     },
+    /// A map of columns is no valid TOML, or has a key that maps do not have.
+    #[error("no map of columns: {0}")]
+    MapSyntax(String),
+    /// A key of a map of columns does not fit the map or the log.
+    #[error("found {found}, expected {expected}")]
+    Map {
+        /// What the map says, or lacks.
+        found: String,
+        /// What would fit.
+        expected: String,
+    },
+    /// A topic with a clock of its own has no sample for longer than is interpolated; in s.
+    #[error(
+        "found no sample for {found} s, expected at most {expected} s (`max_gap_s` in `[time]`)"
+    )]
+    Gap {
+        /// Distance of two samples.
+        found: f64,
+        /// Largest distance accepted.
+        expected: f64,
+    },
+    /// The clocks of a log's topics have no two samples in common.
+    #[error("found clocks that do not overlap, expected topics of the same time")]
+    NoOverlap,
+    /// The trunk points straight up or down, where an angular velocity says no rates of roll and yaw.
+    #[error("found a pitch of 90 degrees, expected less where rates come from angular velocities")]
+    Upright,
     /// A cell is not a finite number.
     #[error("found `{found}`, expected {expected}")]
     Number {
@@ -187,6 +231,17 @@ impl RecordingFault {
     /// The fault of an argument, in no file.
     pub(super) fn of_argument(self) -> RecordingError {
         Located::new("", Place::Whole, self)
+    }
+}
+
+/// How to read a header with hardly a name of the format.
+fn foreign_hint(missing: &[String]) -> &'static str {
+    const MANY: usize = 30;
+    match missing.len() {
+        MANY.. => {
+            "; for a log of another program `romc inspect --guess LOG` writes a map for --columns"
+        }
+        _ => "",
     }
 }
 

@@ -5,12 +5,20 @@ use std::sync::mpsc::sync_channel;
 use std::sync::{Arc, OnceLock};
 
 use super::check::{Finding, check};
-use super::condition::{ConditionOptions, Conditioned, ImplausibleSamples, conditioned};
-use super::csv::read;
+use super::condition::{
+    ConditionOptions, Conditioned, ImplausibleSamples, SmoothedRows, conditioned,
+};
 use super::error::RecordingError;
 use super::mismatch::{Mismatch, mismatches};
-use super::segment::Recording;
+use super::reader::{Reader, Reading, ReadingNotes};
+use super::segment::{Recording, Segment};
+use super::smoothing::SavitzkyGolay;
 use crate::robot::Robot;
+
+/// Half the window over which rows of late samples are smoothed, in s.
+const HALF_SMOOTHING_S: f64 = 0.015;
+/// Degree of the polynomials that smooth them.
+const SMOOTHING_ORDER: usize = 3;
 
 /// Recordings, held in memory or read from their files again each time.
 #[derive(Clone, Debug)]
@@ -67,6 +75,7 @@ pub struct RecordingFiles {
     files: Vec<RecordingFile>,
     robot: &'static Robot,
     options: ConditionOptions,
+    reader: Reader,
     notes: OnceLock<Notes>,
 }
 
@@ -88,6 +97,8 @@ pub struct Notes {
     pub mismatches: Vec<(PathBuf, Mismatch)>,
     /// Number of samples that were left out.
     pub left_out: usize,
+    /// What reading did besides reading.
+    pub reading: ReadingNotes,
 }
 
 impl RecordingFiles {
@@ -101,8 +112,14 @@ impl RecordingFiles {
             files,
             robot,
             options,
+            reader: Reader::default(),
             notes: OnceLock::new(),
         }
+    }
+
+    /// The same files, read by this reader.
+    pub fn read_by(self, reader: Reader) -> Self {
+        Self { reader, ..self }
     }
 
     /// Whether there is no file.
@@ -115,14 +132,15 @@ impl RecordingFiles {
         self.notes.get().cloned().unwrap_or_default()
     }
 
-    /// The recordings of the first `count` files, neither checked nor conditioned.
+    /// The recordings of the first `count` files, neither checked nor conditioned, with clocks as recorded.
     ///
     /// # Errors
-    /// As [`read`].
+    /// As [`Reader::read`].
     pub fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
         let mut recordings = Vec::new();
         for file in self.files.iter().take(count) {
-            recordings.extend(Self::chosen(file)?);
+            let reading = self.reader.as_stamped().read(&file.path)?;
+            recordings.extend(chosen(file, reading.recording));
         }
         Ok(recordings)
     }
@@ -138,7 +156,9 @@ impl RecordingFiles {
     ) -> Result<(), E> {
         let mut notes = Notes::default();
         let result = self.in_order(|recordings| {
-            for ready in recordings? {
+            let (recordings, reading) = recordings?;
+            notes.reading.add(&reading);
+            for ready in recordings {
                 let path = &ready.recording.path;
                 let found = ready.findings.into_iter();
                 (notes.findings).extend(found.map(|finding| (path.clone(), finding)));
@@ -155,7 +175,7 @@ impl RecordingFiles {
 
     fn in_order<E: From<RecordingError>>(
         &self,
-        mut take: impl FnMut(Result<Vec<Conditioned>, RecordingError>) -> Result<(), E>,
+        mut take: impl FnMut(Result<Ready, RecordingError>) -> Result<(), E>,
     ) -> Result<(), E> {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = threads.clamp(1, 2);
@@ -181,21 +201,56 @@ impl RecordingFiles {
         })
     }
 
-    /// The recordings of one file as they are.
-    fn chosen(file: &RecordingFile) -> Result<Vec<Recording>, RecordingError> {
-        let recording = read(&file.path)?;
-        Ok(match &file.segments {
-            None => vec![recording],
-            Some(chosen) => single_segments(recording, chosen),
-        })
+    /// The steps for one recording: where times were rebuilt, which is where samples came late or were lost, rows are
+    /// smoothed unless a filter is asked for.
+    fn options_for(
+        &self,
+        reading: &mut Reading,
+        recording: &Recording,
+    ) -> Result<ConditionOptions, RecordingError> {
+        let mut options = self.options.clone();
+        let rebuilt = reading
+            .mended
+            .iter()
+            .any(|mended| mended.elapsed_ratio.is_some());
+        let step_s = recording
+            .segments
+            .iter()
+            .map(Segment::mean_step_s)
+            .fold(0.0, f64::max);
+        let half = (HALF_SMOOTHING_S / step_s).round();
+        let window = if half.is_finite() {
+            2 * half as usize + 1
+        } else {
+            1
+        };
+        let fits = recording
+            .segments
+            .iter()
+            .all(|segment| segment.len() >= window);
+        if options.smoothing.is_none() && rebuilt && window > SMOOTHING_ORDER && fits {
+            let filter = SavitzkyGolay::new(window, SMOOTHING_ORDER)?;
+            options.smoothing = Some((filter, SmoothedRows::All));
+            reading.notes.push(format!(
+                "rows are smoothed (--smooth {window},{SMOOTHING_ORDER} --smooth-rows all)"
+            ));
+        }
+        Ok(options)
     }
 
-    /// The recordings of one file. Checks that only report are made once.
-    fn read(&self, file: &RecordingFile) -> Result<Vec<Conditioned>, RecordingError> {
-        let recordings = Self::chosen(file)?;
+    /// The recordings of one file, and its reading without samples. Checks that only report are made once.
+    fn read(&self, file: &RecordingFile) -> Result<Ready, RecordingError> {
+        let mut reading = self.reader.read(&file.path)?;
+        let empty = Recording {
+            path: file.path.clone(),
+            segments: Vec::new(),
+            ignored_columns: Vec::new(),
+        };
+        let recording = std::mem::replace(&mut reading.recording, empty);
+        let options = self.options_for(&mut reading, &recording)?;
         let keeps = self.options.implausible == ImplausibleSamples::Keep;
-        let ready = recordings.into_iter().map(|recording| {
-            let is_first = self.notes.get().is_none();
+        let is_first = self.notes.get().is_none();
+        let ready = chosen(file, recording).into_iter().map(|recording| {
             let findings = match keeps && !is_first {
                 true => Vec::new(),
                 false => check(&recording, self.robot),
@@ -206,10 +261,21 @@ impl RecordingFiles {
             };
             Ok::<_, RecordingError>(Conditioned {
                 mismatches: unlike,
-                ..conditioned(recording, findings, &self.options)?
+                ..conditioned(recording, findings, &options)?
             })
         });
-        ready.collect()
+        Ok((ready.collect::<Result<_, _>>()?, reading))
+    }
+}
+
+/// The recordings of one file, conditioned, and what reading did.
+type Ready = (Vec<Conditioned>, Reading);
+
+/// The whole recording of a file, or the segments that are asked for.
+fn chosen(file: &RecordingFile, recording: Recording) -> Vec<Recording> {
+    match &file.segments {
+        None => vec![recording],
+        Some(chosen) => single_segments(recording, chosen),
     }
 }
 

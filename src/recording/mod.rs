@@ -33,28 +33,35 @@
 //! ```
 
 pub mod check;
+pub mod clock;
 pub mod columns;
 pub mod condition;
 pub mod csv;
 pub mod files;
+pub mod foreign;
 pub mod mismatch;
 pub mod phases;
 pub mod preprocess;
+pub mod reader;
 pub mod segment;
 pub mod smoothing;
 pub mod write;
 
 mod error;
+mod instant;
 mod lines;
 mod number;
+mod segments;
 mod table;
 
 pub use self::csv::{read, read_from_bytes};
-pub use self::write::{WriteOptions, write, write_with};
+pub use self::write::{WriteOptions, write, write_inputs_with, write_mcap, write_with};
 pub use condition::{
     Accelerations, ConditionOptions, Conditioned, ImplausibleSamples, SmoothedRows, condition,
 };
 pub use error::{RecordingError, RecordingFault};
 pub use files::{RecordingFile, RecordingFiles, Source};
+pub use foreign::map::ColumnMap;
 pub use phases::{PhaseRule, PhaseSpan, Stance};
+pub use reader::{Clocks, Mended, Reader, Reading, ReadingNotes};
 pub use segment::{Recording, Segment};

@@ -10,11 +10,14 @@ use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use nalgebra::DMatrix;
 
 use super::columns::Column;
 use super::error::{RecordingError, RecordingFault};
+use super::foreign;
 use super::segment::{Recording, Segment};
 use crate::files::write_whole;
+use crate::robot::Robot;
 
 /// Cell separator and decimal mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -61,17 +64,47 @@ pub fn write_with(
     recording: &Recording,
     options: &WriteOptions,
 ) -> Result<(), RecordingError> {
+    write_inputs_with(path, recording, None, options)
+}
+
+/// [`write_with`] and, if given, the inputs of each segment (18 x samples), as columns `Input fr.hx` and so on, which
+/// reading ignores.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_inputs_with(
+    path: &Path,
+    recording: &Recording,
+    inputs: Option<&[DMatrix<f64>]>,
+    options: &WriteOptions,
+) -> Result<(), RecordingError> {
     let is_gzip = (path.extension()).is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     let written = write_whole(path, |mut file| {
         if !is_gzip {
-            return write_to(&mut file, recording, options);
+            return write_table(&mut file, recording, inputs, options);
         }
         let mut packed = GzEncoder::new(file, Compression::best());
-        write_to(&mut packed, recording, options)?;
+        write_table(&mut packed, recording, inputs, options)?;
         packed.finish().map(|_| ())
     });
     let action = "write";
     written.map_err(|source| RecordingFault::Io { action, source }.of(path))
+}
+
+/// Writes a segment as an MCAP file: joint states, odometry, contact, and if given the inputs (18 x samples).
+///
+/// # Errors
+/// [`RecordingFault::Io`]. An existing file is replaced.
+pub fn write_mcap(
+    path: &Path,
+    segment: &Segment,
+    inputs: Option<&DMatrix<f64>>,
+) -> Result<(), RecordingError> {
+    let mut bytes = io::Cursor::new(Vec::new());
+    foreign::write_mcap(&mut bytes, segment, inputs)
+        .map_err(|error| RecordingFault::Mcap(error.to_string()).of(path))?;
+    let written = write_whole(path, |file| file.write_all(bytes.get_ref()));
+    written.map_err(|source| RecordingFault::io("write", source).of(path))
 }
 
 /// Writes a recording as text.
@@ -83,6 +116,16 @@ pub fn write_with(
 pub fn write_to(
     destination: &mut impl Write,
     recording: &Recording,
+    options: &WriteOptions,
+) -> io::Result<()> {
+    write_table(destination, recording, None, options)
+}
+
+/// [`write_to`] with inputs behind the other columns.
+fn write_table(
+    destination: &mut impl Write,
+    recording: &Recording,
+    inputs: Option<&[DMatrix<f64>]>,
     options: &WriteOptions,
 ) -> io::Result<()> {
     let with_force = recording.segments.iter().all(|s| s.body_wrench.is_some());
@@ -102,10 +145,14 @@ pub fn write_to(
         Notation::Semicolon => ";",
         Notation::Comma => ",",
     };
-    let names: Vec<String> = columns.iter().map(|column| column.name()).collect();
+    let mut names: Vec<String> = columns.iter().map(|column| column.name()).collect();
+    if inputs.is_some() {
+        names.extend(Robot::input_names().map(|name| format!("Input {name}")));
+    }
     writeln!(destination, "{}", names.join(separator))?;
     let (mut line, mut number) = (String::new(), String::new());
-    for segment in &recording.segments {
+    for (index, segment) in recording.segments.iter().enumerate() {
+        let inputs = inputs.map(|inputs| &inputs[index]);
         for sample in 0..segment.len() {
             line.clear();
             for (place, column) in columns.iter().enumerate() {
@@ -114,6 +161,16 @@ pub fn write_to(
                 }
                 number.clear();
                 push_cell(&mut number, segment, *column, sample);
+                match options.notation {
+                    Notation::Semicolon => line.push_str(&number.replace('.', ",")),
+                    Notation::Comma => line.push_str(&number),
+                }
+            }
+            for row in 0..inputs.map_or(0, |inputs| inputs.nrows()) {
+                let value = inputs.map_or(0.0, |inputs| inputs[(row, sample)]);
+                line.push_str(separator);
+                number.clear();
+                write!(number, "{value:?}").expect("a String takes any text");
                 match options.notation {
                     Notation::Semicolon => line.push_str(&number.replace('.', ",")),
                     Notation::Comma => line.push_str(&number),

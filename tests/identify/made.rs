@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use nalgebra::{DMatrix, DVector, SVector};
 
 use romc::files::Place;
-use romc::identify::clock::timed;
 use romc::identify::equations::{BODY_ROWS, JOINT_ROWS, SampleEquations, joint_unknowns};
 use romc::identify::motion::Motion;
 use romc::identify::parameters::{
@@ -13,6 +12,7 @@ use romc::identify::parameters::{
     THIGH_SECOND, TRUNK_FORWARD, VISCOUS,
 };
 use romc::identify::{Identification, IdentifyError, IdentifyFault, identify};
+use romc::recording::clock::timed;
 use romc::recording::{Recording, Segment};
 use romc::robot::{ContactFlags, JOINT_DIM, Robot, STATE_DIM};
 

@@ -311,14 +311,14 @@ fn other_delimiters_are_told() {
     for cell in sheet.rows.iter_mut().flatten() {
         *cell = cell.replace(',', ".");
     }
-    for separator in ["\t", "|", " "] {
+    for separator in ["|", " "] {
         sheet.separator = separator;
         let error = fault(&sheet);
         assert!(
             matches!(error.kind, RecordingFault::Delimiter { .. }) && error.place.row() == Some(1),
             "{error:?}"
         );
-        assert!(message(&error).contains("expected cells separated by `;` or `,`"));
+        assert!(message(&error).contains("expected cells separated by `;`, a tab or `,`"));
     }
 }
 
@@ -332,10 +332,15 @@ fn decimal_commas_between_commas_are_told() {
 }
 
 #[test]
-fn tabs_are_seen_in_the_error() {
+fn tabs_separate_and_one_too_many_is_told() {
     let mut sheet = Sheet::landing();
     sheet.separator = "\t";
-    assert!(message(&fault(&sheet)).contains("found `Time\\t"));
+    assert_eq!(sheet.read().unwrap().segments[0].len(), 24);
+    sheet.set(3, "Time", "1\t2");
+    assert!(matches!(
+        fault(&sheet).kind,
+        RecordingFault::RowLength { .. }
+    ));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use clap::{Parser, Subcommand};
 
 use super::check::CheckArguments;
 use super::compile::CompileArguments;
+use super::convert::ConvertArguments;
 use super::identify::IdentifyArguments;
 use super::import::ImportArguments;
 use super::manual::{CompletionsArguments, ManualArguments};
@@ -37,6 +38,8 @@ pub enum Command {
     Demo(DemoArguments),
     /// Describe a recording or a model, and list what is implausible in it
     Inspect(InspectArguments),
+    /// Write recordings, or logs of other programs, as CSV or MCAP
+    Convert(ConvertArguments),
     /// Find gravity, mass and the joints' losses in recordings
     Identify(IdentifyArguments),
     /// Learn a model from recordings

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::number::{count, real};
+use super::reading::ReadingArguments;
 use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::Target;
 use crate::limits::table::{DIGITS, MARGIN, SIGNIFICANT, WIDTH};
@@ -142,4 +143,6 @@ pub struct SimplifyArguments {
     /// Also write the simplified model to this file
     #[arg(long, value_name = "MODEL.json", requires = "domain")]
     pub save_model: Option<PathBuf>,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use super::robot::RobotParser;
 use clap::Args;
 
+use super::reading::ReadingArguments;
+
 /// `romc identify`
 #[derive(Debug, Args)]
 #[command(
@@ -26,4 +28,6 @@ pub struct IdentifyArguments {
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::number::{count, real};
+use super::reading::ReadingArguments;
 use super::robot::RobotParser;
 use crate::import::{
     Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
@@ -116,4 +117,6 @@ pub struct ImportArguments {
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }

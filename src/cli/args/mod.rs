@@ -11,11 +11,13 @@
 mod check;
 mod command;
 mod compile;
+mod convert;
 mod identify;
 mod import;
 mod manual;
 mod number;
 mod plan;
+mod reading;
 mod robot;
 mod run;
 mod train;
@@ -25,10 +27,12 @@ pub use command::{Arguments, Command};
 pub use compile::{
     CodeArguments, CompileArguments, EquationArguments, SimplifyArguments, UnitsChoice,
 };
+pub use convert::ConvertArguments;
 pub use identify::IdentifyArguments;
 pub use import::{ImportArguments, LibraryArgument};
 pub use manual::{CompletionsArguments, ManualArguments};
 pub use plan::PlanArguments;
+pub use reading::ReadingArguments;
 pub use robot::{RobotArguments, RobotParser};
 pub use run::{DemoArguments, InspectArguments, MpcArguments, ReportArguments, SimulateArguments};
 pub use train::{Dimensions, PhaseSet, StudyArguments, TrainArguments, TrainSettings, Widths};

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::number::real;
+use super::reading::ReadingArguments;
 use crate::limits::table::{APEX, DISTANCE};
 
 /// `romc plan`
@@ -55,4 +56,6 @@ pub struct PlanArguments {
     /// Write a plan that is not to be trusted, and replace existing files
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }

@@ -6,6 +6,7 @@ use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
 use super::number::{count, real};
+use super::reading::ReadingArguments;
 use super::robot::RobotParser;
 use crate::evaluate::ReferenceInput;
 use crate::limits::table::{HORIZON, RESTART_EVERY, STEP};
@@ -27,7 +28,7 @@ pub struct DemoArguments {
 /// `romc inspect`
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example:\n  romc inspect models/go1-d4.json examples/recordings/go1/test_01.csv.gz"
+    after_help = "Example:\n  romc inspect models/go1-d4.json examples/recordings/go1/test_01.csv.gz\n  romc inspect --guess my-log.csv > my-log.toml"
 )]
 pub struct InspectArguments {
     /// Models (`.json`) and recordings (`.csv`, `.csv.gz`)
@@ -36,6 +37,17 @@ pub struct InspectArguments {
     /// Robot whose limits the recordings are compared with: go1, go2, a1, or a .toml or .urdf file
     #[arg(long, value_name = "ROBOT", default_value = "go1", value_parser = RobotParser, hide_possible_values = true)]
     pub robot: String,
+    /// Write a first map of an unknown log for --columns, from its names and numbers
+    #[arg(long, conflicts_with = "columns")]
+    pub guess: bool,
+    /// Write the guessed map to this file instead of to stdout
+    #[arg(long, value_name = "MAP.toml", requires = "guess")]
+    pub output: Option<PathBuf>,
+    /// Replace an existing output file
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }
 
 /// `romc simulate`
@@ -59,6 +71,8 @@ pub struct SimulateArguments {
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }
 
 impl ValueEnum for Lift {
@@ -128,6 +142,8 @@ pub struct MpcArguments {
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }
 
 /// `romc report`
@@ -168,4 +184,6 @@ pub struct ReportArguments {
     /// Replace an existing page, or write into a folder that holds files romc did not make
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }

@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
 use super::number::{count, finite, real};
+use super::reading::ReadingArguments;
 use super::robot::RobotParser;
 use crate::limits::table;
 use crate::model::Activation;
@@ -107,6 +108,8 @@ pub struct TrainArguments {
     /// Replace an existing output file
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }
 
 /// Settings of `romc train`; what is not given keeps the default of the method.
@@ -275,6 +278,8 @@ pub struct StudyArguments {
     /// Replace tables and figures of these names that romc did not make
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub reading: ReadingArguments,
 }
 
 /// Latent dimensions of a study, ascending.

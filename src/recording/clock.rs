@@ -6,8 +6,9 @@
 
 use nalgebra::DMatrix;
 
-use crate::recording::preprocess::{differences, resampled};
-use crate::recording::{RecordingError, Segment};
+use super::error::RecordingError;
+use super::preprocess::{differences, resampled};
+use super::segment::Segment;
 use crate::robot::{BODY_DIM, JOINT_DIM};
 
 /// Elapsed over stamped time from which a segment's clock is replaced.
@@ -37,6 +38,8 @@ pub struct Timed {
     /// Whether the trunk's angular rates are differences of its angles, because those of the file
     /// disagree with them.
     pub rates_replaced: bool,
+    /// Whether the steps were uneven and the samples are interpolated.
+    pub resampled: bool,
     /// Samples that stand in for lost ones: straight lines across more than five steps.
     pub lost: Vec<bool>,
 }
@@ -60,20 +63,25 @@ pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
         false => segment.clone(),
     };
     let step_s = segment.mean_step_s();
-    let mut mended = match is_even(&chosen) {
-        true => chosen.clone(),
-        false => {
+    let resamples = !is_even(&chosen);
+    let mut mended = match resamples {
+        false => chosen.clone(),
+        true => {
             let rows = (chosen.duration_s() / step_s).round() as usize + 1;
             resampled(&chosen, rows)?
         }
     };
     let lost = lost(&chosen.time_s, &mended.time_s, step_s);
     let rates_replaced = replace_angular_rates(&mut mended);
+    if rebuilt || rates_replaced {
+        mended.ddx = differences(&mended.time_s, &mended.dx);
+    }
     Ok(Timed {
         segment: mended,
         elapsed_ratio,
         rebuilt,
         rates_replaced,
+        resampled: resamples,
         lost,
     })
 }

@@ -1,0 +1,181 @@
+//! Quaternions to roll, pitch and yaw; angular velocities to the rates of these angles.
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use std::f64::consts::{PI, TAU};
+
+/// Cosine of the pitch below which roll and yaw cannot be told apart.
+const UPRIGHT: f64 = 1e-6;
+
+/// Roll, pitch and yaw of quaternions (w, x, y, z), R = Rz Ry Rx; the length of a quaternion does not matter.
+pub(super) fn angles_of_quaternions(quaternions: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(3, quaternions.ncols());
+    for (mut angles, q) in out.column_iter_mut().zip(quaternions.column_iter()) {
+        let norm = q.norm();
+        let (w, x, y, z) = (q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm);
+        let sine = 2.0 * (w * y - x * z);
+        let (forward, side) = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z));
+        angles[0] = (2.0 * (y * z + w * x)).atan2(1.0 - 2.0 * (x * x + y * y));
+        angles[1] = sine.atan2(forward.hypot(side));
+        angles[2] = side.atan2(forward);
+    }
+    out
+}
+
+/// Takes whole turns off rows of angles where they jump by more than half a turn; whether any did.
+pub(super) fn unwrap(angles: &mut DMatrix<f64>) -> bool {
+    let mut any = false;
+    for mut row in angles.row_iter_mut() {
+        let mut turns = 0.0;
+        for i in 1..row.len() {
+            let now = row[i] + turns;
+            let jump = now - row[i - 1];
+            if jump.abs() > PI {
+                turns -= TAU * (jump / TAU).round();
+                any = true;
+            }
+            row[i] += turns;
+        }
+    }
+    any
+}
+
+/// Axes that an angular velocity is given in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum RateAxes {
+    Body,
+    World,
+}
+
+/// Rates of roll, pitch and yaw from an angular velocity about the body's or the world's axes.
+///
+/// `None` for the first sample at which the trunk points straight up or down.
+pub(super) fn angle_rates(
+    angles: &DMatrix<f64>,
+    angular: &DMatrix<f64>,
+    axes: RateAxes,
+) -> Result<DMatrix<f64>, usize> {
+    let mut out = DMatrix::zeros(3, angular.ncols());
+    for i in 0..angular.ncols() {
+        let [roll, pitch, yaw] = [angles[(0, i)], angles[(1, i)], angles[(2, i)]];
+        let omega = Vector3::new(angular[(0, i)], angular[(1, i)], angular[(2, i)]);
+        let (s_p, c_p) = pitch.sin_cos();
+        if c_p.abs() < UPRIGHT {
+            return Err(i);
+        }
+        let map = match axes {
+            RateAxes::Body => {
+                let (s_r, c_r) = roll.sin_cos();
+                let tangent = s_p / c_p;
+                Matrix3::new(
+                    1.0,
+                    s_r * tangent,
+                    c_r * tangent, //
+                    0.0,
+                    c_r,
+                    -s_r, //
+                    0.0,
+                    s_r / c_p,
+                    c_r / c_p,
+                )
+            }
+            RateAxes::World => {
+                let (s_y, c_y) = yaw.sin_cos();
+                Matrix3::new(
+                    c_y / c_p,
+                    s_y / c_p,
+                    0.0, //
+                    -s_y,
+                    c_y,
+                    0.0, //
+                    c_y * s_p / c_p,
+                    s_y * s_p / c_p,
+                    1.0,
+                )
+            }
+        };
+        out.set_column(i, &(map * omega));
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::input_rule::rotation;
+
+    const ATTITUDES: [[f64; 3]; 4] = [
+        [0.1, -0.2, 0.3],
+        [-1.0, 1.2, -3.0],
+        [0.0, -1.5, 2.0],
+        [3.0, 0.4, 0.0],
+    ];
+
+    /// Half-angle products in the order z, y, x.
+    fn quaternion([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
+        let of = |axis: usize, angle: f64| {
+            let mut q = [(angle / 2.0).cos(), 0.0, 0.0, 0.0];
+            q[axis] = (angle / 2.0).sin();
+            q
+        };
+        let times = |a: [f64; 4], b: [f64; 4]| {
+            [
+                a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+                a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+                a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+                a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+            ]
+        };
+        times(times(of(3, yaw), of(2, pitch)), of(1, roll))
+    }
+
+    #[test]
+    fn angles_of_quaternions_of_either_sign_and_any_length_are_those_of_the_rotation() {
+        for angles in ATTITUDES {
+            for scale in [1.0, -1.0, 0.4] {
+                let q = quaternion(angles).map(|part| scale * part);
+                let found = angles_of_quaternions(&DMatrix::from_column_slice(4, 1, &q));
+                let error = (&found - DMatrix::from_column_slice(3, 1, &angles)).amax();
+                assert!(error < 1e-14, "{angles:?} {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn angle_rates_agree_with_the_derivative_of_the_rotation() {
+        let rates = [0.7, -1.1, 0.4];
+        for angles in ATTITUDES {
+            let turned = |h: f64| rotation(std::array::from_fn(|i| angles[i] + h * rates[i]));
+            let (h, r) = (1e-6, rotation(angles));
+            let derivative = (turned(h) - turned(-h)) / (2.0 * h);
+            for (axes, spin) in [
+                (RateAxes::Body, r.transpose() * derivative),
+                (RateAxes::World, derivative * r.transpose()),
+            ] {
+                let omega = [spin[(2, 1)], spin[(0, 2)], spin[(1, 0)]];
+                let column = |values: &[f64; 3]| DMatrix::from_column_slice(3, 1, values);
+                let found = angle_rates(&column(&angles), &column(&omega), axes).unwrap();
+                let error = (&found - column(&rates)).amax();
+                assert!(error < 1e-8, "{axes:?} {angles:?}: {found}");
+            }
+        }
+        let upright = DMatrix::from_column_slice(3, 1, &[0.0, PI / 2.0, 0.0]);
+        assert_eq!(
+            angle_rates(&upright, &DMatrix::zeros(3, 1), RateAxes::Body),
+            Err(0)
+        );
+    }
+
+    #[test]
+    fn unwrap_takes_whole_turns_off() {
+        let mut angles = DMatrix::from_row_slice(1, 5, &[3.0, 3.1, -3.1, -3.0, 3.1]);
+        assert!(unwrap(&mut angles));
+        let expected = [3.0, 3.1, TAU - 3.1, TAU - 3.0, 3.1];
+        assert!(
+            angles
+                .iter()
+                .zip(expected)
+                .all(|(a, b)| (a - b).abs() < 1e-14)
+        );
+        assert!(!unwrap(&mut angles));
+    }
+}

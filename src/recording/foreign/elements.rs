@@ -1,0 +1,225 @@
+//! The quantities of a recording and the names of their elements, in romc's order.
+
+use super::units::Dimension;
+use crate::recording::columns::Column;
+use crate::robot::{FOOT_DIM, JOINT_DIM, JOINT_NAMES, Leg};
+
+/// A quantity that a map places.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Quantity {
+    /// Joint angles.
+    JointPosition,
+    /// Joint velocities.
+    JointVelocity,
+    /// Joint accelerations.
+    JointAcceleration,
+    /// Joint torques.
+    JointTorque,
+    /// Position of the trunk.
+    BodyPosition,
+    /// Attitude of the trunk: a quaternion, or roll, pitch and yaw.
+    Orientation,
+    /// Velocity of the trunk.
+    BodyVelocity,
+    /// Angular velocity of the trunk, or rates of roll, pitch and yaw.
+    AngularVelocity,
+    /// Acceleration of the trunk.
+    BodyAcceleration,
+    /// Second derivatives of roll, pitch and yaw.
+    AngularAcceleration,
+    /// Contact, or forces at the feet.
+    Feet,
+}
+
+impl Quantity {
+    /// All, in the order of a map.
+    pub const ALL: [Self; 11] = [
+        Self::JointPosition,
+        Self::JointVelocity,
+        Self::JointAcceleration,
+        Self::JointTorque,
+        Self::BodyPosition,
+        Self::Orientation,
+        Self::BodyVelocity,
+        Self::AngularVelocity,
+        Self::BodyAcceleration,
+        Self::AngularAcceleration,
+        Self::Feet,
+    ];
+
+    /// Its table in a map.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::JointPosition => "joint.position",
+            Self::JointVelocity => "joint.velocity",
+            Self::JointAcceleration => "joint.acceleration",
+            Self::JointTorque => "joint.torque",
+            Self::BodyPosition => "body.position",
+            Self::Orientation => "body.orientation",
+            Self::BodyVelocity => "body.velocity",
+            Self::AngularVelocity => "body.angular_velocity",
+            Self::BodyAcceleration => "body.acceleration",
+            Self::AngularAcceleration => "body.angular_acceleration",
+            Self::Feet => "feet",
+        }
+    }
+
+    /// What its units measure.
+    pub(super) const fn dimension(self) -> Dimension {
+        match self {
+            Self::JointPosition
+            | Self::JointVelocity
+            | Self::JointAcceleration
+            | Self::Orientation
+            | Self::AngularVelocity
+            | Self::AngularAcceleration => Dimension::Angle,
+            Self::BodyPosition | Self::BodyVelocity | Self::BodyAcceleration => Dimension::Length,
+            Self::JointTorque => Dimension::Torque,
+            Self::Feet => Dimension::Force,
+        }
+    }
+
+    /// Whether a recording cannot be without it.
+    pub(super) const fn is_required(self) -> bool {
+        matches!(
+            self,
+            Self::JointPosition
+                | Self::JointTorque
+                | Self::BodyPosition
+                | Self::Orientation
+                | Self::Feet
+        )
+    }
+
+    /// Whether the quantity is one of joints.
+    pub(super) const fn is_of_joints(self) -> bool {
+        matches!(
+            self,
+            Self::JointPosition | Self::JointVelocity | Self::JointAcceleration | Self::JointTorque
+        )
+    }
+
+    /// Names of its elements in romc's order; a quaternion has [`QUATERNION`] instead.
+    pub(super) fn elements(self) -> Vec<String> {
+        let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        match self {
+            _ if self.is_of_joints() => owned(&JOINT_NAMES),
+            Self::Orientation | Self::AngularAcceleration => owned(&ANGLES),
+            Self::Feet => Leg::ALL.map(|leg| leg.to_string()).to_vec(),
+            _ => owned(&AXES),
+        }
+    }
+
+    /// The recording's column of an element, for messages.
+    pub(super) fn column(self, element: usize) -> Column {
+        match self {
+            Self::JointPosition => Column::Position(element),
+            Self::JointVelocity => Column::Velocity(element),
+            Self::JointAcceleration => Column::Acceleration(element),
+            Self::JointTorque => Column::Torque(element),
+            Self::BodyPosition => Column::Position(JOINT_DIM + element),
+            Self::Orientation => Column::Position(JOINT_DIM + 3 + element.min(2)),
+            Self::BodyVelocity => Column::Velocity(JOINT_DIM + element),
+            Self::AngularVelocity => Column::Velocity(JOINT_DIM + 3 + element),
+            Self::BodyAcceleration => Column::Acceleration(JOINT_DIM + element),
+            Self::AngularAcceleration => Column::Acceleration(JOINT_DIM + 3 + element),
+            Self::Feet => Column::Foot(element.min(FOOT_DIM - 1)),
+        }
+    }
+}
+
+/// Axes of the body or the world.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+/// Roll, pitch and yaw.
+pub(super) const ANGLES: [&str; 3] = ["roll", "pitch", "yaw"];
+/// Elements of a quaternion, the real part first.
+pub(super) const QUATERNION: [&str; 4] = ["w", "x", "y", "z"];
+
+/// The elements that the words of an order name, in that order: single names, names with `*` for every leg or
+/// joint (`*.hx`, `fl.*`), a word of single letters (`wxyz`, `rpy`, `xyz`).
+///
+/// # Errors
+/// The word that names nothing, or an element that is named twice.
+pub(super) fn ordered(words: &[String], elements: &[String]) -> Result<Vec<usize>, String> {
+    let mut out = Vec::new();
+    for word in words {
+        let found = named(word, elements);
+        if found.is_empty() {
+            return Err(format!("`{word}`, which is none of {}", elements.join(" ")));
+        }
+        for element in found {
+            if out.contains(&element) {
+                return Err(format!("`{}` twice", elements[element]));
+            }
+            out.push(element);
+        }
+    }
+    Ok(out)
+}
+
+/// The elements that one word names.
+pub(super) fn named(word: &str, elements: &[String]) -> Vec<usize> {
+    let word = word.trim().to_lowercase();
+    let matches = |element: &String| match word.split_once('*') {
+        Some((start, end)) => element.starts_with(start) && element.ends_with(end),
+        None => *element == word,
+    };
+    let found: Vec<usize> = (0..elements.len())
+        .filter(|i| matches(&elements[*i]))
+        .collect();
+    if !found.is_empty() || !word.is_ascii() {
+        return found;
+    }
+    // Letters: `wxyz`, or the first letters of roll, pitch and yaw.
+    let letters = word.chars().map(|letter| {
+        let first = |element: &String| element.starts_with(letter);
+        elements.iter().position(first)
+    });
+    let short = elements
+        .iter()
+        .all(|element| ["x", "y", "z", "w", "roll", "pitch", "yaw"].contains(&&element[..]));
+    match letters.collect::<Option<Vec<usize>>>() {
+        Some(found) if short => found,
+        Some(_) | None => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn order(text: &str, quantity: Quantity) -> Result<Vec<usize>, String> {
+        let words: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
+        ordered(&words, &quantity.elements())
+    }
+
+    #[test]
+    fn ordered_wildcards_stand_for_every_leg_or_joint() {
+        let found = order("*.hx *.hy *.kn", Quantity::JointPosition).unwrap();
+        assert_eq!(found, [0, 3, 6, 9, 1, 4, 7, 10, 2, 5, 8, 11]);
+        let found = order("fl.* fr.* rl.* rr.*", Quantity::JointTorque).unwrap();
+        assert_eq!(found, [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]);
+        assert_eq!(order("fl fr rl rr", Quantity::Feet).unwrap(), [1, 0, 3, 2]);
+    }
+
+    #[test]
+    fn ordered_letters_stand_for_axes_and_angles() {
+        assert_eq!(order("ypr", Quantity::Orientation).unwrap(), [2, 1, 0]);
+        assert_eq!(order("zxy", Quantity::BodyPosition).unwrap(), [2, 0, 1]);
+        let quaternion = QUATERNION.map(str::to_owned);
+        let found = ordered(&["xyzw".to_owned()], &quaternion).unwrap();
+        assert_eq!(found, [1, 2, 3, 0]);
+    }
+
+    #[test]
+    fn ordered_unknown_and_repeated_names_are_refused() {
+        let error = order("fr.hx fr.hx", Quantity::JointPosition).unwrap_err();
+        assert_eq!(error, "`fr.hx` twice");
+        assert!(
+            order("FR.hz", Quantity::JointPosition)
+                .unwrap_err()
+                .starts_with("`FR.hz`")
+        );
+        assert!(order("xx", Quantity::BodyPosition).is_err());
+    }
+}

@@ -1,0 +1,147 @@
+//! What the numbers say: a velocity is the derivative of its position in one unit, sign and frame only.
+
+use nalgebra::{DMatrix, Matrix3};
+
+use super::super::attitude::{RateAxes, angle_rates};
+use crate::recording::preprocess::differences;
+use crate::robot::input_rule::rotation;
+
+/// Share of a derivative that a velocity must leave unexplained at most to be evidence.
+const UNEXPLAINED: f64 = 0.5;
+/// Times the least residual below which a plainer explanation is preferred.
+const AS_GOOD: f64 = 1.1;
+
+/// A unit and sign for all rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Scale {
+    pub unit: &'static str,
+    pub factor: f64,
+    pub sign: f64,
+}
+
+/// Slopes without the samples at which time jumps.
+pub(super) fn slopes(times_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(rows.nrows(), rows.ncols());
+    let mut start = 0;
+    for end in 1..=times_s.len() {
+        if end < times_s.len() && times_s[end] > times_s[end - 1] {
+            continue;
+        }
+        let own = rows.columns(start, end - start).into_owned();
+        let of = differences(&times_s[start..end], &own);
+        out.columns_mut(start, end - start).copy_from(&of);
+        start = end;
+    }
+    out
+}
+
+/// Squared residual of `derivative = scale x velocity`, as a share of the derivative.
+pub(super) fn residual(derivative: &DMatrix<f64>, velocity: &DMatrix<f64>) -> f64 {
+    (derivative - velocity).norm_squared() / derivative.norm_squared().max(1e-30)
+}
+
+/// The unit among `units` in which velocities are the derivatives best; `None` if in none.
+pub(super) fn scale(
+    derivative: &DMatrix<f64>,
+    raw: &DMatrix<f64>,
+    units: &[(&'static str, f64)],
+) -> Option<(Scale, f64)> {
+    let signs = [1.0, -1.0];
+    let candidates = units.iter().flat_map(|(unit, factor)| {
+        signs.map(|sign| {
+            let (unit, factor) = (*unit, *factor);
+            let left = residual(derivative, &(raw * (sign * factor)));
+            (Scale { unit, factor, sign }, left)
+        })
+    });
+    let best = candidates.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (best.1 < UNEXPLAINED).then_some(best)
+}
+
+/// Axes of the trunk's velocities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Axes {
+    Angles,
+    World,
+    Body,
+}
+
+/// Unit and axes of an angular velocity that is the rate of these angles.
+pub(super) fn angular(
+    angles: &DMatrix<f64>,
+    rates: &DMatrix<f64>,
+    raw: &DMatrix<f64>,
+    units: &[(&'static str, f64)],
+) -> Option<(Scale, Axes)> {
+    let turned = |axes: Axes| match axes {
+        Axes::Angles => Some(raw.clone()),
+        Axes::Body => angle_rates(angles, raw, RateAxes::Body).ok(),
+        Axes::World => angle_rates(angles, raw, RateAxes::World).ok(),
+    };
+    best([Axes::Angles, Axes::Body, Axes::World], |axes| {
+        scale(rates, &turned(axes)?, units)
+    })
+}
+
+/// Unit and axes of a velocity that is the rate of a position, in the world's axes or the body's.
+pub(super) fn linear(
+    angles: Option<&DMatrix<f64>>,
+    rates: &DMatrix<f64>,
+    raw: &DMatrix<f64>,
+    units: &[(&'static str, f64)],
+) -> Option<(Scale, Axes)> {
+    let turned = |axes: Axes| match (axes, angles) {
+        (Axes::Body, Some(angles)) if angles.ncols() == raw.ncols() => {
+            let mut out = raw.clone();
+            for i in 0..raw.ncols() {
+                let turn: Matrix3<f64> = rotation([angles[(0, i)], angles[(1, i)], angles[(2, i)]]);
+                out.set_column(i, &(turn * raw.fixed_view::<3, 1>(0, i)));
+            }
+            Some(out)
+        }
+        (Axes::Body, _) | (Axes::Angles, _) => None,
+        (Axes::World, _) => Some(raw.clone()),
+    };
+    best([Axes::World, Axes::Body], |axes| {
+        scale(rates, &turned(axes)?, units)
+    })
+}
+
+/// The first choice that explains nearly as much as the best.
+fn best<const N: usize>(
+    choices: [Axes; N],
+    explain: impl Fn(Axes) -> Option<(Scale, f64)>,
+) -> Option<(Scale, Axes)> {
+    let found: Vec<(Axes, Scale, f64)> = choices
+        .into_iter()
+        .filter_map(|axes| explain(axes).map(|(scale, left)| (axes, scale, left)))
+        .collect();
+    let least = found
+        .iter()
+        .map(|choice| choice.2)
+        .fold(f64::INFINITY, f64::min);
+    let first = found
+        .into_iter()
+        .find(|choice| choice.2 <= AS_GOOD * least + 1e-12)?;
+    Some((first.1, first.0))
+}
+
+/// Whether a quaternion's real part is its first or last element: that of a robot on its feet is the largest.
+pub(super) fn real_is_last(quaternions: &DMatrix<f64>) -> bool {
+    let size = |row: usize| {
+        quaternions
+            .row(row)
+            .iter()
+            .map(|value| value.abs())
+            .sum::<f64>()
+    };
+    size(3) > size(0)
+}
+
+/// The largest value, the 99th percentile of absolute values, so that single spikes do not count.
+pub(super) fn reach(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.map(f64::abs).collect();
+    sorted.sort_by(f64::total_cmp);
+    let place = (0.99 * (sorted.len() as f64 - 1.0)).max(0.0) as usize;
+    sorted.get(place).copied().unwrap_or_default()
+}

@@ -1,0 +1,417 @@
+//! What the name of a column says: leg, joint, axis, quantity, unit.
+
+use super::super::elements::Quantity;
+
+/// Words for legs, in romc's order.
+const LEGS: [&[&str]; 4] = [
+    &["fr", "rf", "frontright", "rightfront"],
+    &["fl", "lf", "frontleft", "leftfront"],
+    &[
+        "rr",
+        "hr",
+        "rh",
+        "br",
+        "rb",
+        "rearright",
+        "hindright",
+        "backright",
+        "rightrear",
+        "righthind",
+    ],
+    &[
+        "rl", "hl", "lh", "bl", "lb", "rearleft", "hindleft", "backleft", "leftrear", "lefthind",
+    ],
+];
+/// Words for joints, in romc's order; a bare `hip` is the first, unless `y`, `pitch` or `flexion` is beside it.
+const JOINTS: [&[&str]; 3] = [
+    &["hx", "haa", "abad", "abduction", "hipx", "hipaa"],
+    &["hy", "hfe", "thigh", "upper", "flexion", "hipy", "hipfe"],
+    &["kn", "kfe", "calf", "knee", "lower", "shank"],
+];
+const TORQUE: &[&str] = &[
+    "torque", "torques", "tau", "effort", "trq", "moment", "tauest",
+];
+const ACCELERATION: &[&str] = &[
+    "acceleration",
+    "acc",
+    "accel",
+    "ddq",
+    "qdd",
+    "ddot",
+    "accelerometer",
+];
+const VELOCITY: &[&str] = &[
+    "velocity", "vel", "dq", "qd", "qdot", "dot", "speed", "rate", "rates", "twist", "v", "dp",
+    "dx",
+];
+const ANGULAR_VELOCITY: &[&str] = &["gyro", "gyroscope", "omega", "w", "angvel"];
+const ANGULAR: &[&str] = &[
+    "angular",
+    "rpy",
+    "euler",
+    "attitude",
+    "orientation",
+    "ang",
+    "rot",
+    "rotation",
+];
+const QUATERNION: &[&str] = &[
+    "quat",
+    "quaternion",
+    "orientation",
+    "attitude",
+    "rotation",
+    "rot",
+    "q",
+];
+const PLACE: &[&str] = &[
+    "position", "pos", "com", "base", "body", "trunk", "torso", "pose", "odom",
+];
+const FEET: &[&str] = &[
+    "foot", "feet", "contact", "contacts", "grf", "touch", "stance", "toe",
+];
+const JOINT_ARRAYS: &[&str] = &[
+    "motor", "motors", "joint", "joints", "q", "dq", "ddq", "qd", "qdd", "qdot", "tau", "torque",
+    "effort", "position", "velocity",
+];
+/// Words of values that a controller asked for rather than measured.
+const WANTED: &[&str] = &[
+    "des",
+    "desired",
+    "ref",
+    "reference",
+    "cmd",
+    "command",
+    "target",
+    "setpoint",
+    "goal",
+    "raw",
+    "lost",
+    "temperature",
+    "mode",
+    "covariance",
+    "ff",
+    "kp",
+    "kd",
+];
+const TIME: &[&str] = &[
+    "time",
+    "timestamp",
+    "stamp",
+    "t",
+    "sec",
+    "secs",
+    "seconds",
+    "clock",
+    "datetime",
+    "date",
+];
+
+/// What a name says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Reading {
+    /// The quantity; a quaternion and angles are both orientations.
+    pub quantity: Quantity,
+    /// The element, in romc's order; of a quaternion 0 is w.
+    pub element: usize,
+    /// Whether the element is one of a quaternion.
+    pub is_quaternion: bool,
+    /// Whether the place was counted rather than named.
+    pub is_counted: bool,
+    /// The words that all elements of one quantity share.
+    pub family: String,
+    /// Whether it is something that was asked for rather than measured.
+    pub is_wanted: bool,
+}
+
+/// Words of a name: lower case, apart at signs, capitals and digits.
+pub(super) fn words(name: &str) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    let mut last = ' ';
+    for c in name.chars() {
+        let starts = !last.is_alphanumeric()
+            || (last.is_lowercase() && c.is_uppercase())
+            || (last.is_ascii_digit() != c.is_ascii_digit());
+        if c.is_alphanumeric() {
+            let low = c.to_lowercase();
+            match out.last_mut() {
+                Some(word) if !starts => word.extend(low),
+                Some(_) | None => out.push(low.collect()),
+            }
+        }
+        last = c;
+    }
+    out
+}
+
+fn is_one(word: &str, of: &[&str]) -> bool {
+    of.contains(&word)
+}
+
+/// Whether a name is one of a clock.
+pub(super) fn is_time(name: &str) -> bool {
+    words(name).iter().any(|word| is_one(word, TIME))
+}
+
+/// The unit that a name carries, such as `q_deg`, `time (ms)`.
+pub(super) fn unit(name: &str, units: &[&'static str]) -> Option<&'static str> {
+    let words = words(name);
+    // A single letter is rather an axis than a unit, unless in brackets.
+    let found = units.iter().find(|unit| {
+        let bracketed = ["(", "[", "/"].iter().any(|open| {
+            let close = if *open == "(" {
+                ")"
+            } else if *open == "[" {
+                "]"
+            } else {
+                ""
+            };
+            !close.is_empty()
+                && name
+                    .to_lowercase()
+                    .contains(&format!("{open}{unit}{close}"))
+        });
+        bracketed || (unit.len() > 1 && words.iter().skip(1).any(|word| word == *unit))
+    });
+    found.copied()
+}
+
+/// What the name of a column says, if it says enough.
+pub(super) fn read(name: &str) -> Option<Reading> {
+    let mut words = words(name);
+    join_pairs(&mut words);
+    split_compact(&mut words);
+    let place = |table: &[&[&str]]| {
+        let of = |word: &String| table.iter().position(|known| is_one(word, known));
+        words.iter().find_map(of)
+    };
+    let has = |known: &[&str]| words.iter().any(|word| is_one(word, known));
+    if has(&["covariance"]) {
+        return None;
+    }
+    let (leg, joint) = (place(&LEGS), joint(&words));
+    let number = words
+        .iter()
+        .rev()
+        .find_map(|word| word.parse::<usize>().ok());
+    let axis = place(&[&["x", "roll"], &["y", "pitch"], &["z", "yaw"]]);
+    let family: Vec<&str> = (words.iter().map(String::as_str))
+        .filter(|word| {
+            !LEGS.iter().chain(&JOINTS).any(|known| is_one(word, known))
+                && !is_one(word, &["x", "y", "z", "w", "roll", "pitch", "yaw", "hip"])
+                && word.parse::<usize>().is_err()
+        })
+        .collect();
+    let reading = |quantity, element, is_quaternion, is_counted| {
+        Some(Reading {
+            quantity,
+            element,
+            is_quaternion,
+            is_counted,
+            family: family.join(" "),
+            is_wanted: has(WANTED),
+        })
+    };
+    let kind = if has(TORQUE) {
+        Quantity::JointTorque
+    } else if has(ACCELERATION) {
+        Quantity::JointAcceleration
+    } else if has(VELOCITY) {
+        Quantity::JointVelocity
+    } else {
+        Quantity::JointPosition
+    };
+    if has(FEET) || (has(&["force", "forces"]) && axis.is_none()) {
+        let element = leg.or(number.filter(|n| *n < 4));
+        let is_place = axis.is_some_and(|axis| axis != 2 || has(&["position", "pos", "velocity"]));
+        return match element {
+            Some(element) if !is_place => reading(Quantity::Feet, element, false, leg.is_none()),
+            Some(_) | None => None,
+        };
+    }
+    if let Some(leg) = leg {
+        let joint = joint.or(number.filter(|number| *number < 3))?;
+        return reading(kind, 3 * leg + joint, false, false);
+    }
+    let in_array = number.filter(|number| *number < 12);
+    let of_body = has(&[
+        "imu", "body", "base", "trunk", "com", "torso", "pose", "odom", "twist",
+    ]);
+    let of_axes =
+        has(QUATERNION) && !has(&["q"]) || has(ANGULAR) || has(&["gyro", "gyroscope", "omega"]);
+    if let Some(number) = in_array
+        && axis.is_none()
+        && !of_body
+        && !of_axes
+        && has(JOINT_ARRAYS)
+    {
+        return reading(kind, number, false, true);
+    }
+    body(&words, axis, number, kind, reading)
+}
+
+/// The joint that words name.
+fn joint(words: &[String]) -> Option<usize> {
+    let of = |word: &String| JOINTS.iter().position(|known| is_one(word, known));
+    let has = |word: &str| words.iter().any(|own| own == word);
+    if has("hip") {
+        let flexes = has("y") || has("pitch") || has("flexion") || has("fe");
+        return Some(usize::from(flexes));
+    }
+    words.iter().find_map(of)
+}
+
+/// The element of a quantity of the trunk.
+fn body(
+    words: &[String],
+    axis: Option<usize>,
+    number: Option<usize>,
+    kind: Quantity,
+    reading: impl Fn(Quantity, usize, bool, bool) -> Option<Reading>,
+) -> Option<Reading> {
+    let has = |known: &[&str]| words.iter().any(|word| is_one(word, known));
+    let by_angle = has(&["roll", "pitch", "yaw", "rpy", "euler"]);
+    let counted = axis.is_none();
+    let is_real = has(&["w"]) && has(QUATERNION);
+    if is_real && !by_angle {
+        return reading(Quantity::Orientation, 0, true, false);
+    }
+    if has(&["quat", "quaternion"]) {
+        return match (axis, number) {
+            (Some(axis), _) => reading(Quantity::Orientation, axis + 1, true, false),
+            (None, Some(number)) if number < 4 => {
+                reading(Quantity::Orientation, number, true, true)
+            }
+            (None, _) => None,
+        };
+    }
+    let element = axis.or(number.filter(|number| *number < 3))?;
+    let angular = by_angle || has(ANGULAR) || has(ANGULAR_VELOCITY);
+    let rate = has(ANGULAR_VELOCITY) || kind == Quantity::JointVelocity;
+    let quantity = match (angular, kind) {
+        (_, Quantity::JointTorque) => return None,
+        (true, Quantity::JointAcceleration) => Quantity::AngularAcceleration,
+        (false, Quantity::JointAcceleration) => Quantity::BodyAcceleration,
+        (true, _) if rate => Quantity::AngularVelocity,
+        (true, _) if by_angle => Quantity::Orientation,
+        // `Body angular Position x`; a bare `orientation.x` is one of a quaternion.
+        (true, _) if has(&["position", "pos", "angle", "angular"]) => Quantity::Orientation,
+        (true, _) => return reading(Quantity::Orientation, element + 1, true, counted),
+        (false, _) if rate => Quantity::BodyVelocity,
+        (false, _) if has(&["q"]) => {
+            return reading(Quantity::Orientation, element + 1, true, counted);
+        }
+        (false, _) if has(PLACE) || words.len() == 1 => Quantity::BodyPosition,
+        (false, _) => return None,
+    };
+    reading(quantity, element, false, counted)
+}
+
+/// Joins `front right` and the like to one word.
+fn join_pairs(words: &mut Vec<String>) {
+    let known = |pair: &str| LEGS.iter().any(|names| is_one(pair, names));
+    let mut i = 0;
+    while i + 1 < words.len() {
+        let pair = format!("{}{}", words[i], words[i + 1]);
+        if pair.len() > 3 && known(&pair) {
+            words[i] = pair;
+            words.remove(i + 1);
+        }
+        i += 1;
+    }
+}
+
+/// Takes `vx`, `wz`, `qw`, `px`, `rollrate` apart.
+fn split_compact(words: &mut Vec<String>) {
+    let parts = |word: &str| -> Option<[String; 2]> {
+        for angle in ["roll", "pitch", "yaw"] {
+            for rate in ["rate", "speed", "dot", "vel"] {
+                if word == format!("{angle}{rate}") {
+                    return Some([angle.to_owned(), "rate".to_owned()]);
+                }
+            }
+            if word == format!("d{angle}") {
+                return Some([angle.to_owned(), "rate".to_owned()]);
+            }
+        }
+        let (what, axis) = word.split_at_checked(word.len().saturating_sub(1))?;
+        let axis_known = is_one(axis, &["x", "y", "z"]) || (what == "q" && axis == "w");
+        let whole = match what {
+            "v" | "vel" | "dp" => "velocity",
+            "w" | "omega" | "gyro" => "omega",
+            "q" | "quat" => "quat",
+            "p" | "pos" | "com" => "pos",
+            "a" | "acc" => "acc",
+            _ => return None,
+        };
+        axis_known.then(|| [whole.to_owned(), axis.to_owned()])
+    };
+    let split = words.iter().flat_map(|word| match parts(word) {
+        Some(parts) => parts.to_vec(),
+        None => vec![word.clone()],
+    });
+    *words = split.collect();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(name: &str) -> Option<(Quantity, usize)> {
+        read(name).map(|reading| (reading.quantity, reading.element))
+    }
+
+    #[test]
+    fn read_names_of_many_loggers() {
+        for (name, expected) in [
+            ("FR_hip_joint/position", (Quantity::JointPosition, 0)),
+            ("position[RL_calf_joint]", (Quantity::JointPosition, 11)),
+            ("effort[LF_HFE]", (Quantity::JointTorque, 4)),
+            ("motor_state[4].dq", (Quantity::JointVelocity, 4)),
+            ("q_11", (Quantity::JointPosition, 11)),
+            ("tau3", (Quantity::JointTorque, 3)),
+            ("front_right.knee.vel", (Quantity::JointVelocity, 2)),
+            ("RearLeft thigh angle (deg)", (Quantity::JointPosition, 10)),
+            ("fl.hip_pitch.torque", (Quantity::JointTorque, 4)),
+            ("pose.pose.position.z", (Quantity::BodyPosition, 2)),
+            ("pose.pose.orientation.w", (Quantity::Orientation, 0)),
+            ("pose.pose.orientation.z", (Quantity::Orientation, 3)),
+            ("twist.twist.linear.y", (Quantity::BodyVelocity, 1)),
+            ("twist.twist.angular.y", (Quantity::AngularVelocity, 1)),
+            ("imu_state.quaternion[2]", (Quantity::Orientation, 2)),
+            ("imu_state.gyroscope[0]", (Quantity::AngularVelocity, 0)),
+            ("qw", (Quantity::Orientation, 0)),
+            ("qx", (Quantity::Orientation, 1)),
+            ("body_vx", (Quantity::BodyVelocity, 0)),
+            ("wz", (Quantity::AngularVelocity, 2)),
+            ("base_pitch", (Quantity::Orientation, 1)),
+            ("yaw_rate", (Quantity::AngularVelocity, 2)),
+            ("foot_force[3]", (Quantity::Feet, 3)),
+            ("contact_RL", (Quantity::Feet, 3)),
+            ("fr Foot", (Quantity::Feet, 0)),
+            ("Body angular Position z", (Quantity::Orientation, 2)),
+            ("Body linear Velocity x", (Quantity::BodyVelocity, 0)),
+            ("com_z", (Quantity::BodyPosition, 2)),
+        ] {
+            assert_eq!(said(name), Some(expected), "{name}");
+        }
+    }
+
+    #[test]
+    fn read_other_columns_say_nothing() {
+        for name in [
+            "wireless_remote[0]",
+            "temperature",
+            "FR_foot_position_x",
+            "battery",
+            "mode",
+            "tick",
+        ] {
+            assert_eq!(said(name), None, "{name}");
+        }
+        assert!(read("q_des_3").unwrap().is_wanted);
+        assert!(is_time("header.stamp") && is_time("Time [ms]") && !is_time("tau"));
+        assert_eq!(unit("Time [ms]", &["s", "ms"]), Some("ms"));
+        assert_eq!(unit("knee_deg", &["rad", "deg"]), Some("deg"));
+    }
+}

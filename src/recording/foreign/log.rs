@@ -1,0 +1,74 @@
+//! A log as it was read: named columns of numbers, before anyone says what they are.
+
+use std::path::PathBuf;
+
+use super::map::Name;
+use crate::recording::instant::Instant;
+
+/// One file or topic.
+#[derive(Debug, Clone)]
+pub(in crate::recording) struct Log {
+    /// The file.
+    pub path: PathBuf,
+    /// Name of the file in a map, or of the topic; empty for the only file.
+    pub name: String,
+    /// Column of the clock, in s, that every message of a topic has.
+    pub clock: Option<usize>,
+    /// The columns in the order of the file.
+    pub columns: Vec<Channel>,
+    /// Whether the columns have names.
+    pub is_named: bool,
+    /// Line of the first sample, 1 for the first message of a topic.
+    pub first_row: usize,
+}
+
+/// One column.
+#[derive(Debug, Clone, Default)]
+pub(in crate::recording) struct Channel {
+    /// Its name; empty without a header.
+    pub name: String,
+    /// Its values; NaN where a cell is empty or no number.
+    pub values: Vec<f64>,
+    /// The same as times, where the column holds times that one number does not hold.
+    pub instants: Option<Vec<Instant>>,
+    /// The first cell that is no number: its sample and text.
+    pub refused: Option<(usize, String)>,
+}
+
+impl Log {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.columns
+            .first()
+            .map_or(0, |channel| channel.values.len())
+    }
+
+    /// The column of a name or number: an exact name before one that differs in case and blanks.
+    pub fn column(&self, name: &Name) -> Option<usize> {
+        match name {
+            Name::Number(number) => number.checked_sub(1).filter(|i| *i < self.columns.len()),
+            Name::Text(text) => {
+                let find = |same: &dyn Fn(&str) -> bool| {
+                    self.columns.iter().position(|channel| same(&channel.name))
+                };
+                let folded = crate::recording::columns::folded(text);
+                find(&|name| name == text)
+                    .or_else(|| find(&|name| crate::recording::columns::folded(name) == folded))
+            }
+        }
+    }
+
+    /// The first columns by name, for messages.
+    pub fn summary(&self) -> String {
+        const MOST: usize = 6;
+        if !self.is_named {
+            return format!("{} columns without names", self.columns.len());
+        }
+        let names = self.columns.iter().take(MOST);
+        let names: Vec<String> = names.map(|channel| format!("`{}`", channel.name)).collect();
+        match self.columns.len().checked_sub(MOST) {
+            Some(more) if more > 0 => format!("{} and {more} more", names.join(", ")),
+            _ => names.join(", "),
+        }
+    }
+}

@@ -1,0 +1,477 @@
+//! The map of a log: which column is what, in which unit, sign and order; a TOML file.
+//!
+//! ```toml
+//! [time]
+//! column = "stamp"
+//! unit = "ms"
+//!
+//! [joint.position]
+//! columns = "{leg}_{joint}_joint/position"
+//! unit = "deg"
+//! ```
+//!
+//! `docs/logs.md` describes every key.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::elements::Quantity;
+use crate::recording::error::{RecordingError, RecordingFault};
+
+/// A map as its file says it.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ColumnMap {
+    /// How text files are laid out.
+    pub text: TextFormat,
+    /// The clock of all tables that have none of their own.
+    pub time: TimeMap,
+    /// Words that stand for legs, joints and axes in patterns of names.
+    pub names: Names,
+    joint: JointTables,
+    body: BodyTables,
+    feet: Option<Table>,
+    /// The file that the map was read from, for messages.
+    #[serde(skip)]
+    pub file: String,
+}
+
+/// How text files are laid out; what is absent is found from the file.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TextFormat {
+    /// Separator of cells.
+    pub delimiter: Option<Delimiter>,
+    /// Whether the first line has names.
+    pub header: Option<bool>,
+    /// Lines before the first that counts.
+    pub skip: usize,
+    /// Empty cells and NaN are samples that a quantity does not have, where topics share one table.
+    pub blank: bool,
+    /// First and last sample to keep, counted from 1.
+    pub rows: Option<[usize; 2]>,
+}
+
+/// Separator of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Delimiter {
+    /// One tab.
+    Tab,
+    /// Any number of blanks or tabs.
+    Blank,
+    /// `,`
+    Comma,
+    /// `;`
+    Semicolon,
+}
+
+/// The clock.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TimeMap {
+    /// Its column; absent with `sample_time_s`.
+    pub column: Option<Name>,
+    /// Its unit, s unless given; dates and times of day are found by themselves.
+    pub unit: Option<String>,
+    /// Distance of samples without a clock, in s.
+    pub sample_time_s: Option<f64>,
+    /// Even steps to bring the recording to, in s.
+    pub resample_s: Option<f64>,
+    /// Largest distance between samples of a topic that is interpolated, in s; 0.05 unless given.
+    pub max_gap_s: Option<f64>,
+}
+
+/// Words that stand for `{leg}`, `{joint}`, `{axis}` in patterns of names, in romc's order.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Names {
+    /// fr, fl, rr, rl.
+    pub legs: [String; 4],
+    /// hx, hy, kn.
+    pub joints: [String; 3],
+    /// x, y, z.
+    pub axes: [String; 3],
+}
+
+impl Default for Names {
+    fn default() -> Self {
+        Self {
+            legs: ["fr", "fl", "rr", "rl"].map(str::to_owned),
+            joints: ["hx", "hy", "kn"].map(str::to_owned),
+            axes: ["x", "y", "z"].map(str::to_owned),
+        }
+    }
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct JointTables {
+    position: Option<Table>,
+    velocity: Option<Table>,
+    acceleration: Option<Table>,
+    torque: Option<Table>,
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct BodyTables {
+    position: Option<Table>,
+    orientation: Option<Table>,
+    velocity: Option<Table>,
+    angular_velocity: Option<Table>,
+    acceleration: Option<Table>,
+    angular_acceleration: Option<Table>,
+}
+
+/// Where one quantity stands: `value = sign x unit x raw + offset`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Table {
+    /// Columns: names, numbers from 1, ranges such as `"4..6"`, or one pattern.
+    pub columns: Columns,
+    /// The file or topic that they are in; the only one unless given.
+    #[serde(default, alias = "topic")]
+    pub file: Option<String>,
+    /// Column of a clock of their own.
+    #[serde(default)]
+    pub time: Option<Name>,
+    /// Unit of that clock.
+    #[serde(default)]
+    pub time_unit: Option<String>,
+    /// Added to the clock, in s.
+    #[serde(default)]
+    pub time_offset_s: f64,
+    /// Unit; SI unless given.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// 1 or -1: for all, for each column, or by the names of elements.
+    #[serde(default)]
+    pub sign: Option<Factors>,
+    /// Added after sign and unit, in SI units: for all, for each column, or by the names of elements.
+    #[serde(default)]
+    pub offset: Option<Factors>,
+    /// What each column is; romc's order unless given.
+    #[serde(default)]
+    pub order: Option<Words>,
+    /// Axes of velocities: `world` (unless given) or `body`; of angular velocities also `angles`, rates of
+    /// roll, pitch and yaw (unless given).
+    #[serde(default)]
+    pub frame: Option<Frame>,
+    /// `start`: x and y count from the first sample.
+    #[serde(default)]
+    pub origin: Option<Origin>,
+    /// Force from which a foot is on the ground, in the table's unit; absent for flags.
+    #[serde(default)]
+    pub threshold: Option<f64>,
+    /// Force below which it is in the air again; the threshold unless given.
+    #[serde(default)]
+    pub release: Option<f64>,
+}
+
+/// A column: its name, or its number from 1.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(untagged)]
+pub enum Name {
+    /// Counted from 1.
+    Number(usize),
+    /// As in the header.
+    Text(String),
+}
+
+/// The columns of a quantity.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(untagged)]
+pub enum Columns {
+    /// One name, range or pattern.
+    One(Name),
+    /// Several.
+    Many(Vec<Name>),
+}
+
+/// Words, also in one text with blanks between them.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(untagged)]
+pub enum Words {
+    /// With blanks.
+    One(String),
+    /// One by one.
+    Many(Vec<String>),
+}
+
+/// A number for all columns, for each, or by name (`*.kn`).
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum Factors {
+    /// For all.
+    All(f64),
+    /// For each column, in the order of the columns.
+    Each(Vec<f64>),
+    /// By the names of elements.
+    Named(BTreeMap<String, f64>),
+}
+
+/// Axes of a velocity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Frame {
+    /// Fixed axes.
+    World,
+    /// The trunk's own.
+    Body,
+    /// Rates of roll, pitch and yaw.
+    Angles,
+}
+
+/// Where positions count from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Origin {
+    /// The first sample, for x and y.
+    Start,
+    /// As logged.
+    Log,
+}
+
+impl ColumnMap {
+    /// Reads a map.
+    ///
+    /// # Errors
+    /// [`RecordingFault::MapSyntax`] with line, key and what was expected; [`RecordingFault::Map`] for
+    /// a key that does not apply to its table.
+    pub fn read(path: &Path) -> Result<Self, RecordingError> {
+        let text = std::fs::read_to_string(path).map_err(|source| match source.kind() {
+            std::io::ErrorKind::NotFound => RecordingFault::Missing.of(path),
+            _ => RecordingFault::io("read", source).of(path),
+        })?;
+        Self::parse(&path.display().to_string(), &text)
+    }
+
+    /// [`Self::read`] of a text; `file` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(file: &str, text: &str) -> Result<Self, RecordingError> {
+        let mut map: Self = toml::from_str(text).map_err(|error| {
+            let message = error.to_string().trim_end().to_owned();
+            RecordingFault::MapSyntax(message).of(Path::new(file))
+        })?;
+        map.file = file.to_owned();
+        map.require_applicable()?;
+        Ok(map)
+    }
+
+    /// Where a quantity stands.
+    pub fn table(&self, quantity: Quantity) -> Option<&Table> {
+        let (joint, body) = (&self.joint, &self.body);
+        match quantity {
+            Quantity::JointPosition => &joint.position,
+            Quantity::JointVelocity => &joint.velocity,
+            Quantity::JointAcceleration => &joint.acceleration,
+            Quantity::JointTorque => &joint.torque,
+            Quantity::BodyPosition => &body.position,
+            Quantity::Orientation => &body.orientation,
+            Quantity::BodyVelocity => &body.velocity,
+            Quantity::AngularVelocity => &body.angular_velocity,
+            Quantity::BodyAcceleration => &body.acceleration,
+            Quantity::AngularAcceleration => &body.angular_acceleration,
+            Quantity::Feet => &self.feet,
+        }
+        .as_ref()
+    }
+
+    /// The files or topics that the map names, each once, in its order.
+    pub fn files(&self) -> Vec<&str> {
+        let mut out: Vec<&str> = Vec::new();
+        let tables = Quantity::ALL.iter().filter_map(|q| self.table(*q));
+        for file in tables.filter_map(|table| table.file.as_deref()) {
+            if !out.contains(&file) {
+                out.push(file);
+            }
+        }
+        out
+    }
+
+    /// The fault of a key.
+    pub(super) fn fault(&self, key: &str, found: String, expected: String) -> RecordingError {
+        let place = crate::files::Place::Entry(format!("`{key}`").into());
+        RecordingError::new(&self.file, place, RecordingFault::Map { found, expected })
+    }
+
+    fn require_applicable(&self) -> Result<(), RecordingError> {
+        for quantity in Quantity::ALL {
+            let Some(table) = self.table(quantity) else {
+                if quantity.is_required() {
+                    let found = "no such table".to_owned();
+                    let expected = format!("the columns of {}", quantity.column(0).name());
+                    return Err(self.fault(quantity.key(), found, expected));
+                }
+                continue;
+            };
+            let refuse = |key: &str, expected: &str| {
+                let key = format!("{}.{key}", quantity.key());
+                Err(self.fault(&key, "a value".to_owned(), expected.to_owned()))
+            };
+            let angular = quantity == Quantity::AngularVelocity;
+            let velocity = quantity == Quantity::BodyVelocity;
+            match table.frame {
+                Some(_) if !angular && !velocity => {
+                    return refuse("frame", "none: only velocities of the body have one");
+                }
+                Some(Frame::Angles) if !angular => return refuse("frame", "`world` or `body`"),
+                Some(_) | None => {}
+            }
+            if table.origin.is_some() && quantity != Quantity::BodyPosition {
+                return refuse("origin", "none: only `body.position` has one");
+            }
+            if table.release.is_some() && table.threshold.is_none() {
+                return refuse("release", "a `threshold` beside it");
+            }
+            if table.threshold.is_some() && quantity != Quantity::Feet {
+                return refuse("threshold", "none: only `feet` has one");
+            }
+            if table.release > table.threshold {
+                return refuse("release", "at most the `threshold`");
+            }
+        }
+        let time = &self.time;
+        if time.column.is_some() && time.sample_time_s.is_some() {
+            let (found, expected) = ("a column too", "either a column or `sample_time_s`");
+            return Err(self.fault("time.sample_time_s", found.into(), expected.into()));
+        }
+        for (key, value) in [
+            ("time.sample_time_s", time.sample_time_s),
+            ("time.resample_s", time.resample_s),
+            ("time.max_gap_s", time.max_gap_s),
+        ] {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                return Err(self.fault(key, value.to_string(), "more than 0 s".to_owned()));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Table {
+    /// Its columns, patterns and ranges written out.
+    pub(super) fn columns(&self, names: &Names, quantity: Quantity) -> Vec<Name> {
+        let entries = match &self.columns {
+            Columns::One(name) => std::slice::from_ref(name),
+            Columns::Many(names) => names,
+        };
+        let mut out = Vec::new();
+        for entry in entries {
+            match entry {
+                Name::Number(number) => out.push(Name::Number(*number)),
+                Name::Text(text) => match range(text) {
+                    Some(numbers) => out.extend(numbers.map(Name::Number)),
+                    None => out.extend(pattern(text, names, quantity).map(Name::Text)),
+                },
+            }
+        }
+        out
+    }
+}
+
+/// `4..6`, both ends included.
+fn range(text: &str) -> Option<std::ops::RangeInclusive<usize>> {
+    let (first, last) = text.split_once("..")?;
+    Some(first.trim().parse().ok()?..=last.trim().parse().ok()?)
+}
+
+/// The names that a pattern stands for: `{leg}`, `{joint}`, `{axis}` for the words of `names`, `{0}` and `{1}`
+/// for numbers that count from 0 or 1; the name itself if it is no pattern.
+fn pattern<'a>(
+    text: &'a str,
+    names: &'a Names,
+    quantity: Quantity,
+) -> Box<dyn Iterator<Item = String> + 'a> {
+    let has = |mark: &str| text.contains(mark);
+    if has("{leg}") || has("{joint}") {
+        let joints = if has("{joint}") {
+            &names.joints[..]
+        } else {
+            &names.joints[..1]
+        };
+        let legs = if has("{leg}") {
+            &names.legs[..]
+        } else {
+            &names.legs[..1]
+        };
+        return Box::new(legs.iter().flat_map(move |leg| {
+            let of_joint =
+                move |joint: &String| text.replace("{leg}", leg).replace("{joint}", joint);
+            joints.iter().map(of_joint)
+        }));
+    }
+    if has("{axis}") {
+        return Box::new(
+            names
+                .axes
+                .iter()
+                .map(move |axis| text.replace("{axis}", axis)),
+        );
+    }
+    for (mark, first) in [("{0}", 0), ("{1}", 1)] {
+        if has(mark) {
+            let count = quantity.elements().len();
+            let numbered = move |i: usize| text.replace(mark, &(i + first).to_string());
+            return Box::new((0..count).map(numbered));
+        }
+    }
+    Box::new(std::iter::once(text.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const REQUIRED: &str = "[time]\ncolumn = 1\n[joint.position]\ncolumns = \"{leg}-{joint}\"\n\
+         [joint.torque]\ncolumns = \"tau{1}\"\n[body.position]\ncolumns = \"p{axis}\"\n\
+         [body.orientation]\ncolumns = [7, \"2..4\"]\norder = \"wxyz\"\n[feet]\ncolumns = \"f_{leg}\"\n";
+
+    fn texts(map: &ColumnMap, quantity: Quantity) -> Vec<String> {
+        let columns = map.table(quantity).unwrap().columns(&map.names, quantity);
+        let text = |name: &Name| match name {
+            Name::Number(number) => number.to_string(),
+            Name::Text(text) => text.clone(),
+        };
+        columns.iter().map(text).collect()
+    }
+
+    #[test]
+    fn parse_patterns_and_ranges_are_written_out() {
+        let map = ColumnMap::parse("m.toml", REQUIRED).unwrap();
+        let joints = texts(&map, Quantity::JointPosition);
+        assert_eq!(
+            (&joints[0][..], &joints[4][..], joints.len()),
+            ("fr-hx", "fl-hy", 12)
+        );
+        assert_eq!(texts(&map, Quantity::JointTorque)[11], "tau12");
+        assert_eq!(texts(&map, Quantity::BodyPosition), ["px", "py", "pz"]);
+        assert_eq!(texts(&map, Quantity::Orientation), ["7", "2", "3", "4"]);
+        assert_eq!(texts(&map, Quantity::Feet).len(), 4);
+    }
+
+    #[test]
+    fn parse_faults_name_key_found_and_expected() {
+        let message = |text: &str| ColumnMap::parse("m.toml", text).unwrap_err().to_string();
+        assert_eq!(
+            message(""),
+            "m.toml: `joint.position`: found no such table, expected the columns of fr.hx Position"
+        );
+        let unknown = message(&format!("{REQUIRED}[foots]\n"));
+        assert!(
+            unknown.contains("foots") && unknown.starts_with("m.toml"),
+            "{unknown}"
+        );
+        let release = message(&format!("{REQUIRED}release = 3.0\n"));
+        assert!(release.contains("`feet.release`"), "{release}");
+        let frame = message(&format!("{REQUIRED}frame = \"body\"\n"));
+        assert!(frame.contains("`feet.frame`"), "{frame}");
+        let step = message(&REQUIRED.replace("column = 1\n", "sample_time_s = 0.0\n"));
+        assert!(step.contains("`time.sample_time_s`: found 0"), "{step}");
+    }
+}

@@ -1,0 +1,211 @@
+//! A recording as an MCAP file of ROS 2 messages, which robots' own tools open and romc reads back.
+
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+
+use mcap::records::MessageHeader;
+use mcap::{WriteOptions, Writer};
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::recording::segment::Segment;
+use crate::robot::input_rule::rotation;
+use crate::robot::{JOINT_DIM, JOINT_NAMES, Leg, Robot};
+
+const HEADER: &str = "================================================================================\n\
+MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n\
+================================================================================\n\
+MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
+const JOINT_STATE: &str = "std_msgs/Header header\n\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n";
+const ODOMETRY: &str = "std_msgs/Header header\nstring child_frame_id\n\
+geometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n";
+const GEOMETRY: &str = "================================================================================\n\
+MSG: geometry_msgs/PoseWithCovariance\nPose pose\nfloat64[36] covariance\n\
+================================================================================\n\
+MSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation\n\
+================================================================================\n\
+MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n\
+================================================================================\n\
+MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n\
+================================================================================\n\
+MSG: geometry_msgs/TwistWithCovariance\nTwist twist\nfloat64[36] covariance\n\
+================================================================================\n\
+MSG: geometry_msgs/Twist\nVector3 linear\nVector3 angular\n\
+================================================================================\n\
+MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n";
+
+/// Topic of joint angles, velocities and torques.
+pub const JOINT_TOPIC: &str = "/joint_states";
+/// Topic of the trunk's pose in the world and its velocities in its own axes.
+pub const BODY_TOPIC: &str = "/odom";
+/// Topic of contact, 1 or 0 for each foot.
+pub const FEET_TOPIC: &str = "/foot_contacts";
+/// Topic of the inputs of a model.
+pub const INPUT_TOPIC: &str = "/inputs";
+
+/// Writes a segment and, if given, its inputs (18 x samples) as messages; chunks are not packed.
+///
+/// # Errors
+/// Those of the destination.
+pub fn write_mcap(
+    destination: impl Write + Seek,
+    segment: &Segment,
+    inputs: Option<&nalgebra::DMatrix<f64>>,
+) -> Result<(), mcap::McapError> {
+    let options = WriteOptions::new()
+        .compression(None)
+        .profile("ros2")
+        .library(concat!("romc ", env!("CARGO_PKG_VERSION")));
+    let mut writer = Writer::with_options(destination, options)?;
+    let joint_text = format!("{JOINT_STATE}{HEADER}");
+    let joint = writer.add_schema(
+        "sensor_msgs/msg/JointState",
+        "ros2msg",
+        joint_text.as_bytes(),
+    )?;
+    let body_text = format!("{ODOMETRY}{GEOMETRY}{HEADER}");
+    let body = writer.add_schema("nav_msgs/msg/Odometry", "ros2msg", body_text.as_bytes())?;
+    let mut topic = |schema, topic| writer.add_channel(schema, topic, "cdr", &BTreeMap::new());
+    let channels = [
+        topic(joint, JOINT_TOPIC)?,
+        topic(body, BODY_TOPIC)?,
+        topic(joint, FEET_TOPIC)?,
+    ];
+    let input_channel = match inputs {
+        Some(_) => Some(topic(joint, INPUT_TOPIC)?),
+        None => None,
+    };
+    let names = JOINT_NAMES.map(str::to_owned);
+    let feet = Leg::ALL.map(|leg| leg.to_string());
+    let input_names = Robot::input_names();
+    for sample in 0..segment.len() {
+        let time_ns = (1e9 * segment.time_s[sample]).round() as i64;
+        let rows = |m: &nalgebra::DMatrix<f64>| -> Vec<f64> {
+            m.column(sample).iter().take(JOINT_DIM).copied().collect()
+        };
+        let contact = segment.feet[sample].map(|down| f64::from(u8::from(down)));
+        let mut messages = vec![
+            (
+                channels[0],
+                Message::stamped(time_ns, "world").joint_state(
+                    &names,
+                    &rows(&segment.x),
+                    &rows(&segment.dx),
+                    &rows(&segment.torque_nm),
+                ),
+            ),
+            (channels[1], odometry(segment, sample, time_ns)),
+            (
+                channels[2],
+                Message::stamped(time_ns, "world").joint_state(&feet, &contact, &[], &[]),
+            ),
+        ];
+        if let (Some(channel), Some(inputs)) = (input_channel, inputs) {
+            let values: Vec<f64> = inputs.column(sample).iter().copied().collect();
+            let message = Message::stamped(time_ns, "world");
+            messages.push((
+                channel,
+                message.joint_state(&input_names, &[], &[], &values),
+            ));
+        }
+        for (channel_id, message) in messages {
+            let log_time = u64::try_from(time_ns).unwrap_or(0);
+            let header = MessageHeader {
+                channel_id,
+                sequence: sample as u32,
+                log_time,
+                publish_time: log_time,
+            };
+            writer.write_to_known_channel(&header, &message.bytes)?;
+        }
+    }
+    writer.finish()?;
+    Ok(())
+}
+
+/// Pose in the world, velocities in the trunk's axes, as `nav_msgs/Odometry` has them.
+fn odometry(segment: &Segment, sample: usize, time_ns: i64) -> Message {
+    const BODY: usize = JOINT_DIM;
+    let of = |m: &nalgebra::DMatrix<f64>, first: usize| -> Vector3<f64> {
+        m.fixed_view::<3, 1>(first, sample).into_owned()
+    };
+    let angles = of(&segment.x, BODY + 3);
+    let turn = rotation(angles.into());
+    let about = |axis: usize| UnitQuaternion::from_scaled_axis(Vector3::ith(axis, angles[axis]));
+    let q = about(2) * about(1) * about(0);
+    let velocity = turn.transpose() * of(&segment.dx, BODY);
+    let rates = of(&segment.dx, BODY + 3);
+    let [(s_r, c_r), (s_p, c_p)] = [angles[0].sin_cos(), angles[1].sin_cos()];
+    let angular = [
+        rates[0] - s_p * rates[2],
+        c_r * rates[1] + s_r * c_p * rates[2],
+        -s_r * rates[1] + c_r * c_p * rates[2],
+    ];
+    let mut message = Message::stamped(time_ns, "world");
+    message.text("base");
+    message.numbers(of(&segment.x, BODY).as_slice());
+    message.numbers(&[q.i, q.j, q.k, q.w]);
+    message.numbers(&[0.0; 36]);
+    message.numbers(velocity.as_slice());
+    message.numbers(&angular);
+    message.numbers(&[0.0; 36]);
+    message
+}
+
+/// A message in CDR, little endian.
+struct Message {
+    bytes: Vec<u8>,
+}
+
+impl Message {
+    /// With header, time and frame.
+    fn stamped(time_ns: i64, frame: &str) -> Self {
+        let mut message = Self {
+            bytes: vec![0, 1, 0, 0],
+        };
+        let seconds = time_ns.div_euclid(1_000_000_000) as i32;
+        message.put(4, &seconds.to_le_bytes());
+        let nanoseconds = time_ns.rem_euclid(1_000_000_000) as u32;
+        message.put(4, &nanoseconds.to_le_bytes());
+        message.text(frame);
+        message
+    }
+
+    fn joint_state(
+        mut self,
+        names: &[String],
+        position: &[f64],
+        velocity: &[f64],
+        effort: &[f64],
+    ) -> Self {
+        self.length(names.len());
+        names.iter().for_each(|name| self.text(name));
+        for values in [position, velocity, effort] {
+            self.length(values.len());
+            self.numbers(values);
+        }
+        self
+    }
+
+    fn length(&mut self, length: usize) {
+        self.put(4, &(length as u32).to_le_bytes());
+    }
+
+    fn text(&mut self, text: &str) {
+        self.length(text.len() + 1);
+        self.bytes.extend(text.as_bytes());
+        self.bytes.push(0);
+    }
+
+    fn numbers(&mut self, values: &[f64]) {
+        values
+            .iter()
+            .for_each(|value| self.put(8, &value.to_le_bytes()));
+    }
+
+    /// Appends at a multiple of `align` bytes after the header.
+    fn put(&mut self, align: usize, bytes: &[u8]) {
+        let body = self.bytes.len() - 4;
+        self.bytes.resize(4 + body.next_multiple_of(align), 0);
+        self.bytes.extend(bytes);
+    }
+}

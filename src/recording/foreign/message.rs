@@ -1,0 +1,465 @@
+//! Messages of ROS 1 and 2 as numbers with names, by the definition that a log carries.
+
+use std::collections::BTreeMap;
+
+/// Longest array whose entries become columns: an image is no column.
+const MOST_ENTRIES: usize = 64;
+/// Deepest nesting of messages.
+const MOST_LEVELS: usize = 16;
+
+/// Why a message or definition cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum MessageFault {
+    /// A line of a definition.
+    #[error("definition: found `{0}`, expected a type and a name")]
+    Definition(String),
+    /// A type without definition.
+    #[error("definition: `{0}` is not defined")]
+    Undefined(String),
+    /// Too short.
+    #[error("message: {0} bytes, which end before its fields do")]
+    Short(usize),
+    /// Lists that are longer in one message than in another.
+    #[error("messages whose lists change in length, expected tables")]
+    Ragged,
+    /// Another encoding than those that are read.
+    #[error("encoding `{0}`, expected cdr with ros2msg or ros1 with ros1msg")]
+    Encoding(String),
+}
+
+/// How the bytes of a message are laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Layout {
+    /// Packed, little endian.
+    Ros1,
+    /// CDR with its header.
+    Ros2,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    Bool,
+    Unsigned(usize),
+    Signed(usize),
+    Float(usize),
+    Text,
+    /// Seconds and nanoseconds.
+    Time,
+    Message(usize),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Count {
+    One,
+    Fixed(usize),
+    Any,
+}
+
+#[derive(Debug, Clone)]
+struct Field {
+    name: String,
+    kind: Kind,
+    count: Count,
+}
+
+/// A message type with all that it is made of; the first is the message's own.
+#[derive(Debug, Clone)]
+pub(super) struct Definition {
+    types: Vec<Vec<Field>>,
+}
+
+/// One number of a message.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Value {
+    Number(f64),
+    /// Seconds and nanoseconds.
+    Time(i64, u32),
+}
+
+impl Definition {
+    /// Reads a definition and those of its parts, as `ros2 bag` and `rosbag` store them.
+    pub fn parse(name: &str, text: &str) -> Result<Self, MessageFault> {
+        let mut texts: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+        let mut current = short(name);
+        for line in text.lines() {
+            let line = line.split('#').next().unwrap_or_default().trim();
+            if let Some(next) = line.strip_prefix("MSG:") {
+                current = short(next.trim());
+            } else if !line.is_empty() && !line.starts_with("===") {
+                texts.entry(current.clone()).or_default().push(line);
+            }
+        }
+        let mut definition = Self { types: Vec::new() };
+        let mut known = BTreeMap::new();
+        definition.add(&short(name), &texts, &mut known, 0)?;
+        Ok(definition)
+    }
+
+    /// Adds a type and its parts; its index.
+    fn add(
+        &mut self,
+        name: &str,
+        texts: &BTreeMap<String, Vec<&str>>,
+        known: &mut BTreeMap<String, usize>,
+        level: usize,
+    ) -> Result<usize, MessageFault> {
+        if let Some(index) = known.get(name) {
+            return Ok(*index);
+        }
+        let lines = texts.get(name).cloned();
+        // An empty message has no lines.
+        let lines = lines.unwrap_or_default();
+        if level > MOST_LEVELS || (lines.is_empty() && level > 0 && !name.ends_with("/Empty")) {
+            return Err(MessageFault::Undefined(name.to_owned()));
+        }
+        let index = self.types.len();
+        known.insert(name.to_owned(), index);
+        self.types.push(Vec::new());
+        let package = name.split('/').next().unwrap_or_default();
+        let mut fields = Vec::new();
+        for line in lines {
+            let fault = || MessageFault::Definition(line.to_owned());
+            let (kind, rest) = line.split_once(char::is_whitespace).ok_or_else(fault)?;
+            let field = rest.split_whitespace().next().ok_or_else(fault)?;
+            if is_constant(rest) {
+                continue;
+            }
+            let (base, count) = counted(kind).ok_or_else(fault)?;
+            let kind = match primitive(base) {
+                Some(kind) => kind,
+                None => {
+                    let full = match (base, base.contains('/')) {
+                        (_, true) => short(base),
+                        ("Header", false) => "std_msgs/Header".to_owned(),
+                        (_, false) => format!("{package}/{base}"),
+                    };
+                    match &full[..] {
+                        "builtin_interfaces/Time" | "builtin_interfaces/Duration" => Kind::Time,
+                        _ => Kind::Message(self.add(&full, texts, known, level + 1)?),
+                    }
+                }
+            };
+            let name = field.to_owned();
+            fields.push(Field { name, kind, count });
+        }
+        self.types[index] = fields;
+        Ok(index)
+    }
+
+    /// Calls `visit` with every number of a message and, if `named`, its name: `pose.position.x`,
+    /// `motor_state[3].q`, and `position[FR_hip_joint]` where a list of names goes with a list of numbers.
+    pub fn visit(
+        &self,
+        layout: Layout,
+        bytes: &[u8],
+        named: bool,
+        mut visit: impl FnMut(&str, Value),
+    ) -> Result<(), MessageFault> {
+        let mut cursor = Cursor::new(layout, bytes)?;
+        let mut path = String::new();
+        self.message(0, &mut cursor, named, &mut path, &mut visit)
+    }
+
+    fn message(
+        &self,
+        index: usize,
+        cursor: &mut Cursor<'_>,
+        named: bool,
+        path: &mut String,
+        visit: &mut dyn FnMut(&str, Value),
+    ) -> Result<(), MessageFault> {
+        let mut names: Vec<String> = Vec::new();
+        let before = path.len();
+        for field in &self.types[index] {
+            let count = match field.count {
+                Count::One => 1,
+                Count::Fixed(count) => count,
+                Count::Any => cursor.length()?,
+            };
+            let is_list = field.count != Count::One;
+            let is_named = field.count == Count::Any && !matches!(field.kind, Kind::Message(_));
+            if field.kind == Kind::Text && is_list && field.name.starts_with("name") {
+                names.clear();
+                for _ in 0..count {
+                    names.push(cursor.text()?);
+                }
+                continue;
+            }
+            for entry in 0..count {
+                if named {
+                    path.truncate(before);
+                    if before > 0 {
+                        path.push('.');
+                    }
+                    path.push_str(&field.name);
+                    if is_list {
+                        match names
+                            .get(entry)
+                            .filter(|_| is_named && names.len() == count)
+                        {
+                            Some(name) => path.push_str(&format!("[{name}]")),
+                            None => path.push_str(&format!("[{entry}]")),
+                        }
+                    }
+                }
+                let mut skip = |_: &str, _: Value| {};
+                let visit: &mut dyn FnMut(&str, Value) = if count > MOST_ENTRIES {
+                    &mut skip
+                } else {
+                    &mut *visit
+                };
+                match field.kind {
+                    Kind::Message(part) => self.message(part, cursor, named, path, visit)?,
+                    Kind::Text => {
+                        cursor.text()?;
+                    }
+                    Kind::Time => {
+                        let seconds = cursor.signed(4)?;
+                        let nanoseconds = cursor.unsigned(4)? as u32;
+                        visit(path, Value::Time(seconds, nanoseconds));
+                    }
+                    Kind::Bool => {
+                        let value = if cursor.unsigned(1)? == 0 { 0.0 } else { 1.0 };
+                        visit(path, Value::Number(value));
+                    }
+                    Kind::Unsigned(size) => {
+                        visit(path, Value::Number(cursor.unsigned(size)? as f64));
+                    }
+                    Kind::Signed(size) => visit(path, Value::Number(cursor.signed(size)? as f64)),
+                    Kind::Float(4) => {
+                        let bits = cursor.unsigned(4)? as u32;
+                        visit(path, Value::Number(f64::from(f32::from_bits(bits))));
+                    }
+                    Kind::Float(_) => {
+                        visit(path, Value::Number(f64::from_bits(cursor.unsigned(8)?)));
+                    }
+                }
+            }
+        }
+        path.truncate(before);
+        Ok(())
+    }
+}
+
+/// `sensor_msgs/msg/JointState` and `sensor_msgs/JointState` are the same type.
+fn short(name: &str) -> String {
+    name.replace("/msg/", "/")
+}
+
+/// `NAME=value`, or `NAME = value`.
+fn is_constant(rest: &str) -> bool {
+    let name = rest.split(['=', ' ', '\t']).next().unwrap_or_default();
+    rest[name.len()..].trim_start().starts_with('=')
+}
+
+/// A type without its brackets, and how many there are.
+fn counted(kind: &str) -> Option<(&str, Count)> {
+    let Some((base, count)) = kind.split_once('[') else {
+        return Some((kind.split("<=").next()?, Count::One));
+    };
+    let base = base.split("<=").next()?;
+    let count = count.strip_suffix(']')?;
+    let count = match count.is_empty() || count.starts_with("<=") {
+        true => Count::Any,
+        false => Count::Fixed(count.parse().ok()?),
+    };
+    Some((base, count))
+}
+
+fn primitive(name: &str) -> Option<Kind> {
+    Some(match name {
+        "bool" => Kind::Bool,
+        "byte" | "char" | "uint8" => Kind::Unsigned(1),
+        "uint16" => Kind::Unsigned(2),
+        "uint32" => Kind::Unsigned(4),
+        "uint64" => Kind::Unsigned(8),
+        "int8" => Kind::Signed(1),
+        "int16" => Kind::Signed(2),
+        "int32" => Kind::Signed(4),
+        "int64" => Kind::Signed(8),
+        "float32" => Kind::Float(4),
+        "float64" => Kind::Float(8),
+        "string" => Kind::Text,
+        "time" | "duration" => Kind::Time,
+        _ => return None,
+    })
+}
+
+/// Bytes of a message from its first field on.
+struct Cursor<'a> {
+    bytes: &'a [u8],
+    place: usize,
+    layout: Layout,
+    big_endian: bool,
+    /// Largest alignment.
+    align: usize,
+}
+
+impl<'a> Cursor<'a> {
+    fn new(layout: Layout, bytes: &'a [u8]) -> Result<Self, MessageFault> {
+        let mut cursor = Self {
+            bytes,
+            place: 0,
+            layout,
+            big_endian: false,
+            align: 1,
+        };
+        if layout == Layout::Ros2 {
+            let header = bytes.get(..4).ok_or(MessageFault::Short(bytes.len()))?;
+            cursor.begin(header[0], header[1])?;
+        }
+        Ok(cursor)
+    }
+
+    /// CDR's header: byte order and alignment.
+    fn begin(&mut self, first: u8, kind: u8) -> Result<(), MessageFault> {
+        (self.big_endian, self.align) = match (first, kind) {
+            (0, 0) => (true, 8),
+            (0, 1) => (false, 8),
+            (0, 6) => (true, 4),
+            (0, 7) => (false, 4),
+            _ => return Err(MessageFault::Encoding(format!("cdr {first:#x} {kind:#x}"))),
+        };
+        self.bytes = &self.bytes[4..];
+        Ok(())
+    }
+
+    fn take(&mut self, count: usize) -> Result<&'a [u8], MessageFault> {
+        let short = MessageFault::Short(self.bytes.len());
+        let end = self.place.checked_add(count).ok_or(short.clone())?;
+        let taken = self.bytes.get(self.place..end).ok_or(short)?;
+        self.place = end;
+        Ok(taken)
+    }
+
+    fn unsigned(&mut self, size: usize) -> Result<u64, MessageFault> {
+        let align = size.min(self.align).max(1);
+        self.place = self.place.next_multiple_of(align);
+        let bytes = self.take(size)?;
+        let join = |value: u64, byte: &u8| value << 8 | u64::from(*byte);
+        Ok(match self.big_endian {
+            true => bytes.iter().fold(0, join),
+            false => bytes.iter().rev().fold(0, join),
+        })
+    }
+
+    fn signed(&mut self, size: usize) -> Result<i64, MessageFault> {
+        let unused = 64 - 8 * size as u32;
+        Ok((self.unsigned(size)? << unused) as i64 >> unused)
+    }
+
+    fn length(&mut self) -> Result<usize, MessageFault> {
+        let length = self.unsigned(4)? as usize;
+        // Every entry has a byte at least.
+        match length <= self.bytes.len() {
+            true => Ok(length),
+            false => Err(MessageFault::Short(self.bytes.len())),
+        }
+    }
+
+    fn text(&mut self) -> Result<String, MessageFault> {
+        let length = self.length()?;
+        let bytes = self.take(length)?;
+        let bytes = match self.layout {
+            Layout::Ros1 => bytes,
+            Layout::Ros2 => bytes.strip_suffix(&[0]).unwrap_or(bytes),
+        };
+        Ok(String::from_utf8_lossy(bytes).into_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "Header header # stamp\nuint8 KIND=3\nbool on\nfloat64 value\nstring[] name\nfloat32[] q\n\
+         Part[2] parts\nuint8[] image\nint16 last\n===\nMSG: std_msgs/Header\n\
+         builtin_interfaces/Time stamp\nstring frame_id\n===\nMSG: demo_msgs/Part\nint8 a\nint64 b\n";
+
+    /// The message in CDR, or packed as ROS 1 does.
+    fn message(layout: Layout) -> Vec<u8> {
+        let mut out: Vec<u8> = Vec::new();
+        let put = |out: &mut Vec<u8>, size: usize, bytes: &[u8]| {
+            while layout == Layout::Ros2 && out.len() % size != 0 {
+                out.push(0xee);
+            }
+            out.extend(bytes);
+        };
+        let text = |out: &mut Vec<u8>, text: &str| {
+            let end = usize::from(layout == Layout::Ros2);
+            put(out, 4, &((text.len() + end) as u32).to_le_bytes());
+            out.extend(text.as_bytes());
+            out.extend(vec![0; end]);
+        };
+        put(&mut out, 4, &7_i32.to_le_bytes());
+        put(&mut out, 4, &250_000_000_u32.to_le_bytes());
+        text(&mut out, "world");
+        put(&mut out, 1, &[1]);
+        put(&mut out, 8, &(-0.5_f64).to_le_bytes());
+        put(&mut out, 4, &2_u32.to_le_bytes());
+        text(&mut out, "hip");
+        text(&mut out, "calf");
+        put(&mut out, 4, &2_u32.to_le_bytes());
+        put(&mut out, 4, &1.5_f32.to_le_bytes());
+        put(&mut out, 4, &2.5_f32.to_le_bytes());
+        for part in 0..2_i64 {
+            put(&mut out, 1, &[(-1_i8 - part as i8) as u8]);
+            put(&mut out, 8, &(part - 9).to_le_bytes());
+        }
+        put(&mut out, 4, &100_u32.to_le_bytes());
+        out.extend([9; 100]);
+        put(&mut out, 2, &(-300_i16).to_le_bytes());
+        match layout {
+            Layout::Ros1 => out,
+            Layout::Ros2 => [&[0, 1, 0, 0], &out[..]].concat(),
+        }
+    }
+
+    #[test]
+    fn visit_messages_of_both_systems_have_the_same_numbers_with_names() {
+        let definition = Definition::parse("demo_msgs/msg/Demo", TEXT).unwrap();
+        let expected = [
+            ("header.stamp", Value::Time(7, 250_000_000)),
+            ("on", Value::Number(1.0)),
+            ("value", Value::Number(-0.5)),
+            ("q[hip]", Value::Number(1.5)),
+            ("q[calf]", Value::Number(2.5)),
+            ("parts[0].a", Value::Number(-1.0)),
+            ("parts[0].b", Value::Number(-9.0)),
+            ("parts[1].a", Value::Number(-2.0)),
+            ("parts[1].b", Value::Number(-8.0)),
+            ("last", Value::Number(-300.0)),
+        ];
+        for layout in [Layout::Ros1, Layout::Ros2] {
+            let mut found = Vec::new();
+            let visit = |name: &str, value| found.push((name.to_owned(), value));
+            definition
+                .visit(layout, &message(layout), true, visit)
+                .unwrap();
+            let found = found.iter().map(|(name, value)| (name.as_str(), *value));
+            assert_eq!(found.collect::<Vec<_>>(), expected, "{layout:?}");
+        }
+    }
+
+    #[test]
+    fn visit_every_cut_message_is_refused() {
+        let definition = Definition::parse("demo_msgs/msg/Demo", TEXT).unwrap();
+        let whole = message(Layout::Ros2);
+        for end in 0..whole.len() {
+            let cut = definition.visit(Layout::Ros2, &whole[..end], false, |_, _| {});
+            assert!(cut.is_err(), "{end}");
+        }
+        let mut other = whole;
+        other[1] = 3;
+        let fault = definition.visit(Layout::Ros2, &other, false, |_, _| {});
+        assert!(matches!(fault, Err(MessageFault::Encoding(_))));
+    }
+
+    #[test]
+    fn parse_unknown_part_is_named() {
+        let fault = Definition::parse("a/B", "Missing part\n").unwrap_err();
+        assert_eq!(fault, MessageFault::Undefined("a/Missing".to_owned()));
+        let fault = Definition::parse("a/B", "float64\n").unwrap_err();
+        assert_eq!(fault, MessageFault::Definition("float64".to_owned()));
+    }
+}

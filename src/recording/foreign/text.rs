@@ -1,0 +1,311 @@
+//! Text files as logs: any separator, with or without header.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use flate2::bufread::MultiGzDecoder;
+
+use super::log::{Channel, Log};
+use super::map::{ColumnMap, Delimiter, TextFormat};
+use crate::recording::csv::GZIP_MAGIC;
+use crate::recording::error::{RecordingError, RecordingFault, shortened};
+use crate::recording::instant::Instant;
+use crate::recording::lines::{Lines, split_cells};
+use crate::recording::number::{DecimalMark, NumberReader};
+use crate::recording::table::MAX_ROWS;
+
+/// Numbers from which a column is kept as times: beyond, one number does not hold a microsecond.
+const LARGE: f64 = 1e8;
+
+/// Reads the files of a recording: `path` itself, or those that the map names, in the folder `path` or beside it.
+///
+/// In a file's name `{}` stands for the name of `path` without its ending.
+///
+/// # Errors
+/// [`RecordingError`] with file and row.
+pub(in crate::recording) fn read_texts(
+    path: &Path,
+    map: &ColumnMap,
+) -> Result<Vec<Log>, RecordingError> {
+    let named = map.files();
+    if path.is_dir() && named.is_empty() {
+        let found = "a folder".to_owned();
+        let expected = format!("a file, or the names of its files in {}", map.file);
+        return Err(RecordingFault::Map { found, expected }.of(path));
+    }
+    let mut logs = Vec::new();
+    if !path.is_dir() {
+        logs.push(read_text(path, String::new(), &map.text)?);
+    }
+    for name in named {
+        logs.push(read_text(
+            &file_beside(path, name),
+            name.to_owned(),
+            &map.text,
+        )?);
+    }
+    Ok(logs)
+}
+
+fn file_beside(path: &Path, name: &str) -> PathBuf {
+    if path.is_dir() {
+        return path.join(name);
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    folder.join(name.replace("{}", stem.trim_end_matches(".csv")))
+}
+
+/// Reads one text file, plain or gzip, as a log of this name.
+pub(in crate::recording) fn read_text(
+    path: &Path,
+    name: String,
+    format: &TextFormat,
+) -> Result<Log, RecordingError> {
+    let file = File::open(path).map_err(|source| match source.kind() {
+        io::ErrorKind::NotFound => RecordingFault::Missing.of(path),
+        _ => RecordingFault::io("open", source).of(path),
+    })?;
+    let mut source = BufReader::new(file);
+    let start = (source.fill_buf()).map_err(|e| RecordingFault::io("read", e).of(path))?;
+    let compressed = start.starts_with(&GZIP_MAGIC);
+    let source: Box<dyn Read> = match compressed {
+        true => Box::new(MultiGzDecoder::new(source)),
+        false => Box::new(source),
+    };
+    let mut lines = Lines::new(path, BufReader::new(source), compressed);
+    let mut sheet: Option<Sheet> = None;
+    while let Some((row, line)) = lines.next_row()? {
+        if row <= format.skip || line.trim().is_empty() {
+            continue;
+        }
+        match &mut sheet {
+            None => sheet = Some(Sheet::begin(row, line, format)),
+            Some(sheet) if sheet.rows == MAX_ROWS => {
+                return Err(RecordingFault::TooManyRows(MAX_ROWS).at(path, sheet.first_row));
+            }
+            Some(sheet) => sheet.push(path, row, line)?,
+        }
+    }
+    let sheet = sheet.ok_or_else(|| RecordingFault::Empty.of(path))?;
+    if sheet.rows == 0 {
+        return Err(RecordingFault::HeaderOnly(sheet.columns.len()).of(path));
+    }
+    Ok(Log {
+        path: path.to_owned(),
+        name,
+        clock: None,
+        columns: sheet.columns,
+        is_named: sheet.is_named,
+        first_row: sheet.first_row,
+    })
+}
+
+/// The rows read so far.
+struct Sheet {
+    delimiter: Delimiter,
+    numbers: NumberReader,
+    columns: Vec<Channel>,
+    is_named: bool,
+    first_row: usize,
+    rows: usize,
+}
+
+impl Sheet {
+    /// From the first line: names, or already numbers.
+    fn begin(row: usize, line: &str, format: &TextFormat) -> Self {
+        // NumPy and MATLAB write headers as comments.
+        let header = line.trim_start().trim_start_matches(['#', '%']);
+        let delimiter = format.delimiter.unwrap_or_else(|| delimiter_of(header));
+        let mark = match delimiter {
+            Delimiter::Comma => DecimalMark::Point,
+            Delimiter::Tab | Delimiter::Blank | Delimiter::Semicolon => DecimalMark::Unknown,
+        };
+        let mut numbers = NumberReader::new(mark);
+        let cells = cells(header, delimiter);
+        let is_value = |cell: &String| {
+            cell.is_empty() || numbers.parse(cell).is_some() || Instant::from_iso(cell).is_some()
+        };
+        let is_named = format.header.unwrap_or_else(|| !cells.iter().all(is_value));
+        let mut sheet = Self {
+            delimiter,
+            numbers: NumberReader::new(mark),
+            columns: vec![Channel::default(); cells.len()],
+            is_named,
+            first_row: if is_named { row + 1 } else { row },
+            rows: 0,
+        };
+        if is_named {
+            for (column, name) in sheet.columns.iter_mut().zip(cells) {
+                column.name = name;
+            }
+        } else {
+            sheet.push_cells(cells);
+        }
+        sheet
+    }
+
+    fn push(&mut self, path: &Path, row: usize, line: &str) -> Result<(), RecordingError> {
+        let mut cells = cells(line, self.delimiter);
+        let expected = self.columns.len();
+        // A separator at the end of each line is no column.
+        if cells.len() == expected + 1 && cells.last().is_some_and(String::is_empty) {
+            cells.pop();
+        }
+        if cells.len() != expected {
+            let (found, hint) = (cells.len(), "");
+            let fault = RecordingFault::RowLength {
+                found,
+                expected,
+                hint,
+            };
+            let name = self.columns.get(found).map_or("", |column| &column.name);
+            return Err(fault.in_cell(path, row, name));
+        }
+        if self.rows == 0 {
+            self.first_row = row;
+        }
+        self.push_cells(cells);
+        Ok(())
+    }
+
+    fn push_cells(&mut self, cells: Vec<String>) {
+        for (column, cell) in self.columns.iter_mut().zip(cells) {
+            column.push(&cell, &mut self.numbers, self.rows);
+        }
+        self.rows += 1;
+    }
+}
+
+impl Channel {
+    fn push(&mut self, cell: &str, numbers: &mut NumberReader, sample: usize) {
+        let value = match numbers.parse(cell) {
+            Some(value) => value,
+            None if cell.is_empty() => f64::NAN,
+            None if cell.eq_ignore_ascii_case("true") => 1.0,
+            None if cell.eq_ignore_ascii_case("false") => 0.0,
+            None => match Instant::from_iso(cell) {
+                Some(instant) => {
+                    self.push_instant(instant);
+                    return;
+                }
+                None => {
+                    self.refused
+                        .get_or_insert_with(|| (sample, shortened(cell)));
+                    f64::NAN
+                }
+            },
+        };
+        if self.instants.is_some() || value.abs() >= LARGE {
+            let exact = Instant::from_decimal(cell).or_else(|| Instant::of(value));
+            if let Some(instant) = exact {
+                self.push_instant(instant);
+                return;
+            }
+        }
+        self.values.push(value);
+        if let Some(instants) = &mut self.instants {
+            // No time: the value is NaN, which whoever needs the column refuses.
+            instants.push(Instant {
+                whole: 0,
+                rest: 0.0,
+            });
+        }
+    }
+
+    /// Adds a time; earlier values become times as well.
+    pub fn push_instant(&mut self, instant: Instant) {
+        let values = &self.values;
+        let earlier = || {
+            values
+                .iter()
+                .map(|v| Instant::of(*v).unwrap_or(instant))
+                .collect()
+        };
+        self.instants.get_or_insert_with(earlier).push(instant);
+        self.values.push(instant.value());
+    }
+}
+
+fn delimiter_of(line: &str) -> Delimiter {
+    match line {
+        _ if line.contains('\t') => Delimiter::Tab,
+        _ if line.contains(';') => Delimiter::Semicolon,
+        _ if line.contains(',') => Delimiter::Comma,
+        _ => Delimiter::Blank,
+    }
+}
+
+fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
+    let separator = match delimiter {
+        Delimiter::Blank => return line.split_whitespace().map(str::to_owned).collect(),
+        Delimiter::Tab => '\t',
+        Delimiter::Comma => ',',
+        Delimiter::Semicolon => ';',
+    };
+    let mut out = Vec::new();
+    let split: Result<(), std::convert::Infallible> = split_cells(line, separator, |cell| {
+        out.push(cell.to_owned());
+        Ok(())
+    });
+    match split {
+        Ok(()) => out,
+        Err(never) => match never {},
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn log(text: &str) -> Log {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.txt");
+        std::fs::write(&path, text).unwrap();
+        read_text(&path, String::new(), &TextFormat::default()).unwrap()
+    }
+
+    #[test]
+    fn read_text_any_separator_gives_the_same_numbers() {
+        for text in [
+            "a;b\n0,5;True\n1;False\n",
+            "a\tb\n0.5\ttrue\n1\tfalse\n",
+            "# a, b\n0.5, 1\n1.0, 0,\n",
+            "a b\n 0.5  1\n 1e0 0\n",
+        ] {
+            let log = log(text);
+            assert_eq!(log.columns[0].values, [0.5, 1.0], "{text}");
+            assert_eq!(log.columns[1].values, [1.0, 0.0], "{text}");
+            assert_eq!((log.columns[1].name.as_str(), log.first_row), ("b", 2));
+        }
+    }
+
+    #[test]
+    fn read_text_without_header_counts_its_first_line() {
+        let log = log("1 2\n3 4\n");
+        assert!(!log.is_named && log.first_row == 1);
+        assert_eq!(log.columns[1].values, [2.0, 4.0]);
+        assert_eq!(log.column(&super::super::map::Name::Number(2)), Some(1));
+        assert_eq!(log.column(&super::super::map::Name::Number(3)), None);
+    }
+
+    #[test]
+    fn read_text_epochs_and_dates_keep_their_digits() {
+        let log = log(
+            "t,d\n1700000000123456789,2024-01-01T00:00:00.5\n1700000000125456789,2024-01-01T00:00:01\n",
+        );
+        let steps = log.columns.iter().map(|column| {
+            let instants = column.instants.as_ref().unwrap();
+            instants[1].since(instants[0])
+        });
+        assert_eq!(steps.collect::<Vec<_>>(), [2e6, 0.5]);
+    }
+
+    #[test]
+    fn read_text_word_among_numbers_is_kept_with_its_sample() {
+        let log = log("a,b\n1,2\n1,x\n");
+        assert_eq!(log.columns[1].refused, Some((1, "x".to_owned())));
+        assert!(log.columns[0].refused.is_none());
+    }
+}

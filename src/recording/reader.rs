@@ -1,0 +1,251 @@
+//! How files become recordings: by romc's own names or a map of columns, with clocks as stamped or mended.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+
+use super::clock::{Timed, timed};
+use super::csv;
+use super::error::{RecordingError, RecordingFault};
+use super::foreign::guess::guess_of;
+use super::foreign::map::ColumnMap;
+use super::foreign::{Assembled, assemble, read_mcap, read_texts};
+use super::segment::Recording;
+use crate::robot::Robot;
+
+/// What becomes of clocks that disagree with the motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Clocks {
+    /// Times, steps and angular rates stay as recorded
+    #[default]
+    Recorded,
+    /// Times that disagree with the motion are rebuilt from it, uneven steps are resampled, angular rates that
+    /// disagree with the angles become their differences
+    Repaired,
+}
+
+/// Reads files of one kind.
+#[derive(Debug, Clone, Default)]
+pub struct Reader {
+    map: Option<Arc<ColumnMap>>,
+    clocks: Clocks,
+}
+
+/// A recording and what was done to it besides reading.
+#[derive(Debug, Clone)]
+pub struct Reading {
+    /// The recording.
+    pub recording: Recording,
+    /// What a map of columns left to be derived, resampled or turned.
+    pub notes: Vec<String>,
+    /// What was mended, segment by segment; empty with [`Clocks::Recorded`].
+    pub mended: Vec<Mended>,
+}
+
+/// What was mended in a segment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mended {
+    /// Time that passed by the motion over time that passed by the stamps, where times were rebuilt.
+    pub elapsed_ratio: Option<f64>,
+    /// Whether steps were uneven and the segment is resampled.
+    pub resampled: bool,
+    /// Whether angular rates are differences of the angles.
+    pub rates_replaced: bool,
+}
+
+impl Reader {
+    /// A reader by a map of columns, or romc's own names, that treats clocks as told.
+    pub fn new(map: Option<ColumnMap>, clocks: Clocks) -> Self {
+        Self {
+            map: map.map(Arc::new),
+            clocks,
+        }
+    }
+
+    /// The same reader that leaves clocks as they are.
+    pub fn as_stamped(&self) -> Self {
+        Self {
+            map: self.map.clone(),
+            clocks: Clocks::Recorded,
+        }
+    }
+
+    /// Reads a file, or with a map a folder of files that are one recording.
+    ///
+    /// # Errors
+    /// [`RecordingError`] with file, row and column, or with the map's key.
+    pub fn read(&self, path: &Path) -> Result<Reading, RecordingError> {
+        let Assembled {
+            mut recording,
+            notes,
+        } = match &self.map {
+            Some(map) if is_mcap(path) => assemble(path, &read_mcap(path)?, map)?,
+            Some(map) => assemble(path, &read_texts(path, map)?, map)?,
+            None if path.is_dir() => return Err(RecordingFault::Folder.of(path)),
+            None if is_mcap(path) => by_guess(path)?,
+            None => Assembled {
+                recording: csv::read(path)?,
+                notes: Vec::new(),
+            },
+        };
+        let mut mended = Vec::new();
+        if self.clocks == Clocks::Repaired {
+            for segment in &mut recording.segments {
+                let timed = timed(segment)?;
+                mended.push(Mended::of(&timed));
+                *segment = timed.segment;
+            }
+        }
+        Ok(Reading {
+            recording,
+            notes,
+            mended,
+        })
+    }
+}
+
+/// Whether a file is an MCAP log by its name.
+pub(super) fn is_mcap(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"))
+}
+
+/// An MCAP file by the names of its topics and fields.
+fn by_guess(path: &Path) -> Result<Assembled, RecordingError> {
+    let logs = read_mcap(path)?;
+    let robot = Robot::by_name("go1").expect("a known robot");
+    let text = guess_of(path, &logs, robot)?.text;
+    let map = ColumnMap::parse(&format!("{}: the guessed map", path.display()), &text)?;
+    let mut assembled = assemble(path, &logs, &map)?;
+    let note = "topics are taken by their names (`romc inspect --guess` prints the map)";
+    assembled.notes.push(note.to_owned());
+    Ok(assembled)
+}
+
+impl Mended {
+    fn of(timed: &Timed) -> Self {
+        Self {
+            elapsed_ratio: timed.rebuilt.then_some(timed.elapsed_ratio),
+            resampled: timed.resampled,
+            rates_replaced: timed.rates_replaced,
+        }
+    }
+}
+
+/// What was done to several recordings besides reading.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReadingNotes {
+    recordings: usize,
+    rebuilt: usize,
+    ratios: Option<(f64, f64)>,
+    resampled: usize,
+    rates_replaced: usize,
+    others: Vec<(String, usize)>,
+}
+
+impl ReadingNotes {
+    /// Counts one recording.
+    pub fn add(&mut self, reading: &Reading) {
+        self.recordings += 1;
+        let any = |of: fn(&Mended) -> bool| usize::from(reading.mended.iter().any(of));
+        self.rebuilt += any(|mended| mended.elapsed_ratio.is_some());
+        self.resampled += any(|mended| mended.elapsed_ratio.is_none() && mended.resampled);
+        self.rates_replaced += any(|mended| mended.rates_replaced);
+        for ratio in reading.mended.iter().filter_map(|m| m.elapsed_ratio) {
+            let (least, most) = self.ratios.unwrap_or((ratio, ratio));
+            self.ratios = Some((least.min(ratio), most.max(ratio)));
+        }
+        for note in &reading.notes {
+            match self.others.iter_mut().find(|(known, _)| known == note) {
+                Some((_, count)) => *count += 1,
+                None => self.others.push((note.clone(), 1)),
+            }
+        }
+    }
+
+    /// The notes as lines: one for clocks and rates, one for each other note.
+    pub fn lines(&self) -> Vec<String> {
+        let of = |count: usize| match self.recordings {
+            1 => String::new(),
+            all => format!(" in {count} of {all} recordings"),
+        };
+        let mut clocks = Vec::new();
+        if let Some((least, most)) = self.ratios {
+            let least = format!("{least:.2}");
+            let most = format!("{most:.2}");
+            let ratio = match least == most {
+                true => most,
+                false => format!("{least} to {most}"),
+            };
+            clocks.push(format!(
+                "times are rebuilt from the motion, which takes {ratio} s in a recorded second{}",
+                of(self.rebuilt)
+            ));
+        }
+        if self.resampled > 0 {
+            clocks.push(format!("uneven steps are resampled{}", of(self.resampled)));
+        }
+        if self.rates_replaced > 0 {
+            clocks.push(format!(
+                "angular rates, which disagree with the angles, are differences of these{}",
+                of(self.rates_replaced)
+            ));
+        }
+        let mut lines = Vec::new();
+        if !clocks.is_empty() {
+            lines.push(format!(
+                "{} (--clock recorded: as recorded)",
+                clocks.join("; ")
+            ));
+        }
+        let others = self.others.iter();
+        lines.extend(others.map(|(note, count)| format!("{note}{}", of(*count))));
+        lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::segment::tests::sample_segment;
+
+    fn reading(elapsed_ratio: Option<f64>, note: &str) -> Reading {
+        let segment = sample_segment(3);
+        Reading {
+            recording: Recording {
+                path: segment.path.clone(),
+                segments: vec![segment],
+                ignored_columns: Vec::new(),
+            },
+            notes: vec![note.to_owned()],
+            mended: vec![Mended {
+                elapsed_ratio,
+                resampled: true,
+                rates_replaced: false,
+            }],
+        }
+    }
+
+    #[test]
+    fn lines_say_each_thing_once_with_its_count() {
+        let mut notes = ReadingNotes::default();
+        notes.add(&reading(Some(1.1), "a"));
+        notes.add(&reading(Some(1.24), "a"));
+        notes.add(&reading(None, "b"));
+        let lines = notes.lines();
+        assert_eq!(lines.len(), 3);
+        assert!(lines[0].contains("1.10 to 1.24 s in a recorded second in 2 of 3 recordings"));
+        assert!(lines[0].contains("uneven steps are resampled in 1 of 3 recordings"));
+        assert_eq!(lines[1], "a in 2 of 3 recordings");
+    }
+
+    #[test]
+    fn a_folder_without_a_map_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = Reader::default().read(folder.path()).unwrap_err();
+        assert!(matches!(error.kind, RecordingFault::Folder));
+    }
+}

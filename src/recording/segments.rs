@@ -1,0 +1,175 @@
+//! Samples become segments.
+
+use std::path::Path;
+
+use nalgebra::DMatrix;
+
+use super::columns::Column;
+use super::error::{RecordingError, RecordingFault};
+use super::preprocess::differences;
+use super::segment::Segment;
+use crate::robot::{BODY_DIM, ContactFlags, JOINT_DIM, STATE_DIM};
+
+/// A step this many times the one before it starts a new segment, as a jump
+/// back does: samples were left out between the two.
+const GAP_STEPS: f64 = 20.0;
+/// Largest mean distance between samples: a jump lasts less than a second.
+const LARGEST_STEP_S: f64 = 0.1;
+
+/// One sample, sorted by meaning.
+#[derive(Default)]
+pub(super) struct Sample {
+    pub time_s: f64,
+    pub x: [f64; STATE_DIM],
+    pub dx: [f64; STATE_DIM],
+    pub ddx: [f64; STATE_DIM],
+    pub torque_nm: [f64; JOINT_DIM],
+    pub force: [f64; BODY_DIM],
+    pub feet: ContactFlags,
+}
+
+/// The samples of a segment so far, each quantity sample after sample.
+#[derive(Default)]
+struct Open {
+    first_row: usize,
+    time_s: Vec<f64>,
+    x: Vec<f64>,
+    dx: Vec<f64>,
+    ddx: Vec<f64>,
+    torque_nm: Vec<f64>,
+    force: Vec<f64>,
+    feet: Vec<ContactFlags>,
+}
+
+/// The segments of a recording, sample by sample.
+pub(super) struct SegmentBuilder<'a> {
+    path: &'a Path,
+    has_acceleration: bool,
+    has_force: bool,
+    open: Open,
+    segments: Vec<Segment>,
+}
+
+impl<'a> SegmentBuilder<'a> {
+    /// Of samples that carry accelerations, or else get differences; and the body wrench.
+    pub fn new(path: &'a Path, has_acceleration: bool, has_force: bool) -> Self {
+        SegmentBuilder {
+            path,
+            has_acceleration,
+            has_force,
+            open: Open::default(),
+            segments: Vec::new(),
+        }
+    }
+
+    pub fn push(&mut self, row: usize, sample: &Sample) -> Result<(), RecordingError> {
+        if begins_segment(&self.open.time_s, sample.time_s)
+            .map_err(|fault| fault.in_cell(self.path, row, "Time"))?
+        {
+            self.close()?;
+        }
+        if self.open.time_s.is_empty() {
+            self.open.first_row = row;
+        }
+        self.open.time_s.push(sample.time_s);
+        self.open.x.extend_from_slice(&sample.x);
+        self.open.dx.extend_from_slice(&sample.dx);
+        if self.has_acceleration {
+            self.open.ddx.extend_from_slice(&sample.ddx);
+        }
+        self.open.torque_nm.extend_from_slice(&sample.torque_nm);
+        if self.has_force {
+            self.open.force.extend_from_slice(&sample.force);
+        }
+        self.open.feet.push(sample.feet);
+        Ok(())
+    }
+
+    fn close(&mut self) -> Result<(), RecordingError> {
+        let open = std::mem::take(&mut self.open);
+        let n = open.time_s.len();
+        if n < 2 {
+            let (found, expected) = (n, 2);
+            let fault = RecordingFault::TooShort { found, expected };
+            return Err(fault.at(self.path, open.first_row));
+        }
+        let step_s = (open.time_s[n - 1] - open.time_s[0]) / (n - 1) as f64;
+        if step_s > LARGEST_STEP_S {
+            let (found, expected) = (step_s, LARGEST_STEP_S);
+            let fault = RecordingFault::Sampling { found, expected };
+            return Err(fault.in_cell(self.path, open.first_row, "Time"));
+        }
+        let dx = DMatrix::from_column_slice(STATE_DIM, n, &open.dx);
+        let ddx = if self.has_acceleration {
+            DMatrix::from_column_slice(STATE_DIM, n, &open.ddx)
+        } else {
+            differences(&open.time_s, &dx)
+        };
+        self.require_finite(&open, &ddx)?;
+        self.segments.push(Segment {
+            path: self.path.to_owned(),
+            first_row: open.first_row,
+            row_stride: 1.0,
+            time_s: open.time_s,
+            x: DMatrix::from_vec(STATE_DIM, n, open.x),
+            dx,
+            ddx,
+            torque_nm: DMatrix::from_vec(JOINT_DIM, n, open.torque_nm),
+            feet: open.feet,
+            body_wrench: self
+                .has_force
+                .then(|| DMatrix::from_vec(BODY_DIM, n, open.force)),
+        });
+        Ok(())
+    }
+
+    /// Differences of huge velocities over tiny steps can overflow.
+    fn require_finite(&self, open: &Open, ddx: &DMatrix<f64>) -> Result<(), RecordingError> {
+        match ddx.iter().position(|value| !value.is_finite()) {
+            None => Ok(()),
+            Some(place) => {
+                let found = format!("{} from differences", ddx[place]);
+                let expected = "a finite number";
+                let row = open.first_row + place / STATE_DIM;
+                let column = Column::Acceleration(place % STATE_DIM).name();
+                let fault = RecordingFault::Number { found, expected };
+                Err(fault.in_cell(self.path, row, &column))
+            }
+        }
+    }
+
+    /// The segments of a file of so many columns.
+    pub fn finish(mut self, columns: usize) -> Result<Vec<Segment>, RecordingError> {
+        if self.open.time_s.is_empty() {
+            return Err(RecordingFault::HeaderOnly(columns).of(self.path));
+        }
+        self.close()?;
+        Ok(self.segments)
+    }
+}
+
+/// Whether a time belongs to a new segment: it jumps back by more than a step or to where the segment of these times
+/// began, or far ahead.
+///
+/// # Errors
+/// [`RecordingFault::Time`] if time stands still, or steps back by less.
+pub(super) fn begins_segment(open_s: &[f64], time_s: f64) -> Result<bool, RecordingFault> {
+    let (first, last) = match open_s {
+        [] => return Ok(false),
+        [first, .., last] => (*first, *last),
+        [only] => (*only, *only),
+    };
+    let before = match open_s {
+        [.., a, b] => b - a,
+        _ => f64::INFINITY,
+    };
+    let step = time_s - last;
+    if step > 0.0 {
+        return Ok(step > GAP_STEPS * before);
+    }
+    if step < 0.0 && (time_s <= first || -step > 1.5 * before) {
+        return Ok(true);
+    }
+    let (found, previous) = (time_s, last);
+    Err(RecordingFault::Time { found, previous })
+}
