@@ -210,6 +210,8 @@ impl Fault {
                 EmitError::Lower(error) => Fault::of_lower(error),
                 EmitError::Control(error) => Fault::of_mpc(error),
                 EmitError::Nonlinear { .. } => Fault::at_tensor("encoder"),
+                EmitError::Jump(error) => Fault::of_recording(error),
+                EmitError::JumpInput(_) => Fault::of(Class::Other),
                 EmitError::Typeset(_) | EmitError::Codegen(_) | EmitError::Template(_) => {
                     Fault::of(Class::Model)
                 }

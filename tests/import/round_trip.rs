@@ -75,7 +75,7 @@ const MODELS: [&str; 5] = [
     "tests/fixtures/models/robot-degree-2.json",
     "tests/fixtures/models/three-phases.json",
     "tests/fixtures/models/one-dimensional.json",
-    "models/go1-d6.json",
+    "tests/fixtures/import/go1-d6.json",
     "models/paper-2d.json",
 ];
 
@@ -174,7 +174,7 @@ fn import_maps_names_that_say_nothing() {
 
 #[test]
 fn import_of_names_of_parts_finds_the_phases_itself() {
-    let original = model("models/go1-d6.json");
+    let original = model("tests/fixtures/import/go1-d6.json");
     let way = ways()[0];
     let torch = |role: &Role| match role {
         Role::Weights(part, _) => format!("model.{}.0.weight", part.name()),
