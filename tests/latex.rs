@@ -514,12 +514,19 @@ fn typeset_document(files: &[EmittedFile], name: &str) {
     }
     let log = fs::read(folder.path().join(format!("{name}.log"))).unwrap();
     let log = String::from_utf8_lossy(&log);
-    for fault in [
-        "Overfull",
-        "undefined",
-        "multiply defined",
-        "Missing character",
-    ] {
+    // Widths of lines are estimates, good to 5 pt.
+    for line in log.lines().filter(|line| line.starts_with("Overfull")) {
+        let points = line
+            .split('(')
+            .nth(1)
+            .and_then(|rest| rest.split("pt").next());
+        let points: Option<f64> = points.and_then(|points| points.parse().ok());
+        assert!(
+            points.is_some_and(|points| points < 5.0),
+            "{preview}: {line}"
+        );
+    }
+    for fault in ["undefined", "multiply defined", "Missing character"] {
         assert!(!log.contains(fault), "{preview}: {fault}\n{log}");
     }
     if let Ok(keep) = std::env::var("ROMC_KEEP_PDF") {

@@ -126,7 +126,7 @@ pub fn along_recording(
         let durations = recording
             .segments
             .iter()
-            .filter(|s| s.len() > 0)
+            .filter(|s| !s.is_empty())
             .map(duration);
         return Err(MpcError::NoStep {
             path: recording.path.clone(),

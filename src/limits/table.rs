@@ -18,6 +18,8 @@ pub const BODY_WEIGHT: Range = Range::real("body-weight", 1e-6, 1e6);
 pub const BPTT_WEIGHT: Range = Range::real("bptt-weight", 0.0, 1e6);
 /// Steps of that window.
 pub const BPTT_WINDOW: Range = Range::whole("bptt-window", 1, 1000);
+/// Steps of the refinement by rollouts.
+pub const REFINEMENTS: Range = Range::whole("refinements", 0, 1000);
 /// Samples per step of that window.
 pub const BPTT_STRIDE: Range = Range::whole("bptt-stride", 1, 1000);
 /// Weight of a prediction relative to the previous one.
@@ -72,7 +74,7 @@ pub const DISTANCE: Range = Range::real("distance", -1000.0, 1000.0);
 pub const APEX: Range = Range::real("apex", -1000.0, 1000.0);
 
 /// The settings of `romc train`, as flags and in files.
-pub static TRAINING: [Range; 18] = [
+pub static TRAINING: [Range; 19] = [
     LATENT_DIM,
     SEEDS,
     EPOCHS,
@@ -80,6 +82,7 @@ pub static TRAINING: [Range; 18] = [
     BODY_WEIGHT,
     BPTT_WEIGHT,
     BPTT_WINDOW,
+    REFINEMENTS,
     BPTT_STRIDE,
     BPTT_DECAY,
     SLACK,

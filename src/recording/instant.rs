@@ -15,7 +15,7 @@ impl Instant {
     /// A time of a clock whose values need no care.
     pub fn of(value: f64) -> Option<Self> {
         let whole = value.floor();
-        (whole.abs() < 9e18).then(|| Instant {
+        (whole.abs() < 9e18).then_some(Instant {
             whole: whole as i64,
             rest: value - whole,
         })

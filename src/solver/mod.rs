@@ -43,6 +43,12 @@
 //! assert_eq!(report.outcome, Outcome::Solved);
 //! assert!((program.stages[0].v[0] + 1.0).abs() < 1e-8);
 //! ```
+// Loops over indices and sums written out have the order of operations of the C that is made of them.
+#![allow(
+    clippy::needless_range_loop,
+    clippy::assign_op_pattern,
+    clippy::neg_cmp_op_on_partial_ord
+)]
 
 mod interior;
 mod problem;

@@ -357,7 +357,7 @@ mod tests {
         let html = table.captioned("Errors & more").html();
         assert!(html.starts_with("<table>\n<caption>Errors &amp; more</caption>\n<thead><tr><th scope=\"col\">coordinate</th>"), "{html}");
         assert!(
-            html.contains("<tr><th scope=\"row\">a|&lt;b&gt;, c</th><td>-</td><td>12</td></tr>\n"),
+            html.contains("<tr><th scope=\"row\">a|&lt;b&gt;, c</th><td>–</td><td>12</td></tr>\n"),
             "{html}"
         );
     }

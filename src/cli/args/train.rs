@@ -173,7 +173,7 @@ pub struct TrainSettings {
     pub slack: Option<Finite>,
     /// Steps by which rollouts of the training jumps refine the chosen coefficients; 0 leaves those of the regression
     /// (10 unless given, 0 with --paper)
-    #[arg(long, value_name = "STEPS")]
+    #[arg(long, value_name = "STEPS", value_parser = count(&table::REFINEMENTS))]
     pub refinements: Option<usize>,
     /// Highest degree of the polynomial candidate terms
     #[arg(long, value_name = "P", value_parser = |text: &str| table::DEGREE.parse::<u32>(text))]

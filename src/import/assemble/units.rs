@@ -157,10 +157,10 @@ impl<'a> Assembly<'a, '_> {
         }
         if let Some(scaling) = &mut parts.scaling {
             for factors in [&mut scaling.state, &mut scaling.input] {
-                if let ScaleFactors::PerCoordinate(values) = factors {
-                    if values.len() == STATE_DIM {
-                        *values = order.sorted(values);
-                    }
+                if let ScaleFactors::PerCoordinate(values) = factors
+                    && values.len() == STATE_DIM
+                {
+                    *values = order.sorted(values);
                 }
             }
         }

@@ -287,6 +287,7 @@ impl Rows<'_> {
     }
 
     /// Velocities about the body's own axes become the derivatives of position and angles.
+    #[allow(clippy::wrong_self_convention)] // turns what it holds
     fn to_world(&mut self, map: &ColumnMap) -> Result<(), RecordingError> {
         let angles = self.values(Quantity::Orientation);
         let angles = angles.expect("a map has the orientation").clone();

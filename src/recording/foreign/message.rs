@@ -380,7 +380,7 @@ mod tests {
     fn message(layout: Layout) -> Vec<u8> {
         let mut out: Vec<u8> = Vec::new();
         let put = |out: &mut Vec<u8>, size: usize, bytes: &[u8]| {
-            while layout == Layout::Ros2 && out.len() % size != 0 {
+            while layout == Layout::Ros2 && !out.len().is_multiple_of(size) {
                 out.push(0xee);
             }
             out.extend(bytes);

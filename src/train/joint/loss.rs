@@ -352,6 +352,9 @@ mod tests {
             latent: 0.6,
         };
         for phi in Activation::ALL {
+            if phi == Activation::Relu {
+                continue; // its Jacobian jumps, and the loss on velocities with it
+            }
             let is_linear = phi == Activation::Linear;
             let widths: (&[usize], &[usize]) = match is_linear {
                 true => (&[7, 3], &[3, 7]),

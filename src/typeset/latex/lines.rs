@@ -7,7 +7,7 @@ use crate::typeset::{
 use super::math::{TexMath, TexSymbol, TexTerms};
 
 /// Longest line unless chosen, in em.
-pub(super) const WIDTH_EM: f64 = 31.5;
+pub(super) const WIDTH_EM: f64 = 30.5;
 /// What a continued line is set in by, in em: `\qquad` and the empty group
 /// before its sign.
 const INDENT: f64 = 2.3;
