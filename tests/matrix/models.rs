@@ -128,7 +128,7 @@ fn sixty() -> ReducedModel {
     let library = Library::standard(d, standard).expect("a library");
     let xi = |shift: usize| {
         DMatrix::from_fn(library.len(), d, |row, column| {
-            let is_active = (7 * row + 11 * column + shift) % 53 == 0;
+            let is_active = (7 * row + 11 * column + shift).is_multiple_of(53);
             if is_active {
                 0.5 - 0.01 * (row % 97) as f64
             } else {
