@@ -78,7 +78,7 @@ impl ChainLeg {
         ]
     }
 
-    /// As [`Self::levers`] over their largest values, absolute.
+    /// As `levers` over their largest values, absolute.
     pub fn spans(&self, q: &[f64; 3]) -> [f64; 2] {
         let ([area, lever], [thigh, calf]) = (Self::levers(&self.moved(q)), self.lengths());
         [area.abs() / (thigh * calf), lever.abs() / (thigh + calf)]

@@ -82,7 +82,7 @@ impl Shape {
         self.input + self.soft + usize::from(self.soft > 0) + self.hard
     }
 
-    /// Numbers that a stage's rows need of [`Memory::rows`].
+    /// Numbers that a stage's rows need of `Memory::rows`.
     pub fn memory(&self) -> usize {
         ROW_NUMBERS * self.rows()
     }

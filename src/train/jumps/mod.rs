@@ -1,7 +1,7 @@
 //! What the training jumps say of jumps that were not recorded: landmarks, prior, deviations.
 //!
 //! In: the training jumps and an encoder. Out: a [`JumpPrior`], or none if fewer than
-//! [`LEAST_JUMPS`] of them are of one kind. [`landmarks`] cuts each jump into parts, [`nodes`]
+//! [`LEAST_JUMPS`] of them are of one kind. `landmarks` cuts each jump into parts, `nodes`
 //! samples the parts at equal shares of their durations, `regression` fits nodes and durations over
 //! the goals, and `deviations` fits how accelerations change about such a trajectory.
 

@@ -27,7 +27,7 @@ use super::table::{self, TableBlock};
 /// - `NAME-robot.tex`, if the model has encoder and decoder: what the latent coordinates
 ///   are made of, and the accelerations of the robot, in SI units;
 /// - `NAME-preview.tex`: a document that shows them all, in two columns where the width asked for is
-///   at most [`TWO_COLUMNS_EM`].
+///   at most `TWO_COLUMNS_EM`.
 ///
 /// The first lines of `NAME.tex` say how coefficients were rounded, the largest
 /// error that this made, and which terms vanished by it. Files with labels list them.

@@ -1,7 +1,7 @@
 //! A first map for an unknown log: from the names of its columns, then checked and completed by its numbers.
 //!
-//! [`first_map`] is the way from one to the other; [`names`] says what a name means; [`evidence`] compares
-//! positions with velocities to find units, signs, axes and the order of a quaternion; [`write`](mod@write)
+//! `first_map` is the way from one to the other; `names` says what a name means; `evidence` compares
+//! positions with velocities to find units, signs, axes and the order of a quaternion; `write`
 //! prints the map with what it rests on.
 
 mod columns;
