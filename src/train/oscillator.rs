@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use nalgebra::{DMatrix, DVector};
 
 use super::dataset::{Dataset, Jump, Rates, ScaleOptions};
+use super::features::Features;
 use super::latent::Latent;
+use crate::model::{Library, StandardLibrary};
 use crate::recording::PhaseRule;
 use crate::robot::STATE_DIM;
 
@@ -22,6 +24,22 @@ pub(super) fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] 
         ],
         _ => [-0.5 * dz[0], -0.981],
     }
+}
+
+/// Library of the terms 1, z1, z2, dz1, dz2, u1, u2, and the known system's coefficients.
+pub(super) fn known() -> (Features, Vec<DMatrix<f64>>) {
+    let standard = StandardLibrary {
+        degree: 1,
+        trigonometric: false,
+        inputs: true,
+    };
+    let features = Features::new(&Library::standard(2, standard).expect("small library"));
+    let mut contact = DMatrix::zeros(7, 2);
+    let mut flight = contact.clone();
+    (contact[(1, 0)], contact[(3, 0)], contact[(5, 0)]) = (-40.0, -3.0, 5.0);
+    (contact[(6, 1)], contact[(1, 1)]) = (8.0, -2.0);
+    (flight[(3, 0)], flight[(0, 1)]) = (-0.5, -0.981);
+    (features, vec![contact, flight])
 }
 
 /// `n_jumps` jumps of the known system, integrated with fine steps, and their latent samples.

@@ -228,30 +228,13 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
-    use crate::model::{Library, StandardLibrary};
     use crate::train::oscillator;
     use crate::train::progress::{Progress, Watch};
-
-    /// Terms 1, z1, z2, dz1, dz2, u1, u2 and the oscillator's coefficients.
-    fn known() -> (Features, Vec<DMatrix<f64>>) {
-        let standard = StandardLibrary {
-            degree: 1,
-            trigonometric: false,
-            inputs: true,
-        };
-        let features = Features::new(&Library::standard(2, standard).expect("small library"));
-        let mut contact = DMatrix::zeros(7, 2);
-        let mut flight = contact.clone();
-        (contact[(1, 0)], contact[(3, 0)], contact[(5, 0)]) = (-40.0, -3.0, 5.0);
-        (contact[(6, 1)], contact[(1, 1)]) = (8.0, -2.0);
-        (flight[(3, 0)], flight[(0, 1)]) = (-0.5, -0.981);
-        (features, vec![contact, flight])
-    }
 
     fn refined(start: Vec<DMatrix<f64>>, knowledge: &[Knowledge]) -> (f64, Coefficients) {
         let (dataset, latent) = oscillator::jumps(3);
         let judge = Judge::new(&dataset, &latent, 0.2);
-        let (features, _) = known();
+        let (features, _) = oscillator::known();
         let refiner = Refiner {
             features: &features,
             knowledge,
@@ -271,7 +254,7 @@ mod tests {
 
     #[test]
     fn coefficients_that_are_off_are_brought_back_by_what_they_predict() {
-        let (_, truth) = known();
+        let (_, truth) = oscillator::known();
         let nothing = vec![Knowledge::nothing(7, 2); 2];
         let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.2 * c)).collect();
         let (before, found) = refined(off, &nothing);
@@ -288,7 +271,7 @@ mod tests {
 
     #[test]
     fn known_coefficients_stay_and_diverging_ones_are_left_alone() {
-        let (_, truth) = known();
+        let (_, truth) = oscillator::known();
         let mut knowledge = vec![Knowledge::nothing(7, 2); 2];
         knowledge[1].free.fill(false);
         let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();

@@ -253,28 +253,12 @@ impl<'a> Stepper<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Library, StandardLibrary};
     use crate::train::oscillator;
-
-    fn known() -> (Features, Vec<DMatrix<f64>>) {
-        let standard = StandardLibrary {
-            degree: 1,
-            trigonometric: false,
-            inputs: true,
-        };
-        let features = Features::new(&Library::standard(2, standard).expect("small library"));
-        let mut contact = DMatrix::zeros(7, 2); // rows: 1, z1, z2, dz1, dz2, u1, u2
-        let mut flight = contact.clone();
-        (contact[(1, 0)], contact[(3, 0)], contact[(5, 0)]) = (-40.0, -3.0, 5.0);
-        (contact[(6, 1)], contact[(1, 1)]) = (8.0, -2.0);
-        (flight[(3, 0)], flight[(0, 1)]) = (-0.5, -0.981);
-        (features, vec![contact, flight])
-    }
 
     #[test]
     fn predictions_of_the_true_dynamics_follow_the_samples_through_both_phases() {
         let (dataset, latent) = oscillator::jumps(2);
-        let (features, xi) = known();
+        let (features, xi) = oscillator::known();
         let candidate = Candidate {
             features: &features,
             xi: &xi,
@@ -315,7 +299,7 @@ mod tests {
     #[test]
     fn diverging_dynamics_predict_infinity() {
         let (dataset, latent) = oscillator::jumps(1);
-        let (features, mut xi) = known();
+        let (features, mut xi) = oscillator::known();
         xi[0][(1, 0)] = 1e7;
         let prediction = &predict(
             Candidate {
