@@ -20,6 +20,7 @@ use romc::model::ModelError;
 use romc::mpc::{ControlError, MpcError};
 use romc::plan::PlanError;
 use romc::recording::RecordingError;
+use romc::robot::WrenchFrame;
 use romc::sim::SimError;
 use romc::simplify::SimplifyError;
 
@@ -196,6 +197,10 @@ impl Fault {
             Error::Model(error) => Fault::of_model(error),
             Error::Artifact(error) => Fault::of_artifact(error),
             Error::Import(error) => Fault::of_import(error),
+            Error::Mismatch { file, .. } => {
+                Fault::of(Class::Model).in_file(&file.to_string_lossy())
+            }
+            Error::RobotFile(error) => Fault::of(Class::Other).in_file(&error.file),
             Error::Sim(error) => Fault::of_sim(error),
             Error::Lower(error) => Fault::of_lower(error),
             Error::Mpc(error) => Fault::of_mpc(error),
@@ -322,6 +327,17 @@ pub fn choice<T: clap::ValueEnum>(py: Python<'_>, option: &str, name: &str) -> P
         usage(
             py,
             &format!("{option}: found {name:?}, expected one of {expected}"),
+        )
+    })
+}
+
+/// The axes of force and moment, by their name on the command line.
+pub fn wrench_frame(py: Python<'_>, name: &str) -> PyResult<WrenchFrame> {
+    WrenchFrame::by_name(name).ok_or_else(|| {
+        let names = WrenchFrame::ALL.map(WrenchFrame::name).join(", ");
+        usage(
+            py,
+            &format!("wrench_frame: found {name:?}, expected one of {names}"),
         )
     })
 }

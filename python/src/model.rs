@@ -7,7 +7,6 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::DVector;
 use numpy::{PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use romc::Error;
 use romc::artifact;
 use romc::files::Overwrite;
 use romc::lower::{CompiledModel, LowerError};
@@ -15,7 +14,6 @@ use romc::model::{ModelError, ReducedModel};
 
 use crate::arrays::{from_vectors, matrix, vectors};
 use crate::errors::{python_error, refusal};
-use crate::recording::{Recording, gather};
 
 /// A checked model.
 #[pyclass(frozen, module = "romc._romc")]
@@ -254,26 +252,6 @@ impl Model {
         });
         let accelerations = accelerations.map_err(|error| python_error(py, error))?;
         Ok(from_vectors(py, d, &accelerations))
-    }
-
-    /// The model with the input statistics of recordings.
-    fn with_inputs(&self, py: Python<'_>, recordings: Vec<PyRef<'_, Recording>>) -> PyResult<Self> {
-        let recordings = gather(&recordings);
-        let made = py.detach(|| -> Result<ReducedModel, Error> {
-            let segments: Vec<_> = recordings.iter().flat_map(|r| &r.segments).collect();
-            let statistics = romc::sim::input_statistics(&self.data, &segments)?;
-            let phases = self.data.phases().iter();
-            let names: Vec<String> = phases.map(|phase| phase.name.clone()).collect();
-            let mut builder = ReducedModel::clone(&self.data).into_builder();
-            for (name, statistics) in names.into_iter().zip(statistics) {
-                if let Some(statistics) = statistics {
-                    builder = builder.input_statistics(name, statistics);
-                }
-            }
-            Ok(builder.build()?)
-        });
-        made.map(Model::new)
-            .map_err(|error| python_error(py, error))
     }
 
     /// The model file's keys besides the tensors, for `repr` and notebooks.

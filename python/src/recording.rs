@@ -9,11 +9,14 @@ use pyo3::prelude::*;
 use romc::Error;
 use romc::files::Place;
 use romc::recording::write::{Notation, write_to};
-use romc::recording::{RecordingError, WriteOptions, read_from_bytes};
-use romc::robot::{ContactFlags, FOOT_DIM, InputRule, JOINT_DIM, Robot, STATE_DIM};
+use romc::recording::{
+    Clocks, ColumnMap, Reader, ReadingNotes, RecordingError, WriteOptions, read_from_bytes,
+};
+use romc::robot::{ContactFlags, FOOT_DIM, InputRule, JOINT_DIM, STATE_DIM};
+use romc::robot_file::find;
 
 use crate::arrays::{into_rows, rows, tuples, values};
-use crate::errors::{bad_reference, python_error};
+use crate::errors::{bad_reference, choice, python_error, wrench_frame};
 use crate::model::Model;
 
 /// The samples of a file or of arrays.
@@ -149,19 +152,68 @@ impl Segment {
         self.inputs_by(py, &rule.map_err(|error| python_error(py, error))?)
     }
 
-    /// The inputs of a robot as published, one row per sample.
-    fn inputs_of<'py>(&self, py: Python<'py>, robot: &str) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let robot = Robot::by_name(robot).map_err(|error| python_error(py, error))?;
-        self.inputs_by(py, &InputRule::published(robot))
+    /// The inputs of a robot without losses in its joints, one row per sample.
+    fn inputs_of<'py>(
+        &self,
+        py: Python<'py>,
+        robot: &str,
+        frame: &str,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let robot = find(robot).map_err(|error| python_error(py, error))?;
+        self.inputs_by(py, &InputRule::new(robot, None, wrench_frame(py, frame)?))
     }
 }
 
-/// Reads a file.
+/// A map of columns: its file, or its text.
+#[derive(FromPyObject)]
+pub enum Columns {
+    #[pyo3(transparent)]
+    Text(String),
+    #[pyo3(transparent)]
+    File(PathBuf),
+}
+
+impl Columns {
+    fn map(&self) -> Result<ColumnMap, RecordingError> {
+        match self {
+            Columns::Text(text) => ColumnMap::parse("columns", text),
+            Columns::File(path) => ColumnMap::read(path),
+        }
+    }
+}
+
+/// Reads files, one reader for all; returns the recordings, and in words what was done besides reading.
 #[pyfunction]
-pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Recording> {
-    let read = py.detach(|| romc::recording::read(&path));
-    read.map(Recording::made)
-        .map_err(|error| python_error(py, error))
+pub fn read(
+    py: Python<'_>,
+    paths: Vec<PathBuf>,
+    columns: Option<Columns>,
+    clock: &str,
+) -> PyResult<(Vec<Recording>, Vec<String>)> {
+    let clocks: Clocks = choice(py, "clock", clock)?;
+    let read = py.detach(|| -> Result<_, RecordingError> {
+        let map = columns.as_ref().map(Columns::map).transpose()?;
+        let reader = Reader::new(map, clocks);
+        let mut notes = ReadingNotes::default();
+        let readings = paths.iter().map(|path| {
+            let reading = reader.read(path)?;
+            notes.add(&reading);
+            Ok(Recording::made(reading.recording))
+        });
+        let recordings = readings.collect::<Result<Vec<_>, _>>()?;
+        Ok((recordings, notes.lines()))
+    });
+    read.map_err(|error| python_error(py, error))
+}
+
+/// A first map of an unknown log; returns its text, and why a log cannot be read by it, if so.
+#[pyfunction]
+pub fn guess(py: Python<'_>, path: PathBuf, robot: &str) -> PyResult<(String, Option<String>)> {
+    let guessed = py.detach(|| -> Result<_, Error> {
+        Ok(romc::recording::foreign::guess::guess(&path, find(robot)?)?)
+    });
+    let guessed = guessed.map_err(|error| python_error(py, error))?;
+    Ok((guessed.text, guessed.outcome.err()))
 }
 
 /// Rows of numbers.

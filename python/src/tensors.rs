@@ -1,15 +1,16 @@
 //! Tensors of Python objects to a model, by the importer of files.
 
-use nalgebra::DVector;
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use romc::Error;
+use romc::evaluate::RoundTrip;
 use romc::import::{ImportOptions, LibraryChoice, Tensor, parse_standard};
-use romc::model::{ScaleFactors, Scaling};
-use romc::robot::Robot;
+use romc::robot_file::find;
+use romc::sim::with_input_statistics;
 
-use crate::errors::{choice, python_error};
+use crate::errors::{choice, python_error, wrench_frame};
 use crate::model::Model;
+use crate::recording::{Recording, gather};
 
 /// The options of `romc import`, under the same names.
 #[derive(FromPyObject)]
@@ -30,8 +31,13 @@ pub struct ImportArguments {
     activation: Option<String>,
     /// `PART=TENSOR` each.
     map: Vec<String>,
+    /// A name or a file.
     robot: Option<String>,
+    order: Option<String>,
+    wrench_frame: String,
     sample_time: Option<f64>,
+    /// Whether a model that misses the recordings is made all the same.
+    unchecked: bool,
 }
 
 impl ImportArguments {
@@ -46,7 +52,8 @@ impl ImportArguments {
             (None, None) => None,
         };
         let activation = self.activation.as_deref().map(str::parse).transpose();
-        let robot = self.robot.as_deref().map(Robot::by_name).transpose();
+        let robot = self.robot.as_deref().map(find).transpose();
+        let order = self.order.as_deref().map(str::parse).transpose();
         let (phases, map) = (self.phases.iter(), self.map.iter());
         Ok(ImportOptions {
             name: self.name.clone(),
@@ -62,37 +69,25 @@ impl ImportArguments {
                 .map(|name| choice(py, "xi_layout", name))
                 .transpose()?,
             activation: activation.map_err(|error| python_error(py, Error::Model(error)))?,
-            scaling: self.scaling(),
             robot: robot.map_err(|error| python_error(py, error))?,
+            order: order.map_err(|error| python_error(py, Error::Model(error)))?,
+            wrench_frame: wrench_frame(py, &self.wrench_frame)?,
             sample_time_s: self.sample_time,
-            ..ImportOptions::default()
-        })
-    }
-
-    fn scaling(&self) -> Option<Scaling> {
-        let factors = |given: &[f64]| match given {
-            [factor] => ScaleFactors::Uniform(*factor),
-            list => ScaleFactors::PerCoordinate(DVector::from_column_slice(list)),
-        };
-        let input = match self.input_scaling.as_slice() {
-            [] => &self.scaling,
-            input => input,
-        };
-        (!self.scaling.is_empty()).then(|| Scaling {
-            state: factors(&self.scaling),
-            input: factors(input),
+            ..ImportOptions::of_factors(&self.scaling, &self.input_scaling)
         })
     }
 }
 
-/// Imports named arrays; returns the model and the report as JSON.
+/// Imports named arrays; returns the model, and what is wrong with it along the recordings, if anything
+/// is and it is not refused. Recordings give it the statistics of the inputs.
 #[pyfunction]
 pub fn import_tensors(
     py: Python<'_>,
     source: &str,
     tensors: Vec<(String, PyReadonlyArrayDyn<'_, f64>)>,
     arguments: ImportArguments,
-) -> PyResult<(Model, String)> {
+    recordings: Vec<PyRef<'_, Recording>>,
+) -> PyResult<(Model, Option<String>)> {
     let options = arguments.options(py)?;
     let tensors: Vec<Tensor<'_>> = tensors
         .iter()
@@ -105,8 +100,24 @@ pub fn import_tensors(
             })
         })
         .collect::<PyResult<_>>()?;
-    let imported = py.detach(|| romc::import::import_tensors(source, &tensors, &options));
-    let imported = imported.map_err(|error| python_error(py, error))?;
-    let report = serde_json::json!(imported.report).to_string();
-    Ok((Model::new(imported.model), report))
+    let recordings = gather(&recordings);
+    let made = py.detach(|| -> Result<_, Error> {
+        let model = romc::import::import_tensors(source, &tensors, &options)?.model;
+        let segments: Vec<_> = recordings.iter().flat_map(|r| &r.segments).collect();
+        if segments.is_empty() {
+            return Ok((model, None));
+        }
+        let model = with_input_statistics(model, &segments)?;
+        let check = RoundTrip::of_import(&model, &segments)?;
+        let is_refused = check.as_ref().is_some_and(RoundTrip::is_refused);
+        match check.as_ref().and_then(RoundTrip::fault) {
+            Some(fault) if is_refused && !arguments.unchecked => Err(Error::Mismatch {
+                file: source.into(),
+                fault,
+            }),
+            fault => Ok((model, fault)),
+        }
+    });
+    let (model, fault) = made.map_err(|error| python_error(py, error))?;
+    Ok((Model::new(model), fault))
 }

@@ -1,12 +1,13 @@
 import json
 import math
 import pickle
+import warnings
 
 import numpy as np
 import pytest
 import romc
 
-from conftest import JUMPS, MODELS
+from conftest import JUMPS, MODELS, ROOT
 
 
 @pytest.fixture(scope="module")
@@ -19,8 +20,10 @@ def parts():
         "decoder": map_of("decoder"),
         "xi": {phase["name"]: np.array(phase["xi"]) for phase in document["phases"]},
         "scaling": document["scaling"]["state"],
+        "input_scaling": document["scaling"]["input"],
         "library": romc.Model.load(MODELS / "go1-d6.json").library,
         "robot": "go1",
+        "wrench_frame": document.get("wrench_frame", "body"),
     }
 
 
@@ -33,14 +36,14 @@ def test_maps_and_accelerations_are_those_of_the_arrays(parts):
     model = romc.Model.from_arrays(**parts)
     rng = np.random.default_rng(5)
     x, dx, u = rng.normal(size=(3, 7, 18))
-    (W, b), (D, c), s = parts["encoder"], parts["decoder"], parts["scaling"]
+    (W, b), (D, c), s, s_u = (parts[key] for key in ("encoder", "decoder", "scaling", "input_scaling"))
     z, dz = model.encode(x), model.encode_velocity(dx)
     u_lat = model.project_input(u)
     np.testing.assert_allclose(z, (s * x) @ W.T + b, rtol=1e-13, atol=1e-13)
     np.testing.assert_allclose(dz, (s * dx) @ W.T, rtol=1e-13, atol=1e-13)
-    np.testing.assert_allclose(u_lat, (s * u) @ np.linalg.pinv(W), rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(u_lat, (s_u * u) @ np.linalg.pinv(W), rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(model.decode(z), (z @ D.T + c) / s, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(model.lift_input(u_lat), u_lat @ W / s, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(model.lift_input(u_lat), u_lat @ W / s_u, rtol=1e-12, atol=1e-12)
     for phase, xi in parts["xi"].items():
         for row in range(len(z)):
             kinds = {"z": z[row], "dz": dz[row], "u": u_lat[row]}
@@ -57,6 +60,8 @@ def test_model_of_arrays_equals_the_import_of_a_file(parts, command_line, tmp_pa
     np.savez(tmp_path / "net.npz", **arrays)
     (tmp_path / "terms.json").write_text(json.dumps(parts["library"]))
     arguments = ["import", "net.npz", "--library", "terms.json", "--scaling", parts["scaling"], "--robot", "go1"]
+    arguments += ["--wrench-frame", parts["wrench_frame"]]
+    arguments += ["--input-scaling", ",".join(map(repr, parts["input_scaling"]))]
     inputs = [JUMPS / "train_01.csv.gz", JUMPS / "train_02.csv.gz"]
     command_line.json(*arguments, "--inputs-from", *inputs, "--output", "net.json")
     expected = json.loads((tmp_path / "net.json").read_text())
@@ -222,3 +227,58 @@ def test_affine_pipeline_of_scikit_learn_is_an_autoencoder(jump):
     kernel = decomposition.KernelPCA(3, kernel="rbf").fit(jump.x)
     with pytest.raises(romc.ModelError, match="nonlinear KernelPCA"):
         romc.Model.from_arrays(encoder=kernel, xi=xi, library=romc.Library(), robot="go1")
+
+
+RECORDED = [JUMPS / "train_01.csv.gz", JUMPS / "train_02.csv.gz"]
+
+
+def test_model_that_misses_its_recordings_is_refused_with_the_slip(parts):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        romc.Model.from_arrays(**parts, inputs_from=RECORDED)
+    wrong = {**parts, "scaling": 10 * parts["scaling"]}
+    with pytest.raises(romc.ModelError, match='scaling="0.1"') as caught:
+        romc.Model.from_arrays(**wrong, inputs_from=RECORDED)
+    assert "unchecked=True" in str(caught.value) and "--" not in str(caught.value)
+    with pytest.warns(romc.RomcWarning, match="misses the recordings") as warned:
+        taken = romc.Model.from_arrays(**wrong, inputs_from=RECORDED, unchecked=True)
+    assert warned[0].filename == __file__
+    assert taken.to_dict()["scaling"]["state"] == 10 * parts["scaling"]
+
+
+def test_mean_and_order_of_a_trainer(parts):
+    # A trainer that took (x - mean) with the body's coordinates first.
+    (W, b), (D, c), s = parts["encoder"], parts["decoder"], parts["scaling"]
+    mean = np.linspace(-0.4, 0.5, 18)
+    order = np.r_[12:18, 0:12]
+    centred = {"encoder": (W[:, order], b + W @ (s * mean)), "decoder": (D[order], (c - s * mean)[order])}
+    foreign = {**parts, **centred}
+    model = romc.Model.from_arrays(**foreign, mean=mean[order], order="body,fr,fl,rr,rl")
+    expected = romc.Model.from_arrays(**parts)
+    x = np.random.default_rng(3).normal(size=(5, 18))
+    np.testing.assert_allclose(model.encode(x), expected.encode(x), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(model.decode(x[:, :6]), expected.decode(x[:, :6]), rtol=1e-12, atol=1e-12)
+    with pytest.raises(romc.ModelError, match='order="body,'):
+        romc.Model.from_arrays(**{**foreign, "encoder": (W[:, order], b), "decoder": (D[order], c[order])},
+                               inputs_from=RECORDED)
+    with pytest.raises(romc.ModelError, match="18 coordinates once"):
+        romc.Model.from_arrays(**parts, order="body,fr,fl")
+
+
+def test_robot_of_a_file_travels_with_the_model(parts, tmp_path):
+    model = romc.Model.from_arrays(**{**parts, "robot": ROOT / "examples" / "robots" / "solo12.toml"})
+    assert model.to_dict()["robot"]["name"] == "solo12"
+    assert "solo12" in repr(model)
+    model.save(tmp_path / "m.json")
+    assert romc.Model.load(tmp_path / "m.json") == model
+    with pytest.raises(romc.RomcError, match="cannot read the robot") as caught:
+        romc.Model.from_arrays(**{**parts, "robot": tmp_path / "none.toml"})
+    assert caught.value.file == str(tmp_path / "none.toml")
+
+
+def test_factors_of_inputs_stand_beside_deviations_of_states(parts):
+    std = np.linspace(0.1, 0.4, 18)
+    model = romc.Model.from_arrays(**{**parts, "scaling": None, "input_scaling": 0.25}, std=std)
+    scaling = model.to_dict()["scaling"]
+    np.testing.assert_allclose(scaling["state"], 1 / std, rtol=1e-14)
+    assert scaling["input"] in (0.25, [0.25] * 18)

@@ -1,14 +1,17 @@
 """The command line of the wheel, the examples, the type annotations."""
 
+import csv
 import pathlib
+import runpy
 import subprocess
 import sys
 import sysconfig
 
+import numpy as np
 import pytest
 import romc
 
-from conftest import ROOT
+from conftest import JUMPS, ROOT
 
 EXAMPLES = ROOT / "python" / "examples"
 
@@ -32,7 +35,43 @@ def test_quickstart_is_short_and_runs(tmp_path):
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert r"\ddot{z}_1" in done.stdout and "solved" in done.stdout
-    assert (tmp_path / "out" / "pca" / "pca.c").is_file()
+
+
+def test_quickstart_is_the_command_line_to_the_bit(command_line, tmp_path, monkeypatch, capsys):
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    made = runpy.run_path(str(EXAMPLES / "quickstart.py"))
+    model, command, test = made["model"], made["command"], JUMPS / "test_01.csv.gz"
+    # The model: its arrays through a file.
+    arrays = {f"xi.{phase}": xi for phase, xi in made["xi"].items()}
+    arrays.update({"encoder.weight": made["W"], "encoder.bias": -made["W"] @ made["mean"]})
+    arrays.update({"decoder.weight": made["W"].T, "decoder.bias": made["mean"]})
+    np.savez("pca.npz", **arrays)
+    training = sorted(JUMPS.glob("train_*.csv.gz"))
+    arguments = ["--library", "degree=1,inputs", "--scaling", "1", "--robot", "go1", "--inputs-from", *training]
+    command_line.json("import", "pca.npz", *arguments, "--output", "pca.json")
+    imported, own = romc.Model.load("pca.json").to_dict(), model.to_dict()
+    assert [document.pop("provenance")["format"] for document in (imported, own)] == ["npz", "arrays"]
+    assert imported == own
+    # Equations and code.
+    command_line.json("compile", "pca.json", "--emit", "latex,c", "--out-dir", "expected")
+    emitted = sorted(path.name for path in (tmp_path / "expected").iterdir() if not path.name.startswith("."))
+    assert "pca.c" in emitted and "pca.tex" in emitted
+    digests = [romc.Model.load("pca.json").digest, model.digest]
+    for name in emitted:
+        texts = [(tmp_path / folder / name).read_text() for folder in ("expected", "out/pca")]
+        # A model file's digest covers where the model came from.
+        expected, found = (text.replace(digest[:16], "") for text, digest in zip(texts, digests))
+        assert found == expected, name
+    # Rollouts.
+    rollouts = command_line.json("simulate", "pca.json", test)["rollouts"]
+    rms = rollouts["restarted"]["coordinates"]["body.z"]["rms"]
+    assert f"rms of body.z, m: {rms!r}" in capsys.readouterr().out
+    # The controller's step.
+    command_line.json("mpc", "pca.json", test, "--output", "steps.csv")
+    first = next(csv.DictReader((tmp_path / "steps.csv").open()))
+    assert first["status"] == command.status
+    assert [float(cell) for name, cell in first.items() if name.endswith(" torque")] == command.torque.tolist()
 
 
 def test_notebook_runs(tmp_path):

@@ -137,3 +137,77 @@ def test_inputs_are_torques_and_the_wrench(model, jump):
     assert flight.any() and not u[flight, 12:].any()
     with pytest.raises(romc.RomcError, match="unknown robot"):
         jump.inputs("go3")
+
+
+def foreign_log(path, jump):
+    """A jump as another program logs it: degrees, ms, left legs first, quaternion, forces at the feet."""
+    legs, joints = ["lf", "rf", "lh", "rh"], ["haa", "hfe", "kfe"]
+    own = [3 * leg + joint for leg in (1, 0, 3, 2) for joint in range(3)]
+    half = jump.x[:, 15:18] / 2
+    (cr, cp, cy), (sr, sp, sy) = np.cos(half).T, np.sin(half).T
+    table = {"stamp_ms": 1e3 * jump.t}
+    table.update({f"q/{leg}_{joint}": np.rad2deg(jump.x[:, own[3 * i + k]])
+                  for i, leg in enumerate(legs) for k, joint in enumerate(joints)})
+    table.update({f"effort/{leg}_{joint}": jump.torque[:, own[3 * i + k]]
+                  for i, leg in enumerate(legs) for k, joint in enumerate(joints)})
+    table.update(zip(["px", "py", "pz"], jump.x[:, 12:15].T))
+    table.update(qw=cr * cp * cy + sr * sp * sy, qx=sr * cp * cy - cr * sp * sy,
+                 qy=cr * sp * cy + sr * cp * sy, qz=cr * cp * sy - sr * sp * cy)
+    table.update({f"grf_{leg}": 80.0 * jump.feet[:, foot] for leg, foot in zip(legs, (1, 0, 3, 2))})
+    rows = zip(*(column.tolist() for column in table.values()))
+    path.write_text("\n".join(["\t".join(table), *("\t".join(map(repr, row)) for row in rows)]) + "\n")
+
+
+MAP = {
+    "time": {"column": "stamp_ms", "unit": "ms"},
+    "names": {"legs": ["rf", "lf", "rh", "lh"], "joints": ["haa", "hfe", "kfe"]},
+    "joint": {
+        "position": {"columns": "q/{leg}_{joint}", "unit": "deg"},
+        "torque": {"columns": "effort/{leg}_{joint}"},
+    },
+    "body": {
+        "position": {"columns": ["px", "py", "pz"]},
+        "orientation": {"columns": ["qw", "qx", "qy", "qz"], "order": "wxyz"},
+    },
+    "feet": {"columns": "grf_{leg}", "threshold": 20.0},
+}
+
+
+def test_log_of_another_program_by_a_map(jump, command_line, tmp_path):
+    log = tmp_path / "log.tsv"
+    foreign_log(log, jump)
+    with pytest.warns(romc.RomcWarning, match="differences"):
+        found = romc.read(log, columns=MAP, clock="recorded")
+    np.testing.assert_allclose(found.x, jump.x, atol=1e-9)
+    np.testing.assert_allclose(found.torque, jump.torque, atol=1e-9)
+    assert np.array_equal(found.feet, jump.feet)
+    # The guessed map reads the same, from its text in a file, and so does the command line.
+    (tmp_path / "map.toml").write_text(romc.guess_columns(log))
+    with pytest.warns(romc.RomcWarning):
+        guessed = romc.read(log, columns=tmp_path / "map.toml", clock="recorded")
+    np.testing.assert_allclose(guessed.x, found.x, atol=1e-12)
+    command_line.json("convert", log, "--columns", "map.toml", "--output", "jump.csv")
+    written = romc.read(tmp_path / "jump.csv", clock="recorded")
+    for name in ["t", "x", "dx", "torque", "feet"]:
+        assert np.array_equal(getattr(written, name), getattr(guessed, name)), name
+    wrong = {**MAP, "feet": {"columns": "grf_{leg}"}}
+    with pytest.raises(romc.RecordingError, match="found 80, expected contact 0 or 1"):
+        romc.read(log, columns=wrong)
+
+
+def test_clock_that_runs_too_fast_is_rebuilt_as_on_the_command_line(jump, model, command_line, tmp_path):
+    fast = romc.Recording.from_arrays(jump.t / 1.15, jump.x, jump.dx, jump.torque, jump.feet)
+    fast.save(tmp_path / "fast.csv")
+    kept = romc.read(tmp_path / "fast.csv", clock="recorded")
+    assert np.array_equal(kept.t, fast.t)
+    with pytest.warns(romc.RomcWarning, match='rebuilt from the motion.*clock="recorded"') as warned:
+        mended = romc.read(tmp_path / "fast.csv")
+    assert warned[0].filename == __file__
+    assert mended.t[-1] == pytest.approx(jump.t[-1] - jump.t[0] + mended.t[0], rel=0.02)
+    expected = command_line.json("simulate", command_line_model(tmp_path, model), "fast.csv")["rollouts"]
+    assert model.simulate(mended).metrics == expected
+
+
+def command_line_model(folder, model):
+    model.save(folder / "m.json")
+    return "m.json"

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use nalgebra::DVector;
 use serde_json::json;
 
 use super::Answer;
@@ -15,9 +14,9 @@ use crate::files::Overwrite;
 use crate::import::{
     Chosen, ImportOptions, ImportReport, LibraryChoice, SymbolNames, import, read_terms,
 };
-use crate::model::{ReducedModel, ScaleFactors, Scaling};
+use crate::model::ReducedModel;
 use crate::recording::Segment;
-use crate::sim::input_statistics;
+use crate::sim::with_input_statistics;
 use crate::typeset::Table;
 use crate::{Error, artifact};
 
@@ -31,10 +30,21 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let imported = import(&arguments.file, &options(arguments)?)?;
     let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
-    let model = with_inputs(imported.model, &segments)?;
+    let model = match segments.is_empty() {
+        true => imported.model,
+        false => with_input_statistics(imported.model, &segments)?,
+    };
     let check = checked(&model, &segments, arguments)?;
     artifact::write_with(&arguments.output, &model, overwrite)?;
     let mut text = describe(&imported.report);
+    if model.robot().is_ok() && model.encoder_map().is_ok() && arguments.wrench_frame.is_none() {
+        let frame = model.wrench_frame().name();
+        let _ = writeln!(
+            text,
+            "note: force and moment of the inputs are along the {frame}'s axes, as published \
+             (--wrench-frame says otherwise)"
+        );
+    }
     if let Some(check) = &check {
         text.push_str(&import_check::describe(check));
     }
@@ -60,22 +70,6 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     })
 }
 
-/// The model with the input statistics of recordings, in the phases that they have samples of.
-fn with_inputs(model: ReducedModel, segments: &[&Segment]) -> Result<ReducedModel, Error> {
-    if segments.is_empty() {
-        return Ok(model);
-    }
-    let statistics = input_statistics(&model, segments)?;
-    let names: Vec<String> = model.phases().iter().map(|p| p.name.clone()).collect();
-    let mut builder = model.into_builder();
-    for (name, statistics) in names.into_iter().zip(statistics) {
-        if let Some(statistics) = statistics {
-            builder = builder.input_statistics(name, statistics);
-        }
-    }
-    Ok(builder.build()?)
-}
-
 /// Compares the model with the recordings, if there are any and it has both maps; refuses one that
 /// misses them.
 fn checked(
@@ -83,19 +77,14 @@ fn checked(
     segments: &[&Segment],
     arguments: &ImportArguments,
 ) -> Result<Option<RoundTrip>, Error> {
-    let has_maps = model.encoder_map().is_ok() && model.decoder_map().is_ok();
-    if segments.is_empty() || !has_maps {
-        return Ok(None);
-    }
-    let check = RoundTrip::of(model, segments)?;
-    match import_check::fault(&check) {
-        Some(fault) if import_check::is_refused(&check) && !arguments.unchecked => {
-            Err(Error::Mismatch {
-                file: arguments.file.clone(),
-                fault,
-            })
-        }
-        _ => Ok(Some(check)),
+    let check = RoundTrip::of_import(model, segments)?;
+    let is_refused = check.as_ref().is_some_and(RoundTrip::is_refused);
+    match check.as_ref().and_then(RoundTrip::fault) {
+        Some(fault) if is_refused && !arguments.unchecked => Err(Error::Mismatch {
+            file: arguments.file.clone(),
+            fault,
+        }),
+        _ => Ok(check),
     }
 }
 
@@ -134,12 +123,11 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
         library: library(arguments)?,
         latent_dim: arguments.latent_dim,
         phases: arguments.phase.clone(),
-        scaling: scaling(arguments),
-        input_scaling: (arguments.scaling.is_empty() && !arguments.input_scaling.is_empty())
-            .then(|| factors(&arguments.input_scaling)),
         order: arguments.order.clone(),
         robot: arguments.robot.as_deref().map(robot::chosen).transpose()?,
+        wrench_frame: arguments.wrench_frame.unwrap_or_default(),
         sample_time_s: arguments.sample_time,
+        ..ImportOptions::of_factors(&arguments.scaling, &arguments.input_scaling)
     })
 }
 
@@ -148,25 +136,6 @@ fn library(arguments: &ImportArguments) -> Result<Option<LibraryChoice>, Error> 
         None => None,
         Some(LibraryArgument::Shorthand(standard)) => Some(LibraryChoice::Standard(*standard)),
         Some(LibraryArgument::File(path)) => Some(LibraryChoice::Terms(read_terms(path)?)),
-    })
-}
-
-fn factors(given: &[f64]) -> ScaleFactors {
-    match given {
-        [factor] => ScaleFactors::Uniform(*factor),
-        list => ScaleFactors::PerCoordinate(DVector::from_column_slice(list)),
-    }
-}
-
-fn scaling(arguments: &ImportArguments) -> Option<Scaling> {
-    let state = arguments.scaling.as_slice();
-    let input = match arguments.input_scaling.as_slice() {
-        [] => state,
-        input => input,
-    };
-    (!state.is_empty()).then(|| Scaling {
-        state: factors(state),
-        input: factors(input),
     })
 }
 

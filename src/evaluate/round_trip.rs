@@ -23,7 +23,9 @@ const GOOD_R2: f64 = 0.2;
 /// differ little.
 const ALIKE: f64 = 1.5;
 /// Relative error that needs no explanation.
-const SMALL_ERROR: f64 = 0.02;
+const SMALL_ERROR: f64 = 0.01;
+/// Relative error beyond which no slip explains anything, however much larger the error was.
+const UNEXPLAINED: f64 = 0.3;
 
 /// A model on recordings, sample by sample.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,7 +76,8 @@ impl RoundTrip {
         let samples = Samples::new(model, segments)?;
         let error = samples.error(&samples.given())?;
         let best = samples.best_slip()?;
-        let is_explained = |found: f64| error > SMALL_ERROR && EXPLAINED * found < error;
+        let is_explained =
+            |found: f64| error > SMALL_ERROR && EXPLAINED * found < error && found < UNEXPLAINED;
         let still = DVector::zeros(STATE_DIM);
         let (acceleration_r2, all) = accelerations(model, segments, 1.0, &still)?;
         let acceleration_slip = match all {
@@ -90,6 +93,22 @@ impl RoundTrip {
         })
     }
 
+    /// Looks at an imported model along the recordings that came with it; none without recordings or
+    /// without both maps.
+    ///
+    /// # Errors
+    /// As [`RoundTrip::of`].
+    pub fn of_import(
+        model: &ReducedModel,
+        segments: &[&Segment],
+    ) -> Result<Option<Self>, EvaluateError> {
+        let has_maps = model.encoder_map().is_ok() && model.decoder_map().is_ok();
+        match segments.is_empty() || !has_maps {
+            true => Ok(None),
+            false => Self::of(model, segments).map(Some),
+        }
+    }
+
     /// Whether the maps fit the recordings.
     pub fn maps_fit(&self) -> bool {
         self.error <= LARGEST_ERROR && self.slip.is_none()
@@ -98,6 +117,71 @@ impl RoundTrip {
     /// Whether the equations say more of the latent accelerations than a constant.
     pub fn equations_fit(&self) -> bool {
         self.all_acceleration_r2.is_none_or(|r2| r2 >= 0.0)
+    }
+
+    /// Whether the model is not to be taken: its maps miss the recordings, or a slip explains why its
+    /// equations do. Equations that miss them for no known reason may be right for other motions.
+    pub fn is_refused(&self) -> bool {
+        !self.maps_fit() || (!self.equations_fit() && self.acceleration_slip.is_some())
+    }
+
+    /// What is wrong with the model along the recordings, if anything is, and the option of an import
+    /// that mends it.
+    pub fn fault(&self) -> Option<String> {
+        if !self.maps_fit() {
+            let found = format!(
+                "decode(encode(x)) misses the recordings by {:.3} times their variance",
+                self.error
+            );
+            return Some(match &self.slip {
+                Some((slip, error)) => format!("{found}, by {error:.3} times {}", slip.advice()),
+                None => format!(
+                    "{found}, whatever the usual factors, means and orders: is it this robot, and \
+                     are these its maps?"
+                ),
+            });
+        }
+        if self.equations_fit() {
+            return None;
+        }
+        let r2 = self.all_acceleration_r2.unwrap_or(f64::NAN);
+        let found = format!("R^2 of the latent accelerations is {r2:.3}");
+        Some(match self.acceleration_slip {
+            Some((AccelerationSlip::Centred, better)) => {
+                format!("{found}, {better:.3} {}", Slip::Centred.advice())
+            }
+            Some((AccelerationSlip::InputFactor(factor), better)) => format!(
+                "{found}, {better:.3} with the inputs times {factor}: expected other factors of the \
+                 inputs (--input-scaling, or a tensor scaling.input or std.input)"
+            ),
+            None => format!(
+                "{found}, below that of a constant: are these motions unlike the training's, or the \
+                 coefficients in another order than the candidate terms?"
+            ),
+        })
+    }
+}
+
+impl Slip {
+    /// What to pass where it explains the error.
+    fn advice(&self) -> String {
+        match self {
+            Slip::Order(order) => format!(
+                "in another order: expected --order {order}, or another that swaps left and right"
+            ),
+            Slip::Factor(factor) => format!("with factor {factor}: expected --scaling {factor}"),
+            Slip::Centred => {
+                "with their mean taken off: expected a tensor mean.state (SI units)".to_owned()
+            }
+            Slip::Standardised => {
+                "as (x - mean) / standard deviation: expected tensors mean.state and std.state (SI \
+                 units)"
+                    .to_owned()
+            }
+            Slip::Both(order, slip) => {
+                format!("in another order, {}, and --order {order}", slip.advice())
+            }
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::str::FromStr;
 
 use clap::ValueEnum;
+use nalgebra::DVector;
 use serde::Serialize;
 
 use super::error::ImportError;
@@ -12,7 +13,7 @@ use super::report::Note;
 use super::role::{Mapping, ONLY_PHASE};
 use crate::files::Place;
 use crate::model::{Activation, CoordinateOrder, FeetRule, ScaleFactors, Scaling, StandardLibrary};
-use crate::robot::{ContactFlags, Robot};
+use crate::robot::{ContactFlags, Robot, WrenchFrame};
 
 /// The kinds of files that can be imported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
@@ -227,11 +228,35 @@ pub struct ImportOptions {
     pub order: Option<CoordinateOrder>,
     /// The robot whose 18 coordinates the encoder takes.
     pub robot: Option<&'static Robot>,
+    /// Axes of the force and moment in the inputs that the model was trained with; needs the robot.
+    pub wrench_frame: WrenchFrame,
     /// Sampling period of the training recordings, s.
     pub sample_time_s: Option<f64>,
 }
 
 impl ImportOptions {
+    /// Options with the scale factors of states and of inputs, each none, one, or one per coordinate;
+    /// inputs have those of the states where tensors bring neither.
+    pub fn of_factors(state: &[f64], input: &[f64]) -> Self {
+        let factors = |given: &[f64]| match given {
+            [factor] => ScaleFactors::Uniform(*factor),
+            list => ScaleFactors::PerCoordinate(DVector::from_column_slice(list)),
+        };
+        let of_inputs = match input {
+            [] => state,
+            input => input,
+        };
+        let scaling = || Scaling {
+            state: factors(state),
+            input: factors(of_inputs),
+        };
+        Self {
+            scaling: (!state.is_empty()).then(scaling),
+            input_scaling: (state.is_empty() && !input.is_empty()).then(|| factors(input)),
+            ..Self::default()
+        }
+    }
+
     /// The rule of a phase: as given, or for `contact` and `flight` as usual.
     pub(super) fn feet_of(&self, phase: &str) -> Option<FeetRule> {
         match phase {

@@ -225,7 +225,7 @@ fn build(
         builder = builder.input_statistics(phase, statistics);
     }
     if let Some(robot) = options.robot {
-        builder = builder.robot(robot);
+        builder = builder.robot(robot).wrench_frame(options.wrench_frame);
         if map.is_some() {
             builder = builder
                 .state(CoordinateNames {

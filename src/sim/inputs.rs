@@ -7,6 +7,25 @@ use super::latent::phases;
 use crate::model::{InputStatistics, ReducedModel};
 use crate::recording::Segment;
 
+/// The model with the input statistics of recordings in the phases that they have samples of.
+///
+/// # Errors
+/// As [`input_statistics`].
+pub fn with_input_statistics(
+    model: ReducedModel,
+    segments: &[&Segment],
+) -> Result<ReducedModel, SimError> {
+    let statistics = input_statistics(&model, segments)?;
+    let names: Vec<String> = model.phases().iter().map(|p| p.name.clone()).collect();
+    let mut builder = model.into_builder();
+    for (name, statistics) in names.into_iter().zip(statistics) {
+        if let Some(statistics) = statistics {
+            builder = builder.input_statistics(name, statistics);
+        }
+    }
+    Ok(builder.build()?)
+}
+
 /// Mean and covariance of the recorded inputs `u = [tau; F; M]` (SI, by the model's rule) in each phase of a model; phases
 /// without a sample have none.
 ///

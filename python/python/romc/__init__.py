@@ -13,11 +13,11 @@ quantities are `(n, d)` in the model's scaled units.
 from romc._romc import __version__
 from romc.controller import Command, ControlRun, Controller
 from romc.equations import Equations
-from romc.errors import ModelError, RecordingError, RomcError
+from romc.errors import ModelError, RecordingError, RomcError, RomcWarning
 from romc.library import Library
 from romc.model import Model, Simplified
 from romc.plan import Plan
-from romc.recording import Recording, Segment, read
+from romc.recording import Recording, Segment, guess_columns, read
 from romc.simulation import Simulation, SimulatedSegment
 
 __all__ = [
@@ -32,10 +32,12 @@ __all__ = [
     "Recording",
     "RecordingError",
     "RomcError",
+    "RomcWarning",
     "Segment",
     "Simplified",
     "SimulatedSegment",
     "Simulation",
     "__version__",
+    "guess_columns",
     "read",
 ]

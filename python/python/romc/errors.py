@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import sys
+import warnings
 from typing import Optional, Union
 
 _OPTION = re.compile(r"--([a-z]+(?:-[a-z]+)*)(?: ([\w.,=-]*\w))?")
@@ -21,6 +23,9 @@ def _in_python(message: str) -> str:
             return f'{name}={{"{left}": "{right}"}}'
         return f'{name}="{value}"'
 
+    message = re.sub(r"(a tensor|tensors) mean\.state and std\.state", "mean= and std=", message)
+    message = message.replace("--unchecked writes", "unchecked=True takes")
+    message = re.sub(r"a tensor (mean|std)\.state", r"\1=", message)
     return _OPTION.sub(argument, message)
 
 
@@ -62,3 +67,16 @@ class ModelError(RomcError):
 
 class RecordingError(RomcError):
     """A recording or reference that cannot be used; `file`, `row` and `column` say where."""
+
+
+class RomcWarning(UserWarning):
+    """What romc did to data besides reading it, or finds doubtful and takes all the same."""
+
+
+def warn(message: str) -> None:
+    """Warns the caller of the package."""
+    level = 2
+    frame = sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "romc":
+        frame, level = frame.f_back, level + 1
+    warnings.warn(_in_python(message), RomcWarning, stacklevel=level)

@@ -6,21 +6,26 @@ import json
 import os
 import re
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from romc import _romc, _sources
 from romc._arrays import Floats, floats, rows
+from romc._options import Factors, Phases
 from romc.equations import Equations
-from romc.errors import ModelError
+from romc.errors import ModelError, warn
 from romc.library import Library
 from romc.plan import Plan
 from romc.recording import PathLike, Recording, Recordings, Segment, natives, read
 from romc.simulation import Simulation
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from romc._options import ImportOptions
+
 LibraryLike = Union[Library, str, Sequence[str]]
-Factors = Union[float, Sequence[float], Floats]
 
 
 class Model:
@@ -48,21 +53,11 @@ class Model:
         library: LibraryLike,
         encoder: Any = None,
         decoder: Any = None,
-        robot: Optional[str] = None,
-        scaling: Optional[Factors] = None,
-        input_scaling: Optional[Factors] = None,
-        mean: Any = None,
-        std: Any = None,
         mask: Optional[Mapping[str, Any]] = None,
-        phases: Optional[Mapping[str, Union[str, Sequence[str]]]] = None,
         activation: Optional[str] = None,
         weights: Optional[str] = None,
-        xi_layout: Optional[str] = None,
         latent_dim: Optional[int] = None,
-        inputs_from: Optional[Recordings] = None,
-        sample_time: Optional[float] = None,
-        name: str = "model",
-        description: str = "",
+        **options: Unpack[ImportOptions],
     ) -> "Model":
         """A model of arrays: NumPy's, JAX's, PyTorch's, lists.
 
@@ -72,11 +67,20 @@ class Model:
         - `xi`: coefficients by phase, `(terms, d)` or `(d, terms)`; `mask` has 0 where training switched one off.
         - `library`: the candidate terms in the order of Xi's rows: names such as `["1", "z1", "sin(dz1)", "u1"]`, or
           the shorthand `Library(degree=1, trigonometric=True, inputs=True)`.
+
+        Options, which `from_torch` and `from_pysindy` take too:
+
+        - `robot`: `"go1"`, `"go2"`, `"a1"`, or a `.toml` or `.urdf` file.
         - `scaling`, `input_scaling`: scaled value = factor x SI value, one number or one per coordinate; 1 if left out.
         - `mean`, `std`: `(n,)`, of a trainer that took `(x - mean) / std`.
+        - `order`: the order of the 18 coordinates in the arrays, such as `"body,fl,fr,rl,rr"`, if it is not romc's.
         - `phases`: the feet that select each phase, `any`, `none`, `always` or patterns such as `"0011,0001"` (fr
           fl rr rl), the first match wins; `contact` and `flight` are known.
-        - `inputs_from`: recordings that give the mean and covariance of the inputs, which the controller needs.
+        - `wrench_frame`: axes of the force and moment in the inputs, `"body"` (as published) or `"world"`.
+        - `inputs_from`: recordings that give the mean and covariance of the inputs, which the controller needs, and
+          that the model is compared with: one that misses them is refused, with the usual slip that explains it;
+          `unchecked=True` warns instead.
+        - `xi_layout`, `sample_time` (s), `name`, `description`.
 
         Raises `ModelError` with `tensor`, `row` and `column`.
         """
@@ -84,25 +88,8 @@ class Model:
         tensors.update(_sources.map_tensors("decoder", decoder))
         tensors.update(_sources.phase_tensors("xi", xi))
         tensors.update(_sources.phase_tensors("mask", mask))
-        for key, value in (("mean.state", mean), ("std.state", std)):
-            if value is not None:
-                tensors[key] = floats(key, value)
-        arguments = _import_arguments(
-            library=library,
-            tensors=tensors,
-            scaling=scaling,
-            input_scaling=input_scaling,
-            phases=phases,
-            activation=activation,
-            weights=weights,
-            xi_layout=xi_layout,
-            latent_dim=latent_dim,
-            robot=robot,
-            sample_time=sample_time,
-            name=name,
-            description=description,
-        )
-        return cls._imported("Model.from_arrays", tensors, arguments, inputs_from)
+        parts = {"activation": activation, "weights": weights, "latent_dim": latent_dim}
+        return cls._imported("Model.from_arrays", tensors, library, parts, **options)
 
     @classmethod
     def from_torch(
@@ -113,47 +100,24 @@ class Model:
         library: LibraryLike,
         xi: Union[Mapping[str, Any], Any, None] = None,
         map: Optional[Mapping[str, str]] = None,
-        robot: Optional[str] = None,
-        scaling: Optional[Factors] = None,
-        input_scaling: Optional[Factors] = None,
-        mean: Any = None,
-        std: Any = None,
-        phases: Optional[Mapping[str, Union[str, Sequence[str]]]] = None,
-        xi_layout: Optional[str] = None,
-        inputs_from: Optional[Recordings] = None,
-        sample_time: Optional[float] = None,
-        name: str = "model",
-        description: str = "",
+        **options: Unpack[ImportOptions],
     ) -> "Model":
         """A model of a PyTorch module with parts named `encoder` and `decoder`, or of two modules: chains of `Linear`
         with one kind of activation between them.
 
         Xi by phase is `xi`, or found in the module by name (`xi.contact`, `xi_flight`, ...); `map` names others, as
-        `{"xi.contact": "Xi_c"}`. The other arguments are those of `from_arrays`.
+        `{"xi.contact": "Xi_c"}`. The options are those of `from_arrays`.
 
         Raises `ModelError` whose `tensor` names the layer or tensor.
         """
         tensors, activation = _sources.torch_parts(module, decoder)
         tensors.update(_sources.phase_tensors("xi", xi))
-        for key, value in (("mean.state", mean), ("std.state", std)):
-            if value is not None:
-                tensors[key] = floats(key, value)
-        arguments = _import_arguments(
-            library=library,
-            tensors=tensors,
-            scaling=scaling,
-            input_scaling=input_scaling,
-            phases=phases,
-            activation=activation,
-            weights="column",
-            xi_layout=xi_layout,
-            map=map,
-            robot=robot,
-            sample_time=sample_time,
-            name=name,
-            description=description,
-        )
-        return cls._imported("Model.from_torch", tensors, arguments, inputs_from)
+        parts = {
+            "activation": activation,
+            "weights": "column",
+            "map": [f"{part}={tensor}" for part, tensor in (map or {}).items()],
+        }
+        return cls._imported("Model.from_torch", tensors, library, parts, **options)
 
     @classmethod
     def from_pysindy(
@@ -162,44 +126,27 @@ class Model:
         *,
         encoder: Any = None,
         decoder: Any = None,
-        robot: Optional[str] = None,
-        scaling: Optional[Factors] = None,
-        input_scaling: Optional[Factors] = None,
-        mean: Any = None,
-        std: Any = None,
-        phases: Optional[Mapping[str, Union[str, Sequence[str]]]] = None,
         activation: Optional[str] = None,
         weights: Optional[str] = None,
-        inputs_from: Optional[Recordings] = None,
-        sample_time: Optional[float] = None,
-        name: str = "model",
-        description: str = "",
+        **options: Unpack[ImportOptions],
     ) -> "Model":
         """A model of fitted PySINDy models by phase, or of a single one that always holds.
 
         Their states are (z1..zd, dz1..dzd), their controls up to d inputs u, their targets (dz, ddz) or ddz alone.
-        Terms and coefficients are theirs, with all digits. The other arguments are those of `from_arrays`.
+        Terms and coefficients are theirs, with all digits. `encoder`, `decoder` and the options are those of
+        `from_arrays`.
         """
         latent_dim, terms, coefficients = _sources.pysindy_parts(models)
+        options["xi_layout"] = "terms-by-latent"
         return cls.from_arrays(
             xi=coefficients,
             library=terms,
             latent_dim=latent_dim,
-            xi_layout="terms-by-latent",
             encoder=encoder,
             decoder=decoder,
-            robot=robot,
-            scaling=scaling,
-            input_scaling=input_scaling,
-            mean=mean,
-            std=std,
-            phases=phases,
             activation=activation,
             weights=weights,
-            inputs_from=inputs_from,
-            sample_time=sample_time,
-            name=name,
-            description=description,
+            **options,
         )
 
     @classmethod
@@ -207,12 +154,57 @@ class Model:
         cls,
         source: str,
         tensors: Dict[str, Floats],
-        arguments: Dict[str, object],
-        inputs_from: Optional[Recordings],
+        library: LibraryLike,
+        parts: Mapping[str, object],
+        *,
+        robot: Optional[PathLike] = None,
+        scaling: Optional[Factors] = None,
+        input_scaling: Optional[Factors] = None,
+        mean: Any = None,
+        std: Any = None,
+        order: Optional[str] = None,
+        phases: Optional[Phases] = None,
+        xi_layout: Optional[str] = None,
+        wrench_frame: str = "body",
+        inputs_from: Optional[Recordings] = None,
+        unchecked: bool = False,
+        sample_time: Optional[float] = None,
+        name: str = "model",
+        description: str = "",
     ) -> "Model":
-        native, _report = _romc.import_tensors(source, list(tensors.items()), arguments)
-        if inputs_from is not None:
-            native = native.with_inputs(natives(inputs_from))
+        for key, value in (("mean.state", mean), ("std.state", std)):
+            if value is not None:
+                tensors[key] = floats(key, value)
+        # Equations alone have no robot coordinates to scale, and tensors may have the factors.
+        has_map = any(re.search(r"(^|[./])(en|de)coder[._]", key) for key in tensors)
+        has_factors = any(re.search(r"(^|[./])(scaling|std)[._](state|input)$", key) for key in tensors)
+        if scaling is None and has_map and not has_factors:
+            scaling = 1.0
+        shorthand = library.shorthand() if isinstance(library, Library) else library
+        terms = None if isinstance(shorthand, str) else [str(term) for term in shorthand]
+        rules = {phase: feet if isinstance(feet, str) else ",".join(feet) for phase, feet in (phases or {}).items()}
+        arguments: Dict[str, object] = {
+            **dict.fromkeys(("activation", "weights", "latent_dim")),
+            "map": [],
+            **parts,
+            "library": shorthand if terms is None else None,
+            "terms": terms,
+            "scaling": _factors("scaling", scaling),
+            "input_scaling": _factors("input_scaling", input_scaling),
+            "phases": [f"{phase}={feet}" for phase, feet in rules.items()],
+            "xi_layout": xi_layout,
+            "robot": None if robot is None else os.fspath(robot),
+            "order": order,
+            "wrench_frame": wrench_frame,
+            "sample_time": sample_time,
+            "unchecked": unchecked,
+            "name": name,
+            "description": description,
+        }
+        recordings = [] if inputs_from is None else natives(inputs_from)
+        native, fault = _romc.import_tensors(source, list(tensors.items()), arguments, recordings)
+        if fault is not None:
+            warn(fault)
         return cls(native)
 
     def save(self, path: PathLike, *, force: bool = False) -> None:
@@ -452,39 +444,6 @@ def _rowwise(function: Any, *arguments: Tuple[str, Any]) -> Floats:
 
 def _factors(name: str, factors: Optional[Factors]) -> List[float]:
     return [] if factors is None else [float(factor) for factor in np.atleast_1d(floats(name, factors))]
-
-
-def _import_arguments(
-    *,
-    library: LibraryLike,
-    tensors: Mapping[str, Floats],
-    scaling: Optional[Factors],
-    input_scaling: Optional[Factors],
-    phases: Optional[Mapping[str, Union[str, Sequence[str]]]],
-    map: Optional[Mapping[str, str]] = None,
-    **others: Any,
-) -> Dict[str, object]:
-    """The options of `romc import`."""
-    # Equations alone have no robot coordinates to scale, and tensors may have the factors.
-    has_map = any(re.search(r"(^|[./])(en|de)coder[._]", name) for name in tensors)
-    has_factors = any(re.search(r"(^|[./])(scaling|std)[._](state|input)$", name) for name in tensors)
-    if scaling is None and has_map and not has_factors:
-        scaling = 1.0
-    shorthand = library.shorthand() if isinstance(library, Library) else library
-    is_shorthand = isinstance(shorthand, str)
-    rules = {name: feet if isinstance(feet, str) else ",".join(feet) for name, feet in (phases or {}).items()}
-    arguments: Dict[str, object] = {
-        "library": shorthand if is_shorthand else None,
-        "terms": None if is_shorthand else [str(term) for term in shorthand],
-        "scaling": _factors("scaling", scaling),
-        "input_scaling": _factors("input_scaling", input_scaling),
-        "phases": [f"{name}={feet}" for name, feet in rules.items()],
-        "map": [f"{part}={tensor}" for part, tensor in (map or {}).items()],
-    }
-    defaults: Dict[str, object] = dict.fromkeys(
-        ["latent_dim", "weights", "xi_layout", "activation", "robot", "sample_time"]
-    )
-    return {**defaults, **arguments, **others}
 
 
 def _emit_arguments(model: Model, *, rename: Optional[Mapping[str, str]], **others: Any) -> Dict[str, object]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import os
-from typing import TYPE_CHECKING, Any, Dict, Iterable, Iterator, List, Union
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Dict, Iterable, Iterator, List, Mapping, Optional, Union
 
 import numpy as np
 
 from romc import _romc
 from romc._arrays import Flags, Floats, flags, floats, rows
-from romc.errors import RecordingError
+from romc.errors import RecordingError, warn
 
 if TYPE_CHECKING:
     from romc.model import Model
@@ -59,11 +61,14 @@ class Segment:
         """Row of the file with the first sample; the header is row 1."""
         return self._native.first_row
 
-    def inputs(self, model: Union["Model", str]) -> Floats:
-        """The inputs u of a model by its own rule, or of a robot such as `"go1"` as published: `(n, 18)`, torques at
-        the joints (N m), force (N) and moment (N m) on the body."""
-        if isinstance(model, str):
-            return self._native.inputs_of(model)
+    def inputs(self, model: Union["Model", PathLike], wrench_frame: str = "body") -> Floats:
+        """The inputs u, `(n, 18)`: torques at the joints (N m), force (N) and moment (N m) on the body.
+
+        Of a model by its own rule; or of a robot, `"go1"` or a `.toml` or `.urdf` file, without losses in its joints,
+        with force and moment along the axes of the body, as published, or of the world.
+        """
+        if isinstance(model, (str, os.PathLike)):
+            return self._native.inputs_of(os.fspath(model), wrench_frame)
         return self._native.inputs(model._native)
 
     def __len__(self) -> int:
@@ -170,30 +175,65 @@ class Recording:
         """Contact of the feet of the only segment, `(n, 4)`."""
         return self._only().feet
 
-    def inputs(self, model: Union["Model", str]) -> Floats:
+    def inputs(self, model: Union["Model", PathLike], wrench_frame: str = "body") -> Floats:
         """The inputs of a model or robot in the only segment, `(n, 18)`, in N m and N."""
-        return self._only().inputs(model)
+        return self._only().inputs(model, wrench_frame)
 
     def __repr__(self) -> str:
         return f"<Recording {self.path!r}, {len(self)} segments>"
 
 
-def read(path: PathLike) -> Recording:
-    """Reads a recording, `.csv` or `.csv.gz`.
+Columns = Union[PathLike, Mapping[str, Any]]
+
+
+def read(path: PathLike, *, columns: Optional[Columns] = None, clock: str = "repaired") -> Recording:
+    """Reads a recording: `.csv`, `.csv.gz`, `.mcap`, or another program's log by a map of its columns.
+
+    - `columns`: the map (`docs/logs.md`), a TOML file, or its tables as a dictionary,
+      `{"time": {"column": "stamp", "unit": "ms"}, ...}`; with it `path` may be a folder of files.
+    - `clock`: as in the commands that compute, times and angular rates that disagree with the motion are mended
+      (`repaired`), which a `RomcWarning` says, or kept (`recorded`).
 
     Raises `RecordingError` with `file`, `row` (from 1, the header) and `column`.
     """
-    return Recording(_romc.read(os.fspath(path)))
+    [recording] = _read([path], columns, clock)
+    return recording
+
+
+def guess_columns(path: PathLike, robot: PathLike = "go1") -> str:
+    """A first map of the columns of an unknown log, TOML with what each line rests on, as `romc inspect --guess`
+    writes it; a `RomcWarning` says why the log cannot be read by it yet, if so."""
+    text, refused = _romc.guess(os.fspath(path), os.fspath(robot))
+    if refused is not None:
+        warn(f"{os.fspath(path)}: read by the guessed map: {refused}")
+    return text
+
+
+def _read(paths: Iterable[PathLike], columns: Optional[Columns], clock: str) -> List[Recording]:
+    if isinstance(columns, Mapping):
+        given: Union[str, Path, None] = "\n".join(f"{json.dumps(key)} = {_toml(of)}" for key, of in columns.items())
+    else:
+        given = None if columns is None else Path(columns)
+    natives_read, notes = _romc.read([os.fspath(path) for path in paths], given, clock)
+    for note in notes:
+        warn(note)
+    return [Recording(native) for native in natives_read]
+
+
+def _toml(value: Any) -> str:
+    """A value of a map as TOML, whose words, numbers and lists are JSON's."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{json.dumps(key)} = {_toml(entry)}" for key, entry in value.items()) + "}"
+    return json.dumps(value, ensure_ascii=False)
 
 
 Recordings = Union[PathLike, Recording, Iterable[Union[PathLike, Recording]]]
 
 
 def natives(recordings: Recordings) -> List["_romc.Recording"]:
-    """Recordings or their files, one or several."""
+    """Recordings or their files, one or several; files are read as by `read`."""
     if isinstance(recordings, (str, os.PathLike, Recording)):
         recordings = [recordings]
-    given = (entry if isinstance(entry, Recording) else read(entry) for entry in recordings)
-    return [recording._native for recording in given]
-
-
+    entries = list(recordings)
+    from_files = iter(_read([entry for entry in entries if not isinstance(entry, Recording)], None, "repaired"))
+    return [(entry if isinstance(entry, Recording) else next(from_files))._native for entry in entries]

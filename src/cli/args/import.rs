@@ -6,12 +6,13 @@ use clap::Args;
 
 use super::number::{count, real};
 use super::reading::ReadingArguments;
-use super::robot::RobotParser;
+use super::robot::{RobotParser, wrench_frame};
 use crate::import::{
     Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
 };
 use crate::limits::table::{IMPORTED_LATENT_DIM, INPUT_SCALING, SAMPLE_TIME, SCALING};
 use crate::model::{Activation, CoordinateOrder, StandardLibrary};
+use crate::robot::WrenchFrame;
 
 /// The candidate terms of an imported model.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -92,6 +93,10 @@ pub struct ImportArguments {
     /// hx,hy,kn,body; romc's own is fr,fl,rr,rl,body
     #[arg(long, value_name = "NAMES", requires = "robot")]
     pub order: Option<CoordinateOrder>,
+    /// Axes of the force and moment in the inputs that the model was trained with: body, as published, unless
+    /// given, or world
+    #[arg(long, value_name = "FRAME", requires = "robot", value_parser = wrench_frame)]
+    pub wrench_frame: Option<WrenchFrame>,
     /// Sampling period of the training recordings
     #[arg(long, value_name = "SECONDS", value_parser = real(&SAMPLE_TIME))]
     pub sample_time: Option<f64>,

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{PossibleValue, TypedValueParser};
 
+use crate::robot::WrenchFrame;
+
 /// Takes any text and offers the names of romc's own robots to shells.
 #[derive(Clone, Debug)]
 pub struct RobotParser;
@@ -25,6 +27,11 @@ impl TypedValueParser for RobotParser {
         let names = crate::robot::Robot::known_names();
         Some(Box::new(names.into_iter().map(PossibleValue::new)))
     }
+}
+
+/// Reads `body` or `world`.
+pub fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
+    WrenchFrame::by_name(text).ok_or_else(|| format!("found `{text}`, expected `world` or `body`"))
 }
 
 /// `romc robot`

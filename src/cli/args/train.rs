@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::number::{count, finite, real};
 use super::reading::ReadingArguments;
-use super::robot::RobotParser;
+use super::robot::{RobotParser, wrench_frame};
 use crate::limits::table;
 use crate::model::Activation;
 use crate::recording::smoothing::SavitzkyGolay;
@@ -70,10 +70,6 @@ pub enum PhaseSet {
     ContactFlight,
     /// A front foot down, only rear feet down, no foot down
     ContactRearFlight,
-}
-
-fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
-    WrenchFrame::by_name(text).ok_or_else(|| format!("found `{text}`, expected `world` or `body`"))
 }
 
 /// `romc train`

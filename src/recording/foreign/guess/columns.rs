@@ -4,6 +4,7 @@ use super::super::elements::Quantity;
 use super::super::log::{Channel, Log};
 use super::super::units::Dimension;
 use super::names::{Reading, is_time, read, unit};
+use crate::robot::JOINT_DIM;
 
 /// The columns of one quantity.
 #[derive(Debug, Clone)]
@@ -52,6 +53,7 @@ pub(super) fn groups(logs: &[Log]) -> Vec<Group> {
     }
     for (_, members) in &mut families {
         lists_of_three(members);
+        bare_hips(members);
     }
     let mut out = Vec::new();
     for quantity in Quantity::ALL {
@@ -83,6 +85,19 @@ pub(super) fn groups(logs: &[Log]) -> Vec<Group> {
         out.extend(chosen.map(|(_, group)| group));
     }
     out
+}
+
+/// Hips without a word for which one are the second joints where the first have another name: `abad hip knee`.
+fn bare_hips(members: &mut [(usize, Reading)]) {
+    let is_first = |reading: &Reading| reading.element % 3 == 0;
+    let is_joint = members[0].1.quantity.elements().len() == JOINT_DIM;
+    let another = |(_, reading): &(usize, Reading)| is_first(reading) && !reading.is_bare_hip;
+    if is_joint && members.iter().any(another) {
+        let hips = members
+            .iter_mut()
+            .filter(|(_, reading)| reading.is_bare_hip);
+        hips.for_each(|(_, reading)| reading.element += 1);
+    }
 }
 
 /// Lists of three counted positions or velocities are the trunk's.

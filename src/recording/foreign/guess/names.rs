@@ -4,8 +4,24 @@ use super::super::elements::Quantity;
 
 /// Words for legs, in romc's order.
 const LEGS: [&[&str]; 4] = [
-    &["fr", "rf", "frontright", "rightfront"],
-    &["fl", "lf", "frontleft", "leftfront"],
+    &[
+        "fr",
+        "rf",
+        "vr",
+        "frontright",
+        "rightfront",
+        "foreright",
+        "rightfore",
+    ],
+    &[
+        "fl",
+        "lf",
+        "vl",
+        "frontleft",
+        "leftfront",
+        "foreleft",
+        "leftfore",
+    ],
     &[
         "rr",
         "hr",
@@ -22,14 +38,15 @@ const LEGS: [&[&str]; 4] = [
         "rl", "hl", "lh", "bl", "lb", "rearleft", "hindleft", "backleft", "leftrear", "lefthind",
     ],
 ];
-/// Words for joints, in romc's order; a bare `hip` is the first, unless `y`, `pitch` or `flexion` is beside it.
+/// Words for joints, in romc's order; a bare `hip` is the first, unless `y`, `pitch` or `flexion` is beside it or
+/// another joint of the leg is.
 const JOINTS: [&[&str]; 3] = [
     &["hx", "haa", "abad", "abduction", "hipx", "hipaa"],
     &["hy", "hfe", "thigh", "upper", "flexion", "hipy", "hipfe"],
     &["kn", "kfe", "calf", "knee", "lower", "shank"],
 ];
 const TORQUE: &[&str] = &[
-    "torque", "torques", "tau", "effort", "trq", "moment", "tauest",
+    "torque", "torques", "tau", "effort", "efforts", "trq", "moment", "tauest", "ctrl",
 ];
 const ACCELERATION: &[&str] = &[
     "acceleration",
@@ -65,14 +82,15 @@ const QUATERNION: &[&str] = &[
     "q",
 ];
 const PLACE: &[&str] = &[
-    "position", "pos", "com", "base", "body", "trunk", "torso", "pose", "odom",
+    "position", "pos", "p", "com", "base", "body", "trunk", "torso", "pose", "odom",
 ];
 const FEET: &[&str] = &[
-    "foot", "feet", "contact", "contacts", "grf", "touch", "stance", "toe",
+    "foot", "feet", "contact", "contacts", "grf", "touch", "stance", "toe", "fz",
 ];
 const JOINT_ARRAYS: &[&str] = &[
     "motor", "motors", "joint", "joints", "q", "dq", "ddq", "qd", "qdd", "qdot", "tau", "torque",
-    "effort", "position", "velocity",
+    "torques", "effort", "efforts", "position", "velocity", "dof", "ctrl", "actuator", "angle",
+    "angles", "theta",
 ];
 /// Words of values that a controller asked for rather than measured.
 const WANTED: &[&str] = &[
@@ -122,13 +140,22 @@ pub(super) struct Reading {
     pub family: String,
     /// Whether it is something that was asked for rather than measured.
     pub is_wanted: bool,
+    /// Whether the joint is a `hip` without a word for which one.
+    pub is_bare_hip: bool,
 }
 
-/// Words of a name: lower case, apart at signs, capitals and digits.
+/// Words of a name: lower case, apart at signs, capitals and digits; `FRHip` is `fr hip`.
 pub(super) fn words(name: &str) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
-    let mut last = ' ';
+    let (mut last, mut capitals) = (' ', 0);
     for c in name.chars() {
+        if c.is_lowercase()
+            && capitals > 2
+            && let Some(initial) = out.last_mut().and_then(String::pop)
+        {
+            out.push(initial.to_string());
+        }
+        capitals = if c.is_uppercase() { capitals + 1 } else { 0 };
         let starts = !last.is_alphanumeric()
             || (last.is_lowercase() && c.is_uppercase())
             || (last.is_ascii_digit() != c.is_ascii_digit());
@@ -181,6 +208,7 @@ pub(super) fn read(name: &str) -> Option<Reading> {
     let mut words = words(name);
     join_pairs(&mut words);
     split_compact(&mut words);
+    greek_angles(&mut words);
     let place = |table: &[&[&str]]| {
         let of = |word: &String| table.iter().position(|known| is_one(word, known));
         words.iter().find_map(of)
@@ -210,6 +238,7 @@ pub(super) fn read(name: &str) -> Option<Reading> {
             is_counted,
             family: family.join(" "),
             is_wanted: has(WANTED),
+            is_bare_hip: joint == Some(0) && has(&["hip"]) && !has(&["x", "roll", "aa"]),
         })
     };
     let kind = if has(TORQUE) {
@@ -221,6 +250,17 @@ pub(super) fn read(name: &str) -> Option<Reading> {
     } else {
         Quantity::JointPosition
     };
+    if let (Some(number), [list, _]) = (number, &words[..])
+        && let Some((quantity, element, is_quaternion)) = generalised(list, number)
+    {
+        let is_counted = is_one(quantity.key(), &["joint.position", "joint.velocity"]);
+        return reading(quantity, element, is_quaternion, is_counted);
+    }
+    if let ([list, _], Some(number @ 0..4)) = (&words[..], number)
+        && list == "c"
+    {
+        return reading(Quantity::Feet, number, false, true);
+    }
     if has(FEET) || (has(&["force", "forces"]) && axis.is_none()) {
         let element = leg.or(number.filter(|n| *n < 4));
         let is_place = axis.is_some_and(|axis| axis != 2 || has(&["position", "pos", "velocity"]));
@@ -232,6 +272,11 @@ pub(super) fn read(name: &str) -> Option<Reading> {
     if let Some(leg) = leg {
         let joint = joint.or(number.filter(|number| *number < 3))?;
         return reading(kind, 3 * leg + joint, false, false);
+    }
+    if let (Some(leg @ 0..4), Some(joint @ 0..3)) =
+        (after(&words, &["leg"]), after(&words, &["joint", "motor"]))
+    {
+        return reading(kind, 3 * leg + joint, false, true);
     }
     let in_array = number.filter(|number| *number < 12);
     let of_body = has(&[
@@ -248,6 +293,25 @@ pub(super) fn read(name: &str) -> Option<Reading> {
         return reading(kind, number, false, true);
     }
     body(&words, axis, number, kind, reading)
+}
+
+/// The number behind a word.
+fn after(words: &[String], known: &[&str]) -> Option<usize> {
+    let pair = words.windows(2).find(|pair| is_one(&pair[0], known))?;
+    pair[1].parse().ok()
+}
+
+/// An element of MuJoCo's lists of a floating robot: place, quaternion, joints.
+fn generalised(list: &str, number: usize) -> Option<(Quantity, usize, bool)> {
+    Some(match (list, number) {
+        ("qpos", 0..3) => (Quantity::BodyPosition, number, false),
+        ("qpos", 3..7) => (Quantity::Orientation, number - 3, true),
+        ("qpos", 7..19) => (Quantity::JointPosition, number - 7, false),
+        ("qvel", 0..3) => (Quantity::BodyVelocity, number, false),
+        ("qvel", 3..6) => (Quantity::AngularVelocity, number - 3, false),
+        ("qvel", 6..18) => (Quantity::JointVelocity, number - 6, false),
+        _ => return None,
+    })
 }
 
 /// The joint that words name.
@@ -307,13 +371,14 @@ fn body(
     reading(quantity, element, false, counted)
 }
 
-/// Joins `front right` and the like to one word.
+/// Joins `front right`, `Co M`, `d Q` and the like to one word.
 fn join_pairs(words: &mut Vec<String>) {
     let known = |pair: &str| LEGS.iter().any(|names| is_one(pair, names));
     let mut i = 0;
     while i + 1 < words.len() {
         let pair = format!("{}{}", words[i], words[i + 1]);
-        if pair.len() > 3 && known(&pair) {
+        let is_split = is_one(&pair, &["com", "dq", "ddq"]);
+        if (pair.len() > 3 && known(&pair)) || is_split {
             words[i] = pair;
             words.remove(i + 1);
         }
@@ -351,6 +416,19 @@ fn split_compact(words: &mut Vec<String>) {
         None => vec![word.clone()],
     });
     *words = split.collect();
+}
+
+/// Phi, theta and psi, where they are not counted, are roll, pitch and yaw.
+fn greek_angles(words: &mut [String]) {
+    if words.iter().any(|word| word.parse::<usize>().is_ok()) {
+        return;
+    }
+    let names = [("phi", "roll"), ("theta", "pitch"), ("psi", "yaw")];
+    for word in words {
+        if let Some((_, angle)) = names.iter().find(|(greek, _)| greek == word) {
+            *word = (*angle).to_owned();
+        }
+    }
 }
 
 #[cfg(test)]
@@ -392,6 +470,22 @@ mod tests {
             ("Body angular Position z", (Quantity::Orientation, 2)),
             ("Body linear Velocity x", (Quantity::BodyVelocity, 0)),
             ("com_z", (Quantity::BodyPosition, 2)),
+            ("CoM Z", (Quantity::BodyPosition, 2)),
+            ("p_y", (Quantity::BodyPosition, 1)),
+            ("qpos[2]", (Quantity::BodyPosition, 2)),
+            ("qpos[3]", (Quantity::Orientation, 0)),
+            ("qpos[18]", (Quantity::JointPosition, 11)),
+            ("qvel_5", (Quantity::AngularVelocity, 2)),
+            ("qvel_6", (Quantity::JointVelocity, 0)),
+            ("ctrl[4]", (Quantity::JointTorque, 4)),
+            ("dof_vel[7]", (Quantity::JointVelocity, 7)),
+            ("leg1_joint2_torque", (Quantity::JointTorque, 5)),
+            ("FRHipPos", (Quantity::JointPosition, 0)),
+            ("dQ_3", (Quantity::JointVelocity, 3)),
+            ("theta", (Quantity::Orientation, 1)),
+            ("psi_dot", (Quantity::AngularVelocity, 2)),
+            ("Fz RF", (Quantity::Feet, 0)),
+            ("c_2", (Quantity::Feet, 2)),
         ] {
             assert_eq!(said(name), Some(expected), "{name}");
         }
