@@ -2,6 +2,7 @@
 
 #[path = "check/command.rs"]
 mod command;
+mod command_line;
 #[path = "check/models.rs"]
 mod models;
 #[path = "check/papers.rs"]

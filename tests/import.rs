@@ -5,6 +5,7 @@
 
 #[path = "import/command.rs"]
 mod command;
+mod command_line;
 #[path = "import/equations.rs"]
 mod equations;
 #[path = "import/faults.rs"]

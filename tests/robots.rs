@@ -4,9 +4,11 @@
 //! `fixtures/robots/reference.json` holds Pinocchio's values, made and checked by
 //! `examples/robots/reference.py`.
 
+mod command_line;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::PathBuf;
+use std::process::Command;
 
 use nalgebra::{Matrix3, Vector3};
 use romc::artifact;
@@ -15,6 +17,8 @@ use romc::model::{Library, ReducedModel};
 use romc::robot::{InputRule, Leg, LegGeometry, Robot, WrenchFrame};
 use romc::robot_file;
 use serde_json::Value;
+
+use command_line::{romc, text};
 
 const FILES: [&str; 3] = ["solo12.toml", "anymal_c.toml", "hare.urdf"];
 
@@ -292,19 +296,6 @@ fn trees_of_other_robots_are_told_apart() {
             .to_string();
         assert!(error.contains(said), "{error}");
     }
-}
-
-fn romc(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_romc"));
-    command
-        .current_dir(folder)
-        .args(arguments)
-        .output()
-        .expect("the binary runs")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
 }
 
 #[test]

@@ -138,10 +138,12 @@ fn planned(
     let Some(path) = &arguments.plan else {
         return Ok(None);
     };
-    if !arguments.emit.contains(&Target::Controller) {
+    let jumps = |target| arguments.emit.contains(&target);
+    if !jumps(Target::Controller) && !jumps(Target::ControllerC) {
         return Err(Error::Config {
             path: path.clone(),
-            message: "--plan without a target that jumps it; add --emit controller".to_owned(),
+            message: "--plan without a target that jumps it; add --emit controller or controller-c"
+                .to_owned(),
         });
     }
     let mut recording = recording::read(path)?;
@@ -151,6 +153,7 @@ fn planned(
         time_s: motion.time_s,
         x: motion.x,
         dx: motion.dx,
+        torque_nm: motion.torque_nm,
         feet: motion.feet,
     }))
 }

@@ -119,6 +119,7 @@ fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
     };
     settings.paper |= arguments.paper;
     settings.method = arguments.method.or(settings.method);
+    settings.robot = arguments.robot.clone().or(settings.robot);
     train_settings::check_pairs(&settings)?;
     settings.method = Some(train_settings::method(&settings));
     Ok(settings)

@@ -23,6 +23,8 @@ pub struct PlannedJump {
     pub dx: DMatrix<f64>,
     /// Inputs by the rule of the model, 18 x n.
     pub u: DMatrix<f64>,
+    /// Torques of the motors, N m, 12 x n.
+    pub torque_nm: DMatrix<f64>,
     /// Feet on the ground.
     pub feet: Vec<ContactFlags>,
 }
@@ -110,6 +112,7 @@ mod tests {
             x: DMatrix::from_fn(18, 2, |i, j| 1.0 / (1.0 + i as f64) - j as f64),
             dx: DMatrix::zeros(18, 2),
             u: DMatrix::from_element(18, 2, -2.5),
+            torque_nm: DMatrix::zeros(12, 2),
             feet: vec![[true; 4], [false, true, false, false]],
         };
         let [header, source] = plan.files("examples", "hop", "made by a test");

@@ -2,21 +2,14 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use serde_json::Value;
 
-fn check(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_romc"))
-        .arg("check")
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("the binary runs")
-}
+use crate::command_line::{romc, text};
 
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
+fn check(folder: &Path, arguments: &[&str]) -> Output {
+    romc(folder, &[&["check"], arguments].concat())
 }
 
 #[test]
@@ -149,16 +142,9 @@ fn unreadable_files_exit_with_2_and_name_the_place() {
 fn papers_become_models() {
     let folder = tempfile::tempdir().expect("a folder");
     let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/papers/align.tex");
-    let output = Command::new(env!("CARGO_BIN_EXE_romc"))
-        .args([
-            "import",
-            paper.to_str().expect("a name"),
-            "--output",
-            "paper.json",
-        ])
-        .current_dir(folder.path())
-        .output()
-        .expect("the binary runs");
+    let paper = paper.to_str().expect("a name");
+    let arguments = ["import", paper, "--output", "paper.json"];
+    let output = romc(folder.path(), &arguments);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/paper-2d.json");
     let output = check(

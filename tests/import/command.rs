@@ -2,27 +2,15 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 
 use romc::artifact;
 use romc::recording;
 use zip::CompressionMethod;
 
+use crate::command_line::{romc, text};
 use crate::store::{list, model, npz, plain};
 
 const EQUATIONS: &str = "[contact]\nddz1 = 0.5 - 2*z1 + u1\n[flight]\nddz1 = -1\n";
-
-fn romc(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_romc"))
-        .current_dir(folder)
-        .args(arguments)
-        .output()
-        .expect("the binary runs")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
 
 #[test]
 fn command_writes_a_model_and_tells_what_it_read() {

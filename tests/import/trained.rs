@@ -4,7 +4,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use nalgebra::{DMatrix, DVector};
 use romc::artifact;
@@ -12,6 +12,7 @@ use romc::import::{Format, ImportOptions, Imported, LibraryChoice, import_from_b
 use romc::model::{Activation, CoordinateOrder, ReducedModel};
 use zip::CompressionMethod;
 
+use crate::command_line::{romc, text};
 use crate::store::{Stored, list, model, npz, options_of, plain, safetensors};
 
 fn mean() -> DVector<f64> {
@@ -201,15 +202,6 @@ fn terms_as_pysindy_names_them_are_read_and_equal_ones_are_one_in_equations() {
     assert_eq!(n_terms, 7, "z1 and 1*z1 are one term");
 }
 
-fn romc(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_romc"));
-    command
-        .current_dir(folder)
-        .args(arguments)
-        .output()
-        .expect("the binary runs")
-}
-
 fn jump() -> String {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     root.join("examples/recordings/go1/validation_01.csv.gz")
@@ -238,8 +230,7 @@ fn compared(tensors: &[Stored], more: &[&str]) -> (Output, tempfile::TempDir) {
 }
 
 fn said(output: &Output) -> String {
-    let text = [&output.stdout[..], &output.stderr[..]].concat();
-    String::from_utf8_lossy(&text).into_owned()
+    text(&[&output.stdout[..], &output.stderr[..]].concat())
 }
 
 fn own_order() -> CoordinateOrder {
@@ -301,6 +292,47 @@ fn wrong_scaling_is_refused_with_the_factor_that_fits() {
     assert!(all_the_same.status.success(), "{}", said(&all_the_same));
     assert!(said(&all_the_same).contains("warning: decode(encode(x)) misses"));
     assert!(folder.path().join("net.json").exists());
+}
+
+#[test]
+fn an_order_that_does_not_fit_is_refused_without_another_reason() {
+    let tensors = in_si(&DVector::zeros(18), &own_order());
+    let factors = input_factors(&own_order());
+    let options = [
+        "--scaling",
+        "1",
+        "--input-scaling",
+        &factors,
+        "--order",
+        "hx,hy,kn,body",
+    ];
+    let (wrong, _folder) = compared(&tensors, &options);
+    assert_eq!(wrong.status.code(), Some(1), "{}", said(&wrong));
+    let text = said(&wrong);
+    assert!(
+        text.contains("misses the recordings by") && !text.contains("mean.state"),
+        "{text}"
+    );
+}
+
+#[test]
+fn wrench_frame_is_that_of_the_trainer() {
+    let tensors = in_si(&DVector::zeros(18), &own_order());
+    let factors = input_factors(&own_order());
+    let options = ["--scaling", "1", "--input-scaling", &factors];
+    let frame_of = |more: &[&str]| {
+        let (done, folder) = compared(&tensors, &[&options[..], more].concat());
+        assert!(done.status.success(), "{}", said(&done));
+        let model = artifact::read(&folder.path().join("net.json")).unwrap();
+        (model.wrench_frame().name(), said(&done))
+    };
+    let (frame, text) = frame_of(&[]);
+    assert!(
+        frame == "body" && text.contains("along the body's axes"),
+        "{text}"
+    );
+    let (frame, text) = frame_of(&["--wrench-frame", "world"]);
+    assert!(frame == "world" && !text.contains("body's axes"), "{text}");
 }
 
 #[test]

@@ -33,7 +33,8 @@ pub struct CompileArguments {
     /// Folder for the emitted files
     #[arg(long, value_name = "DIR")]
     pub out_dir: PathBuf,
-    /// A recording that the C example of a generated controller follows, such as `romc plan` makes
+    /// A recording that the C examples of generated controllers follow, such as `romc plan` makes: of the model's own
+    /// robot, where that is not a go1
     #[arg(long, value_name = "PLAN.csv")]
     pub plan: Option<PathBuf>,
     #[command(flatten)]

@@ -256,6 +256,9 @@ pub struct StudyArguments {
     /// Train as published (joint method)
     #[arg(long)]
     pub paper: bool,
+    /// Robot of the recordings: go1, go2, a1, or a .toml or .urdf file (go1 unless given)
+    #[arg(long, value_name = "ROBOT", value_parser = RobotParser, hide_possible_values = true)]
+    pub robot: Option<String>,
     /// Settings of `romc train`, except `latent-dim`, `seed` and `seeds`
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,

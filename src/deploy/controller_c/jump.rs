@@ -5,18 +5,20 @@ use nalgebra::DMatrix;
 use super::Facts;
 use super::numbers::{Numbers, integers, nested};
 use crate::codegen::Precision;
-use crate::deploy::EmitError;
-use crate::recording::{self, Segment};
+use crate::deploy::{EmitError, PlannedJump};
+use crate::recording;
 use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, STATE_DIM};
 
 /// A jump of a simulated go1 that no shipped model was trained on.
 const SHIPPED: &[u8] = include_bytes!("../../../examples/recordings/go1/test_01.csv.gz");
-/// Samples of the recording per sample here.
-const STRIDE: usize = 5;
+/// Distance of samples, s, where the recording's are denser.
+const STEP_S: f64 = 0.01;
 
 /// Samples of a jump.
 #[derive(Debug)]
 pub(super) struct Jump {
+    /// What it is, in words.
+    what: &'static str,
     pub time_s: Vec<f64>,
     pub x: Vec<Vec<f64>>,
     pub dx: Vec<Vec<f64>>,
@@ -25,27 +27,54 @@ pub(super) struct Jump {
 }
 
 impl Jump {
-    /// The shipped jump, every fifth sample.
+    /// The shipped jump.
     ///
     /// # Errors
     /// [`EmitError::Jump`] if it cannot be read.
     pub(super) fn shipped() -> Result<Self, EmitError> {
-        let recording = recording::read_from_bytes("test_01.csv.gz", SHIPPED)?;
-        let segment: &Segment = &recording.segments[0];
-        let samples = || (0..segment.len()).step_by(STRIDE);
+        let mut recording = recording::read_from_bytes("test_01.csv.gz", SHIPPED)?;
+        let segment = recording.segments.swap_remove(0);
+        let (x, dx, torque) = (&segment.x, &segment.dx, &segment.torque_nm);
+        let what = "A jump of a simulated go1";
+        Ok(Self::of(
+            what,
+            &segment.time_s,
+            [x, dx, torque],
+            &segment.feet,
+        ))
+    }
+
+    /// A jump of one's own.
+    pub(super) fn planned(plan: &PlannedJump) -> Self {
+        let rows = [&plan.x, &plan.dx, &plan.torque_nm];
+        Self::of("A jump of one's own", &plan.time_s, rows, &plan.feet)
+    }
+
+    /// Every so many samples of states, velocities and torques.
+    fn of(
+        what: &'static str,
+        time_s: &[f64],
+        [x, dx, torque_nm]: [&DMatrix<f64>; 3],
+        feet: &[ContactFlags],
+    ) -> Self {
+        let (start, end) = (time_s[0], time_s[time_s.len() - 1]);
+        let mean_step_s = (end - start) / (time_s.len().max(2) - 1) as f64;
+        let stride = (STEP_S / mean_step_s).round().max(1.0) as usize;
+        let samples = || (0..time_s.len()).step_by(stride);
         let columns = |matrix: &DMatrix<f64>| -> Vec<Vec<f64>> {
             let column = |k| matrix.column(k).iter().copied().collect();
             samples().map(column).collect()
         };
-        Ok(Self {
-            time_s: samples()
-                .map(|k| segment.time_s[k] - segment.time_s[0])
+        Self {
+            what,
+            time_s: samples().map(|k| time_s[k] - start).collect(),
+            x: columns(x),
+            dx: columns(dx),
+            torque_nm: samples()
+                .map(|k| std::array::from_fn(|joint| torque_nm[(joint, k)]))
                 .collect(),
-            x: columns(&segment.x),
-            dx: columns(&segment.dx),
-            torque_nm: samples().map(|k| segment.torque(k)).collect(),
-            feet: samples().map(|k| segment.feet[k]).collect(),
-        })
+            feet: samples().map(|k| feet[k]).collect(),
+        }
     }
 
     /// `NAME_jump.h`.
@@ -60,12 +89,13 @@ impl Jump {
         let torques = numbers.matrix(self.torque_nm.iter().copied());
         let feet = self.feet.iter().map(|feet| integers(feet.map(i64::from)));
         format!(
-            "{}\n/* A jump of a simulated go1: times, states, velocities, motor torques and feet of {count} samples. */\n\
+            "{}\n/* {}: times, states, velocities, motor torques and feet of {count} samples. */\n\
              #ifndef {upper}_JUMP_H\n#define {upper}_JUMP_H\n\n#include <stdint.h>\n\n\
              static const double JUMP_TIME_S[{count}] = {times};\n{}\
              static const {real} JUMP_TORQUE[{count}][{JOINT_DIM}] = {torques};\n\
              static const uint8_t JUMP_FEET[{count}][{FOOT_DIM}] = {};\n\n#endif\n",
             facts.banner,
+            self.what,
             states.concat(),
             nested(feet),
         )

@@ -114,7 +114,10 @@ pub fn emit(
     }
     let facts = &facts(&entries, &plant, &rows, options.precision, provenance);
     let source = Source::new(facts, &entries, &plant, &rows, options.precision);
-    let jump = Jump::shipped()?;
+    let jump = match &options.plan {
+        Some(plan) => Jump::planned(plan),
+        None => Jump::shipped()?,
+    };
     let texts = [
         ("NAME_controller.h", Header { facts }.render()?),
         ("NAME_controller.c", source.render()?),

@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 use super::super::attitude::angles_of_quaternions;
 use super::super::elements::Quantity;
 use super::super::log::Log;
+use super::super::units::Dimension;
 use super::columns::{Clock, Group};
 use super::evidence::{Axes, Scale, angular, linear, reach, real_is_last, scale, slopes};
 use super::first_map::{raw, times_s};
@@ -24,6 +25,8 @@ const LENGTH: [(&str, f64); 3] = [("m", 1.0), ("mm", 1e-3), ("cm", 1e-2)];
 const ANGLE_RAD: f64 = 5.0;
 /// Share of the largest force at which a foot counts as down.
 const FOOT_SHARE: f64 = 0.1;
+/// Share of the largest force below which the least is that of a foot in the air.
+const RESTING: f64 = 0.3;
 
 /// The lines of a table.
 struct Lines {
@@ -228,7 +231,7 @@ impl Source<'_> {
         };
         let mut position = raw(self.logs, group);
         out.is_counted = group.is_counted;
-        let told = self.told(group, &["rad", "deg"]);
+        let told = self.told(group, &["mrad", "rad", "deg"]);
         let in_degrees = reach(position.iter().copied()) > ANGLE_RAD;
         let unit = told.unwrap_or(if in_degrees { "deg" } else { "rad" });
         let why = if told.is_none() && in_degrees {
@@ -237,7 +240,7 @@ impl Source<'_> {
             ""
         };
         out.of.push((Quantity::JointPosition, unit, why.to_owned()));
-        position *= if unit == "deg" { ANGLE[1].1 } else { 1.0 };
+        position *= Dimension::Angle.factor(unit).unwrap_or(1.0);
         let mut element: Vec<usize> = (0..JOINT_DIM).collect();
         if group.is_counted && grouped_by_joint(&position) {
             out.order = Some("*.hx *.hy *.kn");
@@ -396,11 +399,13 @@ impl Source<'_> {
             );
         }
         if values.iter().any(|value| *value != 0.0 && *value != 1.0) {
-            let threshold = FOOT_SHARE * reach(values.iter().copied());
+            let (rest, most) = (rest_force(&values), reach(values.iter().copied()));
+            let at = |share: f64| rest + share * (most - rest);
             lines.push(format!(
-                "threshold = {threshold:.3}   # a tenth of the largest force"
+                "threshold = {:.3}   # a tenth of the way from no force to the largest",
+                at(FOOT_SHARE)
             ));
-            lines.push(format!("release = {:.3}", threshold / 2.0));
+            lines.push(format!("release = {:.3}", at(FOOT_SHARE / 2.0)));
         }
         lines
     }
@@ -421,6 +426,17 @@ impl Source<'_> {
         let same = scale(&rates, &raw(self.logs, group), &[("", 1.0)]);
         let sound = of_velocity.is_none_or(|(_, lines)| lines.iter().all(plain));
         sound && same.is_some_and(|(scale, left)| scale.sign > 0.0 && left < 0.1)
+    }
+}
+
+/// What sensors of feet in the air show: the first percentile, or none where all feet stand throughout.
+fn rest_force(values: &DMatrix<f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.iter().copied().collect();
+    sorted.sort_by(f64::total_cmp);
+    let least = sorted.get(sorted.len() / 100).copied().unwrap_or_default();
+    match least.abs() < RESTING * reach(sorted.into_iter()) {
+        true => least,
+        false => 0.0,
     }
 }
 
