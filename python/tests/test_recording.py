@@ -211,3 +211,38 @@ def test_clock_that_runs_too_fast_is_rebuilt_as_on_the_command_line(jump, model,
 def command_line_model(folder, model):
     model.save(folder / "m.json")
     return "m.json"
+
+
+def test_topics_at_two_rates_are_one_recording(jump, tmp_path):
+    """Joints at 500 Hz, the trunk at 250 Hz: a jump with its landings, where velocities change within a sample."""
+    def write(name, every, table):
+        rows = zip(*(np.asarray(column)[::every].tolist() for column in table.values()))
+        lines = [",".join(table), *(",".join(map(repr, row)) for row in rows)]
+        (tmp_path / name).write_text("\n".join(lines) + "\n")
+
+    clock = {"t": jump.t}
+    joints = {f"q{i}": jump.x[:, i] for i in range(12)} | {f"dq{i}": jump.dx[:, i] for i in range(12)}
+    joints |= {f"tau{i}": jump.torque[:, i] for i in range(12)} | {f"c{i}": 1.0 * jump.feet[:, i] for i in range(4)}
+    body = {f"p{i}": jump.x[:, 12 + i] for i in range(6)} | {f"v{i}": jump.dx[:, 12 + i] for i in range(6)}
+    write("joints.csv", 1, clock | joints)
+    write("body.csv", 2, clock | body)
+    file = {"file": "body.csv", "time": "t"}
+    columns = {
+        "time": {"column": "t"},
+        "joint": {"position": {"columns": "q{0}"}, "velocity": {"columns": "dq{0}"}, "torque": {"columns": "tau{0}"}},
+        "body": {
+            "position": {**file, "columns": ["p0", "p1", "p2"]},
+            "orientation": {**file, "columns": ["p3", "p4", "p5"]},
+            "velocity": {**file, "columns": ["v0", "v1", "v2"]},
+            "angular_velocity": {**file, "columns": ["v3", "v4", "v5"]},
+        },
+        "feet": {"columns": "c{0}"},
+    }
+    with pytest.warns(romc.RomcWarning, match="clocks of their own"):
+        found = romc.read(tmp_path / "joints.csv", columns=columns, clock="recorded")
+    assert np.array_equal(found.t, jump.t) and np.array_equal(found.x[:, :12], jump.x[:, :12])
+    state, velocity = np.abs(found.x - jump.x), np.abs(found.dx - jump.dx).max(axis=1)
+    print(f"states to {state.max():.1e}, velocities to {np.quantile(velocity, 0.9):.1e} in 90 % of samples, "
+          f"{velocity.max():.1e} in all")
+    assert state.max() < 1e-4
+    assert np.quantile(velocity, 0.9) < 1e-3 and velocity.max() < 0.1
