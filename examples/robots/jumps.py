@@ -245,7 +245,8 @@ def main():
     robot = DescribedRobot(json.loads(shown.stdout)["robot"])
     arguments.out_dir.mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng(arguments.seed)
-    for jump in range(1, arguments.jumps + 1):
+    jump, failed = 1, 0
+    while jump <= arguments.jumps:
         plan = plan_of(robot, random, arguments.effort)
         simulation = Simulation(robot)
         simulation.reset(robot.standing_joints(plan.stand_height_m), plan.stand_height_m)
@@ -261,9 +262,14 @@ def main():
             f"{way:+.3f} m ahead, roll and pitch to {np.abs(log.x[:, 15:17]).max():.2f} rad"
         )
         if flight_s < 0.12 or not upright or log.other_contact.any():
-            raise SystemExit(f"jump_{jump:02}: no jump that lands on its feet")
+            print(f"jump_{jump:02}: no jump that lands on its feet, drawn anew")
+            failed += 1
+            if failed > arguments.jumps:
+                raise SystemExit("more than half of the jumps do not land: try less --effort")
+            continue
         path = arguments.out_dir / f"jump_{jump:02}.csv.gz"
         write_recording(path, log.time_s, log.x, log.dx, log.torque_nm, log.feet())
+        jump += 1
 
 
 if __name__ == "__main__":
