@@ -22,7 +22,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--romc", type=pathlib.Path, default="romc")
     parser.add_argument("--out-dir", type=pathlib.Path, required=True)
-    parser.add_argument("--jumps", type=int, default=8)
+    parser.add_argument("--jumps", type=int, default=8, help="eight or more: a plan needs six to learn from")
     parser.add_argument("--robots", nargs="+", default=list(EFFORT))
     parser.add_argument(
         "--crates", nargs="*", default=["solo12.toml"], help="robots whose controller's crate is built, by cargo"
