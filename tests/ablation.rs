@@ -158,7 +158,9 @@ fn knows_physics(model: &ReducedModel) -> bool {
 fn shipped_models_with_named_coordinates_keep_known_physics() {
     for name in ["go1-d2", "go1-d4", "go1-d6", "go2-async-d4"] {
         let model = shipped(name);
-        let invariance = Invariance::of(&model).expect("complete");
+        let invariance = Invariance::of(&model)
+            .expect("of full rank")
+            .expect("complete");
         if !knows_physics(&model) {
             continue;
         }
@@ -186,7 +188,9 @@ fn invariance_finds_a_model_that_depends_on_the_place() {
             "z1" => value + change,
             _ => value,
         });
-        let invariance = Invariance::of(&shifted).expect("complete");
+        let invariance = Invariance::of(&shifted)
+            .expect("of full rank")
+            .expect("complete");
         invariance
             .phases
             .iter()

@@ -28,8 +28,9 @@ use romc::check::{CheckOptions, Side, Verdict, compare};
 use romc::codegen::Precision;
 use romc::deploy::{EmitError, EmitOptions, Target, emit};
 use romc::equations::Equations;
-use romc::files::{Overwrite, write_files};
+use romc::files::{EmittedFile, Overwrite, write_files};
 use romc::lower::{Form, LowerOptions};
+use romc::model::ReducedModel;
 
 /// Functions without a point at which all results are finite.
 const FINITE_NOWHERE: [&str; 4] = [
@@ -155,7 +156,7 @@ fn latex_markdown_and_mathml_say_what_the_model_says() {
 }
 
 /// The preview through pdflatex; told and skipped without it, unless required.
-fn typeset(files: &[romc::files::EmittedFile], name: &str) {
+fn typeset(files: &[EmittedFile], name: &str) {
     if Command::new("pdflatex").arg("--version").output().is_err() {
         let required = std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1");
         assert!(!required, "pdflatex is missing and ROMC_REQUIRE_TOOLS=1");
@@ -177,42 +178,97 @@ fn typeset(files: &[romc::files::EmittedFile], name: &str) {
     assert!(output.status.success(), "{name}: {said}");
 }
 
+/// The files of a controller; `None` for a model that is rightly refused, as it has no robot.
+fn controller(
+    model: &ReducedModel,
+    target: Target,
+    precision: Precision,
+) -> Option<Vec<EmittedFile>> {
+    let options = EmitOptions {
+        precision,
+        ..EmitOptions::default()
+    };
+    let emitted = emit(&Equations::of(model), &[target], &options);
+    if models::has_controller(model) {
+        return Some(emitted.unwrap_or_else(|error| panic!("{}: {error}", model.name())));
+    }
+    let refused = matches!(emitted, Err(EmitError::Control(_)));
+    assert!(refused, "{} {target:?}", model.name());
+    None
+}
+
+/// A compiler of C that takes no warning.
+fn strict_cc() -> Command {
+    let mut cc = Command::new(std::env::var("CC").unwrap_or_else(|_| "cc".to_owned()));
+    cc.args(["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"]);
+    cc
+}
+
+/// What an example says: torques, each a number.
+fn says_torques(name: &str, said: &str) {
+    assert!(said.contains("N m"), "{name}: {said}");
+    assert!(
+        !said.contains("nan") && !said.contains("inf"),
+        "{name}: {said}"
+    );
+}
+
 #[test]
 fn controllers_compile_and_command_finite_torques() {
     let scratch = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    // tests/controller.rs compiles the same dependencies there.
     let target = scratch.join("controller-target");
     for model in models::all() {
-        let equations = Equations::of(&model);
-        let emitted = emit(&equations, &[Target::Controller], &EmitOptions::default());
-        if !models::has_controller(&model) {
-            let refused = matches!(emitted, Err(EmitError::Control(_)));
-            assert!(refused, "{}", model.name());
+        let Some(files) = controller(&model, Target::Controller, Precision::Double) else {
             continue;
-        }
-        let files = emitted.unwrap_or_else(|error| panic!("{}: {error}", model.name()));
+        };
         let name = model.identifier().as_str();
         let folder = scratch.join("matrix");
         write_files(&folder, &files, Overwrite::Replace).expect("written");
         let folder = folder.join(format!("{name}-controller"));
         let mut cargo = Command::new(env!("CARGO"));
+        // Dependencies as tests/controller.rs compiles them; this crate as fast as the compiler can.
+        let level = format!("profile.release.package.{name}-controller.opt-level=0");
         cargo
-            .args(["build", "--release"])
+            .args(["build", "--release", "--config", &level])
             .env("CARGO_TARGET_DIR", &target);
         succeed(cargo.current_dir(&folder));
         let program = target.join(format!("{name}_matrix"));
-        let mut cc = Command::new(std::env::var("CC").unwrap_or_else(|_| "cc".to_owned()));
-        cc.args(["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-I"]);
-        cc.arg(folder.join("include"))
-            .arg(folder.join("examples/example.c"));
+        let mut cc = strict_cc();
+        cc.arg("-I").arg(folder.join("include"));
+        cc.arg(folder.join("examples/example.c"));
         cc.arg(target.join(format!("release/lib{name}_controller.a")));
         cc.args(["-lm", "-lpthread", "-ldl", "-lrt", "-o"])
             .arg(&program);
         succeed(&mut cc);
-        let said = succeed(&mut Command::new(&program));
-        assert!(said.contains("N m"), "{name}: {said}");
-        assert!(
-            !said.contains("nan") && !said.contains("inf"),
-            "{name}: {said}"
-        );
+        says_torques(name, &succeed(&mut Command::new(&program)));
+    }
+}
+
+#[test]
+fn controllers_in_c_compile_pass_their_self_tests_and_jump() {
+    for precision in [Precision::Double, Precision::Single] {
+        for model in models::all() {
+            let Some(files) = controller(&model, Target::ControllerC, precision) else {
+                continue;
+            };
+            let name = model.identifier().as_str();
+            let scratch = tempfile::tempdir().expect("a folder");
+            write_files(scratch.path(), &files, Overwrite::Refuse).expect("written");
+            let folder = scratch.path().join(format!("{name}-controller-c"));
+            for main in ["selftest", "controller_selftest", "example"] {
+                let mut cc = strict_cc();
+                cc.args(["-O1", "-ffp-contract=off", "-o", main]);
+                cc.args([format!("{name}.c"), format!("{name}_{main}.c")]);
+                if main != "selftest" {
+                    cc.arg(format!("{name}_controller.c"));
+                }
+                succeed(cc.arg("-lm").current_dir(&folder));
+                let said = succeed(&mut Command::new(folder.join(main)));
+                if main == "example" {
+                    says_torques(name, &said);
+                }
+            }
+        }
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use super::output::note;
 use super::train_settings::refused;
 use crate::Error;
 use crate::identify::identify;
@@ -30,9 +31,9 @@ pub(super) fn identified(
     match identify(&recordings.first(IDENTIFIED_FROM)?, robot) {
         Ok(found) => Ok(Some(found.actuators)),
         Err(reason) => {
-            eprintln!(
-                "note: torques are those of the motors, as the recordings do not tell the joints' losses: {reason}"
-            );
+            note(&format!(
+                "torques are those of the motors, as the recordings do not tell the joints' losses: {reason}"
+            ));
             Ok(None)
         }
     }

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::InspectArguments;
-use super::output::{check_output, reader, write_file};
+use super::output::{check_output, note, reader, write_file};
 use super::{inspect_model, inspect_recording, robot};
 use crate::files::Overwrite;
 use crate::recording::foreign::guess::guess;
@@ -53,7 +53,7 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
             write_file(path, guess.text.as_bytes(), overwrite)?;
             text = format!("{}: a first map; {outcome}\n", path.display());
         }
-        None => eprintln!("note: {outcome}"),
+        None => note(&outcome),
     }
     Ok(Answer {
         text,

@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::Answer;
+use super::output::note;
 use super::simplification::exact_words;
 use crate::Error;
 use crate::artifact;
@@ -83,7 +84,13 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     } else {
         text.push_str("latent-only: no encoder, so it says nothing about a robot's coordinates\n");
     }
-    let invariance = Invariance::of(model).ok();
+    let invariance = Invariance::of(model).unwrap_or_else(|error| {
+        note(&format!(
+            "{}: invariance is not told: {error}",
+            path.display()
+        ));
+        None
+    });
     if let Some(invariance) = &invariance {
         let table = invariance_table(invariance);
         let _ = write!(text, "\n{}\n\n{table}", table.caption());

@@ -101,6 +101,11 @@ pub fn note(text: &str) {
     eprintln!("note: {}", printable(text));
 }
 
+/// Prints a warning to stderr.
+pub fn warn(text: &str) {
+    eprintln!("warning: {}", printable(text));
+}
+
 /// As [`printable`], for one JSON object.
 pub fn printable_json(text: &str) -> Cow<'_, str> {
     // Those of JSON itself have been escaped, so that all of them are in strings; none is beyond U+FFFF.

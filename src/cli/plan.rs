@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::{PlanArguments, ReadingArguments};
-use super::output::{check_output, names, progress_bar, reader, spinner};
+use super::output::{check_output, names, progress_bar, reader, spinner, warn};
 use super::train_settings::refused;
 use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
@@ -50,9 +50,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
             return Err(Error::Distrusted(reasons.join("; ")));
         }
         Verdict::Refused(reasons) | Verdict::Extrapolates(reasons) => {
-            reasons
-                .iter()
-                .for_each(|reason| eprintln!("warning: {reason}"));
+            reasons.iter().for_each(|reason| warn(reason));
         }
         Verdict::Trusted => {}
     }

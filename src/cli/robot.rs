@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::RobotArguments;
-use super::output::{check_output, write_file};
+use super::output::{check_output, note, write_file};
 use crate::Error;
 use crate::files::Overwrite;
 use crate::robot::{JOINT_NAMES, Leg, Robot};
@@ -21,7 +21,11 @@ use crate::typeset::Table;
 pub fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
     let robot = robot_file::find(name_or_file)?;
     if Robot::by_name(name_or_file).is_err() {
-        eprintln!("{name_or_file}: robot {}, {}", robot.name(), matched(robot));
+        note(&format!(
+            "{name_or_file}: robot {}, {}",
+            robot.name(),
+            matched(robot)
+        ));
     }
     Ok(robot)
 }

@@ -48,11 +48,19 @@ pub struct PhaseInvariance {
 }
 
 impl Invariance {
-    /// Of a model over the robot's coordinates.
+    /// Of a model over the robot's coordinates; `None` without encoder, decoder, scaling or robot.
     ///
     /// # Errors
-    /// [`ModelError::Missing`] for a model without encoder, decoder, scaling or robot.
-    pub fn of(model: &ReducedModel) -> Result<Self, ModelError> {
+    /// [`ModelError::RankDeficient`] if the Jacobian of an encoder with layers lacks rank where the model is asked.
+    pub fn of(model: &ReducedModel) -> Result<Option<Self>, ModelError> {
+        match Self::of_complete(model) {
+            Ok(invariance) => Ok(Some(invariance)),
+            Err(ModelError::Missing { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn of_complete(model: &ReducedModel) -> Result<Self, ModelError> {
         let rest = model.decode(&DVector::zeros(model.latent_dim()))?;
         model.robot()?;
         let phases = 0..model.phases().len();
@@ -69,13 +77,16 @@ impl Invariance {
 impl PhaseInvariance {
     fn of(model: &ReducedModel, phase: usize, rest: &DVector<f64>) -> Result<Self, ModelError> {
         let input = mean_input(model, phase);
+        let accelerated = |x: &DVector<f64>, dx: &DVector<f64>, u: &DVector<f64>| {
+            Instant { x, dx, u }.body_acceleration(model, phase)
+        };
         let mut shifts = [0.0_f64; 2];
         for velocity in velocities() {
-            let here = body_acceleration(model, phase, rest, &velocity, &input)?;
+            let here = accelerated(rest, &velocity, &input)?;
             for (axis, shift) in shifts.iter_mut().enumerate() {
                 let mut moved = rest.clone();
                 moved[FORWARD + axis] += SHIFT_M;
-                let there = body_acceleration(model, phase, &moved, &velocity, &input)?;
+                let there = accelerated(&moved, &velocity, &input)?;
                 *shift = larger(*shift, (there - &here).norm() / SHIFT_M);
             }
         }
@@ -86,11 +97,8 @@ impl PhaseInvariance {
                 let (mut x, mut dx) = (rest.clone(), still.clone());
                 let off = if moving { &mut dx } else { &mut x };
                 off[joint] += OFF_RAD;
-                let of_image = |x: &DVector<f64>, dx: &DVector<f64>, u: &DVector<f64>| {
-                    body_acceleration(model, phase, x, dx, u)
-                };
-                let seen = of_image(&x, &dx, &input)?;
-                let image = of_image(&mirrored(&x), &mirrored(&dx), &mirrored(&input))?;
+                let seen = accelerated(&x, &dx, &input)?;
+                let image = accelerated(&mirrored(&x), &mirrored(&dx), &mirrored(&input))?;
                 let difference = (seen[0] - image[0]).hypot(seen[2] - image[2]);
                 mirror_asymmetry = larger(mirror_asymmetry, difference);
             }
@@ -134,34 +142,40 @@ fn mean_input(model: &ReducedModel, phase: usize) -> DVector<f64> {
         })
 }
 
-/// Latent acceleration at a state of the robot, scaled units.
-fn latent_acceleration(
-    model: &ReducedModel,
-    phase: usize,
-    x: &DVector<f64>,
-    dx: &DVector<f64>,
-    u: &DVector<f64>,
-) -> Result<DVector<f64>, ModelError> {
-    let tangent = model.tangent(x)?;
-    model.ddz(
-        phase,
-        &model.encode(x)?,
-        &(&tangent.encode * dx),
-        &(&tangent.project * u),
-    )
+/// A state and an input of the robot, SI, `state_dim` each.
+struct Instant<'a> {
+    x: &'a DVector<f64>,
+    dx: &'a DVector<f64>,
+    u: &'a DVector<f64>,
 }
 
-/// Linear acceleration of the body, m/s^2.
-fn body_acceleration(
-    model: &ReducedModel,
-    phase: usize,
-    x: &DVector<f64>,
-    dx: &DVector<f64>,
-    u: &DVector<f64>,
-) -> Result<DVector<f64>, ModelError> {
-    let ddz = latent_acceleration(model, phase, x, dx, u)?;
-    let decoder = model.decoder_jacobian(&model.encode(x)?)?;
-    Ok(decoder.rows(FORWARD, 3) * ddz)
+impl Instant<'_> {
+    /// Latent acceleration of a phase, scaled units.
+    fn latent_acceleration(
+        &self,
+        model: &ReducedModel,
+        phase: usize,
+    ) -> Result<DVector<f64>, ModelError> {
+        let tangent = model.tangent(self.x)?;
+        let z = model.encode(self.x)?;
+        model.ddz(
+            phase,
+            &z,
+            &(&tangent.encode * self.dx),
+            &(&tangent.project * self.u),
+        )
+    }
+
+    /// Linear acceleration of the body, m/s^2.
+    fn body_acceleration(
+        &self,
+        model: &ReducedModel,
+        phase: usize,
+    ) -> Result<DVector<f64>, ModelError> {
+        let ddz = self.latent_acceleration(model, phase)?;
+        let decoder = model.decoder_jacobian(&model.encode(self.x)?)?;
+        Ok(decoder.rows(FORWARD, 3) * ddz)
+    }
 }
 
 /// The mirror image of a state, a velocity or an input: legs change sides; abduction, y, roll and yaw (and the force and
@@ -211,7 +225,12 @@ impl Height {
         let flight = model.phase_for([false; 4]);
         let of_flight = |phase| -> Result<(DMatrix<f64>, DVector<f64>), ModelError> {
             let input = mean_input(model, phase);
-            let ddz = latent_acceleration(model, phase, rest, &still, &input)?;
+            let at = Instant {
+                x: rest,
+                dx: &still,
+                u: &input,
+            };
+            let ddz = at.latent_acceleration(model, phase)?;
             Ok((gain(model, phase, rest, &input, &ddz)?, ddz))
         };
         let (combination, gravity_m_s2) = match flight {
@@ -291,7 +310,10 @@ fn mass_kg(
         .copy_from(&wrench);
     let input = mean_input(model, phase);
     let still = DVector::zeros(STATE_DIM);
-    let at = |u: &DVector<f64>| latent_acceleration(model, phase, rest, &still, u);
+    let at = |u: &DVector<f64>| {
+        let (x, dx) = (rest, &still);
+        Instant { x, dx, u }.latent_acceleration(model, phase)
+    };
     let change = combination.dot(&(at(&(&input + &u))? - at(&input)?));
     Ok((change != 0.0)
         .then(|| 1.0 / change)

@@ -22,6 +22,7 @@
 mod build;
 mod interpret;
 mod program;
+mod range;
 mod real;
 mod roundoff;
 pub mod sin_cos;
@@ -34,6 +35,7 @@ pub use program::{
     Binary, Group, LANES, Program, QUAD, Quad, QuadSum, ResultEntry, Slopes, Slot, Statement,
     Table, TableId, Unary, ValueId,
 };
+pub use range::Range;
 pub use real::Real;
-pub use roundoff::{Range, Rounded, rounding_errors};
+pub use roundoff::{Rounded, rounding_errors};
 pub use validate::IrError;

@@ -10,164 +10,23 @@
 //! The bound also holds where compilers fuse a product with a sum, which rounds less often, and where a
 //! processor replaces numbers below the least normal one by zero.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::interpret::Interpreter;
 use super::program::{Program, Unary};
+use super::range::Range;
 use super::real::Real;
 
 /// Largest relative error of one operation rounded to nearest in single precision.
 const UNIT: f64 = 1.0 / (1u64 << 24) as f64;
 /// Least normal number: what a processor that flushes to zero may lose.
-const TINY: f64 = f32::MIN_POSITIVE as f64;
+pub(super) const TINY: f64 = f32::MIN_POSITIVE as f64;
 /// Units by which the sine-and-cosine kernel or a library's sine may be off: two of the last place.
 const SIN_COS_UNITS: f64 = 4.0;
 /// Units by which another library function may be off: four of the last place.
 const LIBRARY_UNITS: f64 = 8.0;
 /// What an operation of this module itself may lose, in double precision.
 const OWN: f64 = 1.0 / (1u64 << 50) as f64;
-
-/// The numbers from `low` to `high`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
-    /// Least number.
-    pub low: f64,
-    /// Largest number.
-    pub high: f64,
-}
-
-impl Range {
-    /// From `-magnitude` to `magnitude`.
-    pub fn within(magnitude: f64) -> Self {
-        Self {
-            low: -magnitude,
-            high: magnitude,
-        }
-    }
-
-    /// One number.
-    pub fn point(value: f64) -> Self {
-        Self {
-            low: value,
-            high: value,
-        }
-    }
-
-    /// Largest absolute value.
-    pub fn magnitude(self) -> f64 {
-        self.low.abs().max(self.high.abs())
-    }
-
-    fn hull(self, other: Self) -> Self {
-        Self {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-        }
-    }
-
-    fn has_zero(self) -> bool {
-        self.low <= 0.0 && self.high >= 0.0
-    }
-
-    /// Each end moved outwards by a share of itself, so that signs stay.
-    fn widened(self, share: f64) -> Self {
-        Self {
-            low: self.low - share * self.low.abs(),
-            high: self.high + share * self.high.abs(),
-        }
-    }
-
-    /// With zero, if an end is so small that a processor may flush it.
-    fn flushed(self) -> Self {
-        let end = |x: f64| if x.abs() < TINY { 0.0 } else { x };
-        let ends = Self {
-            low: end(self.low),
-            high: end(self.high),
-        };
-        self.hull(ends)
-    }
-
-    fn sum(self, other: Self) -> Self {
-        Self {
-            low: self.low + other.low,
-            high: self.high + other.high,
-        }
-    }
-
-    fn product(self, other: Self) -> Self {
-        let corners = [
-            self.low * other.low,
-            self.low * other.high,
-            self.high * other.low,
-            self.high * other.high,
-        ];
-        Self {
-            low: corners.into_iter().fold(f64::INFINITY, f64::min),
-            high: corners.into_iter().fold(f64::NEG_INFINITY, f64::max),
-        }
-    }
-
-    fn absolute(self) -> Self {
-        let least = if self.has_zero() {
-            0.0
-        } else {
-            self.low.abs().min(self.high.abs())
-        };
-        Self {
-            low: least,
-            high: self.magnitude(),
-        }
-    }
-
-    fn squared(self) -> Self {
-        let absolute = self.absolute();
-        Self {
-            low: absolute.low * absolute.low,
-            high: absolute.high * absolute.high,
-        }
-    }
-
-    /// `1 / self`, which must not hold zero.
-    fn reciprocal(self) -> Self {
-        Self {
-            low: 1.0 / self.high,
-            high: 1.0 / self.low,
-        }
-    }
-
-    fn mapped(self, increasing: impl Fn(f64) -> f64) -> Self {
-        Self {
-            low: increasing(self.low),
-            high: increasing(self.high),
-        }
-    }
-
-    fn negated(self) -> Self {
-        Self {
-            low: -self.high,
-            high: -self.low,
-        }
-    }
-
-    /// All cosines of the range.
-    fn cosine(self) -> Self {
-        let (first, last) = (self.low / TAU, self.high / TAU);
-        let mut range = Self::point(self.low.cos()).hull(Self::point(self.high.cos()));
-        let slack = 1e-9;
-        if (last + slack).floor() > (first - slack).floor() {
-            range.high = 1.0;
-        }
-        if (last + 0.5 + slack).floor() > (first + 0.5 - slack).floor() {
-            range.low = -1.0;
-        }
-        range
-    }
-
-    fn sine(self) -> Self {
-        self.sum(Self::point(-FRAC_PI_2)).cosine()
-    }
-}
 
 /// What single precision makes of a value, over all states of a box.
 #[derive(Clone, Copy, Debug)]
@@ -505,15 +364,5 @@ mod tests {
         };
         assert_eq!(at(-1.0, 1.0), [false, true, false]);
         assert_eq!(at(0.5, 100.0), [true, false, true]);
-    }
-
-    #[test]
-    fn ranges_of_sines_hold_their_extrema() {
-        let range = |low, high| Range { low, high };
-        assert_eq!(range(-0.5, 0.5).cosine().high, 1.0);
-        assert!(range(-0.5, 0.5).cosine().low > 0.87);
-        assert_eq!(range(1.0, 2.0).sine().high, 1.0);
-        assert_eq!(range(4.0, 5.0).sine().low, -1.0);
-        assert_eq!(range(-30.0, 30.0).sine(), range(-1.0, 1.0));
     }
 }

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use serde_json::{Map, Value};
 
+use super::checks::{check_map, check_robot_names, check_widths, identifier_of};
 use super::coordinate_names::CoordinateNames;
 use super::error::{ModelError, check_finite, check_shape};
 use super::identifier::Identifier;
@@ -431,77 +432,5 @@ impl ModelBuilder {
             *slot = Some(statistics.clone());
         }
         Ok(ordered)
-    }
-}
-
-/// Refuses a name that a model cannot have, before one is made.
-///
-/// # Errors
-/// [`ModelError::Name`].
-pub fn check_name(name: &str) -> Result<(), ModelError> {
-    identifier_of("model name", name).map(|_| ())
-}
-
-fn identifier_of(what: &str, name: &str) -> Result<Identifier, ModelError> {
-    Identifier::from_name(name).map_err(|source| ModelError::Name {
-        what: what.to_owned(),
-        name: name.chars().take(80).collect(),
-        source,
-    })
-}
-
-fn check_robot_names(
-    signals: &'static str,
-    given: &Option<CoordinateNames>,
-    expected: &[String],
-    robot: &Robot,
-) -> Result<(), ModelError> {
-    let Some(given) = given else {
-        return Ok(());
-    };
-    for (index, (found, expected)) in given.names.iter().zip(expected).enumerate() {
-        if found != expected {
-            let place = format!("`{signals}.names`[{index}]");
-            let expected = format!("{expected:?} as on robot {}", robot.name());
-            return Err(ModelError::invalid(place, format!("{found:?}"), expected));
-        }
-    }
-    Ok(())
-}
-
-/// Checks what enters the first layer and what leaves the last; `expected` is the Jacobian's shape.
-fn check_map(name: &str, map: &StateMap, expected: (usize, usize)) -> Result<(), ModelError> {
-    if let Some(affine) = map.as_affine() {
-        return check_shape(
-            &format!("{name}.weights"),
-            affine.weights().shape(),
-            expected,
-        );
-    }
-    let last = map.layers().len() - 1;
-    let ends = [(0, None, Some(expected.1)), (last, Some(expected.0), None)];
-    for (layer, rows, columns) in ends {
-        let found = map.layers()[layer].map.weights().shape();
-        let expected = (rows.unwrap_or(found.0), columns.unwrap_or(found.1));
-        check_shape(&format!("{name}.layers[{layer}].weights"), found, expected)?;
-    }
-    Ok(())
-}
-
-/// No layer of an encoder may be narrower than the latent space, or its Jacobian never has full
-/// rank.
-fn check_widths(encoder: &StateMap, latent_dim: usize) -> Result<(), ModelError> {
-    let widths = encoder.layers().iter().map(|layer| layer.map.output_dim());
-    match widths.enumerate().find(|&(_, width)| width < latent_dim) {
-        None => Ok(()),
-        Some((layer, found)) => {
-            let expected = format!("at least {latent_dim}, one per latent coordinate");
-            let place = format!("`encoder.layers[{layer}]`");
-            Err(ModelError::invalid(
-                place,
-                format!("{found} units"),
-                expected,
-            ))
-        }
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::{Dim, Matrix, RawStorage};
 use thiserror::Error;
 
 use super::identifier::IdentifierError;
-use super::library::LibraryError;
+use super::library_error::LibraryError;
 use crate::robot::RobotError;
 
 /// Why a model was refused, or could not answer.

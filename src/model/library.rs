@@ -3,12 +3,13 @@
 use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
-use thiserror::Error;
 
 use super::error::{ModelError, check_shape};
 use super::evaluation::Tape;
-use super::standard_library::{MAX_DEGREE, StandardLibrary};
-use crate::symbolic::{ExprId, ExprPool, ParseError, SymbolId};
+use super::library_error::LibraryError;
+use super::standard_library::StandardLibrary;
+use super::variable::LatentVariable;
+use crate::symbolic::{ExprId, ExprPool, SymbolId};
 
 /// Largest number of latent coordinates.
 pub const MAX_LATENT_DIM: usize = 64;
@@ -29,53 +30,6 @@ impl TermId {
     /// The row of Xi.
     pub fn index(self) -> usize {
         self.0
-    }
-}
-
-/// A variable of candidate terms; indices count from 0, names in files from 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum LatentVariable {
-    /// Latent coordinate, `z1` for index 0.
-    Z(usize),
-    /// Latent velocity, `dz1` for index 0.
-    Dz(usize),
-    /// Latent input, `u1` for index 0.
-    U(usize),
-}
-
-impl LatentVariable {
-    /// The variable with this name, if there is one at `latent_dim`.
-    pub fn from_name(name: &str, latent_dim: usize) -> Option<Self> {
-        let digits_at = name.find(|c: char| c.is_ascii_digit())?;
-        let (kind, digits) = name.split_at(digits_at);
-        let canonical = !digits.starts_with('0') && digits.bytes().all(|b| b.is_ascii_digit());
-        let number: usize = digits.parse().ok().filter(|_| canonical)?;
-        let index = number.checked_sub(1).filter(|&index| index < latent_dim)?;
-        match kind {
-            "z" => Some(LatentVariable::Z(index)),
-            "dz" => Some(LatentVariable::Dz(index)),
-            "u" => Some(LatentVariable::U(index)),
-            _ => None,
-        }
-    }
-
-    /// All variables at `latent_dim`: z, then dz, then u.
-    pub fn all(latent_dim: usize) -> impl Iterator<Item = Self> {
-        let indices = move || 0..latent_dim;
-        indices()
-            .map(LatentVariable::Z)
-            .chain(indices().map(LatentVariable::Dz))
-            .chain(indices().map(LatentVariable::U))
-    }
-}
-
-impl fmt::Display for LatentVariable {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            LatentVariable::Z(index) => write!(f, "z{}", index + 1),
-            LatentVariable::Dz(index) => write!(f, "dz{}", index + 1),
-            LatentVariable::U(index) => write!(f, "u{}", index + 1),
-        }
     }
 }
 
@@ -110,81 +64,6 @@ pub enum LibrarySource {
     Terms,
     /// The shorthand.
     Standard(StandardLibrary),
-}
-
-/// Why a library was refused.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum LibraryError {
-    /// Too few or too many latent coordinates.
-    #[error("`latent_dim`: found {found}, expected 1 to {MAX_LATENT_DIM}")]
-    LatentDim {
-        /// The number given.
-        found: usize,
-    },
-    /// No term at all.
-    #[error("`library`: found no term, expected at least one")]
-    Empty,
-    /// More terms than can be handled.
-    #[error("`library`: found {found} terms, expected at most {MAX_LIBRARY_DIM}")]
-    TooManyTerms {
-        /// How many there are or would be.
-        found: usize,
-    },
-    /// The shorthand asks for a polynomial degree beyond the bound.
-    #[error("`library.degree`: found {found}, expected at most {MAX_DEGREE}")]
-    Degree {
-        /// The degree.
-        found: u32,
-    },
-    /// A term is too long or has control characters.
-    #[error(
-        "`library`[{index}]: found {found} bytes or a control character, expected one line of at most {MAX_TERM_LEN} bytes"
-    )]
-    TermText {
-        /// Index of the term, from 0.
-        index: usize,
-        /// Its length.
-        found: usize,
-    },
-    /// A term is no expression over the model's variables.
-    #[error("`library`[{index}]: {text:?} is not a candidate term")]
-    Parse {
-        /// Index of the term, from 0.
-        index: usize,
-        /// The term.
-        text: String,
-        /// Position, found, expected.
-        #[source]
-        source: Box<ParseError>,
-    },
-    /// A term equals an earlier one, which a library to be trained on must not have.
-    #[error("`library`[{second}]: {text:?} equals [{first}] {earlier:?}")]
-    Duplicate {
-        /// Index of the earlier term.
-        first: usize,
-        /// Index of the later term.
-        second: usize,
-        /// The later term.
-        text: String,
-        /// The earlier term.
-        earlier: String,
-    },
-    /// A part of a term without variables has no finite value, such as `1/0`.
-    #[error("`library`[{index}]: a constant part of {text:?} has no finite value")]
-    NotFinite {
-        /// Index of the term, from 0.
-        index: usize,
-        /// The term.
-        text: String,
-    },
-    /// A term vanishes for all arguments.
-    #[error("`library`[{index}]: {text:?} is zero everywhere")]
-    Zero {
-        /// Index of the term, from 0.
-        index: usize,
-        /// The term.
-        text: String,
-    },
 }
 
 /// Candidate terms in order, over `z1..zd`, `dz1..dzd`, `u1..ud`.
@@ -469,28 +348,6 @@ mod tests {
 
     fn terms(texts: &[&str]) -> Vec<String> {
         texts.iter().map(|&text| text.to_owned()).collect()
-    }
-
-    #[test]
-    fn variable_names_are_read_and_written_alike() {
-        for variable in LatentVariable::all(12) {
-            assert_eq!(
-                LatentVariable::from_name(&variable.to_string(), 12),
-                Some(variable)
-            );
-        }
-        for name in [
-            "z0",
-            "z13",
-            "z01",
-            "z",
-            "z1x",
-            "ddz1",
-            "1",
-            "u99999999999999999999",
-        ] {
-            assert_eq!(LatentVariable::from_name(name, 12), None, "{name}");
-        }
     }
 
     #[test]

@@ -35,12 +35,14 @@
 mod activation;
 mod affine;
 mod builder;
+mod checks;
 mod coordinate_names;
 mod error;
 mod evaluation;
 mod identifier;
 mod jump_prior;
 mod library;
+mod library_error;
 mod maps;
 mod normal;
 mod order;
@@ -52,6 +54,7 @@ mod standard_library;
 mod state_map;
 mod statistics;
 mod tangent;
+mod variable;
 
 #[cfg(test)]
 mod tests;
@@ -59,16 +62,17 @@ mod tests;
 pub use crate::robot::FeetRule;
 pub use activation::{Activation, GELU_CUBIC, GELU_RATE};
 pub use affine::AffineMap;
-pub use builder::{ModelBuilder, check_name};
+pub use builder::ModelBuilder;
+pub use checks::check_name;
 pub use coordinate_names::CoordinateNames;
 pub use error::ModelError;
 pub(crate) use evaluation::{Step, Tape};
 pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN};
 pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior};
 pub use library::{
-    CandidateTerm, LatentVariable, Library, LibraryError, LibrarySource, MAX_LATENT_DIM,
-    MAX_LIBRARY_DIM, MAX_TERM_LEN, TermId,
+    CandidateTerm, Library, LibrarySource, MAX_LATENT_DIM, MAX_LIBRARY_DIM, MAX_TERM_LEN, TermId,
 };
+pub use library_error::LibraryError;
 pub(crate) use normal::{DENSITY_AT_ZERO, TAIL};
 pub use order::CoordinateOrder;
 pub use phase::Phase;
@@ -79,3 +83,4 @@ pub use standard_library::{MAX_DEGREE, StandardLibrary};
 pub use state_map::{Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};
 pub use statistics::InputStatistics;
 pub use tangent::Tangent;
+pub use variable::LatentVariable;

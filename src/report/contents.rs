@@ -58,9 +58,10 @@ pub struct JumpFigures {
     pub film: Option<Film>,
     /// The same as a strip, for paper.
     pub strip: Option<Figure>,
-    /// Body, accelerations, template models.
-    pub figures: Vec<Figure>,
-    /// Figures to fold away, each with a title: joints, and the controller's run if this is the first jump of a recording.
+    /// Position and orientation of the body.
+    pub body: Figure,
+    /// Figures to fold away, each with a title: accelerations, template models, joints, and the controller's run if this
+    /// is the first jump of a recording.
     pub folded: Vec<(&'static str, Figure)>,
 }
 
@@ -70,7 +71,7 @@ impl AllFigures {
         let jumps = self.jumps.iter();
         let jumps = jumps.flat_map(|jump| {
             let folded = jump.folded.iter().map(|(_, figure)| figure);
-            jump.strip.iter().chain(&jump.figures).chain(folded)
+            jump.strip.iter().chain([&jump.body]).chain(folded)
         });
         self.encoder.iter().chain(jumps).chain(&self.study)
     }
@@ -90,7 +91,11 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
     }
     for (index, jump) in jumps(content).into_iter().take(MAX_JUMPS).enumerate() {
         let [joints, body] = jump.coordinates()?;
-        let mut folded = vec![("Joint angles", joints)];
+        let mut folded = vec![
+            ("Latent accelerations", jump.accelerations()?),
+            ("Beside the pendulum", jump.baselines()?),
+            ("Joint angles", joints),
+        ];
         let path = &jump.run.segment.path;
         let is_first = (assessment.runs[..index].iter()).all(|run| run.segment.path != *path);
         let run = content.consistent.iter().find(|(of, _)| of == path);
@@ -109,7 +114,7 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
             body_rms_m: jump.body_rms_m()?,
             film,
             strip,
-            figures: vec![body, jump.accelerations()?, jump.baselines()?],
+            body,
             folded,
         });
     }

@@ -99,7 +99,7 @@ fn jump_view(jump: &JumpFigures) -> JumpView {
         film: jump.film.clone(),
         film_legend: (jump.film.as_ref()).map_or_else(Vec::new, |film| legend(&film.legend)),
         strip: jump.strip.as_ref().map(figure_view),
-        figures: jump.figures.iter().map(figure_view).collect(),
+        body: figure_view(&jump.body),
         folded: (jump.folded.iter())
             .map(|(title, figure)| (*title, figure_view(figure)))
             .collect(),
@@ -185,7 +185,7 @@ struct JumpView {
     film: Option<Film>,
     film_legend: Vec<(&'static str, String)>,
     strip: Option<FigureView>,
-    figures: Vec<FigureView>,
+    body: FigureView,
     folded: Vec<(&'static str, FigureView)>,
 }
 

@@ -107,20 +107,26 @@ pub(super) fn sections(
     } = *content;
     let every = assessment.restart_every_s;
     let by_phase = format!(
-        "Root mean square errors over whole jumps and restarted every {every} s; on the right those of each phase, restarted"
+        "All {} coordinates: root mean square errors over whole jumps and restarted every {every} s; on the right those of \
+         each phase, restarted",
+        assessment.names.len()
     );
+    let invariance = Invariance::of(model);
+    let not_told = invariance.as_ref().err();
+    let not_told = not_told.map(|error| format!("Invariance is not told: {error}."));
     let mut sections = vec![
         Section::new("coordinates", "Errors of every coordinate", &[])
-            .with(&[], [error_table(model, assessment).captioned(by_phase)]),
+            .folding([error_table(model, assessment).captioned(by_phase)]),
         Section::new(
             "stability",
             "Phases, stability and inputs",
             &[DYNAMICS_WORDS],
         )
+        .and(not_told)
         .with(
             &[],
             std::iter::once(dynamics_table(model, assessment).captioned("Each phase of the model"))
-                .chain(Invariance::of(model).ok().as_ref().map(invariance_table)),
+                .chain(invariance.ok().flatten().as_ref().map(invariance_table)),
         ),
         beside_pendulum(content),
         control(content),
@@ -183,9 +189,17 @@ fn control(content: &Content<'_>) -> Section {
     .with(
         &[],
         shown.map(|runs| {
-            control_table(runs).captioned("Consistent lift: the model and its baselines")
+            let along = match runs.len() {
+                1 => "",
+                _ => " along the first recording",
+            };
+            let caption = format!("Consistent lift: the model and its baselines{along}");
+            control_table(&runs[..1]).captioned(caption)
         }),
     )
+    .folding(shown.filter(|runs| runs.len() > 1).map(|runs| {
+        control_table(runs).captioned("Consistent lift: the same along every recording")
+    }))
     .folding(
         plain.map(|runs| {
             control_table(runs).captioned(format!("{PLAIN}: the model and its baselines"))

@@ -249,9 +249,10 @@ fn beside_pendulum(content: &Content<'_>) -> Option<String> {
     });
     let words = |axis: usize, name: &str| -> Option<String> {
         let ratio = best[axis]? / own[axis]?;
-        let words = match ratio >= 1.0 {
-            true => format!("{} times closer in {name}", rounded(ratio, 2)),
-            false => format!("{} times further off in {name}", rounded(1.0 / ratio, 2)),
+        let words = match ratio {
+            1.05.. => format!("{} times closer in {name}", rounded(ratio, 2)),
+            0.96.. => format!("as close in {name}"),
+            _ => format!("{} times further off in {name}", rounded(1.0 / ratio, 2)),
         };
         (ratio.is_finite() && ratio > 0.0).then_some(words)
     };
@@ -352,7 +353,8 @@ fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
         .column("body.x rms, whole jump", "mm", |(.., rms)| shown(rms[0]))
         .column("body.z rms, whole jump", "mm", |(.., rms)| shown(rms[1]))
         .table();
-    Ok(table)
+    let count = counted(table.len(), "jump");
+    Ok(table.captioned(format!("{count} of the recordings")))
 }
 
 #[cfg(test)]

@@ -27,6 +27,7 @@ mod data_sets;
 mod dynamics_fit;
 mod error;
 mod judge;
+mod map_options;
 mod options;
 #[cfg(test)]
 mod oscillator;
@@ -46,10 +47,11 @@ pub use data_sets::Recordings;
 pub use dataset::{MIN_SAMPLES, ScaleOptions};
 pub use error::TrainError;
 pub use joint::{Integrator, Unroll, joint};
+pub use map_options::MapOptions;
 pub use metrics::{SetMetrics, assess};
 pub use options::{
-    Coordinates, EncoderOptions, JointOptions, LibraryChoice, MapOptions, Method,
-    RegressionOptions, TrainOptions, Transfer,
+    Coordinates, EncoderOptions, JointOptions, LibraryChoice, Method, RegressionOptions,
+    TrainOptions, Transfer,
 };
 pub use progress::{Progress, Watch};
 pub use report::{PhaseTerms, SeedReport, TrainReport, Trained};

@@ -15,7 +15,8 @@ pub const OPERATOR: f64 = 1.222;
 /// An equals sign with its spaces.
 pub const EQUALS: f64 = 1.333;
 const MINUS: f64 = 0.778;
-const SCRIPT: f64 = 0.7;
+/// Of a character in a script of the same, whose font is wider than the large one scaled to its size.
+const SCRIPT: f64 = 0.8;
 
 /// The width of `math` in em.
 pub fn width(math: &Math) -> f64 {

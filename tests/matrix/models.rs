@@ -13,6 +13,7 @@ use romc::model::{
 pub fn all() -> Vec<ReducedModel> {
     vec![
         hollow(),
+        idle(),
         one_phase(),
         one_coordinate(),
         empty(),
@@ -39,6 +40,15 @@ fn hollow() -> ReducedModel {
     let mut phases = model.phases().to_vec();
     phases[0].xi.fill(0.0);
     let builder = model.into_builder().name("hollow").phases(phases);
+    builder.build().expect("a valid model")
+}
+
+/// A robot's model without any term.
+fn idle() -> ReducedModel {
+    let model = go1();
+    let mut phases = model.phases().to_vec();
+    phases.iter_mut().for_each(|phase| phase.xi.fill(0.0));
+    let builder = model.into_builder().name("idle").phases(phases);
     builder.build().expect("a valid model")
 }
 

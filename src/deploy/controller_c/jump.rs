@@ -6,6 +6,7 @@ use super::Facts;
 use super::numbers::{Numbers, integers, nested};
 use crate::codegen::Precision;
 use crate::deploy::{EmitError, PlannedJump};
+use crate::model::ReducedModel;
 use crate::recording;
 use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, STATE_DIM};
 
@@ -75,6 +76,23 @@ impl Jump {
                 .collect(),
             feet: samples().map(|k| feet[k]).collect(),
         }
+    }
+
+    /// Of the jump the longest part for which a model has phases; all of it where there is no such part, which the
+    /// controller then refuses.
+    pub(super) fn within(mut self, model: &ReducedModel) -> Self {
+        let all: Vec<usize> = (0..self.time_s.len()).collect();
+        let parts = all.split(|&k| model.phase_for(self.feet[k]).is_none());
+        let part = parts.max_by_key(|part| part.len()).unwrap_or(&[]);
+        if let [first, .., last] = *part {
+            let start = self.time_s[first];
+            self.time_s = self.time_s[first..=last].iter().map(|time| time - start).collect();
+            self.x = self.x[first..=last].to_vec();
+            self.dx = self.dx[first..=last].to_vec();
+            self.torque_nm = self.torque_nm[first..=last].to_vec();
+            self.feet = self.feet[first..=last].to_vec();
+        }
+        self
     }
 
     /// `NAME_jump.h`.

@@ -116,7 +116,7 @@ pub fn emit(
     let source = Source::new(facts, &entries, &plant, &rows, options.precision);
     let jump = match &options.plan {
         Some(plan) => Jump::planned(plan),
-        None => Jump::shipped()?,
+        None => Jump::shipped()?.within(model),
     };
     let texts = [
         ("NAME_controller.h", Header { facts }.render()?),

@@ -70,7 +70,6 @@ pub(super) struct Source<'a> {
 struct PhaseNames<'a> {
     identifier: &'a str,
     upper: String,
-    nnz: usize,
 }
 
 struct SolverNumbers {
@@ -179,7 +178,6 @@ impl<'a> Source<'a> {
                 .map(|phase| PhaseNames {
                     identifier: &phase.identifier,
                     upper: format!("{}_{}", facts.upper, phase.identifier.to_ascii_uppercase()),
-                    nnz: phase.pattern.len(),
                 })
                 .collect(),
         }

@@ -49,7 +49,6 @@ pub fn emit(
     };
     let is_physical = system.latent_units().is_some();
     let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?;
-    let negligible = robot.as_ref().map_or(0, |robot| robot.negligible_weights);
     let robot = robot.map(|robot| robot_equations(model, &robot, is_physical, &header));
     let fit = Fit::to(options.width_em);
     let blocks = table::blocks(&typeset.table, model.name(), options.numbers, &fit);
@@ -57,6 +56,7 @@ pub fn emit(
         true => "Needs booktabs and longtable.",
         false => "Needs booktabs.",
     };
+    let tables = table::references(&blocks);
     let coefficients = Table {
         header: header.short(packages) + &label_list(blocks.iter().flat_map(TableBlock::labels)),
         blocks,
@@ -73,7 +73,7 @@ pub fn emit(
         phases: (equations.systems.iter().enumerate())
             .map(|(place, system)| {
                 (
-                    system.introduction(),
+                    system.introduction.clone(),
                     model.phase_identifier(place).to_string(),
                 )
             })
@@ -81,9 +81,7 @@ pub fn emit(
         rounding: words::rounding::<Tex>(options.rounding, &typeset.rounding),
         siunitx: options.numbers == NumberStyle::Siunitx,
         two_columns: fit.is_narrow,
-        robot: (robot.iter().flat_map(|robot| &robot.systems))
-            .map(System::sentence)
-            .collect(),
+        has_robot: robot.is_some(),
         latent: match is_physical {
             true => "latent coordinates and inputs have the units of the list of symbols",
             false => {
@@ -91,7 +89,7 @@ pub fn emit(
                  accelerations per second squared"
             }
         },
-        negligible,
+        tables,
     };
     let mut files = vec![file(format!("{stem}.tex"), &equations)?];
     files.extend(phase_files(model, &equations, &header)?);
@@ -192,10 +190,10 @@ impl Spelling for Tex {
 struct System {
     /// What it is, in a comment.
     comment: String,
-    /// Name of its phase, escaped for the running text; none for equations of no phase.
-    phase: Option<String>,
-    /// When it holds, escaped for the running text.
-    condition: String,
+    /// What it is, in a sentence of the running text.
+    introduction: String,
+    /// The sentence before it, where its file holds more than the equations of motion.
+    words: String,
     label: String,
     aligned: bool,
     lines: Vec<String>,
@@ -204,29 +202,6 @@ struct System {
 }
 
 impl System {
-    /// What stands before the equations.
-    fn introduction(&self) -> String {
-        let phase = self.phase.as_deref().unwrap_or_default();
-        format!(r"Phase \emph{{{phase}}}, with {}:", self.condition)
-    }
-
-    /// The numbers of its equations and when they hold.
-    fn sentence(&self) -> String {
-        let label = &self.label;
-        let number = match (self.aligned, self.count) {
-            (true, 2..) => format!(
-                r"equations \eqref{{{label}:1}} to \eqref{{{label}:{}}}",
-                self.count
-            ),
-            (true, _) => format!(r"equation \eqref{{{label}:1}}"),
-            (false, _) => format!(r"equation \eqref{{{label}}}"),
-        };
-        match &self.phase {
-            Some(phase) => format!(r"phase \emph{{{phase}}}, with {}: {number}", self.condition),
-            None => format!("{}: {number}", self.condition),
-        }
-    }
-
     /// What `\ref` and `\eqref` can name.
     fn labels(&self) -> String {
         let label = &self.label;
@@ -286,11 +261,12 @@ struct Preview {
     rounding: String,
     siunitx: bool,
     two_columns: bool,
-    /// What each system of the robot's equations is; none for a model without a robot.
-    robot: Vec<String>,
+    /// Whether there is a file of the robot's equations.
+    has_robot: bool,
     /// Units of the latent quantities.
     latent: &'static str,
-    negligible: usize,
+    /// References to the tables of coefficients.
+    tables: String,
 }
 
 /// The systems of a model's phases; `part` tells their labels from those of another file.
@@ -313,8 +289,8 @@ fn phases(
             };
             System {
                 comment: format!("Phase {}: {feet}.{tall}", CommentText(&system.phase)),
-                phase: Some(TexText(&system.phase).to_string()),
-                condition: feet,
+                introduction: format!(r"Phase \emph{{{}}}, with {feet}:", TexText(&system.phase)),
+                words: String::new(),
                 aligned: block.aligned,
                 lines: block.lines,
                 label,
@@ -337,20 +313,30 @@ fn robot_equations(
         equations: robot.encoder.clone(),
     };
     let block = lines::block(&encoder, &label, header.options);
+    let introduction = match robot.negligible_weights {
+        0 => "Latent coordinates:".to_owned(),
+        count => format!(
+            r"Latent coordinates, without weights below 2\,\% of the largest of their row ({count}):"
+        ),
+    };
     let mut systems = vec![System {
         comment: format!(
             "Latent coordinates, 3 significant digits; {} weights below 2 % of the largest of \
              their row are left out.",
             robot.negligible_weights
         ),
-        phase: None,
-        condition: "latent coordinates".to_owned(),
+        words: introduction.clone(),
+        introduction,
         aligned: block.aligned,
         lines: block.lines,
         label,
         count: robot.encoder.len(),
     }];
-    systems.extend(phases(model, &robot.systems, "-robot", header.options));
+    let of_phases = phases(model, &robot.systems, "-robot", header.options);
+    systems.extend(of_phases.into_iter().map(|system| System {
+        words: system.introduction.clone(),
+        ..system
+    }));
     let latent = match is_physical {
         true => "",
         false => ", scaled",

@@ -94,6 +94,16 @@ pub(super) fn blocks(
     cuts.iter().enumerate().map(block).collect()
 }
 
+/// The numbers of the tables in running text.
+pub(super) fn references(blocks: &[TableBlock]) -> String {
+    let of = |block: &TableBlock| format!(r"\ref{{{}}}", block.labels[block.labels.len() - 1]);
+    match blocks {
+        [] => "none".to_owned(),
+        [one] => format!("table~{}", of(one)),
+        [first, .., last] => format!("tables~{} to~{}", of(first), of(last)),
+    }
+}
+
 /// Columns that stand side by side.
 fn groups(table: &CoefficientTable, width_em: f64) -> Vec<Vec<usize>> {
     let terms = table.rows.iter().map(|row| {
