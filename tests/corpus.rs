@@ -56,4 +56,7 @@ targets! {
     safetensors_files_of_the_corpus_never_panic: import_safetensors, at least 1;
     latex_of_the_corpus_never_panics_and_equals_itself: import_latex, at least 7;
     equations_of_the_corpus_never_panic: import_equations, at least 2;
+    column_maps_of_the_corpus_never_panic_and_what_reads_is_sound: column_map, at least 3;
+    mcap_files_of_the_corpus_never_panic_and_what_reads_is_sound: mcap, at least 2;
+    robot_files_of_the_corpus_never_panic_and_read_back: robot_file, at least 3;
 }

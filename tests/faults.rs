@@ -270,8 +270,17 @@ fn an_interrupted_training_says_so_and_its_model_too() {
 
 #[test]
 fn the_derivative_of_a_power_of_a_product_has_a_value_where_the_product_is_zero() {
-    for power in ["1.5", "2.5", "3.5"] {
-        let terms = [format!("(z1*z2)^{power}"), "u1".to_owned()];
+    for power in [
+        "(z1*z2)^1.5",
+        "(z1*z2)^2.5",
+        "(z1*z2)^3.5",
+        "sqrt((z1*z2)^3)",
+        "sqrt(2*z1^3*z2^3)",
+        "sqrt(z1^2*z2^4)",
+        "((1 - u1)*z2)^1.5*z1",
+        "(z1*sin(z2))^2.5",
+    ] {
+        let terms = [power.to_owned(), "u1".to_owned()];
         let library = Library::from_terms(2, &terms).expect("two terms");
         let xi = DMatrix::from_element(2, 2, 1.0);
         let phase = Phase {
@@ -366,6 +375,42 @@ fn escapes_of_a_file_do_not_reach_the_terminal() {
 }
 
 #[test]
+fn escapes_of_arguments_do_not_reach_the_terminal() {
+    let acting = "\u{1b}[31mX\u{1b}]0;t\u{7}\u{202e}";
+    let file = format!("{acting}.toml");
+    let name = format!("z1={acting}");
+    let out = tempfile::tempdir().expect("a folder");
+    let out = out.path().to_str().expect("UTF-8");
+    for arguments in [
+        ["study", JUMP, "--latent-dims", acting, "--out-dir", out].as_slice(),
+        &["compile", MODEL, "--emit", acting, "--out-dir", out],
+        &[
+            "compile",
+            MODEL,
+            "--emit",
+            "latex",
+            "--rename",
+            &name,
+            "--out-dir",
+            out,
+        ],
+        &["robot", acting],
+        &["robot", &file],
+        &["inspect", acting],
+        &[acting],
+    ] {
+        let output = romc(arguments);
+        let said = [output.stdout, output.stderr].concat();
+        let said = String::from_utf8(said).expect("UTF-8");
+        let acts = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
+        assert!(
+            said.contains("\\u{1b}") && !said.contains(acts),
+            "{arguments:?}: {said:?}"
+        );
+    }
+}
+
+#[test]
 fn a_bomb_of_blank_lines_is_refused_early() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("bomb.csv.gz");
@@ -386,7 +431,50 @@ fn a_bomb_of_blank_lines_is_refused_early() {
         let error = fails(1, &["inspect", path.to_str().expect("UTF-8")]);
         let expected = format!("row {place}: found more than 10000 empty lines");
         assert!(error.contains(&expected), "{error}");
+        // Read by a map of columns, or for one, the text is the same.
+        let log = path.to_str().expect("UTF-8");
+        let map = "docs/maps/a1-raw.toml";
+        for arguments in [
+            ["inspect", "--guess", log].as_slice(),
+            &["inspect", log, "--columns", map],
+        ] {
+            let error = fails(1, arguments);
+            assert!(
+                error.contains(&expected) || error.contains("joint_act.txt"),
+                "{error}"
+            );
+        }
     }
+}
+
+#[test]
+fn an_encoder_without_rank_is_named_where_invariance_is_asked_of_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut model = shipped("go1-d4");
+    let weights = model["encoder"]["weights"].take();
+    let identity: Vec<[f64; 4]> = (0..4)
+        .map(|i| std::array::from_fn(|j| f64::from(i == j)))
+        .collect();
+    // Units that are never active at rest.
+    model["encoder"] = serde_json::json!({ "layers": [
+        { "weights": weights, "bias": [-1e3, -1e3, -1e3, -1e3], "activation": "relu" },
+        { "weights": identity, "bias": [0, 0, 0, 0] },
+    ] });
+    model["schema"] = "romc-model/2".into();
+    for part in ["landmarks", "prior"] {
+        model.as_object_mut().expect("an object").remove(part);
+    }
+    let path = folder.path().join("model.json").display().to_string();
+    fs::write(&path, model.to_string()).expect("written");
+    let output = romc(&["inspect", &path, "--json"]);
+    let note = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{note}");
+    assert!(note.contains("invariance is not told: Jacobian of the encoder"), "{note}");
+    let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert!(told["models"][0]["invariance"].is_null() || told["invariance"].is_null());
+    // A latent-only model has none to tell, which is no fault.
+    let output = romc(&["inspect", MODEL]);
+    assert!(output.stderr.is_empty(), "{:?}", String::from_utf8_lossy(&output.stderr));
 }
 
 /// A model in other units has the same rollouts: coordinates of a millionth, and of a million.

@@ -30,6 +30,7 @@ mod train;
 mod train_settings;
 mod trajectory;
 
+use std::borrow::Cow;
 use std::ffi::OsString;
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -63,7 +64,12 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(arguments) => arguments,
         Err(refusal) => {
             // Help and the version are refusals of clap that go to stdout; a reader that has gone away is no failure.
-            let _ = refusal.print();
+            let text = refusal.to_string();
+            match printable(&text) {
+                // Colours stay where what was typed has no controls of its own.
+                Cow::Borrowed(_) => drop(refusal.print()),
+                Cow::Owned(text) => eprint!("{text}"),
+            }
             return u8::try_from(refusal.exit_code()).unwrap_or(WRONG_USAGE);
         }
     };

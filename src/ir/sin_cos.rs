@@ -42,7 +42,8 @@ pub const COS: [f64; 6] = [
     -1.135_873_928_367_384_2e-11,
 ];
 
-/// Sine and cosine of `x` rad, each within 1.1 ulp for |x| up to [`LIMIT`].
+/// Sine and cosine of `x` rad, each within 1.6 ulp for |x| up to [`LIMIT`]: the remainder is rounded to half its
+/// last place, which counts up to 0.87 of the sine's, the last sum adds 0.5, the products before it 0.2.
 ///
 /// Beyond the limit, and for infinities and NaN, the standard library's functions.
 #[inline]

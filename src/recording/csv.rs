@@ -16,9 +16,6 @@ use super::lines::{Lines, split_cells};
 use super::segment::Recording;
 use super::table::Table;
 
-/// Most empty lines at the start or the end of a file; compressed, billions would fit into a small one.
-const MAX_BLANK_ROWS: usize = 10_000;
-
 pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// Reads a recording, plain or gzip.
@@ -70,7 +67,7 @@ fn read_lines<R: BufRead>(
     let mut blank = None;
     while let Some((row, line)) = lines.next_row()? {
         if line.trim().is_empty() {
-            check_blank(path, *blank.get_or_insert(row), row)?;
+            blank.get_or_insert(row);
             continue;
         }
         // Blank lines may end a file, but not divide it.
@@ -86,14 +83,6 @@ fn read_lines<R: BufRead>(
     })
 }
 
-/// Refuses to read on after too many empty lines.
-fn check_blank(path: &Path, first: usize, row: usize) -> Result<(), RecordingError> {
-    match row - first < MAX_BLANK_ROWS {
-        true => Ok(()),
-        false => Err(RecordingFault::TooManyBlankRows(MAX_BLANK_ROWS).at(path, row)),
-    }
-}
-
 fn read_header<R: BufRead>(
     path: &Path,
     lines: &mut Lines<'_, R>,
@@ -103,9 +92,7 @@ fn read_header<R: BufRead>(
         Some(found) => found,
     };
     if line.trim().is_empty() {
-        let first = row;
         while let Some((row, line)) = lines.next_row()? {
-            check_blank(path, first, row)?;
             if !line.trim().is_empty() {
                 return Err(
                     RecordingFault::delimiter("", "`;`, a tab or `,` in a header")

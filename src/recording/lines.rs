@@ -8,12 +8,17 @@ use super::error::{RecordingError, RecordingFault};
 /// Longest line accepted, in bytes: some thirty times a row of 71 columns.
 pub(super) const MAX_LINE_BYTES: usize = 1 << 16;
 
+/// Most empty lines in a row, and in all beyond one for each that is not; compressed, billions would fit into a small file.
+const MAX_BLANK_ROWS: usize = 10_000;
+
 /// The rows of a text, without line ends, byte order mark or trailing blanks.
 pub(super) struct Lines<'a, R> {
     source: R,
     path: &'a Path,
     compressed: bool,
     row: usize,
+    /// Empty lines since the last that was not, and in all.
+    blank: [usize; 2],
     buffer: Vec<u8>,
 }
 
@@ -24,6 +29,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
             path,
             compressed,
             row: 0,
+            blank: [0; 2],
             buffer: Vec::new(),
         }
     }
@@ -49,6 +55,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
         if self.buffer.len() > MAX_LINE_BYTES {
             return Err(RecordingFault::LineTooLong(MAX_LINE_BYTES).at(self.path, self.row));
         }
+        self.count_blank()?;
         let bytes = match self.buffer.strip_prefix(b"\xef\xbb\xbf") {
             Some(rest) if self.row == 1 => rest,
             _ => &self.buffer,
@@ -60,6 +67,24 @@ impl<'a, R: BufRead> Lines<'a, R> {
                 let byte = error.valid_up_to() + 1;
                 Err(RecordingFault::Encoding { byte, found }.at(self.path, self.row))
             }
+        }
+    }
+
+    /// Refuses to read on after too many empty lines.
+    fn count_blank(&mut self) -> Result<(), RecordingError> {
+        let is_blank = match self.buffer.first() {
+            Some(first) if first.is_ascii_graphic() => false,
+            _ => String::from_utf8_lossy(&self.buffer).trim().is_empty(),
+        };
+        let [since, all] = &mut self.blank;
+        (*since, *all) = match is_blank {
+            true => (*since + 1, *all + 1),
+            false => (0, *all),
+        };
+        let filled = self.row - *all;
+        match *since > MAX_BLANK_ROWS || *all > filled.saturating_add(MAX_BLANK_ROWS) {
+            true => Err(RecordingFault::TooManyBlankRows(MAX_BLANK_ROWS).at(self.path, self.row)),
+            false => Ok(()),
         }
     }
 

@@ -251,7 +251,7 @@ fn gcd(mut a: u128, mut b: u128) -> u128 {
     a
 }
 
-fn gcd_short(mut a: u64, mut b: u64) -> u64 {
+pub(super) fn gcd_short(mut a: u64, mut b: u64) -> u64 {
     while b != 0 {
         (a, b) = (b, a % b);
     }

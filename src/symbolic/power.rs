@@ -1,7 +1,7 @@
 //! Canonical constructors of powers and functions.
 
 use super::node::{ExprId, Function, Node, Parity};
-use super::number::Number;
+use super::number::{Number, gcd_short};
 use super::order::Exponent;
 use super::pool::ExprPool;
 
@@ -99,6 +99,16 @@ impl ExprPool {
                 .collect();
             return self.product(&powers);
         }
+        if let Some((root, common)) = self.common_power(factors)
+            && let Some(combined) = exponent.checked_mul(Number::integer(common))
+        {
+            // sqrt((x*y)^3) = sqrt(x*y)^3, whose derivative has a value at x = 0; the sign as in powers of one base.
+            let root = match common % 2 {
+                0 => self.apply(Function::Abs, root),
+                _ => root,
+            };
+            return self.pow_number(root, combined);
+        }
         let (coefficient, rest) = match self.as_number(factors[0]) {
             Some(number) if self.as_number(factors[1]).is_none() => {
                 (number, self.product(&factors[1..]))
@@ -113,11 +123,38 @@ impl ExprPool {
                 let rest = self.pow_number(rest, exponent);
                 self.scale(outside, rest)
             }
+            None if !coefficient.is_negative() && self.common_power(&factors[1..]).is_some() => {
+                let outside = self.pow_of_number(coefficient, exponent);
+                let rest = self.pow_number(rest, exponent);
+                self.product(&[outside, rest])
+            }
             None => {
                 let base = self.intern(Node::Product(factors.into()));
                 self.raw_power(base, exponent)
             }
         }
+    }
+
+    /// The product of which all factors together are an integer power above 1, and that power.
+    fn common_power(&mut self, factors: &[ExprId]) -> Option<(ExprId, i64)> {
+        let mut common = 0;
+        let mut powers = Vec::with_capacity(factors.len());
+        for factor in factors {
+            let (base, Exponent::Number(exponent)) = self.base_and_exponent(*factor) else {
+                return None;
+            };
+            let exponent = exponent
+                .as_integer()
+                .filter(|_| self.as_number(base).is_none())?;
+            common = gcd_short(common, exponent.unsigned_abs());
+            powers.push((base, exponent));
+        }
+        let common = i64::try_from(common).ok().filter(|&common| common > 1)?;
+        let roots = powers
+            .into_iter()
+            .map(|(base, exponent)| self.pow_number(base, Number::integer(exponent / common)));
+        let roots: Vec<ExprId> = roots.collect();
+        Some((self.product(&roots), common))
     }
 
     /// A power of a constant: folded where that is exact or correctly rounded; otherwise the

@@ -12,12 +12,13 @@ use romc::deploy::{EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::import::{Format, ImportOptions, LibraryChoice, import_from_bytes, parse_standard};
 use romc::model::{ReducedModel, Scaling};
-use romc::recording::PhaseRule;
 use romc::recording::check::{check, without};
 use romc::recording::preprocess::prepare;
 use romc::recording::write::{Notation, WriteOptions, write_to};
 use romc::recording::{self, Recording, Segment};
+use romc::recording::{Clocks, ColumnMap, PhaseRule, Reader};
 use romc::robot::{InputRule, Robot};
+use romc::robot_file;
 use romc::symbolic::ExprPool;
 
 /// A model that reads is written and reads back equal; small ones are compiled to every target.
@@ -161,6 +162,56 @@ pub fn recording_gz(bytes: &[u8]) {
     recording(bytes);
     if !bytes.starts_with(&[0x1f, 0x8b]) {
         recording(&[&[0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3], bytes].concat());
+    }
+}
+
+/// A map of columns; behind a line `---` the log that it is for, as text, which is read by it.
+pub fn column_map(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
+    let (map, log) = text.split_once("\n---\n").unwrap_or((text, ""));
+    let Ok(map) = ColumnMap::parse("fuzz.toml", map) else {
+        return;
+    };
+    // One file: those that a map names stand beside it, and are not there.
+    if !log.is_empty() && map.files().is_empty() {
+        read_from_disk("txt", log.as_bytes(), Some(map));
+    }
+}
+
+/// An MCAP file, read by the names of its topics.
+pub fn mcap(bytes: &[u8]) {
+    read_from_disk("mcap", bytes, None);
+}
+
+/// What reads is sound, with clocks as stamped and mended.
+fn read_from_disk(ending: &str, bytes: &[u8], map: Option<ColumnMap>) {
+    let name = format!("romc-fuzz-{}.{ending}", std::process::id());
+    let path = std::env::temp_dir().join(name);
+    std::fs::write(&path, bytes).expect("a file of the fuzzer's own");
+    for clocks in [Clocks::Recorded, Clocks::Repaired] {
+        if let Ok(reading) = Reader::new(map.clone(), clocks).read(&path) {
+            reading.recording.segments.iter().for_each(is_sound);
+        }
+    }
+    std::fs::remove_file(&path).expect("it was there");
+}
+
+/// A robot as TOML, or as URDF where it begins as XML does; what reads is written and reads back as itself.
+pub fn robot_file(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
+    let robot = match text.trim_start().starts_with('<') {
+        true => robot_file::from_urdf("fuzz.urdf", text, &[]),
+        false => robot_file::from_toml("fuzz.toml", text),
+    };
+    if let Ok(robot) = robot {
+        let text = robot_file::to_toml(robot);
+        let again = robot_file::from_toml("again.toml", &text);
+        let again = again.unwrap_or_else(|error| panic!("{error}\n{text}"));
+        assert_eq!(robot_file::to_toml(again), text);
     }
 }
 
