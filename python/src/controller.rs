@@ -7,11 +7,12 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods}
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use romc::evaluate::{ReferenceInput, StepRow, along_recording};
+use romc::limits::table;
 use romc::mpc::{Command, Lift, Measurement, MpcError, MpcSettings, ReferenceSamples};
 use romc::robot::{ContactFlags, FOOT_DIM};
 
 use crate::arrays::into_rows;
-use crate::errors::{bad_reference, choice, python_error};
+use crate::errors::{bad_reference, choice, count_within, python_error, within};
 use crate::model::Model;
 use crate::recording::{Recording, Segment};
 
@@ -31,8 +32,8 @@ impl Settings {
     fn settings(&self, py: Python<'_>) -> PyResult<MpcSettings> {
         let lift: Lift = choice(py, "lift", &self.lift)?;
         let mut settings = MpcSettings {
-            horizon: self.horizon,
-            step_s: self.step,
+            horizon: count_within(py, table::HORIZON, self.horizon)?,
+            step_s: within(py, table::STEP, self.step)?,
             lift,
             ..MpcSettings::default()
         };

@@ -9,11 +9,12 @@ use romc::cli::args::UnitsChoice;
 use romc::deploy::{self, EmitOptions, Target};
 use romc::equations::{EquationForm, Equations};
 use romc::files::{EmittedFile, Overwrite};
+use romc::limits::table;
 use romc::typeset::latex::tex_cases;
 use romc::typeset::words;
 use romc::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Typeset, TypesetError};
 
-use crate::errors::{choice, python_error};
+use crate::errors::{choice, count_within, python_error, within};
 use crate::model::Model;
 
 /// Width of the lines of a notebook, in em.
@@ -51,14 +52,22 @@ impl EmitArguments {
         let symbols = SymbolTable::parse(&self.rename, model.data.latent_dim());
         let symbols = symbols.map_err(|error| python_error(py, error))?;
         let form = self.form.as_deref().map(|name| choice(py, "form", name));
+        let count = |range, digits: Option<usize>| {
+            digits
+                .map(|digits| count_within(py, range, digits))
+                .transpose()
+        };
+        let digits = count(table::DIGITS, self.digits)?;
+        let significant = count(table::SIGNIFICANT, self.significant)?;
+        let width = self.width.map(|width| within(py, table::WIDTH, width));
         let print = PrintOptions {
-            rounding: match (self.digits, self.significant) {
+            rounding: match (digits, significant) {
                 (Some(places), _) => Rounding::Decimals(places),
                 (None, Some(digits)) => Rounding::Significant(digits),
                 (None, None) if self.exact => Rounding::Exact,
                 (None, None) => Rounding::default(),
             },
-            width_em: self.width,
+            width_em: width.transpose()?,
             symbols,
             digest: Some(artifact::digest(&model.data).short()),
             numbers: match self.siunitx {

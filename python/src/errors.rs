@@ -15,6 +15,7 @@ use romc::deploy::EmitError;
 use romc::evaluate::EvaluateError;
 use romc::files::Place;
 use romc::import::{ImportError, ImportFault};
+use romc::limits::{OutOfRange, Range};
 use romc::lower::LowerError;
 use romc::model::ModelError;
 use romc::mpc::{ControlError, MpcError};
@@ -316,6 +317,26 @@ pub fn bad_reference(py: Python<'_>, message: &str, array: &str) -> PyErr {
 /// An option with a value that it cannot have.
 pub fn usage(py: Python<'_>, message: &str) -> PyErr {
     Fault::of(Class::Other).raise(py, message)
+}
+
+/// A number inside the range that the command line has for it.
+pub fn within(py: Python<'_>, range: Range, value: f64) -> PyResult<f64> {
+    range.check(value).map_err(|error| out_of_range(py, &error))
+}
+
+/// A count inside the range that the command line has for it.
+pub fn count_within(py: Python<'_>, range: Range, count: usize) -> PyResult<usize> {
+    range
+        .check_count(count)
+        .map_err(|error| out_of_range(py, &error))
+}
+
+fn out_of_range(py: Python<'_>, error: &OutOfRange) -> PyErr {
+    let name = error.name.replace('-', "_");
+    usage(
+        py,
+        &format!("{name} is {}, expected {}", error.found, error.expected),
+    )
 }
 
 /// One of the values that an option has, by its name on the command line.

@@ -3,10 +3,11 @@
 use nalgebra::DMatrix;
 use pyo3::prelude::*;
 use romc::Error;
+use romc::limits::table;
 use romc::plan::{Goal, PlanSettings, Verdict};
 use romc::report::plan_json;
 
-use crate::errors::python_error;
+use crate::errors::{python_error, within};
 use crate::model::Model;
 use crate::recording::{Recording, Segment};
 
@@ -21,6 +22,8 @@ pub fn plan(
     start: Option<PyRef<'_, Segment>>,
     force: bool,
 ) -> PyResult<(Recording, String)> {
+    let distance = within(py, table::DISTANCE, distance)?;
+    let apex = within(py, table::APEX, apex)?;
     let start = start.map(|start| {
         let column = |rows: &DMatrix<f64>| rows.column(0).into_owned();
         (column(&start.data().x), column(&start.data().dx))

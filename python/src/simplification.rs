@@ -5,13 +5,14 @@ use std::path::Path;
 use pyo3::prelude::*;
 use romc::Error;
 use romc::equations::Equations;
+use romc::limits::table;
 use romc::model::ReducedModel;
 use romc::sim::LatentSegment;
 use romc::simplify::{
     Domain, MARGIN, Samples, SimplifyError, Tolerance, certificate_json, markdown,
 };
 
-use crate::errors::{python_error, usage};
+use crate::errors::{python_error, usage, within};
 use crate::model::Model;
 use crate::recording::{Recording, gather};
 
@@ -31,6 +32,9 @@ pub fn simplify(
     let tolerance: Tolerance =
         (tolerance.parse()).map_err(|error| usage(py, &format!("tolerance: {error}")))?;
     let recordings = gather(&recordings);
+    let margin = margin
+        .map(|margin| within(py, table::MARGIN, margin))
+        .transpose()?;
     let original = &model.data;
     let made = py.detach(|| {
         let (domain, samples) = match ranges {

@@ -6,12 +6,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use romc::Error;
 use romc::evaluate::{Assessment, SegmentRun};
+use romc::limits::table;
 use romc::model::{ModelError, ReducedModel};
 use romc::report::assessment_json;
 use romc::sim::Rollout;
 
 use crate::arrays::into_rows;
-use crate::errors::python_error;
+use crate::errors::{python_error, within};
 use crate::model::Model;
 use crate::recording::{Recording, gather};
 
@@ -86,6 +87,7 @@ pub fn simulate<'py>(
     recordings: Vec<PyRef<'_, Recording>>,
     restart_every: f64,
 ) -> PyResult<(String, Bound<'py, PyList>)> {
+    let restart_every = within(py, table::RESTART_EVERY, restart_every)?;
     let recordings = gather(&recordings);
     let made = py.detach(|| -> Result<_, Error> {
         let assessment = Assessment::over(&model.data, &recordings, restart_every)?;

@@ -106,8 +106,13 @@ def test_settings_reach_the_controller(model, jump):
     assert np.array_equal(torque(), default)
     for settings in [{"horizon": 5}, {"input_weight": 1.0}, {"velocity_weight": 1.0}, {"lift": "consistent"}]:
         assert not np.array_equal(torque(**settings), default), settings
-    with pytest.raises(romc.RomcError, match="horizon"):
+    with pytest.raises(romc.RomcError, match="horizon is 0, expected a whole number from 1 to 500"):
         romc.Controller(model, horizon=0)
+    for step in [1e9, 0.0, float("nan")]:
+        with pytest.raises(romc.RomcError, match="step is .*, expected a number from 1e-4 to 1"):
+            romc.Controller(model, step=step)
+    with pytest.raises(romc.RomcError, match="restart_every is 1e-300, expected a number from 0.001 to 1e4"):
+        model.simulate(PATHS, restart_every=1e-300)
     with pytest.raises(romc.RomcError, match="lift: found \"up\", expected one of transpose, consistent"):
         romc.Controller(model, lift="up")
 
