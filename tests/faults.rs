@@ -469,12 +469,19 @@ fn an_encoder_without_rank_is_named_where_invariance_is_asked_of_it() {
     let output = romc(&["inspect", &path, "--json"]);
     let note = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{note}");
-    assert!(note.contains("invariance is not told: Jacobian of the encoder"), "{note}");
+    assert!(
+        note.contains("invariance is not told: Jacobian of the encoder"),
+        "{note}"
+    );
     let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert!(told["models"][0]["invariance"].is_null() || told["invariance"].is_null());
     // A latent-only model has none to tell, which is no fault.
     let output = romc(&["inspect", MODEL]);
-    assert!(output.stderr.is_empty(), "{:?}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.stderr.is_empty(),
+        "{:?}",
+        String::from_utf8_lossy(&output.stderr)
+    );
 }
 
 /// A model in other units has the same rollouts: coordinates of a millionth, and of a million.

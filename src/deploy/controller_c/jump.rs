@@ -86,7 +86,10 @@ impl Jump {
         let part = parts.max_by_key(|part| part.len()).unwrap_or(&[]);
         if let [first, .., last] = *part {
             let start = self.time_s[first];
-            self.time_s = self.time_s[first..=last].iter().map(|time| time - start).collect();
+            self.time_s = self.time_s[first..=last]
+                .iter()
+                .map(|time| time - start)
+                .collect();
             self.x = self.x[first..=last].to_vec();
             self.dx = self.dx[first..=last].to_vec();
             self.torque_nm = self.torque_nm[first..=last].to_vec();
