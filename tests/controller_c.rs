@@ -3,7 +3,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 use romc::codegen::Precision;
 use romc::deploy::{EmitError, EmitOptions, Target, emit};
@@ -11,8 +11,11 @@ use romc::equations::Equations;
 use romc::model::ReducedModel;
 use romc::mpc::{Controller, Measurement, MpcSettings, ReferenceSamples, Solver};
 
+#[path = "controller/programs.rs"]
+mod programs;
 #[path = "mpc/random.rs"]
 mod random;
+use programs::{has, root, shipped, succeed, with_losses};
 use random::Random;
 
 /// Warnings that the sources must not raise.
@@ -27,14 +30,6 @@ const STRICT: [&str; 9] = [
     "-Wvla",
     "-Werror",
 ];
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-fn shipped(name: &str) -> ReducedModel {
-    romc::artifact::read(&root().join(format!("models/{name}.json"))).expect("a shipped model")
-}
 
 /// The shipped model with torques over 0.3 as large for the same latent input: its limits bind as if
 /// they were 30 % of what they are.
@@ -52,31 +47,6 @@ fn with_tight_limits(name: &str) -> ReducedModel {
     let path = folder.path().join("tight.json");
     fs::write(&path, manifest.to_string()).expect("written");
     romc::artifact::read(&path).expect("a sound model")
-}
-
-fn succeed(command: &mut Command) -> Output {
-    let output = command
-        .output()
-        .unwrap_or_else(|error| panic!("{command:?}: {error}"));
-    assert!(
-        output.status.success(),
-        "{command:?}\n{}{}",
-        String::from_utf8_lossy(&output.stdout),
-        String::from_utf8_lossy(&output.stderr)
-    );
-    output
-}
-
-/// Whether a tool is there; where it is not, the calling test says so and is skipped, or fails with
-/// ROMC_REQUIRE_TOOLS=1.
-fn has(tool: &str) -> bool {
-    let found = Command::new(tool).arg("--version").output().is_ok();
-    if !found {
-        let required = std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1");
-        assert!(!required, "{tool} is missing and ROMC_REQUIRE_TOOLS=1");
-        println!("skipped: {tool} is not installed");
-    }
-    found
 }
 
 /// A generated folder.
@@ -275,17 +245,11 @@ fn step_count() -> usize {
 
 #[test]
 fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_limits() {
-    let with_losses = {
-        let actuators = romc::robot::Actuators::of_leg([1.0, 0.6, 0.6], [0.2; 3], [0.01; 3]);
-        let builder = shipped("go1-d4").into_builder().actuators(Some(actuators));
-        let builder = builder.wrench_frame(romc::robot::WrenchFrame::World);
-        builder.build().expect("a sound model")
-    };
     let models = [
         (shipped("go1-d4"), false),
         (with_tight_limits("go1-d4"), true),
         (with_tight_limits("go1-d6"), true),
-        (with_losses, false),
+        (with_losses(shipped("go1-d4")), false),
     ];
     for (number, (model, is_tight)) in models.into_iter().enumerate() {
         let emitted = Emitted::new(&model, Precision::Double);

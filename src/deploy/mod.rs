@@ -4,6 +4,32 @@
 //! into a folder. Equations come from `typeset`, code from `codegen`; `controller` adds the sources of
 //! `mpc/online` and `robot` and the model's numbers. Read `emit` first.
 
+/// Templates of whole files, each a struct of its first line and the `Facts` of its module.
+macro_rules! templates {
+    ($($template:ident: $path:tt),* $(,)?) => {$(
+        #[derive(askama::Template)]
+        #[template(path = $path, config = "templates/askama.toml")]
+        struct $template<'a> {
+            banner: &'a str,
+            facts: &'a Facts<'a>,
+        }
+
+        impl<'a> $template<'a> {
+            fn text(banner: &'a str, facts: &'a Facts<'a>) -> askama::Result<String> {
+                askama::Template::render(&Self { banner, facts })
+            }
+        }
+
+        impl<'a> std::ops::Deref for $template<'a> {
+            type Target = Facts<'a>;
+
+            fn deref(&self) -> &Facts<'a> {
+                self.facts
+            }
+        }
+    )*};
+}
+
 mod controller;
 mod controller_c;
 mod emit;

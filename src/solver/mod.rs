@@ -14,7 +14,7 @@
 //! optimality conditions hold, computed from the program's own numbers.
 //!
 //! Nothing here needs `std` or allocates, and every sum has one order: C that `romc compile --emit
-//! controller-c` makes has the same bits. Read `problem` first, then `interior`.
+//! controller-c` makes has the same bits. Read `problem` first, then `solve`.
 //!
 //! ```
 //! use romc::solver::{Cost, Outcome, Program, RowMatrices, Settings, Shape, Stage};
@@ -53,7 +53,9 @@
 mod interior;
 mod problem;
 mod riccati;
+mod rows;
 mod scalar;
+mod solve;
 
 pub use interior::{COLD, SHORT_STEP, TO_THE_BOUNDARY, WARM};
 pub use problem::{Cost, Outcome, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage};

@@ -25,25 +25,15 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
     let mut pb = [[T::ZERO; NU]; NX];
     for i in 0..NX {
         for k in 0..NX {
-            let factor = p[i][k];
-            for j in 0..NX {
-                pa[i][j] += factor * a[k][j];
-            }
-            for j in 0..NU {
-                pb[i][j] += factor * b[k][j];
-            }
+            add_multiple(p[i][k], &a[k], &mut pa[i]);
+            add_multiple(p[i][k], &b[k], &mut pb[i]);
         }
     }
     let mut hvx = [[T::ZERO; NX]; NU];
     for k in 0..NX {
         for i in 0..NU {
-            let factor = b[k][i];
-            for j in 0..NX {
-                hvx[i][j] += factor * pa[k][j];
-            }
-            for j in 0..NU {
-                hvv[i][j] += factor * pb[k][j];
-            }
+            add_multiple(b[k][i], &pa[k], &mut hvx[i]);
+            add_multiple(b[k][i], &pb[k], &mut hvv[i]);
         }
     }
     if !factorise(&hvv, &mut stage.factor) {
@@ -69,10 +59,7 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
     let mut next = [[T::ZERO; NX]; NX];
     for i in 0..NX {
         for k in 0..NX {
-            let entry = a[k][i];
-            for j in 0..NX {
-                next[i][j] += entry * pa[k][j];
-            }
+            add_multiple(a[k][i], &pa[k], &mut next[i]);
         }
         for k in 0..NU {
             let entry = y[k][i];
@@ -150,6 +137,14 @@ pub(super) fn solve_factored<T: Real, const NU: usize>(
     h
 }
 
+/// `out += factor row`.
+#[inline(always)]
+pub(super) fn add_multiple<T: Real, const N: usize>(factor: T, row: &[T; N], out: &mut [T; N]) {
+    for j in 0..N {
+        out[j] += factor * row[j];
+    }
+}
+
 /// `out += Mᵀ y`.
 #[inline(always)]
 pub(super) fn add_transposed<T: Real, const ROWS: usize, const COLS: usize>(
@@ -158,9 +153,7 @@ pub(super) fn add_transposed<T: Real, const ROWS: usize, const COLS: usize>(
     out: &mut [T; COLS],
 ) {
     for k in 0..ROWS {
-        for j in 0..COLS {
-            out[j] += matrix[k][j] * y[k];
-        }
+        add_multiple(y[k], &matrix[k], out);
     }
 }
 

@@ -8,8 +8,6 @@ mod control_model;
 mod lock;
 mod sources;
 
-use std::ops::Deref;
-
 use askama::Template;
 
 use crate::codegen::interface::ModelInterface;
@@ -47,32 +45,6 @@ struct Facts<'a> {
     clarabel: &'a str,
     nalgebra: &'a str,
     thiserror: &'a str,
-}
-
-/// Templates of the project, each a struct of its first line and the [`Facts`].
-macro_rules! templates {
-    ($($template:ident: $path:tt),* $(,)?) => {$(
-        #[derive(Template)]
-        #[template(path = $path, config = "templates/askama.toml")]
-        struct $template<'a> {
-            banner: &'a str,
-            facts: &'a Facts<'a>,
-        }
-
-        impl<'a> $template<'a> {
-            fn text(banner: &'a str, facts: &'a Facts<'a>) -> askama::Result<String> {
-                Self { banner, facts }.render()
-            }
-        }
-
-        impl<'a> Deref for $template<'a> {
-            type Target = Facts<'a>;
-
-            fn deref(&self) -> &Facts<'a> {
-                self.facts
-            }
-        }
-    )*};
 }
 
 templates! {

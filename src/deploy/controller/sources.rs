@@ -16,7 +16,7 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 44] = sources![
+const SOURCES: [(&str, &str); 46] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
@@ -60,7 +60,9 @@ const SOURCES: [(&str, &str); 44] = sources![
     "solver/mod.rs",
     "solver/problem.rs",
     "solver/riccati.rs",
+    "solver/rows.rs",
     "solver/scalar.rs",
+    "solver/solve.rs",
 ];
 
 /// The sources below the generated crate, each with a first line that says what it is.

@@ -52,25 +52,6 @@ struct Facts<'a> {
     n_joint_stored: usize,
 }
 
-/// Templates of whole files, each a struct of the [`Facts`].
-macro_rules! templates {
-    ($($template:ident: $path:tt),* $(,)?) => {$(
-        #[derive(Template)]
-        #[template(path = $path, config = "templates/askama.toml")]
-        struct $template<'a> {
-            facts: &'a Facts<'a>,
-        }
-
-        impl<'a> std::ops::Deref for $template<'a> {
-            type Target = Facts<'a>;
-
-            fn deref(&self) -> &Facts<'a> {
-                self.facts
-            }
-        }
-    )*};
-}
-
 templates! {
     Header: "controller_c/header.askama",
     Cmake: "controller_c/cmake.askama",
@@ -118,21 +99,19 @@ pub fn emit(
         Some(plan) => Jump::planned(plan),
         None => Jump::shipped()?.within(model),
     };
+    let (block, hash) = (facts.banner.as_str(), format!("# {provenance}"));
     let texts = [
-        ("NAME_controller.h", Header { facts }.render()?),
+        ("NAME_controller.h", Header::text(block, facts)?),
         ("NAME_controller.c", source.render()?),
         ("NAME_jump.h", jump.header(facts, options.precision)),
         (
             "NAME_controller_selftest.c",
             selftest::text(facts, model, &jump, options.precision)?,
         ),
-        ("NAME_robot.h", RobotHeader { facts }.render()?),
-        ("NAME_example.c", Example { facts }.render()?),
-        (
-            "CMakeLists.txt",
-            format!("# {provenance}\n{}", Cmake { facts }.render()?),
-        ),
-        ("README.md", Readme { facts }.render()?),
+        ("NAME_robot.h", RobotHeader::text(block, facts)?),
+        ("NAME_example.c", Example::text(block, facts)?),
+        ("CMakeLists.txt", Cmake::text(&hash, facts)?),
+        ("README.md", Readme::text(provenance, facts)?),
     ];
     for (path, text) in texts {
         let path = format!("{folder}/{}", path.replace("NAME", &name));

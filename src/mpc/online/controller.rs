@@ -258,27 +258,30 @@ impl Controller {
         if self.settings.linearisation == Linearisation::LastPlan || !time_s.is_finite() {
             return;
         }
+        let middle_s = time_s + 0.5 * self.settings.step_s;
+        let feet = reference.feet_at(middle_s);
+        self.prepare_stages(time_s, feet);
+    }
+
+    /// Writes the horizon from a time on and its gains; none without a reference.
+    fn prepare_stages(&mut self, time_s: f64, feet: ContactFlags) -> Option<Contact> {
         let inputs = StageInputs {
             plant: &self.plant,
             settings: &self.settings,
-            reference,
+            reference: self.reference.as_ref()?,
             plan: &self.plan,
             rows: &self.near_rows,
         };
-        let middle_s = time_s + 0.5 * self.settings.step_s;
-        let feet = reference.feet_at(middle_s);
         let dynamics = self.dynamics.as_mut();
-        self.horizon.prepare(&inputs, dynamics, time_s, feet);
-        let last = self.settings.horizon - 1;
-        let step = StepData {
-            stages: self.horizon.stages(),
-            last_position: &self.horizon.end(last)[..self.plant.latent_dim()],
-            measured: &self.memory.measured,
-            last_input: &self.memory.input,
-            deviation: reference.deviation(),
-            input_cholesky: &self.input_cholesky,
-        };
+        let contact = self.horizon.prepare(&inputs, dynamics, time_s, feet);
+        let step = step_data(
+            &self.horizon,
+            &self.memory,
+            inputs.reference,
+            &self.input_cholesky,
+        );
         self.engine.prepare(&step, &self.horizon);
+        Some(contact)
     }
 
     /// Like [`Controller::step_into`], with a command of its own.
@@ -347,30 +350,11 @@ impl Controller {
 
     /// Solves for a plan and makes the command from it.
     fn plan_step(&mut self, measurement: &Measurement<'_>, command: &mut Command) -> Status {
-        let Some(reference) = &self.reference else {
+        let prepared = self.prepare_stages(measurement.time_s, measurement.feet);
+        let (Some(contact), Some(reference)) = (prepared, &self.reference) else {
             return Status::NoReference;
         };
-        let inputs = StageInputs {
-            plant: &self.plant,
-            settings: &self.settings,
-            reference,
-            plan: &self.plan,
-            rows: &self.near_rows,
-        };
-        let (time_s, feet) = (measurement.time_s, measurement.feet);
-        let contact = self
-            .horizon
-            .prepare(&inputs, self.dynamics.as_mut(), time_s, feet);
-        let last = self.settings.horizon - 1;
-        let step = StepData {
-            stages: self.horizon.stages(),
-            last_position: &self.horizon.end(last)[..self.plant.latent_dim()],
-            measured: &self.memory.measured,
-            last_input: &self.memory.input,
-            deviation: reference.deviation(),
-            input_cholesky: &self.input_cholesky,
-        };
-        self.engine.prepare(&step, &self.horizon);
+        let step = step_data(&self.horizon, &self.memory, reference, &self.input_cholesky);
         let (outcome, iterations) = self.engine.solve(&step);
         command.iterations = iterations;
         match outcome {
@@ -383,7 +367,7 @@ impl Controller {
         let phase = step.stages[0].phase;
         self.plan
             .begin(measurement.time_s, phase, &self.memory.measured);
-        for stage in 0..=last {
+        for stage in 0..self.settings.horizon {
             self.engine.input(stage, &step, self.plan.input_mut(stage));
             let end = self.horizon.end(stage);
             self.engine
@@ -474,6 +458,25 @@ impl Controller {
         let produced = map * SVector::<f64, JOINT_DIM>::from(*net_nm);
         let force = SVector::<f64, 6>::from_fn(|axis, _| lifted[JOINT_DIM + axis]);
         (force.norm() > SMALL_FORCE_N).then(|| (force - produced).norm() / force.norm())
+    }
+}
+
+/// The horizon's numbers as the engine takes them.
+fn step_data<'a>(
+    horizon: &'a Horizon,
+    memory: &'a Memory,
+    reference: &'a Reference,
+    input_cholesky: &'a [DMatrix<f64>],
+) -> StepData<'a> {
+    let stages = horizon.stages();
+    let latent_dim = memory.input.len();
+    StepData {
+        stages,
+        last_position: &horizon.end(stages.len() - 1)[..latent_dim],
+        measured: &memory.measured,
+        last_input: &memory.input,
+        deviation: reference.deviation(),
+        input_cholesky,
     }
 }
 

@@ -1,0 +1,160 @@
+//! The rows of a stage: their numbers, their products with a point, and their share of gradients.
+
+use super::problem::Program;
+use super::scalar::Real;
+
+/// The numbers of one stage's rows.
+pub(super) struct Rows<'a, T> {
+    pub bound: &'a mut [T],
+    pub slack: &'a mut [T],
+    pub multiplier: &'a mut [T],
+    pub weight: &'a mut [T],
+    pub target: &'a mut [T],
+    pub residual: &'a mut [T],
+    pub dslack: &'a mut [T],
+    pub dmultiplier: &'a mut [T],
+}
+
+impl<'a, T> Rows<'a, T> {
+    #[inline(always)]
+    pub fn of(memory: &'a mut [T], count: usize) -> Self {
+        let (bound, rest) = memory.split_at_mut(count);
+        let (slack, rest) = rest.split_at_mut(count);
+        let (multiplier, rest) = rest.split_at_mut(count);
+        let (weight, rest) = rest.split_at_mut(count);
+        let (target, rest) = rest.split_at_mut(count);
+        let (residual, rest) = rest.split_at_mut(count);
+        let (dslack, rest) = rest.split_at_mut(count);
+        let (dmultiplier, _) = rest.split_at_mut(count);
+        Self {
+            bound,
+            slack,
+            multiplier,
+            weight,
+            target,
+            residual,
+            dslack,
+            dmultiplier,
+        }
+    }
+}
+
+impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+    #[inline(always)]
+    pub(super) fn rows_of(&mut self, stage: usize) -> Rows<'_, T> {
+        let (count, memory) = (self.shape.rows(), self.shape.memory());
+        let first = self.at(stage) * memory;
+        Rows::of(&mut self.rows[first..][..memory], count)
+    }
+
+    /// The rows of a stage times a point, into their `target`.
+    #[inline(always)]
+    pub(super) fn rows_times(&mut self, k: usize, v: &[T; NU], x: &[T; NX], t: T) -> Rows<'_, T> {
+        let place = self.at(k);
+        let (shape, stage, matrices) = (self.shape, &self.stages[place], self.matrices);
+        let (count, memory) = (shape.rows(), shape.memory());
+        let rows = Rows::of(&mut self.rows[place * memory..][..memory], count);
+        let (input, rest) = rows.target.split_at_mut(shape.input);
+        for (out, row) in input.iter_mut().zip(&matrices.input[stage.input_rows..]) {
+            *out = dot(row, v);
+        }
+        let (soft, rest) = rest.split_at_mut(shape.soft);
+        if shape.soft > 0 {
+            let z: &[T; NU] = part(x, 0);
+            for (out, row) in soft.iter_mut().zip(&matrices.soft[stage.soft_rows..]) {
+                *out = dot(row, z) - t;
+            }
+            rest[0] = -t;
+        }
+        if shape.hard > 0 {
+            let z: &[T; NU] = part(x, shape.hard_offset);
+            let hard = &mut rest[usize::from(shape.soft > 0)..];
+            for (out, row) in hard.iter_mut().zip(&matrices.hard[stage.hard_rows..]) {
+                *out = dot(row, z);
+            }
+        }
+        rows
+    }
+
+    /// Adds the rows' share, with multipliers `y`, of the gradient by input and state; returns that by
+    /// the slack.
+    #[inline(always)]
+    pub(super) fn add_rows_pull(
+        &self,
+        k: usize,
+        y: &[T],
+        by_v: &mut [T; NU],
+        by_x: &mut [T; NX],
+    ) -> T {
+        let (shape, stage, matrices) = (self.shape, &self.stages[self.at(k)], self.matrices);
+        let (input, rest) = y.split_at(shape.input);
+        for (y, row) in input.iter().zip(&matrices.input[stage.input_rows..]) {
+            for j in 0..NU {
+                by_v[j] += *y * row[j];
+            }
+        }
+        let mut by_t = T::ZERO;
+        if shape.soft > 0 {
+            by_t = self.cost.slack;
+            for (y, row) in rest[..shape.soft]
+                .iter()
+                .zip(&matrices.soft[stage.soft_rows..])
+            {
+                by_t -= *y;
+                for j in 0..NU {
+                    by_x[j] += *y * row[j];
+                }
+            }
+            by_t -= rest[shape.soft];
+        }
+        if shape.hard > 0 {
+            let hard = &rest[shape.soft + usize::from(shape.soft > 0)..];
+            for (y, row) in hard.iter().zip(&matrices.hard[stage.hard_rows..]) {
+                for j in 0..NU {
+                    by_x[shape.hard_offset + j] += *y * row[j];
+                }
+            }
+        }
+        by_t
+    }
+}
+
+#[inline(always)]
+pub(super) fn part<T, const NX: usize, const NU: usize>(x: &[T; NX], first: usize) -> &[T; NU] {
+    x[first..]
+        .first_chunk()
+        .expect("rows on states begin at least NU before their end")
+}
+
+#[inline(always)]
+pub(super) fn dot<T: Real, const N: usize>(row: &[T; N], x: &[T; N]) -> T {
+    let mut sum = row[0] * x[0];
+    for j in 1..N {
+        sum += row[j] * x[j];
+    }
+    sum
+}
+
+/// `M += w r rᵀ`.
+#[inline(always)]
+pub(super) fn add_square<T: Real, const N: usize>(w: T, row: &[T; N], matrix: &mut [[T; N]; N]) {
+    for i in 0..N {
+        let factor = w * row[i];
+        for j in 0..N {
+            matrix[i][j] += factor * row[j];
+        }
+    }
+}
+
+#[inline(always)]
+pub(super) fn add_block<T: Real, const N: usize, const NX: usize>(
+    block: &[[T; N]; N],
+    first: usize,
+    matrix: &mut [[T; NX]; NX],
+) {
+    for i in 0..N {
+        for j in 0..N {
+            matrix[first + i][first + j] += block[i][j];
+        }
+    }
+}

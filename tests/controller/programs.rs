@@ -1,0 +1,53 @@
+//! Programs of others that the tests of generated controllers run, and the models they are made of.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use romc::model::ReducedModel;
+use romc::robot::{Actuators, WrenchFrame};
+
+/// The project's folder.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A model of `models/`.
+pub fn shipped(name: &str) -> ReducedModel {
+    romc::artifact::read(&root().join(format!("models/{name}.json"))).expect("a shipped model")
+}
+
+/// The model with other inputs: torques at the links, forces in the world's axes.
+pub fn with_losses(model: ReducedModel) -> ReducedModel {
+    let actuators = Actuators::of_leg([1.0, 0.6, 0.6], [0.2; 3], [0.01; 3]);
+    let builder = model.into_builder().actuators(Some(actuators));
+    let builder = builder.wrench_frame(WrenchFrame::World);
+    builder.build().expect("a sound model")
+}
+
+/// Runs a command and returns its output, which must be a success.
+pub fn succeed(command: &mut Command) -> Output {
+    let output = command
+        .output()
+        .unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    assert!(
+        output.status.success(),
+        "{command:?}\n{}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    output
+}
+
+/// Whether a tool is there; where it is not, the calling test says so and is skipped, or fails with
+/// ROMC_REQUIRE_TOOLS=1.
+pub fn has(tool: &str) -> bool {
+    let found = Command::new(tool).arg("--version").output().is_ok();
+    if !found {
+        let required = std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1");
+        assert!(!required, "{tool} is missing and ROMC_REQUIRE_TOOLS=1");
+        // not by println!, which the test harness captures
+        let _ = writeln!(std::io::stderr(), "skipped: {tool} is not installed");
+    }
+    found
+}
