@@ -266,7 +266,7 @@ fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_
             .parse()
             .expect("a count");
         assert!(
-            active > if is_tight { 50 } else { 0 },
+            active > if is_tight { 20 } else { 0 },
             "limits hardly bind: {text}"
         );
     }

@@ -8,13 +8,18 @@ use super::scalar::Real;
 /// Share of the way to the boundary that a step goes.
 pub const TO_THE_BOUNDARY: f64 = 0.995;
 /// Smallest slack and smallest product of slack and multiplier at a start from the gains.
-pub const COLD: (f64, f64) = (3e-1, 1e-1);
+pub const COLD: (f64, f64) = (3e-1, 3.0);
 /// The same at a start from a guess.
 pub const WARM: (f64, f64) = (1e-2, 1e-3);
 /// A first step from a guess that is shorter than this shows that the guess is not near a solution.
 pub const SHORT_STEP: f64 = 0.3;
+/// Iterations after which slacks and multipliers are centred again: now and then the method goes round
+/// in a circle.
+pub const PATIENCE: u32 = 16;
+
 impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     /// First point of the iterations: the guess, or the point of the gains.
+    #[inline(always)]
     pub(super) fn start(&mut self, x0: &[T; NX], is_warm: bool) {
         let (price, slack_row) = (self.cost.slack, self.shape.input + self.shape.soft);
         let mut x = *x0;
@@ -42,6 +47,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
 
     /// Slacks and multipliers of the present point, none smaller than these: slacks, and products of
     /// the two.
+    #[inline(always)]
     pub(super) fn centre(&mut self, (smallest, product): (f64, f64)) {
         let (smallest, product) = (T::of(smallest), T::of(product));
         for k in 0..self.stages.len() {
@@ -58,6 +64,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
 
     /// Residuals of the rows at the present point; the largest of them, and mean and largest product of
     /// slacks and multipliers.
+    #[inline(always)]
     pub(super) fn measure(&mut self) -> (T, T, T) {
         let (mut infeasibility, mut sum, mut largest) = (T::ZERO, T::ZERO, T::ZERO);
         for k in 0..self.stages.len() {
@@ -79,6 +86,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
 
     /// One step of Mehrotra's method from the present point with this mean complementarity; its length,
     /// none if a Hessian is not positive definite.
+    #[inline(always)]
     pub(super) fn step(&mut self, complementarity: T) -> Option<T> {
         if !self.eliminate_all() {
             return None;
@@ -116,6 +124,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     }
 
     /// Gains with the weights of the rows; the rows' targets are those of the step that does not centre.
+    #[inline(always)]
     fn eliminate_all(&mut self) -> bool {
         let (horizon, shape) = (self.stages.len(), self.shape);
         let mut p = [[T::ZERO; NX]; NX];
@@ -174,6 +183,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     }
 
     /// Constant parts of the inputs' changes, from the rows' targets.
+    #[inline(always)]
     fn pull_all(&mut self) {
         let (horizon, shape) = (self.stages.len(), self.shape);
         let mut p = [T::ZERO; NX];
@@ -206,6 +216,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
 
     /// The changes of all unknowns; how often the longest step of slacks, and of multipliers, that
     /// keeps them positive goes into a whole one.
+    #[inline(always)]
     fn advance(&mut self) -> (T, T) {
         let shape = self.shape;
         let (mut to_slack, mut to_multiplier) = (T::ZERO, T::ZERO);
@@ -247,6 +258,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     }
 
     /// Moves all unknowns along their changes.
+    #[inline(always)]
     fn move_by(&mut self, length: T) {
         for k in 0..self.stages.len() {
             let at = self.at(k);

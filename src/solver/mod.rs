@@ -56,7 +56,9 @@ mod riccati;
 mod rows;
 mod scalar;
 mod solve;
+#[cfg(target_arch = "x86_64")]
+mod wide;
 
-pub use interior::{COLD, SHORT_STEP, TO_THE_BOUNDARY, WARM};
+pub use interior::{COLD, PATIENCE, SHORT_STEP, TO_THE_BOUNDARY, WARM};
 pub use problem::{Cost, Outcome, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage};
 pub use scalar::Real;

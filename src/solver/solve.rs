@@ -1,6 +1,6 @@
 //! The solve: the linear-quadratic optimum if it keeps every row, otherwise iterations from a guess.
 
-use super::interior::{COLD, SHORT_STEP};
+use super::interior::{COLD, PATIENCE, SHORT_STEP};
 use super::problem::{Outcome, Program, Report, Residuals, Settings};
 use super::riccati::{add_transposed, answer, eliminate, plus_product, pull};
 use super::scalar::Real;
@@ -8,6 +8,7 @@ use super::scalar::Real;
 impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     /// Eliminates all stages without their rows: gains and constant parts of the linear-quadratic
     /// optimum from any initial state. False if a Hessian is not positive definite.
+    #[inline(always)]
     pub fn prepare(&mut self) -> bool {
         let horizon = self.stages.len();
         let mut p = [[T::ZERO; NX]; NX];
@@ -36,6 +37,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     ///
     /// `is_warm` says that inputs and multipliers are a guess at the solution, such as the last one's,
     /// shifted by a stage.
+    #[inline(always)]
     pub fn solve(&mut self, x0: &[T; NX], is_warm: bool, settings: &Settings<T>) -> Report<T> {
         let worst = self.follow_gains(x0);
         if !worst.is_finite_number() {
@@ -68,7 +70,8 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 let Some(length) = self.step(complementarity) else {
                     break;
                 };
-                if may_restart && length < T::of(SHORT_STEP) {
+                let is_poor = may_restart && length < T::of(SHORT_STEP);
+                if is_poor || iterations % PATIENCE == 0 {
                     self.centre(COLD);
                 }
                 may_restart = false;
@@ -100,6 +103,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     }
 
     /// States and inputs that the gains give, kept if no row is violated; returns the largest violation.
+    #[inline(always)]
     fn follow_gains(&mut self, x0: &[T; NX]) -> T {
         let horizon = self.stages.len();
         let mut worst = T::ZERO;
@@ -127,6 +131,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     }
 
     /// Takes the point of the gains for the solution: no row is active.
+    #[inline(always)]
     fn take_gains(&mut self) {
         let soft = self.shape.soft;
         for k in 0..self.stages.len() {
@@ -148,6 +153,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     }
 
     /// Residuals of the optimality conditions at the present point, from the program's own numbers.
+    #[inline(always)]
     pub fn residuals(&mut self, x0: &[T; NX]) -> Residuals<T> {
         let (horizon, shape) = (self.stages.len(), self.shape);
         let (mut primal, mut dual, mut gap) = (T::ZERO, T::ZERO, T::ZERO);
@@ -210,6 +216,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
 }
 
 /// The larger of two numbers, or not a number if the new one is not.
+#[inline(always)]
 fn kept_larger<T: Real>(new: T, so_far: T) -> T {
     if new <= so_far { so_far } else { new }
 }

@@ -16,7 +16,7 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 46] = sources![
+const SOURCES: [(&str, &str); 47] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
@@ -63,6 +63,7 @@ const SOURCES: [(&str, &str); 46] = sources![
     "solver/rows.rs",
     "solver/scalar.rs",
     "solver/solve.rs",
+    "solver/wide.rs",
 ];
 
 /// The sources below the generated crate, each with a first line that says what it is.

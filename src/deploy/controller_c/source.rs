@@ -17,7 +17,7 @@ use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
 use crate::solver;
 
 /// Complementarity and residual in single precision, at which rounding ends the progress.
-const SINGLE: (f64, f64) = (1e-5, 1e-3);
+const SINGLE: (f64, f64) = (1e-4, 1e-3);
 
 /// `NAME_controller.c`.
 #[derive(Template)]
@@ -80,6 +80,7 @@ struct SolverNumbers {
     warm: (String, String),
     cold: (String, String),
     short_step: String,
+    patience: u32,
     sqrt_half: String,
 }
 
@@ -200,6 +201,7 @@ impl SolverNumbers {
             warm: pair(solver::WARM),
             cold: pair(solver::COLD),
             short_step: one(solver::SHORT_STEP),
+            patience: solver::PATIENCE,
             sqrt_half: one(std::f64::consts::FRAC_1_SQRT_2),
         }
     }

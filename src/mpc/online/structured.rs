@@ -10,7 +10,7 @@ use super::problem::StageRows;
 use super::qp::Outcome;
 use super::settings::MpcSettings;
 use super::transcribe::{SLACK_PRICE, Stage as StageData, Weights};
-use crate::solver::{self, Cost, Program, RowMatrices, Settings, Shape, Stage};
+use crate::solver::{self, Cost, Program, Report, RowMatrices, Settings, Shape, Stage};
 
 /// Complementarity and violation of rows at which iterations end.
 pub const TOLERANCE: f64 = 1e-9;
@@ -213,6 +213,21 @@ impl<const NX: usize, const NU: usize> Horizon<NX, NU> {
     }
 }
 
+/// Solves with the widest vectors that the processor has; the bits are the same with all.
+fn solve<const NX: usize, const NU: usize>(
+    program: &mut Program<'_, f64, NX, NU>,
+    x0: &[f64; NX],
+    is_warm: bool,
+    settings: &Settings<f64>,
+) -> Report<f64> {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has what this is compiled for.
+        return unsafe { program.solve_avx2(x0, is_warm, settings) };
+    }
+    program.solve(x0, is_warm, settings)
+}
+
 /// `row C` for a lower triangular `C`, and `row · input`.
 fn scaled<const NU: usize>(
     row: &[f64],
@@ -248,13 +263,19 @@ impl<const NX: usize, const NU: usize> StructuredProgram for Horizon<NX, NU> {
     }
 
     fn prepare(&mut self) -> bool {
-        self.program().prepare()
+        let mut program = self.program();
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has what this is compiled for.
+            return unsafe { program.prepare_avx2() };
+        }
+        program.prepare()
     }
 
     fn solve(&mut self, x0: &[f64]) -> (Outcome, u32) {
         let x0 = std::array::from_fn(|i| x0[i]);
         let (is_warm, settings) = (self.is_warm, self.settings);
-        let report = self.program().solve(&x0, is_warm, &settings);
+        let report = solve(&mut self.program(), &x0, is_warm, &settings);
         let outcome = match report.outcome {
             solver::Outcome::Solved => Outcome::Solved,
             solver::Outcome::Inaccurate => Outcome::Inaccurate,
