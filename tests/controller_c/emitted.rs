@@ -1,0 +1,107 @@
+//! Generated folders of controllers in C, and programs that are made of them.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+
+use romc::codegen::Precision;
+use romc::deploy::{EmitOptions, Target, emit};
+use romc::equations::Equations;
+use romc::model::ReducedModel;
+
+use crate::programs::succeed;
+
+/// Warnings that the sources must not raise.
+pub const STRICT: [&str; 9] = [
+    "-std=c99",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wshadow",
+    "-pedantic",
+    "-Wdouble-promotion",
+    "-Wvla",
+    "-Werror",
+];
+
+/// A generated folder.
+pub struct Emitted {
+    pub name: String,
+    pub scratch: tempfile::TempDir,
+}
+
+impl Emitted {
+    pub fn new(model: &ReducedModel, precision: Precision) -> Self {
+        let options = EmitOptions {
+            precision,
+            ..EmitOptions::default()
+        };
+        let files = emit(&Equations::of(model), &[Target::ControllerC], &options);
+        let scratch = tempfile::tempdir().expect("a folder");
+        for file in files.expect("a complete model") {
+            let path = scratch.path().join(&file.path);
+            fs::create_dir_all(path.parent().expect("inside the folder")).expect("a folder");
+            fs::write(path, file.contents).expect("written");
+        }
+        let name = model.identifier().to_string();
+        Self { name, scratch }
+    }
+
+    pub fn folder(&self) -> PathBuf {
+        self.scratch
+            .path()
+            .join(format!("{}-controller-c", self.name))
+    }
+
+    /// Compiles a source of the folder, or another, unless that was done before; the object.
+    pub fn object(&self, compiler: &str, flags: &[&str], source: &str) -> PathBuf {
+        let key: String = format!("{compiler} {flags:?} {source}")
+            .chars()
+            .filter(|letter| letter.is_ascii_alphanumeric())
+            .collect();
+        let object = self.scratch.path().join(format!("{key}.o"));
+        if object.exists() {
+            return object;
+        }
+        let name = &self.name;
+        succeed(
+            Command::new(compiler)
+                .args(STRICT)
+                .args(["-O2", "-ffp-contract=off"])
+                .args(flags)
+                .arg(format!("-DNAME={name}"))
+                .arg(format!("-DUPPER={}", name.to_ascii_uppercase()))
+                .arg(format!("-DHEADER=\"{name}_controller.h\""))
+                .args(["-I.", "-c", source, "-o"])
+                .arg(&object)
+                .current_dir(self.folder()),
+        );
+        object
+    }
+
+    /// The controller's two objects.
+    pub fn objects(&self, compiler: &str, flags: &[&str]) -> [PathBuf; 2] {
+        ["_controller.c", ".c"]
+            .map(|end| self.object(compiler, flags, &format!("{}{end}", self.name)))
+    }
+
+    /// A program of the folder, or the replay of the tests, linked with the controller.
+    pub fn program(&self, compiler: &str, flags: &[&str], source: &str) -> PathBuf {
+        let main = self.object(compiler, flags, source);
+        let program = main.with_extension("program");
+        succeed(
+            Command::new(compiler)
+                .args(flags)
+                .arg(main)
+                .args(self.objects(compiler, flags))
+                .args(["-lm", "-o"])
+                .arg(&program),
+        );
+        program
+    }
+
+    /// Text of a command's standard output.
+    pub fn output(command: &mut Command) -> String {
+        String::from_utf8_lossy(&succeed(command).stdout).into_owned()
+    }
+}

@@ -1,0 +1,107 @@
+//! The generated C under sanitizers, valgrind, analysers, other compilers and from C++.
+
+use std::fs;
+use std::process::Command;
+
+use romc::codegen::Precision;
+
+use crate::emitted::Emitted;
+use crate::programs::{has, shipped, succeed};
+
+const PRECISIONS: [Precision; 2] = [Precision::Double, Precision::Single];
+
+#[test]
+fn self_tests_and_example_pass_in_both_precisions_with_sanitizers() {
+    for precision in PRECISIONS {
+        let emitted = Emitted::new(&shipped("go1-d4"), precision);
+        let sanitize = [
+            "-g",
+            "-O1",
+            "-fsanitize=address,undefined",
+            "-fno-sanitize-recover=all",
+        ];
+        for program in ["controller_selftest", "selftest", "example"] {
+            let source = format!("{}_{program}.c", emitted.name);
+            let built = emitted.program("cc", &sanitize, &source);
+            println!(
+                "{precision:?}: {}",
+                Emitted::output(&mut Command::new(built))
+            );
+        }
+    }
+}
+
+#[test]
+fn self_tests_pass_for_every_latent_dimension_under_clang_and_valgrind() {
+    for model in ["go1-d2", "go1-d4", "go1-d6"] {
+        for precision in PRECISIONS {
+            let emitted = Emitted::new(&shipped(model), precision);
+            let source = format!("{}_controller_selftest.c", emitted.name);
+            if has("clang") {
+                let built = emitted.program("clang", &[], &source);
+                println!(
+                    "{model} {precision:?}: {}",
+                    Emitted::output(&mut Command::new(built))
+                );
+            }
+            if model != "go1-d6" && has("valgrind") {
+                let built = emitted.program("cc", &["-g"], &source);
+                let quiet = ["-q", "--error-exitcode=9", "--track-origins=yes"];
+                succeed(Command::new("valgrind").args(quiet).arg(built));
+            }
+        }
+    }
+}
+
+#[test]
+fn analysers_find_nothing() {
+    let emitted = Emitted::new(&shipped("go1-d2"), Precision::Double);
+    let name = &emitted.name;
+    let sources = ["_controller.c", "_example.c", "_controller_selftest.c"];
+    let sources = sources.map(|end| format!("{name}{end}"));
+    if has("clang-tidy") {
+        // Vectors of one length follow each other; the stage is a struct with plain arrays.
+        let checks = "-*,bugprone-*,clang-analyzer-*,-bugprone-easily-swappable-parameters";
+        succeed(
+            Command::new("clang-tidy")
+                .args(["--quiet", "--warnings-as-errors=*"])
+                .arg(format!("--checks={checks}"))
+                .args(&sources[..2])
+                .args(["--", "-std=c99"])
+                .current_dir(emitted.folder()),
+        );
+    }
+    if has("cppcheck") {
+        succeed(
+            Command::new("cppcheck")
+                .args(["--std=c99", "--quiet", "--error-exitcode=1"])
+                .arg("--enable=warning,performance,portability")
+                .args(&sources)
+                .current_dir(emitted.folder()),
+        );
+    }
+}
+
+#[test]
+fn headers_are_clean_in_cpp() {
+    let emitted = Emitted::new(&shipped("go1-d6"), Precision::Single);
+    let name = &emitted.name;
+    let caller = format!(
+        "#include \"{name}_controller.h\"\n#include \"{name}_robot.h\"\n\
+         int main() {{ static {name}_controller c; return {name}_controller_init(&c, nullptr); }}\n"
+    );
+    fs::write(emitted.folder().join("caller.cpp"), caller).expect("written");
+    let strict = ["-Wall", "-Wextra", "-pedantic", "-Werror"];
+    let program = emitted.scratch.path().join("caller");
+    succeed(
+        Command::new("c++")
+            .arg("-std=c++11")
+            .args(strict)
+            .arg("caller.cpp")
+            .args(emitted.objects("cc", &[]))
+            .args(["-lm", "-o"])
+            .arg(&program)
+            .current_dir(emitted.folder()),
+    );
+    succeed(&mut Command::new(program));
+}
