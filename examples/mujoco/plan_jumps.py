@@ -15,7 +15,7 @@ import numpy as np
 import romc_controller
 from assessment import assess, repetition_faults
 from closed_loop import named_number, read_jump
-from followers import LatentMpc, Replay
+from followers import POSITION_GAIN, VELOCITY_GAIN, LatentMpc, Replay
 from model_inputs import ModelInputs
 from perturbations import NOMINAL, PERTURBATIONS, Motors, perturbed_simulation
 from primitives import Goal, Recorded
@@ -146,13 +146,18 @@ def parse_arguments():
     parser.add_argument("--settings", type=pathlib.Path, help="weights of the plan, a TOML file")
     parser.add_argument(
         "--setting", type=named_number, action="append", metavar="NAME=NUMBER",
-        help="a setting of the controller (default: velocity_weight=0.15)",
+        help="a setting of the controller (default: those of the library, the share of the input that "
+        "arrives estimated with the gains of the joint PD)",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, not the table")
     parser.add_argument("--jobs", type=int, help="runs at a time (default: one per core)")
     arguments = parser.parse_args()
     if arguments.setting is None:
-        arguments.setting = [("velocity_weight", 0.15)]
+        arguments.setting = [
+            ("effectiveness_time_s", 1.0),
+            ("drive_stiffness_nm_rad", POSITION_GAIN),
+            ("drive_damping_nm_s_rad", VELOCITY_GAIN),
+        ]
     arguments.out_dir, arguments.romc = arguments.out_dir.resolve(), arguments.romc.resolve()
     return arguments
 

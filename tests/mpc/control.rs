@@ -1,11 +1,11 @@
 //! What the controller commands when all is well.
 
-use nalgebra::DVector;
+use nalgebra::{DVector, SVector};
 use romc::lower::CompiledModel;
 use romc::model::ReducedModel;
 use romc::mpc::{
-    Command, ControlError, Controller, Drift, Linearisation, Measurement, MissingInput, MpcError,
-    MpcSettings, ReferenceSamples, Source, Status,
+    Command, ControlError, ControlModel, Controller, Drift, Effectiveness, Linearisation,
+    Measurement, MissingInput, MpcError, MpcSettings, ReferenceSamples, Source, Status,
 };
 use romc::robot::ContactFlags;
 
@@ -84,9 +84,66 @@ fn on_a_reference_that_the_model_follows_the_reference_input_is_commanded() {
 /// Weight of velocities with which errors of position are made good fast.
 const STIFF: f64 = 0.02;
 
+/// Motors that deliver a share of their torques, those of their joint PD included.
+#[derive(Clone, Copy)]
+struct Motors {
+    share: f64,
+    stiffness_nm_rad: f64,
+    damping_nm_s_rad: f64,
+}
+
+const EXACT: Motors = Motors {
+    share: 1.0,
+    stiffness_nm_rad: 0.0,
+    damping_nm_s_rad: 0.0,
+};
+
+impl Motors {
+    /// Latent input that arrives for a command at a state.
+    fn arrives(
+        self,
+        plant: &ControlModel,
+        command: &Command,
+        (x, dx): (&[f64; 18], &[f64; 18]),
+        feet: ContactFlags,
+    ) -> Vec<f64> {
+        let torque = SVector::<f64, 12>::from_fn(|joint, _| {
+            self.stiffness_nm_rad * (command.joint_position_rad[joint] - x[joint])
+                + self.damping_nm_s_rad * (command.joint_velocity_rad_s[joint] - dx[joint])
+        });
+        let joints = std::array::from_fn(|joint| x[joint]);
+        let map = plant
+            .input_rule()
+            .wrench_map(&joints, [x[15], x[16], x[17]], feet)
+            .expect("legs far from stretched");
+        let wrench = map * torque;
+        let input: Vec<f64> = torque.iter().chain(wrench.iter()).copied().collect();
+        let mut held = vec![0.0; D];
+        plant.project(x, &input, &mut held);
+        let entries = command.u_lat.iter().zip(&held);
+        entries.map(|(u, held)| self.share * (u + held)).collect()
+    }
+}
+
 /// Runs the model itself under the controller from an offset; returns the distance from the
 /// reference, in latent units, at every step.
 fn closed_loop(model: &ReducedModel, settings: MpcSettings, with_input: bool) -> Vec<f64> {
+    let steps = run(model, settings, with_input, EXACT);
+    steps.into_iter().map(|(off, _)| off).collect()
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
+    squares.sum::<f64>().sqrt()
+}
+
+/// Distance from the reference and latent coordinates at every step.
+fn run(
+    model: &ReducedModel,
+    settings: MpcSettings,
+    with_input: bool,
+    motors: Motors,
+) -> Vec<(f64, [f64; D])> {
     let reference = trajectory(model);
     let samples = if with_input {
         reference.samples()
@@ -96,7 +153,7 @@ fn closed_loop(model: &ReducedModel, settings: MpcSettings, with_input: bool) ->
     let mut controller = controller(model, settings, samples);
     let mut dynamics = CompiledModel::new(model).expect("lowers");
     let (mut z, mut dz) = ([0.02, -0.02, 0.02], [0.1, 0.0, -0.1]);
-    let mut distances = Vec::new();
+    let mut steps = Vec::new();
     for sample in (0..350).step_by(5) {
         let (x, dx) = decoded(model, &z, &dz);
         let feet = reference.feet[sample];
@@ -111,20 +168,62 @@ fn closed_loop(model: &ReducedModel, settings: MpcSettings, with_input: bool) ->
         assert_within_limits(&command);
         let target = DVector::from_iterator(18, (0..18).map(|i| reference.x[sample * 18 + i]));
         let target = model.encode(&target).expect("has an encoder");
-        distances.push(
-            (0..D)
-                .map(|i| (z[i] - target[i]).powi(2))
-                .sum::<f64>()
-                .sqrt(),
-        );
+        steps.push((distance(&z, target.as_slice()), z));
         for held in sample..sample + 5 {
             let phase = model
                 .phase_for(reference.feet[held])
                 .expect("has both phases");
-            dynamics.rk4_step(phase, &mut z, &mut dz, &command.u_lat, 0.002);
+            let (x, dx) = decoded(model, &z, &dz);
+            let arrives = motors.arrives(
+                controller.plant(),
+                &command,
+                (&x, &dx),
+                reference.feet[held],
+            );
+            dynamics.rk4_step(phase, &mut z, &mut dz, &arrives, 0.002);
         }
     }
-    distances
+    steps
+}
+
+#[test]
+fn weak_and_strong_motors_are_made_up_for() {
+    let model = model(Equations::Nonlinear);
+    let trusting = MpcSettings {
+        velocity_weight: STIFF,
+        ..MpcSettings::default()
+    };
+    for stiffness_nm_rad in [0.0, 5.0] {
+        let damping_nm_s_rad = 0.04 * stiffness_nm_rad;
+        let estimating = MpcSettings {
+            effectiveness: Some(Effectiveness {
+                time_constant_s: 1.0,
+                stiffness_nm_rad,
+                damping_nm_s_rad,
+            }),
+            ..trusting
+        };
+        let states = |settings, share| -> Vec<[f64; D]> {
+            let motors = Motors {
+                share,
+                stiffness_nm_rad,
+                damping_nm_s_rad,
+            };
+            let steps = run(&model, settings, true, motors);
+            steps.into_iter().map(|(_, z)| z).collect()
+        };
+        let exact = states(trusting, 1.0);
+        let off = |settings, share| -> f64 {
+            let pairs = states(settings, share).into_iter().zip(&exact);
+            pairs.map(|(z, exact)| distance(&z, exact)).sum()
+        };
+        for share in [0.8, 1.2] {
+            let (trusted, made_up) = (off(trusting, share), off(estimating, share));
+            assert!(made_up < 0.7 * trusted, "{share}: {made_up} of {trusted}");
+            let noticed = off(estimating, 1.0);
+            assert!(noticed < 0.1 * trusted, "{share}: {noticed} of {trusted}");
+        }
+    }
 }
 
 #[test]
@@ -412,6 +511,17 @@ fn settings_out_of_range_are_refused_by_name() {
             ..MpcSettings::default()
         }),
         "body_friction"
+    );
+    assert_eq!(
+        refused(MpcSettings {
+            effectiveness: Some(Effectiveness {
+                time_constant_s: 1.0,
+                stiffness_nm_rad: -1.0,
+                damping_nm_s_rad: 0.0,
+            }),
+            ..MpcSettings::default()
+        }),
+        "drive_stiffness_nm_rad"
     );
 }
 

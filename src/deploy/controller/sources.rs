@@ -16,11 +16,12 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 47] = sources![
+const SOURCES: [(&str, &str); 48] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
     "mpc/online/dynamics.rs",
+    "mpc/online/effectiveness.rs",
     "mpc/online/engine.rs",
     "mpc/online/error.rs",
     "mpc/online/estimate.rs",

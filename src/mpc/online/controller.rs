@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, SVector};
 use super::command::{Command, Source, Status};
 use super::control_model::ControlModel;
 use super::dynamics::LatentDynamics;
+use super::effectiveness::Effectiveness;
 use super::engine::Engine;
 use super::error::ControlError;
 use super::fallback::Memory;
@@ -52,6 +53,7 @@ pub struct Controller {
     /// Latent state of the posture that is commanded.
     posture: Vec<f64>,
     pub(super) memory: Memory,
+    effectiveness: Effectiveness,
 }
 
 /// One measurement.
@@ -94,6 +96,7 @@ impl Controller {
             plan: Plan::new(d, settings.horizon, settings.step_s),
             posture: vec![0.0; 2 * d],
             memory: Memory::new(d),
+            effectiveness: Effectiveness::full(d),
             reference: None,
             near_rows: rows.clone(),
             rows,
@@ -245,6 +248,7 @@ impl Controller {
         self.horizon.forget();
         self.engine.forget();
         self.memory = Memory::new(self.plant.latent_dim());
+        self.effectiveness = Effectiveness::full(self.plant.latent_dim());
     }
 
     /// Prepares the step at a time ahead, for the feet that the reference has on the ground then: its
@@ -306,6 +310,13 @@ impl Controller {
         if !status.has_plan() {
             self.fall_back(measurement.time_s, command);
         }
+        if let Some(settings) = &self.settings.effectiveness {
+            let held = [command.joint_position_rad, command.joint_velocity_rad_s];
+            match status.has_plan() {
+                true => (self.effectiveness).keep(&self.plant, settings, &measurement, held),
+                false => self.effectiveness.interrupt(),
+            }
+        }
         self.memory.joint_position = Some(command.joint_position_rad);
         self.memory.input.copy_from_slice(&command.u_lat);
         command.solve_us = started.elapsed().as_secs_f64() * 1e6;
@@ -344,6 +355,16 @@ impl Controller {
             }
         }
         self.memory.disbelieved = 0;
+        if let Some(settings) = &self.settings.effectiveness {
+            let d = self.plant.latent_dim();
+            self.effectiveness.update(
+                (&self.plant, &self.plan),
+                settings,
+                measurement,
+                &self.memory.measured[d..],
+                &reference.deviation()[d..],
+            );
+        }
         self.stand_at(measurement.x);
         Ok(())
     }
@@ -373,6 +394,9 @@ impl Controller {
             self.engine
                 .state(stage, &step, end, self.plan.end_mut(stage));
         }
+        let is_grounded = self.plant.phases()[phase].is_grounded;
+        self.effectiveness
+            .begin(&step.stages[0].model.b, is_grounded);
         command.slack = self.largest_violation();
         self.memory.stance = Some(StanceState {
             joints_rad: std::array::from_fn(|joint| measurement.x[joint]),
@@ -417,8 +441,11 @@ impl Controller {
         };
         reference.state_at(end_s, &mut self.posture);
         let (z, dz) = self.posture.split_at(self.plant.latent_dim());
-        let input = self.plan.input(stage);
-        command.u_lat.copy_from_slice(input);
+        command.u_lat.copy_from_slice(self.plan.input(stage));
+        for input in &mut command.u_lat {
+            *input /= self.effectiveness.estimate();
+        }
+        let input = command.u_lat.as_slice();
         command.phase = Some(self.plan.phase());
         command.joint_position_rad = self.plant.clamp_joints(self.plant.decode_joints(z));
         command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);

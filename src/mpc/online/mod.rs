@@ -9,6 +9,7 @@ mod command;
 mod control_model;
 mod controller;
 mod dynamics;
+mod effectiveness;
 mod engine;
 mod error;
 pub mod estimate;
@@ -51,8 +52,8 @@ pub use prune::needed_rows_of;
 pub use qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, SolverProfile};
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{
-    Drift, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput, MpcSettings,
-    RowSelection, Solver,
+    Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput,
+    MpcSettings, RowSelection, Solver,
 };
 pub use sparse::SparseColumns;
 pub use structured::MAX_STRUCTURED_DIM;

@@ -38,6 +38,18 @@ impl Plan {
         self.states[..2 * self.latent_dim].copy_from_slice(state);
     }
 
+    /// Duration of a stage, s.
+    pub(super) fn step_s(&self) -> f64 {
+        self.step_s
+    }
+
+    /// Share of the first stage that has passed at a time; none before its end plus a tenth, at its
+    /// beginning, or without a plan.
+    pub(super) fn share_of_first(&self, time_s: f64) -> Option<f64> {
+        let share = (time_s - self.start_s?) / self.step_s;
+        (share > 0.0 && share < 1.1).then_some(share)
+    }
+
     /// Phase of the first stage.
     pub fn phase(&self) -> usize {
         self.phase

@@ -94,6 +94,17 @@ impl Default for FallbackSettings {
     }
 }
 
+/// How the share of the input that arrives is estimated, and what the motors add to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effectiveness {
+    /// Time constant with which what was learned fades, s.
+    pub time_constant_s: f64,
+    /// Stiffness of the joint PD that holds the commanded posture, N m/rad; 0 without one.
+    pub stiffness_nm_rad: f64,
+    /// Its damping, N m s/rad.
+    pub damping_nm_s_rad: f64,
+}
+
 /// Settings of the controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MpcSettings {
@@ -130,6 +141,8 @@ pub struct MpcSettings {
     /// Largest change of a plainly lifted torque, N m/s; none leaves it free. What the consistent lift
     /// makes of the same latent input is not limited.
     pub torque_rate_nm_s: Option<f64>,
+    /// Estimates how much of the input arrives, and makes up for it; none trusts the motors.
+    pub effectiveness: Option<Effectiveness>,
     /// Which rows of the constraints are kept.
     pub rows: RowSelection,
     /// What solves the program of a step; the consistent lift's own cones are clarabel's.
@@ -157,6 +170,7 @@ impl Default for MpcSettings {
             foot_friction: 0.6,
             lift_prior_weight: 1e-3,
             torque_rate_nm_s: None,
+            effectiveness: None,
             rows: RowSelection::Needed,
             solver: Solver::Clarabel,
             qp: QpSettings::default(),
@@ -191,6 +205,10 @@ impl MpcSettings {
             ("lift_prior_weight", self.lift_prior_weight),
             ("body_friction", self.body_friction.unwrap_or(1.0)),
             ("torque_rate_nm_s", self.torque_rate_nm_s.unwrap_or(1.0)),
+            (
+                "effectiveness_time_s",
+                (self.effectiveness).map_or(1.0, |effectiveness| effectiveness.time_constant_s),
+            ),
             ("qp.tolerance", self.qp.tolerance),
             ("qp.accepted_residual", self.qp.accepted_residual),
             ("qp.max_iterations", f64::from(self.qp.max_iterations)),
@@ -206,13 +224,19 @@ impl MpcSettings {
                 });
             }
         }
-        let damping = self.fallback.damping_nm_s;
-        if !(damping.is_finite() && damping >= 0.0) {
-            return Err(ControlError::Setting {
-                name: "fallback.damping_nm_s",
-                found: damping,
-                expected: "zero or a positive number",
-            });
+        let mut not_negative = vec![("fallback.damping_nm_s", self.fallback.damping_nm_s)];
+        if let Some(effectiveness) = &self.effectiveness {
+            not_negative.push(("drive_stiffness_nm_rad", effectiveness.stiffness_nm_rad));
+            not_negative.push(("drive_damping_nm_s_rad", effectiveness.damping_nm_s_rad));
+        }
+        for (name, found) in not_negative {
+            if !(found.is_finite() && found >= 0.0) {
+                return Err(ControlError::Setting {
+                    name,
+                    found,
+                    expected: "zero or a positive number",
+                });
+            }
         }
         if let (Solver::Riccati, Some(found)) = (self.solver, self.torque_rate_nm_s) {
             return Err(ControlError::Setting {

@@ -1,7 +1,7 @@
 //! The controller's settings as C has them.
 
 use super::super::error::ControlError;
-use super::super::settings::{Lift, Linearisation, MpcSettings, Solver};
+use super::super::settings::{Effectiveness, Lift, Linearisation, MpcSettings, Solver};
 
 /// Settings as C has them; zero friction of the body and zero rate leave both free.
 #[repr(C)]
@@ -35,11 +35,18 @@ pub struct Settings {
     pub lift_prior_weight: f64,
     /// Largest change of a lifted torque, N m/s, or 0.
     pub torque_rate_nm_s: f64,
+    /// Time constant of the estimate of how much of the input arrives, s, or 0 for none.
+    pub effectiveness_time_s: f64,
+    /// Stiffness of the joint PD that holds the commanded posture, N m/rad, for that estimate.
+    pub drive_stiffness_nm_rad: f64,
+    /// Its damping, N m s/rad.
+    pub drive_damping_nm_s_rad: f64,
 }
 
 impl Default for Settings {
     fn default() -> Self {
         let settings = MpcSettings::default();
+        let estimate = settings.effectiveness;
         Self {
             horizon: settings.horizon as i32,
             max_iterations: settings.qp.max_iterations as i32,
@@ -64,6 +71,9 @@ impl Default for Settings {
             foot_friction: settings.foot_friction,
             lift_prior_weight: settings.lift_prior_weight,
             torque_rate_nm_s: settings.torque_rate_nm_s.unwrap_or(0.0),
+            effectiveness_time_s: estimate.map_or(0.0, |estimate| estimate.time_constant_s),
+            drive_stiffness_nm_rad: estimate.map_or(0.0, |estimate| estimate.stiffness_nm_rad),
+            drive_damping_nm_s_rad: estimate.map_or(0.0, |estimate| estimate.damping_nm_s_rad),
         }
     }
 }
@@ -110,6 +120,11 @@ impl Settings {
             foot_friction: self.foot_friction,
             lift_prior_weight: self.lift_prior_weight,
             torque_rate_nm_s: (self.torque_rate_nm_s != 0.0).then_some(self.torque_rate_nm_s),
+            effectiveness: (self.effectiveness_time_s != 0.0).then_some(Effectiveness {
+                time_constant_s: self.effectiveness_time_s,
+                stiffness_nm_rad: self.drive_stiffness_nm_rad,
+                damping_nm_s_rad: self.drive_damping_nm_s_rad,
+            }),
             ..MpcSettings::default()
         };
         settings.qp.max_iterations = u32::try_from(self.max_iterations)
