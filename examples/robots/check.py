@@ -122,10 +122,10 @@ class Check:
         self.say("controller-c", tested)
         off = float(re.search(r"within ([\d.e+-]+) N m", tested)[1])
         self.require(off < TORQUE_NM, "the controller in C has other torques than romc")
+        # The example fails unless every step has a plan within all limits.
         jumped = compiled(folder, [f"{stem}_controller.c", f"{stem}.c", f"{stem}_example.c"])
         steps = [line for line in jumped.splitlines() if re.match(r" *\d+\.\d\d ", line)]
-        solved = sum(line.rstrip().endswith("solved") for line in steps)
-        self.say("controller-c", f"its example jumps the plan: {solved} of {len(steps)} printed steps solved")
+        self.say("controller-c", f"its example jumps the plan, to {steps[-1].split()[0]} s")
         if self.builds_crate:
             crate = out / f"{stem}-controller"
             output(["cargo", "build", "--release", "--quiet", "--manifest-path", crate / "Cargo.toml"])
