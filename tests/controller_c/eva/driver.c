@@ -32,6 +32,10 @@ int main(void)
         || go1_d2_controller_set_reference(&controller, COUNT, time_s, x, dx, u, feet) != 0) {
         return 1;
     }
+    /* What a reference that was taken has set already: Eva joins that state with those of refused ones. */
+    const go1_d2_reference taken = {COUNT, time_s, x, dx, u, 0, feet};
+    controller.reference = taken;
+    controller.has_reference = 1;
     for (int k = 0; k < 2; ++k) {
         fill(now_x, 18, 4.0);
         fill(now_dx, 18, 40.0);
