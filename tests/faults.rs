@@ -404,7 +404,7 @@ fn escapes_of_arguments_do_not_reach_the_terminal() {
         let said = String::from_utf8(said).expect("UTF-8");
         let acts = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
         assert!(
-            said.contains("\\u{1b}") && !said.contains(acts),
+            said.contains("\\u{202e}") && !said.contains(acts),
             "{arguments:?}: {said:?}"
         );
     }

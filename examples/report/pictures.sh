@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Makes pictures for docs/pages.md: printed pages of the shipped models in one and two columns, and the report in
-# Chromium. Run from the root of the repository; needs pdflatex, pdftoppm, chromium and npm, and target/release/romc.
+# Makes the pictures of docs/pages.md, and checks printed pages of the shipped models in one and two columns and the
+# report in Chromium. Run from the root of the repository; needs pdflatex, pdftoppm, chromium and npm, and target/release/romc.
 #
-#   examples/report/pictures.sh [FOLDER]      (target/pictures unless given)
+#   examples/report/pictures.sh [FOLDER]      (docs/pictures unless given)
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 romc=$PWD/target/release/romc
-folder=${1:-target/pictures}
+folder=${1:-docs/pictures}
 mkdir -p "$folder"
 folder=$(cd "$folder" && pwd)
 work=$(mktemp -d)
@@ -25,8 +25,11 @@ for model in paper-2d go1-d2 go1-d4 go2-async-d4; do
       echo "$model in $columns column(s): too wide" >&2
       exit 1
     fi
-    pdftoppm -r 64 -gray -png -f 1 -l 1 -singlefile "$work/$model-$columns/$stem-preview.pdf" "$folder/$model-$columns"
-    echo "$folder/$model-$columns.png: page 1 of $(pdfinfo "$work/$model-$columns/$stem-preview.pdf" | awk '/^Pages/ { print $2 }')"
+    pdf=$work/$model-$columns/$stem-preview.pdf
+    echo "$model in $columns column(s): $(pdfinfo "$pdf" | awk '/^Pages/ { print $2 }') page(s)"
+    case $model-$columns in
+      paper-2d-one | go1-d4-two) pdftoppm -r 72 -gray -png -f 1 -l 1 -singlefile "$pdf" "$folder/$model-$columns" ;;
+    esac
   done
 done
 
