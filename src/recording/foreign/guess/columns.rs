@@ -89,7 +89,7 @@ pub(super) fn groups(logs: &[Log]) -> Vec<Group> {
 
 /// Hips without a word for which one are the second joints where the first have another name: `abad hip knee`.
 fn bare_hips(members: &mut [(usize, Reading)]) {
-    let is_first = |reading: &Reading| reading.element % 3 == 0;
+    let is_first = |reading: &Reading| reading.element.is_multiple_of(3);
     let is_joint = members[0].1.quantity.elements().len() == JOINT_DIM;
     let another = |(_, reading): &(usize, Reading)| is_first(reading) && !reading.is_bare_hip;
     if is_joint && members.iter().any(another) {
