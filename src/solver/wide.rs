@@ -6,12 +6,18 @@ use super::scalar::Real;
 
 impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     /// [`Program::prepare`] on a processor with AVX2.
+    ///
+    /// # Safety
+    /// The processor must have AVX2.
     #[target_feature(enable = "avx2")]
     pub fn prepare_avx2(&mut self) -> bool {
         self.prepare()
     }
 
     /// [`Program::solve`] on a processor with AVX2.
+    ///
+    /// # Safety
+    /// The processor must have AVX2.
     #[target_feature(enable = "avx2")]
     pub fn solve_avx2(&mut self, x0: &[T; NX], is_warm: bool, settings: &Settings<T>) -> Report<T> {
         self.solve(x0, is_warm, settings)
