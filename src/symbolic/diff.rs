@@ -204,7 +204,7 @@ mod tests {
             ("(x*y)^(5/2)", "5/2*y*sqrt(x*y)^3"),
             ("sqrt((x*y)^3)", "3/2*y*sqrt(x*y)"),
             ("sqrt(2*(x*y)^3)", "3/2*sqrt(2)*y*sqrt(x*y)"),
-            ("sqrt(x^2*y^4)", "sign(x)*y^2"),
+            ("sqrt(x^2*y^4)", "y^2*sign(x)"),
             ("(x*y)^(-1/2)", "-1/2*y/sqrt(x*y)^3"),
             ("y^x", "y^x*log(y)"),
             ("sin(x)*cos(x)", "-sin(x)^2 + cos(x)^2"),

@@ -99,14 +99,16 @@ impl ExprPool {
                 .collect();
             return self.product(&powers);
         }
-        if let Some((root, common)) = self.common_power(factors)
+        if let Some((mut roots, common)) = self.common_power(factors)
             && let Some(combined) = exponent.checked_mul(Number::integer(common))
         {
-            // sqrt((x*y)^3) = sqrt(x*y)^3, whose derivative has a value at x = 0; the sign as in powers of one base.
-            let root = match common % 2 {
-                0 => self.apply(Function::Abs, root),
-                _ => root,
-            };
+            // sqrt((x*y)^3) = sqrt(x*y)^3, whose derivative has a value at x = 0; the signs as in powers of one base.
+            if common % 2 == 0 {
+                for root in &mut roots {
+                    *root = self.apply(Function::Abs, *root);
+                }
+            }
+            let root = self.product(&roots);
             return self.pow_number(root, combined);
         }
         let (coefficient, rest) = match self.as_number(factors[0]) {
@@ -135,8 +137,8 @@ impl ExprPool {
         }
     }
 
-    /// The product of which all factors together are an integer power above 1, and that power.
-    fn common_power(&mut self, factors: &[ExprId]) -> Option<(ExprId, i64)> {
+    /// Factors whose product to an integer power above 1 the given ones are, and that power.
+    fn common_power(&mut self, factors: &[ExprId]) -> Option<(Vec<ExprId>, i64)> {
         let mut common = 0;
         let mut powers = Vec::with_capacity(factors.len());
         for factor in factors {
@@ -153,8 +155,7 @@ impl ExprPool {
         let roots = powers
             .into_iter()
             .map(|(base, exponent)| self.pow_number(base, Number::integer(exponent / common)));
-        let roots: Vec<ExprId> = roots.collect();
-        Some((self.product(&roots), common))
+        Some((roots.collect(), common))
     }
 
     /// A power of a constant: folded where that is exact or correctly rounded; otherwise the
