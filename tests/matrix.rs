@@ -231,6 +231,7 @@ fn controllers_compile_and_command_finite_torques() {
         let level = format!("profile.release.package.{name}-controller.opt-level=0");
         cargo
             .args(["build", "--release", "--config", &level])
+            .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1")
             .env("CARGO_TARGET_DIR", &target);
         succeed(cargo.current_dir(&folder));
         let program = target.join(format!("{name}_matrix"));
