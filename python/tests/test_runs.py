@@ -111,7 +111,7 @@ def test_settings_reach_the_controller(model, jump):
     for step in [1e9, 0.0, float("nan")]:
         with pytest.raises(romc.RomcError, match="step is .*, expected a number from 1e-4 to 1"):
             romc.Controller(model, step=step)
-    with pytest.raises(romc.RomcError, match="restart_every is 1e-300, expected a number from 0.001 to 1e4"):
+    with pytest.raises(romc.RomcError, match="restart_every is 1e-300, expected a number from 1e-3 to 1e4"):
         model.simulate(PATHS, restart_every=1e-300)
     with pytest.raises(romc.RomcError, match="lift: found \"up\", expected one of transpose, consistent"):
         romc.Controller(model, lift="up")
