@@ -227,10 +227,7 @@ impl Fault {
                 PlanError::Lower(error) => Fault::of_lower(error),
                 _ => Fault::of(Class::Other),
             },
-            Error::Simplify(error) => match error {
-                SimplifyError::NoEncoder { .. } => Fault::at_tensor("encoder"),
-                _ => Fault::of(Class::Other),
-            },
+            Error::Simplify(SimplifyError::NoEncoder { .. }) => Fault::at_tensor("encoder"),
             Error::Typeset(_) | Error::Codegen(_) | Error::Physical(_) => Fault::of(Class::Model),
             _ => Fault::of(Class::Other),
         }
