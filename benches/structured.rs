@@ -17,8 +17,9 @@
 
 use std::io::Write as _;
 
+use romc::mpc::widest::{prepare, solve};
 use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, SparseColumns, needed_rows_of};
-use romc::solver::{Cost, Outcome, Program, Report, RowMatrices, Settings, Shape, Stage};
+use romc::solver::{Cost, Outcome, Program, RowMatrices, Settings, Shape, Stage};
 
 #[path = "shared/clock.rs"]
 mod clock;
@@ -205,7 +206,8 @@ fn run<const NX: usize, const NU: usize>(
             }
             write(&mut program, &shared, &step);
             let x0 = std::array::from_fn(|i| step.x0[i] - step.reference[i]);
-            report = Some(prepare_and_solve(&mut program, &x0, tick > 0, &settings));
+            prepare(&mut program);
+            report = Some(solve(&mut program, &x0, tick > 0, &settings));
         }));
         let report = report.expect("solved or not");
         iterations.push(f64::from(report.iterations));
@@ -248,25 +250,6 @@ fn run<const NX: usize, const NU: usize>(
         clock::percentile(&iterations, 1.0),
     );
     (times, line)
-}
-
-/// With the widest vectors that the processor has, as the controller does it.
-fn prepare_and_solve<const NX: usize, const NU: usize>(
-    program: &mut Program<'_, f64, NX, NU>,
-    x0: &[f64; NX],
-    is_warm: bool,
-    settings: &Settings<f64>,
-) -> Report<f64> {
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has what this is compiled for.
-        return unsafe {
-            program.prepare_avx2();
-            program.solve_avx2(x0, is_warm, settings)
-        };
-    }
-    program.prepare();
-    program.solve(x0, is_warm, settings)
 }
 
 fn write<const NX: usize, const NU: usize>(

@@ -68,6 +68,7 @@ impl Built {
                 .current_dir(&built.folder)
                 // The bits are those of full optimisation, and the build takes half the time.
                 .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1")
+                .env("CARGO_PROFILE_RELEASE_LTO", "off")
                 .env("CARGO_TARGET_DIR", &built.target),
         );
         let told = String::from_utf8_lossy(&output.stderr);

@@ -22,7 +22,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use agreement::{Rule, Tally, compare};
-use drivers::{Build, Workshop, contents};
+use drivers::{Build, Workshop, contents, is_thorough};
 use functions::{Function, Random, functions as functions_of};
 use nalgebra::DVector;
 use romc::equations::Equations;
@@ -31,14 +31,22 @@ use romc::lower::CompiledModel;
 use romc::lower::{self, Form, LowerOptions, dynamics_jacobian};
 use romc::model::{LatentVariable, ReducedModel};
 
-/// Random models of tests that compile nothing or little.
+/// Random models of tests that compile nothing.
 const SOME_MODELS: u64 = 24;
+
+/// Random models of a comparison that compiles them all for one program.
+fn n_models_a_program() -> u64 {
+    match is_thorough() {
+        true => SOME_MODELS,
+        false => SOME_MODELS / 3,
+    }
+}
 
 /// Random models of the comparison with generated code by the builds that must have the
 /// interpreter's bits; `.ci/run` asks for 200.
 fn n_random_models() -> u64 {
     let asked = std::env::var("ROMC_RANDOM_MODELS").ok();
-    asked.map_or(40, |count| {
+    asked.map_or(2 * n_models_a_program(), |count| {
         count.parse().expect("ROMC_RANDOM_MODELS is a number")
     })
 }
@@ -154,7 +162,7 @@ fn generated_code_of_shipped_models_equals_the_interpreter() {
 fn generated_code_of_random_models_equals_the_interpreter() {
     let seeds: Vec<u64> = (0..n_random_models()).collect();
     let cases: Vec<Case> = seeds
-        .chunks(SOME_MODELS as usize)
+        .chunks(n_models_a_program() as usize)
         .map(|seeds| {
             let models = seeds.iter().map(|seed| models::random(*seed)).collect();
             Case::new(models, 50, Form::Automatic)
@@ -220,7 +228,7 @@ fn random_models_have_all_shapes() {
 
 #[test]
 fn generated_code_with_tables_equals_the_interpreter() {
-    let random_models = (1000..1000 + SOME_MODELS).map(models::random);
+    let random_models = (1000..1000 + n_models_a_program()).map(models::random);
     let models = models::shipped().into_iter().chain(random_models).collect();
     let cases = [Case::new(models, 100, Form::Tables)];
     check_all("tables", &cases, |_| {

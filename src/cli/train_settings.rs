@@ -119,25 +119,24 @@ fn of_the_joint_method(settings: &TrainSettings) -> Option<&'static str> {
         ("epochs", settings.epochs.is_some()),
         (layers, !maps(settings).is_linear()),
         ("bptt-weight", settings.bptt_weight.is_some()),
-        ("bptt-window", settings.bptt_window.is_some()),
-        ("bptt-stride", settings.bptt_stride.is_some()),
-        ("bptt-decay", settings.bptt_decay.is_some()),
-        ("bptt-integrator", settings.bptt_integrator.is_some()),
     ];
-    let given = given.into_iter().find(|(_, is_given)| *is_given);
-    given.map(|(name, _)| name)
+    first(&given).or_else(|| of_the_window(settings))
 }
 
 /// The first setting of the window of predictions beside its weight.
 fn of_the_window(settings: &TrainSettings) -> Option<&'static str> {
-    let given = [
+    first(&[
         ("bptt-window", settings.bptt_window.is_some()),
         ("bptt-stride", settings.bptt_stride.is_some()),
         ("bptt-decay", settings.bptt_decay.is_some()),
         ("bptt-integrator", settings.bptt_integrator.is_some()),
-    ];
-    let given = given.into_iter().find(|(_, is_given)| *is_given);
-    given.map(|(name, _)| name)
+    ])
+}
+
+/// The first of some settings that is given.
+fn first(settings: &[(&'static str, bool)]) -> Option<&'static str> {
+    let given = settings.iter().find(|(_, is_given)| *is_given);
+    given.map(|(name, _)| *name)
 }
 
 fn library(settings: &TrainSettings, default: LibraryChoice) -> LibraryChoice {

@@ -7,7 +7,7 @@ use romc::model::ReducedModel;
 
 use super::drivers::{Build, Workshop};
 use super::functions::{Function, Random, functions as functions_of};
-use super::{SOME_MODELS, models};
+use super::{models, n_models_a_program};
 
 /// Magnitudes for which bounds are stated; point after point takes its turn.
 const MAGNITUDES: [f64; 2] = [1.0, 10.0];
@@ -132,7 +132,7 @@ fn single_precision_of_shipped_models_equals_the_interpreter_and_stays_within_it
 
 #[test]
 fn single_precision_of_random_models_equals_the_interpreter_and_stays_within_its_bound() {
-    let random = (0..SOME_MODELS / 2).map(models::random);
+    let random = (0..n_models_a_program() / 2).map(models::random);
     let nonlinear = (0..2).map(models::random_nonlinear);
     let models: Vec<ReducedModel> = random.chain(nonlinear).collect();
     check(&models, Form::Automatic, 50);
@@ -140,7 +140,7 @@ fn single_precision_of_random_models_equals_the_interpreter_and_stays_within_its
 
 #[test]
 fn single_precision_with_tables_equals_the_interpreter_and_stays_within_its_bound() {
-    let random = (1000..1000 + SOME_MODELS / 4).map(models::random);
+    let random = (1000..1000 + n_models_a_program() / 4).map(models::random);
     let models: Vec<ReducedModel> = random.collect();
     check(&models, Form::Tables, 50);
 }

@@ -16,7 +16,7 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 48] = sources![
+const SOURCES: [(&str, &str); 49] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
@@ -44,6 +44,7 @@ const SOURCES: [(&str, &str); 48] = sources![
     "mpc/online/reference.rs",
     "mpc/online/settings.rs",
     "mpc/online/sparse.rs",
+    "mpc/online/step.rs",
     "mpc/online/structured.rs",
     "mpc/online/transcribe.rs",
     "robot/actuators.rs",

@@ -27,6 +27,7 @@ mod qp;
 mod reference;
 mod settings;
 mod sparse;
+mod step;
 mod structured;
 mod transcribe;
 
@@ -37,6 +38,11 @@ pub mod shared {
     pub use super::reference::{DEVIATION_FLOOR, STILL_SHARE, STILL_TIME_S};
     pub use super::structured::TOLERANCE;
     pub use super::transcribe::SLACK_PRICE;
+}
+
+/// The structured solver with the widest vectors that the processor has.
+pub mod widest {
+    pub use super::structured::{prepare, solve};
 }
 
 pub use command::{Command, Source, Status};

@@ -213,8 +213,18 @@ impl<const NX: usize, const NU: usize> Horizon<NX, NU> {
     }
 }
 
-/// Solves with the widest vectors that the processor has; the bits are the same with all.
-fn solve<const NX: usize, const NU: usize>(
+/// [`Program::prepare`] with the widest vectors that the processor has; the bits are the same with all.
+pub fn prepare<const NX: usize, const NU: usize>(program: &mut Program<'_, f64, NX, NU>) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has what this is compiled for.
+        return unsafe { program.prepare_avx2() };
+    }
+    program.prepare()
+}
+
+/// [`Program::solve`] with the widest vectors that the processor has; the bits are the same with all.
+pub fn solve<const NX: usize, const NU: usize>(
     program: &mut Program<'_, f64, NX, NU>,
     x0: &[f64; NX],
     is_warm: bool,
@@ -263,13 +273,7 @@ impl<const NX: usize, const NU: usize> StructuredProgram for Horizon<NX, NU> {
     }
 
     fn prepare(&mut self) -> bool {
-        let mut program = self.program();
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has what this is compiled for.
-            return unsafe { program.prepare_avx2() };
-        }
-        program.prepare()
+        prepare(&mut self.program())
     }
 
     fn solve(&mut self, x0: &[f64]) -> (Outcome, u32) {

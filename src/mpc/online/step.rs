@@ -1,0 +1,184 @@
+//! One step of the controller: a measurement screened, a plan solved for, a command made of it.
+
+use nalgebra::SVector;
+
+use super::command::{Command, Source, Status};
+use super::controller::{Controller, Measurement, SOFTENED_FROM, step_data};
+use super::horizon::Contact;
+use super::lift::StanceState;
+use super::qp::Outcome;
+use crate::robot::{JOINT_DIM, STATE_DIM};
+
+/// Lifted force, N, below which its inconsistency means nothing.
+const SMALL_FORCE_N: f64 = 1.0;
+
+impl Controller {
+    /// Screens a measurement and, if it can be believed, keeps it.
+    pub(super) fn take(&mut self, measurement: &Measurement<'_>) -> Result<(), Status> {
+        if measurement.x.len() != STATE_DIM || measurement.dx.len() != STATE_DIM {
+            return Err(Status::WrongDimension);
+        }
+        let values = measurement.x.iter().chain(measurement.dx);
+        if !measurement.time_s.is_finite() || values.into_iter().any(|value| !value.is_finite()) {
+            return Err(Status::NotFinite);
+        }
+        self.memory.time_s = Some(measurement.time_s);
+        self.memory.joint_velocity = std::array::from_fn(|joint| measurement.dx[joint]);
+        let Some(reference) = &self.reference else {
+            return Err(Status::NoReference);
+        };
+        let (z, dz) = self.memory.measured.split_at_mut(self.plant.latent_dim());
+        self.plant.encode(measurement.x, z);
+        self.plant
+            .encode_velocity(measurement.x, measurement.dx, dz);
+        let normalised_innovation = self.plan.normalised_innovation(
+            measurement.time_s,
+            &self.memory.measured,
+            reference.deviation(),
+        );
+        let fallback = &self.settings.fallback;
+        if normalised_innovation.is_some_and(|normalised_innovation| {
+            normalised_innovation.is_nan() || normalised_innovation > fallback.jump_deviations
+        }) {
+            self.memory.disbelieved += 1;
+            if self.memory.disbelieved <= fallback.jump_patience {
+                return Err(Status::MeasurementJump);
+            }
+        }
+        self.memory.disbelieved = 0;
+        if let Some(settings) = &self.settings.effectiveness {
+            let d = self.plant.latent_dim();
+            self.effectiveness.update(
+                (&self.plant, &self.plan),
+                settings,
+                measurement,
+                &self.memory.measured[d..],
+                &reference.deviation()[d..],
+            );
+        }
+        self.stand_at(measurement.x);
+        Ok(())
+    }
+
+    /// Solves for a plan and makes the command from it.
+    pub(super) fn plan_step(
+        &mut self,
+        measurement: &Measurement<'_>,
+        command: &mut Command,
+    ) -> Status {
+        let prepared = self.prepare_stages(measurement.time_s, measurement.feet);
+        let (Some(contact), Some(reference)) = (prepared, &self.reference) else {
+            return Status::NoReference;
+        };
+        let step = step_data(&self.horizon, &self.memory, reference, &self.input_cholesky);
+        let (outcome, iterations) = self.engine.solve(&step);
+        command.iterations = iterations;
+        match outcome {
+            Outcome::Solved => {}
+            Outcome::Inaccurate => return Status::Inaccurate,
+            Outcome::Infeasible => return Status::Infeasible,
+            Outcome::IterationCap => return Status::IterationCap,
+            Outcome::Unbounded | Outcome::NumericalFailure => return Status::NumericalFailure,
+        }
+        let phase = step.stages[0].phase;
+        self.plan
+            .begin(measurement.time_s, phase, &self.memory.measured);
+        for stage in 0..self.settings.horizon {
+            self.engine.input(stage, &step, self.plan.input_mut(stage));
+            let end = self.horizon.end(stage);
+            self.engine
+                .state(stage, &step, end, self.plan.end_mut(stage));
+        }
+        let is_grounded = self.plant.phases()[phase].is_grounded;
+        self.effectiveness
+            .begin(&step.stages[0].model.b, is_grounded);
+        command.slack = self.largest_violation();
+        self.memory.stance = Some(StanceState {
+            joints_rad: std::array::from_fn(|joint| measurement.x[joint]),
+            attitude_rad: std::array::from_fn(|angle| measurement.x[15 + angle]),
+            feet: measurement.feet,
+            phase,
+            losses_nm: [0.0; JOINT_DIM],
+        });
+        if !self.write_plan(0, command) {
+            return Status::LiftFailed;
+        }
+        command.source = Source::Plan;
+        match contact {
+            Contact::Early => Status::ContactEarly,
+            Contact::Late => Status::ContactLate,
+            Contact::Unknown => Status::ContactUnknown,
+            Contact::AsScheduled if command.slack > SOFTENED_FROM => Status::Softened,
+            Contact::AsScheduled => Status::Solved,
+        }
+    }
+
+    /// Largest violation of a joint limit at the ends of the plan's stages, in half ranges of the
+    /// joint, whichever rows the program has.
+    fn largest_violation(&self) -> f64 {
+        let d = self.plant.latent_dim();
+        let limits = self.plant.robot().joint_limit_rad();
+        let mut largest = 0.0_f64;
+        for stage in 0..self.settings.horizon {
+            let joints = self.plant.decode_joints(&self.plan.end(stage)[..d]);
+            for (position, &(lower, upper)) in joints.iter().zip(limits) {
+                let outside = (position - upper).max(lower - position);
+                largest = largest.max(outside / (0.5 * (upper - lower)));
+            }
+        }
+        largest
+    }
+
+    /// Writes a stage of the plan into the command; false if its input cannot be lifted.
+    pub(super) fn write_plan(&mut self, stage: usize, command: &mut Command) -> bool {
+        let (Some(reference), Some(end_s)) = (&self.reference, self.plan.end_s(stage)) else {
+            return false;
+        };
+        reference.state_at(end_s, &mut self.posture);
+        let (z, dz) = self.posture.split_at(self.plant.latent_dim());
+        command.u_lat.copy_from_slice(self.plan.input(stage));
+        for input in &mut command.u_lat {
+            *input /= self.effectiveness.estimate();
+        }
+        let input = command.u_lat.as_slice();
+        command.phase = Some(self.plan.phase());
+        command.joint_position_rad = self.plant.clamp_joints(self.plant.decode_joints(z));
+        command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
+        let lifted = self.local_plant().lift(input);
+        let (start, end) = (self.plan.start(stage), self.plan.end(stage));
+        let losses = self.plant.planned_losses(start, end, self.settings.step_s);
+        if let Some(stance) = &mut self.memory.stance {
+            stance.losses_nm = losses;
+        }
+        let net: [f64; JOINT_DIM] = match (&mut self.consistent, &self.memory.stance) {
+            (None, _) => std::array::from_fn(|joint| lifted[joint]),
+            (Some(lift), Some(stance)) => match lift.lift(&self.plant, input, stance) {
+                Ok(torque) => torque,
+                Err(_) => return false,
+            },
+            (Some(_), None) => return false,
+        };
+        let torque = std::array::from_fn(|joint| net[joint] + losses[joint]);
+        command.torque_nm = self.plant.clamp_torque(torque);
+        command.losses_nm = losses;
+        self.memory.feed_forward_nm = command.torque_nm;
+        command.inconsistency = self.inconsistency(&lifted, &command.net_torque_nm());
+        true
+    }
+
+    /// `|F_lift − G τ| / |F_lift|` of torques at the links, with force and moment as they are lifted.
+    fn inconsistency(&self, lifted: &[f64; STATE_DIM], net_nm: &[f64; JOINT_DIM]) -> Option<f64> {
+        let stance = self.memory.stance.as_ref()?;
+        if !stance.feet.contains(&true) {
+            return None;
+        }
+        let map = self
+            .plant
+            .input_rule()
+            .wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet)
+            .ok()?;
+        let produced = map * SVector::<f64, JOINT_DIM>::from(*net_nm);
+        let force = SVector::<f64, 6>::from_fn(|axis, _| lifted[JOINT_DIM + axis]);
+        (force.norm() > SMALL_FORCE_N).then(|| (force - produced).norm() / force.norm())
+    }
+}
