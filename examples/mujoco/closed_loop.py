@@ -372,10 +372,11 @@ def write_outcomes(folder, outcomes, text):
     (folder / "table.txt").write_text(text + "\n", encoding="utf-8")
 
 
-def write_strip(path, jump, states):
-    """Recorded jump above, driven one below, at the same times."""
+def write_strip(path, jump, states, first=0, last=None):
+    """Jump to follow above, driven one below, at the same times; from row `first` to `last`."""
     robot = RobotModel(ROBOT)
-    rows = np.linspace(0, min(len(jump.x), len(states)) - 1, FRAMES).astype(int)
+    end = min(len(jump.x), len(states)) - 1
+    rows = np.linspace(first, end if last is None else min(last, end), FRAMES).astype(int)
     strips = [np.hstack(render(robot, x[rows])) for x in (jump.x, states)]
     Image.fromarray(np.vstack(strips)).save(path)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 import romc_controller
 from assessment import assess, repetition_faults
-from closed_loop import named_number, read_jump
+from closed_loop import named_number, read_jump, write_strip
 from followers import POSITION_GAIN, VELOCITY_GAIN, LatentMpc, Replay
 from model_inputs import ModelInputs
 from perturbations import NOMINAL, PERTURBATIONS, Motors, perturbed_simulation
@@ -29,6 +29,7 @@ RECORDINGS = ROOT / "examples/recordings/go1"
 ROMC = ROOT / "target/release/romc"
 ROBOT = "go1"
 INSIDE, OUTSIDE = 12, 6
+STRIP_MARGIN_S = 0.14  # of a film strip, before take-off and after landing
 CONDITIONS = (NOMINAL, *(p for p in PERTURBATIONS if p.short in ("+1 kg", "tau 0.9")))
 EXAMPLE = """example:
   cargo build --release
@@ -37,7 +38,8 @@ draws 12 goals inside the range of the training jumps and 6 outside (up to 35 % 
 than any of them) from the seed, plans each from the start of a test jump, and drives the simulated
 robot: the plan with the model's generated controller and with joint PD alone, and beside it replays,
 blends and regressions of the training jumps. --variants adds rows of plans by changed models: the
-ablations. Writes plan_jumps.csv (one row per run), plan_jumps.json, table.txt and every plan."""
+ablations. Writes plan_jumps.csv (one row per run), plan_jumps.json, table.txt, every plan and, with
+--strips (and MUJOCO_GL=egl where there is no display), film strips."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,10 @@ def parse_arguments():
         "--setting", type=named_number, action="append", metavar="NAME=NUMBER",
         help="a setting of the controller (default: those of the library, the share of the input that "
         "arrives estimated with the gains of the joint PD)",
+    )
+    parser.add_argument(
+        "--strips", action="store_true",
+        help="a film strip of each nominal plan with the controller, planned above, jumped below",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, not the table")
     parser.add_argument("--jobs", type=int, help="runs at a time (default: one per core)")
@@ -262,6 +268,8 @@ def run(task):
         follower = LatentMpc(controller)
     else:
         follower = Replay(reference, with_torques=True)
+    # Of these references, torques in flight are known: they swing the legs.
+    follower.feed_forward_in_flight = True
     motors = Motors(follower, condition, simulation.robot.torque_limit_nm)
     log = simulation.run(motors, reference.time_s[-1])
     if controller:
@@ -274,6 +282,11 @@ def run(task):
     outcome.success, outcome.faults = not faults, "; ".join(faults)
     outcome.distance_error_m = forwards - goal.distance_m
     outcome.apex_error_m = repeated.apex_rise_m - goal.apex_m
+    if arguments.strips and name == "plan, controller" and condition is NOMINAL:
+        in_flight = np.flatnonzero(~reference.feet.any(axis=1))
+        margin = round(STRIP_MARGIN_S / CONTROL_STEP_S)
+        path = arguments.out_dir / f"{goal.name}.png"
+        write_strip(path, reference, log.x, in_flight[0] - margin, in_flight[-1] + margin)
     return outcome
 
 

@@ -4,10 +4,17 @@
 //! into a folder. Equations come from `typeset`, code from `codegen`; `controller` adds the sources of
 //! `mpc/online` and `robot` and the model's numbers. Read `emit` first.
 
-/// Templates of whole files, each a struct of its first line and the `Facts` of its module.
+/// Templates of whole files, each a struct of its first line and the `Facts` of its module. The caller
+/// writes the derive: askama looks for files from where it stands.
 macro_rules! templates {
-    ($($template:ident: $path:tt),* $(,)?) => {$(
-        #[derive(askama::Template)]
+    (#[$derive:meta] $($template:ident: $path:tt),* $(,)?) => {
+        templates! { @each [#[$derive]] $($template: $path),* }
+    };
+    (@each $derive:tt $($template:ident: $path:tt),*) => {$(
+        templates! { @one $derive $template: $path }
+    )*};
+    (@one [$($derive:tt)*] $template:ident: $path:tt) => {
+        $($derive)*
         #[template(path = $path, config = "templates/askama.toml")]
         struct $template<'a> {
             banner: &'a str,
@@ -27,7 +34,7 @@ macro_rules! templates {
                 self.facts
             }
         }
-    )*};
+    };
 }
 
 mod controller;

@@ -81,7 +81,8 @@ impl Goal {
         let values = [self.distance_m, self.apex_m, start_height_m];
         for ((found, range), what) in values.into_iter().zip(prior.ranges()).zip(names) {
             let width = (range.most - range.least).max(0.02);
-            let [least, most] = [range.least - reach * width, range.most + reach * width];
+            let least = (range.least - reach * width).max(0.0);
+            let most = range.most + reach * width;
             if !(least..=most).contains(&found) {
                 let expected = format!(
                     "{least:.3} to {most:.3} m: the recorded jumps have {:.3} to {:.3} m",

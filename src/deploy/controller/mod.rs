@@ -48,6 +48,7 @@ struct Facts<'a> {
 }
 
 templates! {
+    #[derive(askama::Template)]
     Cargo: "controller/cargo.askama",
     Lib: "controller/lib.askama",
     Header: "controller/header.askama",

@@ -53,6 +53,7 @@ struct Facts<'a> {
 }
 
 templates! {
+    #[derive(askama::Template)]
     Header: "controller_c/header.askama",
     Cmake: "controller_c/cmake.askama",
     Readme: "controller_c/readme.askama",

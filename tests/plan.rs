@@ -1,0 +1,169 @@
+//! `romc plan` as a user runs it: what it writes and says, what it refuses, and that other commands
+//! take its plan.
+
+#[path = "command_line/mod.rs"]
+mod command_line;
+
+use std::fs;
+use std::path::Path;
+
+use command_line::{romc, text};
+use serde_json::Value;
+
+/// A shipped model that plans.
+fn model() -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    root.join("models/go1-d6.json").display().to_string()
+}
+
+/// Runs, expects success, returns stdout.
+fn done(folder: &Path, arguments: &[&str]) -> String {
+    let output = romc(folder, arguments);
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {stderr}");
+    text(&output.stdout)
+}
+
+/// Runs, expects an error and no file of the name `plan.csv`, returns stderr.
+fn failed(folder: &Path, arguments: &[&str]) -> String {
+    let output = romc(folder, arguments);
+    let stderr = text(&output.stderr);
+    assert!(
+        [Some(1), Some(2)].contains(&output.status.code()),
+        "{stderr}"
+    );
+    assert!(stderr.contains("error: "), "{stderr}");
+    assert!(!stderr.contains("panicked"), "{stderr}");
+    assert!(!folder.join("plan.csv").exists(), "{arguments:?}");
+    stderr
+}
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+#[test]
+fn plan_is_a_recording_that_other_commands_take() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (folder, model) = (folder.path(), model());
+    let goal = ["--distance", "0.28", "--apex", "0.12"];
+    let plan = ["plan", &model, "--output", "plan.csv", "--json"];
+    let said: Value = serde_json::from_str(&done(folder, &[&plan[..], &goal].concat())).expect("J");
+    assert_eq!(said["status"], "trusted", "{said}");
+    assert!((number(&said["distance_m"]) - 0.28).abs() < 2e-3, "{said}");
+    assert!((number(&said["apex_m"]) - 0.12).abs() < 2e-3, "{said}");
+    assert!(number(&said["margins"]["torque_share"]) < 1.0, "{said}");
+
+    let recording = romc::recording::read(&folder.join("plan.csv")).expect("a sound recording");
+    let x = &recording.segments[0].x;
+    let travelled = x[(12, x.ncols() - 1)] - x[(12, 0)];
+    assert!(
+        (travelled - number(&said["distance_m"])).abs() < 1e-6,
+        "{travelled}"
+    );
+
+    let followed: Value =
+        serde_json::from_str(&done(folder, &["mpc", &model, "plan.csv", "--json"])).expect("JSON");
+    let run = &followed["runs"][0];
+    assert_eq!(run["solved"], run["steps"], "{run}");
+    assert!(number(&run["lift"]["torque_r2"]["contact"]) > 0.99, "{run}");
+    let emitted = done(
+        folder,
+        &[
+            "compile",
+            &model,
+            "--emit",
+            "controller-c",
+            "--plan",
+            "plan.csv",
+            "--out-dir",
+            "code",
+        ],
+    );
+    assert!(emitted.contains("controller"), "{emitted}");
+    let again = [&plan[..], &goal].concat();
+    let output = romc(folder, &again);
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "an output stands there");
+    assert!(stderr.contains("plan.csv"), "{stderr}");
+}
+
+#[test]
+fn absurd_goals_end_with_the_reason_and_without_a_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = model();
+    for (distance, apex, reason) in [
+        ("0", "0.12", "distance: found 0"),
+        ("-0.3", "0.12", "distance: found -0.3"),
+        ("5", "0.12", "distance: found 5"),
+        ("nan", "0.12", "'nan' for '--distance"),
+        ("0.3", "inf", "'inf' for '--apex"),
+        ("0.3", "-0.1", "apex: found -0.1"),
+        ("0.3", "0.01", "apex: found 0.01"),
+    ] {
+        let goal = [format!("--distance={distance}"), format!("--apex={apex}")];
+        let arguments = ["plan", &model, &goal[0], &goal[1], "--output", "plan.csv"];
+        let stderr = failed(folder.path(), &arguments);
+        assert!(stderr.contains(reason), "{distance}, {apex}: {stderr}");
+    }
+}
+
+#[test]
+fn goal_beyond_the_recordings_is_planned_with_a_warning() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = model();
+    let goal = ["--distance", "0.45", "--apex", "0.12"];
+    let arguments = [&["plan", &model, "--output", "plan.csv"][..], &goal].concat();
+    let output = romc(folder.path(), &arguments);
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    assert!(
+        stderr.contains("beyond the recorded jumps by"),
+        "no warning: {stderr}"
+    );
+}
+
+#[test]
+fn figures_and_settings_of_a_plan() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (folder, model) = (folder.path(), model());
+    let goal = ["--distance", "0.28", "--apex", "0.12"];
+    let plan = ["plan", &model, "--output", "plan.csv"];
+    fs::write(folder.join("bad.toml"), "no_such_weight = 1\n").expect("written");
+    let bad = [&plan[..], &goal, &["--settings", "bad.toml"]].concat();
+    let stderr = failed(folder, &bad);
+    assert!(
+        stderr.contains("bad.toml") && stderr.contains("no_such_weight"),
+        "{stderr}"
+    );
+    let figures = [&plan[..], &goal, &["--figures", "figures"]].concat();
+    done(folder, &figures);
+    let files = fs::read_dir(folder.join("figures")).expect("figures");
+    let endings: Vec<String> = files
+        .filter_map(|file| Some(file.ok()?.path().extension()?.to_str()?.to_owned()))
+        .collect();
+    for ending in ["svg", "pdf"] {
+        assert!(endings.iter().any(|found| found == ending), "{endings:?}");
+    }
+}
+
+#[test]
+fn a_model_without_jumps_or_robot_says_what_it_lacks() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let paper = root.join("models/paper-2d.json").display().to_string();
+    let arguments = [
+        "plan",
+        &paper,
+        "--distance=0.3",
+        "--apex=0.12",
+        "--output=plan.csv",
+    ];
+    let stderr = failed(folder.path(), &arguments);
+    assert!(
+        stderr.contains("prior") || stderr.contains("robot"),
+        "{stderr}"
+    );
+}
