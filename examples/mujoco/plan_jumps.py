@@ -282,7 +282,7 @@ def run(task):
     outcome.success, outcome.faults = not faults, "; ".join(faults)
     outcome.distance_error_m = forwards - goal.distance_m
     outcome.apex_error_m = repeated.apex_rise_m - goal.apex_m
-    if arguments.strips and name == "plan, controller" and condition is NOMINAL:
+    if arguments.strips and name == "plan, controller" and condition.name == NOMINAL.name:
         in_flight = np.flatnonzero(~reference.feet.any(axis=1))
         margin = round(STRIP_MARGIN_S / CONTROL_STEP_S)
         path = arguments.out_dir / f"{goal.name}.png"
