@@ -13,7 +13,7 @@ use romc::recording::Segment;
 
 #[path = "controller/programs.rs"]
 mod programs;
-use programs::{has, root, shipped, succeed, with_losses};
+use programs::{has, is_thorough, root, shipped, succeed, with_losses};
 
 /// Warnings that generated headers and examples must not raise.
 const STRICT: [&str; 6] = [
@@ -314,7 +314,7 @@ fn model_without_a_robot_or_with_activations_is_refused_with_the_reason() {
 fn generated_controllers_command_the_librarys_bits_and_survive_abuse() {
     // A crate is a minute of compiling: the simpler model only where everything is asked for.
     let mut models = vec![with_losses(shipped("go1-d6"))];
-    if std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1") {
+    if is_thorough() {
         models.push(shipped("go1-d4"));
     }
     for model in models {

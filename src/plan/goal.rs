@@ -77,11 +77,16 @@ impl Goal {
         start_height_m: f64,
         reach: f64,
     ) -> Result<(), PlanError> {
-        let names = ["distance", "apex", "height at the start"];
+        // Heights count from wherever the recordings have their zero.
+        let names = [
+            ("distance", 0.0),
+            ("apex", 0.0),
+            ("height at the start", f64::NEG_INFINITY),
+        ];
         let values = [self.distance_m, self.apex_m, start_height_m];
-        for ((found, range), what) in values.into_iter().zip(prior.ranges()).zip(names) {
+        for ((found, range), (what, floor)) in values.into_iter().zip(prior.ranges()).zip(names) {
             let width = (range.most - range.least).max(0.02);
-            let least = (range.least - reach * width).max(0.0);
+            let least = (range.least - reach * width).max(floor);
             let most = range.most + reach * width;
             if !(least..=most).contains(&found) {
                 let expected = format!(

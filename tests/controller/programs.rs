@@ -39,13 +39,17 @@ pub fn succeed(command: &mut Command) -> Output {
     output
 }
 
+/// Whether everything is asked for, all tools included, as `.ci/run` does.
+pub fn is_thorough() -> bool {
+    std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1")
+}
+
 /// Whether a tool is there; where it is not, the calling test says so and is skipped, or fails with
 /// ROMC_REQUIRE_TOOLS=1.
 pub fn has(tool: &str) -> bool {
     let found = Command::new(tool).arg("--version").output().is_ok();
     if !found {
-        let required = std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1");
-        assert!(!required, "{tool} is missing and ROMC_REQUIRE_TOOLS=1");
+        assert!(!is_thorough(), "{tool} is missing and ROMC_REQUIRE_TOOLS=1");
         // not by println!, which the test harness captures
         let _ = writeln!(std::io::stderr(), "skipped: {tool} is not installed");
     }

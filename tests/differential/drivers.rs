@@ -383,8 +383,7 @@ impl Build {
         Self::c_with("C, -O2", &["-O2"])
     }
 
-    /// With sanitizers of addresses and of undefined behaviour, where they are installed; the
-    /// first finding ends the program.
+    /// With sanitizers of addresses and of undefined behaviour; the first finding ends the program.
     pub fn sanitized() -> Option<Self> {
         let flags = [
             "-O1",
@@ -397,7 +396,7 @@ impl Build {
         build.links().then_some(build)
     }
 
-    /// Under valgrind, where it is installed.
+    /// Under valgrind.
     pub fn valgrind() -> Option<Self> {
         is_installed("valgrind").then(|| Self {
             under: &["valgrind", "-q", "--error-exitcode=9", "--leak-check=full"],
@@ -405,7 +404,7 @@ impl Build {
         })
     }
 
-    /// Whether the compiler is there and finds what its flags need.
+    /// Whether checks with the build are asked for; the compiler must find what its flags need then.
     fn links(&self) -> bool {
         let Compiler::C { command, flags } = &self.compiler else {
             return true;
@@ -465,7 +464,7 @@ pub fn is_thorough() -> bool {
     std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1")
 }
 
-/// Whether a tool answers.
+/// Whether checks with a tool are asked for; it must answer then.
 pub fn is_installed(tool: &str) -> bool {
     is_there(tool, Command::new(tool).arg("--version"))
 }
