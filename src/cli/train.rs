@@ -226,6 +226,10 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
         );
         row(&name, "", &|set| set.ddz_r2.get(phase).copied());
     }
+    for score in &report.deviations {
+        let name = format!("ddz R^2 of deviations in {}, jump left out", score.part);
+        table.row([name.into(), "".into(), Cell::from(score.ddz_r2)]);
+    }
     if let Some(overlap) = report.support_overlap {
         let name = format!("overlap of supports, {} seeds", report.seeds.len());
         table.row([name.into(), "".into(), Cell::from(overlap)]);

@@ -125,7 +125,7 @@ pub struct JumpPrior {
     pub state_std: DVector<f64>,
     /// Lowest and highest body height at the end of the jumps, m.
     pub end_height_m: [f64; 2],
-    /// Lowest body height after touch-down, m.
+    /// Lowest body height after touch-down, at the end of jumps without a landing, m.
     pub landing_height_m: f64,
     /// Parts in the order of time.
     pub parts: Vec<JumpPart>,
@@ -168,18 +168,18 @@ impl JumpPrior {
                 "ordered",
             ));
         }
-        if self.parts.len() < 3 {
+        if self.parts.len() < 2 {
             let found = format!("{} parts", self.parts.len());
-            return Err(ModelError::invalid("`landmarks.parts`", found, "3 or more"));
+            return Err(ModelError::invalid("`landmarks.parts`", found, "2 or more"));
         }
         let parts = self.parts.iter().enumerate();
         parts
             .into_iter()
             .try_for_each(|(i, part)| check_part(part, &format!("prior.parts[{i}]"), d, phases))?;
         let in_air = |part: &&JumpPart| !part.feet.contains(&true);
-        let (first, last) = (&self.parts[0], &self.parts[self.parts.len() - 1]);
-        if self.parts.iter().filter(in_air).count() != 1 || in_air(&first) || in_air(&last) {
-            let expected = "exactly one part without a foot on the ground, neither first nor last";
+        let first = &self.parts[0];
+        if self.parts.iter().filter(in_air).count() != 1 || in_air(&first) {
+            let expected = "exactly one part without a foot on the ground, not the first";
             return Err(ModelError::invalid("`landmarks.parts`", "others", expected));
         }
         Ok(())

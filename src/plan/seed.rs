@@ -148,12 +148,10 @@ fn seed_part<'a>(
         };
         slope.push(by_latent * &scales);
     }
-    for (coordinate, acceleration) in falling_freely(model, part.phase)? {
+    for coordinate in falling_freely(model, part.phase)? {
         slope
             .iter_mut()
             .for_each(|m| m.row_mut(coordinate).fill(0.0));
-        ddz.iter_mut().for_each(|v| v[coordinate] = acceleration);
-        drift.iter_mut().for_each(|v| v[coordinate] = 0.0);
     }
     Ok(SeedPart {
         part,
@@ -179,9 +177,10 @@ fn scales(prior: &JumpPrior, root: &DMatrix<f64>, d: usize) -> DMatrix<f64> {
     scales
 }
 
-/// Latent coordinates that the model lets fall freely in a phase without contact, with their
-/// constant accelerations: those that alone hold the body's x or z, and whose equation is a constant.
-fn falling_freely(model: &ReducedModel, phase: usize) -> Result<Vec<(usize, f64)>, PlanError> {
+/// Latent coordinates that nothing moves in a phase without contact but gravity, by the model's
+/// equations: those that alone hold the body's x or z, and whose equation is a constant. Plans keep
+/// their recorded accelerations, which the last contact at take-off is a part of.
+fn falling_freely(model: &ReducedModel, phase: usize) -> Result<Vec<usize>, PlanError> {
     if model.phases()[phase].feet != FeetRule::None {
         return Ok(Vec::new());
     }
@@ -195,8 +194,7 @@ fn falling_freely(model: &ReducedModel, phase: usize) -> Result<Vec<(usize, f64)
         };
         let terms = model.active_terms(phase, coordinate)?;
         if terms.iter().all(|(_, term)| term.text() == "1") {
-            let acceleration = terms.iter().map(|(coefficient, _)| coefficient).sum();
-            falling.push((coordinate, acceleration));
+            falling.push(coordinate);
         }
     }
     Ok(falling)

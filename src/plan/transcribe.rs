@@ -10,13 +10,13 @@
 //! subject to z_(k+1)  - z_k  = h (bar dz + drift_k)
 //!            dz_(k+1) - dz_k = h (ddz_k + bar f(zeta, nu, mu))
 //!            z, dz continuous, those measured at the start
-//!            body x at the end, body z + vz |vz| / 2 g in mid-flight, rest and height at the end
+//!            body x at the end, body z + vz |vz| / 2 g in mid-flight, height at the end, rest on ground
 //!            |lift u_lat + losses| <= limit, joints inside their limits, |Fx| <= mu Fz
 //! ```
 //!
-//! `drift_k` and `ddz_k` are such that the prior itself is a trajectory; where the model knows a
-//! coordinate to fall freely, that holds instead. Of this only products with `h`, `vz^2`, the
-//! feet and the losses are not linear: they are linearised about the iterate, or kept from it.
+//! `drift_k` and `ddz_k` are such that the prior itself is a trajectory; `f` is zero for a coordinate
+//! that the model lets fall freely. Only products with `h`, `vz^2`, the feet and the losses are not
+//! linear: they are linearised about the iterate, or kept from it.
 //! Bounds that are far from active are left out, and looked at again with the result.
 
 use nalgebra::DVector;
@@ -337,6 +337,19 @@ impl Task<'_> {
         let mut distance = self.x(part, node, BODY_X);
         distance.constant -= self.start_x(BODY_X) + self.seed.goal.distance_m();
         builder.equal(scaled(distance, 0.1));
+        if self.seed.parts[part].is_grounded() {
+            self.rest(builder);
+        }
+        let [least, most] = self.seed.prior.end_height_m;
+        let slack = self.settings.height_slack_m;
+        let height = self.layout.slack(Bound::Height);
+        let range = [least - slack, most + slack];
+        within(builder, &self.x(part, node, BODY_Z), range, Some(height));
+    }
+
+    /// Rest and a level body at the end, for jumps that land.
+    fn rest(&self, builder: &mut Builder) {
+        let (part, node) = self.last();
         let speed = self.settings.end_speed_m_s;
         for coordinate in [BODY_X, BODY_Z] {
             within(
@@ -348,11 +361,6 @@ impl Task<'_> {
         }
         let pitch = self.settings.end_pitch_rad;
         within(builder, &self.x(part, node, PITCH), [-pitch, pitch], None);
-        let [least, most] = self.seed.prior.end_height_m;
-        let slack = self.settings.height_slack_m;
-        let height = self.layout.slack(Bound::Height);
-        let range = [least - slack, most + slack];
-        within(builder, &self.x(part, node, BODY_Z), range, Some(height));
     }
 
     /// The last node.
@@ -387,7 +395,7 @@ impl Task<'_> {
     fn bounds(&self, part: usize, y: &[f64], builder: &mut Builder) {
         let of = &self.seed.parts[part];
         let robot = self.seed.rule.robot();
-        let landing = part + 1 == self.seed.parts.len();
+        let landing = part + 1 == self.seed.parts.len() && of.is_grounded();
         let [torque, joint, friction, height] = Bound::ALL.map(|b| self.layout.slack(b));
         for node in 0..of.z.len() {
             let losses = self.losses(part, node, y);

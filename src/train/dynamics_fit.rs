@@ -171,6 +171,7 @@ impl Task<'_> {
             candidates: candidates.unwrap_or(0),
             seeds: Vec::new(),
             support_overlap: None,
+            deviations: Vec::new(),
             training,
             validation: validation.transpose()?,
         })

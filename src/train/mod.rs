@@ -54,5 +54,5 @@ pub use options::{
     TrainOptions, Transfer,
 };
 pub use progress::{Progress, Watch};
-pub use report::{PhaseTerms, SeedReport, TrainReport, Trained};
+pub use report::{PartScore, PhaseTerms, SeedReport, TrainReport, Trained};
 pub use split::Split;

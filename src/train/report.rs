@@ -35,10 +35,24 @@ pub struct TrainReport {
     /// Mean over pairs of seeds of (coefficients active in both) / (active in either), latent coordinates matched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub support_overlap: Option<f64>,
+    /// How well the deviations of the training jumps from their prior are explained, one entry per part
+    /// of a jump; empty without a prior.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub deviations: Vec<PartScore>,
     /// Figures on the training recordings.
     pub training: SetMetrics,
     /// Figures on the validation recordings, if there were any.
     pub validation: Option<SetMetrics>,
+}
+
+/// How well the accelerations' deviations in one part of a jump are explained.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PartScore {
+    /// Name of the part.
+    pub part: String,
+    /// Coefficient of determination of the deviations from the prior, over all latent coordinates and
+    /// jumps, each jump left out of prior and fit in turn; 0 is what the prior alone explains.
+    pub ddz_r2: f64,
 }
 
 /// Number of coefficients that are not zero in one phase.

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::assemble::{Origin, Parts, assemble};
 use super::dynamics_fit::Fitted;
 use super::error::TrainError;
-use super::jumps::jump_prior;
+use super::jumps::learn_jumps;
 use super::overlap::support_overlap;
 use super::progress::Watch;
 use super::report::{SeedReport, Trained};
@@ -70,7 +70,13 @@ impl Seeds {
             (report.seeds, report.support_overlap) = (best.reports, best.overlap);
         }
         let (options, training) = (task.options, &task.sets.training);
-        let jumps = jump_prior(training, &best.fitted.encoder)?;
+        let jumps = match learn_jumps(training, &best.fitted.encoder)? {
+            None => None,
+            Some(learned) => {
+                report.deviations = learned.scores;
+                Some(learned.prior)
+            }
+        };
         let parts = Parts {
             library: task.library,
             encoder: best.fitted.encoder,

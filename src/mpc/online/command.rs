@@ -149,8 +149,8 @@ pub struct Command {
     /// What the planned motion takes of the torques in the joints, N m: `torque_nm` less this reaches the
     /// links. Zero in a hold and for a model without actuators.
     pub losses_nm: [f64; JOINT_DIM],
-    /// Desired joint positions, rad, within the robot's limits: the decoded reference at the end of
-    /// the step. The plan begins at the measurement, so its own posture would leave a joint PD
+    /// Desired joint positions, rad, within the robot's limits: the decoded reference at 0.9 of the
+    /// step. The plan begins at the measurement, so its own posture would leave a joint PD
     /// nothing to correct.
     pub joint_position_rad: [f64; JOINT_DIM],
     /// Desired joint velocities, rad/s.

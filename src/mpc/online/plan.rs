@@ -1,5 +1,9 @@
 //! The last good plan, in latent units, and how long it may be trusted.
 
+/// Share of a stage whose posture is commanded for all of it. A joint PD that holds the posture of the
+/// stage's end is ahead of the motion and adds to the thrust; that of the middle takes from it.
+pub const POSTURE_SHARE: f64 = 0.9;
+
 /// Inputs and states of a solved horizon.
 #[derive(Debug, Clone)]
 pub struct Plan {
@@ -73,9 +77,9 @@ impl Plan {
         (passed > -0.5).then(|| (passed + 1e-6).floor().max(0.0) as usize)
     }
 
-    /// The instant at which a stage ends, s; none without a plan.
-    pub fn end_s(&self, stage: usize) -> Option<f64> {
-        Some(self.start_s? + (stage + 1) as f64 * self.step_s)
+    /// The instant whose posture is commanded for a stage, s; none without a plan.
+    pub fn posture_s(&self, stage: usize) -> Option<f64> {
+        Some(self.start_s? + (stage as f64 + POSTURE_SHARE) * self.step_s)
     }
 
     /// Input of a stage.

@@ -131,10 +131,10 @@ impl Controller {
 
     /// Writes a stage of the plan into the command; false if its input cannot be lifted.
     pub(super) fn write_plan(&mut self, stage: usize, command: &mut Command) -> bool {
-        let (Some(reference), Some(end_s)) = (&self.reference, self.plan.end_s(stage)) else {
+        let (Some(reference), Some(time_s)) = (&self.reference, self.plan.posture_s(stage)) else {
             return false;
         };
-        reference.state_at(end_s, &mut self.posture);
+        reference.state_at(time_s, &mut self.posture);
         let (z, dz) = self.posture.split_at(self.plant.latent_dim());
         command.u_lat.copy_from_slice(self.plan.input(stage));
         for input in &mut command.u_lat {

@@ -20,6 +20,9 @@ pub struct Deviations {
     pub xi: DMatrix<f64>,
     /// Standard deviation over the jumps of the mean residual, each jump left out of the fit.
     pub acceleration_std: DVector<f64>,
+    /// Coefficient of determination of the accelerations' deviations from the prior, over all latent
+    /// coordinates, each jump left out of prior and fit; 0 is what the prior alone explains.
+    pub ddz_r2: f64,
 }
 
 /// Fits the deviations of one part; `translation` is the change of `z` by a shift forwards.
@@ -37,6 +40,7 @@ pub fn fit_deviations(
     let all: Vec<&Sampled> = sampled.iter().collect();
     let d = translation.len();
     let mut square = DVector::zeros(d);
+    let (mut unexplained, mut total) = (0.0, 0.0);
     for left_out in 0..sampled.len() {
         let others: Vec<&Sampled> = (all.iter().enumerate())
             .filter(|(jump, _)| *jump != left_out)
@@ -45,13 +49,16 @@ pub fn fit_deviations(
         let prior = fit.prior(&others);
         let xi = fit.xi(&prior, &others);
         let (variables, target) = fit.deviations(&prior, all[left_out]);
+        total += target.norm_squared();
         let residual = target - variables * xi;
+        unexplained += residual.norm_squared();
         let mean = residual.row_mean().transpose();
         square += mean.component_mul(&mean);
     }
     Deviations {
         xi: fit.xi(&fit.prior(&all), &all),
         acceleration_std: (square / sampled.len() as f64).map(f64::sqrt),
+        ddz_r2: 1.0 - unexplained / total,
     }
 }
 

@@ -9,6 +9,8 @@ use crate::robot::{ContactFlags, FeetRule};
 
 /// The thrust begins when the body last rises more slowly than this before the feet leave, m/s.
 const THRUST_SPEED_M_S: f64 = 0.1;
+/// A jump that is recorded for less than this after touch-down ends with its flight, s.
+const LEAST_LANDING_S: f64 = 0.1;
 /// Fewest samples of a part.
 const LEAST_SAMPLES: usize = 8;
 
@@ -27,7 +29,7 @@ pub struct Landmark {
 pub struct Cut {
     /// The parts.
     pub kind: Vec<Landmark>,
-    /// First sample of each part, and the last sample of the jump.
+    /// First sample of each part, and the last sample of the last.
     borders: Vec<usize>,
     /// Their times, s.
     times_s: Vec<f64>,
@@ -44,13 +46,19 @@ impl Cut {
         self.times_s[part + 1] - self.times_s[part]
     }
 
-    /// First sample after touch-down.
-    pub fn landing(&self) -> usize {
-        self.borders[self.kind.len() - 1]
+    /// First sample after touch-down; none for a jump that ends with its flight.
+    pub fn landing(&self) -> Option<usize> {
+        let lands = self.kind.last()?.feet.contains(&true);
+        lands.then(|| self.borders[self.kind.len() - 1])
+    }
+
+    /// The last sample of the last part.
+    pub fn end(&self) -> usize {
+        self.borders[self.kind.len()]
     }
 }
 
-/// The cut of every jump; none where a jump has no flight with contact before and after it.
+/// The cut of every jump; none where a jump has no flight with contact before it.
 ///
 /// # Errors
 /// As [`Dataset::for_each`].
@@ -73,7 +81,7 @@ fn cut(training: &Dataset, jump: &Jump, rising: impl Fn(usize) -> bool) -> Optio
         .max_by_key(|(_, (_, range))| range.len())?;
     let before = &jump.spans[..flight];
     let landing = &jump.spans[flight + 1..];
-    if before.is_empty() || landing.is_empty() || before.iter().any(|(phase, _)| flies(*phase)) {
+    if before.is_empty() || before.iter().any(|(phase, _)| flies(*phase)) {
         return None;
     }
     let thrust = 1 + (0..in_air.start).rev().find(|&sample| !rising(sample))?;
@@ -99,6 +107,11 @@ fn cut(training: &Dataset, jump: &Jump, rising: impl Fn(usize) -> bool) -> Optio
     }
     kind.push(landmark("flight", *flight_phase)?);
     borders.push(in_air.start);
+    let last = jump.len() - 1;
+    if jump.time_s[last] < jump.time_s[in_air.end.min(last)] + LEAST_LANDING_S {
+        borders.push(in_air.end - 1);
+        return finished(jump, kind, borders);
+    }
     let lengths = (0..patterns.len()).map(|phase| {
         let own = landing.iter().filter(|(of, _)| *of == phase);
         own.map(|(_, range)| range.len()).sum::<usize>()
@@ -108,7 +121,12 @@ fn cut(training: &Dataset, jump: &Jump, rising: impl Fn(usize) -> bool) -> Optio
         .filter(|(phase, _)| !flies(*phase))
         .max_by_key(|(_, length)| *length)?;
     kind.push(landmark("landing", commonest.0)?);
-    borders.extend([in_air.end, jump.len() - 1]);
+    borders.extend([in_air.end, last]);
+    finished(jump, kind, borders)
+}
+
+/// The cut at these borders; none with a part of too few samples.
+fn finished(jump: &Jump, kind: Vec<Landmark>, borders: Vec<usize>) -> Option<Cut> {
     if borders
         .windows(2)
         .any(|pair| pair[1] < pair[0] + LEAST_SAMPLES)

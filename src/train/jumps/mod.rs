@@ -1,6 +1,6 @@
 //! What the training jumps say of jumps that were not recorded: landmarks, prior, deviations.
 //!
-//! In: the training jumps and an encoder. Out: a [`JumpPrior`], or none if fewer than
+//! In: the training jumps and an encoder. Out: [`LearnedJumps`], or none if fewer than
 //! [`LEAST_JUMPS`] of them are of one kind. `landmarks` cuts each jump into parts, `nodes`
 //! samples the parts at equal shares of their durations, `regression` fits nodes and durations over
 //! the goals, and `deviations` fits how accelerations change about such a trajectory.
@@ -16,6 +16,7 @@ use super::dataset::Dataset;
 use super::error::TrainError;
 use super::latent::Latent;
 use super::metrics::{BODY_X, BODY_Z};
+use super::report::PartScore;
 use crate::model::{GOAL_DIM, GoalRange, JumpPart, JumpPrior, StateMap};
 use deviations::{Deviations, fit_deviations};
 use landmarks::{Cut, Landmark, commonest_kind};
@@ -33,12 +34,24 @@ struct Sampled {
     parts: Vec<PartNodes>,
 }
 
+/// A prior, and how well its deviations are explained in each of its parts.
+#[derive(Debug, PartialEq)]
+pub struct LearnedJumps {
+    /// Landmarks and prior.
+    pub prior: JumpPrior,
+    /// One score per part.
+    pub scores: Vec<PartScore>,
+}
+
 /// Landmarks and prior of the training jumps; none for a nonlinear encoder or too few jumps of one
 /// kind.
 ///
 /// # Errors
 /// As [`Dataset::for_each`].
-pub fn jump_prior(training: &Dataset, encoder: &StateMap) -> Result<Option<JumpPrior>, TrainError> {
+pub fn learn_jumps(
+    training: &Dataset,
+    encoder: &StateMap,
+) -> Result<Option<LearnedJumps>, TrainError> {
     let Some(affine) = encoder.as_affine() else {
         return Ok(None);
     };
@@ -62,7 +75,7 @@ pub fn jump_prior(training: &Dataset, encoder: &StateMap) -> Result<Option<JumpP
     let sampled: Vec<Sampled> = chosen
         .iter()
         .map(|&(jump, cut)| Sampled {
-            goal: goal_of(training, jump),
+            goal: goal_of(training, jump, cut),
             parts: (counts.iter().enumerate())
                 .map(|(part, &count)| {
                     sample(&training.jumps[jump], &latent[jump], cut, part, count)
@@ -74,21 +87,23 @@ pub fn jump_prior(training: &Dataset, encoder: &StateMap) -> Result<Option<JumpP
     let ends = Ends::of(training, &chosen);
     let jumps: Vec<_> = sampled.iter().map(|jump| jump.goal).collect();
     let goal = GoalRange::of(&jumps);
-    Ok(Some(JumpPrior {
-        parts: (0..kind.len())
-            .map(|part| part_of(&sampled, &goal, &kind[part], part, &translation))
-            .collect(),
+    let (parts, scores) = (0..kind.len())
+        .map(|part| part_of(&sampled, &goal, &kind[part], part, &translation))
+        .unzip();
+    let prior = JumpPrior {
+        parts,
         jumps,
         start: ends.start.map(rounded),
         state_std: state_std(&latent, &chosen).map(rounded),
         end_height_m: ends.end_height_m.map(rounded),
         landing_height_m: rounded(ends.landing_height_m),
-    }))
+    };
+    Ok(Some(LearnedJumps { prior, scores }))
 }
 
 /// Distance, rise of the body at the apex and height at the start of a jump, m.
-fn goal_of(training: &Dataset, jump: usize) -> [f64; GOAL_DIM] {
-    let x = &training.jumps[jump].x;
+fn goal_of(training: &Dataset, jump: usize, cut: &Cut) -> [f64; GOAL_DIM] {
+    let x = training.jumps[jump].x.columns(0, cut.end() + 1);
     let scale = &training.scaling.state;
     let (row, forwards) = (x.row(BODY_Z) / scale[BODY_Z], x.row(BODY_X) / scale[BODY_X]);
     [
@@ -105,7 +120,7 @@ fn part_of(
     landmark: &Landmark,
     part: usize,
     translation: &DVector<f64>,
-) -> JumpPart {
+) -> (JumpPart, PartScore) {
     let regression = GoalRegression::of(sampled, goal);
     let all: Vec<&PartNodes> = sampled.iter().map(|jump| &jump.parts[part]).collect();
     let table = |pick: fn(&PartNodes) -> &DMatrix<f64>| {
@@ -118,8 +133,13 @@ fn part_of(
     let Deviations {
         xi,
         acceleration_std,
+        ddz_r2,
     } = fit_deviations(sampled, goal, part, translation);
-    JumpPart {
+    let score = PartScore {
+        part: landmark.name.clone(),
+        ddz_r2,
+    };
+    let part = JumpPart {
         name: landmark.name.clone(),
         phase: landmark.phase,
         feet: landmark.feet,
@@ -131,7 +151,8 @@ fn part_of(
         xi: Some(xi.map(rounded)),
         input_covariance: input_covariance(&all).map(rounded),
         acceleration_std: acceleration_std.map(rounded),
-    }
+    };
+    (part, score)
 }
 
 /// Covariance of the inputs at the nodes of a part over all jumps, with a floor for directions in
@@ -173,10 +194,10 @@ impl Ends {
             let x = &training.jumps[jump].x;
             ends.start += x.column(0).component_div(scale) / chosen.len() as f64;
             let heights = x.row(BODY_Z) / scale[BODY_Z];
-            let last = heights[heights.len() - 1];
+            let last = heights[cut.end()];
             let [least, most] = ends.end_height_m;
             ends.end_height_m = [least.min(last), most.max(last)];
-            let landing = heights.columns_range(cut.landing()..);
+            let landing = heights.columns_range(cut.landing().unwrap_or(cut.end())..cut.end() + 1);
             ends.landing_height_m = ends.landing_height_m.min(landing.min());
         }
         ends

@@ -33,9 +33,10 @@ fn encoder() -> StateMap {
 #[test]
 fn jumps_are_cut_into_crouch_thrust_flight_and_landing() {
     let training = training();
-    let prior = jump_prior(&training, &encoder())
+    let prior = learn_jumps(&training, &encoder())
         .unwrap()
-        .expect("jumps of one kind");
+        .expect("jumps of one kind")
+        .prior;
     let names: Vec<&str> = prior.parts.iter().map(|part| part.name.as_str()).collect();
     assert_eq!(names, ["crouch", "thrust", "flight", "landing"]);
     assert_eq!(prior.parts[2].feet, [false; 4]);
@@ -53,9 +54,10 @@ fn jumps_are_cut_into_crouch_thrust_flight_and_landing() {
 #[test]
 fn prior_at_the_goal_of_a_jump_is_nearer_to_it_than_the_mean_jump() {
     let training = training();
-    let prior = jump_prior(&training, &encoder())
+    let prior = learn_jumps(&training, &encoder())
         .unwrap()
-        .expect("jumps of one kind");
+        .expect("jumps of one kind")
+        .prior;
     let latent = Latent::of(&training, &encoder()).unwrap();
     let last = prior.parts.last().unwrap();
     let error = |features: &dyn Fn(usize) -> [f64; FEATURE_DIM]| -> f64 {
@@ -73,9 +75,10 @@ fn prior_at_the_goal_of_a_jump_is_nearer_to_it_than_the_mean_jump() {
 
 #[test]
 fn deviations_know_nothing_of_where_the_robot_stands() {
-    let prior = jump_prior(&training(), &encoder())
+    let prior = learn_jumps(&training(), &encoder())
         .unwrap()
-        .expect("jumps of one kind");
+        .expect("jumps of one kind")
+        .prior;
     for part in &prior.parts {
         let xi = part.xi.as_ref().unwrap();
         assert!(xi.row(0).amax() < 1e-9 * xi.amax(), "{}", part.name);
@@ -87,5 +90,27 @@ fn deviations_know_nothing_of_where_the_robot_stands() {
 fn too_few_jumps_have_no_prior() {
     let mut training = training();
     training.jumps.truncate(LEAST_JUMPS - 1);
-    assert_eq!(jump_prior(&training, &encoder()).unwrap(), None);
+    assert_eq!(learn_jumps(&training, &encoder()).unwrap(), None);
+}
+
+#[test]
+fn score_of_deviations_falls_when_inputs_belong_to_other_jumps() {
+    let score = |training: &Dataset| -> f64 {
+        let learned = learn_jumps(training, &encoder()).unwrap();
+        let scores = learned.expect("jumps of one kind").scores;
+        let thrust = scores.iter().find(|score| score.part == "thrust");
+        thrust.expect("a thrust").ddz_r2
+    };
+    let mut training = training();
+    let right = score(&training);
+    let inputs: Vec<DMatrix<f64>> = training.jumps.iter().map(|jump| jump.u.clone()).collect();
+    for (k, jump) in training.jumps.iter_mut().enumerate() {
+        let other = &inputs[(k + 3) % inputs.len()];
+        let last = other.ncols() - 1;
+        jump.u = DMatrix::from_fn(STATE_DIM, jump.u.ncols(), |i, sample| {
+            other[(i, sample.min(last))]
+        });
+    }
+    let wrong = score(&training);
+    assert!(right > 0.3 && wrong < right - 0.1, "{right} {wrong}");
 }
