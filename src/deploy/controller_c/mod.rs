@@ -6,6 +6,7 @@
 //! `templates/controller_c/source.askama` first.
 
 mod jump;
+mod legs;
 mod numbers;
 mod selftest;
 mod source;
