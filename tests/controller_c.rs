@@ -20,6 +20,8 @@ mod emitted;
 mod programs;
 #[path = "mpc/random.rs"]
 mod random;
+#[path = "controller_c/ros2.rs"]
+mod ros2;
 #[path = "controller_c/tools.rs"]
 mod tools;
 use emitted::{Emitted, STRICT};

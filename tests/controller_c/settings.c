@@ -27,9 +27,9 @@ static void expect(FN(_controller_settings) settings, const char *name)
 
 #define TRY(field, value)                                                                                              \
     do {                                                                                                               \
-        FN(_controller_settings) settings = FN(_controller_settings_default)();                                        \
-        settings.field = (value);                                                                                      \
-        expect(settings, #field);                                                                                      \
+        FN(_controller_settings) changed = FN(_controller_settings_default)();                                         \
+        changed.field = (value);                                                                                       \
+        expect(changed, #field);                                                                                       \
     } while (0)
 
 int main(void)
