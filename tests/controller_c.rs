@@ -171,6 +171,11 @@ fn one_step(
     }
     let jitter = if random.signed() > 0.9 { 0.003 } else { 0.0 };
     let time_s = segment.time_s[sample] + jitter;
+    let resets = random.signed() > 0.97;
+    if resets {
+        controller.reset();
+        trusting.reset();
+    }
     let prepares = random.signed() > 0.0;
     if prepares {
         controller.prepare(time_s);
@@ -187,7 +192,7 @@ fn one_step(
     push(bytes, &x);
     push(bytes, &dx);
     bytes.extend(feet.map(u8::from));
-    bytes.push(u8::from(prepares));
+    bytes.push(u8::from(prepares) + 2 * u8::from(resets));
     push(bytes, &command.torque_nm);
     push(bytes, &command.joint_position_rad);
     push(bytes, &command.joint_velocity_rad_s);

@@ -3,8 +3,8 @@
  * runs until the end of the file, each of
  *   int64 samples, steps, has_u; double body_friction, effectiveness_time_s, stiffness and damping of the drives;
  *   double time_s[samples], x[18 samples], dx[18 samples], u[18 samples] if has_u; uint8 feet[4 samples]
- *   and for each step double time_s, x[18], dx[18]; uint8 feet[4], prepare[1]; double torque[12], joint_position[12],
- *   joint_velocity[12], u_lat[D]; int64 status, iterations. */
+ *   and for each step double time_s, x[18], dx[18]; uint8 feet[4], flags (1 prepare, 2 reset); double torque[12],
+ *   joint_position[12], joint_velocity[12], u_lat[D]; int64 status, iterations. */
 #include HEADER
 
 #include <stdio.h>
@@ -80,7 +80,10 @@ int main(int argc, char **argv)
             need(flags, 1, 5);
             need(wanted, sizeof wanted[0], 36 + D);
             need(codes, sizeof codes[0], 2);
-            if (flags[4]) {
+            if (flags[4] & 2) {
+                FN(_controller_reset)(&controller);
+            }
+            if (flags[4] & 1) {
                 FN(_controller_prepare)(&controller, measured[0]);
             }
             FN(_controller_step)(&controller, measured[0], measured + 1, measured + 19, flags, &command);

@@ -187,10 +187,10 @@ struct Robot
 };
 
 /// Efforts along the jump are those of the controller in C with a joint PD; the largest difference, N m.
-double follow_jump(double effectiveness_time_s)
+double follow_jump(double effectiveness_time_s, bool torque_in_flight)
 {
     const double stiffness = 20, damping = 0.8;
-    Robot robot({{"effectiveness_time_s", effectiveness_time_s}});
+    Robot robot({{"effectiveness_time_s", effectiveness_time_s}, {"torque_in_flight", torque_in_flight}});
     require(robot.configure() == CallbackReturn::SUCCESS, "on_configure");
     require(robot.activate() == CallbackReturn::SUCCESS, "on_activate");
     static FN(_controller) beside;
@@ -211,7 +211,7 @@ double follow_jump(double effectiveness_time_s)
         for (int call = 0; call < CALLS; ++call) {
             require(robot.update() == return_type::OK, "update along the jump");
             for (std::size_t i = 0; i < 12; ++i) {
-                double effort = is_grounded ? command.torque[i] : 0;
+                double effort = is_grounded || torque_in_flight ? command.torque[i] : 0;
                 effort += stiffness * (command.joint_position[i] - JUMP_X[k][i])
                     + damping * (command.joint_velocity[i] - JUMP_DX[k][i]);
                 effort = std::fmin(std::fmax(effort, -LIMIT[i % 3]), LIMIT[i % 3]);
@@ -232,6 +232,11 @@ void survive_undefined_values()
     robot.states[20].value = std::nan("");
     require(robot.update() == return_type::OK, "a first value that is undefined");
     require(!(robot.commands[0].value < 0 || robot.commands[0].value > 0), "no effort before a sound measurement");
+    return_type waited = return_type::OK;
+    for (int call = 0; call < 6 * CALLS + 1; ++call) {
+        waited = robot.update();
+    }
+    require(waited == return_type::ERROR, "too long without a sound measurement");
     std::size_t k = 0;
     const auto run = [&](std::size_t samples, bool is_sound) {
         return_type last = return_type::OK;
@@ -293,7 +298,7 @@ void load(const std::string & path)
 
 int main(int argc, char ** argv)
 {
-    const double trusting = follow_jump(0), estimating = follow_jump(1);
+    const double trusting = follow_jump(0, false), estimating = follow_jump(1, true);
     std::printf("efforts within %.1e and, with the estimate, %.1e N m\n", trusting, estimating);
     require(trusting < 1e-6 && estimating < 1e-6, "efforts are those of the controller in C");
     survive_undefined_values();
