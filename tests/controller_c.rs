@@ -9,7 +9,8 @@ use romc::codegen::Precision;
 use romc::deploy::{EmitError, EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::model::ReducedModel;
-use romc::mpc::{Controller, Measurement, MpcSettings, ReferenceSamples, Solver};
+use romc::mpc::{Controller, Effectiveness, Measurement, MpcSettings, ReferenceSamples, Solver};
+use romc::robot::WrenchFrame;
 
 #[path = "controller_c/boards.rs"]
 mod boards;
@@ -19,9 +20,11 @@ mod emitted;
 mod programs;
 #[path = "mpc/random.rs"]
 mod random;
+#[path = "controller_c/ros2.rs"]
+mod ros2;
 #[path = "controller_c/tools.rs"]
 mod tools;
-use emitted::Emitted;
+use emitted::{Emitted, STRICT};
 use programs::{has, root, shipped, succeed, with_losses};
 use random::Random;
 
@@ -52,11 +55,12 @@ fn push_counts(bytes: &mut Vec<u8>, values: &[i64]) {
 }
 
 /// Steps of random measurements along random variations of recorded jumps, with what the library
-/// commands, as `replay.c` reads them.
-fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> Vec<u8> {
+/// commands, as `replay.c` reads them; and how many latent inputs the estimate of the share that
+/// arrives has changed. Every second run has that estimate.
+fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize) {
     let mut random = Random::new(seed);
     let mut bytes = Vec::new();
-    let mut done = 0;
+    let (mut done, mut changed) = (0, 0);
     let rule = model.input_rule().expect("a robot");
     for run in 0.. {
         if done >= steps {
@@ -79,13 +83,24 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> Vec<u8> {
         );
         let u = (run % 4 != 3).then(|| vary(input.as_slice(), 0.5, &mut random));
         let friction = if run % 3 == 2 { 0.6 } else { 0.0 };
+        let effectiveness = (run % 2 == 1).then(|| Effectiveness {
+            time_constant_s: [0.05, 1.0][run / 2 % 2],
+            stiffness_nm_rad: [20.0, 0.0, 40.0][run / 2 % 3],
+            damping_nm_s_rad: [0.8, 0.0][run / 4 % 2],
+        });
         let settings = MpcSettings {
             solver: Solver::Riccati,
             missing_input: romc::mpc::MissingInput::Mean,
             body_friction: (friction > 0.0).then_some(friction),
+            effectiveness,
             ..MpcSettings::default()
         };
-        let mut controller = Controller::new(model, settings).expect("a complete model");
+        let trusting = MpcSettings {
+            effectiveness: None,
+            ..settings
+        };
+        let [mut controller, mut trusting] =
+            [settings, trusting].map(|s| Controller::new(model, s).expect("a complete model"));
         let reference = ReferenceSamples {
             time_s: &segment.time_s,
             x: &x,
@@ -94,7 +109,12 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> Vec<u8> {
             feet: &segment.feet,
         };
         controller.set_reference(reference).expect("sound");
-        let samples: Vec<usize> = (0..segment.len()).step_by(5).collect();
+        trusting.set_reference(reference).expect("sound");
+        // A measurement for each stage, or more: some are then within the first stage of the last plan
+        // although a step without a plan lies between.
+        let is_dense = run % 2 == 1 && seed.is_multiple_of(2);
+        let stride = if is_dense { 2 } else { 5 };
+        let samples: Vec<usize> = (0..segment.len()).step_by(stride).collect();
         push_counts(
             &mut bytes,
             &[
@@ -104,6 +124,12 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> Vec<u8> {
             ],
         );
         push(&mut bytes, &[friction]);
+        push(
+            &mut bytes,
+            &effectiveness.map_or([0.0; 3], |e| {
+                [e.time_constant_s, e.stiffness_nm_rad, e.damping_nm_s_rad]
+            }),
+        );
         push(&mut bytes, &segment.time_s);
         push(&mut bytes, &x);
         push(&mut bytes, &dx);
@@ -111,28 +137,29 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> Vec<u8> {
         bytes.extend(segment.feet.iter().flatten().map(|down| u8::from(*down)));
         let roughness = [0.0, 0.3, 1.0, 3.0][run % 4];
         for &sample in &samples {
-            one_step(
-                &mut controller,
+            changed += usize::from(one_step(
+                [&mut controller, &mut trusting],
                 segment,
                 sample,
                 roughness,
                 &mut random,
                 &mut bytes,
-            );
+            ));
         }
-        done += samples.len();
+        done += segment.len() / 5;
     }
-    bytes
+    (bytes, changed)
 }
 
+/// Whether both controllers command different latent inputs.
 fn one_step(
-    controller: &mut Controller,
+    [controller, trusting]: [&mut Controller; 2],
     segment: &romc::recording::Segment,
     sample: usize,
     roughness: f64,
     random: &mut Random,
     bytes: &mut Vec<u8>,
-) {
+) -> bool {
     let mut x: [f64; 18] = std::array::from_fn(|i| segment.x[(i, sample)]);
     let mut dx: [f64; 18] = std::array::from_fn(|i| segment.dx[(i, sample)]);
     for i in 0..18 {
@@ -148,21 +175,28 @@ fn one_step(
     }
     let jitter = if random.signed() > 0.9 { 0.003 } else { 0.0 };
     let time_s = segment.time_s[sample] + jitter;
+    let resets = random.signed() > 0.97;
+    if resets {
+        controller.reset();
+        trusting.reset();
+    }
     let prepares = random.signed() > 0.0;
     if prepares {
         controller.prepare(time_s);
     }
-    let command = controller.step(Measurement {
+    let measurement = Measurement {
         time_s,
         x: &x,
         dx: &dx,
         feet,
-    });
+    };
+    let command = controller.step(measurement);
+    let is_changed = trusting.step(measurement).u_lat != command.u_lat;
     push(bytes, &[time_s]);
     push(bytes, &x);
     push(bytes, &dx);
     bytes.extend(feet.map(u8::from));
-    bytes.push(u8::from(prepares));
+    bytes.push(u8::from(prepares) + 2 * u8::from(resets));
     push(bytes, &command.torque_nm);
     push(bytes, &command.joint_position_rad);
     push(bytes, &command.joint_velocity_rad_s);
@@ -174,6 +208,7 @@ fn one_step(
             i64::from(command.iterations),
         ],
     );
+    is_changed
 }
 
 /// Steps of the comparison: 2000, or as many as `ROMC_CONTROLLER_STEPS` says.
@@ -195,7 +230,8 @@ fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_
         let replay = root().join("tests/controller_c/replay.c");
         let program = emitted.program("cc", &[], replay.to_str().expect("UTF-8"));
         let file = emitted.scratch.path().join("steps");
-        let steps = replay_file(&model, step_count() / 5, number as u64);
+        let (steps, changed) = replay_file(&model, step_count() / 5, number as u64);
+        assert!(changed > 50, "inputs hardly change: {changed}");
         fs::write(&file, steps).expect("written");
         let output = succeed(Command::new(program).arg(&file));
         let text = String::from_utf8_lossy(&output.stdout);
@@ -209,6 +245,73 @@ fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_
             "limits hardly bind: {text}"
         );
     }
+}
+
+/// The model on the robot of a file, with forces in one of the frames.
+fn on_robot(name: &str, frame: WrenchFrame) -> ReducedModel {
+    let path = root().join("examples/robots").join(name);
+    let robot = romc::robot_file::read(&path, &[]).expect("an example");
+    let builder = shipped("go1-d4").into_builder().robot(robot);
+    builder.wrench_frame(frame).build().expect("a sound model")
+}
+
+#[test]
+fn forces_of_the_drives_have_the_librarys_bits_for_planar_legs_and_chains_in_both_frames() {
+    let mut random = Random::new(5);
+    for model in [
+        on_robot("solo12.toml", WrenchFrame::Body),
+        on_robot("hare.urdf", WrenchFrame::World),
+        on_robot("anymal_c.toml", WrenchFrame::Body),
+        shipped("go1-d4"),
+    ] {
+        let rule = model.input_rule().expect("a robot");
+        let mut bytes = Vec::new();
+        for sample in 0..2000 {
+            // Every third posture is near a stretched knee.
+            let reach = if sample % 3 == 0 { 0.2 } else { 2.0 };
+            let x: [f64; 18] = std::array::from_fn(|i| match i % 3 {
+                2 if i < 12 => reach * random.signed(),
+                _ => 1.5 * random.signed(),
+            });
+            let torque: [f64; 12] = std::array::from_fn(|_| 20.0 * random.signed());
+            let feet: [bool; 4] = std::array::from_fn(|_| random.signed() > -0.5);
+            let wrench = rule.wrench(&x, &torque, feet).expect("finite");
+            push(&mut bytes, &x);
+            push(&mut bytes, &torque);
+            push(&mut bytes, wrench.as_slice());
+            bytes.extend(feet.map(u8::from));
+        }
+        let emitted = Emitted::new(&model, Precision::Double);
+        let file = emitted.scratch.path().join("samples");
+        fs::write(&file, bytes).expect("written");
+        let program = emitted.scratch.path().join("wrench");
+        succeed(
+            Command::new("cc")
+                .args(STRICT)
+                .args(["-O2", "-ffp-contract=off", "-I."])
+                .arg(format!("-DSOURCE=\"{}_controller.c\"", emitted.name))
+                .arg(root().join("tests/controller_c/wrench.c"))
+                .arg(format!("{}.c", emitted.name))
+                .args(["-lm", "-o"])
+                .arg(&program)
+                .current_dir(emitted.folder()),
+        );
+        println!("{}", Emitted::output(Command::new(program).arg(file)));
+    }
+}
+
+#[test]
+fn settings_that_are_refused_are_named() {
+    let emitted = Emitted::new(&shipped("go1-d2"), Precision::Double);
+    let program = emitted.program(
+        "cc",
+        &[],
+        root()
+            .join("tests/controller_c/settings.c")
+            .to_str()
+            .expect("UTF-8"),
+    );
+    succeed(&mut Command::new(program));
 }
 
 #[test]

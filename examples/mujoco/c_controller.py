@@ -36,7 +36,7 @@ def load(crate):
             (name, number)
             for name in (
                 "step_s", "input_weight", "velocity_weight", "terminal_weight", "joint_penalty",
-                "body_friction",
+                "body_friction", "effectiveness_time_s", "drive_stiffness_nm_rad", "drive_damping_nm_s_rad",
             )
         ]  # fmt: skip
 

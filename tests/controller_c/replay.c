@@ -1,10 +1,10 @@
 /* Replays steps from a file through a generated controller and compares every command with the file's, bit for bit.
  * usage: replay FILE; prints steps, differing ones, the most iterations and torques beyond their limits. Native byte order:
  * runs until the end of the file, each of
- *   int64 samples, steps, has_u; double body_friction; double time_s[samples], x[18 samples], dx[18 samples], u[18 samples]
- *   if has_u; uint8 feet[4 samples]
- *   and for each step double time_s, x[18], dx[18]; uint8 feet[4], prepare[1]; double torque[12], joint_position[12],
- *   joint_velocity[12], u_lat[D]; int64 status, iterations. */
+ *   int64 samples, steps, has_u; double body_friction, effectiveness_time_s, stiffness and damping of the drives;
+ *   double time_s[samples], x[18 samples], dx[18 samples], u[18 samples] if has_u; uint8 feet[4 samples]
+ *   and for each step double time_s, x[18], dx[18]; uint8 feet[4], flags (1 prepare, 2 reset); double torque[12],
+ *   joint_position[12], joint_velocity[12], u_lat[D]; int64 status, iterations. */
 #include HEADER
 
 #include <stdio.h>
@@ -53,8 +53,8 @@ int main(int argc, char **argv)
     }
     while (get(head, sizeof head[0], 3)) {
         const size_t count = (size_t)head[0];
-        double friction;
-        need(&friction, sizeof friction, 1);
+        double chosen[4];
+        need(chosen, sizeof chosen[0], 4);
         double *time_s = array(sizeof(double), count), *x = array(sizeof(double), 18 * count);
         double *dx = array(sizeof(double), 18 * count), *u = NULL;
         if (head[2]) {
@@ -62,7 +62,10 @@ int main(int argc, char **argv)
         }
         uint8_t *feet = array(1, 4 * count);
         FN(_controller_settings) settings = FN(_controller_settings_default)();
-        settings.body_friction = friction;
+        settings.body_friction = chosen[0];
+        settings.effectiveness_time_s = chosen[1];
+        settings.drive_stiffness_nm_rad = chosen[2];
+        settings.drive_damping_nm_s_rad = chosen[3];
         if (FN(_controller_init)(&controller, &settings) != 0
             || FN(_controller_set_reference)(&controller, count, time_s, x, dx, u, feet) != 0) {
             fprintf(stderr, "refused\n");
@@ -77,7 +80,10 @@ int main(int argc, char **argv)
             need(flags, 1, 5);
             need(wanted, sizeof wanted[0], 36 + D);
             need(codes, sizeof codes[0], 2);
-            if (flags[4]) {
+            if (flags[4] & 2) {
+                FN(_controller_reset)(&controller);
+            }
+            if (flags[4] & 1) {
                 FN(_controller_prepare)(&controller, measured[0]);
             }
             FN(_controller_step)(&controller, measured[0], measured + 1, measured + 19, flags, &command);

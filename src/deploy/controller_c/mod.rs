@@ -6,7 +6,9 @@
 //! `templates/controller_c/source.askama` first.
 
 mod jump;
+mod legs;
 mod numbers;
+mod ros2_control;
 mod selftest;
 mod source;
 
@@ -24,6 +26,7 @@ use crate::mpc::problem::StageRows;
 use crate::mpc::{ControlModel, MpcSettings};
 use crate::robot::{Robot, STATE_DIM};
 use jump::Jump;
+use numbers::Numbers;
 use source::Source;
 
 /// Rows of the friction pyramid and of the slack.
@@ -42,6 +45,8 @@ struct Facts<'a> {
     input_names: String,
     input_is: String,
     real: &'static str,
+    /// Torque limits, an initialiser in double precision.
+    torque_limit: String,
     /// Suffix of libm's functions.
     f: &'static str,
     codes: Vec<(String, i32)>,
@@ -114,7 +119,11 @@ pub fn emit(
         ("CMakeLists.txt", Cmake::text(&hash, facts)?),
         ("README.md", Readme::text(provenance, facts)?),
     ];
-    for (path, text) in texts {
+    let texts = texts.map(|(path, text)| (path.to_owned(), text));
+    for (path, text) in texts
+        .into_iter()
+        .chain(ros2_control::files(facts, provenance)?)
+    {
         let path = format!("{folder}/{}", path.replace("NAME", &name));
         files.push(EmittedFile::new(path, tidy(&text)));
     }
@@ -144,6 +153,8 @@ fn facts<'a>(
             Precision::Double => "double",
             Precision::Single => "float",
         },
+        torque_limit: Numbers(Precision::Double)
+            .vector(plant.robot().torque_limit_nm().iter().copied()),
         f: match precision {
             Precision::Double => "",
             Precision::Single => "f",

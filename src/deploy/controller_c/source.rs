@@ -3,6 +3,7 @@
 use askama::Template;
 
 use super::Facts;
+use super::legs::Legs;
 use super::numbers::{Numbers, integers, nested};
 use crate::codegen::Precision;
 use crate::codegen::interface::ModelInterface;
@@ -10,7 +11,8 @@ use crate::deploy::controller::texts;
 use crate::mpc::interface::Settings;
 use crate::mpc::problem::{Row, StageRows};
 use crate::mpc::shared::{
-    DEVIATION_FLOOR, SLACK_PRICE, SOFTENED_FROM, STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
+    DEVIATION_FLOOR, EFFECTIVENESS_RANGE, LARGEST_WEIGHT, PRIOR_WEIGHT, SLACK_PRICE, SOFTENED_FROM,
+    STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
 };
 use crate::mpc::{ControlModel, FallbackSettings, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
@@ -36,6 +38,8 @@ pub(super) struct Source<'a> {
     is_body_frame: bool,
     solver: SolverNumbers,
     reference: ReferenceNumbers,
+    effectiveness: EffectivenessNumbers,
+    legs: Legs,
     fallback: FallbackSettings,
     softened_from: f64,
     defaults: Settings,
@@ -82,6 +86,12 @@ struct SolverNumbers {
     short_step: String,
     patience: u32,
     sqrt_half: String,
+}
+
+struct EffectivenessNumbers {
+    prior_weight: f64,
+    largest_weight: f64,
+    range: (f64, f64),
 }
 
 struct ReferenceNumbers {
@@ -134,6 +144,12 @@ impl<'a> Source<'a> {
                 deviation_floor: DEVIATION_FLOOR,
                 state_reach: STATE_REACH,
             },
+            effectiveness: EffectivenessNumbers {
+                prior_weight: PRIOR_WEIGHT,
+                largest_weight: LARGEST_WEIGHT,
+                range: EFFECTIVENESS_RANGE,
+            },
+            legs: Legs::of(robot, numbers),
             fallback: mpc.fallback,
             softened_from: SOFTENED_FROM,
             defaults: Settings::default(),

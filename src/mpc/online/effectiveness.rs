@@ -16,7 +16,7 @@
 //! the thrust, where models err most, does not outweigh what came before; it fades by
 //! `exp(−age/T)`. Inputs are divided by `γ̂` before they are lifted.
 
-use nalgebra::{DMatrix, SVector};
+use nalgebra::DMatrix;
 
 use super::control_model::ControlModel;
 use super::controller::Measurement;
@@ -25,11 +25,11 @@ use super::settings::Effectiveness as Settings;
 use crate::robot::{JOINT_DIM, STATE_DIM};
 
 /// Weight of the one from before the motion, in first steps.
-const PRIOR_WEIGHT: f64 = 10.0;
+pub const PRIOR_WEIGHT: f64 = 10.0;
 /// Largest weight of a step, in first steps.
-const LARGEST_WEIGHT: f64 = 2.0;
+pub const LARGEST_WEIGHT: f64 = 2.0;
 /// Smallest and largest estimate.
-const RANGE: (f64, f64) = (0.7, 1.3);
+pub const RANGE: (f64, f64) = (0.7, 1.3);
 
 /// The estimate and the sums behind it.
 #[derive(Debug, Clone)]
@@ -157,16 +157,15 @@ impl Effectiveness {
             return false;
         };
         let (x, dx) = (measurement.x, measurement.dx);
-        let torque = SVector::<f64, JOINT_DIM>::from_fn(|joint, _| {
+        let torque: [f64; JOINT_DIM] = std::array::from_fn(|joint| {
             settings.stiffness_nm_rad * (joints[joint] - x[joint])
                 + settings.damping_nm_s_rad * (rates[joint] - dx[joint])
         });
-        let posture = std::array::from_fn(|joint| x[joint]);
+        let state: [f64; STATE_DIM] = std::array::from_fn(|i| x[i]);
         let rule = plant.input_rule();
-        let Ok(map) = rule.wrench_map(&posture, [x[15], x[16], x[17]], measurement.feet) else {
+        let Ok(wrench) = rule.wrench(&state, &torque, measurement.feet) else {
             return false;
         };
-        let wrench = map * torque;
         let input: [f64; STATE_DIM] = std::array::from_fn(|i| match i.checked_sub(JOINT_DIM) {
             None => torque[i],
             Some(axis) => wrench[axis],

@@ -34,6 +34,7 @@ mod transcribe;
 /// Numbers that the controller in C shares, which are no settings.
 pub mod shared {
     pub use super::controller::SOFTENED_FROM;
+    pub use super::effectiveness::{LARGEST_WEIGHT, PRIOR_WEIGHT, RANGE as EFFECTIVENESS_RANGE};
     pub use super::problem::STATE_REACH;
     pub use super::reference::{DEVIATION_FLOOR, STILL_SHARE, STILL_TIME_S};
     pub use super::structured::TOLERANCE;

@@ -20,6 +20,7 @@ static void fill(double *values, int count, double limit)
 int main(void)
 {
     go1_d2_command command;
+    go1_d2_controller_settings settings = go1_d2_controller_settings_default();
     double now_x[18], now_dx[18];
     uint8_t now_feet[4];
     fill(x, COUNT * 18, 4.0);
@@ -28,7 +29,10 @@ int main(void)
     for (int i = 0; i < COUNT * 4; ++i) {
         feet[i] = (uint8_t)Frama_C_interval(0, 1);
     }
-    if (go1_d2_controller_init(&controller, 0) != 0
+    settings.effectiveness_time_s = 1.0;
+    settings.drive_stiffness_nm_rad = 20.0;
+    settings.drive_damping_nm_s_rad = 0.8;
+    if (go1_d2_controller_init(&controller, &settings) != 0
         || go1_d2_controller_set_reference(&controller, COUNT, time_s, x, dx, u, feet) != 0) {
         return 1;
     }

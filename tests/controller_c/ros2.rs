@@ -1,0 +1,103 @@
+//! The generated plugin of ros2_control, built and driven on stubs of ROS.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use romc::codegen::Precision;
+
+use crate::emitted::Emitted;
+use crate::programs::{has, root, shipped, succeed};
+
+const WARNINGS: [&str; 7] = [
+    "-std=c++17",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wshadow",
+    "-pedantic",
+    "-Werror",
+];
+
+fn stubs() -> PathBuf {
+    root().join("tests/controller_c/ros2")
+}
+
+/// The plugin, its driver and the controller as one program.
+fn drive(emitted: &Emitted, compiler: &str, flags: &[&str]) -> PathBuf {
+    let (name, package) = (&emitted.name, emitted.folder().join("ros2_control"));
+    let program = emitted.scratch.path().join("drive");
+    succeed(
+        Command::new(compiler)
+            .args(WARNINGS)
+            .args(["-g", "-O1"])
+            .args(flags)
+            .arg(format!("-DNAME={name}"))
+            .arg(format!("-DJUMP=\"{name}_jump.h\""))
+            .arg(format!("-I{}", stubs().join("include").display()))
+            .args(["-I..", "-Isrc", "src/controller.cpp", "src/plan.cpp"])
+            .arg(stubs().join("drive.cpp"))
+            .args(emitted.objects("cc", &[]))
+            .args(["-lm", "-o"])
+            .arg(&program)
+            .current_dir(package),
+    );
+    program
+}
+
+/// A recorded jump as a file that is not packed.
+fn jump_file(folder: &Path) -> PathBuf {
+    let path = root().join("examples/recordings/go1/test_01.csv.gz");
+    let recording = romc::recording::read(&path).expect("a sound recording");
+    let file = folder.join("jump.csv");
+    romc::recording::write(&file, &recording).expect("written");
+    file
+}
+
+#[test]
+fn plugin_gives_the_controllers_efforts_without_allocating_with_both_interfaces_of_ros() {
+    let emitted = Emitted::new(&shipped("go1-d4"), Precision::Double);
+    let jump = jump_file(emitted.scratch.path());
+    let sanitize = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+    let humble = [&sanitize[..], &["-DROMC_STUB_HUMBLE"]].concat();
+    let builds = [("c++", &sanitize[..]), ("c++", &humble), ("clang++", &[])];
+    for (compiler, flags) in builds {
+        if compiler == "clang++" && !has(compiler) {
+            continue;
+        }
+        let program = drive(&emitted, compiler, flags);
+        let text = Emitted::output(Command::new(program).arg(&jump));
+        println!("{compiler} {flags:?}: {text}");
+    }
+}
+
+#[test]
+fn package_builds_and_installs_with_cmake_in_both_precisions() {
+    if !has("cmake") {
+        return;
+    }
+    for precision in [Precision::Double, Precision::Single] {
+        let emitted = Emitted::new(&shipped("go1-d2"), precision);
+        let package = emitted.folder().join("ros2_control");
+        let prefix = emitted.scratch.path().join("prefix");
+        let run = |arguments: &[&str]| {
+            succeed(Command::new("cmake").args(arguments).current_dir(&package));
+        };
+        let places = [
+            format!("-DCMAKE_PREFIX_PATH={}", stubs().display()),
+            format!("-DCMAKE_INSTALL_PREFIX={}", prefix.display()),
+            format!("-DCMAKE_CXX_FLAGS={}", WARNINGS[1..].join(" ")),
+        ];
+        let [stubs, installed, warnings] = places.each_ref().map(String::as_str);
+        run(&["-S", ".", "-B", "build", stubs, installed, warnings]);
+        run(&["--build", "build"]);
+        run(&["--install", "build"]);
+        let description = prefix.join("share/go1_d2_ros2_control/plugin.xml");
+        let text = fs::read_to_string(description).expect("installed");
+        assert!(
+            text.contains("<library path=\"go1_d2_ros2_control\">"),
+            "{text}"
+        );
+        assert!(prefix.join("lib/libgo1_d2_ros2_control.so").exists());
+    }
+}

@@ -1,0 +1,309 @@
+// Drives the generated plugin of ros2_control as a controller manager would, on stubs of ROS: along the jump of the
+// generated header, in a world that is turned and shifted, with efforts beside those of the controller in C; with values
+// that are not finite; and with parameters that are refused. usage: drive JUMP.csv
+#include JUMP
+
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <new>
+
+#include "controller.hpp"
+
+#define PASTE_(a, b) a##b
+#define PASTE(a, b) PASTE_(a, b)
+#define FN(suffix) PASTE(NAME, suffix)
+
+using controller_interface::CallbackReturn;
+using controller_interface::ControllerInterface;
+using controller_interface::return_type;
+using hardware_interface::Handle;
+using hardware_interface::LoanedCommandInterface;
+using hardware_interface::LoanedStateInterface;
+
+// Of the stub of pluginlib, in place of its loader.
+std::unique_ptr<ControllerInterface> stub_plugin();
+
+namespace
+{
+long allocations = 0;
+bool is_counted = false;
+}  // namespace
+
+// Not inlined: compilers would see memory of one function freed by another.
+[[gnu::noinline]] void * operator new(std::size_t size)
+{
+    allocations += is_counted;
+    if (void * memory = std::malloc(size)) {
+        return memory;
+    }
+    throw std::bad_alloc();
+}
+
+[[gnu::noinline]] void operator delete(void * memory) noexcept
+{
+    std::free(memory);
+}
+
+[[gnu::noinline]] void operator delete(void * memory, std::size_t) noexcept
+{
+    std::free(memory);
+}
+
+namespace
+{
+
+constexpr std::size_t COUNT = sizeof JUMP_TIME_S / sizeof JUMP_TIME_S[0];
+constexpr int64_t PERIOD_NS = 2'000'000, START_NS = 1'700'000'000'000'000'000;
+constexpr int CALLS = 5;
+constexpr double TURN = 3.1415, AT[2] = {3.0, -7.0}, LIMIT[3] = {23.7, 23.7, 35.55};
+
+void require(bool is_so, const char * what)
+{
+    if (!is_so) {
+        std::fprintf(stderr, "not so: %s\n", what);
+        std::exit(1);
+    }
+}
+
+std::vector<std::string> names(const char * prefix, int count)
+{
+    std::vector<std::string> found;
+    for (int i = 0; i < count; ++i) {
+        found.push_back(prefix + std::to_string(i));
+    }
+    return found;
+}
+
+/// A plugin with the values that its interfaces are loaned of.
+struct Robot
+{
+    std::unique_ptr<ControllerInterface> plugin = stub_plugin();
+    std::vector<Handle> commands, states;
+    int64_t calls = 0;
+
+    explicit Robot(const std::map<std::string, rclcpp::Value> & values = {})
+    {
+        auto & declared = plugin->get_node()->values;
+        declared["joints"] = names("joint", 12);
+        std::vector<std::string> feet;
+        for (const std::string & foot : names("foot", 4)) {
+            feet.push_back(foot + "/contact");
+        }
+        declared["feet"] = feet;
+        for (const auto & [name, value] : values) {
+            declared[name] = value;
+        }
+        require(plugin->on_init() == CallbackReturn::SUCCESS, "on_init");
+    }
+
+    CallbackReturn configure() { return plugin->on_configure({}); }
+
+    CallbackReturn activate(bool in_order = true)
+    {
+        for (const std::string & name : plugin->command_interface_configuration().names) {
+            commands.push_back({name, 99.0});
+        }
+        for (const std::string & name : plugin->state_interface_configuration().names) {
+            states.push_back({name});
+        }
+        if (!in_order) {
+            std::swap(states[0], states[1]);
+        }
+        std::vector<LoanedCommandInterface> loaned_commands;
+        std::vector<LoanedStateInterface> loaned_states;
+        for (Handle & handle : commands) {
+            loaned_commands.emplace_back(handle);
+        }
+        for (const Handle & handle : states) {
+            loaned_states.emplace_back(handle);
+        }
+        plugin->assign_interfaces(std::move(loaned_commands), std::move(loaned_states));
+        return plugin->on_activate({});
+    }
+
+    /// Measures a sample of the jump in a world that is turned and shifted.
+    void measure(std::size_t k)
+    {
+        const double * x = JUMP_X[k];
+        const double * dx = JUMP_DX[k];
+        double values[41];
+        for (int i = 0; i < 12; ++i) {
+            values[2 * i] = x[i];
+            values[2 * i + 1] = dx[i];
+        }
+        const double yaw = x[17] + TURN, sr = std::sin(x[15]), cr = std::cos(x[15]), sp = std::sin(x[16]), cp = std::cos(x[16]);
+        const double hr = 0.5 * x[15], hp = 0.5 * x[16], hy = 0.5 * yaw;
+        values[24] = std::sin(hr) * std::cos(hp) * std::cos(hy) - std::cos(hr) * std::sin(hp) * std::sin(hy);
+        values[25] = std::cos(hr) * std::sin(hp) * std::cos(hy) + std::sin(hr) * std::cos(hp) * std::sin(hy);
+        values[26] = std::cos(hr) * std::cos(hp) * std::sin(hy) - std::sin(hr) * std::sin(hp) * std::cos(hy);
+        values[27] = std::cos(hr) * std::cos(hp) * std::cos(hy) + std::sin(hr) * std::sin(hp) * std::sin(hy);
+        values[28] = dx[15] - dx[17] * sp;
+        values[29] = dx[16] * cr + dx[17] * sr * cp;
+        values[30] = -dx[16] * sr + dx[17] * cr * cp;
+        const double c = std::cos(TURN), s = std::sin(TURN);
+        values[31] = AT[0] + c * x[12] - s * x[13];
+        values[32] = AT[1] + s * x[12] + c * x[13];
+        values[33] = x[14];
+        values[34] = c * dx[12] - s * dx[13];
+        values[35] = s * dx[12] + c * dx[13];
+        values[36] = dx[14];
+        for (int foot = 0; foot < 4; ++foot) {
+            values[37 + foot] = JUMP_FEET[k][foot];
+        }
+        for (std::size_t i = 0; i < states.size(); ++i) {
+            states[i].value = values[i];
+        }
+    }
+
+    return_type update()
+    {
+        // Calls are never quite on time.
+        const int64_t late_ns = 1000 * (calls * 7919 % 100);
+        const rclcpp::Time now(START_NS + calls++ * PERIOD_NS + late_ns);
+        const long before = allocations;
+        is_counted = true;
+        const return_type result = plugin->update(now, rclcpp::Duration(PERIOD_NS));
+        is_counted = false;
+        require(allocations == before, "update allocates nothing");
+        for (std::size_t i = 0; i < 12; ++i) {
+            require(std::abs(commands[i].value) <= LIMIT[i % 3], "efforts are finite and within the limits");
+        }
+        return result;
+    }
+
+    /// Steps and fallbacks, as the plugin reports them on deactivation.
+    std::pair<long, long> deactivate()
+    {
+        require(plugin->on_deactivate({}) == CallbackReturn::SUCCESS, "on_deactivate");
+        for (const Handle & command : commands) {
+            require(!(command.value < 0 || command.value > 0), "no effort after deactivation");
+        }
+        std::pair<long, long> found;
+        require(std::sscanf(plugin->get_node()->last->c_str(), "%ld steps, %ld of", &found.first, &found.second) == 2,
+                "a report");
+        return found;
+    }
+};
+
+/// Efforts along the jump are those of the controller in C with a joint PD; the largest difference, N m.
+double follow_jump(double effectiveness_time_s, bool torque_in_flight)
+{
+    const double stiffness = 20, damping = 0.8;
+    Robot robot({{"effectiveness_time_s", effectiveness_time_s}, {"torque_in_flight", torque_in_flight}});
+    require(robot.configure() == CallbackReturn::SUCCESS, "on_configure");
+    require(robot.activate() == CallbackReturn::SUCCESS, "on_activate");
+    static FN(_controller) beside;
+    FN(_controller_settings) settings = FN(_controller_settings_default)();
+    settings.effectiveness_time_s = effectiveness_time_s;
+    settings.drive_stiffness_nm_rad = stiffness;
+    settings.drive_damping_nm_s_rad = damping;
+    require(FN(_controller_init)(&beside, &settings) == 0
+                && FN(_controller_set_reference_torque)(&beside, COUNT, JUMP_TIME_S, JUMP_X[0], JUMP_DX[0], JUMP_TORQUE[0],
+                                                       JUMP_FEET[0]) == 0,
+            "the controller in C");
+    double worst = 0;
+    for (std::size_t k = 0; k < COUNT; ++k) {
+        FN(_command) command;
+        FN(_controller_step)(&beside, static_cast<double>(k) * settings.step_s, JUMP_X[k], JUMP_DX[k], JUMP_FEET[k], &command);
+        const bool is_grounded = JUMP_FEET[k][0] || JUMP_FEET[k][1] || JUMP_FEET[k][2] || JUMP_FEET[k][3];
+        robot.measure(k);
+        for (int call = 0; call < CALLS; ++call) {
+            require(robot.update() == return_type::OK, "update along the jump");
+            for (std::size_t i = 0; i < 12; ++i) {
+                double effort = is_grounded || torque_in_flight ? command.torque[i] : 0;
+                effort += stiffness * (command.joint_position[i] - JUMP_X[k][i])
+                    + damping * (command.joint_velocity[i] - JUMP_DX[k][i]);
+                effort = std::fmin(std::fmax(effort, -LIMIT[i % 3]), LIMIT[i % 3]);
+                worst = std::fmax(worst, std::abs(effort - robot.commands[i].value));
+            }
+        }
+    }
+    const auto [steps, fallbacks] = robot.deactivate();
+    require(steps == static_cast<long>(COUNT) && fallbacks == 0, "as many steps as samples, all with a plan");
+    return worst;
+}
+
+void survive_undefined_values()
+{
+    Robot robot({{"max_fallbacks", int64_t{6}}});
+    require(robot.configure() == CallbackReturn::SUCCESS && robot.activate() == CallbackReturn::SUCCESS, "activation");
+    robot.measure(0);
+    robot.states[20].value = std::nan("");
+    require(robot.update() == return_type::OK, "a first value that is undefined");
+    require(!(robot.commands[0].value < 0 || robot.commands[0].value > 0), "no effort before a sound measurement");
+    return_type waited = return_type::OK;
+    for (int call = 0; call < 6 * CALLS + 1; ++call) {
+        waited = robot.update();
+    }
+    require(waited == return_type::ERROR, "too long without a sound measurement");
+    std::size_t k = 0;
+    const auto run = [&](std::size_t samples, bool is_sound) {
+        return_type last = return_type::OK;
+        for (std::size_t end = k + samples; k < end; ++k) {
+            robot.measure(k);
+            if (!is_sound) {
+                robot.states[3].value = std::nan("");
+            }
+            for (int call = 0; call < CALLS; ++call) {
+                last = robot.update();
+            }
+        }
+        return last;
+    };
+    require(run(10, true) == return_type::OK, "sound measurements");
+    require(run(6, false) == return_type::OK, "a few fallbacks");
+    require(run(1, false) == return_type::ERROR, "too many fallbacks in a row");
+    require(run(10, true) == return_type::OK, "sound measurements again");
+    robot.calls = 0;
+    require(robot.update() == return_type::ERROR, "a clock that was set back");
+    require(robot.deactivate().second == 7, "fallbacks are counted");
+    require(robot.plugin->get_node()->last->find("not finite") != std::string::npos, "the last fallback is named");
+}
+
+void refuse()
+{
+    const auto faults = [](const char * name, const rclcpp::Value & value, const char * word) {
+        Robot robot({{name, value}});
+        require(robot.configure() == CallbackReturn::FAILURE, name);
+        require(robot.plugin->get_node()->last->find(word) != std::string::npos, word);
+    };
+    faults("joints", names("joint", 11), "12 names");
+    faults("feet", std::vector<std::string>{}, "4 full names");
+    faults("plan_file", std::string("missing.csv"), "missing.csv: cannot be read");
+    faults("plan_file", std::string(__FILE__), "no column");
+    faults("effectiveness_time_s", -1.0, "effectiveness_time_s");
+    faults("body_friction", std::nan(""), "body_friction");
+    faults("stiffness", -2.0, "stiffness");
+    Robot robot;
+    require(robot.configure() == CallbackReturn::SUCCESS, "on_configure");
+    require(robot.activate(false) == CallbackReturn::ERROR, "interfaces in another order");
+}
+
+void load(const std::string & path)
+{
+    Robot robot({{"plan_file", path}});
+    require(robot.configure() == CallbackReturn::SUCCESS, robot.plugin->get_node()->last->c_str());
+    require(robot.activate() == CallbackReturn::SUCCESS, "on_activate with a plan from a file");
+    for (std::size_t k = 0; k < COUNT; ++k) {
+        robot.measure(k);
+        for (int call = 0; call < CALLS; ++call) {
+            require(robot.update() == return_type::OK, "update along a plan from a file");
+        }
+    }
+    require(robot.deactivate().second == 0, "no fallback along a plan from a file");
+}
+
+}  // namespace
+
+int main(int argc, char ** argv)
+{
+    const double trusting = follow_jump(0, false), estimating = follow_jump(1, true);
+    std::printf("efforts within %.1e and, with the estimate, %.1e N m\n", trusting, estimating);
+    require(trusting < 1e-6 && estimating < 1e-6, "efforts are those of the controller in C");
+    survive_undefined_values();
+    refuse();
+    require(argc > 1, "a jump in a file");
+    load(argv[1]);
+    return 0;
+}

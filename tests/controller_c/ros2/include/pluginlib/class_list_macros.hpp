@@ -1,0 +1,12 @@
+// STUB for romc's tests, not ROS: see rclcpp/stub.hpp. A function makes the plugin, where pluginlib has a loader.
+#ifndef ROMC_STUB_PLUGINLIB
+#define ROMC_STUB_PLUGINLIB
+
+#define PLUGINLIB_EXPORT_CLASS(Class, Base) \
+    std::unique_ptr<Base> stub_plugin(); \
+    std::unique_ptr<Base> stub_plugin() \
+    { \
+        return std::make_unique<Class>(); \
+    }
+
+#endif

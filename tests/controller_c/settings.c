@@ -1,0 +1,62 @@
+/* Settings that a generated controller refuses: each is named, and init returns its code. */
+#include HEADER
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define PASTE_(a, b) a##b
+#define PASTE(a, b) PASTE_(a, b)
+#define FN(suffix) PASTE(NAME, suffix)
+
+static int faults;
+
+static void expect(FN(_controller_settings) settings, const char *name)
+{
+    static FN(_controller) controller;
+    const char *found = FN(_controller_refused_setting)(&settings);
+    const int code = FN(_controller_init)(&controller, &settings);
+    const int is_right = name == NULL ? found == NULL && code == 0
+                                      : found != NULL && strncmp(found, name, strlen(name)) == 0
+                                            && code == PASTE(UPPER, _BAD_SETTING);
+    if (!is_right) {
+        printf("%s: found %s, code %d\n", name ? name : "none", found ? found : "none", code);
+        ++faults;
+    }
+}
+
+#define TRY(field, value)                                                                                              \
+    do {                                                                                                               \
+        FN(_controller_settings) changed = FN(_controller_settings_default)();                                         \
+        changed.field = (value);                                                                                       \
+        expect(changed, #field);                                                                                       \
+    } while (0)
+
+int main(void)
+{
+    FN(_controller_settings) settings = FN(_controller_settings_default)();
+    expect(settings, NULL);
+    TRY(horizon, 0);
+    TRY(horizon, PASTE(UPPER, _MAX_HORIZON) + 1);
+    TRY(max_iterations, 0);
+    TRY(lift, 1);
+    TRY(linearisation, 1);
+    TRY(step_s, (double)NAN);
+    TRY(input_weight, 0);
+    TRY(velocity_weight, -1);
+    TRY(terminal_weight, (double)INFINITY);
+    TRY(joint_penalty, 0);
+    TRY(body_friction, -0.5);
+    TRY(effectiveness_time_s, -1);
+    TRY(effectiveness_time_s, (double)NAN);
+    settings.effectiveness_time_s = 1;
+    expect(settings, NULL);
+    settings.drive_stiffness_nm_rad = -1;
+    expect(settings, "drive_stiffness_nm_rad");
+    settings.drive_stiffness_nm_rad = 20;
+    settings.drive_damping_nm_s_rad = (double)NAN;
+    expect(settings, "drive_damping_nm_s_rad");
+    settings.effectiveness_time_s = 0;
+    expect(settings, NULL);
+    return faults > 0;
+}
