@@ -11,8 +11,8 @@ use crate::deploy::controller::texts;
 use crate::mpc::interface::Settings;
 use crate::mpc::problem::{Row, StageRows};
 use crate::mpc::shared::{
-    DEVIATION_FLOOR, EFFECTIVENESS_RANGE, LARGEST_WEIGHT, PRIOR_WEIGHT, SLACK_PRICE, SOFTENED_FROM,
-    STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
+    DEVIATION_FLOOR, EFFECTIVENESS_RANGE, LARGEST_WEIGHT, POSTURE_SHARE, PRIOR_WEIGHT, SLACK_PRICE,
+    SOFTENED_FROM, STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
 };
 use crate::mpc::{ControlModel, FallbackSettings, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
@@ -95,6 +95,7 @@ struct EffectivenessNumbers {
 }
 
 struct ReferenceNumbers {
+    posture_share: f64,
     still_share: f64,
     still_time_s: f64,
     deviation_floor: f64,
@@ -139,6 +140,7 @@ impl<'a> Source<'a> {
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: SolverNumbers::new(precision, mpc.qp.accepted_residual),
             reference: ReferenceNumbers {
+                posture_share: POSTURE_SHARE,
                 still_share: STILL_SHARE,
                 still_time_s: STILL_TIME_S,
                 deviation_floor: DEVIATION_FLOOR,

@@ -35,6 +35,7 @@ mod transcribe;
 pub mod shared {
     pub use super::controller::SOFTENED_FROM;
     pub use super::effectiveness::{LARGEST_WEIGHT, PRIOR_WEIGHT, RANGE as EFFECTIVENESS_RANGE};
+    pub use super::plan::POSTURE_SHARE;
     pub use super::problem::STATE_REACH;
     pub use super::reference::{DEVIATION_FLOOR, STILL_SHARE, STILL_TIME_S};
     pub use super::structured::TOLERANCE;
