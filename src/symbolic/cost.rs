@@ -12,7 +12,7 @@
 use std::collections::HashMap;
 
 use super::intern::BuildIdHasher;
-use super::node::{ExprId, Node};
+use super::node::{ExprId, Function, Node};
 use super::number::Number;
 use super::pool::ExprPool;
 
@@ -86,10 +86,14 @@ impl ExprPool {
                 (factors.iter().map(|operand| factor(*operand))).fold(0, u64::saturating_add)
             }
             Node::Power(base, exponent) => {
+                // The power of exp(x) stands outside parentheses.
+                let power = match self.node(*base) {
+                    Node::Apply(Function::Exp, _) => 1 + PARENTHESES,
+                    _ => 1,
+                };
                 let exponent = match self.as_number(*exponent).and_then(Number::as_integer) {
-                    Some(integer) => {
-                        u64::from(integer.unsigned_abs() != 1) + u64::from(integer < 0)
-                    }
+                    Some(1 | -1) => 1,
+                    Some(integer) => power + u64::from(integer < 0),
                     None => FUNCTION + length_of(*exponent),
                 };
                 factor(*base).saturating_add(exponent)
@@ -140,7 +144,6 @@ fn digits(coefficient: f64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::symbolic::Function;
 
     fn cost(text: &str) -> u64 {
         let mut pool = ExprPool::new();

@@ -12,7 +12,7 @@
 //! | `lexer`, `parse`, `display` | the grammar of candidate terms, both ways |
 //! | `eval`, `interval`, `rounding`, `interval_eval`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `substitute` | derivatives and substitution |
-//! | `expand`, `rational`, `trig`, `rules` | rewriting, each way when asked |
+//! | `expand`, `rational`, `perfect_power`, `trig`, `rules` | rewriting, each way when asked |
 //! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
 //!
@@ -51,6 +51,7 @@ mod node;
 mod number;
 mod order;
 mod parse;
+mod perfect_power;
 mod pool;
 mod power;
 mod rational;

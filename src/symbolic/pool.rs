@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 
 use super::intern::{BuildIdHasher, InternTable};
-use super::node::{ExprId, Node, SymbolId};
+use super::node::{ExprId, Function, Node, SymbolId};
 use super::number::Number;
 use super::order::SymbolKey;
 
@@ -56,6 +56,15 @@ struct Facts {
     grade: u32,
     /// The symbols that occur: bit `i` for symbol `i`, the last bit for all from 63 on.
     symbols: u64,
+    sign: Sign,
+}
+
+/// The values that a node can have, as far as its operands show it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Sign {
+    Any,
+    NonNegative,
+    Positive,
 }
 
 impl Default for ExprPool {
@@ -255,6 +264,11 @@ impl ExprPool {
         self.facts[expr.index()].grade
     }
 
+    /// Whether an expression has no negative values, or none that is zero either.
+    pub(super) fn sign(&self, expr: ExprId) -> Sign {
+        self.facts[expr.index()].sign
+    }
+
     /// The id of a node that is canonical already.
     pub(super) fn intern(&mut self, node: Node) -> ExprId {
         let slot = match self.table.find(&self.nodes, &node) {
@@ -278,6 +292,7 @@ impl ExprPool {
             itself: id,
             grade: self.grade_of(&node),
             symbols: self.symbols_in(&node),
+            sign: self.sign_of(&node),
         };
         self.nodes.push(node);
         self.facts.push(facts);
@@ -298,6 +313,33 @@ impl ExprPool {
             [only] => *only,
             several => self.intern(Node::Product(several.into())),
         })
+    }
+
+    fn sign_of(&self, node: &Node) -> Sign {
+        let of = |operand: &ExprId| self.sign(*operand);
+        match node {
+            Node::Number(number) if number.is_negative() => Sign::Any,
+            Node::Number(number) if number.is_zero() => Sign::NonNegative,
+            Node::Number(_) | Node::Apply(Function::Exp, _) => Sign::Positive,
+            Node::Symbol(_) => Sign::Any,
+            Node::Sum(terms) => match terms.iter().map(of).min() {
+                Some(Sign::NonNegative) if terms.iter().map(of).max() == Some(Sign::Positive) => {
+                    Sign::Positive
+                }
+                least => least.unwrap_or(Sign::NonNegative),
+            },
+            Node::Product(factors) => factors.iter().map(of).min().unwrap_or(Sign::Positive),
+            Node::Power(base, exponent) => match self.as_number(*exponent) {
+                Some(number) if number.is_even() || number.as_integer().is_none() => {
+                    of(base).max(Sign::NonNegative)
+                }
+                _ => of(base),
+            },
+            Node::Apply(Function::Abs | Function::Sqrt, argument) => {
+                of(argument).max(Sign::NonNegative)
+            }
+            Node::Apply(..) => Sign::Any,
+        }
     }
 
     fn symbols_in(&self, node: &Node) -> u64 {

@@ -3,7 +3,7 @@
 use super::node::{ExprId, Function, Node, Parity};
 use super::number::{Number, gcd_short};
 use super::order::Exponent;
-use super::pool::ExprPool;
+use super::pool::{ExprPool, Sign};
 
 /// Trial divisors for square factors under a root: `sqrt(8) = 2*sqrt(2)`.
 const SQUARE_FACTOR_LIMIT: i64 = 1_000;
@@ -216,7 +216,7 @@ impl ExprPool {
     }
 
     /// `function(argument)`, with the values and symmetries that need no rounding:
-    /// `sin(0) = 0`, `cos(-x) = cos(x)`, `log(exp(x)) = x`, `abs(-2) = 2`.
+    /// `sin(0) = 0`, `cos(-x) = cos(abs(x)) = cos(x)`, `log(exp(x)) = x`, `abs(-2) = 2`.
     ///
     /// `sin(1)` and `sin(0.5)` stay symbolic: sines are not the same to the last bit everywhere.
     pub fn apply(&mut self, function: Function, argument: ExprId) -> ExprId {
@@ -243,10 +243,13 @@ impl ExprPool {
         match (function, self.node(argument)) {
             (Function::Sin | Function::Tan | Function::Tanh, _) if is_zero => Some(ExprId::ZERO),
             (Function::Cos | Function::Exp, _) if is_zero => Some(ExprId::ONE),
+            (Function::Cos, &Node::Apply(Function::Abs, inner)) => {
+                Some(self.apply(Function::Cos, inner))
+            }
             (Function::Log, _) if argument == ExprId::ONE => Some(ExprId::ZERO),
             (Function::Log, &Node::Apply(Function::Exp, inner))
             | (Function::Exp, &Node::Apply(Function::Log, inner)) => Some(inner),
-            (Function::Abs, _) if self.is_non_negative(argument) => Some(argument),
+            (Function::Abs, _) if self.sign(argument) != Sign::Any => Some(argument),
             (Function::Abs, _) => {
                 let (coefficient, rest) = self.split(argument);
                 if coefficient.is_one() {
@@ -260,7 +263,7 @@ impl ExprPool {
                 Some(number) if number.is_negative() => Some(self.integer(-1)),
                 Some(_) => Some(ExprId::ONE),
                 None => match self.node(argument) {
-                    Node::Apply(Function::Exp, _) => Some(ExprId::ONE),
+                    _ if self.sign(argument) == Sign::Positive => Some(ExprId::ONE),
                     Node::Apply(Function::Sign, _) => Some(argument),
                     _ => {
                         let (coefficient, rest) = self.split(argument);
@@ -272,26 +275,6 @@ impl ExprPool {
                 },
             },
             _ => None,
-        }
-    }
-
-    /// Whether an expression obviously has no negative values: its top level says so.
-    pub(super) fn is_non_negative(&self, expr: ExprId) -> bool {
-        match self.node(expr) {
-            Node::Number(number) => !number.is_negative(),
-            Node::Apply(Function::Abs | Function::Exp | Function::Sqrt, _) => true,
-            Node::Power(base, exponent) => match self.as_number(*exponent) {
-                Some(number) => {
-                    number.is_even()
-                        || number.as_integer().is_none()
-                        || matches!(
-                            self.node(*base),
-                            Node::Apply(Function::Abs | Function::Exp | Function::Sqrt, _)
-                        )
-                }
-                None => false,
-            },
-            Node::Symbol(_) | Node::Sum(_) | Node::Product(_) | Node::Apply(..) => false,
         }
     }
 }

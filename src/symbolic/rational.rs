@@ -6,6 +6,7 @@ use super::expand::{MAX_TERMS, Terms};
 use super::node::{ExprId, Node};
 use super::number::Number;
 use super::order::Exponent;
+use super::perfect_power::add;
 use super::pool::ExprPool;
 
 /// Most steps of one polynomial division.
@@ -14,7 +15,7 @@ const MAX_STEPS: usize = 500;
 const MAX_DENOMINATORS: usize = 12;
 
 /// Exact coefficients by the exponents of common bases.
-type Monomials = BTreeMap<Vec<i64>, Number>;
+pub(super) type Monomials = BTreeMap<Vec<i64>, Number>;
 
 impl ExprPool {
     /// The terms of a sum over one common denominator, with the numerator multiplied out and
@@ -65,7 +66,7 @@ impl ExprPool {
     }
 
     /// The factors of a term as powers with constant exponents.
-    fn numeric_powers(&self, rest: ExprId) -> Vec<(ExprId, Number)> {
+    pub(super) fn numeric_powers(&self, rest: ExprId) -> Vec<(ExprId, Number)> {
         self.factors_of(rest)
             .iter()
             .filter_map(|factor| match self.base_and_exponent(*factor) {
@@ -101,12 +102,7 @@ impl ExprPool {
     /// integer powers, and the division leaves no remainder.
     fn divide_exactly(&mut self, dividend: ExprId, divisor: ExprId) -> Option<ExprId> {
         let (dividend, divisor) = (self.terms_of(dividend), self.terms_of(divisor));
-        let mut bases: Vec<ExprId> = Vec::new();
-        for (_, rest) in dividend.iter().chain(&divisor) {
-            bases.extend(self.numeric_powers(*rest).into_iter().map(|(base, _)| base));
-        }
-        bases.sort_by(|a, b| self.compare(*a, *b));
-        bases.dedup();
+        let bases = bases_of(self, dividend.iter().chain(&divisor));
         let mut remainder = self.monomials(&dividend, &bases)?;
         let divisor = self.monomials(&divisor, &bases)?;
         let (leading, leading_coefficient) = divisor.last_key_value()?;
@@ -122,12 +118,7 @@ impl ExprPool {
             let factor = coefficient.checked_div(*leading_coefficient)?;
             for (exponents, coefficient) in &divisor {
                 let place: Vec<i64> = exponents.iter().zip(&step).map(|(a, b)| a + b).collect();
-                let product = coefficient.checked_mul(factor)?;
-                let entry = remainder.entry(place.clone()).or_insert(Number::ZERO);
-                *entry = entry.checked_add(-product).filter(|sum| sum.is_exact())?;
-                if entry.is_zero() {
-                    remainder.remove(&place);
-                }
+                add(&mut remainder, place, -coefficient.checked_mul(factor)?)?;
             }
             quotient.insert(step, factor);
         }
@@ -136,7 +127,7 @@ impl ExprPool {
 
     /// Terms by exponents; `None` for floats, numeric roots and powers that are not positive
     /// integers.
-    fn monomials(&self, terms: &Terms, bases: &[ExprId]) -> Option<Monomials> {
+    pub(super) fn monomials(&self, terms: &Terms, bases: &[ExprId]) -> Option<Monomials> {
         let mut monomials = Monomials::new();
         for (coefficient, rest) in terms {
             let powers = self.numeric_powers(*rest);
@@ -158,7 +149,7 @@ impl ExprPool {
         Some(monomials)
     }
 
-    fn sum_of_monomials(&mut self, monomials: &Monomials, bases: &[ExprId]) -> ExprId {
+    pub(super) fn sum_of_monomials(&mut self, monomials: &Monomials, bases: &[ExprId]) -> ExprId {
         let mut terms = Vec::with_capacity(monomials.len());
         for (exponents, coefficient) in monomials {
             let powers: Vec<ExprId> = bases
@@ -171,6 +162,18 @@ impl ExprPool {
         }
         self.sum(&terms)
     }
+}
+
+/// The bases of the powers in some terms, in canonical order.
+pub(super) fn bases_of<'t>(
+    pool: &ExprPool,
+    terms: impl IntoIterator<Item = &'t (Number, ExprId)>,
+) -> Vec<ExprId> {
+    let powers = (terms.into_iter()).flat_map(|(_, rest)| pool.numeric_powers(*rest));
+    let mut bases: Vec<ExprId> = powers.map(|(base, _)| base).collect();
+    bases.sort_by(|a, b| pool.compare(*a, *b));
+    bases.dedup();
+    bases
 }
 
 #[cfg(test)]

@@ -10,12 +10,14 @@
 //! | `n*log(a) + m*log(b)` | `log(a^n*b^m)` for small integers `n`, `m` up to a common factor |
 //! | `abs(a*b)`, `abs(a)^2`, `abs(a)*sign(a)` | `abs(a)*abs(b)`, `a^2`, `a` |
 //! | `sign(a)*a`, `sign(a)^3` | `abs(a)`, `sign(a)` |
-//! | `sqrt(a)*sqrt(b)` | `sqrt(a*b)` |
+//! | `sqrt(a)*sqrt(b)`, `sqrt(exp(a))` | `sqrt(a*b)`, `exp(a/2)` |
+//! | `1/(a^2 + a*b)` | `1/(a*(a + b))` |
 //!
 //! | fewer calls | |
 //! |---|---|
 //! | `sin(a)/cos(a)` | `tan(a)` |
-//! | `abs(a)*abs(b)` | `abs(a*b)` |
+//! | `abs(a)*abs(b)`, `abs(a)/a` | `abs(a*b)`, `sign(a)` |
+//! | `(exp(a) - exp(b))/(exp(a) + exp(b))` | `tanh((a - b)/2)` |
 
 use super::node::{ExprId, Function, Node};
 use super::number::Number;
@@ -32,7 +34,15 @@ impl ExprPool {
             Node::Apply(Function::Log, argument) => self.split_log(argument).unwrap_or(expr),
             Node::Apply(Function::Exp, argument) => self.split_exp(argument).unwrap_or(expr),
             Node::Apply(Function::Abs, argument) => self.split_abs(argument).unwrap_or(expr),
+            Node::Apply(Function::Sqrt, argument) => match *self.node(argument) {
+                Node::Apply(Function::Exp, exponent) => {
+                    let half = self.scale(Number::HALF, exponent);
+                    self.apply(Function::Exp, half)
+                }
+                _ => expr,
+            },
             Node::Product(_) | Node::Power(..) => {
+                let expr = self.split_divisor(expr);
                 let expr = self.merge_exponentials(expr);
                 let expr = self.merge_signs(expr);
                 self.merge_roots(expr)
@@ -47,7 +57,9 @@ impl ExprPool {
         match self.node(expr) {
             Node::Product(_) => {
                 let expr = self.merge_tangents(expr);
-                self.merge_abs(expr)
+                let expr = self.merge_hyperbolic_tangent(expr);
+                let expr = self.merge_abs(expr);
+                self.abs_to_sign(expr)
             }
             Node::Number(_)
             | Node::Symbol(_)
@@ -131,6 +143,52 @@ impl ExprPool {
         (product != whole).then_some(product)
     }
 
+    /// `1/(a^2 + a*b) = 1/(a*(a + b))`, also with the least negative powers in front.
+    fn split_divisor(&mut self, expr: ExprId) -> ExprId {
+        let (base, Exponent::Number(exponent)) = self.base_and_exponent(expr) else {
+            return expr;
+        };
+        if !exponent.is_negative() || exponent.as_integer().is_none() {
+            return expr;
+        }
+        let Node::Sum(terms) = self.node(base) else {
+            return expr;
+        };
+        let terms = terms.to_vec();
+        let mut shared: Vec<(ExprId, Number)> = Vec::new();
+        let powers: Vec<Vec<(ExprId, Number)>> = (terms.iter())
+            .map(|term| self.numeric_powers(*term))
+            .collect();
+        for &(factor, _) in powers.iter().flatten() {
+            let of_term = |powers: &Vec<(ExprId, Number)>| {
+                let found = powers.iter().find(|(base, _)| *base == factor);
+                found.map_or(Number::ZERO, |(_, exponent)| *exponent)
+            };
+            let least =
+                (powers.iter().map(of_term)).min_by(|a, b| a.to_f64().total_cmp(&b.to_f64()));
+            match least.filter(|least| !least.is_zero() && least.as_integer().is_some()) {
+                Some(least) if !shared.contains(&(factor, least)) => shared.push((factor, least)),
+                _ => {}
+            }
+        }
+        if shared.is_empty() {
+            return expr;
+        }
+        let divisor: Vec<ExprId> = (shared.into_iter())
+            .map(|(factor, least)| self.pow_number(factor, -least))
+            .collect();
+        let divisor = self.product(&divisor);
+        let rest: Vec<ExprId> = (terms.into_iter())
+            .map(|term| self.mul(term, divisor))
+            .collect();
+        let rest = self.sum(&rest);
+        let parts = [
+            self.pow_number(rest, exponent),
+            self.pow_number(divisor, -exponent),
+        ];
+        self.product(&parts)
+    }
+
     fn merge_exponentials(&mut self, expr: ExprId) -> ExprId {
         let mut exponents = Vec::new();
         let mut others = Vec::new();
@@ -212,8 +270,7 @@ impl ExprPool {
         for factor in self.factors_of(expr).to_vec() {
             match self.base_and_exponent(factor) {
                 (base, Exponent::Number(exponent))
-                    if matches!(exponent.as_rational(), Some((_, 2)))
-                        && self.as_number(base).is_none() =>
+                    if matches!(exponent.as_rational(), Some((_, 2))) =>
                 {
                     inside.push(base);
                     let whole = exponent.checked_add(-Number::HALF).unwrap_or(Number::ZERO);
@@ -269,6 +326,76 @@ impl ExprPool {
         let product = self.product(&inside);
         outside.push(self.apply(Function::Abs, product));
         self.product(&outside)
+    }
+
+    /// `abs(a)/a = sign(a)`.
+    fn abs_to_sign(&mut self, expr: ExprId) -> ExprId {
+        let factors = self.factors_of(expr).to_vec();
+        for (place, &factor) in factors.iter().enumerate() {
+            let Some((Function::Abs, argument, 1)) = self.function_power(factor) else {
+                continue;
+            };
+            let is_divisor = |factor: &ExprId| match self.base_and_exponent(*factor) {
+                (base, Exponent::Number(number)) => {
+                    base == argument && number.is_negative() && number.as_integer().is_some()
+                }
+                (_, Exponent::Expr(_)) => false,
+            };
+            if factors.iter().any(is_divisor) {
+                let mut merged = factors.clone();
+                merged[place] = self.apply(Function::Sign, argument);
+                merged.push(argument);
+                return self.product(&merged);
+            }
+        }
+        expr
+    }
+
+    /// `(exp(a) - exp(b))/(exp(a) + exp(b)) = tanh((a - b)/2)`, where `1` is `exp(0)`.
+    fn merge_hyperbolic_tangent(&mut self, expr: ExprId) -> ExprId {
+        let factors = self.factors_of(expr).to_vec();
+        for (above, &top) in factors.iter().enumerate() {
+            let Some([(first, a), (second, b)]) = self.two_exponentials(top) else {
+                continue;
+            };
+            let Some((below, unit)) = factors.iter().enumerate().find_map(|(below, factor)| {
+                let (base, Exponent::Number(Number::MINUS_ONE)) = self.base_and_exponent(*factor)
+                else {
+                    return None;
+                };
+                let [(unit, c), (other, d)] = self.two_exponentials(base)?;
+                (unit == other && [a, b] == [c, d]).then_some((below, unit))
+            }) else {
+                continue;
+            };
+            let Some(scale) = first.checked_div(unit).filter(|_| first == -second) else {
+                continue;
+            };
+            let difference = self.sub(a, b);
+            let half = self.scale(Number::HALF, difference);
+            let tangent = self.apply(Function::Tanh, half);
+            let mut merged = factors.clone();
+            merged[above] = self.scale(scale, tangent);
+            merged[below] = ExprId::ONE;
+            return self.product(&merged);
+        }
+        expr
+    }
+
+    /// Coefficients and exponents of a sum of two exponentials, of which one may be a number.
+    fn two_exponentials(&self, expr: ExprId) -> Option<[(Number, ExprId); 2]> {
+        let Node::Sum(terms) = self.node(expr) else {
+            return None;
+        };
+        let exponential = |term: ExprId| match (self.split(term), self.node(self.split(term).1)) {
+            ((number, ExprId::ONE), _) => Some((number, ExprId::ZERO)),
+            ((number, _), Node::Apply(Function::Exp, exponent)) => Some((number, *exponent)),
+            _ => None,
+        };
+        match terms[..] {
+            [a, b] => Some([exponential(a)?, exponential(b)?]),
+            _ => None,
+        }
     }
 
     /// Adds logarithms that have the same cofactor and coefficients in small integer ratios.
@@ -360,6 +487,11 @@ mod tests {
             ("sign(a)^2", "sign(a)^2"),
             ("sqrt(a)*sqrt(b)", "sqrt(a*b)"),
             ("sqrt(a)^3/sqrt(b)", "a*sqrt(a*b)/b"),
+            ("sqrt(2)*sqrt(2*a)*b", "2*sqrt(a)*b"),
+            ("sqrt(exp(a))", "exp(1/2*a)"),
+            ("b/(a^2 + a*b)", "b/(a*(a + b))"),
+            ("1/(1/a + 1/b)", "a*b/(a + b)"),
+            ("1/(a + b)", "1/(a + b)"),
         ] {
             assert_eq!(rewritten(text, ExprPool::normal_rules), expected, "{text}");
         }
@@ -373,6 +505,10 @@ mod tests {
             ("cos(a)/sin(a)", "1/tan(a)"),
             ("sin(a)*cos(a)", "sin(a)*cos(a)"),
             ("abs(a)*abs(b)*c", "c*abs(a*b)"),
+            ("abs(a)*b/a", "b*sign(a)"),
+            ("(exp(a) - exp(-a))/(exp(a) + exp(-a))", "tanh(a)"),
+            ("b*(1 - exp(-2*a))/(2 + 2*exp(-2*a))", "1/2*b*tanh(a)"),
+            ("(exp(a) - 1)/(exp(a) + 2)", "-(1 - exp(a))/(2 + exp(a))"),
         ] {
             assert_eq!(rewritten(text, ExprPool::compact_rules), expected, "{text}");
         }

@@ -3,7 +3,7 @@
 //! A region (see `region.rs`) is brought to a normal form, in which equal expressions tend to
 //! coincide: multiplied out, angles expanded, sines reduced to cosines, exponentials and
 //! logarithms merged, over a common denominator. From it a few shorter forms are derived: with
-//! sines for cosines angle by angle, with angles combined. The one with the least
+//! sines for cosines angle by angle, with angles combined, with sums as powers. The one with the least
 //! [`cost`](ExprPool::cost) replaces the region, if it is shorter than what was there.
 //!
 //! **Termination.** Every accepted step lowers the cost, a natural number. The work of one step
@@ -20,6 +20,8 @@
 use super::cost::Costs;
 use super::expand::MAX_PRODUCTS;
 use super::node::{ExprId, Function, Node};
+use super::number::Number;
+use super::order::Exponent;
 use super::pool::ExprPool;
 
 /// Most angles whose squares are tried both as sines and as cosines.
@@ -69,7 +71,10 @@ impl ExprPool {
             plain.extend(self.with_sines(normal, budget));
             plain.push(self.combine_angles(normal));
         }
-        plain.push(self.expand_region(region, budget));
+        plain.push(self.rewrite_region(normal, |pool, node| pool.shorter_sums(node, budget)));
+        let expanded = self.expand_region(region, budget);
+        plain.extend(self.as_power(expanded));
+        plain.push(expanded);
         plain.push(region);
         let mut forms = Vec::new();
         for form in plain {
@@ -82,6 +87,47 @@ impl ExprPool {
             }
         }
         forms
+    }
+
+    /// A sum, or a product of divisors such as `(1 - x)*(1 + x)`, with fewer terms.
+    fn shorter_sums(&mut self, expr: ExprId, budget: &mut usize) -> ExprId {
+        match self.node(expr) {
+            Node::Sum(_) => self.shorter_sum(expr, budget),
+            Node::Product(factors) => {
+                let is_divisor = |factor: &ExprId| {
+                    let (base, exponent) = self.base_and_exponent(*factor);
+                    let is_sum = matches!(self.node(base), Node::Sum(_));
+                    is_sum && exponent == Exponent::Number(Number::MINUS_ONE)
+                };
+                let (divisors, mut rest): (Vec<ExprId>, Vec<ExprId>) =
+                    factors.iter().partition(|factor| is_divisor(factor));
+                let sums: Vec<ExprId> = (divisors.iter())
+                    .map(|factor| self.base_and_exponent(*factor).0)
+                    .collect();
+                let product = self.product(&sums);
+                let product = self.expand_region(product, budget);
+                let product = self.shorter_sum(product, budget);
+                let n_terms = |expr: &ExprId| self.terms_of(*expr).len();
+                if n_terms(&product) >= sums.iter().map(n_terms).sum() {
+                    return expr;
+                }
+                rest.push(self.powi(product, -1));
+                self.product(&rest)
+            }
+            Node::Number(_) | Node::Symbol(_) | Node::Power(..) | Node::Apply(..) => expr,
+        }
+    }
+
+    /// A sum as a power, or with sines for cosines, if it has fewer terms then.
+    fn shorter_sum(&mut self, sum: ExprId, budget: &mut usize) -> ExprId {
+        if !matches!(self.node(sum), Node::Sum(_)) {
+            return sum;
+        }
+        let mut forms = self.with_sines(sum, budget);
+        forms.extend(self.as_power(sum));
+        let n_terms = |pool: &ExprPool, form| pool.terms_of(form).len();
+        let shorter = forms.into_iter().min_by_key(|form| n_terms(self, *form));
+        (shorter.filter(|form| n_terms(self, *form) < n_terms(self, sum))).unwrap_or(sum)
     }
 
     /// The forms that have sines instead of cosines of some of the angles with squares.

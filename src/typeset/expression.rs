@@ -120,7 +120,7 @@ impl Layout<'_> {
     fn sum(&self, terms: &[ExprId]) -> Result<Signed, UnknownSymbol> {
         let mut order: Vec<ExprId> = terms.to_vec();
         order.sort_by(|a, b| self.compare_terms(*a, *b));
-        let terms = order
+        let mut terms: Vec<Signed> = order
             .into_iter()
             .map(|term| {
                 let signed = self.signed(term)?;
@@ -132,6 +132,10 @@ impl Layout<'_> {
                 Ok(Signed { math, ..signed })
             })
             .collect::<Result<_, UnknownSymbol>>()?;
+        // z_1 - 1 rather than -1 + z_1.
+        if let Some(positive) = terms.iter().position(|term| !term.negative) {
+            terms[..=positive].rotate_right(1);
+        }
         Ok(Signed::plus(Math::Sum(terms)))
     }
 
@@ -185,6 +189,10 @@ impl Layout<'_> {
                     parts.top.push(factor);
                 }
             }
+        }
+        if parts.negative {
+            let mut factors = parts.top.iter_mut().chain(&mut parts.bottom);
+            parts.negative = !factors.any(|(_, factor)| turn_difference(factor));
         }
         Ok(parts.assemble())
     }
@@ -377,6 +385,27 @@ impl Quotient {
             math,
         }
     }
+}
+
+/// Changes the sign of `(1 - z_1)`, which is then `(z_1 - 1)`; other factors stay.
+fn turn_difference(factor: &mut Math) -> bool {
+    let Math::Group(inner) = factor else {
+        return false;
+    };
+    let Math::Sum(terms) = inner.as_mut() else {
+        return false;
+    };
+    let is_constant = |term: &Signed| matches!(term.math, Math::Number(_));
+    let is_difference = terms[0].negative != terms[1].negative
+        && is_constant(&terms[0])
+        && terms[1..].iter().all(|term| term.negative);
+    if is_difference {
+        terms.rotate_left(1);
+        terms
+            .iter_mut()
+            .for_each(|term| term.negative = !term.negative);
+    }
+    is_difference
 }
 
 /// A function in parentheses; bars and roots show themselves where they end.

@@ -102,7 +102,7 @@ fn unreadable_files_exit_with_2_and_name_the_place() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(
         folder.path().join("a.tex"),
-        "\\[\\ddot z_1 = \\sinh z_1\\]\n",
+        "\\[\\ddot z_1 = \\arcsin z_1\\]\n",
     )
     .expect("written");
     fs::write(folder.path().join("b.txt"), "ddz1 = z1").expect("written");
@@ -111,7 +111,7 @@ fn unreadable_files_exit_with_2_and_name_the_place() {
     for (arguments, message) in [
         (
             vec!["a.tex", "b.txt"],
-            "error: a.tex:1:15: found `\\sinh`, expected",
+            "error: a.tex:1:15: found `\\arcsin`, expected",
         ),
         (
             vec!["b.txt", "c.npz"],

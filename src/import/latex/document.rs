@@ -10,7 +10,9 @@ use super::token::{Kind, Token};
 const MAX_EXPANDED: usize = 200_000;
 /// Environments of mathematics of their own.
 const DISPLAYS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath \
-    dgroup cases dcases aligned alignedat split gathered";
+    dgroup cases dcases aligned alignedat split gathered IEEEeqnarray";
+/// Environments that begin with an argument: a number of columns, or what each column is.
+pub(super) const WITH_COLUMNS: &str = "alignat alignedat array IEEEeqnarray";
 /// Environments whose contents are no LaTeX.
 const VERBATIM: &str = "verbatim Verbatim lstlisting minted comment filecontents";
 
@@ -51,6 +53,9 @@ pub(super) fn items(file: &str, tokens: &[Token]) -> Result<Vec<Item>, ImportErr
                 continue;
             }
             Kind::Begin(name) if is_one_of(DISPLAYS, name) => {
+                if is_one_of(WITH_COLUMNS, name) && scanner.peek() == Some(&Kind::Open) {
+                    scanner.argument();
+                }
                 Some(scanner.until(token, &Kind::End(name.clone()), Some(&token.kind))?)
             }
             Kind::Begin(name) if is_one_of(VERBATIM, name) => {

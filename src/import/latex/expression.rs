@@ -18,7 +18,21 @@ impl Reader<'_> {
         (self.end, self.depth) = (end, depth);
         let symbol = symbol.ok().flatten().filter(|symbol| symbol.dots == 2)?;
         self.skip_time();
-        self.character('=').then_some((symbol, self.at))
+        self.relation().then_some((symbol, self.at))
+    }
+
+    /// `=`, or what is written for it where something is defined or was rounded.
+    fn relation(&mut self) -> bool {
+        const NAMES: [&str; 6] = [
+            "coloneqq",
+            "coloneq",
+            "triangleq",
+            "equiv",
+            "approx",
+            "simeq",
+        ];
+        self.character(':');
+        self.character('=') || NAMES.iter().any(|name| self.command(name))
     }
 
     /// Latent coordinate of a left side, from 0.

@@ -11,7 +11,7 @@ pub(super) const MAX_DEPTH: usize = 60;
 pub(super) const INVISIBLE: &str = ", ; : ! > quad qquad enspace thinspace medspace thickspace negthinspace \
     displaystyle textstyle scriptstyle limits nolimits nonumber notag allowbreak nobreak \
     allowdisplaybreaks hfill hfil mathstrut strut relax big Big bigg Bigg centering noindent par \
-    smallskip medskip bigskip";
+    smallskip medskip bigskip IEEEyesnumber IEEEnonumber IEEEeqnarraynumspace";
 pub(super) const INVISIBLE_WITH_ARGUMENT: &str =
     "tag hspace vspace mspace hskip phantom hphantom vphantom color cline";
 /// Commands that only choose a font.

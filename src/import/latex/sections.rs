@@ -2,14 +2,14 @@
 
 use super::super::equations::{Section, Sections, complete, refused, text_of};
 use super::super::error::ImportError;
-use super::document::{Item, is_one_of, items};
+use super::document::{Item, WITH_COLUMNS, is_one_of, items};
 use super::names::SymbolNames;
 use super::reader::{Digits, Reader};
 use super::token::{Kind, Token, of_markdown, of_tex};
 
 /// Environments that only arrange lines.
 const LAYOUTS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath dgroup \
-    cases dcases aligned alignedat split gathered subequations";
+    cases dcases aligned alignedat split gathered subequations IEEEeqnarray";
 
 /// Reads the equations of a document.
 ///
@@ -94,22 +94,34 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
     while let Some(token) = tokens.get(at) {
         at += 1;
         match &token.kind {
-            Kind::Begin(name) if is_one_of(LAYOUTS, name) => {
+            Kind::Begin(name)
+                if is_one_of(LAYOUTS, name) || name == "array" && has_left_side(&tokens[at..]) =>
+            {
                 open.push(token);
                 if flat.len() >= 2 && flat[flat.len() - 2].is_command("left") {
                     flat.truncate(flat.len() - 2);
                 }
-                if name.starts_with("alignat") || name.starts_with("alignedat") {
-                    at += 3 * usize::from(tokens.get(at).is_some_and(|t| t.kind == Kind::Open));
-                } else if tokens
-                    .get(at)
-                    .is_some_and(|t| t.kind == Kind::Character('['))
-                {
+                let kind = |at: usize| tokens.get(at).map(|token| &token.kind);
+                if kind(at) == Some(&Kind::Character('[')) {
                     // A vertical position such as [t].
                     at += 3;
                 }
+                if is_one_of(WITH_COLUMNS, name) && kind(at) == Some(&Kind::Open) {
+                    let mut depth = 0;
+                    while let Some(kind) = kind(at) {
+                        depth += usize::from(*kind == Kind::Open);
+                        depth -= usize::from(*kind == Kind::Close);
+                        at += 1;
+                        if depth == 0 {
+                            break;
+                        }
+                    }
+                }
             }
-            Kind::End(name) if is_one_of(LAYOUTS, name) => {
+            Kind::End(name)
+                if is_one_of(LAYOUTS, name)
+                    || name == "array" && open.last().is_some_and(|t| is_array(t)) =>
+            {
                 if open.pop().map(|begin| &begin.kind) != Some(&Kind::Begin(name.clone())) {
                     let expected = "environments that end in the order in which they begin";
                     return Err(refused(
@@ -143,6 +155,17 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
             ))
         }
     }
+}
+
+fn is_array(token: &Token) -> bool {
+    token.kind == Kind::Begin("array".to_owned())
+}
+
+/// Whether the environment whose contents begin here has equations in it, and is no matrix.
+fn has_left_side(contents: &[Token]) -> bool {
+    let end = Kind::End("array".to_owned());
+    let inside = contents.iter().take_while(|token| token.kind != end);
+    inside.into_iter().any(|token| token.is_command("ddot"))
 }
 
 struct Document<'d> {
@@ -204,7 +227,12 @@ impl Document<'_> {
         }
         if left_sides.is_empty() {
             if self.strange.is_none() {
-                self.strange = strange;
+                let token = tokens.iter().find(|token| token.is_command("ddot"));
+                let unequal = token.map(|token| {
+                    let found = "`\\ddot` without `=` behind its variable".to_owned();
+                    (token.clone(), found)
+                });
+                self.strange = strange.or(unequal);
             }
             return Ok(());
         }
@@ -295,12 +323,15 @@ impl Document<'_> {
                     .equations
                     .iter()
                     .any(|equation| equation.output == output);
-                let other_label = self.phase.is_none() && label.is_some() && label != open.phase;
+                let is_known = label
+                    .as_ref()
+                    .is_some_and(|label| self.known.contains(label));
+                let other_label = self.phase.is_none() && is_known && label != open.phase;
                 named.is_some() || repeats || other_label
             }
         };
         if is_new {
-            let named = named.or(label.filter(|_| self.phase.is_none()));
+            let named = named.or(label.clone().filter(|_| self.phase.is_none()));
             if let Some(earlier) =
                 (self.sections.iter()).find(|section| named.is_some() && section.phase == named)
             {
@@ -320,9 +351,12 @@ impl Document<'_> {
                 equations: Vec::new(),
             });
         }
-        Ok(self
-            .sections
-            .last_mut()
-            .expect("one was just made if there was none"))
+        let section = (self.sections.last_mut()).expect("one was just made if there was none");
+        let is_known = |name: &String| self.known.contains(name);
+        if self.phase.is_none() && label.is_some() && label != section.phase {
+            // Labels that name single equations do not name their phase.
+            section.phase.take_if(|name| !is_known(name));
+        }
+        Ok(section)
     }
 }

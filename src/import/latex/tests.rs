@@ -96,6 +96,23 @@ fn constructs_mean_what_they_print() {
             "z1^2 + z1^(-2) + sqrt(z1)",
         ),
         (r"- - z_1 + -z_2", "z1 - z2"),
+        (
+            r"\sec z_1 + \csc^2(z_2) + 2\cot(2 z_1)",
+            "1/cos(z1) + 1/sin(z2)^2 + 2/tan(2*z1)",
+        ),
+        (
+            r"\sinh(z_1 + 1) + \cosh^2 z_2",
+            "(exp(z1 + 1) - exp(-(z1 + 1)))/2 + ((exp(z2) + exp(-z2))/2)^2",
+        ),
+        (
+            r"0.75 sin(\dot z_1) + cos^2(z_1) - tanh\left(z_2\right)",
+            "0.75*sin(dz1) + cos(z1)^2 - tanh(z2)",
+        ),
+        (
+            "ż₁ − z₂² + u_1·z₁⁻¹ + 1.5e−3 z\u{307}₂",
+            "dz1 - z2^2 + u1/z1 + 0.0015*dz2",
+        ),
+        (r"0{,}36 z_1 + 12{,}5", "12.5 + 0.36*z1"),
     ] {
         let mut pool = ExprPool::new();
         let expected = pool.parse(expected, &|_| true).expect(expected);
@@ -110,7 +127,8 @@ fn constructs_mean_what_they_print() {
 #[test]
 fn unreadable_constructs_are_named_with_their_place() {
     for (latex, line, column, found) in [
-        (r"z_1 + \sinh z_1", 1, 19, r"`\sinh`"),
+        (r"z_1 + \arcsin z_1", 1, 19, r"`\arcsin`"),
+        (r"cosec(z_1)", 1, 13, "`c`"),
         (r"\sin z_1 u_1", 1, 22, "`u`"),
         (r"\sin 2 \cdot z_1", 1, 20, r"`\cdot`"),
         (r"z_1/z_2 u_1", 1, 21, "`u`"),
@@ -125,7 +143,7 @@ fn unreadable_constructs_are_named_with_their_place() {
         (r"\begin{array}{l} 1 \end{array}", 1, 13, r"`\begin{array}`"),
         (r"z_1 \pm 1", 1, 17, r"`\pm`"),
         (r"\sin^{-1} z_1", 1, 19, "`-`"),
-        (r"0{,}36", 1, 15, "`,`"),
+        (r"1{,}500 z_1", 1, 15, "`,`"),
         (r"z_1^2^3", 1, 18, "`^`"),
         (r"z_1'", 1, 16, "`'`"),
         (r"{z_1 + 1} u_1", 1, 18, "`+`"),
@@ -142,6 +160,28 @@ fn unreadable_constructs_are_named_with_their_place() {
         let start = format!(":{line}:{column}: found {found}, expected ");
         assert!(error.to_string().contains(&start), "{latex}: {error}");
     }
+}
+
+#[test]
+fn equations_are_read_in_every_layout_and_relation() {
+    let expected: Phases = vec![(None, vec!["dz1".to_owned(), "2*u2".to_owned()])];
+    for text in [
+        r"\[ \left\{\begin{array}{@{}rcl@{}} \ddot z_1 &=& \dot z_1 \\ \ddot z_2 &=& 2u_2 \end{array}\right. \]",
+        r"\begin{IEEEeqnarray}{rCl} \ddot z_1 &=& \dot z_1 \IEEEyesnumber \\ \ddot z_2 &=& 2u_2 \end{IEEEeqnarray}",
+        r"\begin{alignat}{2} \ddot z_1 &= \dot z_1 \label{eq:first} \\ \ddot z_2 &= 2u_2 \label{eq:second} \end{alignat}",
+        r"\[ \ddot z_1 := \dot z_1 \] \[ \ddot z_2 \coloneqq 2u_2 \]",
+        r"\[ \ddot z_1 \approx \dot z_1 \] \[ \ddot z_2 \triangleq 2u_2 \]",
+        r"\begin{equation} \ddot z_1 = \dot z_1 \label{eq:z1} \end{equation}
+          \begin{equation} \ddot z_2 = 2u_2 \label{eq:z2} \end{equation}",
+        "\\[ z\u{308}₁ = ż₁ \\] \\[ z\u{308}₂ = 2u₂ \\]",
+    ] {
+        let found = named(text, &[]).unwrap_or_else(|error| panic!("{text}: {error}"));
+        assert_eq!(found, expected, "{text}");
+    }
+    let vector = r"\[ \begin{bmatrix} \ddot z_1 \\ \ddot z_2 \end{bmatrix} = 2u \]";
+    let error = named(vector, &[]).expect_err("a vector").to_string();
+    let start = r"paper.tex:1:20: found `\ddot` without `=` behind its variable, expected ";
+    assert!(error.starts_with(start), "{error}");
 }
 
 #[test]

@@ -1,5 +1,8 @@
 //! Tokens of LaTeX with their places, line by line.
 
+/// The minus of Unicode.
+const MINUS: char = '\u{2212}';
+
 /// One token and where it starts, both counted from 1.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Token {
@@ -210,12 +213,13 @@ impl Line {
                 self.next += 1;
                 continue;
             }
-            let kind = self.token(first);
-            tokens.push(Token {
+            let of_unicode = self.dotted_or_raised(first);
+            let kinds = of_unicode.unwrap_or_else(|| vec![self.token(first)]);
+            tokens.extend(kinds.into_iter().map(|kind| Token {
                 kind,
                 line: self.number,
                 column,
-            });
+            }));
         }
     }
 
@@ -249,25 +253,79 @@ impl Line {
                 }
                 None => Kind::Character('#'),
             },
-            '\u{2212}' => Kind::Character('-'),
+            MINUS => Kind::Character('-'),
             '·' | '⋅' | '×' => Kind::Command("cdot".to_owned()),
             _ => Kind::Character(first),
         }
     }
 
-    /// Digits, a point with digits after it, and an exponent with digits.
+    /// The tokens of a letter with dots above it, or of raised or lowered digits.
+    fn dotted_or_raised(&mut self, first: char) -> Option<Vec<Kind>> {
+        let precomposed = [('ż', 'z'), ('ẋ', 'x'), ('ẏ', 'y'), ('ẍ', 'x'), ('ÿ', 'y')];
+        let precomposed = precomposed.iter().find(|(dotted, _)| *dotted == first);
+        let (letter, dots, length) = match (precomposed, self.peek(1)) {
+            (Some((_, letter)), _) if "ẍÿ".contains(first) => (*letter, "ddot", 1),
+            (Some((_, letter)), _) => (*letter, "dot", 1),
+            (None, Some('\u{307}')) => (first, "dot", 2),
+            (None, Some('\u{308}')) => (first, "ddot", 2),
+            (None, _) => return self.raised(),
+        };
+        self.next += length;
+        Some(vec![
+            Kind::Command(dots.to_owned()),
+            Kind::Character(letter),
+        ])
+    }
+
+    /// `²`, `⁻¹` and `₁₀` as powers and subscripts in braces.
+    fn raised(&mut self) -> Option<Vec<Kind>> {
+        const RAISED: &str = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+        const LOWERED: &str = "₀₁₂₃₄₅₆₇₈₉";
+        let first = self.peek(0)?;
+        let (digits, kind) = match LOWERED.contains(first) {
+            true => (LOWERED, Kind::Subscript),
+            false => (RAISED, Kind::Superscript),
+        };
+        let is_negative = first == '⁻' && self.peek(1).is_some_and(|c| RAISED.contains(c));
+        let mut kinds = vec![kind, Kind::Open];
+        if is_negative {
+            self.next += 1;
+            kinds.push(Kind::Character('-'));
+        }
+        let number = self.take_while(|c| digits.contains(c));
+        let values = number
+            .chars()
+            .filter_map(|c| digits.chars().position(|d| d == c));
+        let number: String = values.map(|value| value.to_string()).collect();
+        kinds.extend([Kind::Number(number.clone()), Kind::Close]);
+        (!number.is_empty()).then_some(kinds)
+    }
+
+    /// Digits, a point (or comma in braces) with digits after it, and an exponent with digits.
     fn number(&mut self) -> Kind {
         let digit = |c: char| c.is_ascii_digit();
         let mut text = self.take_while(digit);
-        if self.peek(0) == Some('.') && self.peek(1).is_some_and(digit) {
-            self.next += 1;
+        let decimals = |from: usize| {
+            let rest = self.characters.iter().skip(self.next + from);
+            rest.take_while(|c| digit(**c)).count()
+        };
+        // 0{,}36 is a decimal fraction; 1{,}500 may be a large number, and is none.
+        let is_decimal = text == "0" || decimals(3) != 3;
+        let point = match [0, 1, 2].map(|ahead| self.peek(ahead)) {
+            [Some('.'), ..] => 1,
+            [Some('{'), Some(','), Some('}')] if is_decimal => 3,
+            _ => 0,
+        };
+        if point > 0 && self.peek(point).is_some_and(digit) {
+            self.next += point;
             text = format!("{text}.{}", self.take_while(digit));
         }
-        let sign = usize::from(matches!(self.peek(1), Some('+' | '-')));
+        let sign = usize::from(matches!(self.peek(1), Some('+' | '-' | MINUS)));
         if matches!(self.peek(0), Some('e' | 'E')) && self.peek(1 + sign).is_some_and(digit) {
-            let exponent: String = self.characters[self.next..=self.next + sign]
-                .iter()
-                .collect();
+            let exponent = match self.peek(1) {
+                Some('-' | MINUS) => "e-",
+                _ => "e",
+            };
             self.next += 1 + sign;
             text = format!("{text}{exponent}{}", self.take_while(digit));
         }

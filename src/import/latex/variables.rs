@@ -10,7 +10,7 @@ impl Reader<'_> {
     /// A function's name at the reader's place, and the place behind it.
     pub(super) fn function_name(&self) -> Option<(String, usize)> {
         let Some(Kind::Command(command)) = self.kind(self.at) else {
-            return None;
+            return self.plain_function_name();
         };
         if let Some(name) = function(command) {
             return Some((name.to_owned(), self.at + 1));
@@ -39,6 +39,29 @@ impl Reader<'_> {
         Some((name.to_owned(), close + 1))
     }
 
+    /// `sin(`, typed without a backslash, where its first letter is no variable.
+    fn plain_function_name(&self) -> Option<(String, usize)> {
+        let first = self.tokens.get(self.at)?;
+        let letters = self.tokens[self.at..self.end].iter().enumerate();
+        let word: String = letters
+            .map_while(|(place, token)| match token.kind {
+                Kind::Character(letter) if letter.is_ascii_alphabetic() => {
+                    let is_next = token.line == first.line && token.column == first.column + place;
+                    is_next.then_some(letter)
+                }
+                _ => None,
+            })
+            .collect();
+        let after = self.at + word.len();
+        let has_argument = match self.kind(after)? {
+            Kind::Character('(' | '[') | Kind::Superscript => true,
+            kind => *kind == Kind::Command("left".to_owned()),
+        };
+        let is_variable = |letter| self.names.variable(letter, self.alone).is_some();
+        let name = function(&word).filter(|_| has_argument && !is_variable(&word[..1]))?;
+        Some((name.to_owned(), after))
+    }
+
     pub(super) fn call(&mut self, place: (usize, usize), name: &str) -> Read<Last> {
         if name == "e" {
             return self.exponential(place);
@@ -62,7 +85,7 @@ impl Reader<'_> {
                     }
                 })?);
         }
-        self.push(place, format!("{name}("));
+        let before = self.pieces.len();
         let argument = self.here();
         let last = match self.peek().map(|token| token.kind.clone()) {
             Some(Kind::Character('(' | '[')) => self.delimited(argument).map(|()| Last::Other)?,
@@ -74,7 +97,24 @@ impl Reader<'_> {
                 .map(|()| Last::Other)?,
             _ => self.bare_argument()?,
         };
-        self.push(place, ")");
+        let argument = self.pieces.split_off(before);
+        let parts: &[&str] = match name {
+            "sec" => &["(1/cos(", "))"],
+            "csc" => &["(1/sin(", "))"],
+            "cot" => &["(1/tan(", "))"],
+            "sinh" => &["((exp(", ")-exp(-(", ")))/2)"],
+            "cosh" => &["((exp(", ")+exp(-(", ")))/2)"],
+            _ => {
+                self.push(place, name);
+                &["(", ")"]
+            }
+        };
+        for (number, part) in parts.iter().enumerate() {
+            if number > 0 {
+                self.pieces.extend(argument.iter().cloned());
+            }
+            self.push(place, *part);
+        }
         match power {
             Some(power) => self.push(place, format!("^({power})")),
             None if last == Last::Other => self.powers(place)?,
@@ -294,6 +334,11 @@ pub(super) fn function(command: &str) -> Option<&'static str> {
         "tan" => "tan",
         "tanh" => "tanh",
         "exp" => "exp",
+        "sec" => "sec",
+        "csc" => "csc",
+        "cot" => "cot",
+        "sinh" => "sinh",
+        "cosh" => "cosh",
         "ln" | "log" => "log",
         "sgn" | "sign" => "sign",
         _ => return None,

@@ -29,14 +29,16 @@ impl Shortener<'_> {
             candidates.extend(self.candidates(unit, &singles));
         }
         let n_terms = self.all_terms(&scaled);
+        let n_written = self.spread(unit, scaled).len();
         for candidate in candidates {
             // Only a fraction whose sums become fewer may be written as several terms.
             let is_resolved = old.len() == 1
                 && self.all_terms(&candidate) < n_terms
                 && !self.denominators(old[0].1).is_empty();
-            if candidate.len() > old.len() && !is_resolved {
+            if candidate.len() > n_written && !is_resolved {
                 continue;
             }
+            let candidate = self.spread(unit, candidate);
             let length = self.length(unit, &candidate);
             let is_negative = |(number, _): &&(Number, ExprId)| in_f64(*number, unit) < 0.0;
             let rank = (length, candidate.iter().filter(is_negative).count());
@@ -57,6 +59,25 @@ impl Shortener<'_> {
             .collect();
         let is_usable = |&(value, _): &(f64, ExprId)| value.is_finite() && value != 0.0;
         summands.iter().all(is_usable).then_some(summands)
+    }
+
+    /// The summands with sums of coefficient 1 or -1 as terms of their own, as they are written.
+    fn spread(&self, unit: Number, summands: Scaled) -> Scaled {
+        let mut terms = Scaled::new();
+        for (number, expr) in summands {
+            match self.pool.node(expr) {
+                Node::Sum(_) if in_f64(number, unit).abs() == 1.0 => {
+                    let parts = self.pool.terms_of(expr).into_iter();
+                    let scaled = parts.map(|(part, rest)| Some((number.checked_mul(part)?, rest)));
+                    match scaled.collect::<Option<Scaled>>() {
+                        Some(scaled) => terms.extend(scaled),
+                        None => terms.push((number, expr)),
+                    }
+                }
+                _ => terms.push((number, expr)),
+            }
+        }
+        collected(self.pool, &terms, Keep::Sums)
     }
 
     /// Terms of a sum with those of sums inside products and fractions.
@@ -110,19 +131,23 @@ impl Shortener<'_> {
                 candidates.push(vec![(Number::ONE, form)]);
             }
         }
-        candidates.extend(self.chosen(unit, singles, sum));
+        candidates.extend(self.chosen(unit, singles));
         candidates
     }
 
     /// Sums in which each term has the form that suits the others best.
-    fn chosen(&mut self, unit: Number, singles: &Scaled, sum: ExprId) -> Vec<Scaled> {
+    fn chosen(&mut self, unit: Number, singles: &Scaled) -> Vec<Scaled> {
         if singles.len() < 2 || singles.len() > MAX_CHOSEN {
             return Vec::new();
         }
         let mut budget = MAX_PRODUCTS;
+        let summands: Summands = (singles.iter())
+            .map(|&(number, expr)| (number.to_f64(), expr))
+            .collect();
+        let waves = self.all_angles(&summands);
         let mut forms: Vec<Vec<ExprId>> = Vec::new();
         for &(_, expr) in singles {
-            let normal = self.normal(expr, sum);
+            let normal = self.normal(expr, waves);
             let mut own = vec![expr, self.pool.expand_region(expr, &mut budget), normal];
             if self.pool.has_waves(normal) {
                 let sines = self.pool.cosines_to_sines(normal);

@@ -2,20 +2,27 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use super::Summands;
 use super::search::{Block, Shortener};
 use crate::symbolic::expand::MAX_PRODUCTS;
 use crate::symbolic::intern::BuildIdHasher;
 use crate::symbolic::node::{ExprId, Function, Node};
 use crate::symbolic::number::Number;
+use crate::symbolic::perfect_power::MAX_POWER;
 use crate::symbolic::pool::ExprPool;
+
+/// Most terms that can be powers of the parts of a sum.
+const MAX_PARTS: usize = 64;
+/// Relative error of coefficients that fit a power.
+const ROUNDING: f64 = 1e-13;
 
 impl Shortener<'_> {
     /// Positions of blocks that can interact, or that are worth a look alone.
     pub(super) fn groups(&mut self, blocks: &[Block]) -> Vec<Vec<usize>> {
-        let exprs: Vec<ExprId> = (blocks.iter())
-            .flat_map(|block| block.summands.iter().map(|&(_, expr)| expr))
-            .collect();
-        let waves = self.all_angles(&exprs);
+        let (places, summands): (Vec<usize>, Summands) = (blocks.iter().enumerate())
+            .flat_map(|(place, block)| block.summands.iter().map(move |&summand| (place, summand)))
+            .unzip();
+        let waves = self.all_angles(&summands);
         let mut leader: Vec<usize> = (0..blocks.len()).collect();
         let mut owner: HashMap<ExprId, usize, BuildIdHasher> = HashMap::default();
         let mut is_plain = vec![true; blocks.len()];
@@ -29,6 +36,10 @@ impl Shortener<'_> {
                 }
             }
         }
+        for [a, b] in self.parts_of_powers(&summands) {
+            let (a, b) = (root(&leader, places[a]), root(&leader, places[b]));
+            leader[a.max(b)] = a.min(b);
+        }
         let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for place in 0..blocks.len() {
             groups.entry(root(&leader, place)).or_default().push(place);
@@ -37,15 +48,64 @@ impl Shortener<'_> {
         groups.into_values().filter(is_worth).collect()
     }
 
-    /// A sum of one wave for each angle of the terms, which fixes the units of multiples.
-    fn all_angles(&mut self, exprs: &[ExprId]) -> ExprId {
+    /// Pairs of summands that belong to one power of a sum: of `p*a^n`, `q*a^(n-1)*b` and `r*b^n`
+    /// with `q^n = n^n*p^(n-1)*r`.
+    pub(super) fn parts_of_powers(&mut self, summands: &[(f64, ExprId)]) -> Vec<[usize; 2]> {
+        let mut pairs = Vec::new();
+        if summands.len() < 3 {
+            return pairs;
+        }
+        let places: HashMap<ExprId, usize, BuildIdHasher> = (summands.iter().enumerate())
+            .map(|(place, &(_, expr))| (expr, place))
+            .collect();
+        for power in 2..=MAX_POWER {
+            let roots: Vec<(usize, ExprId)> = (summands.iter().enumerate())
+                .filter_map(|(place, &(_, expr))| Some((place, self.pool.whole_root(expr, power)?)))
+                .take(MAX_PARTS)
+                .collect();
+            for &(first, a) in &roots {
+                for &(last, b) in roots.iter().filter(|(last, _)| *last != first) {
+                    let mut place_of = |n_last: i64| {
+                        let a = self.pool.pow_number(a, Number::integer(power - n_last));
+                        let b = self.pool.pow_number(b, Number::integer(n_last));
+                        places.get(&self.pool.product(&[a, b])).copied()
+                    };
+                    let Some(second) = place_of(1) else { continue };
+                    let [p, q, r] = [first, second, last].map(|at| summands[at].0.abs());
+                    let n = power as i32;
+                    let expected = f64::from(n).powi(n) * p.powi(n - 1) * r;
+                    if (q.powi(n) - expected).abs() > ROUNDING * expected {
+                        continue;
+                    }
+                    pairs.push([first, last]);
+                    pairs.extend((1..power).filter_map(place_of).map(|place| [first, place]));
+                }
+            }
+        }
+        pairs
+    }
+
+    /// A sum of one wave for each angle of the terms, which fixes the units of multiples, and for
+    /// half the angle of `cos(2*x)` beside a term with which it is `1 - cos(2*x)` or `1 + cos(2*x)`.
+    pub(super) fn all_angles(&mut self, summands: &[(f64, ExprId)]) -> ExprId {
         let mut sines = Vec::new();
-        for &expr in exprs {
+        for &(coefficient, expr) in summands {
             for atom in self.pool.atoms_of(expr) {
-                if let Node::Apply(Function::Sin | Function::Cos | Function::Tan, angle) =
+                let Node::Apply(function @ (Function::Sin | Function::Cos | Function::Tan), angle) =
                     *self.pool.node(atom)
-                {
-                    sines.push(self.pool.apply(Function::Sin, angle));
+                else {
+                    continue;
+                };
+                sines.push(self.pool.apply(Function::Sin, angle));
+                if function == Function::Cos && self.pool.split(angle).0.is_even() {
+                    let beside = self.pool.div(expr, atom);
+                    let is_beside = |&(other, expr): &(f64, ExprId)| {
+                        expr == beside && other.abs() == coefficient.abs()
+                    };
+                    if summands.iter().any(is_beside) {
+                        let half = self.pool.scale(Number::HALF, angle);
+                        sines.push(self.pool.apply(Function::Sin, half));
+                    }
                 }
             }
         }
@@ -77,10 +137,7 @@ impl Shortener<'_> {
             let common = self.pool.apply(Function::Log, minus_one);
             monomials.push(self.pool.product(&[cofactor, common]));
         }
-        // Terms with the same denominator can be added.
-        for base in self.denominators(expr) {
-            monomials.push(self.pool.powi(base, -1));
-        }
+        monomials.extend(self.monomials_of_fraction(expr));
         monomials.extend(rests(self.pool, normal));
         if self.pool.has_waves(normal) {
             let combined = self.pool.combine_angles(normal);
@@ -89,6 +146,39 @@ impl Shortener<'_> {
         monomials.extend(rests(self.pool, expr));
         monomials.push(self.pool.split(expr).1);
         self.monomials.insert((expr, waves), monomials.clone());
+        monomials
+    }
+
+    /// What a term with sines, cosines or sums in its denominator can be added to.
+    fn monomials_of_fraction(&mut self, expr: ExprId) -> Vec<ExprId> {
+        let mut monomials = Vec::new();
+        for base in self.denominators(expr) {
+            // Fractions: with the same denominator, or denominators of the same variables.
+            monomials.push(self.pool.powi(base, -1));
+            let mut variables: Vec<ExprId> = (self.pool.symbols_of(base).into_iter())
+                .map(|symbol| self.pool.symbol_expr(symbol))
+                .collect();
+            // No model has this term.
+            let minus_two = self.pool.integer(-2);
+            variables.push(self.pool.apply(Function::Log, minus_two));
+            monomials.push(self.pool.product(&variables));
+            // Terms that have a term of the numerator when they are multiplied by the denominator.
+            let numerator = self.pool.product(&[expr, base]);
+            let numerator = (self.pool).expand_region(numerator, &mut MAX_PRODUCTS.clone());
+            for (_, above) in self.pool.terms_of(numerator) {
+                for (_, below) in self.pool.terms_of(base) {
+                    monomials.push(self.pool.div(above, below));
+                }
+            }
+        }
+        for factor in self.pool.factors_of(expr).to_vec() {
+            if let Some((Function::Sin | Function::Cos, _, power)) =
+                self.pool.function_power(factor)
+                && power < 0
+            {
+                monomials.push(self.pool.div(expr, factor));
+            }
+        }
         monomials
     }
 
@@ -107,7 +197,10 @@ impl Shortener<'_> {
     /// The normal form of a term, with its angles in the units of all.
     pub(super) fn normal(&mut self, expr: ExprId, waves: ExprId) -> ExprId {
         let mut budget = MAX_PRODUCTS;
-        let expanded = self.pool.expand_angles_like(expr, waves);
+        let arguments = &mut MAX_PRODUCTS.clone();
+        let expanded =
+            (self.pool).map_regions(expr, |pool, part| pool.expand_region(part, arguments));
+        let expanded = self.pool.expand_angles_like(expanded, waves);
         self.pool.normal_form(expanded, &mut budget)
     }
 }

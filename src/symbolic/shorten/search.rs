@@ -71,7 +71,7 @@ impl<'a> Shortener<'a> {
     /// The replacements that make `sum coefficient * expr` shortest, in the order of the first
     /// positions they replace; none if it is short already.
     pub fn shorten(&mut self, summands: &[(f64, ExprId)]) -> Vec<Shortened> {
-        if self.is_plain_sum(summands) {
+        if self.is_plain_sum(summands) && self.parts_of_powers(summands).is_empty() {
             return Vec::new();
         }
         let mut blocks: Vec<Block> = (summands.iter().enumerate())
@@ -121,6 +121,8 @@ impl<'a> Shortener<'a> {
                 Node::Symbol(_) => true,
                 // Logarithms of different variables become one.
                 Node::Apply(Function::Log, _) => false,
+                // Signs and magnitudes merge with their variables.
+                Node::Apply(Function::Sign | Function::Abs, _) if factor != expr => false,
                 Node::Apply(_, argument) => {
                     n_functions += 1;
                     n_functions < 2 && pool.as_symbol(argument).is_some()
