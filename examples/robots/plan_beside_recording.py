@@ -2,7 +2,7 @@
 
     python plan_beside_recording.py FOLDER --robot a1 --jump a1_07.csv.gz --shorter-than 0.4 --phases contact-rear-flight
 
-FOLDER holds recordings that romc reads as they are. The plan starts where the jump started and gets its distance and rise;
+FOLDER holds recordings that romc reads as they are; their clocks are mended first. The plan starts where the jump started and gets its distance and rise;
 nothing else of it. Prints root mean square differences of body path, joint angles and torques on the ground to the jump that
 was recorded, for the plan and for what needs none: the training jump nearest to the goal and the mean of all. Draws the
 three with the jump (`--figure`).
@@ -71,12 +71,11 @@ def romc(arguments, *words):
 def planned(arguments, jump, training):
     """The model of the training jumps, and its plan of the jump's goal."""
     out = arguments.out_dir
-    out.mkdir(parents=True, exist_ok=True)
-    files = [arguments.folder / other.name for other in training]
+    files = [out / "jumps" / other.name for other in training]
     words = ["--robot", arguments.robot, "--phases", arguments.phases, "--latent-dim", arguments.latent_dim]
     romc(arguments, "train", *files, *words, "--output", out / "model.json", "--force")
     distance, apex = jump.goal
-    words = ["--distance", f"{distance:.4f}", "--apex", f"{apex:.4f}", "--start", arguments.folder / jump.name]
+    words = ["--distance", f"{distance:.4f}", "--apex", f"{apex:.4f}", "--start", out / "jumps" / jump.name]
     text = romc(arguments, "plan", out / "model.json", *words, "--output", out / "plan.csv", "--force", "--json")
     return Jump(out / "plan.csv"), json.loads(text)
 
@@ -156,8 +155,12 @@ def main():
     parser.add_argument("--out-dir", type=pathlib.Path, default=pathlib.Path("out/plan_beside_recording"))
     parser.add_argument("--figure", type=pathlib.Path)
     arguments = parser.parse_args()
-    files = sorted(arguments.folder.glob("*.csv*"))
-    jumps = [Jump(path) for path in files]
+    jumps = []
+    (arguments.out_dir / "jumps").mkdir(parents=True, exist_ok=True)
+    for path in sorted(arguments.folder.glob("*.csv*")):
+        mended = arguments.out_dir / "jumps" / path.name
+        romc(arguments, "convert", path, "--clock", "repaired", "--output", mended, "--force")
+        jumps.append(Jump(mended))
     jump = next((jump for jump in jumps if jump.name == arguments.jump), None)
     if jump is None:
         raise SystemExit(f"{arguments.folder}: no {arguments.jump} in it")

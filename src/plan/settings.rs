@@ -37,8 +37,6 @@ pub struct PlanSettings {
     pub end_pitch_rad: f64,
     /// Height below that of the training jumps' landings, and around that of their ends, m.
     pub height_slack_m: f64,
-    /// Share of the flight at which the apex is asked for.
-    pub apex_at: f64,
     /// Convex programs at most.
     pub programs: usize,
     /// Input deviation beyond which a plan comes with a warning.
@@ -68,7 +66,6 @@ impl Default for PlanSettings {
             end_speed_m_s: 0.03,
             end_pitch_rad: 0.06,
             height_slack_m: 0.02,
-            apex_at: 0.45,
             programs: 8,
             warn_deviation: 0.6,
             refuse_deviation: 1.0,
@@ -111,7 +108,6 @@ impl PlanSettings {
         let inside = [
             ("inset", self.inset, 0.5),
             ("torque_share", self.torque_share, 1.0),
-            ("apex_at", self.apex_at, 1.0),
             ("foot_m", self.foot_m[0], 1.0),
             ("foot_m", self.foot_m[1], 1.0),
         ];

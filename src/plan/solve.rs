@@ -8,7 +8,7 @@ use super::goal::Goal;
 use super::motion::{Margins, motion};
 use super::seed::Seed;
 use super::settings::PlanSettings;
-use super::transcribe::{Bound, Layout, Task};
+use super::transcribe::{Bound, Task};
 use super::verdict::{Findings, Verdict, verdict};
 use crate::model::ReducedModel;
 use crate::mpc::{Outcome, QpSettings, QpSolver, SolverProfile};
@@ -18,6 +18,8 @@ use crate::recording::Segment;
 const CONVERGED_DEFECT: f64 = 1e-4;
 /// Largest change of a variable from one program to the next that counts as none.
 const CONVERGED_STEP: f64 = 2e-2;
+/// Programs after which the node of the apex is looked for again; later it stays, so that they converge.
+const APEX_PROGRAMS: usize = 3;
 /// Largest violation of an equation with which a plan may be used at all.
 const USABLE_DEFECT: f64 = 1e-3;
 
@@ -69,12 +71,8 @@ pub struct Plan {
 pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Result<Plan, PlanError> {
     let clock = Instant::now();
     let seed = Seed::new(model, goal, settings)?;
-    let task = Task {
-        layout: Layout::new(&seed),
-        seed: &seed,
-        settings,
-    };
-    let (y, programs) = solve(&task)?;
+    let mut task = Task::new(&seed, settings);
+    let (y, programs) = solve(&mut task)?;
     let (motion, margins) = motion(&task, &y, model.sample_time_s().unwrap_or(0.002))?;
     let parts = (seed.parts.iter().enumerate())
         .map(|(part, of)| PlannedPart {
@@ -108,7 +106,7 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
 }
 
 /// The variables at the end of the programs, and how many there were.
-fn solve(task: &Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
+fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
     let goal = &task.seed.goal;
     let (distance_m, apex_m) = (goal.distance_m(), goal.apex_m());
     let settings = QpSettings {
@@ -134,6 +132,9 @@ fn solve(task: &Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
         let pairs = next.iter().zip(&y);
         let step = pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
         y.copy_from_slice(next);
+        if iteration <= APEX_PROGRAMS {
+            task.place_apex(&y);
+        }
         let defect = task.defect(&y);
         if defect < CONVERGED_DEFECT && step < CONVERGED_STEP {
             return Ok((y, iteration));

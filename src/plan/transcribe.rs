@@ -10,7 +10,7 @@
 //! subject to z_(k+1)  - z_k  = h (bar dz + drift_k)
 //!            dz_(k+1) - dz_k = h (ddz_k + bar f(zeta, nu, mu))
 //!            z, dz continuous, those measured at the start
-//!            body x at the end, body z + vz |vz| / 2 g in mid-flight, height at the end, rest on ground
+//!            body x at the end, body z + vz |vz| / 2 g where it is highest, height at the end, rest on ground
 //!            |lift u_lat + losses| <= limit, joints inside their limits, |Fx| <= mu Fz
 //! ```
 //!
@@ -119,9 +119,22 @@ pub struct Task<'a> {
     pub seed: &'a Seed<'a>,
     pub layout: Layout,
     pub settings: &'a PlanSettings,
+    /// Node of the flight where the apex is asked for.
+    pub apex_node: usize,
 }
 
-impl Task<'_> {
+impl<'a> Task<'a> {
+    /// The program of a seed, its apex where the prior has it.
+    pub fn new(seed: &'a Seed<'a>, settings: &'a PlanSettings) -> Self {
+        let mut task = Self {
+            layout: Layout::new(seed),
+            seed,
+            settings,
+            apex_node: 0,
+        };
+        task.place_apex(&task.prior_point());
+        task
+    }
     /// Duration of a part at an iterate, s.
     pub fn duration_s(&self, part: usize, y: &[f64]) -> f64 {
         let tau = y[self.layout.duration(part)];
@@ -374,17 +387,29 @@ impl Task<'_> {
         self.seed.decoded(&self.seed.start[0])[coordinate]
     }
 
+    /// Takes the apex at the node of the flight where the body is highest at an iterate.
+    pub fn place_apex(&mut self, y: &[f64]) {
+        let flight = self.flight();
+        let height = |node: usize| self.x(flight, node, BODY_Z).at(y);
+        let nodes = 0..=self.seed.parts[flight].intervals();
+        let highest = nodes.max_by(|a, b| height(*a).total_cmp(&height(*b)));
+        self.apex_node = highest.expect("invariant: a part has nodes");
+    }
+
+    /// The part in the air.
+    fn flight(&self) -> usize {
+        let mut parts = self.seed.parts.iter();
+        let flight = parts.position(|part| !part.is_grounded());
+        flight.expect("invariant: checked with the model")
+    }
+
     /// Height that the body reaches by its height and speed at the node of the apex, less the height
     /// that is wanted; linear about the iterate.
     fn apex(&self, y: &[f64]) -> Affine {
-        let parts = self.seed.parts.iter();
-        let flight = parts.into_iter().position(|part| !part.is_grounded());
-        let flight = flight.expect("invariant: checked with the model");
-        let count = self.seed.parts[flight].intervals() as f64;
-        let node = (self.settings.apex_at * count).round() as usize;
-        let mut height = self.x(flight, node, BODY_Z);
+        let flight = self.flight();
+        let mut height = self.x(flight, self.apex_node, BODY_Z);
         height.constant -= self.start_x(BODY_Z) + self.seed.goal.apex_m();
-        let speed = self.dx(flight, node, BODY_Z);
+        let speed = self.dx(flight, self.apex_node, BODY_Z);
         let now = speed.at(y);
         height.add_scaled(&speed, now.abs() / GRAVITY_M_S2);
         height.constant -= 0.5 * now * now.abs() / GRAVITY_M_S2;
