@@ -1,11 +1,13 @@
-"""A plan beside what a robot did: trains on the shorter jumps of a folder, plans a longer one of them, compares.
+"""A plan beside what a robot did: learns the shorter jumps of a folder, plans a longer one.
 
-    python plan_beside_recording.py FOLDER --robot a1 --jump a1_07.csv.gz --shorter-than 0.4 --phases contact-rear-flight
+    python plan_beside_recording.py FOLDER --robot a1 --jump a1_07.csv.gz --shorter-than 0.4 \\
+        --phases contact-rear-flight
 
-FOLDER holds recordings that romc reads as they are; their clocks are mended first. The plan starts where the jump started and gets its distance and rise;
-nothing else of it. Prints root mean square differences of body path, joint angles and torques on the ground to the jump that
-was recorded, for the plan and for what needs none: the training jump nearest to the goal and the mean of all. Draws the
-three with the jump (`--figure`).
+FOLDER holds recordings that romc reads as they are; their clocks are mended first. The plan starts
+where the jump started and gets its distance and rise; nothing else of it. Prints root mean square
+differences of body path, joint angles and torques on the ground to the jump that was recorded, for
+the plan and for what needs none: the training jump nearest to the goal and the mean of all. Draws
+the three with the jump (`--figure`).
 """
 
 import argparse
@@ -23,7 +25,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 class Jump:
-    """Times, body path and pitch, joint angles, torques and feet of a recording, up to its touch-down."""
+    """Times, body path, pitch, joint angles and torques of a recording, up to its touch-down."""
 
     def __init__(self, path):
         opened = gzip.open if path.suffix == ".gz" else open
@@ -72,16 +74,39 @@ def planned(arguments, jump, training):
     """The model of the training jumps, and its plan of the jump's goal."""
     out = arguments.out_dir
     files = [out / "jumps" / other.name for other in training]
-    words = ["--robot", arguments.robot, "--phases", arguments.phases, "--latent-dim", arguments.latent_dim]
+    words = [
+        "--robot",
+        arguments.robot,
+        "--phases",
+        arguments.phases,
+        "--latent-dim",
+        arguments.latent_dim,
+    ]
     romc(arguments, "train", *files, *words, "--output", out / "model.json", "--force")
     distance, apex = jump.goal
-    words = ["--distance", f"{distance:.4f}", "--apex", f"{apex:.4f}", "--start", out / "jumps" / jump.name]
-    text = romc(arguments, "plan", out / "model.json", *words, "--output", out / "plan.csv", "--force", "--json")
+    words = [
+        "--distance",
+        f"{distance:.4f}",
+        "--apex",
+        f"{apex:.4f}",
+        "--start",
+        out / "jumps" / jump.name,
+    ]
+    text = romc(
+        arguments,
+        "plan",
+        out / "model.json",
+        *words,
+        "--output",
+        out / "plan.csv",
+        "--force",
+        "--json",
+    )
     return Jump(out / "plan.csv"), json.loads(text)
 
 
 def differences(jump, other):
-    """Root mean square differences on the jump's own times: x, z in m, pitch and angles in rad, torques in N m."""
+    """Root mean square differences on the jump's own times: m, m, rad, rad, N m."""
     time_s = jump.time_s[jump.time_s <= other.time_s[-1]]
     ground = time_s[time_s < jump.time_s[jump.take_off]]
 
@@ -128,8 +153,18 @@ def draw(path, jump, rows):
         ("pitch", lambda j: (j.time_s, j.pitch), "time, s", "rad"),
         ("rear right thigh", lambda j: (j.time_s, j.joints[:, thigh]), "time, s", "rad"),
         ("rear right knee", lambda j: (j.time_s, j.joints[:, knee]), "time, s", "rad"),
-        ("its torque until take-off", lambda j: (j.time_s[: j.take_off], j.torque[: j.take_off, knee]), "time, s", "N m"),
-        ("front right knee torque", lambda j: (j.time_s[: j.take_off], j.torque[: j.take_off, 2]), "time, s", "N m"),
+        (
+            "its torque until take-off",
+            lambda j: (j.time_s[: j.take_off], j.torque[: j.take_off, knee]),
+            "time, s",
+            "N m",
+        ),
+        (
+            "front right knee torque",
+            lambda j: (j.time_s[: j.take_off], j.torque[: j.take_off, 2]),
+            "time, s",
+            "N m",
+        ),
     ]
     for axis, (title, of, x, y) in zip(axes.flat, panels, strict=True):
         for (name, line), colour in zip(lines, colours):
@@ -144,15 +179,21 @@ def draw(path, jump, rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--jump", required=True, help="file name of the jump to plan")
     parser.add_argument("--robot", required=True)
     parser.add_argument("--phases", default="contact-flight")
     parser.add_argument("--latent-dim", type=int, default=6)
-    parser.add_argument("--shorter-than", type=float, default=np.inf, help="distance of training jumps, m")
+    parser.add_argument(
+        "--shorter-than", type=float, default=np.inf, help="distance of training jumps, m"
+    )
     parser.add_argument("--romc", type=pathlib.Path, default=ROOT / "target/release/romc")
-    parser.add_argument("--out-dir", type=pathlib.Path, default=pathlib.Path("out/plan_beside_recording"))
+    parser.add_argument(
+        "--out-dir", type=pathlib.Path, default=pathlib.Path("out/plan_beside_recording")
+    )
     parser.add_argument("--figure", type=pathlib.Path)
     arguments = parser.parse_args()
     jumps = []
@@ -164,14 +205,25 @@ def main():
     jump = next((jump for jump in jumps if jump.name == arguments.jump), None)
     if jump is None:
         raise SystemExit(f"{arguments.folder}: no {arguments.jump} in it")
-    training = [other for other in jumps if other.goal[0] < arguments.shorter_than and other is not jump]
+    training = [
+        other for other in jumps if other.goal[0] < arguments.shorter_than and other is not jump
+    ]
     plan, found = planned(arguments, jump, training)
     goal = np.array(jump.goal)
     nearest = min(training, key=lambda other: np.linalg.norm(np.array(other.goal) - goal))
-    rows = [("plan", plan), (f"nearest, {nearest.name}", nearest), ("mean of all", mean_of(training))]
-    print(f"{jump.name}: {goal[0]:.3f} m, apex {goal[1]:.3f} m; {len(training)} training jumps of", end=" ")
+    rows = [
+        ("plan", plan),
+        (f"nearest, {nearest.name}", nearest),
+        ("mean of all", mean_of(training)),
+    ]
+    print(
+        f"{jump.name}: {goal[0]:.3f} m, apex {goal[1]:.3f} m; {len(training)} training jumps of",
+        end=" ",
+    )
     print(f"{min(t.goal[0] for t in training):.3f} to {max(t.goal[0] for t in training):.3f} m")
-    print(f"planned: {found['distance_m']:.3f} m, apex {found['apex_m']:.3f} m; {'; '.join(found['reasons']) or 'trusted'}")
+    print(
+        f"planned: {found['distance_m']:.3f} m, apex {found['apex_m']:.3f} m; {'; '.join(found['reasons']) or 'trusted'}"
+    )
     print(f"{'':<24}{'x m':>8}{'z m':>8}{'pitch rad':>11}{'joints rad':>12}{'torque N m':>12}")
     for name, other in rows:
         x, z, pitch, joints, torque = differences(jump, other)
