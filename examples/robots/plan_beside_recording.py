@@ -41,6 +41,8 @@ class Jump:
 
         feet = stack([f"{leg} Foot" for leg in LEGS]) > 0.5
         in_air = np.flatnonzero(~feet.any(axis=1))
+        if in_air.size == 0:
+            raise SystemExit(f"{path}: no sample without a foot on the ground")
         end = in_air[-1] + 1
         self.name, self.take_off = path.name, in_air[0]
         self.time_s = columns["Time"][:end] - columns["Time"][0]
@@ -118,12 +120,12 @@ def differences(jump, other):
         rms(lambda j: j.path[:, 1]),
         rms(lambda j: j.pitch),
         rms(lambda j: j.joints),
-        rms(lambda j: j.torque[:, LEFT_OUT], ground),
+        rms(lambda j: j.torque[:, THIGHS_AND_KNEES], ground),
     ]
 
 
 # Hips hold the legs upright and say nothing of the jump.
-LEFT_OUT = [k for k, name in enumerate(NAMES) if not name.endswith("hx")]
+THIGHS_AND_KNEES = [k for k, name in enumerate(NAMES) if not name.endswith("hx")]
 
 
 def mean_of(training):
@@ -208,6 +210,8 @@ def main():
     training = [
         other for other in jumps if other.goal[0] < arguments.shorter_than and other is not jump
     ]
+    if not training:
+        raise SystemExit(f"{arguments.folder}: no jump shorter than {arguments.shorter_than} m")
     plan, found = planned(arguments, jump, training)
     goal = np.array(jump.goal)
     nearest = min(training, key=lambda other: np.linalg.norm(np.array(other.goal) - goal))

@@ -125,7 +125,7 @@ pub struct JumpPrior {
     pub state_std: DVector<f64>,
     /// Lowest and highest body height at the end of the jumps, m.
     pub end_height_m: [f64; 2],
-    /// Lowest body height after touch-down, at the end of jumps without a landing, m.
+    /// Lowest body height after touch-down; for jumps without a landing that at their end, m.
     pub landing_height_m: f64,
     /// Parts in the order of time.
     pub parts: Vec<JumpPart>,

@@ -17,6 +17,7 @@
 //! ```
 
 mod affine;
+mod apex;
 mod costs;
 mod error;
 mod feet;

@@ -178,8 +178,8 @@ fn scales(prior: &JumpPrior, root: &DMatrix<f64>, d: usize) -> DMatrix<f64> {
 }
 
 /// Latent coordinates that nothing moves in a phase without contact but gravity, by the model's
-/// equations: those that alone hold the body's x or z, and whose equation is a constant. Plans keep
-/// their recorded accelerations, which the last contact at take-off is a part of.
+/// equations: those that alone hold the body's x or z, and whose equation is a constant. Deviations
+/// do not move them; their accelerations stay the prior's, which include the last contact at take-off.
 fn falling_freely(model: &ReducedModel, phase: usize) -> Result<Vec<usize>, PlanError> {
     if model.phases()[phase].feet != FeetRule::None {
         return Ok(Vec::new());

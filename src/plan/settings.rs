@@ -31,9 +31,9 @@ pub struct PlanSettings {
     pub friction: f64,
     /// Force that may exceed the friction cone, N: the input's force is not free of noise.
     pub friction_slack_n: f64,
-    /// Most speed of the body at the end, m/s.
+    /// Most speed of the body at the end, of jumps that land, m/s.
     pub end_speed_m_s: f64,
-    /// Most pitch of the body at the end, rad.
+    /// Most pitch of the body at the end, of jumps that land, rad.
     pub end_pitch_rad: f64,
     /// Height below that of the training jumps' landings, and around that of their ends, m.
     pub height_slack_m: f64,

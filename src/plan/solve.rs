@@ -18,7 +18,8 @@ use crate::recording::Segment;
 const CONVERGED_DEFECT: f64 = 1e-4;
 /// Largest change of a variable from one program to the next that counts as none.
 const CONVERGED_STEP: f64 = 2e-2;
-/// Programs after which the node of the apex is looked for again; later it stays, so that they converge.
+/// First programs after each of which the node of the apex is placed anew; then it stays, so that they
+/// converge.
 const APEX_PROGRAMS: usize = 3;
 /// Largest violation of an equation with which a plan may be used at all.
 const USABLE_DEFECT: f64 = 1e-3;

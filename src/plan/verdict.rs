@@ -65,7 +65,7 @@ pub fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
                     "the feet would slip: the force leaves the friction cone by {:.0} N",
                     100.0 * slack
                 ),
-                Bound::Height => format!("the body would be {slack:.3} m too low or high at its end"),
+                Bound::Height => format!("the body would be {slack:.3} m too low or high in the landing or at the end"),
             });
         }
     }

@@ -265,18 +265,37 @@ impl ExprPool {
     }
 
     fn merge_roots(&mut self, expr: ExprId) -> ExprId {
-        let mut inside = Vec::new();
-        let mut outside = Vec::new();
+        let (mut inside, mut outside, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
         for factor in self.factors_of(expr).to_vec() {
             match self.base_and_exponent(factor) {
                 (base, Exponent::Number(exponent))
                     if matches!(exponent.as_rational(), Some((_, 2))) =>
                 {
-                    inside.push(base);
                     let whole = exponent.checked_add(-Number::HALF).unwrap_or(Number::ZERO);
-                    outside.push(self.pow_number(base, whole));
+                    let parts = (base, self.pow_number(base, whole));
+                    match self.as_number(base) {
+                        Some(_) => numbers.push((factor, parts)),
+                        None => {
+                            inside.push(parts.0);
+                            outside.push(parts.1);
+                        }
+                    }
                 }
                 _ => outside.push(factor),
+            }
+        }
+        // Roots of numbers stay outside unless they meet another root that makes them rational.
+        for (factor, (base, whole)) in numbers {
+            inside.push(base);
+            let radicand = self.product(&inside);
+            let (content, _) = self.split(radicand);
+            let content = self.scale(content, ExprId::ONE);
+            let root = self.pow_number(content, Number::HALF);
+            if inside.len() > 1 && self.as_number(root).is_some() {
+                outside.push(whole);
+            } else {
+                inside.pop();
+                outside.push(factor);
             }
         }
         if inside.len() < 2 {

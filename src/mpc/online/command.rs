@@ -150,7 +150,7 @@ pub struct Command {
     /// links. Zero in a hold and for a model without actuators.
     pub losses_nm: [f64; JOINT_DIM],
     /// Desired joint positions, rad, within the robot's limits: the decoded reference at 0.9 of the
-    /// step. The plan begins at the measurement, so its own posture would leave a joint PD
+    /// stage. The plan begins at the measurement, so its own posture would leave a joint PD
     /// nothing to correct.
     pub joint_position_rad: [f64; JOINT_DIM],
     /// Desired joint velocities, rad/s.

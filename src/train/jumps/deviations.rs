@@ -58,7 +58,7 @@ pub fn fit_deviations(
     Deviations {
         xi: fit.xi(&fit.prior(&all), &all),
         acceleration_std: (square / sampled.len() as f64).map(f64::sqrt),
-        ddz_r2: 1.0 - unexplained / total,
+        ddz_r2: 1.0 - unexplained / f64::max(total, f64::MIN_POSITIVE),
     }
 }
 

@@ -108,9 +108,11 @@ fn cut(training: &Dataset, jump: &Jump, rising: impl Fn(usize) -> bool) -> Optio
     kind.push(landmark("flight", *flight_phase)?);
     borders.push(in_air.start);
     let last = jump.len() - 1;
-    if jump.time_s[last] < jump.time_s[in_air.end.min(last)] + LEAST_LANDING_S {
+    let landed_s = jump.time_s[last] - jump.time_s[in_air.end.min(last)];
+    if landed_s < LEAST_LANDING_S || last < in_air.end + LEAST_SAMPLES {
         borders.push(in_air.end - 1);
-        return finished(jump, kind, borders);
+        // A recording that ends on the way up says nothing of its apex.
+        return finished(jump, kind, borders).filter(|_| !rising(in_air.end - 1));
     }
     let lengths = (0..patterns.len()).map(|phase| {
         let own = landing.iter().filter(|(of, _)| *of == phase);

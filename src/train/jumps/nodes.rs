@@ -59,7 +59,7 @@ pub fn sample(jump: &Jump, latent: &Latent, cut: &Cut, part: usize, count: usize
         DMatrix::from_fn(count + 1, d, |node, i| {
             let time = first + step * node as f64;
             let inside = |t: &f64| (t - time).abs() <= 0.5 * step + 1e-9;
-            // The last sample belongs to the next part.
+            // The last sample is the next part's first, if there is one.
             let own = times[..times.len() - 1].iter().enumerate();
             let near = own.filter(|(_, t)| inside(t));
             let (sum, n) = near.fold((0.0, 0), |(sum, n), (k, _)| {
