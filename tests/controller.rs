@@ -13,17 +13,8 @@ use romc::recording::Segment;
 
 #[path = "controller/programs.rs"]
 mod programs;
-use programs::{has, is_thorough, root, shipped, succeed, with_losses};
+use programs::{WARNINGS, has, is_thorough, root, shipped, succeed, with_losses};
 
-/// Warnings that generated headers and examples must not raise.
-const STRICT: [&str; 6] = [
-    "-Wall",
-    "-Wextra",
-    "-Wconversion",
-    "-Wshadow",
-    "-pedantic",
-    "-Werror",
-];
 /// What a Rust static library needs from the system.
 const SYSTEM: [&str; 4] = ["-lm", "-lpthread", "-ldl", "-lrt"];
 
@@ -105,7 +96,7 @@ impl Built {
         succeed(
             Command::new(compiler)
                 .args(flags)
-                .args(STRICT)
+                .args(WARNINGS)
                 .arg("-I")
                 .arg(self.folder.join("include"))
                 .arg(format!("-DNAME={}", self.name))

@@ -12,7 +12,7 @@
 //! | `lexer`, `parse`, `display` | the grammar of candidate terms, both ways |
 //! | `eval`, `interval`, `rounding`, `interval_eval`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `substitute` | derivatives and substitution |
-//! | `expand`, `rational`, `perfect_power`, `trig`, `rules` | rewriting, each way when asked |
+//! | `expand`, `rational`, `perfect_power`, `trig`, `rules`, `magnitudes` | rewriting, each way when asked |
 //! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
 //!
@@ -47,6 +47,7 @@ mod intern;
 mod interval;
 mod interval_eval;
 mod lexer;
+mod magnitudes;
 mod node;
 mod number;
 mod order;

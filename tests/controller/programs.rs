@@ -7,6 +7,16 @@ use std::process::{Command, Output};
 use romc::model::ReducedModel;
 use romc::robot::{Actuators, WrenchFrame};
 
+/// Warnings that generated headers, examples and plugins must not raise, in C and C++.
+pub const WARNINGS: [&str; 6] = [
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wshadow",
+    "-pedantic",
+    "-Werror",
+];
+
 /// The project's folder.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))

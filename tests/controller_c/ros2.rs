@@ -7,17 +7,7 @@ use std::process::Command;
 use romc::codegen::Precision;
 
 use crate::emitted::Emitted;
-use crate::programs::{has, root, shipped, succeed};
-
-const WARNINGS: [&str; 7] = [
-    "-std=c++17",
-    "-Wall",
-    "-Wextra",
-    "-Wconversion",
-    "-Wshadow",
-    "-pedantic",
-    "-Werror",
-];
+use crate::programs::{WARNINGS, has, root, shipped, succeed};
 
 fn stubs() -> PathBuf {
     root().join("tests/controller_c/ros2")
@@ -30,7 +20,7 @@ fn drive(emitted: &Emitted, compiler: &str, flags: &[&str]) -> PathBuf {
     succeed(
         Command::new(compiler)
             .args(WARNINGS)
-            .args(["-g", "-O1"])
+            .args(["-std=c++17", "-g", "-O1"])
             .args(flags)
             .arg(format!("-DNAME={name}"))
             .arg(format!("-DJUMP=\"{name}_jump.h\""))
@@ -86,7 +76,7 @@ fn package_builds_and_installs_with_cmake_in_both_precisions() {
         let places = [
             format!("-DCMAKE_PREFIX_PATH={}", stubs().display()),
             format!("-DCMAKE_INSTALL_PREFIX={}", prefix.display()),
-            format!("-DCMAKE_CXX_FLAGS={}", WARNINGS[1..].join(" ")),
+            format!("-DCMAKE_CXX_FLAGS={}", WARNINGS.join(" ")),
         ];
         let [stubs, installed, warnings] = places.each_ref().map(String::as_str);
         run(&["-S", ".", "-B", "build", stubs, installed, warnings]);
