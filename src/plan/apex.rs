@@ -16,7 +16,7 @@ impl Task<'_> {
     }
 
     /// The part in the air.
-    fn flight(&self) -> usize {
+    pub fn flight(&self) -> usize {
         let mut parts = self.seed.parts.iter();
         let flight = parts.position(|part| !part.is_grounded());
         flight.expect("invariant: checked with the model")

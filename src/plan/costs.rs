@@ -73,9 +73,9 @@ fn each(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
 /// the start or from touch-down, above it from the start or from the prior's own height.
 fn feet(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
     let settings = task.settings;
-    let flight = task.seed.parts.iter().position(|part| !part.is_grounded());
+    let flight = task.flight();
     for (part, of) in task.seed.parts.iter().enumerate() {
-        let is_landing = flight.is_some_and(|flight| part > flight);
+        let is_landing = part > flight;
         let anchor_part = if is_landing { part } else { 0 };
         if !of.is_grounded() {
             continue;

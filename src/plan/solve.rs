@@ -189,10 +189,7 @@ fn reached(motion: &Segment) -> [f64; 2] {
 /// What accelerations of the thrust that the deviations do not explain make of distance and rise.
 fn expected_error(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
     let parts = &task.seed.parts;
-    let flight = parts.iter().position(|part| !part.is_grounded());
-    let Some(flight) = flight.filter(|flight| *flight > 0) else {
-        return [0.0; 2];
-    };
+    let flight = task.flight();
     let thrust = flight - 1;
     let duration_s = task.duration_s(thrust, y);
     let of_latent = &parts[thrust].part.acceleration_std;
