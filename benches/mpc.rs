@@ -4,10 +4,12 @@
 //! cargo bench --bench mpc                      the table
 //! cargo bench --bench mpc -- --steps 100000    growth of memory over so many steps instead
 //! cargo bench --bench mpc -- --dump FILE       the problems as JSON lines, for other solvers
+//! cargo bench --bench mpc -- --dump FILE --along   the same of measured states as they were recorded
 //! ```
 //!
 //! Drives the shipped model along the recorded jumps from measurements that are off the reference,
-//! so that limits become active. Each problem is solved by the controller (linearisation, solve and
+//! so that limits become active; with `--along` the measurements are the recorded ones. Each problem
+//! comes with the time that the controller with the structured solver takes for it. Each problem is solved by the controller (linearisation, solve and
 //! lift together) and, at once, by clarabel with its default settings, set up anew. Times are those
 //! of this thread's CPU clock where the system has one.
 
@@ -16,7 +18,7 @@ use std::path::Path;
 
 use romc::mpc::{
     Command, ConeProgram, Controller, Lift, Measurement, MpcSettings, Outcome, QpSettings,
-    QpSolver, ReferenceSamples, RowSelection, SolverProfile,
+    QpSolver, ReferenceSamples, RowSelection, Solver, SolverProfile,
 };
 use romc::recording::Segment;
 
@@ -50,7 +52,11 @@ fn main() {
         let steps = steps.parse().expect("--steps takes a number");
         watch_memory(&model, &segments[0], steps);
     } else if let Some(path) = value_of("--dump") {
-        dump(&model, &segments, Path::new(path));
+        let push = match arguments.iter().any(|argument| argument == "--along") {
+            true => 0.0,
+            false => 1.0,
+        };
+        dump(&model, &segments, push, Path::new(path));
     } else {
         compare(&model, &segments);
     }
@@ -82,11 +88,11 @@ fn conic(controller: &Controller) -> &QpSolver {
     controller.solver().expect("clarabel is what solves")
 }
 
-/// The recorded state, pushed forwards, down and into a pitch that change slowly.
-fn pushed(segment: &Segment, sample: usize) -> ([f64; 18], [f64; 18]) {
+/// The recorded state, pushed forwards, down and into a pitch that change slowly, by `size` times as much as in the table.
+fn pushed(segment: &Segment, sample: usize, size: f64) -> ([f64; 18], [f64; 18]) {
     let mut x: [f64; 18] = std::array::from_fn(|i| segment.x[(i, sample)]);
     let mut dx: [f64; 18] = std::array::from_fn(|i| segment.dx[(i, sample)]);
-    let wave = (12.0 * segment.time_s[sample]).sin();
+    let wave = size * (12.0 * segment.time_s[sample]).sin();
     x[12] += 0.1 * wave;
     x[14] -= 0.08 * wave;
     x[16] += 0.3 * wave;
@@ -95,7 +101,17 @@ fn pushed(segment: &Segment, sample: usize) -> ([f64; 18], [f64; 18]) {
 }
 
 fn step(controller: &mut Controller, segment: &Segment, sample: usize, command: &mut Command) {
-    let (x, dx) = pushed(segment, sample);
+    step_pushed(controller, segment, sample, 1.0, command);
+}
+
+fn step_pushed(
+    controller: &mut Controller,
+    segment: &Segment,
+    sample: usize,
+    push: f64,
+    command: &mut Command,
+) {
+    let (x, dx) = pushed(segment, sample, push);
     let feet = segment.feet[sample];
     let measurement = Measurement {
         time_s: segment.time_s[sample],
@@ -260,14 +276,24 @@ fn watch_memory(model: &romc::model::ReducedModel, segment: &Segment, steps: usi
     );
 }
 
-fn dump(model: &romc::model::ReducedModel, segments: &[Segment], path: &Path) {
+fn dump(model: &romc::model::ReducedModel, segments: &[Segment], push: f64, path: &Path) {
     let file = std::fs::File::create(path).expect("the file can be made");
     let mut out = std::io::BufWriter::new(file);
     for segment in segments {
+        let structured = MpcSettings {
+            solver: Solver::Riccati,
+            ..MpcSettings::default()
+        };
+        let mut own = self::controller(model, segment, structured);
+        let mut prepared = self::controller(model, segment, structured);
         let mut controller = controller(model, segment, MpcSettings::default());
         let mut command = Command::zeros(model.latent_dim());
         for sample in (0..segment.len() - 5).step_by(5) {
-            step(&mut controller, segment, sample, &mut command);
+            let own_us = timed(|| step_pushed(&mut own, segment, sample, push, &mut command));
+            prepared.prepare(segment.time_s[sample]);
+            let prepared_us =
+                timed(|| step_pushed(&mut prepared, segment, sample, push, &mut command));
+            step_pushed(&mut controller, segment, sample, push, &mut command);
             let program = conic(&controller).program();
             let equalities = program.cones.first().map_or(0, |cone| cone.dim());
             let matrix = |matrix: &romc::mpc::SparseColumns| {
@@ -281,6 +307,7 @@ fn dump(model: &romc::model::ReducedModel, segments: &[Segment], path: &Path) {
             let problem = serde_json::json!({
                 "P": matrix(&program.p), "q": program.q, "A": matrix(&program.a), "b": program.b,
                 "equalities": equalities, "solution": conic(&controller).solution(),
+                "own_us": own_us, "prepared_us": prepared_us,
             });
             writeln!(out, "{problem}").expect("the disk has room");
         }

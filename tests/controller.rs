@@ -13,7 +13,8 @@ use romc::recording::Segment;
 
 #[path = "controller/programs.rs"]
 mod programs;
-use programs::{WARNINGS, has, is_thorough, root, shipped, succeed, with_losses};
+mod tools;
+use programs::{WARNINGS, has, root, shipped, succeed, with_losses};
 
 /// What a Rust static library needs from the system.
 const SYSTEM: [&str; 4] = ["-lm", "-lpthread", "-ldl", "-lrt"];
@@ -305,7 +306,7 @@ fn model_without_a_robot_or_with_activations_is_refused_with_the_reason() {
 fn generated_controllers_command_the_librarys_bits_and_survive_abuse() {
     // A crate is a minute of compiling: the simpler model only where everything is asked for.
     let mut models = vec![with_losses(shipped("go1-d6"))];
-    if is_thorough() {
+    if tools::is_thorough() {
         models.push(shipped("go1-d4"));
     }
     for model in models {

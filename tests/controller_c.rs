@@ -12,6 +12,8 @@ use romc::model::ReducedModel;
 use romc::mpc::{Controller, Effectiveness, Measurement, MpcSettings, ReferenceSamples, Solver};
 use romc::robot::WrenchFrame;
 
+#[path = "controller_c/analysers.rs"]
+mod analysers;
 #[path = "controller_c/boards.rs"]
 mod boards;
 #[path = "controller_c/emitted.rs"]
@@ -22,7 +24,6 @@ mod programs;
 mod random;
 #[path = "controller_c/ros2.rs"]
 mod ros2;
-#[path = "controller_c/tools.rs"]
 mod tools;
 use emitted::{Emitted, STRICT};
 use programs::{has, root, shipped, succeed, with_losses};

@@ -16,13 +16,14 @@ mod models;
 mod single;
 #[path = "differential/terms.rs"]
 mod terms;
+mod tools;
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use agreement::{Rule, Tally, compare};
-use drivers::{Build, Workshop, contents, is_thorough};
+use drivers::{Build, Workshop, contents};
 use functions::{Function, Random, functions as functions_of};
 use nalgebra::DVector;
 use romc::equations::Equations;
@@ -36,7 +37,7 @@ const SOME_MODELS: u64 = 24;
 
 /// Random models of a comparison that compiles them all for one program.
 fn n_models_a_program() -> u64 {
-    match is_thorough() {
+    match tools::is_thorough() {
         true => SOME_MODELS,
         false => SOME_MODELS / 3,
     }

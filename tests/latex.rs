@@ -13,6 +13,8 @@ use romc::typeset::latex;
 use romc::typeset::{Form, NumberStyle, PrintOptions};
 use romc::typeset::{Rounding, SymbolTable};
 
+mod tools;
+
 /// Equations (25) and (26) as the paper prints them, without spaces and with plain parentheses.
 const PAPER_CONTACT: &str = concat!(
     r"\begin{cases}",
@@ -479,17 +481,14 @@ fn emission_is_identical_from_run_to_run() {
 }
 
 /// Runs pdflatex on the preview and fails on errors and on lines that stick out. Without pdflatex
-/// it says so and returns, unless ROMC_REQUIRE_TOOLS=1. With ROMC_KEEP_PDF=DIR the PDF is kept.
+/// it is as [`tools::answers`] says. With ROMC_KEEP_PDF=DIR the PDF is kept.
 fn typeset(files: &[EmittedFile], stem: &str) {
     typeset_document(files, &format!("{stem}-preview"));
 }
 
 /// The same for the document `NAME.tex`.
 fn typeset_document(files: &[EmittedFile], name: &str) {
-    let required = std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1");
-    if Command::new("pdflatex").arg("--version").output().is_err() {
-        assert!(!required, "pdflatex is missing and ROMC_REQUIRE_TOOLS=1");
-        println!("skipped: pdflatex is not installed");
+    if !tools::answers(Command::new("pdflatex").arg("--version")) {
         return;
     }
     let folder = tempfile::tempdir().unwrap();

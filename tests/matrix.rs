@@ -18,11 +18,12 @@ mod models;
 #[path = "differential/terms.rs"]
 #[allow(dead_code, reason = "the terms of tests/differential.rs")]
 mod terms;
+mod tools;
 
 use std::path::Path;
 use std::process::Command;
 
-use drivers::{Build, Workshop, is_thorough};
+use drivers::{Build, Workshop};
 use romc::artifact;
 use romc::check::{CheckOptions, Side, Verdict, compare};
 use romc::codegen::Precision;
@@ -64,7 +65,7 @@ fn self_tests_of_c_and_rust_compile_and_pass_in_both_precisions() {
             let workshop = Workshop::in_precision(one, &LowerOptions::default(), precision);
             workshop.run_c_selftest(&Build::c(), &name);
             // A crate takes seconds to compile.
-            if precision == Precision::Double || is_thorough() {
+            if precision == Precision::Double || tools::is_thorough() {
                 workshop.run_rust_selftest(&name);
             }
         }
@@ -160,12 +161,7 @@ fn latex_markdown_and_mathml_say_what_the_model_says() {
 
 /// The preview through pdflatex; told and skipped without it, unless required.
 fn typeset(files: &[EmittedFile], name: &str) {
-    if Command::new("pdflatex").arg("--version").output().is_err() {
-        assert!(
-            !is_thorough(),
-            "pdflatex is missing and ROMC_REQUIRE_TOOLS=1"
-        );
-        eprintln!("skipped: {name} is not typeset, pdflatex is missing");
+    if !tools::answers(Command::new("pdflatex").arg("--version")) {
         return;
     }
     let folder = tempfile::tempdir().expect("a folder");

@@ -6,6 +6,7 @@ mod checkers;
 mod functions;
 #[path = "differential/models.rs"]
 mod models;
+mod tools;
 
 use checkers::check;
 use romc::deploy::Target;

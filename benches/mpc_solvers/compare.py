@@ -1,11 +1,15 @@
 """Other solvers on the controller's problems: times, iterations, distance from its solution.
 
-    cargo bench --bench mpc -- --dump problems.jsonl
+    cargo bench --bench mpc -- --dump problems.jsonl           # add --along: no limit is active
     python -m venv venv && venv/bin/pip install -r benches/mpc_solvers/requirements.txt
     venv/bin/python benches/mpc_solvers/compare.py problems.jsonl
 
 Each solver is set up once a jump (the rows that matter differ between jumps) and then only updated,
-as the controller does it; times are those of this thread's CPU clock for update and solve. The controller's own are printed by the bench.
+as the controller does it; times are those of this thread's CPU clock for update and solve. Those in
+the last rows are of the controller with romc's structured solver, which the bench measured when it
+wrote the problems: a whole step, linearisation, gains and lift included, and the step alone after
+`Controller::prepare`, which linearises and makes the gains between two steps. `x whole` and `x prepared`
+say how many times as long a solver takes in the median.
 """
 
 import json
@@ -37,6 +41,8 @@ def read(path):
                 "b": np.array(stored["b"]),
                 "equalities": stored["equalities"],
                 "solution": np.array(stored["solution"]),
+                "own_us": stored["own_us"],
+                "prepared_us": stored["prepared_us"],
             }
 
 
@@ -96,7 +102,8 @@ def main():
     }
     print(f"{len(problems)} problems; CPU time of update and solve in us; `off` is the largest")
     print("distance of an unknown from the controller's, all unknowns being scaled to about one")
-    print(f"{'':<12}{'median':>9}{'p99':>9}{'iterations':>12}{'median off':>12}{'p99 off':>10}")
+    own, prepared = ([problem[key] for problem in problems] for key in ("own_us", "prepared_us"))
+    print(f"{'':<12}{'median':>9}{'p99':>9}{'iterations':>12}{'median off':>12}{'p99 off':>10}{'x whole':>9}{'x prepared':>12}")
     for name, solver in solvers.items():
         times, iterations, off = [], [], []
         pattern = None
@@ -113,7 +120,10 @@ def main():
         print(
             f"{name:<12}{np.median(times):>9.0f}{np.percentile(times, 99):>9.0f}"
             f"{np.median(iterations):>12.0f}{np.median(off):>12.1e}{np.percentile(off, 99):>10.1e}"
+            f"{np.median(times) / np.median(own):>9.1f}{np.median(times) / np.median(prepared):>12.1f}"
         )
+    for name, times in (("romc", own), ("prepared", prepared)):
+        print(f"{name:<12}{np.median(times):>9.1f}{np.percentile(times, 99):>9.1f}")
 
 
 if __name__ == "__main__":

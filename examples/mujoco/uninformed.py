@@ -2,7 +2,8 @@
 
 Encoder, decoder, phases and input statistics stay. The one number g of a phase is the least-squares
 fit to training jumps, in the scaled units of the model file, so that a controller on the copy has
-the right scale and nothing else. What a controller on the model itself does better is due to Xi.
+the right scale and nothing else; how far its accelerations are off is its own. What a controller on
+the model itself does better is due to Xi.
 """
 
 import json
@@ -32,8 +33,13 @@ def write_uninformed(model_path, output, recordings, inputs):
         ddz, u = (np.concatenate(parts) for parts in zip(*chosen, strict=True))
         if len(u) == 0:
             raise SystemExit(f"{model_path}: phase `{phase['name']}` is in none of the recordings")
-        gains[phase["name"]] = float((ddz * u).sum() / (u * u).sum())
-        phase["xi"] = (gains[phase["name"]] * np.eye(latent_dim)).tolist()
+        gain = float((ddz * u).sum() / (u * u).sum())
+        gains[phase["name"]] = gain
+        given_state = model["input_statistics"][phase["name"]].get("given_state")
+        if given_state:
+            error = ddz - gain * u
+            given_state["acceleration_error"] = (error.T @ error / len(error)).tolist()
+        phase["xi"] = (gain * np.eye(latent_dim)).tolist()
     model["library"] = [f"u{k + 1}" for k in range(latent_dim)]
     for part in model.get("prior", {}).get("parts", []):
         part.pop("xi", None)

@@ -83,6 +83,8 @@ def planned(arguments, jump, training):
         arguments.phases,
         "--latent-dim",
         arguments.latent_dim,
+        "--actuators",
+        arguments.actuators,
     ]
     romc(arguments, "train", *files, *words, "--output", out / "model.json", "--force")
     distance, apex = jump.goal
@@ -189,6 +191,7 @@ def main():
     parser.add_argument("--robot", required=True)
     parser.add_argument("--phases", default="contact-flight")
     parser.add_argument("--latent-dim", type=int, default=6)
+    parser.add_argument("--actuators", default="identify", help="as of romc train")
     parser.add_argument(
         "--shorter-than", type=float, default=np.inf, help="distance of training jumps, m"
     )

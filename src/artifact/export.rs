@@ -2,8 +2,8 @@
 
 use super::jump_prior::entries_of;
 use super::manifest::{
-    LayerEntry, LibraryEntry, Manifest, MapEntry, Pairs, PhaseEntry, RobotValue, SCHEMA, SCHEMA_2,
-    StatisticsEntry,
+    GivenStateEntry, LayerEntry, LibraryEntry, Manifest, MapEntry, Pairs, PhaseEntry, RobotValue,
+    SCHEMA, SCHEMA_2, StatisticsEntry, has_given_state,
 };
 use super::matrices::to_rows;
 use crate::model::{InputStatistics, Library, LibrarySource, Phase, ReducedModel, StateMap};
@@ -25,10 +25,13 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
     let wrench_frame = (frame != WrenchFrame::Body).then_some(frame);
     let robot = model.robot().ok().map(robot_value);
     let (landmarks, prior) = entries_of(model);
-    let schema = match (&actuators, wrench_frame, &prior, &robot) {
-        (None, None, None, None | Some(RobotValue::Name(_))) => SCHEMA,
-        _ => SCHEMA_2,
-    };
+    let statistics = Pairs(statistics.collect());
+    let is_later = actuators.is_some()
+        || wrench_frame.is_some()
+        || prior.is_some()
+        || matches!(robot, Some(RobotValue::Entry(_)))
+        || has_given_state(&statistics);
+    let schema = if is_later { SCHEMA_2 } else { SCHEMA };
     Manifest {
         schema: schema.to_owned(),
         name: model.name().to_owned(),
@@ -41,7 +44,7 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
         latent_dim: model.latent_dim(),
         library: library_entry(model.library()),
         phases: model.phases().iter().map(phase_entry).collect(),
-        input_statistics: Pairs(statistics.collect()),
+        input_statistics: statistics,
         robot,
         actuators,
         wrench_frame,
@@ -98,5 +101,13 @@ fn statistics_entry(statistics: &InputStatistics) -> StatisticsEntry {
     StatisticsEntry {
         mean: statistics.mean.as_slice().to_vec(),
         covariance: to_rows(&statistics.covariance),
+        given_state: statistics
+            .given_state
+            .as_ref()
+            .map(|given| GivenStateEntry {
+                mean: to_rows(&given.mean),
+                covariance: to_rows(&given.covariance),
+                acceleration_error: to_rows(&given.acceleration_error),
+            }),
     }
 }

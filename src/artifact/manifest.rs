@@ -20,7 +20,8 @@ use crate::robot_file::RobotEntry;
 /// Name and version of the format of a model without the keys of [`SCHEMA_2`].
 pub const SCHEMA: &str = "romc-model/1";
 
-/// The format with `actuators`, `wrench_frame`, `landmarks`, `prior` and a `robot` that is described.
+/// The format with `actuators`, `wrench_frame`, `landmarks`, `prior`, inputs given states, and a
+/// `robot` that is described.
 pub const SCHEMA_2: &str = "romc-model/2";
 
 /// Rows of a matrix.
@@ -191,6 +192,23 @@ pub(super) struct PhaseEntry {
 pub(super) struct StatisticsEntry {
     pub mean: Vec<f64>,
     pub covariance: Rows,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub given_state: Option<GivenStateEntry>,
+}
+
+/// The latent input given the latent state.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GivenStateEntry {
+    pub mean: Rows,
+    pub covariance: Rows,
+    pub acceleration_error: Rows,
+}
+
+/// Whether the statistics of a phase say something of inputs given states, which the first schema does not know.
+pub(super) fn has_given_state(statistics: &Pairs<StatisticsEntry>) -> bool {
+    let mut entries = statistics.0.iter();
+    entries.any(|(_, entry)| entry.given_state.is_some())
 }
 
 /// A list of terms, or the shorthand.

@@ -10,13 +10,13 @@ use serde_json::Value;
 use super::error::{ArtifactError, ArtifactFault, refused};
 use super::jump_prior::prior_of;
 use super::manifest::{
-    LibraryEntry, Manifest, MapEntry, PhaseEntry, RobotValue, Rows, SCHEMA, SCHEMA_2, SchemaProbe,
-    StatisticsEntry,
+    GivenStateEntry, LibraryEntry, Manifest, MapEntry, PhaseEntry, RobotValue, Rows, SCHEMA,
+    SCHEMA_2, SchemaProbe, StatisticsEntry, has_given_state,
 };
 use super::matrices::from_rows;
 use crate::model::{
-    Activation, AffineMap, InputStatistics, Layer, Library, ModelError, Phase, ReducedModel,
-    StateMap,
+    Activation, AffineMap, InputGivenState, InputStatistics, Layer, Library, ModelError, Phase,
+    ReducedModel, StateMap,
 };
 use crate::robot::{Robot, STATE_DIM};
 
@@ -68,6 +68,10 @@ pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, Artifac
             ("wrench_frame", manifest.wrench_frame.is_some()),
             ("landmarks", manifest.landmarks.is_some()),
             ("prior", manifest.prior.is_some()),
+            (
+                "input_statistics.given_state",
+                has_given_state(&manifest.input_statistics),
+            ),
             (
                 "robot",
                 matches!(manifest.robot, Some(RobotValue::Entry(_))),
@@ -255,9 +259,28 @@ fn statistics_of(
     entry: &StatisticsEntry,
 ) -> Result<InputStatistics, ArtifactError> {
     let phase: String = phase.chars().take(80).collect();
-    let tensor = format!("input_statistics.{}.covariance", phase.escape_debug());
+    let place = format!("input_statistics.{}", phase.escape_debug());
+    let tensor = format!("{place}.covariance");
+    let given = entry.given_state.as_ref();
     Ok(InputStatistics {
         mean: DVector::from_column_slice(&entry.mean),
         covariance: from_rows(file, &tensor, &entry.covariance, Some(entry.mean.len()))?,
+        given_state: given
+            .map(|given| given_state_of(file, &place, given))
+            .transpose()?,
+    })
+}
+
+fn given_state_of(
+    file: &str,
+    place: &str,
+    entry: &GivenStateEntry,
+) -> Result<InputGivenState, ArtifactError> {
+    let matrix =
+        |key: &str, rows: &Rows| from_rows(file, &format!("{place}.given_state.{key}"), rows, None);
+    Ok(InputGivenState {
+        mean: matrix("mean", &entry.mean)?,
+        covariance: matrix("covariance", &entry.covariance)?,
+        acceleration_error: matrix("acceleration_error", &entry.acceleration_error)?,
     })
 }

@@ -72,10 +72,11 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let validation = read_all(&recorded.validation)?;
     recorded.report_findings();
     let mut base = train_settings::options(&settings, 1, String::new())?;
-    if settings.actuators.as_deref() == Some(actuators::IDENTIFIED) {
+    if train_settings::actuators(&settings) == actuators::IDENTIFIED {
         base.actuators = actuators::identified(&recorded.training, robot)?;
     }
     settings.wrench_frame = Some(base.wrench_frame);
+    settings.actuators = Some(train_settings::actuators(&settings).to_owned());
     let plan = plan(arguments, &settings, &training, &validation);
     let store = Store::create(&arguments.out_dir, plan)?;
     let bar = spinner("training");

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde_json::json;
 
 use super::Answer;
-use super::actuators::{self, NONE};
+use super::actuators;
 use super::args::{TrainArguments, TrainSettings};
 use super::output::{check_output, names, note, spinner, stem};
 use super::prepared_recordings::{RecordedSets, read_all};
@@ -36,7 +36,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let robot = robot::chosen(settings.robot.as_deref().unwrap_or("go1"))?;
     let mut options = train_settings::options(&settings, latent_dim, model_name(arguments))?;
     let recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
-    if settings.actuators.as_deref() == Some(actuators::IDENTIFIED) {
+    if train_settings::actuators(&settings) == actuators::IDENTIFIED {
         options.actuators = actuators::identified(&recorded.training, robot)?;
     }
     // a fault of the test recordings ends the command before the training
@@ -149,7 +149,7 @@ fn command_line(
         method: Some(method),
         wrench_frame: Some(options.wrench_frame),
         coordinates: Some(options.coordinates()),
-        actuators: Some(settings.actuators.clone().unwrap_or(NONE.to_owned())),
+        actuators: Some(train_settings::actuators(settings).to_owned()),
         ..settings.clone()
     };
     line += &train_settings::as_flags(&settings);

@@ -66,9 +66,9 @@ pub(super) fn options(
     if settings.phases == Some(PhaseSet::ContactRearFlight) {
         options.phases = PhaseRule::three_phase().with_min_samples(options.phases.min_samples);
     }
-    options.actuators = match settings.actuators.as_deref() {
-        None | Some(actuators::NONE | actuators::IDENTIFIED) => None,
-        Some(path) => Some(actuators::read(Path::new(path))?),
+    options.actuators = match actuators(settings) {
+        actuators::NONE | actuators::IDENTIFIED => None,
+        path => Some(actuators::read(Path::new(path))?),
     };
     Ok(options)
 }
@@ -106,6 +106,15 @@ pub(super) fn method(settings: &TrainSettings) -> Method {
         Some(_) => Method::Joint,
     };
     settings.method.unwrap_or(default)
+}
+
+/// Where the joints' losses come from: a file, or one of the words of [`actuators`].
+pub(super) fn actuators(settings: &TrainSettings) -> &str {
+    let default = match settings.paper {
+        true => actuators::NONE,
+        false => actuators::IDENTIFIED,
+    };
+    settings.actuators.as_deref().unwrap_or(default)
 }
 
 /// The first setting that the closed form would ignore.

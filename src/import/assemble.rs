@@ -325,7 +325,12 @@ impl<'a> Assembly<'a, '_> {
             let matrix = self.read(covariance)?.matrix((dim, dim));
             self.note_used(covariance, Layout::Plain);
             let covariance = matrix;
-            all.push((rule.name.clone(), InputStatistics { mean, covariance }));
+            let statistics = InputStatistics {
+                mean,
+                covariance,
+                given_state: None,
+            };
+            all.push((rule.name.clone(), statistics));
         }
         Ok(all)
     }

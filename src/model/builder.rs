@@ -133,6 +133,12 @@ impl ModelBuilder {
         self
     }
 
+    /// Replaces the input statistics of all phases.
+    pub fn all_input_statistics(mut self, statistics: Vec<(String, InputStatistics)>) -> Self {
+        self.statistics = statistics;
+        self
+    }
+
     /// Sets names and units of the state.
     pub fn state(mut self, state: CoordinateNames) -> Self {
         self.state = Some(state);
@@ -428,7 +434,7 @@ impl ModelBuilder {
                 part: "input_statistics",
                 needs: "encoder",
             })?;
-            statistics.check(name, dim)?;
+            statistics.check(name, dim, self.library.latent_dim())?;
             *slot = Some(statistics.clone());
         }
         Ok(ordered)

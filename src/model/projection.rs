@@ -1,4 +1,4 @@
-//! Pseudo-inverses of encoders: `u_lat = pinv(W_e^T) u`.
+//! Pseudo-inverses of encoders, `u_lat = pinv(W_e^T) u`, and projectors.
 
 use nalgebra::DMatrix;
 
@@ -64,4 +64,18 @@ fn refined(projection: DMatrix<f64>, weights: &DMatrix<f64>) -> DMatrix<f64> {
     }
     let step = &residual * &projection;
     projection + step
+}
+
+/// The projector on what is orthogonal to the columns: `I` without columns that are zero.
+pub fn complement(columns: &DMatrix<f64>) -> DMatrix<f64> {
+    let d = columns.nrows();
+    let mut projector = DMatrix::identity(d, d);
+    for column in columns.column_iter() {
+        let direction = &projector * column;
+        let square = direction.norm_squared();
+        if square > f64::EPSILON * column.norm_squared() {
+            projector -= &direction * direction.transpose() / square;
+        }
+    }
+    projector
 }

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::error::{ModelError, check_finite, check_shape};
+use super::given_state::InputGivenState;
 
 /// Largest asymmetry, and most negative eigenvalue, that count as rounding: relative to the
 /// largest entry, and to the largest eigenvalue.
@@ -15,6 +16,8 @@ pub struct InputStatistics {
     pub mean: DVector<f64>,
     /// `input_dim x input_dim`, symmetric positive semidefinite.
     pub covariance: DMatrix<f64>,
+    /// What the latent state says of the latent input, if it was learned.
+    pub given_state: Option<InputGivenState>,
 }
 
 impl InputStatistics {
@@ -34,29 +37,53 @@ impl InputStatistics {
             squares.gemm(1.0, &block, &block.transpose(), 1.0);
         }
         let covariance = squares / n.max(1) as f64;
-        let covariance = (&covariance + covariance.transpose()) * 0.5;
-        Self { mean, covariance }
-    }
-
-    /// Mean and covariance of the latent input `u_lat = projection u`, scaled units.
-    pub fn projected(&self, projection: &DMatrix<f64>) -> Self {
         Self {
-            mean: projection * &self.mean,
-            covariance: projection * &self.covariance * projection.transpose(),
+            mean,
+            covariance: symmetric(covariance),
+            given_state: None,
         }
     }
 
-    /// Complains unless mean and covariance are those of some distribution over `dim` inputs.
-    pub(super) fn check(&self, phase: &str, dim: usize) -> Result<(), ModelError> {
-        let mean = format!("input_statistics.{phase}.mean");
+    /// Mean and covariance of the latent input `u_lat = projection u`, scaled units.
+    pub fn projected(&self, projection: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        let covariance = projection * &self.covariance * projection.transpose();
+        (projection * &self.mean, covariance)
+    }
+
+    /// Complains unless mean and covariance are those of some distribution over `dim` inputs, and
+    /// over `latent_dim` latent ones.
+    pub(super) fn check(
+        &self,
+        phase: &str,
+        dim: usize,
+        latent_dim: usize,
+    ) -> Result<(), ModelError> {
+        let place = format!("input_statistics.{phase}");
+        let mean = format!("{place}.mean");
         check_shape(&mean, self.mean.shape(), (dim, 1))?;
         check_finite(&mean, &self.mean)?;
-        let tensor = format!("input_statistics.{phase}.covariance");
-        check_shape(&tensor, self.covariance.shape(), (dim, dim))?;
-        check_finite(&tensor, &self.covariance)?;
-        check_symmetric(&tensor, &self.covariance)?;
-        check_positive(&tensor, &self.covariance)
+        check_covariance(&format!("{place}.covariance"), &self.covariance, dim)?;
+        match &self.given_state {
+            None => Ok(()),
+            Some(given) => given.check(&format!("{place}.given_state"), latent_dim),
+        }
     }
+}
+
+/// The matrix without the asymmetry of rounding.
+pub(super) fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    (&matrix + matrix.transpose()) * 0.5
+}
+
+pub(super) fn check_covariance(
+    tensor: &str,
+    found: &DMatrix<f64>,
+    dim: usize,
+) -> Result<(), ModelError> {
+    check_shape(tensor, found.shape(), (dim, dim))?;
+    check_finite(tensor, found)?;
+    check_symmetric(tensor, found)?;
+    check_positive(tensor, found)
 }
 
 fn check_symmetric(tensor: &str, covariance: &DMatrix<f64>) -> Result<(), ModelError> {

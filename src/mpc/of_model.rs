@@ -8,8 +8,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 
 use super::error::MpcError;
 use super::online::{
-    ControlModel, ControlModelParts, ControlPhase, Controller, InputMaps, LatentDynamics,
-    MpcSettings, NonlinearMaps,
+    ControlModel, ControlModelParts, ControlPhase, Controller, InputGivenState, InputMaps,
+    LatentDynamics, MpcSettings, NonlinearMaps,
 };
 use crate::lower::CompiledModel;
 use crate::model::ReducedModel;
@@ -147,11 +147,11 @@ fn phase_under(
 ) -> Result<ControlPhase, MpcError> {
     let name = model.phases()[phase].name.clone();
     let input = model.input_statistics(phase)?;
-    let latent = input.projected(projection);
+    let (latent_mean, latent_covariance) = input.projected(projection);
     let unusable = || MpcError::Statistics {
         phase: name.clone(),
     };
-    let latent_root = Cholesky::new(with_floor(latent.covariance))
+    let latent_root = Cholesky::new(with_floor(latent_covariance))
         .ok_or_else(unusable)?
         .unpack();
     let torque_covariance = with_floor(
@@ -167,8 +167,13 @@ fn phase_under(
         is_grounded: model.phase_for([false; 4]) != Some(phase),
         torque_mean: SVector::from_fn(|joint, _| input.mean[joint]),
         torque_precision: SMatrix::from_fn(|row, col| torque_precision[(row, col)]),
-        latent_mean: latent.mean,
+        latent_mean,
         latent_root,
+        given_state: input.given_state.as_ref().map(|given| InputGivenState {
+            mean: given.mean.clone(),
+            covariance: given.covariance.clone(),
+            acceleration_error: given.acceleration_error.clone(),
+        }),
         name,
     })
 }

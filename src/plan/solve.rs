@@ -111,7 +111,7 @@ fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
     let goal = &task.seed.goal;
     let (distance_m, apex_m) = (goal.distance_m(), goal.apex_m());
     let settings = QpSettings {
-        profile: SolverProfile::AsShipped,
+        profile: SolverProfile::Scaled,
         max_iterations: 60,
         ..QpSettings::default()
     };

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | 4 | a term that is added, with its sign; 2 inside the argument of a function |
 //! | 3 | the name of a function |
+//! | 3 | a function among the factors of another one's argument, beside its name |
 //! | 2 | a pair of parentheses, a whole number before a term inside a sum or argument |
 //! | 1 | a symbol, a power, a fraction bar, a digit of a coefficient (at most three) |
 //!
@@ -100,7 +101,8 @@ impl ExprPool {
             }
             Node::Apply(_, argument) => {
                 let connectors = INNER_TERM * (self.n_terms(*argument) - 1);
-                length_of(*argument).saturating_add(FUNCTION + connectors)
+                let nested = FUNCTION * self.n_functions(*argument);
+                length_of(*argument).saturating_add(FUNCTION + connectors + nested)
             }
         }
     }
@@ -110,6 +112,21 @@ impl ExprPool {
         match self.n_terms(expr) {
             1 => length,
             n => length.saturating_add(TERM * (n - 1) + PARENTHESES),
+        }
+    }
+
+    /// Functions among the factors of the terms.
+    fn n_functions(&self, expr: ExprId) -> u64 {
+        let is_function = |factor: &ExprId| self.function_power(*factor).is_some();
+        let of_term = |term: ExprId| {
+            self.factors_of(term)
+                .iter()
+                .filter(|f| is_function(f))
+                .count()
+        };
+        match self.node(expr) {
+            Node::Sum(terms) => terms.iter().map(|term| of_term(*term) as u64).sum(),
+            _ => of_term(expr) as u64,
         }
     }
 
@@ -161,6 +178,7 @@ mod tests {
         assert!(cost("sin(2*x)") < cost("2*sin(x)*cos(x)"));
         assert!(cost("sin(x + y)") < cost("sin(x)*cos(y) + cos(x)*sin(y)"));
         assert!(cost("0.123*x") == cost("0.123456789*x"));
+        assert!(cost("log(x) + y") < cost("log(x*exp(y))"));
         assert!(cost("2 + sin(x)^2") < cost("3*sin(x)^2 + 2*cos(x)^2"));
     }
 

@@ -56,7 +56,24 @@ impl ExprPool {
             }
             return self.product(&rest);
         }
-        expr
+        self.merge_factors(Function::Sign, &factors).unwrap_or(expr)
+    }
+
+    /// `f(a)*f(b) = f(a*b)`, for magnitudes and signs.
+    fn merge_factors(&mut self, function: Function, factors: &[ExprId]) -> Option<ExprId> {
+        let (mut inside, mut outside) = (Vec::new(), Vec::new());
+        for &factor in factors {
+            match self.function_power(factor) {
+                Some((of_factor, argument, 1)) if of_factor == function => inside.push(argument),
+                _ => outside.push(factor),
+            }
+        }
+        if inside.len() < 2 {
+            return None;
+        }
+        let product = self.product(&inside);
+        outside.push(self.apply(function, product));
+        Some(self.product(&outside))
     }
 
     /// What loses a factor and what takes its place when `sign(argument)` is multiplied in:
@@ -85,20 +102,8 @@ impl ExprPool {
 
     /// `abs(a)*abs(b) = abs(a*b)`.
     pub(super) fn merge_abs(&mut self, expr: ExprId) -> ExprId {
-        let mut inside = Vec::new();
-        let mut outside = Vec::new();
-        for factor in self.factors_of(expr).to_vec() {
-            match self.function_power(factor) {
-                Some((Function::Abs, argument, 1)) => inside.push(argument),
-                _ => outside.push(factor),
-            }
-        }
-        if inside.len() < 2 {
-            return expr;
-        }
-        let product = self.product(&inside);
-        outside.push(self.apply(Function::Abs, product));
-        self.product(&outside)
+        let factors = self.factors_of(expr).to_vec();
+        self.merge_factors(Function::Abs, &factors).unwrap_or(expr)
     }
 
     /// `abs(a)/a = sign(a)`.

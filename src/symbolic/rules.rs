@@ -12,7 +12,8 @@
 //! | `abs(a*b)`, `abs(a)^2`, `abs(a)*sign(a)` | `abs(a)*abs(b)`, `a^2`, `a` |
 //! | `sign(a)*a`, `sign(a)^3` | `abs(a)`, `sign(a)` |
 //! | `sqrt(a)*sqrt(b)`, `sqrt(exp(a))` | `sqrt(a*b)`, `exp(a/2)` |
-//! | `1/(a^2 + a*b)` | `1/(a*(a + b))` |
+//! | `1/(a^2 + a*b)`, `1/(1 + exp(-a))` | `1/(a*(a + b))`, `exp(a)/(exp(a) + 1)` |
+//! | `sign(a)*sign(b)` | `sign(a*b)` |
 //!
 //! | fewer calls | |
 //! |---|---|
@@ -137,7 +138,7 @@ impl ExprPool {
         let terms = terms.to_vec();
         let mut shared: Vec<(ExprId, Number)> = Vec::new();
         let powers: Vec<Vec<(ExprId, Number)>> = (terms.iter())
-            .map(|term| self.numeric_powers(*term))
+            .map(|term| self.powers_with_exponentials(*term))
             .collect();
         for &(factor, _) in powers.iter().flatten() {
             let of_term = |powers: &Vec<(ExprId, Number)>| {
@@ -159,7 +160,10 @@ impl ExprPool {
             .collect();
         let divisor = self.product(&divisor);
         let rest: Vec<ExprId> = (terms.into_iter())
-            .map(|term| self.mul(term, divisor))
+            .map(|term| {
+                let term = self.mul(term, divisor);
+                self.merge_exponentials(term)
+            })
             .collect();
         let rest = self.sum(&rest);
         let parts = [
@@ -167,6 +171,31 @@ impl ExprPool {
             self.pow_number(divisor, -exponent),
         ];
         self.product(&parts)
+    }
+
+    /// Factors of a term with their powers, where `exp(2*a - b)` is `exp(a)^2*exp(b)^-1`.
+    fn powers_with_exponentials(&mut self, term: ExprId) -> Vec<(ExprId, Number)> {
+        let mut powers = Vec::new();
+        for (base, power) in self.numeric_powers(term) {
+            let Node::Apply(Function::Exp, argument) = *self.node(base) else {
+                powers.push((base, power));
+                continue;
+            };
+            for (coefficient, rest) in self.terms_of(argument) {
+                let whole = if coefficient.as_integer().is_some() && rest != ExprId::ONE {
+                    coefficient
+                } else if coefficient.is_negative() {
+                    Number::MINUS_ONE
+                } else {
+                    Number::ONE
+                };
+                let unit = coefficient.checked_div(whole).unwrap_or(Number::ONE);
+                let unit = self.scale(unit, rest);
+                let single = self.apply(Function::Exp, unit);
+                powers.push((single, whole.checked_mul(power).unwrap_or(power)));
+            }
+        }
+        powers
     }
 
     fn merge_exponentials(&mut self, expr: ExprId) -> ExprId {
@@ -397,6 +426,8 @@ mod tests {
             ("b/(a^2 + a*b)", "b/(a*(a + b))"),
             ("1/(1/a + 1/b)", "a*b/(a + b)"),
             ("1/(a + b)", "1/(a + b)"),
+            ("1/(1 + exp(-a))", "exp(a)/(1 + exp(a))"),
+            ("1/(exp(a) + exp(2*a - b))", "exp(-a + b)/(exp(a) + exp(b))"),
         ] {
             assert_eq!(rewritten(text, ExprPool::normal_rules), expected, "{text}");
         }

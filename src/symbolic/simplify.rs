@@ -76,6 +76,13 @@ impl ExprPool {
         plain.extend(self.as_power(expanded));
         plain.push(expanded);
         plain.push(region);
+        // Sines and cosines may have become factors of one divisor only now.
+        for form in plain.clone() {
+            let combined = self.combine_angles(form);
+            if !plain.contains(&combined) {
+                plain.push(combined);
+            }
+        }
         let mut forms = Vec::new();
         for form in plain {
             let compact = self.rewrite_region(form, ExprPool::compact_rules);

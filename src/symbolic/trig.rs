@@ -195,24 +195,50 @@ impl ExprPool {
 
     fn combine_angles_of_term(&mut self, rest: ExprId) -> ExprId {
         let mut others = Vec::new();
-        let mut waves = Vec::new();
+        let (mut above, mut below) = (Vec::new(), Vec::new());
         for factor in self.factors_of(rest).to_vec() {
             match self.function_power(factor) {
                 Some((function @ (Function::Sin | Function::Cos), argument, exponent))
-                    if (1..=MAX_TRIG_DEGREE).contains(&exponent) =>
+                    if (1..=MAX_TRIG_DEGREE).contains(&exponent.abs()) =>
                 {
-                    waves.extend((0..exponent).map(|_| (function, argument)));
+                    let waves = if exponent > 0 { &mut above } else { &mut below };
+                    waves.extend((0..exponent.abs()).map(|_| (function, argument)));
                 }
                 _ => others.push(factor),
             }
         }
+        // One divisor takes the place of two: 1/(sin(x)*cos(x)) = 2/sin(2*x).
+        let divisor = self.sum_of_waves(&below);
+        match divisor.filter(|divisor| !matches!(self.node(*divisor), Node::Sum(_))) {
+            Some(divisor) => others.push(self.powi(divisor, -1)),
+            None => others.extend(
+                below
+                    .iter()
+                    .map(|&(function, argument)| self.apply_power(function, argument, -1)),
+            ),
+        }
+        let others = self.product(&others);
+        match self.sum_of_waves(&above) {
+            Some(sum) => self.expanded_product(others, sum),
+            None => {
+                let waves: Vec<ExprId> = (above.iter())
+                    .map(|&(function, argument)| self.apply(function, argument))
+                    .collect();
+                let waves = self.product(&waves);
+                self.mul(others, waves)
+            }
+        }
+    }
+
+    /// A product of at least two sines and cosines as a sum of them.
+    fn sum_of_waves(&mut self, waves: &[(Function, ExprId)]) -> Option<ExprId> {
         if waves.len() < 2 || waves.len() > MAX_TRIG_DEGREE as usize {
-            return rest;
+            return None;
         }
         // The product so far, as a sum of sines and cosines.
         let (function, argument) = waves[0];
         let mut sum = vec![(Number::ONE, function, argument)];
-        for (factor, angle) in waves.into_iter().skip(1) {
+        for &(factor, angle) in &waves[1..] {
             let mut next = Vec::with_capacity(2 * sum.len());
             for (coefficient, function, argument) in sum {
                 let half = coefficient.checked_mul(Number::HALF).unwrap_or(coefficient);
@@ -233,9 +259,7 @@ impl ExprPool {
             let wave = self.apply(function, argument);
             terms.push(self.scale(coefficient, wave));
         }
-        let sum = self.sum(&terms);
-        let others = self.product(&others);
-        self.expanded_product(others, sum)
+        Some(self.sum(&terms))
     }
 }
 

@@ -8,10 +8,14 @@ use sha2::{Digest, Sha256};
 
 use super::dataset::Dataset;
 use super::error::TrainError;
+use super::features::{FeatureValues, Features};
+use super::latent::Latent;
+use super::metrics::PLACE;
 use super::options::{EncoderOptions, TrainOptions};
 use super::report::TrainReport;
 use crate::model::{
-    CoordinateNames, JumpPrior, Library, Phase, ReducedModel, ScaleFactors, Scaling, StateMap,
+    CoordinateNames, InputGivenState, InputStatistics, JumpPrior, Library, Phase, ReducedModel,
+    ScaleFactors, Scaling, StateMap,
 };
 use crate::recording::Recording;
 use crate::robot::Robot;
@@ -86,7 +90,7 @@ pub(super) fn assemble(
     origin: &Origin,
     report: &TrainReport,
 ) -> Result<ReducedModel, TrainError> {
-    let mut builder = ReducedModel::builder(options.name.clone(), parts.library)
+    let builder = ReducedModel::builder(options.name.clone(), parts.library.clone())
         .description(description(options, robot))
         .robot(robot)
         .actuators(options.actuators.clone())
@@ -97,21 +101,56 @@ pub(super) fn assemble(
             state: ScaleFactors::Uniform(options.scaling.state),
             input: ScaleFactors::PerCoordinate(options.scaling.factors().input),
         })
-        .encoder(parts.encoder)
-        .decoder(parts.decoder)
-        .jump_prior(parts.jumps)
         .sample_time_s(median_step_s(dataset))
         .provenance(provenance(options, method, origin, report)?);
-    for (index, (pattern, xi)) in dataset.phases.patterns.iter().zip(parts.xi).enumerate() {
+    let given_state = inputs_given_states(&parts, dataset)?;
+    let mut builder = builder
+        .encoder(parts.encoder)
+        .decoder(parts.decoder)
+        .jump_prior(parts.jumps);
+    let phases = dataset.phases.patterns.iter().zip(parts.xi);
+    for (index, ((pattern, xi), given_state)) in phases.zip(given_state).enumerate() {
+        let statistics = InputStatistics {
+            given_state,
+            ..dataset.input_statistics(index)
+        };
         builder = builder
             .phase(Phase {
                 name: pattern.name.clone(),
                 feet: pattern.feet.clone(),
                 xi,
             })
-            .input_statistics(pattern.name.clone(), dataset.input_statistics(index));
+            .input_statistics(pattern.name.clone(), statistics);
     }
     Ok(builder.build()?)
+}
+
+/// What the latent state says of the latent input, one entry a phase; of linear encoders.
+fn inputs_given_states(
+    parts: &Parts,
+    dataset: &Dataset,
+) -> Result<Vec<Option<InputGivenState>>, TrainError> {
+    let Some(encoder) = parts.encoder.as_affine() else {
+        return Ok(vec![None; parts.xi.len()]);
+    };
+    // Where the robot is, and which way it looks, is in `z` but says nothing of its inputs.
+    let shifts = encoder.weights().select_columns(&PLACE);
+    let latent = Latent::of(dataset, &parts.encoder)?;
+    let features = Features::new(&parts.library);
+    let phases = parts.xi.iter().enumerate();
+    let given = phases.map(|(phase, xi)| {
+        let blocks = || {
+            let mut values = FeatureValues::default();
+            let blocks = Latent::regression_blocks(dataset, &latent, phase);
+            let features = &features;
+            blocks.map(move |(variables, ddz)| {
+                let left = ddz - features.evaluate(&variables, &mut values) * xi;
+                (variables, left)
+            })
+        };
+        InputGivenState::of_blocks(dataset.samples(Some(phase)), &shifts, blocks)
+    });
+    Ok(given.collect())
 }
 
 fn description(options: &TrainOptions, robot: &Robot) -> String {

@@ -100,8 +100,6 @@ pub struct Jump {
     pub x: DMatrix<f64>,
     /// Inputs `[tau; F; M]`, `18 x n`.
     pub u: DMatrix<f64>,
-    /// What the recorded torques have on top of those in `u`, `12 x n`; none without actuators.
-    pub losses: Option<DMatrix<f64>>,
     /// Velocities and accelerations; `None` where the dataset reads them again when they are needed.
     pub rates: Option<Rates>,
     /// Index of the model's phase at every sample.
@@ -112,19 +110,26 @@ pub struct Jump {
     pub implausible: Vec<usize>,
 }
 
-/// Derivatives of the states of one jump, scaled units.
+/// Derivatives of the states of one jump, and what the joints take at them, scaled units.
 #[derive(Clone, Debug)]
 pub struct Rates {
     /// Velocities, `18 x n`.
     pub dx: DMatrix<f64>,
     /// Accelerations smoothed within each phase, `18 x n`.
     pub ddx: DMatrix<f64>,
+    /// What the recorded torques have on top of those in the inputs, `12 x n`; none without actuators.
+    pub losses: Option<DMatrix<f64>>,
 }
 
 impl Jump {
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.time_s.len()
+    }
+
+    /// Samples whose torques can be the robot's.
+    pub fn torque_samples(&self) -> impl Iterator<Item = usize> {
+        (0..self.len()).filter(|sample| !self.implausible.contains(sample))
     }
 
     /// Whether there is no sample.
@@ -144,6 +149,8 @@ pub struct Dataset {
     pub scaling: Scaling,
     /// Window of the moving average over accelerations, in samples.
     pub(super) smoothing: usize,
+    /// How inputs are made of recordings.
+    pub(super) rule: InputRule,
     /// Where rates that are not held are read again.
     pub(super) files: Option<Arc<RecordingFiles>>,
 }
@@ -184,12 +191,13 @@ impl Dataset {
             phases: phases.clone(),
             scaling: scaling.clone(),
             smoothing,
+            rule: rule.clone(),
             files: None,
         };
         let mut n_samples = 0;
         source.for_each(|recording| {
             for segment in &recording.segments {
-                let jump = dataset.jump(segment, rule)?;
+                let jump = dataset.jump(segment)?;
                 n_samples += jump.len();
                 dataset.jumps.push(jump);
             }
@@ -282,15 +290,6 @@ impl Dataset {
         })
     }
 
-    /// Jump and sample of every sample whose torques can be the robot's.
-    pub fn torque_samples(&self) -> impl Iterator<Item = (usize, usize)> {
-        let jumps = self.jumps.iter().enumerate();
-        jumps.flat_map(|(index, jump)| {
-            let kept = (0..jump.len()).filter(|sample| !jump.implausible.contains(sample));
-            kept.map(move |sample| (index, sample))
-        })
-    }
-
     /// Mean of one quantity over the samples of one phase or of all.
     pub fn mean(&self, quantity: Quantity, phase: Option<usize>) -> DVector<f64> {
         mean(self.blocks(quantity, phase), self.samples(phase))
@@ -370,7 +369,7 @@ impl Dataset {
         Ok(())
     }
 
-    fn jump(&self, segment: &Segment, rule: &InputRule) -> Result<Jump, TrainError> {
+    fn jump(&self, segment: &Segment) -> Result<Jump, TrainError> {
         let n = segment.len();
         if n < MIN_SAMPLES {
             return Err(TrainError::TooFewSamples {
@@ -390,9 +389,7 @@ impl Dataset {
             path: segment.path.clone(),
             time_s: segment.time_s.clone(),
             x: scaled(segment.x.clone(), &self.scaling.state),
-            losses: (rule.actuators().is_some())
-                .then(|| scaled(segment.losses(rule), &self.scaling.input)),
-            u: scaled(segment.input(rule)?, &self.scaling.input),
+            u: scaled(segment.input(&self.rule)?, &self.scaling.input),
             rates: match self.files {
                 None => Some(self.rates(segment, &spans)),
                 Some(_) => None,
@@ -400,12 +397,13 @@ impl Dataset {
             phase,
             spans,
             implausible: (0..n)
-                .filter(|&sample| !is_plausible(rule.robot(), &segment.torque(sample)))
+                .filter(|&sample| !is_plausible(self.rule.robot(), &segment.torque(sample)))
                 .collect(),
         })
     }
 
     fn rates(&self, segment: &Segment, spans: &[(usize, Range<usize>)]) -> Rates {
+        let rule = &self.rule;
         let mut ddx = DMatrix::zeros(STATE_DIM, segment.len());
         for (_, range) in spans {
             let span = segment.ddx.columns_range(range.clone()).into_owned();
@@ -415,6 +413,8 @@ impl Dataset {
         Rates {
             dx: scaled(segment.dx.clone(), &self.scaling.state),
             ddx: scaled(ddx, &self.scaling.state),
+            losses: (rule.actuators().is_some())
+                .then(|| scaled(segment.losses(rule), &self.scaling.input)),
         }
     }
 }

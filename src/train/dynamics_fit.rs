@@ -118,7 +118,7 @@ impl Task<'_> {
             choice: Some((selected.choice, selected.candidates)),
             training: None,
         };
-        let measured = measure_encoded(fitted.assessed(&self.features), training, &latent);
+        let measured = measure_encoded(fitted.assessed(&self.features), training, &latent)?;
         fitted.training = Some(measured);
         Ok(fitted)
     }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::dataset::{Dataset, Jump, Scaling};
+use super::dataset::{Dataset, Rates, Scaling};
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
 use super::latent::{Latent, lift_samples, map_samples};
@@ -17,6 +17,8 @@ use crate::sim::phase_rule;
 pub(super) const BODY_X: usize = JOINT_DIM;
 /// Row of body z in the state.
 pub(super) const BODY_Z: usize = JOINT_DIM + 2;
+/// Rows of the state that say where the robot is on the floor and which way it looks: x, y, yaw.
+pub(super) const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5];
 /// Length of the short predictions.
 const SHORT_S: f64 = 0.1;
 /// Window over which the accelerations behind `ddz_r2` are averaged, in samples.
@@ -92,7 +94,7 @@ pub fn assess<'a>(
 /// Measures a model on a dataset.
 pub(super) fn measure(model: Assessed<'_>, dataset: &Dataset) -> Result<SetMetrics, TrainError> {
     let latent = Latent::of(dataset, model.encoder)?;
-    Ok(measure_encoded(model, dataset, &latent))
+    measure_encoded(model, dataset, &latent)
 }
 
 /// Measures a model on a dataset that it has encoded already.
@@ -100,21 +102,21 @@ pub(super) fn measure_encoded(
     model: Assessed<'_>,
     dataset: &Dataset,
     latent: &[Latent],
-) -> SetMetrics {
+) -> Result<SetMetrics, TrainError> {
     let [prediction_x_m, prediction_z_m] =
         body_rms(model, dataset, latent, &restarted(dataset, SHORT_S));
     let [rollout_x_m, rollout_z_m] = body_rms(model, dataset, latent, &whole(dataset));
-    SetMetrics {
+    Ok(SetMetrics {
         decoder_mse: decoder_mse(model, dataset, latent),
         ddz_r2: (0..dataset.phases.patterns.len())
             .map(|phase| ddz_r2(model.candidate, dataset, latent, phase))
             .collect(),
-        torque_r2: torque_r2(model.encoder, dataset, latent),
+        torque_r2: torque_r2(model.encoder, dataset, latent)?,
         prediction_x_m,
         prediction_z_m,
         rollout_x_m: rollout_x_m.is_finite().then_some(rollout_x_m),
         rollout_z_m: rollout_z_m.is_finite().then_some(rollout_z_m),
-    }
+    })
 }
 
 /// Root mean square errors of decoded body x and z, in metres, over all predicted samples of the windows.
@@ -174,38 +176,40 @@ fn ddz_r2(candidate: Candidate<'_>, dataset: &Dataset, latent: &[Latent], phase:
 }
 
 /// Of the samples whose torques can be the robot's, see [`is_plausible`].
-fn torque_r2(encoder: &StateMap, dataset: &Dataset, latent: &[Latent]) -> f64 {
-    let n = dataset.torque_samples().count();
+fn torque_r2(encoder: &StateMap, dataset: &Dataset, latent: &[Latent]) -> Result<f64, TrainError> {
+    let n: usize = (dataset.jumps.iter())
+        .map(|jump| jump.torque_samples().count())
+        .sum();
     let mut mean = DVector::zeros(JOINT_DIM);
-    for (jump, sample) in dataset.torque_samples() {
-        let Jump { u, .. } = &dataset.jumps[jump];
-        mean.axpy(
-            1.0 / n as f64,
-            &recorded_torque(&dataset.jumps[jump], u, sample),
-            1.0,
-        );
-    }
-    let mut sums = Determination::about(mean);
-    let mut lifted: Option<(usize, DMatrix<f64>)> = None;
-    for (jump, sample) in dataset.torque_samples() {
-        let Jump { x, u, .. } = &dataset.jumps[jump];
-        if lifted.as_ref().is_none_or(|(of, _)| *of != jump) {
-            lifted = Some((jump, lift_samples(encoder, x, &latent[jump].u_lat)));
+    dataset.for_each(|jump, rates| {
+        for sample in jump.torque_samples() {
+            mean.axpy(
+                1.0 / n as f64,
+                &recorded_torque(&jump.u, rates, sample),
+                1.0,
+            );
         }
-        let (_, lift) = lifted.as_ref().expect("just set");
-        let torques = |u| {
-            let torque = recorded_torque(&dataset.jumps[jump], u, sample);
-            DMatrix::from_column_slice(JOINT_DIM, 1, torque.as_slice())
-        };
-        sums.add(&torques(lift), &torques(u));
-    }
-    sums.r2()
+    })?;
+    let mut sums = Determination::about(mean);
+    let mut latent = latent.iter();
+    dataset.for_each(|jump, rates| {
+        let samples = latent.next().expect("invariant: one of each jump");
+        let lift = lift_samples(encoder, &jump.x, &samples.u_lat);
+        for sample in jump.torque_samples() {
+            let torques = |u| {
+                let torque = recorded_torque(u, rates, sample);
+                DMatrix::from_column_slice(JOINT_DIM, 1, torque.as_slice())
+            };
+            sums.add(&torques(&lift), &torques(&jump.u));
+        }
+    })?;
+    Ok(sums.r2())
 }
 
 /// The motors' torques of a sample for inputs `u`: those at the links and what the joints take.
-fn recorded_torque(jump: &Jump, u: &DMatrix<f64>, sample: usize) -> DVector<f64> {
+fn recorded_torque(u: &DMatrix<f64>, rates: &Rates, sample: usize) -> DVector<f64> {
     let net = u.view((0, sample), (JOINT_DIM, 1)).column(0).into_owned();
-    match &jump.losses {
+    match &rates.losses {
         None => net,
         Some(losses) => net + losses.column(sample),
     }

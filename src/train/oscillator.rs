@@ -9,7 +9,7 @@ use super::features::Features;
 use super::latent::Latent;
 use crate::model::{Library, StandardLibrary};
 use crate::recording::PhaseRule;
-use crate::robot::STATE_DIM;
+use crate::robot::{InputRule, Robot, STATE_DIM, WrenchFrame};
 
 /// Samples between contact and flight.
 const LIFT_OFF: usize = 120;
@@ -58,10 +58,10 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
             time_s: (0..n).map(|i| i as f64 * STEP_S).collect(),
             x: lift(&samples.z),
             u: lift(&samples.u_lat),
-            losses: None,
             rates: Some(Rates {
                 dx: lift(&samples.dz),
                 ddx: lift(&samples.ddz),
+                losses: None,
             }),
             phase: (0..n).map(|i| usize::from(i >= LIFT_OFF)).collect(),
             spans: vec![(0, 0..LIFT_OFF), (1, LIFT_OFF..n)],
@@ -73,6 +73,11 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
         Dataset {
             jumps: jumps.collect(),
             phases: PhaseRule::two_phase(),
+            rule: InputRule::new(
+                Robot::by_name("go1").expect("known"),
+                None,
+                WrenchFrame::World,
+            ),
             scaling,
             smoothing: 1,
             files: None,

@@ -52,7 +52,7 @@ pub(super) struct Refiner<'a> {
 
 /// The squared errors about some coefficients: `|r + J s|^2` for relative changes `s`.
 struct Model {
-    residual: DVector<f64>,
+    squared_error: f64,
     gram: DMatrix<f64>,
     gradient: DVector<f64>,
 }
@@ -84,8 +84,8 @@ impl Refiner<'_> {
                 |(at, scale): (&Place, &f64)| (xi[at.0][(at.1, at.2)] - start.at(*at)) / scale;
             DVector::from_iterator(places.len(), places.iter().zip(&scales).map(change))
         };
-        let cost = |residual: &DVector<f64>, xi: &[DMatrix<f64>]| {
-            residual.norm_squared() + PRIOR * moved(xi).norm_squared()
+        let cost = |squared_error: f64, xi: &[DMatrix<f64>]| {
+            squared_error + PRIOR * moved(xi).norm_squared()
         };
         let mut best = Coefficients {
             score: self.score(&start.xi),
@@ -100,7 +100,7 @@ impl Refiner<'_> {
             let Some(model) = self.model(&current, places, &scales, weights) else {
                 break;
             };
-            let before = cost(&model.residual, &current);
+            let before = cost(model.squared_error, &current);
             let gradient = &model.gradient + moved(&current) * PRIOR;
             let lower = (0..ATTEMPTS).find_map(|_| {
                 let mut system = model.gram.clone();
@@ -112,8 +112,8 @@ impl Refiner<'_> {
                 for ((at, scale), change) in places.iter().zip(&scales).zip(change.iter()) {
                     trial[at.0][(at.1, at.2)] += change * scale;
                 }
-                let residual = self.residual(&trial, weights);
-                let after = residual.map_or(f64::INFINITY, |residual| cost(&residual, &trial));
+                let squared_error = self.squared_error(&trial, weights);
+                let after = squared_error.map_or(f64::INFINITY, |error| cost(error, &trial));
                 damping *= if after < before { 0.1 } else { 10.0 };
                 (after < before).then_some((trial, after))
             });
@@ -143,15 +143,16 @@ impl Refiner<'_> {
         })
     }
 
-    /// Errors with each of the changes, weighted and stacked.
+    /// Errors of a part with each of the changes, weighted and stacked.
     fn residuals(
         &self,
         xi: &[DMatrix<f64>],
         changes: &[Option<Change>],
         weights: [f64; 2],
+        part: usize,
     ) -> Option<Vec<DVector<f64>>> {
         let features = self.features;
-        let errors = self.training.errors(Candidate { features, xi }, changes)?;
+        let errors = (self.training).errors(Candidate { features, xi }, changes, part)?;
         let stacked = errors.into_iter().map(|pair| {
             let each = pair.iter().zip(weights);
             let values = each.flat_map(|(errors, weight)| errors.iter().map(move |e| e * weight));
@@ -160,16 +161,23 @@ impl Refiner<'_> {
         Some(stacked.collect())
     }
 
-    fn residual(&self, xi: &[DMatrix<f64>], weights: [f64; 2]) -> Option<DVector<f64>> {
-        self.residuals(xi, &[None], weights)?.pop()
+    /// Squared errors of all parts; none if a rollout diverges.
+    fn squared_error(&self, xi: &[DMatrix<f64>], weights: [f64; 2]) -> Option<f64> {
+        let of_part = |part| Some(self.residuals(xi, &[None], weights, part)?[0].norm_squared());
+        self.training.parts().map(of_part).sum()
     }
 
     /// Weights under which the squared errors of both kinds of windows are 1; none if a rollout diverges.
     fn weights(&self, xi: &[DMatrix<f64>]) -> Option<[f64; 2]> {
         let features = self.features;
-        let errors = self.training.errors(Candidate { features, xi }, &[None])?;
-        let weight = |errors: &DVector<f64>| errors.norm().max(f64::MIN_POSITIVE).recip();
-        errors.first().map(|pair| pair.each_ref().map(weight))
+        let mut squares = [0.0; 2];
+        for part in self.training.parts() {
+            let errors = (self.training).errors(Candidate { features, xi }, &[None], part)?;
+            for (square, errors) in squares.iter_mut().zip(&errors[0]) {
+                *square += errors.norm_squared();
+            }
+        }
+        Some(squares.map(|square: f64| square.sqrt().max(f64::MIN_POSITIVE).recip()))
     }
 
     /// The squared errors about `xi`; none if a rollout diverges.
@@ -180,26 +188,33 @@ impl Refiner<'_> {
         scales: &[f64],
         weights: [f64; 2],
     ) -> Option<Model> {
-        let residual = self.residual(xi, weights)?;
-        let mut sensitivity = DMatrix::zeros(residual.len(), places.len());
-        for first in (0..places.len()).step_by(TOGETHER) {
-            let last = (first + TOGETHER).min(places.len());
-            let change = |i: usize| {
-                Some(Change {
-                    place: places[i],
-                    by: STEP * scales[i],
-                })
-            };
-            let changes: Vec<_> = (first..last).map(change).collect();
-            for (column, moved) in (first..last).zip(self.residuals(xi, &changes, weights)?) {
-                sensitivity.set_column(column, &((moved - &residual) / STEP));
+        let mut model = Model {
+            squared_error: 0.0,
+            gram: DMatrix::zeros(places.len(), places.len()),
+            gradient: DVector::zeros(places.len()),
+        };
+        for part in self.training.parts() {
+            let residual = self.residuals(xi, &[None], weights, part)?.pop()?;
+            let mut sensitivity = DMatrix::zeros(residual.len(), places.len());
+            for first in (0..places.len()).step_by(TOGETHER) {
+                let last = (first + TOGETHER).min(places.len());
+                let change = |i: usize| {
+                    Some(Change {
+                        place: places[i],
+                        by: STEP * scales[i],
+                    })
+                };
+                let changes: Vec<_> = (first..last).map(change).collect();
+                let moved = self.residuals(xi, &changes, weights, part)?;
+                for (column, moved) in (first..last).zip(moved) {
+                    sensitivity.set_column(column, &((moved - &residual) / STEP));
+                }
             }
+            model.squared_error += residual.norm_squared();
+            model.gram += sensitivity.tr_mul(&sensitivity);
+            model.gradient += sensitivity.tr_mul(&residual);
         }
-        Some(Model {
-            gram: sensitivity.tr_mul(&sensitivity),
-            gradient: sensitivity.tr_mul(&residual),
-            residual,
-        })
+        Some(model)
     }
 
     /// Every coefficient that may change.

@@ -19,6 +19,7 @@ use romc::model::ReducedModel;
 use super::agreement::Rule;
 use super::driver_text::{c_driver, rust_driver};
 use super::functions::Function;
+use super::tools::{answers, is_thorough};
 
 /// A folder with the generated code of some models.
 pub struct Workshop {
@@ -458,23 +459,16 @@ pub fn cc() -> String {
     std::env::var("CC").unwrap_or_else(|_| "cc".to_owned())
 }
 
-/// Whether everything is asked for, all tools included: with ROMC_REQUIRE_TOOLS=1, as `.ci/run` does.
-/// Otherwise the machine's C compiler and rustc run on fewer models, within minutes.
-pub fn is_thorough() -> bool {
-    std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1")
-}
-
 /// Whether checks with a tool are asked for; it must answer then.
 pub fn is_installed(tool: &str) -> bool {
     is_there(tool, Command::new(tool).arg("--version"))
 }
 
-/// Whether everything is asked for, for which a probe must succeed; says so once if it is not.
+/// Whether everything is asked for, for which a probe must succeed; says so once if it is not. Then the machine's C
+/// compiler and rustc run on fewer models, within minutes.
 fn is_there(tool: &str, probe: &mut Command) -> bool {
     if is_thorough() {
-        let found = probe.output().is_ok_and(|output| output.status.success());
-        assert!(found, "`{tool}` is required and missing: {probe:?}");
-        return true;
+        return answers(probe);
     }
     static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
     if TOLD.lock().expect("no panic").insert(tool.to_owned()) {

@@ -105,8 +105,11 @@ fn over_the_robot(
         .robot(model.robot().expect("a robot"))
         .sample_time_s(model.sample_time_s().expect("a period"));
     for (place, phase) in phases.iter().enumerate() {
-        let statistics: InputStatistics =
-            model.input_statistics(place).expect("statistics").clone();
+        // what is known of inputs given states is in the whole model's coordinates
+        let statistics = InputStatistics {
+            given_state: None,
+            ..model.input_statistics(place).expect("statistics").clone()
+        };
         builder = builder.input_statistics(phase.name.clone(), statistics);
     }
     builder.phases(phases).build().expect("a valid model")

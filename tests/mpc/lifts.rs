@@ -72,7 +72,12 @@ fn informed_model() -> ReducedModel {
         / count as f64;
     // Products of sums round differently on both sides of the diagonal.
     let covariance = 0.5 * (&covariance + covariance.transpose());
-    model_with(Equations::Linear, InputStatistics { mean, covariance })
+    let statistics = InputStatistics {
+        mean,
+        covariance,
+        given_state: None,
+    };
+    model_with(Equations::Linear, statistics)
 }
 
 fn projected(plant: &ControlModel, torque: &[f64; 12]) -> [f64; D] {

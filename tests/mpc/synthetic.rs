@@ -106,6 +106,7 @@ fn statistics(torque_nm: f64, force_n: f64) -> InputStatistics {
             (true, true) => torque_nm * torque_nm,
             (true, false) => force_n * force_n,
         }),
+        given_state: None,
     }
 }
 

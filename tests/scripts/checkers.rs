@@ -12,6 +12,7 @@ use romc::model::ReducedModel;
 use serde_json::{Value, json};
 
 use super::functions::{Function, Random, functions as functions_of};
+use super::tools;
 
 /// Points at which each function is compared.
 const N_POINTS: usize = 5;
@@ -20,7 +21,7 @@ const N_POINTS: usize = 5;
 const MAX_DRAWN: usize = 4000;
 
 /// Compares the functions that a target of Python, CasADi or MATLAB has for models; without the language says so
-/// and returns, unless ROMC_REQUIRE_TOOLS=1. The functions that were left out because no point was found at which
+/// and returns, unless everything is asked for. The functions that were left out because no point was found at which
 /// they are finite; `None` without the language.
 pub fn check(target: Target, models: Vec<(ReducedModel, Form)>) -> Option<Vec<String>> {
     let python = |library| {
@@ -150,11 +151,7 @@ fn run(
     models: Vec<(ReducedModel, Form)>,
     checker: impl Fn(&Path) -> Command,
 ) -> Option<Vec<String>> {
-    let found = probe.output().is_ok_and(|output| output.status.success());
-    if !found {
-        let required = std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1");
-        assert!(!required, "{probe:?} fails and ROMC_REQUIRE_TOOLS=1");
-        println!("skipped: {probe:?} fails");
+    if !tools::answers(probe) {
         return None;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -181,7 +181,7 @@ pub struct TrainSettings {
     #[arg(long, value_name = "TERMS", conflicts_with_all = ["degree", "trigonometric"])]
     pub terms: Option<String>,
     /// Friction and inertia of the joints, taken from the torques: a file with a table `actuators`, `identify` for what the
-    /// training recordings tell (as `romc identify` does), or `none` (none unless given)
+    /// training recordings tell (as `romc identify` does), or `none` (identify unless given, none with --paper)
     #[arg(long, value_name = "FILE.toml")]
     pub actuators: Option<String>,
     /// Axes of force and moment in the inputs: `world` or, as published, `body` (world unless given)

@@ -5,7 +5,7 @@ use nalgebra::Dim;
 use nalgebra::storage::RawStorage;
 
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
-use crate::mpc::{ControlModel, ControlPhase};
+use crate::mpc::{ControlModel, ControlPhase, InputGivenState};
 use crate::robot::{Leg, LegGeometry, Robot, STATE_DIM, WrenchFrame};
 
 /// Numbers per line.
@@ -35,6 +35,8 @@ pub struct ControlModelText<'a> {
     lift: Numbers,
     projection: Numbers,
     phase_of_feet: String,
+    /// Whether a phase knows its inputs given states.
+    knows_inputs: bool,
     phases: Vec<PhaseNumbers<'a>>,
 }
 
@@ -45,8 +47,16 @@ struct PhaseNumbers<'a> {
     is_grounded: bool,
     latent_mean: Numbers,
     latent_root: Numbers,
+    given_state: Option<GivenStateNumbers>,
     torque_mean: Numbers,
     torque_precision: Numbers,
+}
+
+/// The matrices of an [`InputGivenState`].
+struct GivenStateNumbers {
+    mean: Numbers,
+    covariance: Numbers,
+    acceleration_error: Numbers,
 }
 
 /// A matrix as a Rust array, row by row.
@@ -104,6 +114,10 @@ impl<'a> ControlModelText<'a> {
             lift: Numbers::new(&parts.lift),
             projection: Numbers::new(&parts.projection),
             phase_of_feet: format!("{:?}", parts.phase_of_feet),
+            knows_inputs: plant
+                .phases()
+                .iter()
+                .any(|phase| phase.given_state.is_some()),
             phases: pairs
                 .map(|(entries, phase)| PhaseNumbers::new(entries, phase))
                 .collect(),
@@ -144,6 +158,16 @@ fn robot_text(robot: &Robot) -> String {
     format!("Robot {{\n{}}}", fields.concat())
 }
 
+impl GivenStateNumbers {
+    fn new(given: &InputGivenState) -> Self {
+        Self {
+            mean: Numbers::new(&given.mean),
+            covariance: Numbers::new(&given.covariance),
+            acceleration_error: Numbers::new(&given.acceleration_error),
+        }
+    }
+}
+
 impl<'a> PhaseNumbers<'a> {
     fn new(entries: &'a PhaseInterface, phase: &'a ControlPhase) -> Self {
         Self {
@@ -153,6 +177,7 @@ impl<'a> PhaseNumbers<'a> {
             is_grounded: phase.is_grounded,
             latent_mean: Numbers::new(&phase.latent_mean),
             latent_root: Numbers::new(&phase.latent_root),
+            given_state: phase.given_state.as_ref().map(GivenStateNumbers::new),
             torque_mean: Numbers::new(&phase.torque_mean),
             torque_precision: Numbers::new(&phase.torque_precision),
         }

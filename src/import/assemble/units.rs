@@ -201,5 +201,6 @@ fn sorted_statistics(statistics: &InputStatistics, order: &CoordinateOrder) -> I
     InputStatistics {
         mean: order.sorted(&statistics.mean),
         covariance: order.sorted_rows(&rows.transpose()).transpose(),
+        given_state: statistics.given_state.clone(),
     }
 }

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::super::equations::refused;
 use super::super::error::ImportError;
+use super::derivatives::with_dots;
 use super::token::{Kind, Token};
 
 /// Most tokens that macros may make of one display.
@@ -23,6 +24,8 @@ pub(super) enum Item {
     Comment(String),
     /// The tokens between the ends of a display.
     Display(Vec<Token>),
+    /// The tokens of mathematics inside a paragraph.
+    Inline(Vec<Token>),
 }
 
 /// A macro; without a body if its definition has a form that is not read.
@@ -67,11 +70,13 @@ pub(super) fn items(file: &str, tokens: &[Token]) -> Result<Vec<Item>, ImportErr
             }
             Kind::Display => Some(scanner.until(token, &Kind::Display, None)?),
             Kind::Dollar => {
-                scanner.skip_inline(&Kind::Dollar);
+                let inline = scanner.inline(&Kind::Dollar);
+                items.extend(scanner.in_line(inline));
                 None
             }
             Kind::Command(name) if name == "(" => {
-                scanner.skip_inline(&Kind::Command(")".to_owned()));
+                let inline = scanner.inline(&Kind::Command(")".to_owned()));
+                items.extend(scanner.in_line(inline));
                 None
             }
             Kind::Command(name) => {
@@ -81,7 +86,7 @@ pub(super) fn items(file: &str, tokens: &[Token]) -> Result<Vec<Item>, ImportErr
             _ => None,
         };
         if let Some(display) = found {
-            items.push(Item::Display(scanner.expanded(display)?));
+            items.push(Item::Display(with_dots(&scanner.expanded(display)?)));
         }
     }
     Ok(items)
@@ -133,13 +138,21 @@ impl<'t> Scanner<'t> {
         Err(refused(self.file, start.line, start.column, found, end))
     }
 
-    /// Passes mathematics inside a paragraph.
-    fn skip_inline(&mut self, end: &Kind) {
+    /// Mathematics inside a paragraph, up to its end.
+    fn inline(&mut self, end: &Kind) -> &'t [Token] {
+        let first = self.at;
         while let Some(token) = self.next() {
             if token.kind == *end || token.kind == Kind::Paragraph {
-                return;
+                return &self.tokens[first..self.at - 1];
             }
         }
+        &self.tokens[first..]
+    }
+
+    /// Mathematics inside a paragraph with its macros replaced; none whose macros are not read, since it may be no equation.
+    fn in_line(&self, tokens: &[Token]) -> Option<Item> {
+        let expanded = self.expanded(tokens).ok()?;
+        Some(Item::Inline(with_dots(&expanded)))
     }
 
     /// The tokens of a group, or one token.

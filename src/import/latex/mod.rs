@@ -2,12 +2,14 @@
 //!
 //! A document enters; sections of equations in the grammar of candidate terms leave, each piece
 //! with its place in the document, so that every later fault is reported there. Displays without
-//! a left side `\ddot z_k =` are skipped, as is the text around them; inside a display that is
+//! a left side `\ddot z_k =` are skipped, as is the text around them, unless the only equations are
+//! in its lines; inside a display that is
 //! read, whatever has no meaning here is an error with line and column, never a guess.
 //!
-//! Read `token.rs` (characters to tokens), `document.rs` (displays and macros), `sections.rs`
-//! (displays to equations and phases), `reader.rs` and `expression.rs` (one right side) in this order.
+//! Read `token.rs` (characters to tokens), `document.rs` (displays and macros), `derivatives.rs`
+//! (dots for other ways to write a derivative), `sections.rs` (displays to equations and phases), `reader.rs` and `expression.rs` (one right side) in this order.
 
+mod derivatives;
 mod document;
 mod expression;
 mod names;

@@ -42,27 +42,38 @@ pub(in crate::import) fn read(
         strange: None,
         sections: Vec::new(),
     };
-    let has_indices = has_indexed_left_side(file, &items)?;
-    for item in &items {
-        match item {
-            Item::Comment(text) => document.comment(text),
-            Item::Display(tokens) => document.display(tokens, !has_indices)?,
+    // Equations in the lines of the text count where there are no others.
+    for in_lines in [false, true] {
+        if !document.sections.is_empty() {
+            break;
+        }
+        (document.digits, document.phase, document.starts_phase) = (None, None, false);
+        let alone = !has_indexed_left_side(file, &items, in_lines)?;
+        for item in &items {
+            match item {
+                Item::Comment(text) => document.comment(text),
+                Item::Display(tokens) if !in_lines => document.display(tokens, alone)?,
+                Item::Inline(tokens) if in_lines => document.display(tokens, alone)?,
+                Item::Display(_) | Item::Inline(_) => {}
+            }
         }
     }
     if let (true, Some((token, found))) = (document.sections.is_empty(), document.strange) {
         let expected = format!("\\ddot z_1 and so on, with {}", names.expected());
         return Err(refused(file, token.line, token.column, found, expected));
     }
-    let expected = "a display such as \\begin{align} \\ddot z_1 &= 0.5 z_1 + u_1 \\end{align}";
+    let expected = "an equation such as \\begin{align} \\ddot z_1 &= 0.5 z_1 + u_1 \\end{align}";
     complete(file, document.sections, text.lines().count(), expected)
 }
 
 /// Whether a left side `\ddot z_1` has an index, so that `z` alone is no coordinate.
-fn has_indexed_left_side(file: &str, items: &[Item]) -> Result<bool, ImportError> {
+fn has_indexed_left_side(file: &str, items: &[Item], in_lines: bool) -> Result<bool, ImportError> {
     let default = SymbolNames::default();
     for item in items {
-        let Item::Display(tokens) = item else {
-            continue;
+        let tokens = match item {
+            Item::Display(tokens) if !in_lines => tokens,
+            Item::Inline(tokens) if in_lines => tokens,
+            Item::Comment(_) | Item::Display(_) | Item::Inline(_) => continue,
         };
         let Ok(mut reader) = Reader::new(file, &default, tokens) else {
             continue;
@@ -229,7 +240,7 @@ impl Document<'_> {
             if self.strange.is_none() {
                 let token = tokens.iter().find(|token| token.is_command("ddot"));
                 let unequal = token.map(|token| {
-                    let found = "`\\ddot` without `=` behind its variable".to_owned();
+                    let found = "a second derivative without `=` behind its variable".to_owned();
                     (token.clone(), found)
                 });
                 self.strange = strange.or(unequal);

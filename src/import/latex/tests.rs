@@ -25,6 +25,37 @@ fn named(text: &str, names: &[&str]) -> Result<Phases, ImportError> {
     Ok(found)
 }
 
+#[test]
+fn derivatives_may_be_primes_fractions_or_dots_and_stand_in_a_line() {
+    let expected = [(None, vec!["u1 + dz2 - z2^3".to_owned(), "dz1^2".to_owned()])];
+    for text in [
+        r"\[\ddot z_1 = \dot z_2 - z_2^3 + u_1\] \[\ddot z_2 = \dot z_1^2\]",
+        r"\[z_1'' = z_2' - z_2^3 + u_1\] \[z_2'' = z_1'^2\]",
+        r"\[z''_1 = z'_2 - z_2^3 + u_1\] \[{z_2}^{\prime\prime} = {z_1^\prime}^2\]",
+        r"\[\frac{d^2 z_1}{dt^2} = \frac{dz_2}{dt} - z_2^3 + u_1\] \[\frac{d^2}{dt^2} z_2 = \left(\frac{d}{dt} z_1\right)^2\]",
+        r"\[\dfrac{\mathrm{d}^{2}}{\mathrm{d}t^{2}} z_1 = \tfrac{\mathrm d}{\mathrm d t} z_2 - z_2^3 + u_1\]
+          \[\frac{d^2 z_2}{dt^2} = \left(\frac{dz_1}{dt}\right)^2\]",
+        r"\[\frac{\partial^2 z_1}{\partial t^2} = \frac{\partial z_2}{\partial t} - z_2^3 + u_1\] \[z_2'' = z_1'^2\]",
+        r"The model is $\ddot z_1 = \dot z_2 - z_2^3 + u_1$ and \(z_2'' = \dot z_1^2\), see $x = 3$.",
+    ] {
+        let found = named(text, &[]).unwrap_or_else(|error| panic!("{text}: {error}"));
+        assert_eq!(found, expected, "{text}");
+    }
+    // What is no derivative with respect to time stays what it is, and is refused at its place.
+    for (text, column) in [
+        (r"\[\ddot z_1 = \frac{d z_1}{dx}\]", 21),
+        (r"\[\ddot z_1 = \frac{d^2 z_1}{dt}\]", 21),
+        (r"\[\ddot z_1 = (z_1)'\]", 20),
+        (r"\[\ddot z_1 = \dot z_1'\]", 15),
+    ] {
+        let error = named(text, &[]).expect_err(text).to_string();
+        assert!(
+            error.contains(&format!("paper.tex:1:{column}:")),
+            "{text}: {error}"
+        );
+    }
+}
+
 /// The one right side of `\ddot z_1`, with a second equation that makes other variables known.
 fn right_side(latex: &str) -> String {
     let text = format!("\\[\\ddot z_1 = {latex}\\]\n\\[\\ddot z_2 = 0\\]");
@@ -145,7 +176,8 @@ fn unreadable_constructs_are_named_with_their_place() {
         (r"\sin^{-1} z_1", 1, 19, "`-`"),
         (r"1{,}500 z_1", 1, 15, "`,`"),
         (r"z_1^2^3", 1, 18, "`^`"),
-        (r"z_1'", 1, 16, "`'`"),
+        (r"z_1''", 1, 13, r"`\ddot z_1`"),
+        (r"(z_1)'", 1, 18, "`'`"),
         (r"{z_1 + 1} u_1", 1, 18, "`+`"),
         (r"z_{i}", 1, 13, "`z_i`"),
         (r"\dot{z_1 + 1}", 1, 17, "`{`"),
@@ -180,7 +212,8 @@ fn equations_are_read_in_every_layout_and_relation() {
     }
     let vector = r"\[ \begin{bmatrix} \ddot z_1 \\ \ddot z_2 \end{bmatrix} = 2u \]";
     let error = named(vector, &[]).expect_err("a vector").to_string();
-    let start = r"paper.tex:1:20: found `\ddot` without `=` behind its variable, expected ";
+    let start =
+        r"paper.tex:1:20: found a second derivative without `=` behind its variable, expected ";
     assert!(error.starts_with(start), "{error}");
 }
 

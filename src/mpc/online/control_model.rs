@@ -8,6 +8,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::error::ControlError;
+use super::estimate::InputGivenState;
 use super::nonlinear::{InputMaps, NonlinearMaps};
 use crate::robot::{ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
@@ -54,6 +55,8 @@ pub struct ControlPhase {
     pub latent_mean: DVector<f64>,
     /// Lower Cholesky factor of the latent input's covariance, `latent_dim` square.
     pub latent_root: DMatrix<f64>,
+    /// What the latent state says of the latent input, if the model knows.
+    pub given_state: Option<InputGivenState>,
     /// Mean torques, N m.
     pub torque_mean: SVector<f64, JOINT_DIM>,
     /// Inverse covariance of the torques, 1/(N m)².
@@ -299,6 +302,12 @@ impl ControlModelParts {
         for phase in &self.phases {
             shapes.push(("latent mean", phase.latent_mean.shape(), (d, 1)));
             shapes.push(("latent root", phase.latent_root.shape(), (d, d)));
+            if let Some(given) = &phase.given_state {
+                let (covariance, error) = (&given.covariance, &given.acceleration_error);
+                shapes.push(("input given state", given.mean.shape(), (d, 1 + 2 * d)));
+                shapes.push(("its covariance", covariance.shape(), (d, d)));
+                shapes.push(("acceleration error", error.shape(), (d, d)));
+            }
         }
         for phase in self.phase_of_feet.into_iter().flatten() {
             shapes.push((

@@ -1,7 +1,7 @@
 //! The input of a reference that comes without one, estimated from its accelerations.
 //!
-//! In each phase the model reads `ddz = f(z, dz, u) + r`. Around the phase's mean training input
-//! `m`, with `B = ∂f/∂u` there, the reference's own acceleration leaves
+//! In each phase the model reads `ddz = f(z, dz, u) + r`. Around an expected input `m`, with `B = ∂f/∂u`
+//! there, the reference's own acceleration leaves
 //!
 //! ```text
 //! y = ddz − f(z, dz, m) = B (u − m) + r,   u − m ~ (0, S),   r ~ (0, R)
@@ -13,11 +13,11 @@
 //! û = m + S Bᵀ (B S Bᵀ + R)⁻¹ y.
 //! ```
 //!
-//! `S` is the covariance of the training inputs. `R`, the covariance of the model's errors, is
-//! estimated from the reference: input and residual of a least-squares model are
-//! uncorrelated, so `Cov(y) = B S Bᵀ + R`, and `R` is what `B S Bᵀ` leaves of the sample covariance
-//! (in units of the standard deviations of `y`, eigenvalues not below `RESIDUAL_FLOOR`). Latents
-//! whose acceleration the model hardly explains then hardly count.
+//! [`InputGivenState`] has `m = M [1; z; dz]`, `S` and `R` of the training. A phase without it has its mean
+//! training input and the covariance of these inputs, and `R` is estimated from the reference: input
+//! and residual of a least-squares model are uncorrelated, so `Cov(y) = B S Bᵀ + R`, and `R` is what
+//! `B S Bᵀ` leaves of the sample covariance (in units of the standard deviations of `y`, eigenvalues
+//! not below `RESIDUAL_FLOOR`). Latents whose acceleration the model hardly explains then hardly count.
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
@@ -28,6 +28,17 @@ use super::dynamics::LatentDynamics;
 const HALF_WINDOW_S: f64 = 0.016 + 1e-9;
 /// Smallest eigenvalue of the residual's covariance in units of the deviations of `y`.
 const RESIDUAL_FLOOR: f64 = 0.03;
+
+/// The latent input of one phase given the latent state, and how far the model's accelerations are off.
+#[derive(Debug, Clone)]
+pub struct InputGivenState {
+    /// `M`, `latent_dim × (1 + 2 latent_dim)`.
+    pub mean: DMatrix<f64>,
+    /// `S`, `latent_dim` square.
+    pub covariance: DMatrix<f64>,
+    /// `R`, `latent_dim` square.
+    pub acceleration_error: DMatrix<f64>,
+}
 
 /// A trajectory whose input is looked for.
 #[derive(Debug, Clone, Copy)]
@@ -60,10 +71,11 @@ pub(super) fn estimate_input(
     let mut evidence: Vec<Vec<Evidence>> = plant.phases().iter().map(|_| Vec::new()).collect();
     let (mut ddz, mut jacobian) = (vec![0.0; d], DMatrix::zeros(d, 3 * d));
     for (sample, &phase) in motion.phase.iter().enumerate() {
-        let mean = plant.phases()[phase].latent_mean.as_slice();
-        input[sample * d..(sample + 1) * d].copy_from_slice(mean);
-        let (z, dz) = motion.state[sample * 2 * d..(sample + 1) * 2 * d].split_at(d);
-        dynamics.jacobian(phase, z, dz, mean, &mut ddz, &mut jacobian);
+        let state = &motion.state[sample * 2 * d..(sample + 1) * 2 * d];
+        let mean = expected_input(&plant.phases()[phase], state);
+        input[sample * d..(sample + 1) * d].copy_from_slice(mean.as_slice());
+        let (z, dz) = state.split_at(d);
+        dynamics.jacobian(phase, z, dz, mean.as_slice(), &mut ddz, &mut jacobian);
         let acceleration = acceleration(motion, d, sample);
         evidence[phase].push(Evidence {
             sample,
@@ -77,15 +89,38 @@ pub(super) fn estimate_input(
     input
 }
 
+/// `m` at a state `(z, dz)`.
+fn expected_input(phase: &ControlPhase, state: &[f64]) -> DVector<f64> {
+    match &phase.given_state {
+        None => phase.latent_mean.clone(),
+        Some(given) => {
+            let gain = given.mean.columns(1, state.len());
+            given.mean.column(0) + gain * DVector::from_column_slice(state)
+        }
+    }
+}
+
+/// `S` and `R` of a phase; none if there are too few samples to tell.
+fn covariances(
+    phase: &ControlPhase,
+    evidence: &[Evidence],
+) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    if let Some(given) = &phase.given_state {
+        return Some((given.covariance.clone(), given.acceleration_error.clone()));
+    }
+    // A covariance of fewer samples than this says nothing about the residual.
+    if evidence.len() < 4 * phase.latent_mean.len() {
+        return None;
+    }
+    let covariance = &phase.latent_root * phase.latent_root.transpose();
+    let residual = residual_covariance(evidence, &covariance)?;
+    Some((covariance, residual))
+}
+
 /// Adds `S Bᵀ (B S Bᵀ + R)⁻¹ y` to the inputs of one phase's samples.
 fn add_estimates(phase: &ControlPhase, evidence: &[Evidence], input: &mut [f64]) {
     let d = phase.latent_mean.len();
-    // A covariance of fewer samples than this says nothing about the residual.
-    if evidence.len() < 4 * d {
-        return;
-    }
-    let covariance = &phase.latent_root * phase.latent_root.transpose();
-    let Some(residual) = residual_covariance(evidence, &covariance) else {
+    let Some((covariance, residual)) = covariances(phase, evidence) else {
         return;
     };
     for Evidence {
@@ -209,6 +244,35 @@ mod tests {
         // One-sided at the edge: the slope at the middle of the eight samples before it.
         assert!((acceleration(&motion, 1, 19)[0] - (time_s[19] + time_s[11])).abs() < 1e-12);
         assert!(acceleration(&motion, 1, 20)[0].abs() < 1e-9);
+    }
+
+    #[test]
+    fn states_set_what_is_expected_and_accelerations_correct_it() {
+        let number = |value: f64| DMatrix::from_element(1, 1, value);
+        let phase = ControlPhase {
+            name: "contact".to_owned(),
+            is_grounded: true,
+            latent_mean: DVector::from_element(1, 7.0),
+            latent_root: number(3.0),
+            given_state: Some(InputGivenState {
+                mean: DMatrix::from_row_slice(1, 3, &[0.5, 1.0, -2.0]),
+                covariance: number(0.5),
+                acceleration_error: number(2.0),
+            }),
+            torque_mean: nalgebra::zero(),
+            torque_precision: nalgebra::one(),
+        };
+        // M [1; z; dz] = 0.5 + 3 - 2 at z = 3, dz = 1.
+        let mut input = expected_input(&phase, &[3.0, 1.0]).as_slice().to_vec();
+        assert_eq!(input, [1.5]);
+        // y = 6 with B = 2: S B / (B S B + R) y = 0.5 * 2 / (2 + 2) * 6.
+        let evidence = [Evidence {
+            sample: 0,
+            unexplained: DVector::from_element(1, 6.0),
+            gain: number(2.0),
+        }];
+        add_estimates(&phase, &evidence, &mut input);
+        assert!((input[0] - 3.0).abs() < 1e-12, "{input:?}");
     }
 
     #[test]

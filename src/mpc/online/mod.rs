@@ -52,6 +52,7 @@ pub use control_model::{ControlModel, ControlModelParts, ControlPhase};
 pub use controller::{Controller, Measurement};
 pub use dynamics::LatentDynamics;
 pub use error::ControlError;
+pub use estimate::InputGivenState;
 pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces};
 pub use nonlinear::{InputMaps, NonlinearMaps};
 pub use plan::Plan;

@@ -61,6 +61,8 @@ pub enum SolverProfile {
     /// For a problem whose rows and variables are already scaled and which is solved over and
     /// over: no equilibration, no iterative refinement, no presolve.
     Tuned,
+    /// For a problem that is solved once: the solver's scaling and refinement, to the given tolerance.
+    Scaled,
     /// The solver's own defaults: what a user gets who sets nothing. Data updates may be refused.
     AsShipped,
 }
@@ -72,7 +74,7 @@ pub struct QpSettings {
     pub profile: SolverProfile,
     /// Cap on interior-point iterations: the deterministic deadline.
     pub max_iterations: u32,
-    /// Feasibility and gap tolerance handed to the solver (`Tuned` only).
+    /// Feasibility and gap tolerance handed to the solver (not `AsShipped`).
     pub tolerance: f64,
     /// Largest relative residual with which a point counts as solved.
     pub accepted_residual: f64,
@@ -373,18 +375,18 @@ fn clarabel_settings(settings: &QpSettings) -> DefaultSettings<f64> {
         .verbose(false)
         .max_iter(settings.max_iterations)
         .direct_solve_method("qdldl".to_string());
-    match settings.profile {
-        SolverProfile::AsShipped => {}
-        SolverProfile::Tuned => {
-            builder
-                .presolve_enable(false)
-                .input_sparse_dropzeros(false)
-                .equilibrate_enable(false)
-                .iterative_refinement_enable(false)
-                .tol_feas(settings.tolerance)
-                .tol_gap_abs(settings.tolerance)
-                .tol_gap_rel(settings.tolerance);
-        }
+    if settings.profile != SolverProfile::AsShipped {
+        builder
+            .tol_feas(settings.tolerance)
+            .tol_gap_abs(settings.tolerance)
+            .tol_gap_rel(settings.tolerance);
+    }
+    if settings.profile == SolverProfile::Tuned {
+        builder
+            .presolve_enable(false)
+            .input_sparse_dropzeros(false)
+            .equilibrate_enable(false)
+            .iterative_refinement_enable(false);
     }
     builder.build().expect("every setting has a legal value")
 }

@@ -159,7 +159,7 @@ impl Default for MpcSettings {
             horizon: 20,
             step_s: 0.01,
             lift: Lift::Transpose,
-            input_weight: 20.0,
+            input_weight: 10.0,
             velocity_weight: 0.1,
             terminal_weight: 1.0,
             linearisation: Linearisation::Reference,

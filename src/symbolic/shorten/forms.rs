@@ -28,14 +28,17 @@ impl Shortener<'_> {
         if old.len() <= MAX_GROUP {
             candidates.extend(self.candidates(unit, &singles));
         }
-        let n_terms = self.all_terms(&scaled);
+        let (n_terms, n_calls) = (self.all_terms(&scaled), self.calls(&scaled));
         let n_written = self.spread(unit, scaled).len();
         for candidate in candidates {
-            // Only a fraction whose sums become fewer may be written as several terms.
-            let is_resolved = old.len() == 1
-                && self.all_terms(&candidate) < n_terms
-                && !self.denominators(old[0].1).is_empty();
-            if candidate.len() > n_written && !is_resolved {
+            // Only a fraction whose sums become fewer, and a function of a function that goes, may be written as
+            // several terms.
+            let is_resolved = || {
+                let is_fraction = !self.denominators(old[0].1).is_empty();
+                (is_fraction && self.all_terms(&candidate) < n_terms)
+                    || self.calls(&candidate) < n_calls
+            };
+            if candidate.len() > n_written && (old.len() > 1 || !is_resolved()) {
                 continue;
             }
             let candidate = self.spread(unit, candidate);
@@ -95,6 +98,20 @@ impl Shortener<'_> {
             }
         }
         count
+    }
+
+    /// Functions that are written, each as often as it is.
+    fn calls(&self, summands: &Scaled) -> usize {
+        let roots: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
+        let mut calls: HashMap<ExprId, usize, BuildIdHasher> = HashMap::default();
+        for expr in self.pool.reachable(&roots) {
+            let own = usize::from(matches!(self.pool.node(expr), Node::Apply(..)));
+            let of_operands = self.pool.children(expr).map(|operand| calls[&operand]);
+            let count = of_operands.fold(own, usize::saturating_add);
+            calls.insert(expr, count);
+        }
+        let of_roots = roots.iter().map(|root| calls[root]);
+        of_roots.fold(0, usize::saturating_add)
     }
 
     fn length(&mut self, unit: Number, summands: &Scaled) -> u64 {

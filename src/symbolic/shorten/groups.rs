@@ -172,11 +172,19 @@ impl Shortener<'_> {
             }
         }
         for factor in self.pool.factors_of(expr).to_vec() {
-            if let Some((Function::Sin | Function::Cos, _, power)) =
-                self.pool.function_power(factor)
-                && power < 0
-            {
-                monomials.push(self.pool.div(expr, factor));
+            match self.pool.function_power(factor) {
+                Some((Function::Sin | Function::Cos, _, power)) if power < 0 => {
+                    monomials.push(self.pool.div(expr, factor));
+                }
+                Some((Function::Tan, angle, _)) => {
+                    // Tangents of an angle and their inverses meet in a term that no model has.
+                    let cofactor = self.pool.div(expr, factor);
+                    let minus_three = self.pool.integer(-3);
+                    let common = self.pool.apply(Function::Log, minus_three);
+                    let tangent = self.pool.apply(Function::Tan, angle);
+                    monomials.push(self.pool.product(&[cofactor, common, tangent]));
+                }
+                _ => {}
             }
         }
         monomials

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::regression::GoalRegression;
 use super::{PartNodes, Sampled};
-use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange};
+use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange, complement};
 
 /// Ridge relative to the variance of each column.
 const RIDGE: f64 = 1e-2;
@@ -35,7 +35,7 @@ pub fn fit_deviations(
     let fit = Fit {
         goal,
         part,
-        projector: without(translation),
+        projector: complement(&DMatrix::from_columns(&[translation.column(0)])),
     };
     let all: Vec<&Sampled> = sampled.iter().collect();
     let d = translation.len();
@@ -59,15 +59,6 @@ pub fn fit_deviations(
         xi: fit.xi(&fit.prior(&all), &all),
         acceleration_std: (square / sampled.len() as f64).map(f64::sqrt),
         ddz_r2: 1.0 - unexplained / f64::max(total, f64::MIN_POSITIVE),
-    }
-}
-
-/// `I - t t^T / t^T t`.
-fn without(t: &DVector<f64>) -> DMatrix<f64> {
-    let identity = DMatrix::identity(t.len(), t.len());
-    match t.norm_squared() {
-        0.0 => identity,
-        square => identity - t * t.transpose() / square,
     }
 }
 

@@ -1,0 +1,215 @@
+//! Derivatives with respect to time, however they are written, as dots.
+
+use super::names::is_greek;
+use super::reader::{FONTS, has};
+use super::token::{Kind, Token};
+
+/// Most dots that have a command.
+const MAX_DOTS: usize = 3;
+/// Longest group that is looked at: a variable or a differential.
+const MAX_GROUP: usize = 32;
+
+/// The tokens with `z_1''`, `z_1^{\prime\prime}` and `\frac{d^2 z_1}{dt^2}` or `\frac{d^2}{dt^2} z_1` written
+/// `\ddot{z_1}`; others stay. What is written anew stands at the place of its first token.
+pub(super) fn with_dots(tokens: &[Token]) -> Vec<Token> {
+    of_primes(&of_fractions(tokens))
+}
+
+fn of_fractions(tokens: &[Token]) -> Vec<Token> {
+    let mut dotted = Vec::with_capacity(tokens.len());
+    let mut at = 0;
+    while at < tokens.len() {
+        match fraction(tokens, at) {
+            Some((dots, variable, behind)) => {
+                dotted.extend(under_dots(&tokens[at], dots, variable));
+                at = behind;
+            }
+            None => {
+                dotted.push(tokens[at].clone());
+                at += 1;
+            }
+        }
+    }
+    dotted
+}
+
+/// A derivative at `at`: its order, its variable, and the place behind it.
+fn fraction(tokens: &[Token], at: usize) -> Option<(usize, &[Token], usize)> {
+    let is_fraction = ["frac", "dfrac", "tfrac"]
+        .iter()
+        .any(|name| tokens[at].is_command(name));
+    if !is_fraction {
+        return None;
+    }
+    let (top, after_top) = group(tokens, at + 1)?;
+    let (bottom, behind) = group(tokens, after_top)?;
+    let of_top = differential(top, 0)?;
+    let (order, of_variable) = power(top, of_top);
+    let time = differential(bottom, 0)?;
+    let is_time = bottom.get(time)?.kind == Kind::Character('t');
+    let (of_time, end) = power(bottom, time + 1);
+    if !is_time || of_time != order || end != bottom.len() || !(1..=MAX_DOTS).contains(&order) {
+        return None;
+    }
+    if of_variable < top.len() {
+        let end = variable_end(top, of_variable)?;
+        return (end == top.len()).then_some((order, &top[of_variable..], behind));
+    }
+    let end = variable_end(tokens, behind)?;
+    Some((order, &tokens[behind..end], end))
+}
+
+/// The place behind the `d` of a differential, upright or not, or its `\partial`.
+fn differential(tokens: &[Token], at: usize) -> Option<usize> {
+    let is_d = |at: usize| {
+        let is_sign =
+            |token: &Token| token.kind == Kind::Character('d') || token.is_command("partial");
+        tokens.get(at).is_some_and(is_sign)
+    };
+    if is_d(at) {
+        return Some(at + 1);
+    }
+    let Kind::Command(font) = &tokens.get(at)?.kind else {
+        return None;
+    };
+    if !has(FONTS, font) {
+        return None;
+    }
+    match group(tokens, at + 1) {
+        Some((inside, behind)) => (inside.len() == 1 && is_d(at + 2)).then_some(behind),
+        None => is_d(at + 1).then_some(at + 2),
+    }
+}
+
+/// A whole power at `at`, 1 without, and the place behind it.
+fn power(tokens: &[Token], at: usize) -> (usize, usize) {
+    let found = || {
+        (tokens.get(at)?.kind == Kind::Superscript).then_some(())?;
+        let (number, behind) = match group(tokens, at + 1) {
+            Some(([number], behind)) => (number, behind),
+            Some(_) => return None,
+            None => (tokens.get(at + 1)?, at + 2),
+        };
+        match &number.kind {
+            Kind::Number(text) => Some((text.parse().ok()?, behind)),
+            _ => None,
+        }
+    };
+    found().unwrap_or((1, at))
+}
+
+/// What stands in the braces that open at `at`, and the place behind them.
+fn group(tokens: &[Token], at: usize) -> Option<(&[Token], usize)> {
+    if tokens.get(at)?.kind != Kind::Open {
+        return None;
+    }
+    let mut depth = 0;
+    for (place, token) in tokens.iter().enumerate().skip(at).take(MAX_GROUP) {
+        match token.kind {
+            Kind::Open => depth += 1,
+            Kind::Close => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 {
+            return Some((&tokens[at + 1..place], place + 1));
+        }
+    }
+    None
+}
+
+/// The place behind the letter or word at `at` with its dots and subscript.
+fn variable_end(tokens: &[Token], at: usize) -> Option<usize> {
+    let end = letter_end(tokens, at)?;
+    Some(subscript_end(tokens, end).unwrap_or(end))
+}
+
+fn letter_end(tokens: &[Token], at: usize) -> Option<usize> {
+    match &tokens.get(at)?.kind {
+        Kind::Character(letter) if letter.is_ascii_alphabetic() => Some(at + 1),
+        Kind::Command(name) if is_greek(name) => Some(at + 1),
+        Kind::Command(name) if has(FONTS, name) || has("dot ddot", name) => {
+            argument_end(tokens, at + 1)
+        }
+        Kind::Open => {
+            let (inside, behind) = group(tokens, at)?;
+            (variable_end(inside, 0)? == inside.len()).then_some(behind)
+        }
+        _ => None,
+    }
+}
+
+fn subscript_end(tokens: &[Token], at: usize) -> Option<usize> {
+    (tokens.get(at)?.kind == Kind::Subscript).then_some(())?;
+    argument_end(tokens, at + 1)
+}
+
+fn argument_end(tokens: &[Token], at: usize) -> Option<usize> {
+    match group(tokens, at) {
+        Some((_, behind)) => Some(behind),
+        None => tokens.get(at).map(|_| at + 1),
+    }
+}
+
+fn of_primes(tokens: &[Token]) -> Vec<Token> {
+    let mut dotted = Vec::with_capacity(tokens.len());
+    let mut at = 0;
+    while at < tokens.len() {
+        let found = letter_end(tokens, at).and_then(|letter| {
+            let subscript = subscript_end(tokens, letter);
+            let (dots, behind) = primes(tokens, subscript.unwrap_or(letter))?;
+            let mut variable = tokens[at..subscript.unwrap_or(letter)].to_vec();
+            // Primes may stand before the subscript.
+            let after = match (subscript, subscript_end(tokens, behind)) {
+                (None, Some(end)) => {
+                    variable.extend_from_slice(&tokens[behind..end]);
+                    end
+                }
+                _ => behind,
+            };
+            Some((dots, variable, after))
+        });
+        match found {
+            Some((dots, variable, after)) => {
+                dotted.extend(under_dots(&tokens[at], dots, &variable));
+                at = after;
+            }
+            None => {
+                dotted.push(tokens[at].clone());
+                at += 1;
+            }
+        }
+    }
+    dotted
+}
+
+/// How many primes stand at `at`, at most as many as there are dots, and the place behind them.
+fn primes(tokens: &[Token], at: usize) -> Option<(usize, usize)> {
+    let is_prime = |token: &Token| token.is_command("prime");
+    let is_mark = |token: &&Token| matches!(token.kind, Kind::Character('\'' | '′' | '’'));
+    let marks = tokens[at..].iter().take_while(is_mark).count();
+    let (count, behind) = match tokens.get(at).map(|token| &token.kind) {
+        Some(Kind::Superscript) => match group(tokens, at + 1) {
+            Some((inside, behind)) if inside.iter().all(is_prime) => (inside.len(), behind),
+            Some(_) => return None,
+            None => (usize::from(is_prime(tokens.get(at + 1)?)), at + 2),
+        },
+        _ => (marks, at + marks),
+    };
+    (1..=MAX_DOTS).contains(&count).then_some((count, behind))
+}
+
+/// `\ddot{z_1}` at the place of `first`.
+fn under_dots(first: &Token, dots: usize, variable: &[Token]) -> Vec<Token> {
+    let command = ["dot", "ddot", "dddot"][dots - 1].to_owned();
+    let of = |kind| Token {
+        kind,
+        ..first.clone()
+    };
+    let mut dotted = vec![of(Kind::Command(command)), of(Kind::Open)];
+    dotted.extend_from_slice(match group(variable, 0) {
+        Some((inside, behind)) if behind == variable.len() => inside,
+        _ => variable,
+    });
+    dotted.push(of(Kind::Close));
+    dotted
+}
