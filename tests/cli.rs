@@ -504,7 +504,7 @@ fn train_takes_what_the_joints_take_off_the_torques_and_says_so() {
         ),
         (
             format!("{table}armature = [0.1, -0.1, 0.1]\n"),
-            "`actuators.armature`, joint fr.hy: found -0.1",
+            "actuators.armature, joint fr.hy: found -0.1",
         ),
     ] {
         fs::write(&losses, content).expect("written");

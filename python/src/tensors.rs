@@ -1,11 +1,14 @@
 //! Tensors of Python objects to a model, by the importer of files.
 
+use std::path::PathBuf;
+
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use romc::Error;
 use romc::evaluate::RoundTrip;
 use romc::import::{ImportOptions, LibraryChoice, Tensor, parse_standard};
-use romc::robot_file::find;
+use romc::robot::Actuators;
+use romc::robot_file::{ActuatorsEntry, RobotFileError, find, read_actuators};
 use romc::sim::with_input_statistics;
 
 use crate::errors::{choice, python_error, wrench_frame};
@@ -35,9 +38,45 @@ pub struct ImportArguments {
     robot: Option<String>,
     order: Option<String>,
     wrench_frame: String,
+    actuators: Option<Losses>,
     sample_time: Option<f64>,
     /// Whether a model that misses the recordings is made all the same.
     unchecked: bool,
+}
+
+/// What the joints take of the motors' torques.
+#[derive(FromPyObject)]
+enum Losses {
+    /// A file with a table `actuators`.
+    #[pyo3(transparent)]
+    File(PathBuf),
+    /// The arrays of a model's document.
+    #[pyo3(from_item_all)]
+    Arrays {
+        viscous: Vec<f64>,
+        dry: Vec<f64>,
+        armature: Vec<f64>,
+    },
+}
+
+impl Losses {
+    fn actuators(&self) -> Result<Actuators, RobotFileError> {
+        match self {
+            Losses::File(path) => read_actuators(path),
+            Losses::Arrays {
+                viscous,
+                dry,
+                armature,
+            } => {
+                let entry = ActuatorsEntry {
+                    viscous: viscous.clone(),
+                    dry: dry.clone(),
+                    armature: armature.clone(),
+                };
+                entry.actuators("")
+            }
+        }
+    }
 }
 
 impl ImportArguments {
@@ -53,6 +92,7 @@ impl ImportArguments {
         };
         let activation = self.activation.as_deref().map(str::parse).transpose();
         let robot = self.robot.as_deref().map(find).transpose();
+        let actuators = self.actuators.as_ref().map(Losses::actuators).transpose();
         let order = self.order.as_deref().map(str::parse).transpose();
         let (phases, map) = (self.phases.iter(), self.map.iter());
         Ok(ImportOptions {
@@ -72,6 +112,7 @@ impl ImportArguments {
             robot: robot.map_err(|error| python_error(py, error))?,
             order: order.map_err(|error| python_error(py, Error::Model(error)))?,
             wrench_frame: wrench_frame(py, &self.wrench_frame)?,
+            actuators: actuators.map_err(|error| python_error(py, error))?,
             sample_time_s: self.sample_time,
             ..ImportOptions::of_factors(&self.scaling, &self.input_scaling)
         })

@@ -23,7 +23,8 @@ def parts():
         "input_scaling": document["scaling"]["input"],
         "library": romc.Model.load(MODELS / "go1-d6.json").library,
         "robot": "go1",
-        "wrench_frame": document.get("wrench_frame", "body"),
+        "wrench_frame": document["wrench_frame"],
+        "actuators": document["actuators"],
     }
 
 
@@ -61,6 +62,9 @@ def test_model_of_arrays_equals_the_import_of_a_file(parts, command_line, tmp_pa
     (tmp_path / "terms.json").write_text(json.dumps(parts["library"]))
     arguments = ["import", "net.npz", "--library", "terms.json", "--scaling", parts["scaling"], "--robot", "go1"]
     arguments += ["--wrench-frame", parts["wrench_frame"]]
+    losses = "".join(f"{name} = {values}\n" for name, values in parts["actuators"].items())
+    (tmp_path / "losses.toml").write_text(f"[actuators]\n{losses}")
+    arguments += ["--actuators", "losses.toml"]
     arguments += ["--input-scaling", ",".join(map(repr, parts["input_scaling"]))]
     inputs = [JUMPS / "train_01.csv.gz", JUMPS / "train_02.csv.gz"]
     command_line.json(*arguments, "--inputs-from", *inputs, "--output", "net.json")
@@ -244,6 +248,26 @@ def test_model_that_misses_its_recordings_is_refused_with_the_slip(parts):
         taken = romc.Model.from_arrays(**wrong, inputs_from=RECORDED, unchecked=True)
     assert warned[0].filename == __file__
     assert taken.to_dict()["scaling"]["state"] == 10 * parts["scaling"]
+
+
+def test_actuators_are_a_mapping_or_a_file_and_checked(parts, tmp_path):
+    given = parts["actuators"]
+    leg = {name: values[:3] for name, values in given.items()}
+    (tmp_path / "losses.toml").write_text("[actuators]\n" + "".join(f"{name} = {v}\n" for name, v in leg.items()))
+    for actuators in (given, leg, tmp_path / "losses.toml", str(tmp_path / "losses.toml")):
+        model = romc.Model.from_arrays(**{**parts, "actuators": actuators})
+        assert model.to_dict()["actuators"] == given
+    without = romc.Model.from_arrays(**{**parts, "actuators": None})
+    assert "actuators" not in without.to_dict()
+    # The torques of the motors are not what the equations were learned with.
+    with pytest.warns(romc.RomcWarning, match="below that of a constant"):
+        romc.Model.from_arrays(**{**parts, "actuators": None}, inputs_from=RECORDED)
+    with pytest.raises(romc.RomcError, match="actuators.dry: found 2 numbers, expected 12"):
+        romc.Model.from_arrays(**{**parts, "actuators": {**given, "dry": [0.1, 0.2]}})
+    with pytest.raises(romc.RomcError, match="joint fr.kn: found -0.5"):
+        romc.Model.from_arrays(**{**parts, "actuators": {**leg, "viscous": [1.0, 1.0, -0.5]}})
+    with pytest.raises(romc.RomcError, match="cannot read"):
+        romc.Model.from_arrays(**{**parts, "actuators": tmp_path / "none.toml"})
 
 
 def test_mean_and_order_of_a_trainer(parts):

@@ -16,6 +16,7 @@ use crate::import::{
 };
 use crate::model::ReducedModel;
 use crate::recording::Segment;
+use crate::robot_file::read_actuators;
 use crate::sim::with_input_statistics;
 use crate::typeset::Table;
 use crate::{Error, artifact};
@@ -126,6 +127,9 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
         order: arguments.order.clone(),
         robot: arguments.robot.as_deref().map(robot::chosen).transpose()?,
         wrench_frame: arguments.wrench_frame.unwrap_or_default(),
+        actuators: (arguments.actuators.as_deref())
+            .map(read_actuators)
+            .transpose()?,
         sample_time_s: arguments.sample_time,
         ..ImportOptions::of_factors(&arguments.scaling, &arguments.input_scaling)
     })

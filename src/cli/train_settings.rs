@@ -13,6 +13,7 @@ use crate::limits::of_training;
 use crate::limits::table::LAYER_WIDTH;
 use crate::model::{Activation, StandardLibrary};
 use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule};
+use crate::robot_file::read_actuators;
 use crate::train::{
     Coordinates, LibraryChoice, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError,
     TrainOptions,
@@ -68,7 +69,7 @@ pub(super) fn options(
     }
     options.actuators = match actuators(settings) {
         actuators::NONE | actuators::IDENTIFIED => None,
-        path => Some(actuators::read(Path::new(path))?),
+        path => Some(read_actuators(Path::new(path))?),
     };
     Ok(options)
 }

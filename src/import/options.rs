@@ -13,7 +13,7 @@ use super::report::Note;
 use super::role::{Mapping, ONLY_PHASE};
 use crate::files::Place;
 use crate::model::{Activation, CoordinateOrder, FeetRule, ScaleFactors, Scaling, StandardLibrary};
-use crate::robot::{ContactFlags, Robot, WrenchFrame};
+use crate::robot::{Actuators, ContactFlags, Robot, WrenchFrame};
 
 /// The kinds of files that can be imported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
@@ -230,6 +230,9 @@ pub struct ImportOptions {
     pub robot: Option<&'static Robot>,
     /// Axes of the force and moment in the inputs that the model was trained with; needs the robot.
     pub wrench_frame: WrenchFrame,
+    /// What the joints take of the motors' torques in the inputs that the model was trained with, `None`
+    /// for the motors' torques as they are; needs the robot.
+    pub actuators: Option<Actuators>,
     /// Sampling period of the training recordings, s.
     pub sample_time_s: Option<f64>,
 }

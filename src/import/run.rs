@@ -225,7 +225,10 @@ fn build(
         builder = builder.input_statistics(phase, statistics);
     }
     if let Some(robot) = options.robot {
-        builder = builder.robot(robot).wrench_frame(options.wrench_frame);
+        builder = builder
+            .robot(robot)
+            .wrench_frame(options.wrench_frame)
+            .actuators(options.actuators.clone());
         if map.is_some() {
             builder = builder
                 .state(CoordinateNames {

@@ -1,4 +1,4 @@
-//! Robots from files: TOML, URDF, the object in a model file; and those that romc brings.
+//! Robots from files: TOML, URDF, the object in a model file; those that romc brings; and tables of joint losses.
 //!
 //! What enters: a name, or the path or text of a file. What leaves: a checked [`Robot`] with its legs
 //! in romc's order, or file, place, what was found and what was expected. Legs are matched by where
@@ -21,6 +21,7 @@
 //!
 //! [`Robot`]: crate::robot::Robot
 
+mod actuators;
 mod entry;
 mod error;
 mod legs;
@@ -29,6 +30,7 @@ mod read;
 mod registry;
 mod urdf;
 
+pub use actuators::{ActuatorsEntry, read_actuators};
 pub use entry::RobotEntry;
 pub use error::{RobotFileError, RobotFileFault};
 pub use print::to_toml;

@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use serde::de::DeserializeOwned;
+
 use super::entry::RobotEntry;
 use super::error::{RobotFileError, RobotFileFault};
 use super::{legs, urdf};
@@ -43,15 +45,7 @@ fn ending(path: &Path) -> String {
 /// [`RobotFileError`] with the entry that is wrong or missing.
 pub fn read(path: &Path, feet: &[String]) -> Result<&'static Robot, RobotFileError> {
     let file = path.display().to_string();
-    let fault = |fault| RobotFileError::new(&file, Place::Whole, fault);
-    let mut text = String::new();
-    // One byte more than allowed distinguishes a file that is too large from one that just fits.
-    File::open(path)
-        .and_then(|open| open.take(MAX_FILE_BYTES + 1).read_to_string(&mut text))
-        .map_err(|source| fault(RobotFileFault::Read(source)))?;
-    if text.len() as u64 > MAX_FILE_BYTES {
-        return Err(fault(RobotFileFault::TooLarge(MAX_FILE_BYTES)));
-    }
+    let text = text_of(path)?;
     match ending(path).as_str() {
         "toml" if feet.is_empty() => from_toml(&file, &text),
         "toml" => {
@@ -64,12 +58,27 @@ pub fn read(path: &Path, feet: &[String]) -> Result<&'static Robot, RobotFileErr
     }
 }
 
+/// The text of a file of bounded size.
+pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
+    let file = path.display().to_string();
+    let fault = |fault| RobotFileError::new(&file, Place::Whole, fault);
+    let mut text = String::new();
+    // One byte more than allowed distinguishes a file that is too large from one that just fits.
+    File::open(path)
+        .and_then(|open| open.take(MAX_FILE_BYTES + 1).read_to_string(&mut text))
+        .map_err(|source| fault(RobotFileFault::Read(source)))?;
+    match text.len() as u64 > MAX_FILE_BYTES {
+        true => Err(fault(RobotFileFault::TooLarge(MAX_FILE_BYTES))),
+        false => Ok(text),
+    }
+}
+
 /// Reads a robot from TOML; `file` names it in errors.
 ///
 /// # Errors
 /// As [`read`].
 pub fn from_toml(file: &str, text: &str) -> Result<&'static Robot, RobotFileError> {
-    legs::robot(file, &entry_of_toml(file, text)?)
+    legs::robot(file, &from_toml_text::<RobotEntry>(file, text)?)
 }
 
 /// Reads a robot from URDF; `feet` names the links of its feet, empty to find them.
@@ -84,7 +93,10 @@ pub fn from_urdf(
     legs::robot(file, &urdf::entry(file, text, feet)?)
 }
 
-pub(super) fn entry_of_toml(file: &str, text: &str) -> Result<RobotEntry, RobotFileError> {
+pub(super) fn from_toml_text<T: DeserializeOwned>(
+    file: &str,
+    text: &str,
+) -> Result<T, RobotFileError> {
     toml::from_str(text).map_err(|error| {
         let place = match error.span() {
             None => Place::Whole,

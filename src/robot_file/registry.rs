@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
+use super::entry::RobotEntry;
 use super::{legs, read};
 use crate::robot::{Robot, RobotError};
 
@@ -32,7 +33,7 @@ impl Robot {
             return Ok(robot);
         }
         let (file, text) = KNOWN[position];
-        let entry = read::entry_of_toml(file, text);
+        let entry = read::from_toml_text::<RobotEntry>(file, text);
         let robot = entry.and_then(|entry| legs::build(file, &entry));
         let robot = robot.expect("a file of romc's own, read by a test");
         Ok(ROBOTS[position].get_or_init(|| keep(robot)))

@@ -23,6 +23,7 @@ class ImportOptions(TypedDict, total=False):
     phases: Phases
     xi_layout: str
     wrench_frame: str
+    actuators: Union[PathLike, Mapping[str, Sequence[float]]]
     inputs_from: Recordings
     unchecked: bool
     sample_time: float

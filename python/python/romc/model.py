@@ -77,6 +77,9 @@ class Model:
         - `phases`: the feet that select each phase, `any`, `none`, `always` or patterns such as `"0011,0001"` (fr
           fl rr rl), the first match wins; `contact` and `flight` are known.
         - `wrench_frame`: axes of the force and moment in the inputs, `"body"` (as published) or `"world"`.
+        - `actuators`: friction and inertia of the joints, if training took them from the torques: a mapping of
+          `"viscous"` (N m s/rad), `"dry"` (N m) and `"armature"` (kg m^2), 12 numbers each or 3 for a leg, or a file
+          of `romc identify`.
         - `inputs_from`: recordings that give the mean and covariance of the inputs, which the controller needs, and
           that the model is compared with: one that misses them is refused, with the usual slip that explains it;
           `unchecked=True` warns instead.
@@ -166,6 +169,7 @@ class Model:
         phases: Optional[Phases] = None,
         xi_layout: Optional[str] = None,
         wrench_frame: str = "body",
+        actuators: Union[PathLike, Mapping[str, Sequence[float]], None] = None,
         inputs_from: Optional[Recordings] = None,
         unchecked: bool = False,
         sample_time: Optional[float] = None,
@@ -196,6 +200,7 @@ class Model:
             "robot": None if robot is None else os.fspath(robot),
             "order": order,
             "wrench_frame": wrench_frame,
+            "actuators": os.fspath(actuators) if isinstance(actuators, os.PathLike) else actuators,
             "sample_time": sample_time,
             "unchecked": unchecked,
             "name": name,

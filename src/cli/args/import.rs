@@ -97,6 +97,10 @@ pub struct ImportArguments {
     /// given, or world
     #[arg(long, value_name = "FRAME", requires = "robot", value_parser = wrench_frame)]
     pub wrench_frame: Option<WrenchFrame>,
+    /// Friction and inertia of the joints, if the model was trained with torques less these: a file with a
+    /// table `actuators`, such as one of `romc identify`; the motors' torques unless given
+    #[arg(long, value_name = "FILE.toml", requires = "robot")]
+    pub actuators: Option<PathBuf>,
     /// Sampling period of the training recordings
     #[arg(long, value_name = "SECONDS", value_parser = real(&SAMPLE_TIME))]
     pub sample_time: Option<f64>,

@@ -1,0 +1,70 @@
+//! What the joints take of the motors' torques, from a file.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::error::RobotFileError;
+use super::read::{from_toml_text, text_of};
+use crate::robot::{Actuators, JOINT_DIM, JOINT_NAMES};
+
+/// The table that is read; a file of `romc identify` has others as well.
+#[derive(Deserialize)]
+struct File {
+    actuators: ActuatorsEntry,
+}
+
+/// Joint losses as files and programs write them: twelve numbers each, or three (hx, hy, kn) that hold
+/// for every leg.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ActuatorsEntry {
+    /// Viscous friction, N m s/rad.
+    pub viscous: Vec<f64>,
+    /// Dry friction, N m.
+    pub dry: Vec<f64>,
+    /// Armature, kg m^2.
+    pub armature: Vec<f64>,
+}
+
+impl ActuatorsEntry {
+    /// The actuators of the entry, which is `actuators` of `file` in errors.
+    ///
+    /// # Errors
+    /// [`RobotFileError`] with array and joint for anything but finite numbers of at least 0.
+    pub fn actuators(&self, file: &str) -> Result<Actuators, RobotFileError> {
+        let joints = |name: &str, values: &[f64]| match values.len() {
+            found @ (3 | JOINT_DIM) => Ok(std::array::from_fn(|joint| values[joint % found])),
+            found => Err(RobotFileError::at(
+                file,
+                format!("actuators.{name}"),
+                format!("{found} numbers"),
+                format!("{JOINT_DIM}, or 3 for hx, hy, kn"),
+            )),
+        };
+        let actuators = Actuators {
+            viscous: joints("viscous", &self.viscous)?,
+            dry: joints("dry", &self.dry)?,
+            armature: joints("armature", &self.armature)?,
+        };
+        match actuators.unusable() {
+            None => Ok(actuators),
+            Some((name, joint, found)) => Err(RobotFileError::at(
+                file,
+                format!("actuators.{name}, joint {}", JOINT_NAMES[joint]),
+                found.to_string(),
+                "a number of at least 0",
+            )),
+        }
+    }
+}
+
+/// Reads the table `[actuators]` of a TOML file, such as one of `romc identify`.
+///
+/// # Errors
+/// [`RobotFileError`] with the place that is wrong or missing.
+pub fn read_actuators(path: &Path) -> Result<Actuators, RobotFileError> {
+    let file = path.display().to_string();
+    let File { actuators } = from_toml_text(&file, &text_of(path)?)?;
+    actuators.actuators(&file)
+}
