@@ -5,12 +5,16 @@ use super::riccati::{answer, eliminate, plus_product, pull};
 use super::rows::{Rows, add_block, add_square, dot, part};
 use super::scalar::Real;
 
-/// Share of the way to the boundary that a step goes.
-pub const TO_THE_BOUNDARY: f64 = 0.995;
+/// Share of the way to the boundary that a step leaves: the least and the most.
+pub const MARGIN: (f64, f64) = (1e-3, 5e-3);
+/// The share between the two, in units of the mean complementarity: near the optimum steps may go further.
+pub const MARGIN_FACTOR: f64 = 10.0;
 /// Smallest slack and smallest product of slack and multiplier at a start from the gains.
 pub const COLD: (f64, f64) = (3e-1, 3.0);
 /// The same at a start from a guess.
 pub const WARM: (f64, f64) = (1e-2, 1e-3);
+/// The same where a guess turned out to be poor, or the iterations go round in a circle.
+pub const AGAIN: (f64, f64) = (1e-1, 5e-1);
 /// A first step from a guess that is shorter than this shows that the guess is not near a solution.
 pub const SHORT_STEP: f64 = 0.3;
 /// Iterations after which slacks and multipliers are centred again: now and then the method goes round
@@ -74,11 +78,14 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             for i in 0..rows.bound.len() {
                 let residual = rows.target[i] + rows.slack[i] - rows.bound[i];
                 rows.residual[i] = residual;
-                infeasibility = residual.magnitude().or_larger(infeasibility);
-                let product = rows.slack[i] * rows.multiplier[i];
-                sum += product;
-                largest = product.or_larger(largest);
+                rows.target[i] = residual.magnitude();
             }
+            infeasibility = largest_of(rows.target, infeasibility);
+            for i in 0..rows.bound.len() {
+                rows.target[i] = rows.slack[i] * rows.multiplier[i];
+            }
+            sum += sum_of(rows.target);
+            largest = largest_of(rows.target, largest);
         }
         let count = self.shape.rows() * self.stages.len();
         (infeasibility, sum / T::of(count as f64), largest)
@@ -92,17 +99,17 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             return None;
         }
         self.pull_all();
-        let (to_slack, to_multiplier) = self.advance();
-        let length = T::ONE / to_slack.or_larger(to_multiplier).or_larger(T::ONE);
+        let length = T::ONE / self.advance().or_larger(T::ONE);
         // What is left of the complementarity after the step that does not centre decides how much is
         // aimed at.
         let mut left = T::ZERO;
         for k in 0..self.stages.len() {
             let rows = self.rows_of(k);
             for i in 0..rows.slack.len() {
-                left += (rows.slack[i] + length * rows.dslack[i])
+                rows.target[i] = (rows.slack[i] + length * rows.dslack[i])
                     * (rows.multiplier[i] + length * rows.dmultiplier[i]);
             }
+            left += sum_of(rows.target);
         }
         let count = T::of((self.shape.rows() * self.stages.len()) as f64);
         let ratio = left / (count * complementarity);
@@ -111,19 +118,19 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             let rows = self.rows_of(k);
             for i in 0..rows.slack.len() {
                 let second_order = rows.dslack[i] * rows.dmultiplier[i];
-                rows.target[i] =
-                    rows.weight[i] * rows.residual[i] + (aim - second_order) / rows.slack[i];
+                rows.dmultiplier[i] =
+                    rows.weight[i] * rows.residual[i] + (aim - second_order) * rows.inverse[i];
             }
         }
         self.pull_all();
-        let (to_slack, to_multiplier) = self.advance();
-        let margin = T::of(TO_THE_BOUNDARY);
-        let longest = margin / to_slack.or_larger(to_multiplier).or_larger(margin);
+        let share = boundary_share(complementarity);
+        let longest = share / self.advance().or_larger(share);
         self.move_by(longest);
         Some(longest)
     }
 
-    /// Gains with the weights of the rows; the rows' targets are those of the step that does not centre.
+    /// Gains with the weights of the rows; the multipliers aimed at, in `dmultiplier` until the step is
+    /// known, are those of the step that does not centre.
     #[inline(always)]
     fn eliminate_all(&mut self) -> bool {
         let (horizon, shape) = (self.stages.len(), self.shape);
@@ -140,9 +147,11 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             let (at, memory) = (self.at(k), shape.memory());
             let rows = Rows::of(&mut self.rows[at * memory..][..memory], shape.rows());
             for i in 0..rows.slack.len() {
-                let weight = rows.multiplier[i] / rows.slack[i];
+                let inverse = T::ONE / rows.slack[i];
+                let weight = rows.multiplier[i] * inverse;
+                rows.inverse[i] = inverse;
                 rows.weight[i] = weight;
-                rows.target[i] = weight * rows.residual[i];
+                rows.dmultiplier[i] = weight * rows.residual[i];
             }
             let stage = &mut self.stages[at];
             let (input, rest) = rows.weight.split_at(shape.input);
@@ -182,7 +191,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         true
     }
 
-    /// Constant parts of the inputs' changes, from the rows' targets.
+    /// Constant parts of the inputs' changes, from the multipliers aimed at.
     #[inline(always)]
     fn pull_all(&mut self) {
         let (horizon, shape) = (self.stages.len(), self.shape);
@@ -199,8 +208,8 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 by_v[i] = self.cost.input[i] * stage.v[i];
             }
             let (count, memory) = (shape.rows(), shape.memory());
-            let target = &self.rows[self.at(k) * memory + 4 * count..][..count];
-            let by_t = self.add_rows_pull(k, target, &mut by_v, &mut by_x);
+            let aim = &self.rows[self.at(k) * memory + 7 * count..][..count];
+            let by_t = self.add_rows_pull(k, aim, &mut by_v, &mut by_x);
             let at = self.at(k);
             let stage = &mut self.stages[at];
             if shape.soft > 0 {
@@ -217,9 +226,9 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     /// The changes of all unknowns; how often the longest step of slacks, and of multipliers, that
     /// keeps them positive goes into a whole one.
     #[inline(always)]
-    fn advance(&mut self) -> (T, T) {
+    fn advance(&mut self) -> T {
         let shape = self.shape;
-        let (mut to_slack, mut to_multiplier) = (T::ZERO, T::ZERO);
+        let mut longest = T::ZERO;
         let mut dx = [T::ZERO; NX];
         for k in 0..self.stages.len() {
             let at = self.at(k);
@@ -238,23 +247,21 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 stage.dt += pulled * stage.soft_inverse;
             }
             let (dv, dt) = (stage.dv, stage.dt);
-            let (count, memory) = (shape.rows(), shape.memory());
-            // `rows_times` overwrites the targets, which the multipliers' change is made of.
-            let targets = Rows::of(&mut self.rows[at * memory..][..memory], count);
-            targets.dmultiplier.copy_from_slice(targets.target);
             let rows = self.rows_times(k, &dv, &dx, dt);
-            for i in 0..count {
+            for i in 0..rows.target.len() {
                 let change = rows.target[i];
                 let dslack = -rows.residual[i] - change;
                 let dmultiplier =
                     rows.dmultiplier[i] - rows.multiplier[i] + rows.weight[i] * change;
                 rows.dslack[i] = dslack;
                 rows.dmultiplier[i] = dmultiplier;
-                to_slack = (-dslack / rows.slack[i]).or_larger(to_slack);
-                to_multiplier = (-dmultiplier / rows.multiplier[i]).or_larger(to_multiplier);
+                let to_slack = -dslack * rows.inverse[i];
+                let to_multiplier = -dmultiplier / rows.multiplier[i];
+                rows.target[i] = to_slack.or_larger(to_multiplier);
             }
+            longest = largest_of(rows.target, longest);
         }
-        (to_slack, to_multiplier)
+        longest
     }
 
     /// Moves all unknowns along their changes.
@@ -277,4 +284,51 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             }
         }
     }
+}
+
+/// Share of the way to the boundary that a step goes at a mean complementarity.
+#[inline(always)]
+fn boundary_share<T: Real>(complementarity: T) -> T {
+    let (least, most) = (T::of(MARGIN.0), T::of(MARGIN.1));
+    let margin = T::of(MARGIN_FACTOR) * complementarity;
+    T::ONE
+        - if margin < most {
+            least.or_larger(margin)
+        } else {
+            most
+        }
+}
+
+/// The largest of numbers and one more, four at a time.
+#[inline(always)]
+fn largest_of<T: Real>(values: &[T], so_far: T) -> T {
+    let mut lanes = [so_far; 4];
+    let (fours, rest) = values.as_chunks::<4>();
+    for four in fours {
+        for j in 0..4 {
+            lanes[j] = four[j].or_larger(lanes[j]);
+        }
+    }
+    for (lane, value) in lanes.iter_mut().zip(rest) {
+        *lane = value.or_larger(*lane);
+    }
+    lanes[0]
+        .or_larger(lanes[1])
+        .or_larger(lanes[2].or_larger(lanes[3]))
+}
+
+/// The sum of numbers in four parts, those of every fourth one.
+#[inline(always)]
+fn sum_of<T: Real>(values: &[T]) -> T {
+    let mut parts = [T::ZERO; 4];
+    let (fours, rest) = values.as_chunks::<4>();
+    for four in fours {
+        for j in 0..4 {
+            parts[j] += four[j];
+        }
+    }
+    for (part, value) in parts.iter_mut().zip(rest) {
+        *part += *value;
+    }
+    (parts[0] + parts[1]) + (parts[2] + parts[3])
 }

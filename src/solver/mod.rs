@@ -59,6 +59,6 @@ mod solve;
 #[cfg(target_arch = "x86_64")]
 mod wide;
 
-pub use interior::{COLD, PATIENCE, SHORT_STEP, TO_THE_BOUNDARY, WARM};
+pub use interior::{AGAIN, COLD, MARGIN, MARGIN_FACTOR, PATIENCE, SHORT_STEP, WARM};
 pub use problem::{Cost, Outcome, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage};
 pub use scalar::Real;

@@ -56,24 +56,24 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
             z[i][j] = factor[i][i] * y[i][j];
         }
     }
-    let mut next = [[T::ZERO; NX]; NX];
     for i in 0..NX {
+        let mut row = [T::ZERO; NX];
         for k in 0..NX {
-            add_multiple(a[k][i], &pa[k], &mut next[i]);
+            add_multiple(a[k][i], &pa[k], &mut row);
         }
         for k in 0..NU {
             let entry = y[k][i];
             for j in 0..NX {
-                next[i][j] = next[i][j] - entry * z[k][j];
+                row[j] = row[j] - entry * z[k][j];
             }
         }
+        p[i] = row;
     }
     for i in 0..NX {
         for j in 0..i {
-            next[j][i] = next[i][j];
+            p[j][i] = p[i][j];
         }
     }
-    *p = next;
     for i in (0..NU).rev() {
         for k in i + 1..NU {
             let entry = factor[k][i];
@@ -165,9 +165,11 @@ pub(super) fn plus_product<T: Real, const ROWS: usize, const COLS: usize>(
     mut out: [T; ROWS],
 ) -> [T; ROWS] {
     for i in 0..ROWS {
+        let mut sum = out[i];
         for j in 0..COLS {
-            out[i] += matrix[i][j] * x[j];
+            sum += matrix[i][j] * x[j];
         }
+        out[i] = sum;
     }
     out
 }

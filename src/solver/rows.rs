@@ -13,6 +13,7 @@ pub(super) struct Rows<'a, T> {
     pub residual: &'a mut [T],
     pub dslack: &'a mut [T],
     pub dmultiplier: &'a mut [T],
+    pub inverse: &'a mut [T],
 }
 
 impl<'a, T> Rows<'a, T> {
@@ -25,7 +26,8 @@ impl<'a, T> Rows<'a, T> {
         let (target, rest) = rest.split_at_mut(count);
         let (residual, rest) = rest.split_at_mut(count);
         let (dslack, rest) = rest.split_at_mut(count);
-        let (dmultiplier, _) = rest.split_at_mut(count);
+        let (dmultiplier, rest) = rest.split_at_mut(count);
+        let (inverse, _) = rest.split_at_mut(count);
         Self {
             bound,
             slack,
@@ -35,6 +37,7 @@ impl<'a, T> Rows<'a, T> {
             residual,
             dslack,
             dmultiplier,
+            inverse,
         }
     }
 }
@@ -88,32 +91,21 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     ) -> T {
         let (shape, stage, matrices) = (self.shape, &self.stages[self.at(k)], self.matrices);
         let (input, rest) = y.split_at(shape.input);
-        for (y, row) in input.iter().zip(&matrices.input[stage.input_rows..]) {
-            for j in 0..NU {
-                by_v[j] += *y * row[j];
-            }
-        }
+        add_rows(input, &matrices.input[stage.input_rows..], by_v);
         let mut by_t = T::ZERO;
         if shape.soft > 0 {
             by_t = self.cost.slack;
-            for (y, row) in rest[..shape.soft]
-                .iter()
-                .zip(&matrices.soft[stage.soft_rows..])
-            {
+            for y in &rest[..shape.soft] {
                 by_t -= *y;
-                for j in 0..NU {
-                    by_x[j] += *y * row[j];
-                }
             }
+            let soft = &matrices.soft[stage.soft_rows..];
+            add_rows(&rest[..shape.soft], soft, part_mut(by_x, 0));
             by_t -= rest[shape.soft];
         }
         if shape.hard > 0 {
-            let hard = &rest[shape.soft + usize::from(shape.soft > 0)..];
-            for (y, row) in hard.iter().zip(&matrices.hard[stage.hard_rows..]) {
-                for j in 0..NU {
-                    by_x[shape.hard_offset + j] += *y * row[j];
-                }
-            }
+            let y = &rest[shape.soft + usize::from(shape.soft > 0)..];
+            let hard = &matrices.hard[stage.hard_rows..];
+            add_rows(y, hard, part_mut(by_x, shape.hard_offset));
         }
         by_t
     }
@@ -124,6 +116,26 @@ pub(super) fn part<T, const NX: usize, const NU: usize>(x: &[T; NX], first: usiz
     x[first..]
         .first_chunk()
         .expect("rows on states begin at least NU before their end")
+}
+
+#[inline(always)]
+fn part_mut<T, const NX: usize, const NU: usize>(x: &mut [T; NX], first: usize) -> &mut [T; NU] {
+    x[first..]
+        .first_chunk_mut()
+        .expect("rows on states begin at least NU before their end")
+}
+
+/// `sum += Σ y row`.
+#[inline(always)]
+fn add_rows<T: Real, const N: usize>(y: &[T], rows: &[[T; N]], sum: &mut [T; N]) {
+    // A local sum stays in registers.
+    let mut local = *sum;
+    for (y, row) in y.iter().zip(rows) {
+        for j in 0..N {
+            local[j] += *y * row[j];
+        }
+    }
+    *sum = local;
 }
 
 #[inline(always)]

@@ -30,16 +30,19 @@ pub trait Real:
     fn wide(self) -> f64;
 
     /// Its magnitude.
+    #[inline(always)]
     fn magnitude(self) -> Self {
         if self < Self::ZERO { -self } else { self }
     }
 
     /// The larger of two; not a number if the other is not.
+    #[inline(always)]
     fn or_larger(self, other: Self) -> Self {
         if self > other { self } else { other }
     }
 
     /// Whether it is neither infinite nor not a number.
+    #[inline(always)]
     fn is_finite_number(self) -> bool {
         // Infinity less itself is not a number, and no such number equals itself.
         #[allow(clippy::eq_op)]
@@ -52,10 +55,12 @@ impl Real for f64 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
 
+    #[inline(always)]
     fn of(value: f64) -> Self {
         value
     }
 
+    #[inline(always)]
     fn wide(self) -> f64 {
         self
     }
@@ -65,10 +70,12 @@ impl Real for f32 {
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
 
+    #[inline(always)]
     fn of(value: f64) -> Self {
         value as f32
     }
 
+    #[inline(always)]
     fn wide(self) -> f64 {
         f64::from(self)
     }

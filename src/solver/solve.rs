@@ -1,6 +1,6 @@
 //! The solve: the linear-quadratic optimum if it keeps every row, otherwise iterations from a guess.
 
-use super::interior::{COLD, PATIENCE, SHORT_STEP};
+use super::interior::{AGAIN, PATIENCE, SHORT_STEP};
 use super::problem::{Outcome, Program, Report, Residuals, Settings};
 use super::riccati::{add_transposed, answer, eliminate, plus_product, pull};
 use super::scalar::Real;
@@ -72,7 +72,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 };
                 let is_poor = may_restart && length < T::of(SHORT_STEP);
                 if is_poor || iterations % PATIENCE == 0 {
-                    self.centre(COLD);
+                    self.centre(AGAIN);
                 }
                 may_restart = false;
             }

@@ -80,9 +80,11 @@ struct SolverNumbers {
     slack_price: String,
     tolerance: String,
     accepted_residual: String,
-    to_the_boundary: String,
+    margin: (String, String),
+    margin_factor: String,
     warm: (String, String),
     cold: (String, String),
+    again: (String, String),
     short_step: String,
     patience: u32,
     sqrt_half: String,
@@ -210,14 +212,16 @@ impl SolverNumbers {
             Precision::Single => SINGLE,
         };
         let one = |value: f64| format!("{value:?}");
-        let pair = |(slack, product)| (one(slack), one(product));
+        let pair = |(first, second)| (one(first), one(second));
         Self {
             slack_price: one(SLACK_PRICE),
             tolerance: one(tolerance),
             accepted_residual: one(accepted),
-            to_the_boundary: one(solver::TO_THE_BOUNDARY),
+            margin: pair(solver::MARGIN),
+            margin_factor: one(solver::MARGIN_FACTOR),
             warm: pair(solver::WARM),
             cold: pair(solver::COLD),
+            again: pair(solver::AGAIN),
             short_step: one(solver::SHORT_STEP),
             patience: solver::PATIENCE,
             sqrt_half: one(std::f64::consts::FRAC_1_SQRT_2),
