@@ -208,8 +208,11 @@ def read(path):
     STAND, LOW, HIGH, TORQUE = take(12), take(12), take(12), take(12)
     FRICTION = float(take(1)[0])
     loop = Loop(lift, decoder, (take(d), take(d), take(d), float(take(1)[0])))
+    first = at
 
     def all_steps():
+        nonlocal at
+        at = first
         for _ in range(steps):
             x0, target = take(2 * d), take(horizon + 1, 2 * d)
             a, b, c = take(horizon, 2 * d, 2 * d), take(horizon, 2 * d, d), take(horizon, 2 * d)
