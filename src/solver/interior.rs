@@ -22,7 +22,7 @@ pub const SHORT_STEP: f64 = 0.3;
 pub const PATIENCE: u32 = 16;
 
 impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
-    /// First point of the iterations: the guess, or the point of the gains.
+    /// First point of the iterations, to be centred: the guess, or the point of the gains.
     #[inline(always)]
     pub(super) fn start(&mut self, x0: &[T; NX], is_warm: bool) {
         let (price, slack_row) = (self.cost.slack, self.shape.input + self.shape.soft);
@@ -46,7 +46,6 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 }
             }
         }
-        self.centre(if is_warm { WARM } else { COLD });
     }
 
     /// Slacks and multipliers of the present point, none smaller than these: slacks, and products of
@@ -98,10 +97,26 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         if !self.eliminate_all() {
             return None;
         }
-        self.pull_all();
-        let length = T::ONE / self.advance().or_larger(T::ONE);
-        // What is left of the complementarity after the step that does not centre decides how much is
-        // aimed at.
+        let mut share = T::ONE;
+        let mut longest = T::ONE;
+        // A loop of two turns, so that the passes over the stages are compiled once: the first looks for
+        // the step that does not centre, the second takes the one that does.
+        for is_last in [false, true] {
+            if is_last {
+                self.aim(complementarity, longest);
+                share = boundary_share(complementarity);
+            }
+            self.pull_all();
+            longest = share / self.advance().or_larger(share);
+        }
+        self.move_by(longest);
+        Some(longest)
+    }
+
+    /// The multipliers aimed at, from the changes of a step of this length that does not centre: how much
+    /// of the complementarity it leaves decides how much is aimed at.
+    #[inline(always)]
+    fn aim(&mut self, complementarity: T, length: T) {
         let mut left = T::ZERO;
         for k in 0..self.stages.len() {
             let rows = self.rows_of(k);
@@ -122,11 +137,6 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                     rows.weight[i] * rows.residual[i] + (aim - second_order) * rows.inverse[i];
             }
         }
-        self.pull_all();
-        let share = boundary_share(complementarity);
-        let longest = share / self.advance().or_larger(share);
-        self.move_by(longest);
-        Some(longest)
     }
 
     /// Gains with the weights of the rows; the multipliers aimed at, in `dmultiplier` until the step is

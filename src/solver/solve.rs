@@ -1,6 +1,6 @@
 //! The solve: the linear-quadratic optimum if it keeps every row, otherwise iterations from a guess.
 
-use super::interior::{AGAIN, PATIENCE, SHORT_STEP};
+use super::interior::{AGAIN, COLD, PATIENCE, SHORT_STEP, WARM};
 use super::problem::{Outcome, Program, Report, Residuals, Settings};
 use super::riccati::{add_transposed, answer, eliminate, plus_product, pull};
 use super::scalar::Real;
@@ -44,12 +44,17 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             return self.broken(0);
         }
         let mut iterations = 0;
+        let mut is_capped = false;
         if worst <= settings.tolerance {
             self.take_gains();
         } else {
             self.start(x0, is_warm);
             let mut may_restart = is_warm;
+            let mut centred = Some(if is_warm { WARM } else { COLD });
             loop {
+                if let Some(least) = centred.take() {
+                    self.centre(least);
+                }
                 let (infeasibility, complementarity, largest) = self.measure();
                 if !(infeasibility + complementarity).is_finite_number() {
                     return self.broken(iterations);
@@ -57,13 +62,9 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 if infeasibility <= settings.tolerance && largest <= settings.tolerance {
                     break;
                 }
-                if iterations == settings.max_iterations {
-                    let residuals = self.residuals(x0);
-                    return Report {
-                        outcome: Outcome::IterationCap,
-                        iterations,
-                        residuals,
-                    };
+                is_capped = iterations == settings.max_iterations;
+                if is_capped {
+                    break;
                 }
                 iterations += 1;
                 // Where rounding ends the progress the residuals decide what the point is worth.
@@ -72,18 +73,19 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 };
                 let is_poor = may_restart && length < T::of(SHORT_STEP);
                 if is_poor || iterations % PATIENCE == 0 {
-                    self.centre(AGAIN);
+                    centred = Some(AGAIN);
                 }
                 may_restart = false;
             }
         }
         let residuals = self.residuals(x0);
+        let outcome = match residuals.within(settings.accepted_residual) {
+            _ if is_capped => Outcome::IterationCap,
+            true => Outcome::Solved,
+            false => Outcome::Inaccurate,
+        };
         Report {
-            outcome: if residuals.within(settings.accepted_residual) {
-                Outcome::Solved
-            } else {
-                Outcome::Inaccurate
-            },
+            outcome,
             iterations,
             residuals,
         }
