@@ -26,10 +26,13 @@ pub enum Form {
 /// Least number of coefficients for which loops are worth their overhead.
 const FEWEST_COEFFICIENTS: usize = 120;
 
-/// Share of a table that may be zero. A vectorised loop works on four numbers at once, so that
+/// Least share of a table that is not zero. A vectorised loop works on four numbers at once, so that
 /// even a half-empty table is faster than straight-line code, which also has to be
-/// fetched and decoded.
+/// fetched and decoded; with few equations its sums have little to overlap with.
 const LEAST_FILL: f64 = 0.35;
+const LEAST_FILL_OF_FEW: f64 = 0.45;
+/// Fewer equations than these are few.
+const MANY_EQUATIONS: usize = 8;
 
 impl LowerOptions {
     /// Whether the equations should become loops over tables.
@@ -40,7 +43,11 @@ impl LowerOptions {
             Form::Automatic => {
                 let active: usize = equations.iter().map(|e| e.items.len()).sum();
                 let entries = equations.len() * n_weights(equations);
-                active >= FEWEST_COEFFICIENTS && active as f64 >= LEAST_FILL * entries as f64
+                let least_fill = match equations.len() < MANY_EQUATIONS {
+                    true => LEAST_FILL_OF_FEW,
+                    false => LEAST_FILL,
+                };
+                active >= FEWEST_COEFFICIENTS && active as f64 >= least_fill * entries as f64
             }
         }
     }
