@@ -25,7 +25,7 @@
 //!     (stage.a, stage.b) = ([[1.0, 0.1], [0.0, 1.0]], [[0.005], [0.1]]);
 //! }
 //! let shape = Shape { input: 2, ..Shape::default() };
-//! let mut rows = [0.0; 10 * 16];
+//! let mut rows = vec![0.0; 10 * shape.memory()];
 //! let mut program = Program {
 //!     stages: &mut stages,
 //!     rows: &mut rows,
