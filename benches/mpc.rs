@@ -9,9 +9,9 @@
 //!
 //! Drives the shipped model along the recorded jumps from measurements that are off the reference,
 //! so that limits become active; with `--along` the measurements are the recorded ones. Each problem
-//! comes with the time that the controller with the structured solver takes for it. Each problem is solved by the controller (linearisation, solve and
-//! lift together) and, at once, by clarabel with its default settings, set up anew. Times are those
-//! of this thread's CPU clock where the system has one.
+//! of the table is solved by the controller (linearisation, solve and lift together) and, at once, by
+//! clarabel with its default settings, set up anew; each that is written out comes with the time of the
+//! controller with the structured solver. Times are those of this thread's CPU clock where the system has one.
 
 use std::io::Write;
 use std::path::Path;

@@ -1,5 +1,6 @@
 //! Tensors of Python objects to a model, by the importer of files.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -44,37 +45,18 @@ pub struct ImportArguments {
     unchecked: bool,
 }
 
-/// What the joints take of the motors' torques.
+/// What the joints take of the motors' torques: a file with a table `actuators`, or its arrays by name.
 #[derive(FromPyObject)]
 enum Losses {
-    /// A file with a table `actuators`.
-    #[pyo3(transparent)]
     File(PathBuf),
-    /// The arrays of a model's document.
-    #[pyo3(from_item_all)]
-    Arrays {
-        viscous: Vec<f64>,
-        dry: Vec<f64>,
-        armature: Vec<f64>,
-    },
+    Arrays(BTreeMap<String, Vec<f64>>),
 }
 
 impl Losses {
     fn actuators(&self) -> Result<Actuators, RobotFileError> {
         match self {
             Losses::File(path) => read_actuators(path),
-            Losses::Arrays {
-                viscous,
-                dry,
-                armature,
-            } => {
-                let entry = ActuatorsEntry {
-                    viscous: viscous.clone(),
-                    dry: dry.clone(),
-                    armature: armature.clone(),
-                };
-                entry.actuators("")
-            }
+            Losses::Arrays(arrays) => ActuatorsEntry::of_arrays(arrays.clone())?.actuators(""),
         }
     }
 }

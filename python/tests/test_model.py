@@ -268,6 +268,12 @@ def test_actuators_are_a_mapping_or_a_file_and_checked(parts, tmp_path):
         romc.Model.from_arrays(**{**parts, "actuators": {**leg, "viscous": [1.0, 1.0, -0.5]}})
     with pytest.raises(romc.RomcError, match="cannot read"):
         romc.Model.from_arrays(**{**parts, "actuators": tmp_path / "none.toml"})
+    with pytest.raises(romc.RomcError, match="actuators.armature: found nothing"):
+        romc.Model.from_arrays(**{**parts, "actuators": {"viscous": [1.0] * 3, "dry": [0.1] * 3}})
+    with pytest.raises(romc.RomcError, match="actuators.stiction: found an unknown array"):
+        romc.Model.from_arrays(**{**parts, "actuators": {**leg, "stiction": [1.0] * 3}})
+    with pytest.raises(romc.RomcError, match="without a robot"):
+        romc.Model.from_arrays(**{**parts, "robot": None})
 
 
 def test_mean_and_order_of_a_trainer(parts):

@@ -208,6 +208,11 @@ fn build(
         let found = format!("{map} without scale factors");
         return Err(ImportError::at(file, Place::Whole, found, expected));
     }
+    if options.robot.is_none() && options.actuators.is_some() {
+        let found = "losses of joints without a robot";
+        let expected = "--robot as well: go1, go2, a1, or a .toml or .urdf file";
+        return Err(ImportError::option("--actuators", found, expected));
+    }
     let mut builder = ReducedModel::builder(options.name.clone(), parts.library)
         .description(options.description.clone())
         .phases(parts.phases)

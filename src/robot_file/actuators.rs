@@ -1,5 +1,6 @@
 //! What the joints take of the motors' torques, from a file.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -7,6 +8,9 @@ use serde::Deserialize;
 use super::error::RobotFileError;
 use super::read::{from_toml_text, text_of};
 use crate::robot::{Actuators, JOINT_DIM, JOINT_NAMES};
+
+/// How many numbers an array has.
+const COUNT: &str = "12, or 3 for hx, hy, kn";
 
 /// The table that is read; a file of `romc identify` has others as well.
 #[derive(Deserialize)]
@@ -28,6 +32,31 @@ pub struct ActuatorsEntry {
 }
 
 impl ActuatorsEntry {
+    /// The entry of a program's arrays by name.
+    ///
+    /// # Errors
+    /// [`RobotFileError`] for an array that is missing or unknown.
+    pub fn of_arrays(mut arrays: BTreeMap<String, Vec<f64>>) -> Result<Self, RobotFileError> {
+        let mut take = |name: &str| {
+            let missing = || RobotFileError::at("", format!("actuators.{name}"), "nothing", COUNT);
+            arrays.remove(name).ok_or_else(missing)
+        };
+        let entry = Self {
+            viscous: take("viscous")?,
+            dry: take("dry")?,
+            armature: take("armature")?,
+        };
+        match arrays.into_keys().next() {
+            None => Ok(entry),
+            Some(name) => Err(RobotFileError::at(
+                "",
+                format!("actuators.{name}"),
+                "an unknown array",
+                "viscous, dry and armature alone",
+            )),
+        }
+    }
+
     /// The actuators of the entry, which is `actuators` of `file` in errors.
     ///
     /// # Errors
@@ -39,7 +68,7 @@ impl ActuatorsEntry {
                 file,
                 format!("actuators.{name}"),
                 format!("{found} numbers"),
-                format!("{JOINT_DIM}, or 3 for hx, hy, kn"),
+                COUNT,
             )),
         };
         let actuators = Actuators {

@@ -301,12 +301,11 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
 fn boundary_share<T: Real>(complementarity: T) -> T {
     let (least, most) = (T::of(MARGIN.0), T::of(MARGIN.1));
     let margin = T::of(MARGIN_FACTOR) * complementarity;
-    T::ONE
-        - if margin < most {
-            least.or_larger(margin)
-        } else {
-            most
-        }
+    if margin < most {
+        T::ONE - least.or_larger(margin)
+    } else {
+        T::ONE - most
+    }
 }
 
 /// The largest of numbers and one more, four at a time.
