@@ -5,7 +5,8 @@
     venv/bin/python benches/mpc_solvers/compare.py problems.jsonl
 
 Each solver is set up once a jump (the rows that matter differ between jumps) and then only updated,
-as the controller does it; times are those of this thread's CPU clock for update and solve. Those in
+as the controller does it; times are those of this thread's CPU clock for update and solve; each
+solver runs alone, and what it takes is in its own form before. Those in
 the last rows are of the controller with romc's structured solver, which the bench measured when it
 wrote the problems: a whole step, linearisation, gains and lift included, and the step alone after
 `Controller::prepare`, which linearises and makes the gains between two steps. `x whole` and `x prepared`
@@ -29,12 +30,20 @@ def matrix(stored):
     return sparse.csc_matrix(parts, shape=stored["shape"])
 
 
+def rows_apart(problem):
+    """What PIQP takes: equalities and inequalities as matrices of their own."""
+    n, b = problem["equalities"], problem["b"]
+    rows = problem["A"].tocsr()
+    lower = np.full(len(b) - n, -np.inf)
+    return problem["P"], problem["q"], rows[:n].tocsc(), b[:n], rows[n:].tocsc(), lower, b[n:]
+
+
 def read(path):
     """Problems min x'Px/2 + q'x subject to Ax = b in the first rows, Ax <= b in the others."""
     with open(path, encoding="utf-8") as lines:
         for line in lines:
             stored = json.loads(line)
-            yield {
+            problem = {
                 "P": matrix(stored["P"]),
                 "q": np.array(stored["q"]),
                 "A": matrix(stored["A"]),
@@ -44,6 +53,8 @@ def read(path):
                 "own_us": stored["own_us"],
                 "prepared_us": stored["prepared_us"],
             }
+            problem["rows apart"] = rows_apart(problem)
+            yield problem
 
 
 class Osqp:
@@ -74,18 +85,14 @@ class Piqp:
         self.solver = None
 
     def solve(self, problem):
-        n = problem["equalities"]
-        rows = problem["A"].tocsr()
-        equal, other = rows[:n].tocsc(), rows[n:].tocsc()
-        arguments = (problem["P"], problem["q"], equal, problem["b"][:n], other)
-        lower = np.full(other.shape[0], -np.inf)
+        arguments = problem["rows apart"]
         if self.solver is None:
             self.solver = piqp.SparseSolver()
             self.solver.settings.eps_abs = self.tolerance
             self.solver.settings.eps_rel = self.tolerance
-            self.solver.setup(*arguments, lower, problem["b"][n:])
+            self.solver.setup(*arguments)
         else:
-            self.solver.update(*arguments, lower, problem["b"][n:])
+            self.solver.update(*arguments)
         self.solver.solve()
         return np.array(self.solver.result.x), self.solver.result.info.iter
 
