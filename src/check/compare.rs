@@ -165,8 +165,9 @@ fn decide(
     phase: &str,
     options: &CheckOptions,
 ) -> (Verdict, Option<Gap>) {
-    let mut pool = ExprPool::new();
+    let mut pool = ExprPool::exact();
     let whole = [0, 1].map(|side| files[side].build(ddz[side], &mut pool));
+    let restrictions = pool.restrictions();
     let table = Table::of(&mut pool, whole);
     let rest = [0, 1].map(|side| table.sum(&mut pool, side, |_| true));
     let unexplained =
@@ -177,10 +178,10 @@ fn decide(
     } else {
         [0, 1]
     };
-    let proof = proof(&pool, whole, rest, order);
+    let proof = proof(&pool, &restrictions, rest, order);
     let searched = |rest: [ExprId; 2], rows: &[&Row]| {
         let groups: Vec<ExprId> = rows.iter().map(|row| row.rest).collect();
-        let sides = Sides::new(&pool, whole, rest);
+        let sides = Sides::new(&pool, whole, rest, &restrictions);
         search(&sides, phase, &options.domain, &groups, proof.is_some())
     };
     let rows: Vec<&Row> = table.differing().collect();
@@ -213,10 +214,10 @@ fn decide(
     (verdict, one_sided)
 }
 
-/// A proof that what is left of both sides is equal.
+/// A proof that what is left of both sides is equal wherever the restrictions have values.
 fn proof(
     pool: &ExprPool,
-    whole: [ExprId; 2],
+    restrictions: &[ExprId],
     rest: [ExprId; 2],
     order: [usize; 2],
 ) -> Option<Verdict> {
@@ -224,7 +225,7 @@ fn proof(
         return Some(Verdict::Equal);
     }
     let literal = |symbol| literal(pool, symbol);
-    let mut forms = CanonicalForms::new(pool, &whole, &literal);
+    let mut forms = CanonicalForms::new(pool, restrictions, &literal);
     let [first, second] = order.map(|side| forms.of(rest[side]));
     let difference = first.minus(&second);
     let verdict = |form: &crate::symbolic::CanonicalForm, rounding: f64| {
@@ -238,11 +239,12 @@ fn proof(
             _ => None,
         }
     };
-    if let Some(verdict) = verdict(&difference, forms.rounding()) {
-        return Some(verdict);
+    let mut found = verdict(&difference, forms.rounding());
+    if found.is_none() {
+        let cleared = forms.without_fractions(&difference)?;
+        found = verdict(&cleared, forms.rounding());
     }
-    let cleared = forms.without_fractions(&difference)?;
-    verdict(&cleared, forms.rounding())
+    found.filter(|_| !forms.is_contradictory())
 }
 
 /// Terms of both sides by what they are without their numbers.

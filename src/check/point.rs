@@ -52,12 +52,19 @@ pub(super) struct Sides<'s> {
     pub(super) whole: [ExprId; 2],
     /// The same without the terms that both have; the difference is that of the whole sides.
     pub(super) rest: [ExprId; 2],
+    /// What has to have a value where the sides are compared.
+    restrictions: &'s [ExprId],
     /// Value and radius of each symbol that stands for a decimal.
     literals: HashMap<SymbolId, (f64, f64)>,
 }
 
 impl<'s> Sides<'s> {
-    pub(super) fn new(pool: &'s ExprPool, whole: [ExprId; 2], rest: [ExprId; 2]) -> Self {
+    pub(super) fn new(
+        pool: &'s ExprPool,
+        whole: [ExprId; 2],
+        rest: [ExprId; 2],
+        restrictions: &'s [ExprId],
+    ) -> Self {
         let symbols = whole.iter().flat_map(|side| pool.symbols_of(*side));
         let literals = symbols.filter_map(|symbol| {
             let literal = literal(pool, symbol)?;
@@ -67,6 +74,7 @@ impl<'s> Sides<'s> {
             pool,
             whole,
             rest,
+            restrictions,
             literals: literals.collect(),
         }
     }
@@ -127,6 +135,7 @@ pub(super) fn search(
             .collect();
         let gap = sides.at(&values);
         match (gap.left.is_nan(), gap.right.is_nan()) {
+            (false, false) if !sides.are_defined(&values) => continue,
             (false, false) if gap.left.is_finite() && gap.right.is_finite() => {
                 search.has_common_point = true;
             }
@@ -163,12 +172,22 @@ fn short(value: f64) -> f64 {
 }
 
 impl Sides<'_> {
-    fn at(&self, values: &BTreeMap<SymbolId, f64>) -> Gap {
+    fn values_of(&self, exprs: &[ExprId], values: &BTreeMap<SymbolId, f64>) -> Vec<f64> {
         let value_of = |symbol: SymbolId| match self.literals.get(&symbol) {
             Some((value, _)) => *value,
             None => values.get(&symbol).copied().unwrap_or(0.0),
         };
-        let both = self.pool.evaluate_all(&self.whole, &value_of);
+        self.pool.evaluate_all(exprs, &value_of)
+    }
+
+    /// Whether all that the files write has a value, parts that cancelled too.
+    fn are_defined(&self, values: &BTreeMap<SymbolId, f64>) -> bool {
+        let all = self.values_of(self.restrictions, values);
+        !all.into_iter().any(f64::is_nan)
+    }
+
+    fn at(&self, values: &BTreeMap<SymbolId, f64>) -> Gap {
+        let both = self.values_of(&self.whole, values);
         Gap {
             point: (values.iter())
                 .map(|(symbol, value)| (self.pool.symbol_name(*symbol).to_owned(), *value))

@@ -12,6 +12,8 @@ use crate::model::{LatentVariable, ReducedModel};
 use crate::symbolic::{ExprId, ExprPool, Literal, Number, SymbolId};
 
 /// Marks of symbols that stand for decimals: exact ones, and ones rounded in their last digit.
+/// Below this, twice a float is an integer to its last digit.
+const LARGEST_TWICE: f64 = 9e15;
 const EXACT: char = '#';
 const ROUNDED: char = '~';
 
@@ -151,7 +153,7 @@ impl Side {
 
     /// Builds every right side once, so that later ones are known to build.
     fn check(&self) -> Result<(), CheckError> {
-        let mut pool = ExprPool::new();
+        let mut pool = ExprPool::exact();
         for right_side in self.phases.iter().flat_map(|phase| &phase.ddz) {
             let RightSide::Text(line, text) = right_side else {
                 continue;
@@ -175,14 +177,15 @@ impl Side {
         pool.parse_with_literals(text, &known, &|number| self.literal_name(number))
     }
 
-    /// The symbol of a decimal. Integers are numbers of the pool, and multiples of 1/2 of exact
+    /// The symbol of a decimal. Integers are numbers of the pool, and short multiples of 1/2 of exact
     /// files, which floats hold exactly.
     fn literal_name(&self, number: &str) -> Option<String> {
         if number.bytes().all(|byte| byte.is_ascii_digit()) && number.parse::<i64>().is_ok() {
             return None;
         }
         let literal = Literal::parse(number, self.is_rounded)?;
-        if !self.is_rounded && (2.0 * literal.to_f64()).fract() == 0.0 && number.len() < 10 {
+        let twice = 2.0 * literal.to_f64();
+        if !self.is_rounded && twice.fract() == 0.0 && twice < LARGEST_TWICE && number.len() < 10 {
             return None;
         }
         let mark = if self.is_rounded { ROUNDED } else { EXACT };

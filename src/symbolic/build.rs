@@ -4,6 +4,7 @@ use super::node::{ExprId, Node};
 use super::number::Number;
 use super::order::Exponent;
 use super::pool::ExprPool;
+use super::power::half_integer;
 
 /// Passes over operands that become flat only after collecting (each pass removes a level, so
 /// two or three suffice in practice; the bound keeps termination obvious).
@@ -36,6 +37,10 @@ impl ExprPool {
 
     /// A constant from a [`Number`].
     pub fn constant(&mut self, number: Number) -> ExprId {
+        let number = match self.is_exact() {
+            true => half_integer(number),
+            false => number,
+        };
         self.intern(Node::Number(number))
     }
 
@@ -64,7 +69,7 @@ impl ExprPool {
     pub fn div(&mut self, a: ExprId, b: ExprId) -> ExprId {
         if let Some(divisor) = self.as_number(b) {
             let (coefficient, rest) = self.split(a);
-            if let Some(quotient) = coefficient.checked_div(divisor) {
+            if let Some(quotient) = self.folded(coefficient.checked_div(divisor)) {
                 return self.scale(quotient, rest);
             }
         }
@@ -88,7 +93,7 @@ impl ExprPool {
     pub(super) fn sum_of_terms(&mut self, terms: Vec<(Number, ExprId)>) -> ExprId {
         let mut terms = terms;
         for _ in 0..MAX_PASSES {
-            terms = collect(terms);
+            terms = collect(terms, |a, b| self.folded(a.checked_add(b)));
             // Collecting may leave `1 * (a + b)`, which belongs into this sum.
             let nested = |&(coefficient, rest): &(Number, ExprId)| {
                 coefficient.abs().is_one() && matches!(self.node(rest), Node::Sum(_))
@@ -131,7 +136,7 @@ impl ExprPool {
             return expr;
         }
         let (inner, rest) = self.split(expr);
-        let Some(coefficient) = coefficient.checked_mul(inner) else {
+        let Some(coefficient) = self.folded(coefficient.checked_mul(inner)) else {
             let factor = self.constant(coefficient);
             return self.product(&[factor, expr]);
         };
@@ -190,7 +195,7 @@ impl ExprPool {
                     && !self.starts_negative(other)
                     && !self.is_unfolded(other)
                     && let (inner, _) = self.split(other)
-                    && number.checked_mul(inner).is_some()
+                    && self.folded(number.checked_mul(inner)).is_some()
                 {
                     return self.scale(number, other);
                 }
@@ -292,7 +297,8 @@ impl ExprPool {
     fn assemble_product(&mut self, numbers: Vec<Number>, mut factors: Vec<ExprId>) -> ExprId {
         let is_negative = numbers.iter().filter(|n| n.is_negative()).count() % 2 == 1;
         let magnitudes = numbers.into_iter().map(Number::abs).collect();
-        let mut numbers = fold(magnitudes, Number::checked_mul, |n| n.to_f64() < 1.0);
+        let product = |a: Number, b| self.folded(a.checked_mul(b));
+        let mut numbers = fold(magnitudes, product, |n| n.to_f64() < 1.0);
         if numbers.iter().any(|number| number.is_zero()) {
             return ExprId::ZERO;
         }
@@ -322,7 +328,10 @@ impl ExprPool {
 }
 
 /// Adds the coefficients of equal rests and drops what cancels.
-fn collect(mut terms: Vec<(Number, ExprId)>) -> Vec<(Number, ExprId)> {
+fn collect(
+    mut terms: Vec<(Number, ExprId)>,
+    add: impl Fn(Number, Number) -> Option<Number>,
+) -> Vec<(Number, ExprId)> {
     terms.sort_by_key(|(_, rest)| *rest);
     let mut collected = Vec::with_capacity(terms.len());
     for group in terms.chunk_by(|a, b| a.1 == b.1) {
@@ -331,7 +340,7 @@ fn collect(mut terms: Vec<(Number, ExprId)>) -> Vec<(Number, ExprId)> {
             _ => {
                 let rest = group[0].1;
                 let numbers = group.iter().map(|(coefficient, _)| *coefficient).collect();
-                let sums = fold(numbers, Number::checked_add, Number::is_negative);
+                let sums = fold(numbers, &add, Number::is_negative);
                 collected.extend(sums.into_iter().map(|sum| (sum, rest)));
             }
         }

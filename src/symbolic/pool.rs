@@ -34,6 +34,8 @@ pub struct ExprPool {
     table: InternTable,
     symbols: Vec<Symbol>,
     symbol_ids: HashMap<String, SymbolId>,
+    /// See [`ExprPool::exact`].
+    is_exact: bool,
     /// Derivatives found so far; expressions never change, so entries stay valid.
     pub(super) derivatives: HashMap<(ExprId, SymbolId), ExprId, BuildIdHasher>,
 }
@@ -82,12 +84,47 @@ impl ExprPool {
             table: InternTable::new(),
             symbols: Vec::new(),
             symbol_ids: HashMap::new(),
+            is_exact: false,
             derivatives: HashMap::default(),
         };
         let zero = pool.intern(Node::Number(Number::ZERO));
         let one = pool.intern(Node::Number(Number::ONE));
         debug_assert_eq!((zero, one), (ExprId::ZERO, ExprId::ONE));
         pool
+    }
+
+    /// An empty pool that folds numbers only where the result is exact, so that equal expressions are
+    /// equal to the last digit: `10^20 + 1` stays a sum.
+    pub fn exact() -> ExprPool {
+        ExprPool {
+            is_exact: true,
+            ..ExprPool::new()
+        }
+    }
+
+    /// Whether this is an [`ExprPool::exact`] pool.
+    pub(super) fn is_exact(&self) -> bool {
+        self.is_exact
+    }
+
+    /// A folded number, if this pool takes it.
+    pub(super) fn folded(&self, number: Option<Number>) -> Option<Number> {
+        number.filter(|number| number.is_exact() || !self.is_exact)
+    }
+
+    /// Every logarithm, root and power that is not an integer which was made so far, whether it is
+    /// left in an expression or not: what was read has values only where all of them have.
+    pub fn restrictions(&self) -> Vec<ExprId> {
+        let all = (0..self.nodes.len() as u32).map(ExprId);
+        let is_restriction = |expr: &ExprId| match self.node(*expr) {
+            Node::Apply(Function::Log | Function::Sqrt, _) => true,
+            Node::Power(_, exponent) => {
+                let number = self.as_number(*exponent);
+                number.is_none_or(|number| number.as_integer().is_none())
+            }
+            _ => false,
+        };
+        all.filter(is_restriction).collect()
     }
 
     /// The number of distinct expressions made so far.

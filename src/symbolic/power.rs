@@ -41,7 +41,7 @@ impl ExprPool {
         let (inner, inner_exponent) = self.base_and_exponent(base);
         match (inner_exponent, self.node(base)) {
             (Exponent::Number(m), _) if !m.is_one() => {
-                if let Some(combined) = m.checked_mul(exponent) {
+                if let Some(combined) = self.folded(m.checked_mul(exponent)) {
                     // (x^2)^(1/2) = |x|: only even integers lose the sign of the base.
                     let inner = if m.is_even() && !is_integer {
                         self.apply(Function::Abs, inner)
@@ -120,7 +120,7 @@ impl ExprPool {
                 return self.raw_power(base, exponent);
             }
         };
-        match exact_power(coefficient, exponent) {
+        match self.folded(exact_power(coefficient, exponent)) {
             Some(outside) => {
                 let rest = self.pow_number(rest, exponent);
                 self.scale(outside, rest)
@@ -168,7 +168,7 @@ impl ExprPool {
             return ExprId::ZERO;
         }
         if let Some(integer) = exponent.as_integer() {
-            if let Some(value) = base.checked_powi(integer) {
+            if let Some(value) = self.folded(base.checked_powi(integer)) {
                 return self.constant(value);
             }
             // Only a positive base is left under a power: (-x)^n = +-(x^n).
@@ -180,7 +180,7 @@ impl ExprPool {
                 power
             };
         }
-        if let Some(value) = exact_power(base, exponent) {
+        if let Some(value) = self.folded(exact_power(base, exponent)) {
             return self.constant(value);
         }
         if base.is_exact()
@@ -202,14 +202,14 @@ impl ExprPool {
         numerator: i64,
         denominator: i64,
     ) -> Option<ExprId> {
-        let outside = base.checked_powi(numerator.div_euclid(denominator))?;
+        let outside = self.folded(base.checked_powi(numerator.div_euclid(denominator)))?;
         let fraction = Number::rational(numerator.rem_euclid(denominator), denominator)?;
         let (factor, radicand) = if denominator == 2 {
             square_free(base)?
         } else {
             (Number::ONE, base)
         };
-        let outside = outside.checked_mul(factor)?;
+        let outside = self.folded(outside.checked_mul(factor))?;
         let radicand = self.constant(radicand);
         let root = self.raw_power(radicand, fraction);
         Some(self.scale(outside, root))
@@ -280,7 +280,7 @@ impl ExprPool {
 }
 
 /// Floats that are multiples of a half become exact, so that `x^0.5` is `sqrt(x)`.
-fn half_integer(exponent: Number) -> Number {
+pub(super) fn half_integer(exponent: Number) -> Number {
     let twice = exponent.to_f64() * 2.0;
     match Number::from_f64(twice).and_then(Number::as_integer) {
         Some(halves) if !exponent.is_exact() => Number::rational(halves, 2).unwrap_or(exponent),

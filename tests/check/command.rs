@@ -153,3 +153,36 @@ fn papers_become_models() {
     );
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stdout));
 }
+
+#[test]
+fn numbers_beyond_floats_are_told_apart_and_equal_ones_proven() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let verdict = |a: &str, b: &str| {
+        for (name, side) in [("a.txt", a), ("b.txt", b)] {
+            fs::write(folder.join(name), format!("ddz1 = {side}\nddz2 = 0\n")).expect("written");
+        }
+        check(folder, &["a.txt", "b.txt"]).status.code()
+    };
+    for (a, b) in [
+        ("(10*z1)^20 + z1^20", "(10*z1)^20"),
+        ("7^25*z1 + z1", "7^25*z1"),
+        ("123456789*987654321*100*z1 + z1", "123456789*987654321*100*z1"),
+        ("1e17*z1 + z1 - 1e17*z1", "0"),
+        ("1.5^0.5*z1", "1.224744871391589*z1"),
+        ("2.5^30", "867361737988.4036"),
+        ("exp(1e16 + 1)*z1", "exp(1e16)*z1"),
+        ("1/(z1 + 1e17)", "1/(z1 + 1e17 + 1)"),
+    ] {
+        assert_eq!(verdict(a, b), Some(1), "{a} and {b}");
+    }
+    for (a, b) in [
+        ("2^100", "1267650600228229401496703205376"),
+        ("z1/3^41", "z1/36472996377170786403"),
+        ("abs(z1)", "exp(log(z1))"),
+        ("abs(z1)", "sqrt(z1)^2"),
+        ("0.5*z1^1.5 + 2.5^2", "z1*sqrt(z1)/2 + 25/4"),
+    ] {
+        assert_eq!(verdict(a, b), Some(0), "{a} and {b}");
+    }
+}

@@ -144,6 +144,9 @@ impl Reader<'_> {
                     after_slash = false;
                 }
                 Some(Kind::Character('/')) => {
+                    if matches!(last, Last::Bare | Last::BareNumber) {
+                        return self.unexpected(BARE);
+                    }
                     self.at += 1;
                     self.push(place, "/");
                     let divisor = self.factor(false)?;
@@ -164,6 +167,11 @@ impl Reader<'_> {
                                 "an operator before the number, or braces around a subscript",
                             );
                         }
+                        _ if self.is_lone_integer() => {
+                            return self.unexpected(
+                                "`\\tag{...}` for the number of an equation, or `\\cdot` before a factor",
+                            );
+                        }
                         _ => {}
                     }
                     self.push(place, "*");
@@ -172,6 +180,16 @@ impl Reader<'_> {
                 _ => return Ok(()),
             }
         }
+    }
+
+    /// Whether an integer alone in parentheses follows, as equations are numbered by hand.
+    fn is_lone_integer(&self) -> bool {
+        let is_one_of = |at: usize, all: &str| matches!(self.kind(at), Some(Kind::Character(c)) if all.contains(*c));
+        let is_integer = |at: usize| match self.kind(at) {
+            Some(Kind::Number(text)) => text.bytes().all(|byte| byte.is_ascii_digit()),
+            _ => false,
+        };
+        is_one_of(self.at, "([") && is_integer(self.at + 1) && is_one_of(self.at + 2, ")]")
     }
 
     pub(super) fn signs(&mut self) {
@@ -253,7 +271,10 @@ impl Reader<'_> {
             }
             Kind::Character('(' | '[') => self.parentheses(place),
             Kind::Command(name) if name == "left" || name == "{" => self.parentheses(place),
-            Kind::Character('e') if self.kind(self.at + 1) == Some(&Kind::Superscript) => {
+            Kind::Character('e')
+                if self.kind(self.at + 1) == Some(&Kind::Superscript)
+                    && self.names.variable("e", self.alone).is_none() =>
+            {
                 self.at += 2;
                 self.exponential(place)
             }
@@ -427,6 +448,13 @@ impl Reader<'_> {
             return Ok(());
         }
         self.at += 1;
+        if self.kind(self.at) == Some(&Kind::Open) {
+            self.at += 1;
+            if self.is_lone_integer() {
+                return self.unexpected("a power without parentheses; derivatives are written with dots");
+            }
+            self.at -= 1;
+        }
         self.push(place, "^(");
         self.inside(|reader| reader.sum(false))?;
         self.push(place, ")");

@@ -180,11 +180,13 @@ impl<'a> Reader<'a> {
             Some(token) => (token.line, token.column, token.quoted()),
             None => {
                 let last = self.tokens[..self.end].last();
-                let found = match self.tokens.get(self.end) {
-                    Some(next) => next.quoted(),
-                    None => "the end of the equation".to_owned(),
-                };
-                last.map_or((1, 1, found.clone()), |t| (t.line, t.column, found))
+                match self.tokens.get(self.end) {
+                    Some(next) => (next.line, next.column, next.quoted()),
+                    None => {
+                        let (line, column) = last.map_or((1, 1), |last| (last.line, last.column));
+                        (line, column, "the end of the equation".to_owned())
+                    }
+                }
             }
         };
         Err(refused(self.file, line, column, found, expected))

@@ -2,7 +2,7 @@
 
 use super::super::equations::refused;
 use super::names::is_greek;
-use super::reader::{FONTS, INVISIBLE, Last, Read, Reader, Symbol, has};
+use super::reader::{BARE, FONTS, INVISIBLE, Last, Read, Reader, Symbol, has};
 use super::token::Kind;
 use crate::model::LatentVariable;
 
@@ -92,9 +92,18 @@ impl Reader<'_> {
             Some(Kind::Command(opener)) if opener == "left" && !self.opens_bar() => {
                 self.delimited(argument).map(|()| Last::Other)?
             }
-            Some(Kind::Open) => self
-                .inside(|reader| reader.sum(false))
-                .map(|()| Last::Other)?,
+            // Braces do not print: a sum or a power of what is in them would read otherwise without.
+            Some(Kind::Open) => {
+                let last = self.inside(|reader| match reader.peek().map(|token| &token.kind) {
+                    Some(Kind::Character('(' | '[')) => reader.factor(false),
+                    _ => reader.bare_argument(),
+                })?;
+                let next = self.peek().map(|token| &token.kind);
+                if last != Last::Other && next == Some(&Kind::Superscript) {
+                    return self.unexpected(BARE);
+                }
+                Last::Other
+            }
             _ => self.bare_argument()?,
         };
         let argument = self.pieces.split_off(before);

@@ -23,17 +23,19 @@ pub struct CanonicalForms<'p> {
     pub(super) atoms: Vec<Atom>,
     pub(super) numbers: HashMap<Atom, u32>,
     pub(super) forms: HashMap<ExprId, CanonicalForm>,
-    /// Arguments so far, with their radii.
-    pub(super) arguments: Vec<CanonicalForm>,
-    pub(super) known: HashSet<CanonicalForm>,
+    arguments: Vec<Argument>,
+    known: HashSet<CanonicalForm>,
     /// Atoms that are positive wherever all given expressions are defined.
     pub(super) positive: HashSet<u32>,
     rounding: f64,
+    /// Whether any argument has radii.
+    is_rounded: bool,
+    is_contradictory: bool,
 }
 
 impl<'p> CanonicalForms<'p> {
-    /// Forms of `exprs` and their parts. Where they are compared they all have values: what stands
-    /// under a logarithm or root of one of them is taken as positive in the others too.
+    /// Forms of expressions that are compared where all of `exprs` have values: what stands under a
+    /// logarithm or root of one of these is taken as positive in all others.
     ///
     /// `literal` gives the symbols that stand for decimals.
     pub fn new(
@@ -51,6 +53,8 @@ impl<'p> CanonicalForms<'p> {
             known: HashSet::new(),
             positive: HashSet::new(),
             rounding: 0.0,
+            is_rounded: false,
+            is_contradictory: false,
         };
         let mut guarded = Vec::new();
         for expr in pool.reachable(exprs) {
@@ -75,6 +79,12 @@ impl<'p> CanonicalForms<'p> {
         }
         forms.rounding = 0.0;
         forms
+    }
+
+    /// Whether no numbers round to all decimals whose arguments were taken for each other: equal forms
+    /// prove nothing then.
+    pub fn is_contradictory(&self) -> bool {
+        self.is_contradictory
     }
 
     /// Largest difference between arguments of functions that only rounding of decimals explains.
@@ -107,14 +117,8 @@ impl<'p> CanonicalForms<'p> {
                 .keys()
                 .flat_map(|monomial| &monomial.powers)
                 .map(|(atom, _)| *atom);
-            let removable = |atom: &u32| {
-                matches!(
-                    self.atoms[*atom as usize],
-                    Atom::Sum(_) | Atom::Tan(_) | Atom::Tanh(_)
-                )
-            };
             // An atom is made after those in its argument.
-            let Some(atom) = numbers.filter(removable).max() else {
+            let Some(atom) = numbers.filter(|atom| self.is_removable(*atom)).max() else {
                 return Some(form);
             };
             form = self.removed(&form, atom)?;
@@ -156,14 +160,11 @@ impl<'p> CanonicalForms<'p> {
         sum.is_small().then_some(sum)
     }
 
-    pub(super) fn is_integer(&self, expr: ExprId) -> bool {
-        match self.pool.node(expr) {
-            Node::Number(number) => number.as_integer().is_some(),
-            Node::Symbol(symbol) => {
-                (self.literal)(*symbol).is_some_and(|literal| literal.value.is_integer())
-            }
-            _ => false,
-        }
+    /// Whether an exponent is an integer, such as `6/3`.
+    fn is_integer(&mut self, expr: ExprId) -> bool {
+        let value = self.of(expr).as_constant();
+        let real = value.as_ref().and_then(Coefficient::as_real);
+        real.is_some_and(Rational::is_integer)
     }
 
     pub(super) fn atom(&mut self, atom: Atom) -> CanonicalForm {
@@ -285,27 +286,89 @@ impl<'p> CanonicalForms<'p> {
         Some(self.atom(atom(argument)).scaled(&sign))
     }
 
-    /// An argument of a function without its radii: one from before that agrees within them.
+    /// An argument of a function without its radii: one from before, if there are numbers that round
+    /// to the decimals of both and of all others that were taken for it.
     pub(super) fn argument(&mut self, form: CanonicalForm) -> CanonicalForm {
         let exact = form.exact();
-        if self.known.contains(&exact) {
+        self.is_rounded |= form.has_radius();
+        if self.is_rounded {
+            for known in &mut self.arguments {
+                if let Some(largest) = known.take(&form) {
+                    self.rounding = self.rounding.max(largest);
+                    return known.form.exact();
+                }
+            }
+        } else if self.known.contains(&exact) {
             return exact;
         }
-        let known = self.arguments.iter().find(|known| {
-            (form.has_radius() || known.has_radius()) && form.minus(known).may_be_zero()
-        });
-        if let Some(known) = known {
-            let differences = form.minus(known);
-            let largest = differences
-                .coefficients()
-                .map(Coefficient::magnitude)
-                .fold(0.0, f64::max);
-            self.rounding = self.rounding.max(largest);
-            return known.exact();
+        if let Some(known) = self.equal_fraction(&exact) {
+            return known;
         }
+        // The same digits with fewer numbers left for them than another argument took away.
+        self.is_contradictory |= self.known.contains(&exact);
         self.known.insert(exact.clone());
-        self.arguments.push(form);
+        self.arguments.push(Argument {
+            form,
+            room: HashMap::new(),
+        });
         exact
+    }
+
+    /// An argument that is the same once fractions are removed.
+    fn equal_fraction(&mut self, exact: &CanonicalForm) -> Option<CanonicalForm> {
+        let has_fraction = self.has_fraction(exact);
+        let known: Vec<CanonicalForm> = (self.arguments.iter().map(|known| &known.form))
+            .filter(|known| has_fraction || self.has_fraction(known))
+            .map(CanonicalForm::exact)
+            .collect();
+        known.into_iter().find(|known| {
+            let difference = self.without_fractions(&exact.minus(known));
+            difference.is_some_and(|difference| difference.is_zero())
+        })
+    }
+
+    fn has_fraction(&self, form: &CanonicalForm) -> bool {
+        let mut atoms = form.terms.keys().flat_map(|monomial| &monomial.powers);
+        atoms.any(|(atom, _)| self.is_removable(*atom))
+    }
+
+    fn is_removable(&self, atom: u32) -> bool {
+        let atom = &self.atoms[atom as usize];
+        matches!(atom, Atom::Sum(_) | Atom::Tan(_) | Atom::Tanh(_))
+    }
+}
+
+/// An argument of a function, and the numbers that its coefficients may still stand for.
+pub(super) struct Argument {
+    form: CanonicalForm,
+    /// Bounds of each coefficient's distance from the one of `form`, where they are narrower than its
+    /// radius.
+    room: HashMap<Monomial, (f64, f64)>,
+}
+
+impl Argument {
+    /// Takes another form for this one if their numbers can be the same, and narrows them to those; the
+    /// largest distance of their coefficients.
+    fn take(&mut self, other: &CanonicalForm) -> Option<f64> {
+        let radius = |form: &CanonicalForm, monomial: &Monomial| {
+            form.terms.get(monomial).map_or(0.0, |c| c.radius)
+        };
+        let mut room = self.room.clone();
+        let mut largest = 0.0_f64;
+        for (monomial, difference) in &other.minus(&self.form).terms {
+            let (own, its) = (radius(&self.form, monomial), radius(other, monomial));
+            let slack = 1e-9 * (own + its);
+            let distance = difference.re.to_f64();
+            let (low, high) = room.get(monomial).copied().unwrap_or((-own, own));
+            let (low, high) = (low.max(distance - its), high.min(distance + its));
+            if low > high + slack || difference.im.to_f64().abs() > own + its + slack {
+                return None;
+            }
+            largest = largest.max(difference.magnitude());
+            room.insert(monomial.clone(), (low.min(high), high.max(low)));
+        }
+        self.room = room;
+        Some(largest)
     }
 }
 

@@ -33,6 +33,7 @@ mod polynomial;
 mod products;
 mod rational;
 mod roots;
+mod squares;
 
 #[cfg(test)]
 mod tests;

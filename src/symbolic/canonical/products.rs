@@ -72,6 +72,19 @@ impl CanonicalForms<'_> {
                     if rest != power {
                         return Some(Some((with_power(rest), self.power(&base, power - rest)?)));
                     }
+                    let shared = base.as_atom().or_else(|| {
+                        // A sum to a negative power has leading coefficient one.
+                        let factor = base.leading()?.reciprocal()?;
+                        let monic = Atom::Sum(base.scaled(&factor));
+                        let number = self.numbers.get(&monic).copied();
+                        number.filter(|_| factor.is_one())
+                    });
+                    let shared = shared.filter(|shared| monomial.power_of(*shared) < 0);
+                    if let Some(shared) = shared {
+                        // |x| / x = sign(x).
+                        let rest = monomial.without(atom).times(&Monomial::atom(shared, 1));
+                        return Some(Some((rest, self.atom(Atom::Sign(base)))));
+                    }
                     let sign = self.numbers.get(&Atom::Sign(base.clone())).copied();
                     let sign = sign.map_or((0, 0), |sign| (sign, monomial.power_of(sign)));
                     if sign.1 > 0 {
@@ -91,10 +104,12 @@ impl CanonicalForms<'_> {
                 Atom::Sign(base) => {
                     let shared = base.as_atom().filter(|base| monomial.power_of(*base) != 0);
                     if let Some(shared) = shared {
-                        // x sign(x) = |x|, x sign(x)^2 = x.
+                        // x sign(x) = |x|, x sign(x)^2 = x, sign(x)/x as it is.
                         let rest = monomial.without(atom);
+                        let is_over = monomial.power_of(shared) > 0;
                         return Some(Some(match power {
                             2 => (rest, CanonicalForm::constant(Coefficient::integer(1))),
+                            _ if !is_over => continue,
                             _ => (
                                 rest.times(&Monomial::atom(shared, -1)),
                                 self.atom(Atom::Abs(base)),

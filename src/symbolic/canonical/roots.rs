@@ -28,6 +28,13 @@ impl CanonicalForms<'_> {
                 }
                 return Some(split);
             }
+            if let Some((scale, root)) = self.square_root(&form) {
+                return Some(Split {
+                    scale,
+                    factors: vec![(self.abs(&root)?, 2)],
+                    exponent: CanonicalForm::default(),
+                });
+            }
             let factors = vec![(form.scaled(&inverse), 1)];
             return Some(Split {
                 scale,
@@ -48,7 +55,15 @@ impl CanonicalForms<'_> {
             [] if sign.is_one() => {}
             [] => return None,
             [(atom, power)] => {
-                factors.push((CanonicalForm::term(sign, Monomial::atom(atom, 1)), power))
+                let base = match &self.atoms[atom as usize] {
+                    Atom::Sum(sum) => sum.scaled(&sign),
+                    _ => CanonicalForm::term(sign, Monomial::atom(atom, 1)),
+                };
+                factors.push((base, power));
+            }
+            // Of a product and its reciprocal one is kept, so that they are known to be powers of each other.
+            [(_, power), ..] if power < 0 => {
+                factors.push((self.settled(vec![(sign, rest.reciprocal())])?, -1));
             }
             _ => factors.push((CanonicalForm::term(sign, rest), 1)),
         }
@@ -75,9 +90,10 @@ impl CanonicalForms<'_> {
     /// The magnitude of an atom: itself if it is positive.
     fn magnitude_of(&mut self, atom: u32) -> Option<CanonicalForm> {
         let base = CanonicalForm::term(Coefficient::integer(1), Monomial::atom(atom, 1));
-        match self.is_positive(atom) {
-            true => Some(base),
-            false => self.abs(&base),
+        match self.atoms[atom as usize].clone() {
+            _ if self.is_positive(atom) => Some(base),
+            Atom::Sum(sum) => self.abs(&sum),
+            _ => Some(self.atom(Atom::Abs(base))),
         }
     }
 
@@ -228,7 +244,7 @@ impl CanonicalForms<'_> {
             let factor = match self.is_positive(atom) || power % 2 == 0 {
                 true => self.power(&base, power)?,
                 false => {
-                    let magnitude = self.atom(Atom::Abs(base));
+                    let magnitude = self.magnitude_of(atom)?;
                     self.power(&magnitude, power)?
                 }
             };
@@ -250,26 +266,35 @@ impl CanonicalForms<'_> {
         }
         let size = Coefficient::real(leading.size(), 0.0).reciprocal()?;
         let normed = form.scaled(&size).scaled(&sign);
-        let is_symbol = |atom: &u32| matches!(self.atoms[*atom as usize], Atom::Symbol(_));
-        let factors: Option<Vec<(u32, i32)>> =
-            normed.as_term().and_then(|(coefficient, monomial)| {
-                let symbols = monomial.powers.iter().all(|(atom, _)| is_symbol(atom));
-                (coefficient.is_one() && symbols).then(|| monomial.powers.clone())
-            });
-        let Some(factors) = factors else {
+        let powers = (normed.as_term())
+            .filter(|(coefficient, _)| coefficient.is_one())
+            .map(|(_, monomial)| monomial.powers.clone());
+        let Some(powers) = powers.filter(|powers| self.have_signs(powers)) else {
             return Some(self.atom(Atom::Sign(normed)).scaled(&sign));
         };
         let mut product = CanonicalForm::constant(sign);
-        for (atom, power) in factors {
+        for (atom, power) in powers {
             if self.positive.contains(&atom) {
                 continue;
             }
             let base = CanonicalForm::term(Coefficient::integer(1), Monomial::atom(atom, 1));
-            let factor = self.atom(Atom::Sign(base));
+            let (factor, power) = match self.atoms[atom as usize].clone() {
+                Atom::Sum(sum) => (self.sign(&sum)?, power),
+                Atom::Abs(inner) => (self.sign(&inner)?, 2),
+                _ => (self.atom(Atom::Sign(base)), power),
+            };
             let factor = self.power(&factor, 2 - (power.abs() % 2))?;
             product = self.product(&product, &factor)?;
         }
         Some(product)
+    }
+
+    /// Whether each factor has a sign that can be told from that of the others.
+    fn have_signs(&self, powers: &[(u32, i32)]) -> bool {
+        powers.iter().all(|(atom, _)| {
+            let atom = &self.atoms[*atom as usize];
+            matches!(atom, Atom::Symbol(_) | Atom::Sum(_) | Atom::Abs(_))
+        })
     }
 }
 

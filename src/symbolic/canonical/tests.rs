@@ -67,3 +67,38 @@ fn large_powers_stay_whole_and_equal_to_themselves() {
     );
     assert!(!difference("(x + y + z)^900", "(x + y)^900").0.may_be_zero());
 }
+
+#[test]
+fn squares_under_roots_and_fractions_in_arguments_are_recognised() {
+    for (a, b) in [
+        ("sqrt(1 - sin(x)^2)", "abs(cos(x))"),
+        ("sqrt(3*x^2 - 6*x*y + 3*y^2)", "sqrt(3)*abs(x - y)"),
+        ("sqrt(1 + cos(2*x))", "sqrt(2)*abs(cos(x))"),
+        ("log((x + y)^2)", "2*log(abs(x + y))"),
+        ("abs(x)/x", "sign(x)"),
+        ("abs(x + y)/(x + y)", "sign(x + y)"),
+        ("abs(1/cos(x))", "1/abs(cos(x))"),
+        ("sign(1/cos(x))", "sign(cos(x))"),
+        ("1/sqrt(1/(x*y))", "sqrt(x*y)"),
+        ("sin((x^2 - 1)/(x - 1))", "sin(x + 1)"),
+        ("exp(tan(x)*cos(x))", "exp(sin(x))"),
+    ] {
+        assert!(difference(a, b).0.is_zero(), "{a} and {b}");
+    }
+    for (a, b) in [
+        ("sqrt(1 + sin(x)^2)", "abs(cos(x))"),
+        ("sqrt(x^2 - 2*x*y + 2*y^2)", "abs(x - y)"),
+        ("abs(x)/x^2", "sign(x)"),
+        ("sign(x)/x", "abs(x)"),
+        ("sin((x^2 - 1)/(x + 2))", "sin(x + 1)"),
+    ] {
+        assert!(!difference(a, b).0.may_be_zero(), "{a} and {b}");
+    }
+}
+
+#[test]
+fn rounded_arguments_are_equal_only_if_one_number_rounds_to_all_of_them() {
+    let agree = |a, b| difference(a, b).0.may_be_zero();
+    assert!(agree("~sin(0.36*x)", "~sin(0.37*x)"));
+    assert!(!agree("~2*sin(0.37*x)", "~sin(0.36*x) + sin(0.38*x)"));
+}

@@ -1,0 +1,99 @@
+//! Sums that are squares.
+
+use std::collections::BTreeMap;
+
+use super::coefficient::Coefficient;
+use super::forms::CanonicalForms;
+use super::polynomial::{CanonicalForm, Monomial};
+use super::rational::Rational;
+
+/// Most terms of a sum whose root is looked for.
+const MAX_TERMS: usize = 100;
+
+impl CanonicalForms<'_> {
+    /// `(scale, q)` with `form = scale * q^2` and a positive scale, if there is such a sum `q`; `form` is
+    /// real. The terms of `q` follow one after the other, largest first, in an order that products keep.
+    pub(super) fn square_root(
+        &mut self,
+        form: &CanonicalForm,
+    ) -> Option<(Rational, CanonicalForm)> {
+        if form.terms.len() > MAX_TERMS {
+            return None;
+        }
+        let order = Order::of(form);
+        let (largest, leading) = order.largest(form)?;
+        let leading = leading.as_real()?.clone();
+        let monic = form.scaled(&Coefficient::real(leading.recip(), 0.0));
+        let first = halved(&largest)?;
+        let mut root = CanonicalForm::term(Coefficient::integer(1), first.clone());
+        let mut last = order.weight(&first);
+        for _ in 0..form.terms.len() {
+            let square = self.product(&root, &root)?;
+            let rest = monic.minus(&square);
+            let Some((monomial, coefficient)) = order.largest(&rest) else {
+                let imaginary = Coefficient::imaginary(1, 1);
+                return Some(match leading.is_negative() {
+                    true => (leading.abs(), root.scaled(&imaginary)),
+                    false => (leading, root),
+                });
+            };
+            let next = monomial.times(&first.reciprocal());
+            let weight = order.weight(&next);
+            if weight >= last {
+                return None;
+            }
+            last = weight;
+            let half = Coefficient::complex(Rational::new(1, 2), Rational::zero());
+            root.add(coefficient.times(&half), next);
+        }
+        None
+    }
+}
+
+/// The monomial whose square this is, if powers are even.
+fn halved(monomial: &Monomial) -> Option<Monomial> {
+    let half = Rational::new(1, 2);
+    let powers = monomial.powers.iter();
+    let powers: Option<Vec<_>> = powers
+        .map(|&(atom, power)| (power % 2 == 0).then_some((atom, power / 2)))
+        .collect();
+    let exponent = monomial.exponent.iter();
+    let exponent = exponent.map(|(of, (re, im))| (of.clone(), (re * &half, im * &half)));
+    Some(Monomial {
+        powers: powers?,
+        exponent: exponent.collect(),
+    })
+}
+
+/// An order of monomials: by a sum of their powers and exponents with weights that have no simple ratio.
+struct Order {
+    exponents: BTreeMap<Monomial, f64>,
+}
+
+impl Order {
+    fn of(form: &CanonicalForm) -> Self {
+        let all = form.terms.keys().flat_map(|monomial| &monomial.exponent);
+        let distinct: std::collections::BTreeSet<&Monomial> = all.map(|(of, _)| of).collect();
+        let weighted = (distinct.into_iter().enumerate())
+            .map(|(place, of)| (of.clone(), (place as f64 + 2.7).sqrt()));
+        Self {
+            exponents: weighted.collect(),
+        }
+    }
+
+    fn weight(&self, monomial: &Monomial) -> f64 {
+        let powers = monomial.powers.iter();
+        let powers = powers.map(|&(atom, power)| f64::from(power) * (f64::from(atom) + 3.1).ln());
+        let exponents = monomial.exponent.iter().map(|(of, (re, im))| {
+            let weight = self.exponents.get(of).copied().unwrap_or(1.0);
+            weight * (re.to_f64() + 1.618 * im.to_f64())
+        });
+        powers.chain(exponents).sum()
+    }
+
+    fn largest(&self, form: &CanonicalForm) -> Option<(Monomial, Coefficient)> {
+        let weighed = form.terms.iter().map(|term| (self.weight(term.0), term));
+        let largest = weighed.max_by(|a, b| a.0.total_cmp(&b.0))?.1;
+        Some((largest.0.clone(), largest.1.clone()))
+    }
+}
