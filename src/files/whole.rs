@@ -42,7 +42,15 @@ pub fn write_whole(
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         Some(_) | None => Path::new("."),
     });
-    let mut part = Part::beside(path)?;
+    // What is no file, such as /dev/null or a pipe, would be gone; a link stays, its file is replaced.
+    let place = match path.metadata() {
+        Ok(found) if !found.is_file() => {
+            return Err(io::Error::other("it is there and no regular file"));
+        }
+        Ok(_) => path.canonicalize()?,
+        Err(_) => path.to_owned(),
+    };
+    let mut part = Part::beside(&place)?;
     let mut file = BufWriter::new(&part.file);
     fill(&mut file)?;
     file.into_inner()?.sync_all()?;
@@ -54,6 +62,21 @@ mod tests {
     use std::fs;
 
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn write_whole_replaces_the_file_behind_a_link_and_nothing_that_is_no_file() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let [file, link, socket] = ["file", "link", "socket"].map(|name| folder.path().join(name));
+        fs::write(&file, "old").expect("written");
+        std::os::unix::fs::symlink(&file, &link).expect("linked");
+        write_whole(&link, |out| out.write_all(b"new")).expect("written");
+        assert_eq!(fs::read(&file).expect("readable"), b"new");
+        assert!(link.symlink_metadata().expect("there").is_symlink());
+        let _listener = std::os::unix::net::UnixListener::bind(&socket).expect("a socket");
+        assert!(write_whole(&socket, |out| out.write_all(b"new")).is_err());
+        assert!(!socket.metadata().expect("still there").is_file());
+    }
 
     #[test]
     fn write_whole_leaves_the_old_file_when_filling_fails() {

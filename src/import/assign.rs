@@ -60,14 +60,14 @@ pub(super) fn assign<'f>(
 }
 
 /// The tensors with names of parts that no option settles: `--map` settles all weights of a map at
-/// once, `--scaling` both kinds of factors.
+/// once, `--scaling` the factors. A `std` beside it is not settled: it is refused.
 fn named<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
     mapped: &[Assigned<'_>],
 ) -> Result<Vec<Assigned<'f>>, ImportError> {
     let is_settled = |role: &Role| match role {
-        Role::StateScaling | Role::InputScaling | Role::StateStd | Role::InputStd
+        Role::StateScaling | Role::InputScaling
             if options.scaling.is_some() =>
         {
             true

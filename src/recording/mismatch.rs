@@ -41,6 +41,11 @@ const OTHER_WEIGHT: (f64, f64) = (0.17, 0.1);
 /// How much worse feet may stay in place with the geometry of a robot that explains the weight.
 const OTHER_SLIP: f64 = 1.15;
 
+/// Distance from the origin, m, and turn about the vertical, rad, at which a segment may begin.
+const ORIGIN: (f64, f64) = (1.0, 0.5);
+/// Height of the feet that are on the ground, m.
+const FLOOR_M: f64 = 0.1;
+
 /// What does not fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MismatchKind {
@@ -60,6 +65,10 @@ pub enum MismatchKind {
     Accelerations,
     /// Another robot that romc knows fits better.
     OtherRobot,
+    /// A segment begins far from the origin, or turned from the x axis.
+    Origin,
+    /// Feet on the ground are not at height zero.
+    Floor,
 }
 
 impl MismatchKind {
@@ -74,6 +83,8 @@ impl MismatchKind {
             Self::HipTorques => "hip_torques",
             Self::Accelerations => "accelerations",
             Self::OtherRobot => "other_robot",
+            Self::Origin => "origin",
+            Self::Floor => "floor",
         }
     }
 }
@@ -110,6 +121,8 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
         hip_torques(&balance),
         accelerations(&balance),
         other_robot(recording, robot, &slip, &balance),
+        origin(recording),
+        floor(recording, robot),
     ];
     found.into_iter().flatten().collect()
 }
@@ -169,6 +182,48 @@ pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
         ));
     }
     notes
+}
+
+/// Encoders and decoders were learned from jumps that begin at the origin and run along x.
+fn origin(recording: &Recording) -> Option<Mismatch> {
+    let starts = recording.segments.iter().map(|segment| segment.state(0));
+    let of = |start: &[f64]| (start[12].abs().max(start[13].abs()), start[17].abs());
+    let (mut far, mut turned) = (0.0_f64, 0.0_f64);
+    for start in starts {
+        let (distance, yaw) = of(&start);
+        (far, turned) = (far.max(distance), turned.max(yaw));
+    }
+    let (kind, advice) = (MismatchKind::Origin, "models expect jumps that begin near the origin and run along x");
+    if far > ORIGIN.0 {
+        return Some(Mismatch {
+            kind,
+            value: far,
+            bound: ORIGIN.0,
+            words: format!(
+                "a segment begins {far:.2} m from the origin: {advice}; `origin = \"start\"` in a map of columns \
+                 counts x and y from the first sample"
+            ),
+        });
+    }
+    (turned > ORIGIN.1).then(|| Mismatch {
+        kind,
+        value: turned,
+        bound: ORIGIN.1,
+        words: format!("a segment begins turned by {turned:.2} rad about the vertical: {advice}"),
+    })
+}
+
+fn floor(recording: &Recording, robot: &Robot) -> Option<Mismatch> {
+    let value = feet::floor_m(recording, robot)?;
+    (value.abs() > FLOOR_M).then(|| Mismatch {
+        kind: MismatchKind::Floor,
+        value,
+        bound: FLOOR_M,
+        words: format!(
+            "feet on the ground are at a height of {value:.2} m ({FLOOR_M:.2} m are accepted): is z that of the trunk \
+             over the ground?"
+        ),
+    })
 }
 
 fn foot_slip(slip: &Slip) -> Option<Mismatch> {

@@ -13,6 +13,8 @@ use crate::robot::{BODY_DIM, ContactFlags, JOINT_DIM, STATE_DIM};
 /// A step this many times the one before it starts a new segment, as a jump
 /// back does: samples were left out between the two.
 const GAP_STEPS: f64 = 20.0;
+/// A first time beyond this is that of a clock that counts from an epoch: times count from it then.
+pub(super) const EPOCH_S: f64 = 1e7;
 /// Largest mean distance between samples: a jump lasts less than a second.
 const LARGEST_STEP_S: f64 = 0.1;
 
@@ -46,6 +48,8 @@ pub(super) struct SegmentBuilder<'a> {
     path: &'a Path,
     has_acceleration: bool,
     has_force: bool,
+    /// Time of the first sample if the clock counts from an epoch, else 0.
+    origin_s: Option<f64>,
     open: Open,
     segments: Vec<Segment>,
 }
@@ -57,13 +61,17 @@ impl<'a> SegmentBuilder<'a> {
             path,
             has_acceleration,
             has_force,
+            origin_s: None,
             open: Open::default(),
             segments: Vec::new(),
         }
     }
 
     pub fn push(&mut self, row: usize, sample: &Sample) -> Result<(), RecordingError> {
-        if begins_segment(&self.open.time_s, sample.time_s)
+        let is_clock = sample.time_s.abs() > EPOCH_S;
+        let first_s = if is_clock { sample.time_s } else { 0.0 };
+        let time_s = sample.time_s - *self.origin_s.get_or_insert(first_s);
+        if begins_segment(&self.open.time_s, time_s)
             .map_err(|fault| fault.in_cell(self.path, row, "Time"))?
         {
             self.close()?;
@@ -71,7 +79,7 @@ impl<'a> SegmentBuilder<'a> {
         if self.open.time_s.is_empty() {
             self.open.first_row = row;
         }
-        self.open.time_s.push(sample.time_s);
+        self.open.time_s.push(time_s);
         self.open.x.extend_from_slice(&sample.x);
         self.open.dx.extend_from_slice(&sample.dx);
         if self.has_acceleration {

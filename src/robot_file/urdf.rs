@@ -84,7 +84,17 @@ pub(super) fn entry(file: &str, text: &str, feet: &[String]) -> Result<RobotEntr
     let leg = leg.collect::<Result<_, _>>()?;
     let mass = root.descendants().filter(|node| node.has_tag_name("mass"));
     let mass: Result<Vec<f64>, _> = mass
-        .map(|node| number(file, node, "value", "a <mass>"))
+        .map(|node| {
+            let value = number(file, node, "value", "a <mass>")?;
+            let is_mass = value.is_finite() && value >= 0.0;
+            is_mass.then_some(value).ok_or_else(|| {
+                let of = (node.ancestors())
+                    .find(|above| above.has_tag_name("link"))
+                    .and_then(|link| link.attribute("name"))
+                    .map_or("a <mass>".to_owned(), |name| format!("<mass> of the link {name:?}"));
+                RobotFileError::at(file, of, value.to_string(), "a mass of 0 kg or more")
+            })
+        })
         .collect();
     Ok(RobotEntry {
         name: root.attribute("name").unwrap_or("robot").to_owned(),

@@ -634,6 +634,18 @@ fn wrong_maps_name_the_key_the_column_and_what_there_is() {
     assert!(text.contains("`x` twice"), "{text}");
     let text = fault("signs", "\"*.kn\" = -1", "\"*.kn\" = 2");
     assert!(text.contains("`joint.position.sign`: found 2"), "{text}");
+    for (columns, found) in [
+        ("\"13..9999999999\"", "`feet.columns`: found \"13..9999999999\", expected at most"),
+        ("[13, 14, 14, 15]", "`feet.columns`: found 14 twice"),
+    ] {
+        let text = fault("bare", "\"13..16\"", columns);
+        assert!(text.contains(found), "{text}");
+    }
+    let text = fault("signs", "offset = { \"*.hy\" = 0.3 }", "offset = nan");
+    assert!(
+        text.contains("`joint.position.offset`: found NaN, expected a finite number"),
+        "{text}"
+    );
     let text = fault("bare", "\"13..16\"", "\"13..15\"");
     assert!(
         text.contains("`feet.columns`: found 3 columns, expected 4"),

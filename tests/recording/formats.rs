@@ -188,3 +188,19 @@ fn written_recording_reads_back_equal() {
     recording::write(&path, &expected).unwrap();
     assert_eq!(recording::read(&path).unwrap(), expected);
 }
+
+#[test]
+fn clocks_that_count_from_an_epoch_count_from_the_first_sample() {
+    let mut sheet = Sheet::landing();
+    let place = sheet.place("Time");
+    for row in &mut sheet.rows[1..] {
+        let time: f64 = row[place].replace(',', ".").parse().expect("a number");
+        row[place] = format!("{:.6}", 1.7e9 + time).replace('.', ",");
+    }
+    let (read, right) = (sheet.read().unwrap(), landing());
+    let (read, right) = (&read.segments[0].time_s, &right.segments[0].time_s);
+    assert_eq!(read[0], 0.0);
+    for (read, right_s) in read.iter().zip(right) {
+        assert!((read - (right_s - right[0])).abs() < 1e-6);
+    }
+}

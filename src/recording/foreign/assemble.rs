@@ -14,14 +14,16 @@ use super::signal::{Signal, Taker};
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::preprocess::differences;
 use crate::recording::segment::Recording;
-use crate::recording::segments::{Sample, SegmentBuilder, begins_segment};
+use crate::recording::segments::{EPOCH_S, Sample, SegmentBuilder, begins_segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM};
 
 /// Largest distance between samples of a topic that is interpolated, in s.
 const MAX_GAP_S: f64 = 0.05;
-/// Seconds beyond which a clock counts from an epoch, and a recording from its first sample.
-const EPOCH_S: f64 = 1e8;
+/// How far the length of a quaternion may be from one.
+const QUATERNION_TOLERANCE: f64 = 0.05;
+/// Most samples of a recording that is resampled.
+const MAX_RESAMPLED: usize = 10_000_000;
 
 /// A recording made of a log, and what was done besides copying.
 #[derive(Debug, Clone)]
@@ -55,7 +57,7 @@ pub(in crate::recording) fn assemble(
         }
     }
     let mut notes = Vec::new();
-    signals.angles(&mut notes);
+    signals.angles(path, &mut notes)?;
     signals.contacts(map, logs, path)?;
     let base = signals.base();
     let (mut times_s, first_row) = (base.times_s.clone(), base.first_row);
@@ -114,15 +116,28 @@ impl Signals {
     }
 
     /// Quaternions become angles, and angles do not jump by whole turns.
-    fn angles(&mut self, notes: &mut Vec<String>) {
+    ///
+    /// # Errors
+    /// [`RecordingFault::Number`] for a quaternion whose length is far from one.
+    fn angles(&mut self, path: &Path, notes: &mut Vec<String>) -> Result<(), RecordingError> {
         let signal = self.get_mut(Quantity::Orientation);
         let signal = signal.expect("a map has the orientation");
         if signal.values.nrows() == QUATERNION.len() {
+            let norms = signal.values.column_iter().map(|q| q.norm());
+            for (sample, norm) in norms.enumerate() {
+                if !((1.0 - norm).abs() <= QUATERNION_TOLERANCE) {
+                    let found = format!("a quaternion of length {norm:.3}");
+                    let expected = "one of length 1";
+                    let fault = RecordingFault::Number { found, expected };
+                    return Err(fault.in_cell(path, signal.first_row + sample, "orientation"));
+                }
+            }
             signal.values = angles_of_quaternions(&signal.values);
         }
         if unwrap(&mut signal.values) {
             notes.push("angles of the trunk run on past half a turn".to_owned());
         }
+        Ok(())
     }
 
     /// Forces become contact: down from the threshold on, up below the release.
@@ -200,6 +215,11 @@ impl Signals {
             None => base.iter().copied().filter(within).collect(),
             Some(step) if end > start => {
                 let steps = ((end - start + margin) / step).floor() as usize;
+                if steps > MAX_RESAMPLED {
+                    let found = format!("{step}, which makes {steps} samples");
+                    let expected = format!("a step that makes at most {MAX_RESAMPLED}");
+                    return Err(map.fault("time.resample_s", found, expected));
+                }
                 (0..=steps).map(|i| start + step * i as f64).collect()
             }
             Some(_) => Vec::new(),

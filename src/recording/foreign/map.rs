@@ -20,6 +20,9 @@ use serde::Deserialize;
 use super::elements::Quantity;
 use crate::recording::error::{RecordingError, RecordingFault};
 
+/// Most columns that a range stands for.
+const MAX_COLUMNS: usize = 10_000;
+
 /// A map as its file says it.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -335,6 +338,24 @@ impl ColumnMap {
             if table.release > table.threshold {
                 return refuse("release", "at most the `threshold`");
             }
+            let scalars = [("time_offset_s", Some(table.time_offset_s))];
+            let scalars = scalars.into_iter().chain([
+                ("threshold", table.threshold),
+                ("release", table.release),
+            ]);
+            let lists = [("sign", &table.sign), ("offset", &table.offset)];
+            let listed = lists.into_iter().flat_map(|(key, factors)| {
+                let values = factors.iter().flat_map(Factors::values);
+                values.map(move |value| (key, Some(value)))
+            });
+            for (key, value) in scalars.chain(listed) {
+                if let Some(value) = value.filter(|value| !value.is_finite()) {
+                    let key = format!("{}.{key}", quantity.key());
+                    let expected = "a finite number".to_owned();
+                    return Err(self.fault(&key, value.to_string(), expected));
+                }
+            }
+            self.require_distinct(quantity, table)?;
         }
         let time = &self.time;
         if time.column.is_some() && time.sample_time_s.is_some() {
@@ -351,6 +372,49 @@ impl ColumnMap {
             }
         }
         Ok(())
+    }
+}
+
+impl Factors {
+    fn values(&self) -> Vec<f64> {
+        match self {
+            Factors::All(value) => vec![*value],
+            Factors::Each(values) => values.clone(),
+            Factors::Named(values) => values.values().copied().collect(),
+        }
+    }
+}
+
+impl ColumnMap {
+    /// No column of a table twice, and no range that no log could have.
+    fn require_distinct(&self, quantity: Quantity, table: &Table) -> Result<(), RecordingError> {
+        let key = format!("{}.columns", quantity.key());
+        let entries = match &table.columns {
+            Columns::One(name) => std::slice::from_ref(name),
+            Columns::Many(names) => names,
+        };
+        for entry in entries {
+            let Name::Text(text) = entry else { continue };
+            if let Some(numbers) = range(text)
+                && numbers.end().saturating_sub(*numbers.start()) >= MAX_COLUMNS
+            {
+                let expected = format!("at most {MAX_COLUMNS} columns");
+                return Err(self.fault(&key, format!("{text:?}"), expected));
+            }
+        }
+        let columns = table.columns(&self.names, quantity);
+        let repeated = (1..columns.len()).find(|at| columns[..*at].contains(&columns[*at]));
+        match repeated.map(|at| &columns[at]) {
+            None => Ok(()),
+            Some(Name::Text(name)) => {
+                let expected = "each column once".to_owned();
+                Err(self.fault(&key, format!("{name:?} twice"), expected))
+            }
+            Some(Name::Number(number)) => {
+                let expected = "each column once".to_owned();
+                Err(self.fault(&key, format!("{number} twice"), expected))
+            }
+        }
     }
 }
 

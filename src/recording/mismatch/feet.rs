@@ -58,6 +58,19 @@ fn higher_m(feet: &ContactFlags, height: &[f64; FOOT_DIM], legs: &[Leg; FOOT_DIM
     mean(false) - mean(true)
 }
 
+/// Median height of the feet that are on the ground, m; none if no foot ever is.
+pub(super) fn floor_m(recording: &Recording, robot: &Robot) -> Option<f64> {
+    let mut heights = Vec::new();
+    for segment in &recording.segments {
+        for (sample, feet) in segment.feet.iter().enumerate() {
+            let x = segment.state(sample);
+            let standing = Leg::ALL.into_iter().filter(|leg| feet[leg.index()]);
+            heights.extend(standing.map(|leg| foot_place(robot, leg, &x, false).z));
+        }
+    }
+    (!heights.is_empty()).then(|| median(heights.into_iter()))
+}
+
 /// Height of each foot over where it stands, m.
 fn heights(segment: &Segment, robot: &Robot) -> Vec<[f64; FOOT_DIM]> {
     let mut heights: Vec<[f64; FOOT_DIM]> = (0..segment.len())
