@@ -67,11 +67,7 @@ fn named<'f>(
     mapped: &[Assigned<'_>],
 ) -> Result<Vec<Assigned<'f>>, ImportError> {
     let is_settled = |role: &Role| match role {
-        Role::StateScaling | Role::InputScaling
-            if options.scaling.is_some() =>
-        {
-            true
-        }
+        Role::StateScaling | Role::InputScaling if options.scaling.is_some() => true,
         _ => mapped.iter().any(|assigned| match (&assigned.role, role) {
             (Role::Weights(a, _), Role::Weights(b, _)) => a == b,
             (a, b) => a == b,

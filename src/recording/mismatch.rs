@@ -193,7 +193,10 @@ fn origin(recording: &Recording) -> Option<Mismatch> {
         let (distance, yaw) = of(&start);
         (far, turned) = (far.max(distance), turned.max(yaw));
     }
-    let (kind, advice) = (MismatchKind::Origin, "models expect jumps that begin near the origin and run along x");
+    let (kind, advice) = (
+        MismatchKind::Origin,
+        "models expect jumps that begin near the origin and run along x",
+    );
     if far > ORIGIN.0 {
         return Some(Mismatch {
             kind,

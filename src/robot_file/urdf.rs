@@ -91,7 +91,9 @@ pub(super) fn entry(file: &str, text: &str, feet: &[String]) -> Result<RobotEntr
                 let of = (node.ancestors())
                     .find(|above| above.has_tag_name("link"))
                     .and_then(|link| link.attribute("name"))
-                    .map_or("a <mass>".to_owned(), |name| format!("<mass> of the link {name:?}"));
+                    .map_or("a <mass>".to_owned(), |name| {
+                        format!("<mass> of the link {name:?}")
+                    });
                 RobotFileError::at(file, of, value.to_string(), "a mass of 0 kg or more")
             })
         })

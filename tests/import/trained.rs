@@ -143,6 +143,23 @@ fn factors_of_states_alone_ask_for_those_of_the_inputs() {
 }
 
 #[test]
+fn factors_beside_deviations_are_refused() {
+    let original = model("tests/fixtures/import/go1-d4.json");
+    let order: CoordinateOrder = "joints,body".parse().unwrap();
+    let bytes = safetensors(&standardised(&original, &order));
+    let options = ImportOptions {
+        scaling: Some(romc::model::Scaling::uniform(0.1)),
+        ..options(&original)
+    };
+    let error = import_from_bytes("n", Format::Safetensors, &bytes, &options);
+    let error = error.unwrap_err().to_string();
+    assert!(
+        error.contains("--scaling: found factors here and in tensors"),
+        "{error}"
+    );
+}
+
+#[test]
 fn activations_of_trainers_are_taken() {
     let original = model("tests/fixtures/import/go1-d4.json");
     let xi = &original.phases()[0].xi;

@@ -635,7 +635,10 @@ fn wrong_maps_name_the_key_the_column_and_what_there_is() {
     let text = fault("signs", "\"*.kn\" = -1", "\"*.kn\" = 2");
     assert!(text.contains("`joint.position.sign`: found 2"), "{text}");
     for (columns, found) in [
-        ("\"13..9999999999\"", "`feet.columns`: found \"13..9999999999\", expected at most"),
+        (
+            "\"13..9999999999\"",
+            "`feet.columns`: found \"13..9999999999\", expected at most",
+        ),
         ("[13, 14, 14, 15]", "`feet.columns`: found 14 twice"),
     ] {
         let text = fault("bare", "\"13..16\"", columns);

@@ -451,7 +451,8 @@ impl Reader<'_> {
         if self.kind(self.at) == Some(&Kind::Open) {
             self.at += 1;
             if self.is_lone_integer() {
-                return self.unexpected("a power without parentheses; derivatives are written with dots");
+                return self
+                    .unexpected("a power without parentheses; derivatives are written with dots");
             }
             self.at -= 1;
         }

@@ -339,10 +339,9 @@ impl ColumnMap {
                 return refuse("release", "at most the `threshold`");
             }
             let scalars = [("time_offset_s", Some(table.time_offset_s))];
-            let scalars = scalars.into_iter().chain([
-                ("threshold", table.threshold),
-                ("release", table.release),
-            ]);
+            let scalars = scalars
+                .into_iter()
+                .chain([("threshold", table.threshold), ("release", table.release)]);
             let lists = [("sign", &table.sign), ("offset", &table.offset)];
             let listed = lists.into_iter().flat_map(|(key, factors)| {
                 let values = factors.iter().flat_map(Factors::values);

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::Summands;
-use super::search::{Block, Shortener};
+use super::search::{Block, Reach, Shortener};
 use crate::symbolic::expand::MAX_PRODUCTS;
 use crate::symbolic::intern::BuildIdHasher;
 use crate::symbolic::node::{ExprId, Function, Node};
@@ -13,12 +13,14 @@ use crate::symbolic::pool::ExprPool;
 
 /// Most terms that can be powers of the parts of a sum.
 const MAX_PARTS: usize = 64;
+/// Denominators of the same variables meet in a term with the logarithm of this.
+const OF_SAME_VARIABLES: i64 = -2;
 /// Relative error of coefficients that fit a power.
 const ROUNDING: f64 = 1e-13;
 
 impl Shortener<'_> {
     /// Positions of blocks that can interact, or that are worth a look alone.
-    pub(super) fn groups(&mut self, blocks: &[Block]) -> Vec<Vec<usize>> {
+    pub(super) fn groups(&mut self, blocks: &[Block], reach: Reach) -> Vec<Vec<usize>> {
         let (places, summands): (Vec<usize>, Summands) = (blocks.iter().enumerate())
             .flat_map(|(place, block)| block.summands.iter().map(move |&summand| (place, summand)))
             .unzip();
@@ -30,6 +32,9 @@ impl Shortener<'_> {
             for &(_, expr) in &block.summands {
                 is_plain[place] &= self.is_plain(expr);
                 for monomial in self.monomials_of(expr, waves) {
+                    if reach == Reach::Near && self.is_far(monomial) {
+                        continue;
+                    }
                     let other = *owner.entry(monomial).or_insert(place);
                     let (a, b) = (root(&leader, place), root(&leader, other));
                     leader[a.max(b)] = a.min(b);
@@ -46,6 +51,13 @@ impl Shortener<'_> {
         }
         let is_worth = |group: &Vec<usize>| group.len() > 1 || !is_plain[group[0]];
         groups.into_values().filter(is_worth).collect()
+    }
+
+    /// Whether a monomial is one by which terms of [`Reach::Far`] alone meet.
+    fn is_far(&mut self, monomial: ExprId) -> bool {
+        let hub = self.pool.integer(OF_SAME_VARIABLES);
+        let hub = self.pool.apply(Function::Log, hub);
+        monomial == ExprId::ONE || self.pool.factors_of(monomial).contains(&hub)
     }
 
     /// Pairs of summands that belong to one power of a sum: of `p*a^n`, `q*a^(n-1)*b` and `r*b^n`
@@ -159,8 +171,8 @@ impl Shortener<'_> {
                 .map(|symbol| self.pool.symbol_expr(symbol))
                 .collect();
             // No model has this term.
-            let minus_two = self.pool.integer(-2);
-            variables.push(self.pool.apply(Function::Log, minus_two));
+            let hub = self.pool.integer(OF_SAME_VARIABLES);
+            variables.push(self.pool.apply(Function::Log, hub));
             monomials.push(self.pool.product(&variables));
             // Terms that have a term of the numerator when they are multiplied by the denominator.
             let numerator = self.pool.product(&[expr, base]);

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::Summands;
 use crate::symbolic::cost::Costs;
 use crate::symbolic::intern::BuildIdHasher;
-use crate::symbolic::node::{ExprId, Function, Node};
+use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
 use crate::symbolic::number::Number;
 use crate::symbolic::pool::ExprPool;
 
@@ -44,6 +44,25 @@ pub struct Shortener<'a> {
     pub(super) monomials: HashMap<(ExprId, ExprId), Vec<ExprId>>,
 }
 
+/// How far terms are looked for that can interact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reach {
+    /// Those whose normal forms share a monomial that is not the constant one, or a denominator.
+    Near,
+    /// Those that share a constant too, or have denominators of the same variables.
+    Far,
+}
+
+fn blocks_of(summands: &[(f64, ExprId)]) -> Vec<Block> {
+    (summands.iter().enumerate())
+        .map(|(position, &summand)| Block {
+            positions: vec![position],
+            summands: vec![summand],
+            is_new: false,
+        })
+        .collect()
+}
+
 /// Summands that stand for those of the original sum at some positions.
 pub(super) struct Block {
     positions: Vec<usize>,
@@ -74,23 +93,20 @@ impl<'a> Shortener<'a> {
         if self.is_plain_sum(summands) && self.parts_of_powers(summands).is_empty() {
             return Vec::new();
         }
-        let mut blocks: Vec<Block> = (summands.iter().enumerate())
-            .map(|(position, &summand)| Block {
-                positions: vec![position],
-                summands: vec![summand],
-                is_new: false,
-            })
-            .collect();
-        for _ in 0..MAX_ROUNDS {
-            let mut is_changed = false;
-            for group in self.groups(&blocks) {
-                is_changed |= self.shorten_group(&mut blocks, &group, summands);
-            }
-            blocks.retain(|block| !block.positions.is_empty());
-            if !is_changed {
-                break;
+        let mut blocks = blocks_of(summands);
+        if let Some((whole, angles)) = self.whole_angles(summands) {
+            blocks = blocks_of(&whole);
+            self.run(&mut blocks, &whole);
+            for block in &mut blocks {
+                for (_, expr) in &mut block.summands {
+                    *expr = self.pool.substitute(*expr, &angles);
+                }
+                if !block.is_new {
+                    block.summands = vec![summands[block.positions[0]]];
+                }
             }
         }
+        self.run(&mut blocks, summands);
         let new = blocks.into_iter().filter(|block| block.is_new);
         let mut found: Vec<Shortened> = new
             .map(|block| Shortened {
@@ -100,6 +116,93 @@ impl<'a> Shortener<'a> {
             .collect();
         found.sort_by(|a, b| a.replaced.cmp(&b.replaced));
         found
+    }
+
+    /// Shortens group after group: first those that share a term, then all that can interact.
+    fn run(&mut self, blocks: &mut Vec<Block>, summands: &[(f64, ExprId)]) {
+        for _ in 0..MAX_ROUNDS {
+            let is_changed = [Reach::Near, Reach::Far].into_iter().any(|reach| {
+                let mut is_changed = false;
+                for group in self.groups(blocks, reach) {
+                    is_changed |= self.shorten_group(blocks, &group, summands);
+                }
+                blocks.retain(|block| !block.positions.is_empty());
+                is_changed
+            });
+            if !is_changed {
+                break;
+            }
+        }
+    }
+
+    /// The summands with a variable of its own in the place of each sum that is an angle, and these sums;
+    /// nothing if no angle is one. So what is true of one angle is found before angles are taken apart.
+    fn whole_angles(
+        &mut self,
+        summands: &[(f64, ExprId)],
+    ) -> Option<(Summands, Vec<(SymbolId, ExprId)>)> {
+        let exprs: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
+        let order = self.pool.reachable(&exprs);
+        let mut families: Vec<(ExprId, Vec<(Number, ExprId)>)> = Vec::new();
+        for &expr in &order {
+            let Node::Apply(Function::Sin | Function::Cos | Function::Tan, angle) =
+                *self.pool.node(expr)
+            else {
+                continue;
+            };
+            let (outer, inner) = self.pool.split(angle);
+            let terms = self.pool.terms_of(inner);
+            let Some(&(first, _)) = terms.get(1).and(terms.first()) else {
+                continue;
+            };
+            let Some(factor) = outer.checked_mul(first) else {
+                continue;
+            };
+            let monic: Option<Vec<ExprId>> = (terms.into_iter())
+                .map(|(number, rest)| Some(self.pool.scale(number.checked_div(first)?, rest)))
+                .collect();
+            let Some(monic) = monic else { continue };
+            let monic = self.pool.sum(&monic);
+            match families.iter_mut().find(|(known, _)| *known == monic) {
+                Some((_, angles)) => angles.push((factor, angle)),
+                None => families.push((monic, vec![(factor, angle)])),
+            }
+        }
+        let mut variables = Vec::new();
+        let mut replaced: HashMap<ExprId, ExprId, BuildIdHasher> = HashMap::default();
+        for (place, (monic, angles)) in families.into_iter().enumerate() {
+            let least = angles.iter().map(|(factor, _)| factor.abs()).min()?;
+            // No file has a variable of this name.
+            let variable = self.pool.symbol_id(&format!(" angle {place}"));
+            let symbol = self.pool.symbol_expr(variable);
+            for (factor, angle) in angles {
+                let multiple = factor.checked_div(least);
+                if let Some(multiple) = multiple.filter(|multiple| multiple.as_integer().is_some())
+                {
+                    replaced.insert(angle, self.pool.scale(multiple, symbol));
+                }
+            }
+            let angle: Vec<ExprId> = (self.pool.terms_of(monic).into_iter())
+                .map(|(number, rest)| {
+                    let number = number.checked_mul(least).unwrap_or(number);
+                    self.pool.scale(number, rest)
+                })
+                .collect();
+            variables.push((variable, self.pool.sum(&angle)));
+        }
+        if replaced.is_empty() {
+            return None;
+        }
+        for expr in order {
+            if !replaced.contains_key(&expr) {
+                let known = &replaced;
+                let operand = |child: ExprId| known.get(&child).copied().unwrap_or(child);
+                let new = self.pool.rebuild(expr, operand);
+                replaced.insert(expr, new);
+            }
+        }
+        let whole = summands.iter().map(|(c, expr)| (*c, replaced[expr]));
+        Some((whole.collect(), variables))
     }
 
     /// Whether the terms are distinct monomials that cannot interact.
