@@ -5,8 +5,8 @@
 //! | 4 | a term that is added, with its sign; 2 inside the argument of a function |
 //! | 3 | the name of a function |
 //! | 3 | a function among the factors of another one's argument, beside its name |
-//! | 2 | a pair of parentheses, a whole number before a term inside a sum or argument |
-//! | 1 | a whole number before the only term of an argument |
+//! | 2 | a pair of parentheses, a whole number before a term inside a sum |
+//! | 1 | a whole number before a term of an argument |
 //! | 1 | a symbol, a power, a fraction bar, a digit of a coefficient (at most three) |
 //!
 //! A shared part counts as often as it is written.
@@ -102,9 +102,10 @@ impl ExprPool {
             }
             Node::Apply(_, argument) => {
                 let connectors = INNER_TERM * (self.n_terms(*argument) - 1);
-                // The multiple of a single angle is read at a glance.
-                let multiple =
-                    u64::from(self.split(*argument).0.as_integer().is_some_and(|n| n > 1));
+                // Multiples of angles are read at a glance.
+                let numbers = self.terms_of(*argument).into_iter();
+                let multiples = numbers.filter_map(|(number, _)| number.abs().as_integer());
+                let multiple = multiples.filter(|number| *number > 1).count() as u64;
                 let nested = FUNCTION * self.n_functions(*argument);
                 length_of(*argument).saturating_add(FUNCTION + connectors + nested - multiple)
             }

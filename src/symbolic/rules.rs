@@ -59,6 +59,7 @@ impl ExprPool {
         match self.node(expr) {
             Node::Product(_) => {
                 let expr = self.merge_tangents(expr);
+                let expr = self.merge_double_angles(expr);
                 let expr = self.merge_hyperbolic_tangent(expr);
                 let expr = self.merge_abs(expr);
                 self.abs_to_sign(expr)
@@ -285,6 +286,70 @@ impl ExprPool {
         expr
     }
 
+    /// `tan(a)/(1 - tan(a)^2) = tan(2*a)/2`, `tanh(a)/(1 + tanh(a)^2) = tanh(2*a)/2`,
+    /// `sin(a)/(1 + cos(a)) = (1 - cos(a))/sin(a) = tan(a/2)` and `sin(a)/(1 - cos(a)) = 1/tan(a/2)`.
+    fn merge_double_angles(&mut self, expr: ExprId) -> ExprId {
+        let factors = self.factors_of(expr).to_vec();
+        for (place, &factor) in factors.iter().enumerate() {
+            let (base, Exponent::Number(side)) = self.base_and_exponent(factor) else {
+                continue;
+            };
+            let terms = self.terms_of(base);
+            let [(Number::ONE, ExprId::ONE), (sign, rest)] = terms[..] else {
+                continue;
+            };
+            let Some((inner, angle, power)) = self.function_power(rest) else {
+                continue;
+            };
+            let (is_below, is_above) = (side == Number::MINUS_ONE, side.is_one());
+            // The other factor with its power, the new function, what its angle and the product are multiplied by.
+            let (partner, wanted, new, multiple, scale) = match (inner, power, sign) {
+                (Function::Tan, 2, Number::MINUS_ONE) if is_below => (
+                    Function::Tan,
+                    1,
+                    (Function::Tan, 1),
+                    Number::integer(2),
+                    Number::HALF,
+                ),
+                (Function::Tanh, 2, Number::ONE) if is_below => (
+                    Function::Tanh,
+                    1,
+                    (Function::Tanh, 1),
+                    Number::integer(2),
+                    Number::HALF,
+                ),
+                (Function::Cos, 1, Number::ONE | Number::MINUS_ONE) if is_below || is_above => {
+                    let wanted = if is_below { 1 } else { -1 };
+                    let new = if sign.is_one() { wanted } else { -wanted };
+                    (
+                        Function::Sin,
+                        wanted,
+                        (Function::Tan, new),
+                        Number::HALF,
+                        Number::ONE,
+                    )
+                }
+                _ => continue,
+            };
+            let has_partner = factors.iter().any(|other| {
+                self.function_power(*other)
+                    .is_some_and(|(function, of, power)| {
+                        (function, of) == (partner, angle) && power * wanted > 0
+                    })
+            });
+            if !has_partner {
+                continue;
+            }
+            let angle_of_new = self.scale(multiple, angle);
+            let mut merged = factors.clone();
+            merged[place] = self.apply_power(new.0, angle_of_new, new.1);
+            merged.push(self.apply_power(partner, angle, -wanted));
+            let product = self.product(&merged);
+            return self.scale(scale, product);
+        }
+        expr
+    }
+
     /// `(exp(a) - exp(b))/(exp(a) + exp(b)) = tanh((a - b)/2)`, where `1` is `exp(0)`.
     fn merge_hyperbolic_tangent(&mut self, expr: ExprId) -> ExprId {
         let factors = self.factors_of(expr).to_vec();
@@ -444,6 +509,12 @@ mod tests {
             ("abs(a)*b/a", "b*sign(a)"),
             ("(exp(a) - exp(-a))/(exp(a) + exp(-a))", "tanh(a)"),
             ("b*(1 - exp(-2*a))/(2 + 2*exp(-2*a))", "1/2*b*tanh(a)"),
+            ("b*tan(a)/(1 - tan(a)^2)", "1/2*b*tan(2*a)"),
+            ("tanh(a)/(1 + tanh(a)^2)", "1/2*tanh(2*a)"),
+            ("tanh(a)/(1 - tanh(a)^2)", "tanh(a)/(1 - tanh(a)^2)"),
+            ("sin(2*a)/(1 + cos(2*a))", "tan(a)"),
+            ("sin(a)/(1 - cos(a))", "1/tan(1/2*a)"),
+            ("b*(1 - cos(2*a))/sin(2*a)", "b*tan(a)"),
             ("(exp(a) - 1)/(exp(a) + 2)", "-(1 - exp(a))/(2 + exp(a))"),
         ] {
             assert_eq!(rewritten(text, ExprPool::compact_rules), expected, "{text}");

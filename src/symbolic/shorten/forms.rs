@@ -7,7 +7,7 @@ use super::units::{in_f64, in_units};
 use super::{Scaled, Summands};
 use crate::symbolic::expand::MAX_PRODUCTS;
 use crate::symbolic::intern::BuildIdHasher;
-use crate::symbolic::node::{ExprId, Node};
+use crate::symbolic::node::{ExprId, Function, Node};
 use crate::symbolic::number::Number;
 use crate::symbolic::pool::ExprPool;
 
@@ -148,8 +148,74 @@ impl Shortener<'_> {
                 candidates.push(vec![(Number::ONE, form)]);
             }
         }
+        candidates.extend(self.waves_as_products(singles));
         candidates.extend(self.chosen(unit, singles));
         candidates
+    }
+
+    /// Sums in which two waves are a product: `cos(a + b) + cos(a - b) = 2*cos(a)*cos(b)` and the like,
+    /// for angles `a` and `b` of any length.
+    fn waves_as_products(&mut self, singles: &Scaled) -> Vec<Scaled> {
+        let mut found = Vec::new();
+        if singles.len() > MAX_CHOSEN {
+            return found;
+        }
+        for second in 1..singles.len() {
+            for first in 0..second {
+                let pair = [singles[first], singles[second]];
+                if let Some(product) = self.product_of_waves(pair) {
+                    let mut sum = singles.clone();
+                    sum[first] = product;
+                    sum.remove(second);
+                    found.push(collected(self.pool, &sum, Keep::Sums));
+                }
+            }
+        }
+        found
+    }
+
+    fn product_of_waves(&mut self, pair: [(Number, ExprId); 2]) -> Option<(Number, ExprId)> {
+        let [(number, first), (other, second)] = pair;
+        let is_difference = number == -other;
+        if !(is_difference || number == other) {
+            return None;
+        }
+        let (cofactor, function, a) = self.wave(first)?;
+        let (beside, same, b) = self.wave(second)?;
+        if (cofactor, function) != (beside, same) {
+            return None;
+        }
+        let angles = [self.pool.add(a, b), self.pool.sub(a, b)];
+        let (of_sum, of_difference, factor) = match (function, is_difference) {
+            (Function::Cos, false) => (Function::Cos, Function::Cos, 2),
+            (Function::Cos, true) => (Function::Sin, Function::Sin, -2),
+            (_, false) => (Function::Sin, Function::Cos, 2),
+            (_, true) => (Function::Cos, Function::Sin, 2),
+        };
+        let mut factors = vec![cofactor];
+        for (function, angle) in [of_sum, of_difference].into_iter().zip(angles) {
+            let mut halves = Vec::new();
+            for (number, rest) in self.pool.terms_of(angle) {
+                halves.push(self.pool.scale(number.checked_mul(Number::HALF)?, rest));
+            }
+            let half = self.pool.sum(&halves);
+            factors.push(self.pool.apply(function, half));
+        }
+        let number = number.checked_mul(Number::integer(factor))?;
+        Some((number, self.pool.product(&factors)))
+    }
+
+    /// The first sine or cosine among the factors of a term: cofactor, function, angle.
+    fn wave(&mut self, expr: ExprId) -> Option<(ExprId, Function, ExprId)> {
+        let factors = self.pool.factors_of(expr).iter();
+        let mut waves = factors.filter_map(|&factor| match *self.pool.node(factor) {
+            Node::Apply(function @ (Function::Sin | Function::Cos), angle) => {
+                Some((factor, function, angle))
+            }
+            _ => None,
+        });
+        let (factor, function, angle) = waves.next()?;
+        Some((self.pool.div(expr, factor), function, angle))
     }
 
     /// Sums in which each term has the form that suits the others best.
