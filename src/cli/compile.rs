@@ -7,14 +7,15 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::{CodeArguments, CompileArguments, EquationArguments, UnitsChoice};
-use super::output::{check_output, names};
+use super::output::{check_output, names, note, read_recordings};
 use super::simplification::{self, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::{EquationForm, Equations, PhaseEquations};
 use crate::files::{EmittedFile, Overwrite, earlier_files};
 use crate::model::ReducedModel;
+use crate::recording::mismatch;
 use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
-use crate::{Error, artifact, recording};
+use crate::{Error, artifact};
 
 /// Compiles a model into a folder.
 ///
@@ -146,7 +147,19 @@ fn planned(
                 .to_owned(),
         });
     }
-    let mut recording = recording::read(path)?;
+    let reading = &arguments.simplification.reading;
+    let mut recording = read_recordings(std::slice::from_ref(path), reading)?.swap_remove(0);
+    for found in mismatch::notes(&recording, model.robot()?) {
+        note(&found);
+    }
+    if recording.segments.len() > 1 {
+        let found = recording.segments.len();
+        let message = format!("--plan takes one jump: found {found} segments");
+        return Err(Error::Config {
+            path: path.clone(),
+            message,
+        });
+    }
     let motion = recording.segments.swap_remove(0);
     Ok(Some(PlannedJump {
         u: motion.input(&model.input_rule()?)?,

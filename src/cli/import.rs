@@ -38,13 +38,16 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let check = checked(&model, &segments, arguments)?;
     artifact::write_with(&arguments.output, &model, overwrite)?;
     let mut text = describe(&imported.report);
-    if model.robot().is_ok() && model.encoder_map().is_ok() && arguments.wrench_frame.is_none() {
+    let has_axes = model.robot().is_ok() && model.encoder_map().is_ok();
+    let axes = (has_axes && arguments.wrench_frame.is_none()).then(|| {
         let frame = model.wrench_frame().name();
-        let _ = writeln!(
-            text,
-            "note: force and moment of the inputs are along the {frame}'s axes, as published \
+        format!(
+            "force and moment of the inputs are along the {frame}'s axes, as published \
              (--wrench-frame says otherwise)"
-        );
+        )
+    });
+    if let Some(axes) = &axes {
+        let _ = writeln!(text, "note: {axes}");
     }
     if let Some(check) = &check {
         text.push_str(&import_check::describe(check));
@@ -55,7 +58,8 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         arguments.output.display(),
         model.name()
     );
-    if let Some(lacking) = lacking(&model) {
+    let lacking = lacking(&model);
+    if let Some(lacking) = lacking {
         let _ = writeln!(text, "\n{lacking}");
     }
     Ok(Answer {
@@ -66,6 +70,8 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
             "name": model.name(),
             "digest": artifact::digest(&model).to_string(),
             "report": imported.report,
+            "wrench_axes": axes,
+            "lacking": lacking,
             "check": check.as_ref().map(import_check::json),
         }),
     })

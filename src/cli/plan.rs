@@ -8,14 +8,15 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::{PlanArguments, ReadingArguments};
-use super::output::{check_output, names, progress_bar, reader, spinner, warn};
+use super::output::{check_output, names, note, progress_bar, reader, spinner, warn};
 use super::train_settings::refused;
 use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
 use crate::plan::{self, Goal, Plan, PlanSettings, Reach, Verdict};
-use crate::recording::{self, Clocks, Recording};
+use crate::recording::{self, Clocks, Recording, mismatch};
 use crate::report::figures::{Figure, figure_files};
 use crate::report::{plan_figures, plan_json, reach_figure};
+use crate::robot::Robot;
 use crate::typeset::{Cell, Table};
 use crate::{Error, artifact};
 
@@ -40,6 +41,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
         apex,
         arguments.start.as_deref(),
         &arguments.reading,
+        model.robot()?,
     )?;
     let bar = spinner("planning");
     let planned = plan::plan(&model, &goal, &settings);
@@ -121,10 +123,14 @@ fn goal(
     apex_m: f64,
     start: Option<&Path>,
     reading: &ReadingArguments,
+    robot: &Robot,
 ) -> Result<Goal, Error> {
     let goal = Goal::new(distance_m, apex_m)?;
     let Some(path) = start else { return Ok(goal) };
     let recording = reader(reading, Clocks::Recorded)?.read(path)?.recording;
+    for found in mismatch::notes(&recording, robot) {
+        note(&found);
+    }
     let first = &recording.segments[0];
     let column = |rows: &nalgebra::DMatrix<f64>| rows.column(0).into_owned();
     Ok(goal.from_start(column(&first.x), column(&first.dx)))

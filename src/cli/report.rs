@@ -8,12 +8,12 @@ use serde_json::json;
 use super::Answer;
 use super::args::ReportArguments;
 use super::mpc::run_with_both_lifts;
-use super::output::{check_output, names, read_recordings, spinner, write_file};
+use super::output::{check_output, names, note, read_recordings, spinner, write_file};
 use super::simplification;
 use crate::evaluate::{Assessment, LAMBDA};
 use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
-use crate::recording::Recording;
+use crate::recording::{Recording, mismatch};
 use crate::report::figures::figure_files;
 use crate::report::{
     Content, PageOptions, Verdict, all_figures, page, verdict, without_statistics,
@@ -21,7 +21,7 @@ use crate::report::{
 use crate::simplify::Tolerance;
 use crate::study::{Store, Summary};
 use crate::train::sha256;
-use crate::{Error, artifact, recording};
+use crate::{Error, artifact};
 
 /// Writes the page, and the figures if a folder for them is given.
 ///
@@ -38,7 +38,13 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     };
     let plan = match &arguments.plan {
         None => None,
-        Some(path) => Some(recording::read(path)?),
+        Some(path) => {
+            let mut read = read_recordings(std::slice::from_ref(path), &arguments.reading)?;
+            for found in mismatch::notes(&read[0], model.robot()?) {
+                note(&found);
+            }
+            Some(read.swap_remove(0))
+        }
     };
     let made = make(
         &model,

@@ -12,7 +12,8 @@ use super::transcribe::{Bound, Task};
 use super::verdict::{Findings, Verdict, verdict};
 use crate::model::ReducedModel;
 use crate::mpc::{Outcome, QpSettings, QpSolver, SolverProfile};
-use crate::recording::Segment;
+use crate::recording::mismatch::weight_share;
+use crate::recording::{Recording, Segment};
 
 /// Largest violation of an equation that counts as none, in standard deviations.
 const CONVERGED_DEFECT: f64 = 1e-4;
@@ -85,11 +86,17 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
     let goal_m = [goal.distance_m(), goal.apex_m()];
     let slack = Bound::ALL.map(|bound| (bound, y[task.layout.slack(bound)]));
     let input_deviation = input_deviation(&task, &y);
+    let recording = Recording {
+        path: motion.path.clone(),
+        segments: vec![motion.clone()],
+        ignored_columns: Vec::new(),
+    };
     let findings = Findings {
         input_deviation,
         slack,
         margins: &margins,
         outside: outside(&seed, goal_m),
+        weight_share: weight_share(&recording, model.robot()?),
     };
     Ok(Plan {
         goal_m,

@@ -4,6 +4,8 @@ use super::motion::Margins;
 use super::settings::PlanSettings;
 use super::transcribe::Bound;
 
+/// Share of the weight that the torques of a plan have to carry.
+const LEAST_WEIGHT_SHARE: f64 = 0.5;
 /// Violation of a bound at the nodes that counts as none, in its unit.
 const NO_SLACK: f64 = 2e-3;
 /// Farthest outside a joint's limit between nodes, rad.
@@ -48,6 +50,8 @@ pub struct Findings<'a> {
     pub margins: &'a Margins,
     /// Widths of the recorded ranges that distance and apex are beyond them.
     pub outside: [f64; 2],
+    /// Impulse of the feet over what the robot's weight and change of velocity need.
+    pub weight_share: Option<f64>,
 }
 
 /// The verdict over the findings.
@@ -86,6 +90,15 @@ pub fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
         let beyond = margins.beyond_friction_n;
         refused.push(format!(
             "the force is {beyond:.0} N outside the friction cone between nodes"
+        ));
+    }
+    if let Some(share) = found
+        .weight_share
+        .filter(|share| *share < LEAST_WEIGHT_SHARE)
+    {
+        refused.push(format!(
+            "its torques carry {share:.3} of what the robot's weight needs: the model's inputs cannot be lifted to \
+             forces of its feet"
         ));
     }
     if found.input_deviation > settings.refuse_deviation {

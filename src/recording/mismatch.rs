@@ -163,6 +163,11 @@ impl Figures {
     }
 }
 
+/// Impulse of the feet over what the robot's weight and change of velocity need; none without stance.
+pub fn weight_share(recording: &Recording, robot: &Robot) -> Option<f64> {
+    Balance::of(recording, robot).weight_share
+}
+
 /// Notes for people: the mismatches of a recording, and how many runs of samples are implausible, such as the first.
 /// Legs near a singularity are no fault.
 pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {

@@ -125,7 +125,7 @@ impl Signals {
         if signal.values.nrows() == QUATERNION.len() {
             let norms = signal.values.column_iter().map(|q| q.norm());
             for (sample, norm) in norms.enumerate() {
-                if !((1.0 - norm).abs() <= QUATERNION_TOLERANCE) {
+                if norm.is_nan() || (1.0 - norm).abs() > QUATERNION_TOLERANCE {
                     let found = format!("a quaternion of length {norm:.3}");
                     let expected = "one of length 1";
                     let fault = RecordingFault::Number { found, expected };
