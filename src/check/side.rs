@@ -12,10 +12,10 @@ use crate::model::{LatentVariable, ReducedModel};
 use crate::symbolic::{ExprId, ExprPool, Literal, Number, SymbolId};
 
 /// Marks of symbols that stand for decimals: exact ones, and ones rounded in their last digit.
-/// Below this, twice a float is an integer to its last digit.
-const LARGEST_TWICE: f64 = 9e15;
 const EXACT: char = '#';
 const ROUNDED: char = '~';
+/// Below this floats hold every multiple of 1/2.
+const LARGEST_HALF: f64 = 4e15;
 
 /// The equations of one file.
 #[derive(Clone, Debug)]
@@ -184,8 +184,8 @@ impl Side {
             return None;
         }
         let literal = Literal::parse(number, self.is_rounded)?;
-        let twice = 2.0 * literal.to_f64();
-        if !self.is_rounded && twice.fract() == 0.0 && twice < LARGEST_TWICE && number.len() < 10 {
+        let is_half = (&literal.value + &literal.value).is_integer();
+        if !self.is_rounded && is_half && literal.to_f64() < LARGEST_HALF {
             return None;
         }
         let mark = if self.is_rounded { ROUNDED } else { EXACT };

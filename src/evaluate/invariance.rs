@@ -29,6 +29,9 @@ pub struct Invariance {
     pub gravity_m_s2: Option<f64>,
     /// Vertical force of four feet over the acceleration of that combination that it makes, kg.
     pub mass_kg: Option<f64>,
+    /// Largest change of a decoded joint angle for a body 1 m further on, rad/m: what a controller's joint
+    /// targets and a plan's postures are off where x does not count from where the jump begins.
+    pub joint_shift_rad_m: f64,
     /// Each phase under its name.
     pub phases: Vec<PhaseInvariance>,
 }
@@ -66,7 +69,12 @@ impl Invariance {
         let phases = 0..model.phases().len();
         let phases = phases.map(|phase| PhaseInvariance::of(model, phase, &rest));
         let height = Height::of(model, &rest)?;
+        let mut moved = rest.clone();
+        moved[FORWARD] += SHIFT_M;
+        let decoded = |x: &DVector<f64>| model.decode(&model.encode(x)?);
+        let change = decoded(&moved)? - decoded(&rest)?;
         Ok(Self {
+            joint_shift_rad_m: change.rows(0, JOINT_DIM).amax() / SHIFT_M,
             gravity_m_s2: height.as_ref().and_then(|height| height.gravity_m_s2),
             mass_kg: height.and_then(|height| height.mass_kg),
             phases: phases.collect::<Result<_, _>>()?,

@@ -139,10 +139,12 @@ pub fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Tabl
 pub fn invariance_table(invariance: &Invariance) -> Table {
     let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
     let words = format!(
-        "What the model says of physics that is known: gravity in flight {} m/s^2, mass {} kg; by phase, change of \
-         the body's acceleration per metre of shift along x and y, and difference between mirror images",
+        "What the model says of physics that is known: gravity in flight {} m/s^2, mass {} kg; decoded joints \
+         move by up to {} rad for a body 1 m further on; by phase, change of the body's acceleration per metre of \
+         shift along x and y, and difference between mirror images",
         shown(invariance.gravity_m_s2),
-        shown(invariance.mass_kg)
+        shown(invariance.mass_kg),
+        significant(invariance.joint_shift_rad_m)
     );
     Table::of(&invariance.phases)
         .column("phase", "", |phase| &phase.phase)

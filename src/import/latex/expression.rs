@@ -182,14 +182,30 @@ impl Reader<'_> {
         }
     }
 
-    /// Whether an integer alone in parentheses follows, as equations are numbered by hand.
+    /// Whether the last thing that follows is an integer alone in parentheses, as equations are numbered by hand.
     fn is_lone_integer(&self) -> bool {
         let is_one_of = |at: usize, all: &str| matches!(self.kind(at), Some(Kind::Character(c)) if all.contains(*c));
         let is_integer = |at: usize| match self.kind(at) {
             Some(Kind::Number(text)) => text.bytes().all(|byte| byte.is_ascii_digit()),
             _ => false,
         };
-        is_one_of(self.at, "([") && is_integer(self.at + 1) && is_one_of(self.at + 2, ")]")
+        let is_last = match self.kind(self.at + 3) {
+            Some(Kind::Character(c)) => ".,".contains(*c),
+            Some(kind) => matches!(
+                kind,
+                Kind::Align
+                    | Kind::Break
+                    | Kind::Label(_)
+                    | Kind::Comment(_)
+                    | Kind::Paragraph
+                    | Kind::Close
+            ),
+            None => true,
+        };
+        is_one_of(self.at, "([")
+            && is_integer(self.at + 1)
+            && is_one_of(self.at + 2, ")]")
+            && is_last
     }
 
     pub(super) fn signs(&mut self) {

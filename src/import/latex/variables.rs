@@ -96,7 +96,10 @@ impl Reader<'_> {
             Some(Kind::Open) => {
                 let last = self.inside(|reader| match reader.peek().map(|token| &token.kind) {
                     Some(Kind::Character('(' | '[')) => reader.factor(false),
-                    _ => reader.bare_argument(),
+                    _ => {
+                        reader.signs();
+                        reader.bare_argument()
+                    }
                 })?;
                 let next = self.peek().map(|token| &token.kind);
                 if last != Last::Other && next == Some(&Kind::Superscript) {

@@ -12,7 +12,7 @@ use crate::symbolic::node::{ExprId, SymbolId};
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Atom {
     Symbol(SymbolId),
-    /// A sum with leading coefficient one, to negative powers only.
+    /// A sum whose leading coefficient has size one and is not negative, to negative powers only.
     Sum(CanonicalForm),
     /// `form^(1/index)`, to powers below the index.
     Root(CanonicalForm, u32),

@@ -159,7 +159,8 @@ impl Coefficient {
 
     /// Whether zero is among the numbers that it may stand for.
     pub fn may_be_zero(&self) -> bool {
-        self.is_zero() || self.magnitude() <= self.radius * (1.0 + 1e-9)
+        let is_within = || self.magnitude() <= self.radius * (1.0 + 1e-9);
+        self.is_zero() || (self.radius > 0.0 && is_within())
     }
 
     /// The value without its radius.

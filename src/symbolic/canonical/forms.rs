@@ -11,6 +11,9 @@ use super::rational::Rational;
 use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
 use crate::symbolic::pool::ExprPool;
 
+/// Most fractions of two arguments that are compared by multiplying out, and most such comparisons.
+const MAX_FRACTIONS: usize = 4;
+const MAX_FRACTION_TRIES: usize = 300;
 /// Most atoms that are removed by multiplying out.
 const MAX_REMOVALS: usize = 40;
 /// Largest index of a root.
@@ -31,6 +34,7 @@ pub struct CanonicalForms<'p> {
     /// Whether any argument has radii.
     is_rounded: bool,
     is_contradictory: bool,
+    n_fraction_tries: usize,
 }
 
 impl<'p> CanonicalForms<'p> {
@@ -55,6 +59,7 @@ impl<'p> CanonicalForms<'p> {
             rounding: 0.0,
             is_rounded: false,
             is_contradictory: false,
+            n_fraction_tries: 0,
         };
         let mut guarded = Vec::new();
         for expr in pool.reachable(exprs) {
@@ -316,20 +321,28 @@ impl<'p> CanonicalForms<'p> {
 
     /// An argument that is the same once fractions are removed.
     fn equal_fraction(&mut self, exact: &CanonicalForm) -> Option<CanonicalForm> {
-        let has_fraction = self.has_fraction(exact);
-        let known: Vec<CanonicalForm> = (self.arguments.iter().map(|known| &known.form))
-            .filter(|known| has_fraction || self.has_fraction(known))
-            .map(CanonicalForm::exact)
-            .collect();
-        known.into_iter().find(|known| {
-            let difference = self.without_fractions(&exact.minus(known));
-            difference.is_some_and(|difference| difference.is_zero())
-        })
+        for place in 0..self.arguments.len() {
+            let known = &self.arguments[place].form;
+            let of_both = [exact, known].map(|form| self.fractions(form));
+            let count = of_both[0].union(&of_both[1]).count();
+            if count == 0 || count > MAX_FRACTIONS || self.n_fraction_tries == MAX_FRACTION_TRIES {
+                continue;
+            }
+            self.n_fraction_tries += 1;
+            let known = known.exact();
+            let difference = self.without_fractions(&exact.minus(&known));
+            if difference.is_some_and(|difference| difference.is_zero()) {
+                return Some(known);
+            }
+        }
+        None
     }
 
-    fn has_fraction(&self, form: &CanonicalForm) -> bool {
-        let mut atoms = form.terms.keys().flat_map(|monomial| &monomial.powers);
-        atoms.any(|(atom, _)| self.is_removable(*atom))
+    /// The atoms of a form that multiplying out would remove.
+    fn fractions(&self, form: &CanonicalForm) -> HashSet<u32> {
+        let atoms = form.terms.keys().flat_map(|monomial| &monomial.powers);
+        let atoms = atoms.map(|(atom, _)| *atom);
+        atoms.filter(|atom| self.is_removable(*atom)).collect()
     }
 
     fn is_removable(&self, atom: u32) -> bool {

@@ -72,13 +72,8 @@ impl CanonicalForms<'_> {
                     if rest != power {
                         return Some(Some((with_power(rest), self.power(&base, power - rest)?)));
                     }
-                    let shared = base.as_atom().or_else(|| {
-                        // A sum to a negative power has leading coefficient one.
-                        let factor = base.leading()?.reciprocal()?;
-                        let monic = Atom::Sum(base.scaled(&factor));
-                        let number = self.numbers.get(&monic).copied();
-                        number.filter(|_| factor.is_one())
-                    });
+                    let sum = self.numbers.get(&Atom::Sum(base.clone())).copied();
+                    let shared = base.as_atom().or(sum);
                     let shared = shared.filter(|shared| monomial.power_of(*shared) < 0);
                     if let Some(shared) = shared {
                         // |x| / x = sign(x).
@@ -161,9 +156,12 @@ impl CanonicalForms<'_> {
             let reciprocal = (coefficient.reciprocal()?, monomial.reciprocal());
             return self.settled(vec![reciprocal]);
         }
-        let factor = leading.exact().reciprocal()?;
-        let monic = self.argument(form.scaled(&factor));
-        let atom = self.number(Atom::Sum(monic));
+        // A real factor: the sum of a real form is real, as magnitudes, signs and roots take it to be.
+        let sign = Coefficient::integer(if leading.is_negative() { -1 } else { 1 });
+        let size = Coefficient::real(leading.size(), 0.0).reciprocal()?;
+        let factor = size.times(&sign);
+        let normed = self.argument(form.scaled(&factor));
+        let atom = self.number(Atom::Sum(normed));
         Some(CanonicalForm::term(factor, Monomial::atom(atom, -1)))
     }
 }

@@ -51,6 +51,8 @@ impl CanonicalForms<'_> {
             }
         }
         let sign = coefficient.times(&inverse);
+        // What is real has real factors: there is no other reading of its root.
+        sign.as_real()?;
         match rest.powers[..] {
             [] if sign.is_one() => {}
             [] => return None,
@@ -91,8 +93,9 @@ impl CanonicalForms<'_> {
     fn magnitude_of(&mut self, atom: u32) -> Option<CanonicalForm> {
         let base = CanonicalForm::term(Coefficient::integer(1), Monomial::atom(atom, 1));
         match self.atoms[atom as usize].clone() {
-            _ if self.is_positive(atom) => Some(base),
+            Atom::Sum(sum) if self.is_positive(atom) => Some(sum),
             Atom::Sum(sum) => self.abs(&sum),
+            _ if self.is_positive(atom) => Some(base),
             _ => Some(self.atom(Atom::Abs(base))),
         }
     }

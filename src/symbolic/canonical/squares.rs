@@ -8,7 +8,7 @@ use super::polynomial::{CanonicalForm, Monomial};
 use super::rational::Rational;
 
 /// Most terms of a sum whose root is looked for.
-const MAX_TERMS: usize = 100;
+const MAX_TERMS: usize = 60;
 
 impl CanonicalForms<'_> {
     /// `(scale, q)` with `form = scale * q^2` and a positive scale, if there is such a sum `q`; `form` is
@@ -26,6 +26,9 @@ impl CanonicalForms<'_> {
         let monic = form.scaled(&Coefficient::real(leading.recip(), 0.0));
         let first = halved(&largest)?;
         let mut root = CanonicalForm::term(Coefficient::integer(1), first.clone());
+        let smallest = form.terms.keys().map(|monomial| order.weight(monomial));
+        // The smallest term of a square is that of its root squared.
+        let least = 0.5 * smallest.fold(f64::INFINITY, f64::min) - 1e-9;
         let mut last = order.weight(&first);
         for _ in 0..form.terms.len() {
             let square = self.product(&root, &root)?;
@@ -39,7 +42,7 @@ impl CanonicalForms<'_> {
             };
             let next = monomial.times(&first.reciprocal());
             let weight = order.weight(&next);
-            if weight >= last {
+            if weight >= last || weight < least {
                 return None;
             }
             last = weight;

@@ -172,6 +172,10 @@ impl<'a> Shortener<'a> {
         let mut replaced: HashMap<ExprId, ExprId, BuildIdHasher> = HashMap::default();
         for (place, (monic, angles)) in families.into_iter().enumerate() {
             let least = angles.iter().map(|(factor, _)| factor.abs()).min()?;
+            let angle: Option<Vec<ExprId>> = (self.pool.terms_of(monic).into_iter())
+                .map(|(number, rest)| Some(self.pool.scale(number.checked_mul(least)?, rest)))
+                .collect();
+            let Some(angle) = angle else { continue };
             // No file has a variable of this name.
             let variable = self.pool.symbol_id(&format!(" angle {place}"));
             let symbol = self.pool.symbol_expr(variable);
@@ -182,12 +186,6 @@ impl<'a> Shortener<'a> {
                     replaced.insert(angle, self.pool.scale(multiple, symbol));
                 }
             }
-            let angle: Vec<ExprId> = (self.pool.terms_of(monic).into_iter())
-                .map(|(number, rest)| {
-                    let number = number.checked_mul(least).unwrap_or(number);
-                    self.pool.scale(number, rest)
-                })
-                .collect();
             variables.push((variable, self.pool.sum(&angle)));
         }
         if replaced.is_empty() {
