@@ -177,7 +177,7 @@ impl Side {
         pool.parse_with_literals(text, &known, &|number| self.literal_name(number))
     }
 
-    /// The symbol of a decimal. Integers are numbers of the pool, and short multiples of 1/2 of exact
+    /// The symbol of a decimal. Integers are numbers of the pool, and multiples of 1/2 of exact
     /// files, which floats hold exactly.
     fn literal_name(&self, number: &str) -> Option<String> {
         if number.bytes().all(|byte| byte.is_ascii_digit()) && number.parse::<i64>().is_ok() {

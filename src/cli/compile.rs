@@ -7,13 +7,12 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::{CodeArguments, CompileArguments, EquationArguments, UnitsChoice};
-use super::output::{check_output, names, note, read_recordings};
+use super::output::{check_output, names, note_mismatches, read_recordings};
 use super::simplification::{self, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::{EquationForm, Equations, PhaseEquations};
 use crate::files::{EmittedFile, Overwrite, earlier_files};
 use crate::model::ReducedModel;
-use crate::recording::mismatch;
 use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
 use crate::{Error, artifact};
 
@@ -149,9 +148,7 @@ fn planned(
     }
     let reading = &arguments.simplification.reading;
     let mut recording = read_recordings(std::slice::from_ref(path), reading)?.swap_remove(0);
-    for found in mismatch::notes(&recording, model.robot()?) {
-        note(&found);
-    }
+    note_mismatches(&recording, model.robot()?);
     if recording.segments.len() > 1 {
         let found = recording.segments.len();
         let message = format!("--plan takes one jump: found {found} segments");

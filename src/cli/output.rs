@@ -9,7 +9,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::args::ReadingArguments;
 use crate::Error;
 use crate::files::{Overwrite, write_whole};
-use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording};
+use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, mismatch};
+use crate::robot::Robot;
 
 /// Refuses an output that could not be written, before long work begins.
 ///
@@ -99,6 +100,13 @@ pub fn printable(text: &str) -> Cow<'_, str> {
 /// Prints a note to stderr.
 pub fn note(text: &str) {
     eprintln!("note: {}", printable(text));
+}
+
+/// Prints on stderr what cannot be true of a recording of this robot.
+pub fn note_mismatches(recording: &Recording, robot: &Robot) {
+    for found in mismatch::notes(recording, robot) {
+        note(&found);
+    }
 }
 
 /// Prints a warning to stderr.

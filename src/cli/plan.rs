@@ -8,12 +8,12 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::{PlanArguments, ReadingArguments};
-use super::output::{check_output, names, note, progress_bar, reader, spinner, warn};
+use super::output::{check_output, names, note_mismatches, progress_bar, reader, spinner, warn};
 use super::train_settings::refused;
 use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
 use crate::plan::{self, Goal, Plan, PlanSettings, Reach, Verdict};
-use crate::recording::{self, Clocks, Recording, mismatch};
+use crate::recording::{self, Clocks, Recording};
 use crate::report::figures::{Figure, figure_files};
 use crate::report::{plan_figures, plan_json, reach_figure};
 use crate::robot::Robot;
@@ -60,8 +60,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     if let Some(path) = &arguments.output {
         let recording = Recording {
             path: path.clone(),
-            segments: vec![planned.motion.clone()],
-            ignored_columns: Vec::new(),
+            ..Recording::from(planned.motion.clone())
         };
         recording::write(path, &recording)?;
         let _ = writeln!(answer.text, "\nthe plan: {}", path.display());
@@ -128,9 +127,7 @@ fn goal(
     let goal = Goal::new(distance_m, apex_m)?;
     let Some(path) = start else { return Ok(goal) };
     let recording = reader(reading, Clocks::Recorded)?.read(path)?.recording;
-    for found in mismatch::notes(&recording, robot) {
-        note(&found);
-    }
+    note_mismatches(&recording, robot);
     let first = &recording.segments[0];
     let column = |rows: &nalgebra::DMatrix<f64>| rows.column(0).into_owned();
     Ok(goal.from_start(column(&first.x), column(&first.dx)))

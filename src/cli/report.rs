@@ -8,12 +8,12 @@ use serde_json::json;
 use super::Answer;
 use super::args::ReportArguments;
 use super::mpc::run_with_both_lifts;
-use super::output::{check_output, names, note, read_recordings, spinner, write_file};
+use super::output::{check_output, names, note_mismatches, read_recordings, spinner, write_file};
 use super::simplification;
 use crate::evaluate::{Assessment, LAMBDA};
 use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
-use crate::recording::{Recording, mismatch};
+use crate::recording::Recording;
 use crate::report::figures::figure_files;
 use crate::report::{
     Content, PageOptions, Verdict, all_figures, page, verdict, without_statistics,
@@ -40,9 +40,7 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         None => None,
         Some(path) => {
             let mut read = read_recordings(std::slice::from_ref(path), &arguments.reading)?;
-            for found in mismatch::notes(&read[0], model.robot()?) {
-                note(&found);
-            }
+            note_mismatches(&read[0], model.robot()?);
             Some(read.swap_remove(0))
         }
     };

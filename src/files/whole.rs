@@ -38,10 +38,6 @@ pub fn write_whole(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    remove_left_in(match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        Some(_) | None => Path::new("."),
-    });
     // What is no file, such as /dev/null or a pipe, would be gone; a link stays, its file is replaced.
     let place = match path.metadata() {
         Ok(found) if !found.is_file() => {
@@ -50,6 +46,10 @@ pub fn write_whole(
         Ok(_) => path.canonicalize()?,
         Err(_) => path.to_owned(),
     };
+    remove_left_in(match place.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        Some(_) | None => Path::new("."),
+    });
     let mut part = Part::beside(&place)?;
     let mut file = BufWriter::new(&part.file);
     fill(&mut file)?;

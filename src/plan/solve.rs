@@ -86,17 +86,12 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
     let goal_m = [goal.distance_m(), goal.apex_m()];
     let slack = Bound::ALL.map(|bound| (bound, y[task.layout.slack(bound)]));
     let input_deviation = input_deviation(&task, &y);
-    let recording = Recording {
-        path: motion.path.clone(),
-        segments: vec![motion.clone()],
-        ignored_columns: Vec::new(),
-    };
     let findings = Findings {
         input_deviation,
         slack,
         margins: &margins,
         outside: outside(&seed, goal_m),
-        weight_share: weight_share(&recording, model.robot()?),
+        weight_share: weight_share(&Recording::from(motion.clone()), model.robot()?),
     };
     Ok(Plan {
         goal_m,

@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use super::check::check;
 use super::segment::Recording;
-use crate::robot::{FOOT_DIM, GRAVITY_M_S2, Leg, Robot};
+use crate::robot::{FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 use balance::Balance;
 use stance::{Slip, best_other_reading};
 
@@ -191,13 +191,12 @@ pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
 
 /// Encoders and decoders were learned from jumps that begin at the origin and run along x.
 fn origin(recording: &Recording) -> Option<Mismatch> {
-    let starts = recording.segments.iter().map(|segment| segment.state(0));
-    let of = |start: &[f64]| (start[12].abs().max(start[13].abs()), start[17].abs());
-    let (mut far, mut turned) = (0.0_f64, 0.0_f64);
-    for start in starts {
-        let (distance, yaw) = of(&start);
-        (far, turned) = (far.max(distance), turned.max(yaw));
-    }
+    let [x, y, yaw] = [0, 1, 5].map(|coordinate| {
+        let starts = recording.segments.iter().map(|segment| segment.state(0));
+        let starts = starts.map(|start| start[JOINT_DIM + coordinate].abs());
+        starts.fold(0.0, f64::max)
+    });
+    let (far, turned) = (x.max(y), yaw);
     let (kind, advice) = (
         MismatchKind::Origin,
         "models expect jumps that begin near the origin and run along x",

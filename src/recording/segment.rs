@@ -30,6 +30,17 @@ impl Recording {
     }
 }
 
+impl From<Segment> for Recording {
+    /// A recording of this segment alone, under its path.
+    fn from(segment: Segment) -> Self {
+        Self {
+            path: segment.path.clone(),
+            segments: vec![segment],
+            ignored_columns: Vec::new(),
+        }
+    }
+}
+
 /// Consecutive samples; every matrix has one column a sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Segment {

@@ -62,6 +62,7 @@ mod rules;
 mod shorten;
 mod simplify;
 mod substitute;
+mod tangents;
 mod trig;
 
 pub use canonical::{CanonicalForm, CanonicalForms, Coefficient, Literal, Rational};

@@ -20,9 +20,6 @@ use serde::Deserialize;
 use super::elements::Quantity;
 use crate::recording::error::{RecordingError, RecordingFault};
 
-/// Most columns that a range stands for.
-const MAX_COLUMNS: usize = 10_000;
-
 /// A map as its file says it.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -302,130 +299,21 @@ impl ColumnMap {
         let place = crate::files::Place::Entry(format!("`{key}`").into());
         RecordingError::new(&self.file, place, RecordingFault::Map { found, expected })
     }
-
-    fn require_applicable(&self) -> Result<(), RecordingError> {
-        for quantity in Quantity::ALL {
-            let Some(table) = self.table(quantity) else {
-                if quantity.is_required() {
-                    let found = "no such table".to_owned();
-                    let expected = format!("the columns of {}", quantity.column(0).name());
-                    return Err(self.fault(quantity.key(), found, expected));
-                }
-                continue;
-            };
-            let refuse = |key: &str, expected: &str| {
-                let key = format!("{}.{key}", quantity.key());
-                Err(self.fault(&key, "a value".to_owned(), expected.to_owned()))
-            };
-            let angular = quantity == Quantity::AngularVelocity;
-            let velocity = quantity == Quantity::BodyVelocity;
-            match table.frame {
-                Some(_) if !angular && !velocity => {
-                    return refuse("frame", "none: only velocities of the body have one");
-                }
-                Some(Frame::Angles) if !angular => return refuse("frame", "`world` or `body`"),
-                Some(_) | None => {}
-            }
-            if table.origin.is_some() && quantity != Quantity::BodyPosition {
-                return refuse("origin", "none: only `body.position` has one");
-            }
-            if table.release.is_some() && table.threshold.is_none() {
-                return refuse("release", "a `threshold` beside it");
-            }
-            if table.threshold.is_some() && quantity != Quantity::Feet {
-                return refuse("threshold", "none: only `feet` has one");
-            }
-            if table.release > table.threshold {
-                return refuse("release", "at most the `threshold`");
-            }
-            let scalars = [("time_offset_s", Some(table.time_offset_s))];
-            let scalars = scalars
-                .into_iter()
-                .chain([("threshold", table.threshold), ("release", table.release)]);
-            let lists = [("sign", &table.sign), ("offset", &table.offset)];
-            let listed = lists.into_iter().flat_map(|(key, factors)| {
-                let values = factors.iter().flat_map(Factors::values);
-                values.map(move |value| (key, Some(value)))
-            });
-            for (key, value) in scalars.chain(listed) {
-                if let Some(value) = value.filter(|value| !value.is_finite()) {
-                    let key = format!("{}.{key}", quantity.key());
-                    let expected = "a finite number".to_owned();
-                    return Err(self.fault(&key, value.to_string(), expected));
-                }
-            }
-            self.require_distinct(quantity, table)?;
-        }
-        let time = &self.time;
-        if time.column.is_some() && time.sample_time_s.is_some() {
-            let (found, expected) = ("a column too", "either a column or `sample_time_s`");
-            return Err(self.fault("time.sample_time_s", found.into(), expected.into()));
-        }
-        for (key, value) in [
-            ("time.sample_time_s", time.sample_time_s),
-            ("time.resample_s", time.resample_s),
-            ("time.max_gap_s", time.max_gap_s),
-        ] {
-            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
-                return Err(self.fault(key, value.to_string(), "more than 0 s".to_owned()));
-            }
-        }
-        Ok(())
-    }
-}
-
-impl Factors {
-    fn values(&self) -> Vec<f64> {
-        match self {
-            Factors::All(value) => vec![*value],
-            Factors::Each(values) => values.clone(),
-            Factors::Named(values) => values.values().copied().collect(),
-        }
-    }
-}
-
-impl ColumnMap {
-    /// No column of a table twice, and no range that no log could have.
-    fn require_distinct(&self, quantity: Quantity, table: &Table) -> Result<(), RecordingError> {
-        let key = format!("{}.columns", quantity.key());
-        let entries = match &table.columns {
-            Columns::One(name) => std::slice::from_ref(name),
-            Columns::Many(names) => names,
-        };
-        for entry in entries {
-            let Name::Text(text) = entry else { continue };
-            if let Some(numbers) = range(text)
-                && numbers.end().saturating_sub(*numbers.start()) >= MAX_COLUMNS
-            {
-                let expected = format!("at most {MAX_COLUMNS} columns");
-                return Err(self.fault(&key, format!("{text:?}"), expected));
-            }
-        }
-        let columns = table.columns(&self.names, quantity);
-        let repeated = (1..columns.len()).find(|at| columns[..*at].contains(&columns[*at]));
-        match repeated.map(|at| &columns[at]) {
-            None => Ok(()),
-            Some(Name::Text(name)) => {
-                let expected = "each column once".to_owned();
-                Err(self.fault(&key, format!("{name:?} twice"), expected))
-            }
-            Some(Name::Number(number)) => {
-                let expected = "each column once".to_owned();
-                Err(self.fault(&key, format!("{number} twice"), expected))
-            }
-        }
-    }
 }
 
 impl Table {
-    /// Its columns, patterns and ranges written out.
-    pub(super) fn columns(&self, names: &Names, quantity: Quantity) -> Vec<Name> {
-        let entries = match &self.columns {
+    /// Its columns as the file has them.
+    pub(super) fn entries(&self) -> &[Name] {
+        match &self.columns {
             Columns::One(name) => std::slice::from_ref(name),
             Columns::Many(names) => names,
-        };
+        }
+    }
+
+    /// Its columns, patterns and ranges written out.
+    pub(super) fn columns(&self, names: &Names, quantity: Quantity) -> Vec<Name> {
         let mut out = Vec::new();
-        for entry in entries {
+        for entry in self.entries() {
             match entry {
                 Name::Number(number) => out.push(Name::Number(*number)),
                 Name::Text(text) => match range(text) {
@@ -439,7 +327,7 @@ impl Table {
 }
 
 /// `4..6`, both ends included.
-fn range(text: &str) -> Option<std::ops::RangeInclusive<usize>> {
+pub(super) fn range(text: &str) -> Option<std::ops::RangeInclusive<usize>> {
     let (first, last) = text.split_once("..")?;
     Some(first.trim().parse().ok()?..=last.trim().parse().ok()?)
 }

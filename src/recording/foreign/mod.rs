@@ -15,6 +15,7 @@ mod elements;
 
 mod interpolate;
 mod log;
+mod map_checks;
 mod mcap;
 mod mcap_write;
 mod message;
