@@ -251,3 +251,22 @@ fn physical_latex_has_the_units_of_a_mass_and_of_times() {
     assert!(file("go1_d4.h").contains("1/kg"));
     assert!(!file("go1_d4.h").contains("scaled"));
 }
+
+#[test]
+fn controllers_of_physical_equations_are_those_of_scaled_ones() {
+    for name in ["go1-d4", "go2-async-d4"] {
+        let model = load(&format!("models/{name}.json"));
+        let scaled = Equations::of(&model);
+        let physical = scaled.in_physical_units().expect("has units");
+        assert!(physical.latent_units().is_some());
+        for target in [Target::Controller, Target::ControllerC] {
+            let [of_scaled, of_physical] = [&scaled, &physical].map(|equations| {
+                emit(equations, &[target], &EmitOptions::default()).expect("emits")
+            });
+            assert!(
+                !of_scaled.is_empty() && of_scaled == of_physical,
+                "{name}: {target:?}"
+            );
+        }
+    }
+}

@@ -72,7 +72,8 @@ pub struct EmitOptions {
 /// The files of the chosen targets, each with its path below the output folder; a target that is chosen
 /// twice gives them once.
 ///
-/// Equal equations and options give equal bytes.
+/// Equal equations and options give equal bytes. Controllers compute in the scaled units of the model's maps, whatever
+/// the units of the equations.
 ///
 /// # Errors
 /// [`EmitError::Codegen`] if a phase cannot be lowered or single precision cannot hold a constant,
@@ -91,6 +92,7 @@ pub fn emit(
         compiled: None,
         scripts: None,
     };
+    let control = equations.in_scaled_units();
     let mut files = Vec::new();
     for (position, target) in targets.iter().enumerate() {
         if targets[..position].contains(target) {
@@ -105,13 +107,10 @@ pub fn emit(
             Target::Latex => latex::emit(equations, &options.print)?,
             Target::Markdown => markdown::emit(equations, &options.print)?,
             Target::Mathml => mathml::emit(equations, &options.print)?,
-            Target::Controller => controller::emit(
-                equations,
-                &options.lower,
-                &provenance,
-                options.plan.as_ref(),
-            )?,
-            Target::ControllerC => controller_c::emit(equations, options, &provenance)?,
+            Target::Controller => {
+                controller::emit(control, &options.lower, &provenance, options.plan.as_ref())?
+            }
+            Target::ControllerC => controller_c::emit(control, options, &provenance)?,
         });
     }
     Ok(files)

@@ -51,6 +51,8 @@ pub struct Equations<'a> {
     pub(super) phases: Vec<PhaseEquations>,
     pub(super) steps: Vec<ExactStep>,
     pub(super) latent_units: Option<LatentUnits>,
+    /// What equations in physical units were made from.
+    scaled: Option<Box<Equations<'static>>>,
 }
 
 impl<'a> Equations<'a> {
@@ -83,6 +85,7 @@ impl<'a> Equations<'a> {
             model: Cow::Borrowed(model),
             steps: Vec::new(),
             latent_units: None,
+            scaled: None,
         }
     }
 
@@ -129,6 +132,7 @@ impl<'a> Equations<'a> {
             phases,
             steps: self.steps.clone(),
             latent_units: Some(units),
+            scaled: Some(Box::new(self.clone().into_owned())),
         }
     }
 
@@ -141,6 +145,16 @@ impl<'a> Equations<'a> {
             phases: self.phases,
             steps: self.steps,
             latent_units: self.latent_units,
+            scaled: self.scaled,
+        }
+    }
+
+    /// These equations in the scaled units of the model's maps, whose latent inputs are those of `W_e`: what a
+    /// controller computes with.
+    pub fn in_scaled_units(&self) -> &Equations<'_> {
+        match &self.scaled {
+            Some(scaled) => scaled,
+            None => self,
         }
     }
 
