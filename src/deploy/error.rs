@@ -31,6 +31,17 @@ pub enum EmitError {
         /// Name of the model.
         model: String,
     },
+    /// A phase has the name of the controller's functions.
+    #[error(
+        "model `{model}`, phase `{phase}`: found the name that the controller's own functions have in C, \
+         expected another"
+    )]
+    PhaseName {
+        /// Name of the model.
+        model: String,
+        /// Name of the phase.
+        phase: String,
+    },
     /// The embedded jump cannot be read.
     #[error("the recorded jump of the example cannot be read")]
     Jump(#[from] RecordingError),

@@ -110,7 +110,8 @@ pub(super) fn input_in_words(rule: &InputRule, name: &str) -> String {
     let torques = match rule.actuators() {
         None => "its torques are those of the motors",
         Some(_) => {
-            "its torques are those at the links, what the joints take is off; commands have it on top"
+            "its torques are those at the links: what friction and the inertia of the motors take is off, and \
+             commands have it on top"
         }
     };
     let wrench = match rule.wrench_frame() {
@@ -123,8 +124,13 @@ pub(super) fn input_in_words(rule: &InputRule, name: &str) -> String {
              those that do work on the rates of roll, pitch and yaw about the body's origin"
         }
     };
-    let text =
-        format!("Of u, {torques}; {wrench}. {name}_generalised_input() of the model makes it.");
+    let of_torques = match rule.actuators() {
+        None => "",
+        Some(_) => ", of torques less the inertia of the motors times ddq",
+    };
+    let text = format!(
+        "Of u, {torques}; {wrench}. {name}_generalised_input() of the model makes it{of_torques}."
+    );
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
         let last = lines.last_mut().expect("never empty");

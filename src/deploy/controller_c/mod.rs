@@ -14,8 +14,9 @@ mod source;
 
 use askama::Template;
 
+use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::tidy;
-use crate::codegen::{Precision, Units, c, interface::ModelInterface};
+use crate::codegen::{Precision, Units, c};
 use crate::deploy::EmitError;
 use crate::deploy::controller::{constant, input_in_words, texts};
 use crate::deploy::emit::EmitOptions;
@@ -89,6 +90,13 @@ pub fn emit(
     options.precision.check(&entries)?;
     if options.precision == Precision::Single {
         entries.state_bounds();
+    }
+    let own = |phase: &&PhaseInterface| phase.identifier.eq_ignore_ascii_case("controller");
+    if let Some(phase) = entries.phases.iter().find(own) {
+        return Err(EmitError::PhaseName {
+            model: model.name().to_owned(),
+            phase: phase.identifier.clone(),
+        });
     }
     let name = entries.identifier.clone();
     let folder = format!("{name}-controller-c");

@@ -30,6 +30,7 @@ const TOLERANCE_NM: [f64; 2] = [1e-6, 0.1];
 struct SelfTest<'a> {
     facts: &'a Facts<'a>,
     steps: usize,
+    horizon: usize,
     torques: String,
     statuses: String,
     push_z: f64,
@@ -91,6 +92,7 @@ pub(super) fn text(
     let text = SelfTest {
         facts,
         steps,
+        horizon: controller.settings().horizon,
         torques: Numbers(Precision::Double).matrix(commands.iter().map(|c| c.torque_nm)),
         statuses: integers(commands.iter().map(|c| i64::from(c.status.code()))),
         push_z: PUSH[0],
@@ -104,14 +106,19 @@ pub(super) fn text(
     Ok(text.render()?)
 }
 
-/// Inputs of all samples as the generated `generalised_input` makes them, without what the inertia of
-/// the motors takes.
+/// Inputs of all samples as `set_reference_torque` makes them: the motors' accelerations by differences of the samples
+/// on both sides.
 fn inputs(rule: &InputRule, jump: &Jump) -> Result<Vec<f64>, EmitError> {
     let mut u = Vec::with_capacity(jump.time_s.len() * STATE_DIM);
     for (k, torque) in jump.torque_nm.iter().enumerate() {
         let x: [f64; STATE_DIM] = std::array::from_fn(|i| jump.x[k][i]);
         let dq = std::array::from_fn(|joint| jump.dx[k][joint]);
-        let losses = rule.losses(&dq, &[0.0; JOINT_DIM]);
+        let (before, after) = (k.saturating_sub(1), (k + 1).min(jump.time_s.len() - 1));
+        let passed_s = jump.time_s[after] - jump.time_s[before];
+        let ddq = std::array::from_fn(|joint| {
+            (jump.dx[after][joint] - jump.dx[before][joint]) / passed_s
+        });
+        let losses = rule.losses(&dq, &ddq);
         let net: [f64; JOINT_DIM] = std::array::from_fn(|joint| torque[joint] - losses[joint]);
         let wrench = rule.wrench(&x, &net, jump.feet[k])?;
         u.extend(net);

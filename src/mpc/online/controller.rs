@@ -315,7 +315,9 @@ impl Controller {
                 false => self.effectiveness.interrupt(),
             }
         }
-        self.memory.joint_position = Some(command.joint_position_rad);
+        if measurement.time_s.is_finite() {
+            self.memory.command_s = Some(measurement.time_s);
+        }
         self.memory.input.copy_from_slice(&command.u_lat);
         command.solve_us = started.elapsed().as_secs_f64() * 1e6;
     }

@@ -18,7 +18,10 @@ pub(super) struct Memory {
     pub joint_velocity: [f64; JOINT_DIM],
     /// Feed-forward part of the last torques, without a hold's damping.
     pub feed_forward_nm: [f64; JOINT_DIM],
+    /// Posture of the last plan, or the one to hold.
     pub joint_position: Option<[f64; JOINT_DIM]>,
+    /// Time of the last command.
+    pub command_s: Option<f64>,
     /// Measurements in a row that were not believed.
     pub disbelieved: usize,
 }
@@ -33,6 +36,7 @@ impl Memory {
             joint_velocity: [0.0; JOINT_DIM],
             feed_forward_nm: [0.0; JOINT_DIM],
             joint_position: None,
+            command_s: None,
             disbelieved: 0,
         }
     }
@@ -56,14 +60,24 @@ impl Controller {
             .filter(|&stage| stage < stages);
         match stage {
             Some(stage) if self.write_plan(stage, command) => command.source = Source::ShiftedPlan,
-            Some(_) | None => self.hold(now, command),
+            Some(_) | None => self.hold(now, self.since_last_command(time_s), command),
+        }
+    }
+
+    /// Time since the last command, at most one stage, and one stage where it is not known.
+    fn since_last_command(&self, time_s: f64) -> f64 {
+        match self.memory.command_s {
+            Some(last_s) if time_s.is_finite() => {
+                (time_s - last_s).clamp(0.0, self.settings.step_s)
+            }
+            _ => self.settings.step_s,
         }
     }
 
     /// Posture held, torque fading, joints damped.
-    fn hold(&mut self, now: Option<f64>, command: &mut Command) {
+    fn hold(&mut self, now: Option<f64>, passed_s: f64, command: &mut Command) {
         let fallback = &self.settings.fallback;
-        let fade = (-self.settings.step_s / fallback.torque_decay_s).exp();
+        let fade = (-passed_s / fallback.torque_decay_s).exp();
         // Velocities of a measurement that was refused must not become torques.
         let damping = match command.status {
             Status::NotFinite | Status::WrongDimension | Status::MeasurementJump => 0.0,
@@ -78,30 +92,26 @@ impl Controller {
         });
         command.torque_nm = self.plant.clamp_torque(torque);
         command.losses_nm = [0.0; JOINT_DIM];
+        if self.memory.joint_position.is_none() {
+            self.memory.joint_position = now.and_then(|now| self.reference_posture(now));
+        }
+        let middle = |(lower, upper): (f64, f64)| 0.5 * (lower + upper);
         command.joint_position_rad = match self.memory.joint_position {
             Some(position) => position,
-            None => self.posture(now),
+            None => self.plant.robot().joint_limit_rad().map(middle),
         };
         command.joint_velocity_rad_s = [0.0; JOINT_DIM];
         command.u_lat.fill(0.0);
         command.source = Source::Hold;
     }
 
-    /// A posture to hold when no command has been given yet: the reference's at the time.
-    fn posture(&mut self, now: Option<f64>) -> [f64; JOINT_DIM] {
+    /// The reference's posture at a time.
+    fn reference_posture(&mut self, now: f64) -> Option<[f64; JOINT_DIM]> {
         let d = self.plant.latent_dim();
-        let middle = self
-            .plant
-            .robot()
-            .joint_limit_rad()
-            .map(|(lower, upper)| 0.5 * (lower + upper));
-        match (&self.reference, now) {
-            (Some(reference), Some(now)) => {
-                reference.state_at(now, &mut self.memory.measured);
-                self.plant
-                    .clamp_joints(self.plant.decode_joints(&self.memory.measured[..d]))
-            }
-            _ => middle,
-        }
+        self.reference
+            .as_ref()?
+            .state_at(now, &mut self.memory.measured);
+        let joints = self.plant.decode_joints(&self.memory.measured[..d]);
+        Some(self.plant.clamp_joints(joints))
     }
 }

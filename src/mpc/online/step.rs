@@ -25,6 +25,9 @@ impl Controller {
         self.memory.time_s = Some(measurement.time_s);
         self.memory.joint_velocity = std::array::from_fn(|joint| measurement.dx[joint]);
         let Some(reference) = &self.reference else {
+            // Nothing to follow yet: the robot stays as it is.
+            let measured = std::array::from_fn(|joint| measurement.x[joint]);
+            (self.memory.joint_position).get_or_insert(self.plant.clamp_joints(measured));
             return Err(Status::NoReference);
         };
         let (z, dz) = self.memory.measured.split_at_mut(self.plant.latent_dim());
@@ -162,6 +165,7 @@ impl Controller {
         command.torque_nm = self.plant.clamp_torque(torque);
         command.losses_nm = losses;
         self.memory.feed_forward_nm = command.torque_nm;
+        self.memory.joint_position = Some(command.joint_position_rad);
         command.inconsistency = self.inconsistency(&lifted, &command.net_torque_nm());
         true
     }
