@@ -29,9 +29,9 @@ const PUSHES: [[f64; 3]; 4] = [
     [0.0, 0.0, 1.0],
     [0.0, 0.0, -1.0],
 ];
-/// Control steps from a push to the end, and from one push to the next.
-const WINDOW_STEPS: usize = 20;
-const STEPS_BETWEEN: usize = 10;
+/// Times from a push to the end, and from one push to the next, s.
+const WINDOW_S: f64 = 0.2;
+const BETWEEN_S: f64 = 0.1;
 /// Most pushes along one segment, times the directions: longer segments are pushed less often.
 const MOST_WINDOWS: usize = 50;
 /// Deviation beyond which a run counts with this one, m: the linear geometry ends there.
@@ -80,6 +80,9 @@ pub(super) fn recovery(
     driver: Driver,
 ) -> Result<Recovery, MpcError> {
     let mut recovery = Recovery::default();
+    let step_s = controller.settings().step_s;
+    let [window_steps, steps_between] =
+        [WINDOW_S, BETWEEN_S].map(|time_s| ((time_s / step_s).round() as usize).max(1));
     for segment in recording.segments.iter().filter(|s| s.len() >= 2) {
         let input = segment.input_within_limits(controller.plant().input_rule())?;
         set_reference(
@@ -88,12 +91,12 @@ pub(super) fn recovery(
             ReferenceInput::Recorded,
             input.as_slice(),
         )?;
-        let samples = control_samples(&segment.time_s, controller.settings().step_s);
+        let samples = control_samples(&segment.time_s, step_s);
         let stands = |window: &&[usize]| {
-            let feet = &segment.feet[window[0]..=window[WINDOW_STEPS]];
+            let feet = &segment.feet[window[0]..=window[window_steps]];
             feet[0].contains(&true) && feet.iter().all(|other| *other == feet[0])
         };
-        let windows = samples.windows(WINDOW_STEPS + 1).step_by(STEPS_BETWEEN);
+        let windows = samples.windows(window_steps + 1).step_by(steps_between);
         let windows: Vec<&[usize]> = windows.filter(stands).collect();
         let every = windows.len().div_ceil(MOST_WINDOWS).max(1);
         for window in windows.into_iter().step_by(every) {
@@ -237,14 +240,20 @@ mod tests {
         let jump = root.join("examples/recordings/go1/test_01.csv.gz");
         let jump = recording::read(&jump).expect("shipped");
         let mut controller = Controller::new(&model, MpcSettings::default()).expect("complete");
-        let mut pushed = |driver| recovery(&mut controller, &jump, driver).expect("a sound jump");
-        let replay = pushed(Driver::Replay).rms_m().expect("the robot stands");
-        // after k of 100 samples of 2 ms the body is 0.1 m/s k 2 ms away
+        // after k of 100 samples of 2 ms the body is 0.1 m/s k 2 ms away, whatever the control step
         let mean_square = (1..=100).map(|k| f64::from(k * k)).sum::<f64>() / 100.0;
-        assert!(
-            (replay - 0.1 * 0.002 * mean_square.sqrt()).abs() < 1e-9,
-            "{replay}"
-        );
+        for step_s in [0.002, 0.02] {
+            let settings = MpcSettings {
+                step_s,
+                ..MpcSettings::default()
+            };
+            let mut controller = Controller::new(&model, settings).expect("complete");
+            let replay = recovery(&mut controller, &jump, Driver::Replay).expect("a sound jump");
+            let replay = replay.rms_m().expect("the robot stands");
+            let expected = 0.1 * 0.002 * mean_square.sqrt();
+            assert!((replay - expected).abs() < 1e-9, "{step_s}: {replay}");
+        }
+        let mut pushed = |driver| recovery(&mut controller, &jump, driver).expect("a sound jump");
         let feedback = pushed(Driver::Feedback);
         let none = pushed(Driver::NoFeedback);
         assert!(feedback.rms_m() < none.rms_m(), "{feedback:?} {none:?}");
