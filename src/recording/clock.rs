@@ -2,7 +2,8 @@
 //!
 //! A logger that counts its samples instead of reading a clock says that time passes evenly even
 //! where samples came late or were lost. The velocities know better: between two samples the robot
-//! moved by velocity times elapsed time, in every coordinate.
+//! moved by velocity times elapsed time, in every coordinate. A clock is wrong for all of them alike: where they
+//! disagree, a coordinate is wrong, not the clock.
 
 use nalgebra::DMatrix;
 
@@ -17,6 +18,10 @@ const LEAST_DISAGREEMENT: f64 = 0.03;
 const JOINT_WEIGHT: f64 = 0.01;
 /// Motion that counts as evidence of either clock, (m/s)^2.
 const STANDSTILL: f64 = 1e-3;
+/// Largest difference of a coordinate's ratio of elapsed to stamped time from the median that agrees with it, relative.
+const AGREES: f64 = 0.25;
+/// Joints and position of the body: angles of the body are mended by themselves.
+const COORDINATES: usize = JOINT_DIM + BODY_DIM / 2;
 /// Samples closer than this share of a step are the same sample, logged again.
 const SAME_SAMPLE: f64 = 0.4;
 /// Steps between two samples from which what lies between them is lost rather than late.
@@ -51,7 +56,10 @@ pub struct Timed {
 /// [`TooShort`](crate::recording::RecordingFault::TooShort) if fewer than two samples remain.
 pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
     let n = segment.len();
-    let elapsed: Vec<Interval> = (1..n).map(|right| Interval::of(segment, right)).collect();
+    let agreeing = agreeing_coordinates(segment);
+    let elapsed: Vec<Interval> = (1..n)
+        .map(|right| Interval::of(segment, right, &agreeing))
+        .collect();
     let moved: f64 = elapsed.iter().map(|interval| interval.moved).sum();
     let stamped: f64 = (elapsed.iter())
         .map(|interval| interval.speed * interval.stamped_s)
@@ -84,6 +92,32 @@ pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
         resampled: resamples,
         lost,
     })
+}
+
+/// The coordinates without those that move and disagree on how fast time passes; none if more than a third of those
+/// that move do.
+fn agreeing_coordinates(segment: &Segment) -> Vec<usize> {
+    let ratio = |row: usize| {
+        let intervals = (1..segment.len()).map(|right| Interval::of(segment, right, &[row]));
+        let (moved, stamped) = intervals.fold((0.0, 0.0), |(moved, stamped), interval| {
+            let speed = interval.speed * interval.stamped_s;
+            (moved + interval.moved, stamped + speed)
+        });
+        (stamped > STANDSTILL * segment.duration_s()).then(|| moved / stamped)
+    };
+    let ratios: Vec<Option<f64>> = (0..COORDINATES).map(ratio).collect();
+    let mut moving: Vec<f64> = ratios.iter().flatten().copied().collect();
+    moving.sort_by(f64::total_cmp);
+    let Some(median) = moving.get(moving.len() / 2).copied() else {
+        return (0..COORDINATES).collect();
+    };
+    let agrees = |ratio: f64| (ratio - median).abs() <= AGREES * median.abs();
+    let count = moving.iter().filter(|ratio| agrees(**ratio)).count();
+    if 3 * count < 2 * moving.len() {
+        return Vec::new();
+    }
+    let all = 0..COORDINATES;
+    all.filter(|&row| ratios[row].is_none_or(agrees)).collect()
 }
 
 /// Which times lie between samples that are more than [`LOST_STEPS`] apart.
@@ -147,10 +181,10 @@ struct Interval {
 }
 
 impl Interval {
-    /// From the sample before `right` to `right`.
-    fn of(segment: &Segment, right: usize) -> Self {
+    /// From the sample before `right` to `right`, in some of the coordinates.
+    fn of(segment: &Segment, right: usize, coordinates: &[usize]) -> Self {
         let (mut speed, mut moved) = (0.0, 0.0);
-        for row in 0..JOINT_DIM + BODY_DIM / 2 {
+        for &row in coordinates {
             let weight = if row < JOINT_DIM { JOINT_WEIGHT } else { 1.0 };
             let velocity = (segment.dx[(row, right - 1)] + segment.dx[(row, right)]) / 2.0;
             let displacement = segment.x[(row, right)] - segment.x[(row, right - 1)];
