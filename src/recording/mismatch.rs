@@ -20,7 +20,7 @@ use super::check::check;
 use super::segment::Recording;
 use crate::robot::{FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 use balance::Balance;
-use stance::{Slip, best_other_reading};
+use stance::{Slip, best_other_place, best_other_reading};
 
 /// Largest root mean square of the places of feet on the ground about their medians, m.
 const SLIP_M: f64 = 0.025;
@@ -28,6 +28,8 @@ const SLIP_M: f64 = 0.025;
 const READING_FACTOR: f64 = 1.4;
 /// By how much they have to stay better in place, m.
 const READING_LEAST_M: f64 = 3e-4;
+/// How many times, and by how much, m, feet stay better where they are with the body's place read otherwise.
+const PLACE: (f64, f64) = (2.0, 0.004);
 /// Vertical acceleration of the body in flight, m/s^2.
 const FALL_M_S2: (f64, f64) = (-16.0, -6.5);
 /// Force of the feet over what weight and acceleration need.
@@ -113,7 +115,7 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
     let slip = Slip::of(recording, robot);
     let balance = Balance::of(recording, robot);
     let found = [
-        foot_slip(&slip),
+        place(recording, robot, &slip).or_else(|| foot_slip(&slip)),
         legs_or_signs(recording, robot, &slip),
         feet_columns(recording, robot),
         fall(&balance),
@@ -244,6 +246,23 @@ fn foot_slip(slip: &Slip) -> Option<Mismatch> {
              pose, their units or signs, or the contacts are not this robot's",
             1e3 * value,
             1e3 * SLIP_M
+        ),
+    })
+}
+
+fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Mismatch> {
+    let value = slip.rms_m()?;
+    let (best, reading) = best_other_place(recording, robot)?;
+    let bound = PLACE.0 * best + PLACE.1;
+    (value > bound).then(|| Mismatch {
+        kind: MismatchKind::FootSlip,
+        value,
+        bound,
+        words: format!(
+            "feet on the ground move by {:.1} mm, and by {:.1} mm {reading}: is the body's place in another frame than \
+             its attitude?",
+            1e3 * value,
+            1e3 * best
         ),
     })
 }

@@ -43,7 +43,7 @@ fn joints(kind: usize) -> impl Iterator<Item = usize> {
 }
 
 /// The wrong recordings of one right one.
-const SPOILED: [(&str, Spoil); 28] = [
+const SPOILED: [(&str, Spoil); 30] = [
     ("joint and body angles in degrees", |s| {
         scale(s, (0..12).chain(15..18), DEGREES);
     }),
@@ -102,6 +102,8 @@ const SPOILED: [(&str, Spoil); 28] = [
     }),
     ("feet always down", |s| s.feet.fill([true; 4])),
     ("body x and z exchanged", |s| swap(s, 12, 14)),
+    ("body x and y exchanged", |s| swap(s, 12, 13)),
+    ("body x backwards", |s| scale(s, [12], -1.0)),
     ("flexion and knee exchanged", |s| {
         for joint in joints(1) {
             swap(s, joint, joint + 1);

@@ -25,12 +25,31 @@ pub(super) enum Reading {
     Legs([Leg; FOOT_DIM]),
     /// Coordinates that are recorded with the other sign, and their name.
     Negated(&'static [usize], &'static str),
+    /// What body x and y are made of, and what that is.
+    Placed([[f64; 2]; 2], &'static str),
+}
+
+impl Reading {
+    /// The state that the columns would mean; orders of legs are not applied here.
+    fn read(&self, x: &mut [f64; STATE_DIM]) {
+        match self {
+            Self::Legs(_) => {}
+            Self::Negated(coordinates, _) => coordinates.iter().for_each(|&i| x[i] = -x[i]),
+            Self::Placed(rows, _) => {
+                let place = [x[JOINT_DIM], x[JOINT_DIM + 1]];
+                for (axis, row) in rows.iter().enumerate() {
+                    x[JOINT_DIM + axis] = row[0] * place[0] + row[1] * place[1];
+                }
+            }
+        }
+    }
 }
 
 impl fmt::Display for Reading {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Negated(_, name) => write!(f, "with {name} of the other sign"),
+            Self::Placed(_, words) => f.write_str(words),
             Self::Legs(legs) => {
                 let names = legs.map(Leg::short_name).join(", ");
                 write!(f, "with the joints of fr, fl, rr, rl taken from {names}")
@@ -38,6 +57,9 @@ impl fmt::Display for Reading {
         }
     }
 }
+
+/// The columns as they are.
+const AS_RECORDED: Reading = Reading::Legs(Leg::ALL);
 
 /// Coordinates that are easily recorded with the other sign.
 const SIGNS: [Reading; 4] = [
@@ -47,11 +69,40 @@ const SIGNS: [Reading; 4] = [
     Reading::Negated(&[0, 3, 6, 9], "hip abduction"),
 ];
 
+/// Frames and orders in which the place of a body is easily recorded, its attitude being right.
+const PLACES: [Reading; 6] = [
+    Reading::Placed([[-1.0, 0.0], [0.0, 1.0]], "with body x of the other sign"),
+    Reading::Placed([[1.0, 0.0], [0.0, -1.0]], "with body y of the other sign"),
+    Reading::Placed([[0.0, 1.0], [1.0, 0.0]], "with body x and y exchanged"),
+    Reading::Placed(
+        [[-1.0, 0.0], [0.0, -1.0]],
+        "with body x and y of the other sign",
+    ),
+    Reading::Placed(
+        [[0.0, 1.0], [-1.0, 0.0]],
+        "with body x and y turned by a right angle",
+    ),
+    Reading::Placed(
+        [[0.0, -1.0], [1.0, 0.0]],
+        "with body x and y turned by a right angle",
+    ),
+];
+
+/// The reading of the body's place under which feet on the ground stay best where they are, and their root mean square
+/// then, m.
+pub(super) fn best_other_place(recording: &Recording, robot: &Robot) -> Option<(f64, Reading)> {
+    let judged = PLACES.into_iter().filter_map(|reading| {
+        let slip = Slip::read(recording, robot, &reading);
+        Some((slip.rms_m()?, reading))
+    });
+    (judged.filter(|(rms_m, _)| rms_m.is_finite())).min_by(|one, other| one.0.total_cmp(&other.0))
+}
+
 /// The reading under which feet on the ground stay best in place against each other, and their root mean square then,
 /// m: of all orders of the legs but the recorded one, and of the other signs of [`SIGNS`].
 pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option<(f64, Reading)> {
     let all: Vec<Stances> = (recording.segments.iter())
-        .map(|segment| Stances::of(segment, robot, &[], &Leg::ALL))
+        .map(|segment| Stances::of(segment, robot, &AS_RECORDED, &Leg::ALL))
         .collect();
     let orders = orders().into_iter().filter(|order| *order != Leg::ALL);
     let of_orders = orders.map(|order| {
@@ -60,17 +111,8 @@ pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option
             .for_each(|stances| stances.add_to(&mut slip, &order));
         (slip, Reading::Legs(order))
     });
-    let of_signs = SIGNS.into_iter().map(|reading| {
-        let negated: &[usize] = match reading {
-            Reading::Negated(coordinates, _) => coordinates,
-            Reading::Legs(_) => &[],
-        };
-        let mut slip = Slip::default();
-        for segment in &recording.segments {
-            Stances::of(segment, robot, negated, &[]).add_to(&mut slip, &Leg::ALL);
-        }
-        (slip, reading)
-    });
+    let of_signs =
+        (SIGNS.into_iter()).map(|reading| (Slip::read(recording, robot, &reading), reading));
     let readings = of_orders.chain(of_signs);
     let judged = readings.filter_map(|(slip, reading)| Some((slip.relative_rms_m()?, reading)));
     (judged.filter(|(rms_m, _)| rms_m.is_finite())).min_by(|one, other| one.0.total_cmp(&other.0))
@@ -120,9 +162,14 @@ pub(super) struct Slip {
 impl Slip {
     /// Over all segments of a recording.
     pub fn of(recording: &Recording, robot: &Robot) -> Self {
+        Self::read(recording, robot, &AS_RECORDED)
+    }
+
+    /// The same if the columns are read otherwise; orders of legs are not.
+    fn read(recording: &Recording, robot: &Robot, reading: &Reading) -> Self {
         let mut slip = Self::default();
         for segment in &recording.segments {
-            Stances::of(segment, robot, &[], &[]).add_to(&mut slip, &Leg::ALL);
+            Stances::of(segment, robot, reading, &[]).add_to(&mut slip, &Leg::ALL);
         }
         slip
     }
@@ -145,15 +192,15 @@ struct Stances {
 }
 
 impl Stances {
-    /// With `negated` coordinates of the state; each leg is read from its own columns and from those of `others`.
-    fn of(segment: &Segment, robot: &Robot, negated: &[usize], others: &[Leg]) -> Self {
+    /// In a reading of the columns; each leg is read from its own columns and from those of `others`.
+    fn of(segment: &Segment, robot: &Robot, reading: &Reading, others: &[Leg]) -> Self {
         let mut moved = Vec::new();
         for (leg, samples) in stances(segment) {
             let others = others.iter().copied().filter(|other| *other != leg);
             for from in std::iter::once(leg).chain(others) {
                 let place = |sample: usize| {
                     let mut x = segment.state(sample);
-                    negated.iter().for_each(|&i| x[i] = -x[i]);
+                    reading.read(&mut x);
                     let q = from.of_joints(&std::array::from_fn(|joint| x[joint]));
                     x[3 * leg.index()..][..3].copy_from_slice(&q);
                     foot_place(robot, leg, &x, true)
