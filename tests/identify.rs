@@ -191,3 +191,42 @@ fn command_unknown_robot_is_wrong_usage() {
         "{stderr}"
     );
 }
+
+#[test]
+fn values_that_the_motion_contradicts_are_told() {
+    let read = |name: &str| recording::read(&path(name)).expect("a shipped recording");
+    let names = [
+        "go1/test_01.csv.gz",
+        "go1/test_02.csv.gz",
+        "go1/test_03.csv.gz",
+    ];
+    let right: Vec<Recording> = names.map(read).into();
+    let go1 = Robot::by_name("go1").expect("a known robot");
+    let spoiled = |spoil: &dyn Fn(&mut recording::Segment)| {
+        let mut wrong = right.clone();
+        wrong
+            .iter_mut()
+            .flat_map(|jump| &mut jump.segments)
+            .for_each(spoil);
+        identify(&wrong, go1).expect("a mass all the same")
+    };
+    assert_eq!(identify(&right, go1).expect("jumps").contradiction(), None);
+    let backwards = spoiled(&|segment| {
+        for matrix in [&mut segment.x, &mut segment.dx, &mut segment.ddx] {
+            matrix.row_mut(12).neg_mut();
+        }
+    });
+    let thighs = spoiled(&|segment| {
+        for leg in 0..4 {
+            segment.torque_nm.row_mut(3 * leg + 1).neg_mut();
+        }
+    });
+    for wrong in [backwards, thighs] {
+        let reason = wrong.contradiction().expect("told");
+        assert!(
+            reason.starts_with("R^2 of the trunk's acceleration forwards is -"),
+            "{reason}"
+        );
+        assert!(wrong.notes.contains(&reason));
+    }
+}

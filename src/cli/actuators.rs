@@ -22,13 +22,14 @@ pub(super) fn identified(
     recordings: &RecordingFiles,
     robot: &Robot,
 ) -> Result<Option<Actuators>, Error> {
-    match identify(&recordings.first(IDENTIFIED_FROM)?, robot) {
-        Ok(found) => Ok(Some(found.actuators)),
-        Err(reason) => {
-            note(&format!(
-                "torques are those of the motors, as the recordings do not tell the joints' losses: {reason}"
-            ));
-            Ok(None)
-        }
-    }
+    let found = identify(&recordings.first(IDENTIFIED_FROM)?, robot);
+    let reason = match found.map(|found| (found.contradiction(), found.actuators)) {
+        Ok((None, actuators)) => return Ok(Some(actuators)),
+        Ok((Some(reason), _)) => reason,
+        Err(reason) => reason.to_string(),
+    };
+    note(&format!(
+        "torques are those of the motors, as the recordings do not tell the joints' losses: {reason}"
+    ));
+    Ok(None)
 }

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::IdentifyArguments;
-use super::output::{check_output, read_with, reader, spinner, write_file};
+use super::output::{check_output, note_repeated, read_with, reader, spinner, write_file};
 use super::robot;
 use crate::Error;
 use crate::files::Overwrite;
@@ -28,6 +28,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
         &reader(&arguments.reading, Clocks::Recorded)?,
         &arguments.recordings,
     )?;
+    note_repeated(&[("recordings", &arguments.recordings)]);
     let progress = spinner("identifying");
     let found = identify(&recordings, robot);
     progress.finish_and_clear();

@@ -1,6 +1,7 @@
 //! Files and progress of every command.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -11,6 +12,7 @@ use crate::Error;
 use crate::files::{Overwrite, write_whole};
 use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, mismatch};
 use crate::robot::Robot;
+use crate::train::sha256;
 
 /// Refuses an output that could not be written, before long work begins.
 ///
@@ -106,6 +108,32 @@ pub fn note(text: &str) {
 pub fn note_mismatches(recording: &Recording, robot: &Robot) {
     for found in mismatch::notes(recording, robot) {
         note(&found);
+    }
+}
+
+/// Prints on stderr which recordings are given twice, under whatever name: sets that share jumps judge nothing, and a
+/// jump that counts twice says less than two.
+pub fn note_repeated(sets: &[(&str, &[PathBuf])]) {
+    let mut first: BTreeMap<String, (&str, &Path)> = BTreeMap::new();
+    for (set, paths) in sets {
+        for path in *paths {
+            let Ok(bytes) = std::fs::read(path) else {
+                continue; // reading it as a recording says why
+            };
+            match first.get(&sha256(&bytes)) {
+                Some((other, earlier)) if other == set => note(&format!(
+                    "{}: the same recording as {}, which counts twice in the {set}",
+                    path.display(),
+                    earlier.display()
+                )),
+                Some((other, earlier)) => note(&format!(
+                    "{}: in the {set} and, as {}, in the {other}: its {set} figures flatter",
+                    path.display(),
+                    earlier.display()
+                )),
+                None => drop(first.insert(sha256(&bytes), (set, path))),
+            }
+        }
     }
 }
 

@@ -17,9 +17,13 @@ use crate::recording::{
     RecordingFiles,
 };
 use crate::robot::Robot;
+use crate::typeset::words::counted;
 
 /// A jump of a divided set: its file, its segment there, and the first row.
 type Place = (PathBuf, usize, usize);
+
+/// Names of the sets of a training.
+const SETS: [&str; 3] = ["training", "validation", "test"];
 
 /// The recordings of a training; their files are read when the samples are needed.
 pub struct RecordedSets {
@@ -117,6 +121,27 @@ impl RecordedSets {
             "validation": places(validation),
             "test": places(test),
         }))
+    }
+
+    /// The sets that the jumps of a file came into, if they were divided.
+    pub fn sets_of(&self, path: &str) -> Vec<&'static str> {
+        let sets = SETS.into_iter().zip(self.divided.iter().flatten());
+        let is_of = |(file, ..): &Place| file.display().to_string() == path;
+        let with = sets.filter(|(_, places)| places.iter().any(is_of));
+        with.map(|(name, _)| name).collect()
+    }
+
+    /// The jumps of each set in words, if they were divided.
+    pub fn text(&self) -> Option<String> {
+        let sets = SETS.into_iter().zip(self.divided.as_ref()?);
+        let lines = sets.map(|(name, places)| {
+            let jumps = places
+                .iter()
+                .map(|(path, _, row)| format!("{} (row {row})", path.display()));
+            let jumps = jumps.collect::<Vec<_>>().join(", ");
+            format!("{name}, {}: {jumps}\n", counted(places.len(), "jump"))
+        });
+        Some(lines.collect())
     }
 
     /// The notes of all sets together, as far as files were read.

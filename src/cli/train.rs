@@ -9,7 +9,7 @@ use serde_json::json;
 use super::Answer;
 use super::actuators;
 use super::args::{TrainArguments, TrainSettings};
-use super::output::{check_output, names, note, spinner, stem};
+use super::output::{check_output, names, note, note_repeated, spinner, stem};
 use super::prepared_recordings::{RecordedSets, read_all};
 use super::robot;
 use super::train_settings;
@@ -44,7 +44,15 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let sets = Recordings::new(&recorded.training, &recorded.validation);
     let files = arguments.recordings.iter().chain(&arguments.validation);
     let command = command_line(arguments, &settings, method, &options);
-    let origin = Origin::of_files(command, files);
+    let mut origin = Origin::of_files(command, files);
+    for file in &mut origin.recordings {
+        file.sets = recorded.sets_of(&file.path);
+    }
+    note_repeated(&[
+        ("training", &arguments.recordings),
+        ("validation", &arguments.validation),
+        ("test", &arguments.test),
+    ]);
 
     let bar = spinner("training");
     let mut findings_reported = false;
@@ -80,13 +88,9 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let mut answer = answer(arguments, &trained, tested.as_ref());
     answer.json["interrupted"] = is_interrupted.into();
     answer.json["recordings"] = recorded.findings_json();
-    if let (Some(sets), Some(json)) = (&recorded.divided, recorded.json()) {
+    if let (Some(text), Some(json)) = (recorded.text(), recorded.json()) {
         answer.json["split"] = json;
-        let [training, validation, test] = sets.each_ref().map(Vec::len);
-        let _ = writeln!(
-            answer.text,
-            "\nof the jumps {training} were for training, {validation} for validation, {test} for test"
-        );
+        let _ = write!(answer.text, "\n{text}");
     }
     if !is_interrupted {
         return Ok((answer, 0));

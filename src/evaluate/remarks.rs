@@ -32,14 +32,21 @@ pub fn remarks(
         .collect())
 }
 
-/// Phases whose accelerations the mean would explain better. Flight is left out: accelerations hardly vary there, and
-/// any model is as far off as their mean.
+/// By how much `R^2` of a phase's accelerations may be below that of the training.
+const BELOW_TRAINING: f64 = 0.5;
+
+/// Phases whose accelerations the mean would explain better, and clearly worse than those of the training are explained.
+/// Flight is left out: accelerations hardly vary there, and any model is as far off as their mean.
 fn unexplained(model: &ReducedModel, pointwise: &PointwiseSums) -> Vec<String> {
     let accelerations = pointwise.acceleration.iter().map(FitSums::fit);
-    let worse_than_mean = |fit: &Option<Fit>| fit.and_then(|fit| fit.r2).is_some_and(|r2| r2 < 0.0);
-    (model.phases().iter().zip(accelerations))
-        .filter(|(phase, fit)| !phase.feet.matches([false; 4]) && worse_than_mean(fit))
-        .map(|(phase, _)| {
+    let phases = model.phases().iter().zip(accelerations).enumerate();
+    let unlike = phases.filter(|(index, (phase, fit))| {
+        let bound = training_r2(model, *index).map_or(0.0, |r2| (r2 - BELOW_TRAINING).min(0.0));
+        let r2 = fit.and_then(|fit: Fit| fit.r2);
+        !phase.feet.matches([false; 4]) && r2.is_some_and(|r2| r2 < bound)
+    });
+    unlike
+        .map(|(_, (phase, _))| {
             format!(
                 "in {} the latent accelerations are further off than their mean would be (R^2 below 0): \
                  these recordings are unlike those of the training. Another robot, other signs or \
@@ -48,4 +55,11 @@ fn unexplained(model: &ReducedModel, pointwise: &PointwiseSums) -> Vec<String> {
             )
         })
         .collect()
+}
+
+/// `R^2` of a phase's accelerations over the training, if the model file says it. Refinement by rollouts may have traded
+/// it for predictions.
+fn training_r2(model: &ReducedModel, phase: usize) -> Option<f64> {
+    let training = model.provenance().get("report")?.get("training")?;
+    training.get("ddz_r2")?.get(phase)?.as_f64()
 }

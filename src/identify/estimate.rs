@@ -75,7 +75,9 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
         ));
     }
     notes.extend(round.notes());
-    state.result(robot, &segments, &round.windows, notes)
+    let mut found = state.result(robot, &segments, &round.windows, notes)?;
+    found.notes.extend(found.contradiction());
+    Ok(found)
 }
 
 /// A segment ready for its equations.

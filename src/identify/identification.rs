@@ -134,7 +134,25 @@ pub struct Identification {
     pub notes: Vec<String>,
 }
 
+/// By how much the whole equation may fit less than forces alone, as rounds weigh windows by their noise.
+const WORSE: f64 = 0.05;
+
 impl Identification {
+    /// Why these values are no robot's: the trunk moves against them, or better by the feet's forces alone.
+    pub fn contradiction(&self) -> Option<String> {
+        let alone = self.force_alone.r2;
+        let axes = [
+            ("forwards", self.r2.x, alone.x),
+            ("upwards", self.r2.z, alone.z),
+        ];
+        let (axis, whole, alone) =
+            (axes.into_iter()).find(|(_, whole, alone)| *whole < 0.0 || *whole < alone - WORSE)?;
+        Some(format!(
+            "R^2 of the trunk's acceleration {axis} is {whole:.2}, and {alone:.2} by the feet's forces alone: \
+             signs, order, units or frames of torques, joints or body are not this robot's, and the values are none"
+        ))
+    }
+
     /// Viscous friction by kind of joint, N m s/rad.
     pub fn viscous(&self) -> PerKind {
         PerKind::mean(&self.actuators.viscous)

@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use serde_json::{Value, json};
+
 use super::contents::{Content, jumps};
 use super::jump::modelled;
 use super::tables::{body_rms, template_rms};
@@ -154,8 +156,14 @@ fn known_digests(model: &ReducedModel) -> BTreeSet<&str> {
         .provenance()
         .get("recordings")
         .and_then(|value| value.as_array());
+    let was_test = |entry: &&Value| {
+        entry
+            .get("sets")
+            .is_some_and(|sets| *sets == json!(["test"]))
+    };
     let entries = recordings.into_iter().flatten();
     entries
+        .filter(|entry| !was_test(entry))
         .filter_map(|entry| entry.get("digest")?.as_str())
         .filter(|text| !text.is_empty())
         .collect()

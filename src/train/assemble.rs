@@ -45,6 +45,8 @@ pub struct SourceFile {
     pub path: String,
     /// Digest of its bytes, with the name of the algorithm in front.
     pub digest: String,
+    /// The sets that its jumps came into, such as `test`, if a training divided them.
+    pub sets: Vec<&'static str>,
 }
 
 impl Origin {
@@ -63,6 +65,7 @@ impl Origin {
             digest: std::fs::read(path.as_ref())
                 .map(|bytes| sha256(&bytes))
                 .unwrap_or_default(),
+            sets: Vec::new(),
         });
         Self {
             command: command.into(),
@@ -190,7 +193,10 @@ fn provenance(
     let recordings: Vec<Value> = origin
         .recordings
         .iter()
-        .map(|file| json!({ "path": file.path, "digest": file.digest }))
+        .map(|file| match file.sets.is_empty() {
+            true => json!({ "path": file.path, "digest": file.digest }),
+            false => json!({ "path": file.path, "digest": file.digest, "sets": file.sets }),
+        })
         .collect();
     let mut map = Map::new();
     map.insert("command".into(), json!(origin.command));
