@@ -87,6 +87,9 @@ pub enum Error {
     /// An MCAP file holds one stretch of time.
     #[error("found {0} segments, expected one for an MCAP file")]
     OneSegment(usize),
+    /// The ending of a file says its format.
+    #[error("{path}: found {found}, expected a name that ends in .csv, .csv.gz or .mcap", path = path.display())]
+    Ending { path: PathBuf, found: String },
     /// A map is guessed of one log at a time.
     #[error("found {0} files, expected one log to guess a map of")]
     OneLog(usize),
@@ -129,6 +132,7 @@ impl Error {
             | Self::Name(_)
             | Self::Check(_)
             | Self::OneLog(_)
+            | Self::Ending { .. }
             | Self::OneSegment(_) => true,
             Self::Recording(_)
             | Self::Identify(_)

@@ -55,7 +55,7 @@ enum Losses {
 impl Losses {
     fn actuators(&self) -> Result<Actuators, RobotFileError> {
         match self {
-            Losses::File(path) => read_actuators(path),
+            Losses::File(path) => read_actuators(path, None),
             Losses::Arrays(arrays) => ActuatorsEntry::of_arrays(arrays.clone())?.actuators(""),
         }
     }

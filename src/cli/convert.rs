@@ -20,6 +20,7 @@ use crate::{Error, artifact};
 pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(Some(&arguments.output), overwrite)?;
+    check_ending(&arguments.output)?;
     let rule = match &arguments.inputs_of {
         None => None,
         Some(path) => Some(artifact::read(path)?.input_rule()?),
@@ -51,6 +52,31 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
             "inputs": rule.is_some(),
         }),
     })
+}
+
+/// Refuses an output whose name does not say its format.
+fn check_ending(path: &Path) -> Result<(), Error> {
+    let name = path
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase();
+    // What is no file of the disk, such as a pipe, may have any name.
+    let is_special = path.exists() && !path.is_file();
+    match is_special
+        || [".csv", ".csv.gz", ".mcap"]
+            .iter()
+            .any(|ending| name.ends_with(ending))
+    {
+        true => Ok(()),
+        false => Err(Error::Ending {
+            path: path.to_owned(),
+            found: match name.split_once('.') {
+                Some((_, ending)) => format!(".{ending}"),
+                None => "no ending".to_owned(),
+            },
+        }),
+    }
 }
 
 /// The segments one after the other; where there are several, each begins at 0 s.

@@ -115,6 +115,8 @@ fn lacking(model: &ReducedModel) -> Option<&'static str> {
 }
 
 fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
+    let robot = arguments.robot.as_deref().map(robot::chosen).transpose()?;
+    let actuators = arguments.actuators.as_deref();
     Ok(ImportOptions {
         name: arguments
             .name
@@ -131,10 +133,10 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
         latent_dim: arguments.latent_dim,
         phases: arguments.phase.clone(),
         order: arguments.order.clone(),
-        robot: arguments.robot.as_deref().map(robot::chosen).transpose()?,
+        robot,
         wrench_frame: arguments.wrench_frame.unwrap_or_default(),
-        actuators: (arguments.actuators.as_deref())
-            .map(read_actuators)
+        actuators: actuators
+            .map(|path| read_actuators(path, robot))
             .transpose()?,
         sample_time_s: arguments.sample_time,
         ..ImportOptions::of_factors(&arguments.scaling, &arguments.input_scaling)

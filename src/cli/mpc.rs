@@ -6,12 +6,12 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::MpcArguments;
-use super::output::{check_output, names, progress_bar, read_recordings, write_file};
+use super::output::{check_output, names, note, progress_bar, read_recordings, write_file};
 use crate::evaluate::{ReferenceInput, along_recording, control_metrics, remarks};
 use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
 use crate::mpc::{Controller, Lift, MpcSettings};
-use crate::recording::Recording;
+use crate::recording::{Recording, Segment};
 use crate::report::figures::figure_files;
 use crate::report::{NamedRun, control_figures, control_table, failures, run_table};
 use crate::robot::{JOINT_DIM, Robot};
@@ -90,7 +90,11 @@ pub fn run_all(
     Ok(runs)
 }
 
-/// Runs with default settings: with the plain lift, then with the consistent one.
+/// By how much samples may be apart for more than a stage, relative.
+const STEP_SLACK: f64 = 1e-3;
+
+/// Runs with default settings: with the plain lift, then with the consistent one. Recordings of fewer samples than a
+/// default stage has are followed at the rate of the slowest, which a note says.
 ///
 /// # Errors
 /// As [`run_all`].
@@ -98,10 +102,23 @@ pub fn run_with_both_lifts(
     model: &ReducedModel,
     recordings: &[Recording],
 ) -> Result<[Vec<NamedRun>; 2], Error> {
+    let default = MpcSettings::default();
+    let segments = recordings.iter().flat_map(|recording| &recording.segments);
+    let steps = segments.filter(|segment| segment.len() >= 2);
+    let slowest_s = steps.map(Segment::mean_step_s).fold(0.0, f64::max);
+    let step_s = default.step_s.max(slowest_s);
+    if step_s > default.step_s * (1.0 + STEP_SLACK) {
+        note(&format!(
+            "the controller acts every {:.0} ms, as often as there are samples; {:.0} ms is usual",
+            1e3 * step_s,
+            1e3 * default.step_s
+        ));
+    }
     let with = |lift| {
         let settings = MpcSettings {
             lift,
-            ..MpcSettings::default()
+            step_s,
+            ..default
         };
         run_all(model, recordings, settings, ReferenceInput::Recorded)
     };

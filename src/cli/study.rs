@@ -9,7 +9,6 @@ use super::actuators;
 use super::args::{StudyArguments, TrainSettings};
 use super::output::spinner;
 use super::prepared_recordings::{RecordedSets, read_all, reader_for};
-use super::robot;
 use super::train_settings;
 use crate::Error;
 use crate::files::{EmittedFile, Overwrite, check_folder, write_files};
@@ -61,7 +60,7 @@ fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
 
 fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let mut settings = settings(arguments)?;
-    let robot = robot::chosen(settings.robot.as_deref().unwrap_or("go1"))?;
+    let robot = train_settings::robot(&settings)?;
     let recorded = RecordedSets::whole(
         [&arguments.recordings, &arguments.validation, &[]],
         &settings,

@@ -11,7 +11,6 @@ use super::actuators;
 use super::args::{TrainArguments, TrainSettings};
 use super::output::{check_output, names, note, note_repeated, spinner, stem};
 use super::prepared_recordings::{RecordedSets, read_all};
-use super::robot;
 use super::train_settings;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
@@ -33,7 +32,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
         .latent_dim
         .expect("checked by clap, or with the file");
     let method = train_settings::method(&settings);
-    let robot = robot::chosen(settings.robot.as_deref().unwrap_or("go1"))?;
+    let robot = train_settings::robot(&settings)?;
     let mut options = train_settings::options(&settings, latent_dim, model_name(arguments))?;
     let recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
     if train_settings::actuators(&settings) == actuators::IDENTIFIED {

@@ -8,11 +8,13 @@ use serde_json::{Map, Value};
 
 use super::actuators;
 use super::args::{PhaseSet, TrainArguments, TrainSettings, Widths};
+use super::robot::chosen;
 use crate::Error;
 use crate::limits::of_training;
 use crate::limits::table::LAYER_WIDTH;
 use crate::model::{Activation, StandardLibrary};
 use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule};
+use crate::robot::Robot;
 use crate::robot_file::read_actuators;
 use crate::train::{
     Coordinates, LibraryChoice, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError,
@@ -69,9 +71,17 @@ pub(super) fn options(
     }
     options.actuators = match actuators(settings) {
         actuators::NONE | actuators::IDENTIFIED => None,
-        path => Some(read_actuators(Path::new(path))?),
+        path => Some(read_actuators(Path::new(path), Some(robot(settings)?))?),
     };
     Ok(options)
+}
+
+/// The robot of a training.
+///
+/// # Errors
+/// [`Error::Robot`] for an unknown name.
+pub(super) fn robot(settings: &TrainSettings) -> Result<&'static Robot, Error> {
+    chosen(settings.robot.as_deref().unwrap_or("go1"))
 }
 
 /// How recordings are prepared for the training.
@@ -252,7 +262,7 @@ pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
     if let (Some(activation), true) = (settings.activation, maps(settings).is_linear()) {
         return refused(
             "activation",
-            format!("{activation:?} without hidden layers"),
+            format!("{activation} without hidden layers"),
             "`--encoder-layers` or `--decoder-layers` beside it",
         );
     }
@@ -271,10 +281,10 @@ pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
             "free, or a training without `--paper`",
         );
     }
-    if let (Some(rows), None) = (settings.smooth_rows, &settings.smooth) {
+    if settings.smooth_rows.is_some() && settings.smooth.is_none() {
         return refused(
             "smooth-rows",
-            format!("{rows:?} without a filter"),
+            "set without a filter".to_owned(),
             "`--smooth` beside it",
         );
     }

@@ -162,13 +162,15 @@ fn leg_frame(
     let calf = thigh * turn(links.flexion, q[2]);
     let [along_hip, along_thigh, along_calf] = [links.hip, links.thigh, links.calf]
         .map(|link| link.try_normalize(0.0).unwrap_or_default());
+    // The body's front, whichever way the axis of a leg turns: the four legs share what is in front of their links.
+    let to_the_left = links.flexion * links.flexion.y.signum();
     let frame = LegFrame {
         abduction: attitude * links.abduction,
         side: hip * along_hip,
         thigh: thigh * along_thigh,
         calf: calf * along_calf,
-        thigh_front: thigh * along_thigh.cross(&links.flexion),
-        calf_front: calf * along_calf.cross(&links.flexion),
+        thigh_front: thigh * along_thigh.cross(&to_the_left),
+        calf_front: calf * along_calf.cross(&to_the_left),
         flexion: hip * links.flexion,
     };
     let hip_rate = rate + frame.abduction * dq[0];

@@ -59,19 +59,18 @@ pub(super) fn assign<'f>(
     })
 }
 
-/// The tensors with names of parts that no option settles: `--map` settles all weights of a map at
-/// once, `--scaling` the factors. A `std` beside it is not settled: it is refused.
+/// The tensors with names of parts that `--map` does not settle: it settles all weights of a map at once. Factors beside
+/// `--scaling` are not settled: they are refused.
 fn named<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
     mapped: &[Assigned<'_>],
 ) -> Result<Vec<Assigned<'f>>, ImportError> {
-    let is_settled = |role: &Role| match role {
-        Role::StateScaling | Role::InputScaling if options.scaling.is_some() => true,
-        _ => mapped.iter().any(|assigned| match (&assigned.role, role) {
+    let is_settled = |role: &Role| {
+        mapped.iter().any(|assigned| match (&assigned.role, role) {
             (Role::Weights(a, _), Role::Weights(b, _)) => a == b,
             (a, b) => a == b,
-        }),
+        })
     };
     let mut named: Vec<Assigned<'f>> = Vec::new();
     for info in tensors.infos() {

@@ -40,7 +40,7 @@ pub enum MpcError {
         phase: String,
     },
     /// A controller that acts more often than there are samples.
-    #[error("{}: a sample every {:.3} ms; found a step of {:.3e} s, expected at least as long", path.display(), recorded_s * 1e3, found_s)]
+    #[error("{}: a sample every {:.3} ms; found a step of {} s, expected at least as long (`romc mpc --step {:.3}`)", path.display(), recorded_s * 1e3, found_s, recorded_s)]
     Step {
         /// The recording.
         path: PathBuf,

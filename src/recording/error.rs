@@ -186,7 +186,10 @@ pub enum RecordingFault {
         phases: Vec<String>,
     },
     /// A smoothing window and polynomial order that do not fit together; no file's fault.
-    #[error("smoothing window {window} with order {order}: expected an odd window above the order")]
+    #[error(
+        "smoothing window {window} with order {order}: expected an odd window above the order, \
+             at most 1001, and an order of at most 12"
+    )]
     Smoothing {
         /// Samples of the window.
         window: usize,

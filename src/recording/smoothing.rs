@@ -28,8 +28,9 @@ impl SavitzkyGolay {
     /// # Errors
     /// [`RecordingFault::Smoothing`] for an even window or one not above the order.
     pub fn new(window: usize, order: usize) -> Result<Self, RecordingError> {
-        const LARGEST: usize = 1001;
-        if window.is_multiple_of(2) || window <= order || window > LARGEST || order > 12 {
+        // The error names both.
+        const LARGEST: (usize, usize) = (1001, 12);
+        if window.is_multiple_of(2) || window <= order || window > LARGEST.0 || order > LARGEST.1 {
             return Err(RecordingFault::Smoothing { window, order }.of_argument());
         }
         let half = (window / 2) as f64;

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::error::RobotFileError;
 use super::read::{from_toml_text, text_of};
-use crate::robot::{Actuators, JOINT_DIM, JOINT_NAMES};
+use crate::robot::{Actuators, JOINT_DIM, JOINT_NAMES, Robot};
 
 /// How many numbers an array has.
 const COUNT: &str = "12, or 3 for hx, hy, kn";
@@ -15,6 +15,7 @@ const COUNT: &str = "12, or 3 for hx, hy, kn";
 /// The table that is read; a file of `romc identify` has others as well.
 #[derive(Deserialize)]
 struct File {
+    robot: Option<String>,
     actuators: ActuatorsEntry,
 }
 
@@ -88,12 +89,23 @@ impl ActuatorsEntry {
     }
 }
 
-/// Reads the table `[actuators]` of a TOML file, such as one of `romc identify`.
+/// Reads the table `[actuators]` of a TOML file, such as one of `romc identify`, for a robot if one is known.
 ///
 /// # Errors
-/// [`RobotFileError`] with the place that is wrong or missing.
-pub fn read_actuators(path: &Path) -> Result<Actuators, RobotFileError> {
+/// [`RobotFileError`] with the place that is wrong or missing; a file that names another robot.
+pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators, RobotFileError> {
     let file = path.display().to_string();
-    let File { actuators } = from_toml_text(&file, &text_of(path)?)?;
-    actuators.actuators(&file)
+    let File {
+        robot: of,
+        actuators,
+    } = from_toml_text(&file, &text_of(path)?)?;
+    match (of, robot.map(Robot::name)) {
+        (Some(found), Some(expected)) if found != expected => Err(RobotFileError::at(
+            &file,
+            "robot",
+            found,
+            format!("{expected}, whose recordings these are, or no such line"),
+        )),
+        _ => actuators.actuators(&file),
+    }
 }

@@ -17,7 +17,7 @@ pub enum RobotFileFault {
     #[error("{0}, or a file that ends in .toml or .urdf")]
     Unknown(RobotError),
     /// The file system refused.
-    #[error("cannot read the robot")]
+    #[error("cannot read the file")]
     Read(#[source] io::Error),
     /// The file is larger than any robot.
     #[error("found more than {0} bytes, which no robot needs")]

@@ -57,7 +57,7 @@ pub enum TrainError {
     },
     /// More latent coordinates than the encoder may look at, or none.
     #[error(
-        "latent dimension {requested}, expected 1 to {active} (the rows that an encoder can have of the coordinates that move or are actuated; `--coordinates free` allows more)"
+        "latent dimension {requested}, expected 1 to {active} (the rows that an encoder can have of the coordinates that move or are actuated; `--coordinates free` and `--mask-std 0` allow more)"
     )]
     LatentDim {
         /// What was asked for.

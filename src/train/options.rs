@@ -147,7 +147,7 @@ pub struct EncoderOptions {
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
     /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right;
-    /// the dynamics obey what is known of them ([`Knowledge`](super::knowledge::Knowledge)).
+    /// the dynamics obey what is known of them.
     Named,
     /// Any rows over all coordinates that move or are actuated.
     Free,

@@ -9,6 +9,9 @@ from typing import Optional, Union
 
 _OPTION = re.compile(r"--([a-z]+(?:-[a-z]+)*)(?: ([\w.,=-]*\w))?")
 
+# Options that take no value.
+_FLAGS = {"as_learned", "exact", "force", "leave_out_implausible", "paper", "siunitx", "unchecked"}
+
 
 def _in_python(message: str) -> str:
     """The message with options of the command line as keyword arguments: `--xi-layout X` as `xi_layout="X"`."""
@@ -16,6 +19,9 @@ def _in_python(message: str) -> str:
     def argument(match: re.Match[str]) -> str:
         name, value = match.group(1).replace("-", "_"), match.group(2)
         name = {"phase": "phases"}.get(name, name)
+        if name in _FLAGS:
+            following = "" if value is None else f" {value}"
+            return f"{name}=True{following}"
         if value is None:
             return f"{name}="
         left, equals, right = value.partition("=")

@@ -13,7 +13,8 @@ pub struct ReadingArguments {
     /// (`romc inspect --guess LOG` writes a first one)
     #[arg(long, value_name = "MAP.toml")]
     pub columns: Option<PathBuf>,
-    /// Whether clocks and angular rates that disagree with the motion are mended (repaired unless given)
+    /// Whether clocks and angular rates that disagree with the motion are mended (unless given they are, but not by
+    /// `inspect` and `convert`, which show and keep what was recorded)
     #[arg(long, value_enum, hide_possible_values = false)]
     pub clock: Option<Clocks>,
 }

@@ -269,7 +269,7 @@ pub struct StudyArguments {
     #[arg(long, value_name = "PART", value_parser = Shard::parse, conflicts_with = "merge")]
     pub shard: Option<Shard>,
     /// Join the finished parts in these folders instead of training
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["recordings", "validation", "config"])]
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["recordings", "validation", "config", "latent_dims", "seeds", "method", "paper", "robot"])]
     pub merge: Vec<PathBuf>,
     /// Folder of the study
     #[arg(long, value_name = "DIR", default_value = "out/study")]

@@ -413,6 +413,8 @@ impl Rows<'_> {
         let has_acceleration = accelerations.iter().any(|q| self.values(*q).is_some());
         if has_acceleration {
             self.derive_accelerations();
+        } else {
+            (self.notes).push("accelerations are differences of velocities".to_owned());
         }
         let mut builder = SegmentBuilder::new(self.path, has_acceleration, false);
         for i in kept {
