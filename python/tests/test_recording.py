@@ -65,7 +65,7 @@ def test_recording_saved_is_read_back(jump, tmp_path):
     path = tmp_path / "jump.csv.gz"
     jump.save(path)
     assert np.array_equal(romc.read(path).dx, jump.dx)
-    with pytest.raises(romc.RomcError, match="already exists"):
+    with pytest.raises(romc.RomcError, match="already exists; pass force=True to replace it"):
         jump.save(path)
     jump.save(path, force=True)
 

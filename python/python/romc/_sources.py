@@ -55,7 +55,10 @@ def _is_pair(source: Any) -> bool:
 
 
 def _layer(name: str, pair: LayerPair) -> Tensors:
-    weights, bias = pair
+    parts = tuple(pair)
+    if len(parts) != 2:
+        raise ModelError(f"`{name}`: found {len(parts)} parts, expected weights and bias", tensor=name)
+    weights, bias = parts
     tensors = {f"{name}.weight": floats(f"{name}.weight", weights, 2)}
     if bias is not None:
         tensors[f"{name}.bias"] = np.ascontiguousarray(floats(f"{name}.bias", bias))
