@@ -320,7 +320,7 @@ fn command_shows_a_robot_and_writes_its_toml() {
         (
             vec!["robot", "none.toml"],
             1,
-            "none.toml: cannot read the robot",
+            "none.toml: cannot read the file",
         ),
         (
             vec!["robot", &urdf, "--feet", "skull,nw_paw,sw_paw,ne_paw"],

@@ -217,6 +217,7 @@ impl Fault {
                 EmitError::Control(error) => Fault::of_mpc(error),
                 EmitError::Nonlinear { .. } => Fault::at_tensor("encoder"),
                 EmitError::Jump(error) => Fault::of_recording(error),
+                EmitError::PhaseName { .. } => Fault::at_tensor("phases"),
                 EmitError::JumpInput(_) => Fault::of(Class::Other),
                 EmitError::Typeset(_) | EmitError::Codegen(_) | EmitError::Template(_) => {
                     Fault::of(Class::Model)

@@ -303,7 +303,7 @@ def test_robot_of_a_file_travels_with_the_model(parts, tmp_path):
     assert "solo12" in repr(model)
     model.save(tmp_path / "m.json")
     assert romc.Model.load(tmp_path / "m.json") == model
-    with pytest.raises(romc.RomcError, match="cannot read the robot") as caught:
+    with pytest.raises(romc.RomcError, match="cannot read the file") as caught:
         romc.Model.from_arrays(**{**parts, "robot": tmp_path / "none.toml"})
     assert caught.value.file == str(tmp_path / "none.toml")
 

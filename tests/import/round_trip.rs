@@ -316,7 +316,7 @@ fn import_takes_scale_factors_from_tensors() {
     let imported = import_from_bytes("m.npz", Format::Npz, &bytes, &options).expect("factors");
     assert_same(&imported, &original, NAMES);
 
-    // Tensors named as the parts need no option; factors that are given take their place.
+    // Tensors named as the parts need no option, and take no other factors beside them.
     for tensor in &mut stored {
         match tensor.name.as_str() {
             "s_x" => tensor.name = "scaling.state".to_owned(),
@@ -326,12 +326,12 @@ fn import_takes_scale_factors_from_tensors() {
     }
     options.mapping.clear();
     let bytes = npz(&stored, CompressionMethod::Stored);
-    let run = |options: &ImportOptions| {
-        import_from_bytes("m.npz", Format::Npz, &bytes, options).expect("factors")
-    };
-    assert_same(&run(&options), &original, NAMES);
+    let run = |options: &ImportOptions| import_from_bytes("m.npz", Format::Npz, &bytes, options);
+    assert_same(&run(&options).expect("factors"), &original, NAMES);
     options.scaling = Some(romc::model::Scaling::uniform(0.5));
-    let given = run(&options);
-    assert_eq!(given.model.scaling().ok(), options.scaling.as_ref());
-    assert_eq!(given.report.unused.len(), 2);
+    let refused = run(&options).expect_err("factors twice").to_string();
+    assert_eq!(
+        refused,
+        "--scaling: found factors here and in tensors, expected one of the two"
+    );
 }
