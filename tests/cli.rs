@@ -1367,3 +1367,152 @@ fn training_that_is_interrupted_says_so_in_text_exit_code_and_provenance() {
     }
     panic!("no training lived to be interrupted");
 }
+
+#[test]
+fn held_out_jumps_and_repeated_recordings_are_said() {
+    let folder = folder();
+    let jumps = ["test_01", "test_02", "test_03", "train_01"];
+    let jumps = jumps.map(|name| format!("examples/recordings/go1/{name}.csv.gz"));
+    let copy = path(&folder, "copy.csv.gz");
+    fs::copy(&jumps[3], &copy).expect("copied");
+    let model = path(&folder, "split.json");
+    let mut arguments = vec!["train"];
+    arguments.extend(jumps.iter().map(String::as_str));
+    arguments.extend([
+        "--latent-dim",
+        "2",
+        "--refinements",
+        "0",
+        "--split",
+        "2,1,1",
+        "--output",
+        &model,
+    ]);
+    let said = done(&arguments);
+    let line = said
+        .lines()
+        .find(|line| line.starts_with("test, 1 jump: "))
+        .expect("the test set");
+    let held_out = jumps
+        .iter()
+        .find(|jump| line.contains(*jump))
+        .expect("one of them");
+    let page = path(&folder, "page.html");
+    let of_test = done(&["report", &model, held_out, "--output", &page]);
+    assert!(
+        of_test.contains("Its training did not see it."),
+        "{of_test}"
+    );
+    let seen = said
+        .lines()
+        .find(|line| line.starts_with("training, "))
+        .expect("the training set");
+    let seen = jumps
+        .iter()
+        .find(|jump| seen.contains(*jump))
+        .expect("one of them");
+    let of_training = done(&["report", &model, seen, "--force", "--output", &page]);
+    assert!(of_training.contains("Its training saw it"), "{of_training}");
+
+    let other = path(&folder, "other.json");
+    let output = romc(&[
+        "train",
+        &jumps[0],
+        &jumps[3],
+        "--test",
+        &copy,
+        "--latent-dim",
+        "2",
+        "--refinements",
+        "0",
+        "--output",
+        &other,
+    ]);
+    let notes = text(&output.stderr);
+    assert!(notes.contains("which is in the training set"), "{notes}");
+    let output = romc(&["identify", &jumps[0], &jumps[0], "--robot", "go1"]);
+    let notes = text(&output.stderr);
+    assert!(notes.contains("and counts twice"), "{notes}");
+}
+
+#[test]
+fn endings_merges_and_losses_that_do_not_fit_are_refused() {
+    let folder = folder();
+    let jump = "examples/recordings/go1/test_01.csv.gz";
+    for name in ["a.xyz", "a.csv.gzip", "a"] {
+        let to = path(&folder, name);
+        let output = romc(&["convert", jump, "--output", &to]);
+        assert_eq!(output.status.code(), Some(2), "{name}");
+        assert!(text(&output.stderr).contains("expected a name that ends in .csv"));
+        assert!(!Path::new(&to).exists());
+    }
+    let upper = path(&folder, "A.MCAP");
+    done(&["convert", jump, "--output", &upper]);
+    assert_eq!(&fs::read(&upper).expect("written")[1..5], b"MCAP");
+
+    let output = romc(&["study", "--merge", "one", "two", "--seeds", "7"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        text(&output.stderr).contains("--seeds"),
+        "{}",
+        text(&output.stderr)
+    );
+
+    let losses = path(&folder, "losses.toml");
+    done(&["identify", jump, "--robot", "go1", "--output", &losses]);
+    let of_another = fs::read_to_string(&losses)
+        .expect("written")
+        .replace("\"go1\"", "\"go2\"");
+    fs::write(&losses, of_another).expect("changed");
+    let model = path(&folder, "model.json");
+    let output = romc(&[
+        "train",
+        jump,
+        "--latent-dim",
+        "2",
+        "--actuators",
+        &losses,
+        "--output",
+        &model,
+    ]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        text(&output.stderr).contains("robot: found go2, expected go1"),
+        "{}",
+        text(&output.stderr)
+    );
+}
+
+#[test]
+fn report_follows_slow_recordings_at_their_own_rate() {
+    let folder = folder();
+    let slow = path(&folder, "slow.csv");
+    let fast = fs::read_to_string({
+        let plain = path(&folder, "fast.csv");
+        done(&[
+            "convert",
+            "examples/recordings/go1/test_01.csv.gz",
+            "--output",
+            &plain,
+        ]);
+        plain
+    });
+    let rows: Vec<String> = fast.expect("written").lines().map(str::to_owned).collect();
+    let every_tenth = rows
+        .iter()
+        .enumerate()
+        .filter(|(row, _)| row % 10 == 1 || *row == 0);
+    let kept: Vec<&str> = every_tenth.map(|(_, line)| line.as_str()).collect();
+    fs::write(&slow, kept.join("\n") + "\n").expect("written");
+    let page = path(&folder, "page.html");
+    let output = romc(&["report", "models/go1-d4.json", &slow, "--output", &page]);
+    let notes = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{notes}");
+    assert!(notes.contains("the controller acts every 20 ms"), "{notes}");
+    let output = romc(&["mpc", "models/go1-d4.json", &slow]);
+    assert!(
+        text(&output.stderr).contains("`romc mpc --step 0.02`"),
+        "{}",
+        text(&output.stderr)
+    );
+}

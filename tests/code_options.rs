@@ -270,3 +270,20 @@ fn controllers_of_physical_equations_are_those_of_scaled_ones() {
         }
     }
 }
+
+#[test]
+fn controller_refuses_a_phase_with_the_name_of_its_functions() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/go1-d2.json");
+    let text = fs::read_to_string(path).expect("shipped");
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("renamed.json");
+    fs::write(&path, text.replace("\"contact\"", "\"controller\"")).expect("written");
+    let renamed = romc::artifact::read(&path).expect("a model");
+    let refused = emit(
+        &Equations::of(&renamed),
+        &[Target::ControllerC],
+        &EmitOptions::default(),
+    );
+    let message = refused.expect_err("two functions of one name").to_string();
+    assert!(message.contains("phase `controller`"), "{message}");
+}

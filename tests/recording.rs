@@ -5,6 +5,8 @@
 
 #[path = "recording/bad_files.rs"]
 mod bad_files;
+#[path = "recording/clock.rs"]
+mod clock;
 #[path = "recording/foreign.rs"]
 mod foreign;
 #[path = "recording/formats.rs"]

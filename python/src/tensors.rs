@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use romc::Error;
 use romc::evaluate::RoundTrip;
 use romc::import::{ImportOptions, LibraryChoice, Tensor, parse_standard};
-use romc::robot::Actuators;
+use romc::robot::{Actuators, Robot};
 use romc::robot_file::{ActuatorsEntry, RobotFileError, find, read_actuators};
 use romc::sim::with_input_statistics;
 
@@ -53,9 +53,9 @@ enum Losses {
 }
 
 impl Losses {
-    fn actuators(&self) -> Result<Actuators, RobotFileError> {
+    fn actuators(&self, robot: Option<&Robot>) -> Result<Actuators, RobotFileError> {
         match self {
-            Losses::File(path) => read_actuators(path, None),
+            Losses::File(path) => read_actuators(path, robot),
             Losses::Arrays(arrays) => ActuatorsEntry::of_arrays(arrays.clone())?.actuators(""),
         }
     }
@@ -74,7 +74,9 @@ impl ImportArguments {
         };
         let activation = self.activation.as_deref().map(str::parse).transpose();
         let robot = self.robot.as_deref().map(find).transpose();
-        let actuators = self.actuators.as_ref().map(Losses::actuators).transpose();
+        let robot = robot.map_err(|error| python_error(py, error))?;
+        let actuators = self.actuators.as_ref();
+        let actuators = actuators.map(|losses| losses.actuators(robot)).transpose();
         let order = self.order.as_deref().map(str::parse).transpose();
         let (phases, map) = (self.phases.iter(), self.map.iter());
         Ok(ImportOptions {
@@ -91,7 +93,7 @@ impl ImportArguments {
                 .map(|name| choice(py, "xi_layout", name))
                 .transpose()?,
             activation: activation.map_err(|error| python_error(py, Error::Model(error)))?,
-            robot: robot.map_err(|error| python_error(py, error))?,
+            robot,
             order: order.map_err(|error| python_error(py, Error::Model(error)))?,
             wrench_frame: wrench_frame(py, &self.wrench_frame)?,
             actuators: actuators.map_err(|error| python_error(py, error))?,

@@ -133,7 +133,7 @@ def test_faults_of_arrays_name_tensor_and_index(parts):
     error = refusal(xi={name: value[:-1] for name, value in parts["xi"].items()})
     assert error.tensor.startswith("xi.")
     error = refusal(encoder=(weights, bias, bias))
-    assert "found 3 parts, expected weights and bias" in str(error)
+    assert "found an array, expected (weights, bias)" in str(error)
     error = refusal(encoder=(weights + 0j, bias))
     assert error.tensor == "encoder.weight" and "complex" in str(error)
     error = refusal(encoder=(np.vstack([weights[:-1], weights[:1]]), bias))

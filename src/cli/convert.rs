@@ -20,7 +20,7 @@ use crate::{Error, artifact};
 pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(Some(&arguments.output), overwrite)?;
-    check_ending(&arguments.output)?;
+    let format = format_of(&arguments.output)?;
     let rule = match &arguments.inputs_of {
         None => None,
         Some(path) => Some(artifact::read(path)?.input_rule()?),
@@ -39,7 +39,7 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
         segments.iter().map(Segment::len).sum::<usize>(),
         segments.len(),
     );
-    write(&arguments.output, segments, inputs.as_deref())?;
+    write((&arguments.output, format), segments, inputs.as_deref())?;
     let output = arguments.output.display().to_string();
     Ok(Answer {
         text: format!("{output}: {samples} samples in {count} segments\n"),
@@ -54,21 +54,26 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     })
 }
 
-/// Refuses an output whose name does not say its format.
-fn check_ending(path: &Path) -> Result<(), Error> {
+/// How an output is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Text,
+    Mcap,
+}
+
+/// The format that the ending of a name says; what is no file of a disk gets text.
+fn format_of(path: &Path) -> Result<Format, Error> {
     let name = path
         .file_name()
         .unwrap_or_default()
         .to_string_lossy()
         .to_lowercase();
-    // What is no file of the disk, such as a pipe, may have any name.
-    let is_special = path.exists() && !path.is_file();
-    match is_special
-        || [".csv", ".csv.gz", ".mcap"]
-            .iter()
-            .any(|ending| name.ends_with(ending))
-    {
-        true => Ok(()),
+    if name.ends_with(".mcap") {
+        return Ok(Format::Mcap);
+    }
+    let is_device = path.starts_with("/dev") || (path.exists() && !path.is_file());
+    match is_device || name.ends_with(".csv") || name.ends_with(".csv.gz") {
+        true => Ok(Format::Text),
         false => Err(Error::Ending {
             path: path.to_owned(),
             found: match name.split_once('.') {
@@ -95,11 +100,11 @@ fn chained(recordings: Vec<Recording>) -> Vec<Segment> {
 }
 
 fn write(
-    path: &Path,
+    (path, format): (&Path, Format),
     segments: Vec<Segment>,
     inputs: Option<&[DMatrix<f64>]>,
 ) -> Result<(), Error> {
-    if path.extension().is_some_and(|ending| ending == "mcap") {
+    if format == Format::Mcap {
         let [segment] = &segments[..] else {
             return Err(Error::OneSegment(segments.len()));
         };

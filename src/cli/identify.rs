@@ -1,6 +1,7 @@
 //! `romc identify`: gravity, mass and the joints' losses from recordings.
 
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
@@ -28,7 +29,8 @@ pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
         &reader(&arguments.reading, Clocks::Recorded)?,
         &arguments.recordings,
     )?;
-    note_repeated(&[("recordings", &arguments.recordings)]);
+    let paths = arguments.recordings.iter().map(PathBuf::as_path);
+    note_repeated(&[("recordings", paths.collect())]);
     let progress = spinner("identifying");
     let found = identify(&recordings, robot);
     progress.finish_and_clear();

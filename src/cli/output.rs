@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -111,27 +112,30 @@ pub fn note_mismatches(recording: &Recording, robot: &Robot) {
     }
 }
 
-/// Prints on stderr which recordings are given twice, under whatever name: sets that share jumps judge nothing, and a
-/// jump that counts twice says less than two.
-pub fn note_repeated(sets: &[(&str, &[PathBuf])]) {
+/// Prints on stderr which recordings are given twice, under whatever name: a jump in two sets judges nothing, and one that
+/// counts twice says less than two.
+pub fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
     let mut first: BTreeMap<String, (&str, &Path)> = BTreeMap::new();
-    for (set, paths) in sets {
-        for path in *paths {
-            let Ok(bytes) = std::fs::read(path) else {
-                continue; // reading it as a recording says why
-            };
-            match first.get(&sha256(&bytes)) {
-                Some((other, earlier)) if other == set => note(&format!(
-                    "{}: the same recording as {}, which counts twice in the {set}",
+    let all = sets
+        .iter()
+        .flat_map(|(set, paths)| paths.iter().map(move |path| (*set, *path)));
+    for (set, path) in all.filter(|(_, path)| path.is_file()) {
+        let Ok(bytes) = std::fs::read(path) else {
+            continue; // reading it as a recording says why
+        };
+        match first.entry(sha256(&bytes)) {
+            Entry::Vacant(place) => drop(place.insert((set, path))),
+            Entry::Occupied(place) => {
+                let (other, earlier) = *place.get();
+                let what = match other == set {
+                    true => "and counts twice".to_owned(),
+                    false => format!("which is in the {other} set: its {set} figures say too much"),
+                };
+                note(&format!(
+                    "{}: the same recording as {}, {what}",
                     path.display(),
                     earlier.display()
-                )),
-                Some((other, earlier)) => note(&format!(
-                    "{}: in the {set} and, as {}, in the {other}: its {set} figures flatter",
-                    path.display(),
-                    earlier.display()
-                )),
-                None => drop(first.insert(sha256(&bytes), (set, path))),
+                ));
             }
         }
     }

@@ -131,6 +131,20 @@ impl RecordedSets {
         with.map(|(name, _)| name).collect()
     }
 
+    /// The files of each set, those with jumps in several in the first.
+    pub fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
+        let sets = [&self.training, &self.validation, &self.test];
+        let mut seen: Vec<&Path> = Vec::new();
+        let mut of_set = |set: usize| {
+            let files = sets[set].files().iter().map(|file| file.path.as_path());
+            let new = files.filter(|path| self.divided.is_none() || !seen.contains(path));
+            let new: Vec<&Path> = new.collect();
+            seen.extend(&new);
+            (SETS[set], new)
+        };
+        [of_set(0), of_set(1), of_set(2)]
+    }
+
     /// The jumps of each set in words, if they were divided.
     pub fn text(&self) -> Option<String> {
         let sets = SETS.into_iter().zip(self.divided.as_ref()?);

@@ -47,11 +47,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     for file in &mut origin.recordings {
         file.sets = recorded.sets_of(&file.path);
     }
-    note_repeated(&[
-        ("training", &arguments.recordings),
-        ("validation", &arguments.validation),
-        ("test", &arguments.test),
-    ]);
+    note_repeated(&recorded.files());
 
     let bar = spinner("training");
     let mut findings_reported = false;

@@ -134,22 +134,23 @@ pub struct Identification {
     pub notes: Vec<String>,
 }
 
-/// By how much the whole equation may fit less than forces alone, as rounds weigh windows by their noise.
+/// By how much the whole equation may fit less forwards than forces alone.
 const WORSE: f64 = 0.05;
 
 impl Identification {
-    /// Why these values are no robot's: the trunk moves against them, or better by the feet's forces alone.
+    /// Why these values are no robot's: the trunk moves against them, or forwards better by the feet's forces alone.
+    /// Upwards forces alone may fit better: rounds weigh windows by their noise, and commanded torques are noisy there.
     pub fn contradiction(&self) -> Option<String> {
         let alone = self.force_alone.r2;
         let axes = [
-            ("forwards", self.r2.x, alone.x),
-            ("upwards", self.r2.z, alone.z),
+            ("forwards", self.r2.x, alone.x, alone.x - WORSE),
+            ("upwards", self.r2.z, alone.z, 0.0),
         ];
-        let (axis, whole, alone) =
-            (axes.into_iter()).find(|(_, whole, alone)| *whole < 0.0 || *whole < alone - WORSE)?;
+        let (axis, whole, alone, _) =
+            (axes.into_iter()).find(|(_, whole, _, bound)| *whole < bound.max(0.0))?;
         Some(format!(
             "R^2 of the trunk's acceleration {axis} is {whole:.2}, and {alone:.2} by the feet's forces alone: \
-             signs, order, units or frames of torques, joints or body are not this robot's, and the values are none"
+             signs, order, units or frames of torques, joints or body are not this robot's; do not use these values"
         ))
     }
 

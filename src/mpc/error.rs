@@ -40,7 +40,7 @@ pub enum MpcError {
         phase: String,
     },
     /// A controller that acts more often than there are samples.
-    #[error("{}: a sample every {:.3} ms; found a step of {} s, expected at least as long (`romc mpc --step {:.3}`)", path.display(), recorded_s * 1e3, found_s, recorded_s)]
+    #[error("{}: a sample every {:.3} ms; found a step of {} s, expected at least as long (`romc mpc --step {}`)", path.display(), recorded_s * 1e3, found_s, (recorded_s * 1e4).ceil() / 1e4)]
     Step {
         /// The recording.
         path: PathBuf,

@@ -95,7 +95,7 @@ pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
 }
 
 /// The coordinates without those that move and disagree on how fast time passes; none if more than a third of those
-/// that move do.
+/// that move do, or if the joints disagree with the body: one of the two is wrong, not the clock.
 fn agreeing_coordinates(segment: &Segment) -> Vec<usize> {
     let ratio = |row: usize| {
         let intervals = (1..segment.len()).map(|right| Interval::of(segment, right, &[row]));
@@ -106,18 +106,30 @@ fn agreeing_coordinates(segment: &Segment) -> Vec<usize> {
         (stamped > STANDSTILL * segment.duration_s()).then(|| moved / stamped)
     };
     let ratios: Vec<Option<f64>> = (0..COORDINATES).map(ratio).collect();
-    let mut moving: Vec<f64> = ratios.iter().flatten().copied().collect();
-    moving.sort_by(f64::total_cmp);
-    let Some(median) = moving.get(moving.len() / 2).copied() else {
-        return (0..COORDINATES).collect();
+    let agrees = |ratio: f64, with: f64| (ratio - with).abs() <= AGREES * with.abs();
+    let (joints, body) = ratios.split_at(JOINT_DIM);
+    let median = match (median(joints), median(body)) {
+        (None, None) => return (0..COORDINATES).collect(),
+        (Some(joints), Some(body)) if !agrees(joints, body) => return Vec::new(),
+        (Some(median), _) | (None, Some(median)) => median,
     };
-    let agrees = |ratio: f64| (ratio - median).abs() <= AGREES * median.abs();
-    let count = moving.iter().filter(|ratio| agrees(**ratio)).count();
-    if 3 * count < 2 * moving.len() {
+    let moving = ratios.iter().flatten();
+    let count = moving
+        .clone()
+        .filter(|ratio| agrees(**ratio, median))
+        .count();
+    if 3 * count < 2 * moving.count() {
         return Vec::new();
     }
     let all = 0..COORDINATES;
-    all.filter(|&row| ratios[row].is_none_or(agrees)).collect()
+    all.filter(|&row| ratios[row].is_none_or(|ratio| agrees(ratio, median)))
+        .collect()
+}
+
+fn median(ratios: &[Option<f64>]) -> Option<f64> {
+    let mut moving: Vec<f64> = ratios.iter().flatten().copied().collect();
+    moving.sort_by(f64::total_cmp);
+    moving.get(moving.len() / 2).copied()
 }
 
 /// Which times lie between samples that are more than [`LOST_STEPS`] apart.

@@ -122,6 +122,11 @@ impl RecordingFiles {
         Self { reader, ..self }
     }
 
+    /// The files.
+    pub fn files(&self) -> &[RecordingFile] {
+        &self.files
+    }
+
     /// Whether there is no file.
     pub fn is_empty(&self) -> bool {
         self.files.is_empty()

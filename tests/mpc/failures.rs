@@ -207,6 +207,77 @@ fn without_a_reference_the_joints_are_damped_and_nothing_else() {
 }
 
 #[test]
+fn without_a_reference_the_posture_measured_first_is_held() {
+    let mut controller =
+        Controller::new(&model(Equations::Linear), MpcSettings::default()).expect("complete");
+    let standing: [f64; 18] = std::array::from_fn(|i| match i {
+        0..12 => [0.1, 0.92, -1.75][i % 3],
+        _ => 0.0,
+    });
+    let mut step = |time_s: f64, x: &[f64; 18]| {
+        controller.step(Measurement {
+            time_s,
+            x,
+            dx: &[0.0; 18],
+            feet: [true; 4],
+        })
+    };
+    assert_eq!(step(0.0, &[f64::NAN; 18]).status, Status::NotFinite);
+    assert_eq!(step(0.01, &standing).joint_position_rad, standing[..12]);
+    let moved = standing.map(|value| value + 0.05);
+    assert_eq!(step(0.02, &moved).joint_position_rad, standing[..12]);
+}
+
+/// The largest torque after each of `times_s`, held after a plan whose stages have run out.
+fn held_torques(times_s: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut bench = Bench::new(MpcSettings::default());
+    bench.nominal(100);
+    let start_s = bench.reference.time_s[100];
+    let mut torques = Vec::new();
+    for time_s in times_s {
+        let command = bench.controller.step(Measurement {
+            time_s: start_s + time_s,
+            x: &[f64::NAN; 18],
+            dx: &[0.0; 18],
+            feet: [true; 4],
+        });
+        if command.source == Source::Hold {
+            let torques_nm = command.torque_nm.iter();
+            torques.push(torques_nm.fold(0.0, |most: f64, torque| most.max(torque.abs())));
+        }
+    }
+    torques
+}
+
+#[test]
+fn hold_fades_by_time_and_by_calls_where_the_clock_says_nothing() {
+    let fade = |torques: &[f64]| torques[torques.len() - 1] / torques[0];
+    let close = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found}");
+    let shifted = (1..5).map(|stage| 0.01 * f64::from(stage));
+    // 100 calls of 1 ms and 10 of 10 ms fade alike; a clock that stands still or runs back, by stages.
+    let often = held_torques(
+        shifted
+            .clone()
+            .chain((0..=100).map(|k| 0.05 + 0.001 * f64::from(k))),
+    );
+    let seldom = held_torques(
+        shifted
+            .clone()
+            .chain((0..=10).map(|k| 0.05 + 0.01 * f64::from(k))),
+    );
+    close(fade(&often), (-2.0_f64).exp());
+    close(fade(&seldom), (-2.0_f64).exp());
+    let still = held_torques(shifted.clone().chain([0.05; 11]));
+    let back = held_torques(shifted.chain((0..=10).map(|k| 0.06 - 0.001 * f64::from(k))));
+    close(fade(&still), (-2.0_f64).exp());
+    assert!(fade(&back) < 0.5, "{back:?}");
+    // Without any time the plan's stages run out, too.
+    let unknown = held_torques([f64::NAN; 20]);
+    assert_eq!(unknown.len(), 16);
+    close(fade(&unknown), (-3.0_f64).exp());
+}
+
+#[test]
 fn jump_of_the_measurement_is_disbelieved_for_a_while_and_then_believed() {
     let mut bench = Bench::new(MpcSettings::default());
     bench.nominal(100);

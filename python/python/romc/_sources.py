@@ -55,9 +55,10 @@ def _is_pair(source: Any) -> bool:
 
 
 def _layer(name: str, pair: LayerPair) -> Tensors:
-    parts = tuple(pair)
+    parts = () if hasattr(pair, "shape") else tuple(pair)
     if len(parts) != 2:
-        raise ModelError(f"`{name}`: found {len(parts)} parts, expected weights and bias", tensor=name)
+        found = f"{len(parts)} parts" if parts else "an array"
+        raise ModelError(f"`{name}`: found {found}, expected (weights, bias)", tensor=name)
     weights, bias = parts
     tensors = {f"{name}.weight": floats(f"{name}.weight", weights, 2)}
     if bias is not None:

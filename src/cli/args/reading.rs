@@ -14,7 +14,7 @@ pub struct ReadingArguments {
     #[arg(long, value_name = "MAP.toml")]
     pub columns: Option<PathBuf>,
     /// Whether clocks and angular rates that disagree with the motion are mended (unless given they are, but not by
-    /// `inspect` and `convert`, which show and keep what was recorded)
+    /// `inspect`, `convert` and `plan`; by `identify` always)
     #[arg(long, value_enum, hide_possible_values = false)]
     pub clock: Option<Clocks>,
 }

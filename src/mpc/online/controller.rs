@@ -315,9 +315,7 @@ impl Controller {
                 false => self.effectiveness.interrupt(),
             }
         }
-        if measurement.time_s.is_finite() {
-            self.memory.command_s = Some(measurement.time_s);
-        }
+        self.memory.command_s = self.time_or_one_stage_on(measurement.time_s);
         self.memory.input.copy_from_slice(&command.u_lat);
         command.solve_us = started.elapsed().as_secs_f64() * 1e6;
     }

@@ -11,7 +11,6 @@ use crate::robot::JOINT_DIM;
 /// What a fallback goes back to.
 #[derive(Debug, Clone)]
 pub(super) struct Memory {
-    pub time_s: Option<f64>,
     pub measured: Vec<f64>,
     pub input: Vec<f64>,
     pub stance: Option<StanceState>,
@@ -29,7 +28,6 @@ pub(super) struct Memory {
 impl Memory {
     pub(super) fn new(latent_dim: usize) -> Self {
         Self {
-            time_s: None,
             measured: vec![0.0; 2 * latent_dim],
             input: vec![0.0; latent_dim],
             stance: None,
@@ -45,11 +43,7 @@ impl Memory {
 impl Controller {
     /// The command without a plan of this step.
     pub(super) fn fall_back(&mut self, time_s: f64, command: &mut Command) {
-        let now = if time_s.is_finite() {
-            Some(time_s)
-        } else {
-            self.memory.time_s
-        };
+        let now = self.time_or_one_stage_on(time_s);
         let stages = self
             .settings
             .fallback
@@ -64,13 +58,24 @@ impl Controller {
         }
     }
 
-    /// Time since the last command, at most one stage, and one stage where it is not known.
+    /// A time, or where it is not known that of the last command and one stage.
+    pub(super) fn time_or_one_stage_on(&self, time_s: f64) -> Option<f64> {
+        match time_s.is_finite() {
+            true => Some(time_s),
+            false => Some(self.memory.command_s? + self.settings.step_s),
+        }
+    }
+
+    /// Time since the last command, at most one stage, and one stage where it is not known or the clock stands still.
     fn since_last_command(&self, time_s: f64) -> f64 {
-        match self.memory.command_s {
-            Some(last_s) if time_s.is_finite() => {
-                (time_s - last_s).clamp(0.0, self.settings.step_s)
-            }
-            _ => self.settings.step_s,
+        let step_s = self.settings.step_s;
+        let passed_s = self
+            .memory
+            .command_s
+            .map_or(step_s, |last_s| time_s - last_s);
+        match passed_s > 0.0 && passed_s <= step_s {
+            true => passed_s,
+            false => step_s,
         }
     }
 

@@ -22,7 +22,6 @@ impl Controller {
         if !measurement.time_s.is_finite() || values.into_iter().any(|value| !value.is_finite()) {
             return Err(Status::NotFinite);
         }
-        self.memory.time_s = Some(measurement.time_s);
         self.memory.joint_velocity = std::array::from_fn(|joint| measurement.dx[joint]);
         let Some(reference) = &self.reference else {
             // Nothing to follow yet: the robot stays as it is.

@@ -1,0 +1,51 @@
+//! Clocks: rebuilt where joints and body agree that they are wrong, and never for one bad coordinate.
+
+use std::path::Path;
+
+use romc::recording::clock::{Timed, timed};
+use romc::recording::{Segment, read};
+
+fn jump() -> Segment {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/recordings/go1/test_01.csv.gz");
+    read(&path).expect("a shipped jump").segments.swap_remove(0)
+}
+
+fn spoiled(spoil: impl Fn(&mut Segment)) -> Timed {
+    let mut segment = jump();
+    spoil(&mut segment);
+    timed(&segment).expect("a jump")
+}
+
+fn scale(segment: &mut Segment, rows: impl IntoIterator<Item = usize>, factor: f64) {
+    for row in rows {
+        segment.dx.row_mut(row).scale_mut(factor);
+    }
+}
+
+#[test]
+fn slow_clock_is_rebuilt_also_beside_a_bad_joint() {
+    for bad in [false, true] {
+        let timed = spoiled(|segment| {
+            segment.time_s.iter_mut().for_each(|time| *time /= 1.2);
+            if bad {
+                scale(segment, [2], 57.3);
+            }
+        });
+        assert!(timed.rebuilt);
+        assert!(
+            (timed.elapsed_ratio - 1.2).abs() < 0.02,
+            "{}",
+            timed.elapsed_ratio
+        );
+    }
+}
+
+#[test]
+fn one_bad_coordinate_or_kind_of_coordinates_changes_no_clock() {
+    assert!(!spoiled(|_| {}).rebuilt);
+    assert!(!spoiled(|segment| scale(segment, [2], 57.3)).rebuilt);
+    assert!(!spoiled(|segment| scale(segment, [11], -1.0)).rebuilt);
+    assert!(!spoiled(|segment| segment.x.row_mut(5).fill(-1.5)).rebuilt);
+    assert!(!spoiled(|segment| scale(segment, 0..12, 1.4)).rebuilt);
+    assert!(!spoiled(|segment| scale(segment, 12..15, 1.6)).rebuilt);
+}
