@@ -1,7 +1,7 @@
 //! Derivatives with respect to time, however they are written, as dots.
 
 use super::names::is_greek;
-use super::reader::{FONTS, has};
+use super::reader::{FONTS, INVISIBLE, has};
 use super::token::{Kind, Token};
 
 /// Most dots that have a command.
@@ -56,7 +56,36 @@ fn fraction(tokens: &[Token], at: usize) -> Option<(usize, &[Token], usize)> {
         return (end == top.len()).then_some((order, &top[of_variable..], behind));
     }
     let end = variable_end(tokens, behind)?;
-    Some((order, &tokens[behind..end], end))
+    ends_product(&tokens[end..]).then_some((order, &tokens[behind..end], end))
+}
+
+/// Whether what follows is no power and no further factor, which a derivative in front might mean as well.
+fn ends_product(tokens: &[Token]) -> bool {
+    let is_space =
+        |token: &&Token| matches!(&token.kind, Kind::Command(name) if has(INVISIBLE, name));
+    let mut rest = tokens.iter().skip_while(is_space);
+    match rest.next().map(|token| &token.kind) {
+        None => true,
+        // The time of `z_1(t)`.
+        Some(Kind::Character('(')) => rest
+            .next()
+            .is_some_and(|token| token.kind == Kind::Character('t')),
+        Some(Kind::Character(mark)) => "+-=,.;)]/:*&|".contains(*mark),
+        Some(Kind::Command(name)) => has(
+            "cdot times ast right coloneqq coloneq triangleq equiv approx simeq rvert vert } text textrm mbox tag label",
+            name,
+        ),
+        Some(kind) => matches!(
+            kind,
+            Kind::Align
+                | Kind::Break
+                | Kind::Close
+                | Kind::End(_)
+                | Kind::Label(_)
+                | Kind::Comment(_)
+                | Kind::Paragraph
+        ),
+    }
 }
 
 /// The place behind the `d` of a differential, upright or not, or its `\partial`.

@@ -4,7 +4,7 @@
 //! the slash, a number after a variable. Nesting is limited, so the machine's stack is safe.
 
 use super::super::equations::Equation;
-use super::reader::{BARE, Last, MAX_DEPTH, Read, Reader, Symbol, has};
+use super::reader::{BARE, INVISIBLE, Last, MAX_DEPTH, Read, Reader, Symbol, has};
 use super::token::{Kind, Token};
 use super::variables::function;
 use crate::model::LatentVariable;
@@ -105,6 +105,10 @@ impl Reader<'_> {
             let place = self.here();
             let mut sign = None;
             while let Some(next) = ['+', '-'].into_iter().find(|sign| self.character(*sign)) {
+                if sign.is_some() && self.breaks_before(self.at - 1) {
+                    self.at -= 1;
+                    return self.unexpected("one operator where a line breaks");
+                }
                 let is_minus = (sign == Some('-')) != (next == '-');
                 sign = Some(if is_minus { '-' } else { '+' });
             }
@@ -119,9 +123,13 @@ impl Reader<'_> {
     }
 
     pub(super) fn term(&mut self, leads: bool) -> Read<()> {
+        self.peek();
+        let is_literal = matches!(self.kind(self.at), Some(Kind::Number(_)));
         let mut last = self.factor(leads)?;
+        let behind_literal = is_literal.then_some(self.at);
         let mut after_slash = false;
         loop {
+            let from = self.at;
             let place = self.here();
             let next = self.peek().map(|token| token.kind.clone());
             match next {
@@ -149,7 +157,14 @@ impl Reader<'_> {
                     }
                     self.at += 1;
                     self.push(place, "/");
+                    self.peek();
+                    let number = self.at;
                     let divisor = self.factor(false)?;
+                    if self.number_takes_power_of_ten(number) {
+                        return self.unexpected(
+                            "`\\frac`, or parentheses around the number that the slash divides by",
+                        );
+                    }
                     after_slash = (last, divisor) != (Last::Number, Last::Number);
                     last = Last::Other;
                 }
@@ -159,9 +174,20 @@ impl Reader<'_> {
                             "`\\frac`, or parentheses around what the slash divides by",
                         );
                     }
+                    if self.breaks_before(self.at) {
+                        return self.unexpected("an operator where a row or column goes on");
+                    }
+                    if behind_literal == Some(from) && self.is_fraction_of_integers() {
+                        return self.unexpected(
+                            "`\\cdot` or `+` between a number and a fraction, which print as a mixed number",
+                        );
+                    }
                     match (last, &kind) {
                         (Last::Bare, Kind::Command(name)) if function(name).is_some() => {}
                         (Last::Bare | Last::BareNumber, _) => return self.unexpected(BARE),
+                        (_, Kind::Command(name)) if name == "num" => {
+                            return self.unexpected("an operator before the number");
+                        }
                         (_, Kind::Number(_)) => {
                             return self.unexpected(
                                 "an operator before the number, or braces around a subscript",
@@ -180,6 +206,50 @@ impl Reader<'_> {
                 _ => return Ok(()),
             }
         }
+    }
+
+    /// Whether a row or column ends right before a place.
+    fn breaks_before(&self, at: usize) -> bool {
+        let is_blank = |kind: &Kind| match kind {
+            Kind::Align | Kind::Break | Kind::Comment(_) | Kind::Paragraph => true,
+            Kind::Character('~') => true,
+            Kind::Command(name) => name == " " || has(INVISIBLE, name),
+            _ => false,
+        };
+        let blanks = self.tokens[..at].iter().rev();
+        (blanks.take_while(|token| is_blank(&token.kind)))
+            .any(|token| matches!(token.kind, Kind::Align | Kind::Break))
+    }
+
+    /// Whether the number at a place was read with `\times 10^{-3}` behind it; goes back there if so.
+    fn number_takes_power_of_ten(&mut self, number: usize) -> bool {
+        let behind = self.tokens[number + 1..self.at].iter();
+        let takes = matches!(self.kind(number), Some(Kind::Number(_)))
+            && behind
+                .take_while(|token| token.kind != Kind::Superscript)
+                .any(|token| token.is_command("times") || token.is_command("cdot"));
+        if takes {
+            self.at = number;
+        }
+        takes
+    }
+
+    /// Whether a fraction of two integers follows.
+    fn is_fraction_of_integers(&self) -> bool {
+        let is_integer = |at: usize| match self.kind(at) {
+            Some(Kind::Number(text)) => text.bytes().all(|byte| byte.is_ascii_digit()),
+            _ => false,
+        };
+        let is_fraction = matches!(self.kind(self.at), Some(Kind::Command(name)) if has("frac dfrac tfrac cfrac", name));
+        let of_groups = [1, 3, 4, 6].map(|place| self.kind(self.at + place))
+            == [
+                Some(&Kind::Open),
+                Some(&Kind::Close),
+                Some(&Kind::Open),
+                Some(&Kind::Close),
+            ];
+        let places = if of_groups { [2, 5] } else { [1, 2] };
+        is_fraction && places.iter().all(|&place| is_integer(self.at + place))
     }
 
     /// Whether the last thing that follows is an integer alone in parentheses, as equations are numbered by hand.
@@ -332,6 +402,13 @@ impl Reader<'_> {
             }
         })?;
         self.push(place, ")");
+        if last == Last::Bare
+            && self
+                .peek()
+                .is_some_and(|token| token.kind == Kind::Superscript)
+        {
+            return self.unexpected("parentheses around the function or its argument");
+        }
         self.powers(place)?;
         Ok(last)
     }

@@ -96,7 +96,15 @@ impl Reader<'_> {
                 _ => reader.unexpected("a number such as 1.2e-3"),
             }
         })?;
+        let is_negative = text.starts_with('(');
         self.push(place, text);
+        if is_negative
+            && self
+                .peek()
+                .is_some_and(|token| token.kind == Kind::Superscript)
+        {
+            return self.unexpected("parentheses around the negative number");
+        }
         self.powers(place)?;
         Ok(Last::Number)
     }

@@ -9,7 +9,9 @@ use super::token::{Kind, Token, of_markdown, of_tex};
 
 /// Environments that only arrange lines.
 const LAYOUTS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath dgroup \
-    cases dcases aligned alignedat split gathered subequations IEEEeqnarray";
+    cases dcases array aligned alignedat split gathered subequations IEEEeqnarray";
+/// Those that arrange lines only if whole equations are in them.
+const DISTINCTIONS: &str = "cases dcases array";
 
 /// Reads the equations of a document.
 ///
@@ -42,12 +44,17 @@ pub(in crate::import) fn read(
         strange: None,
         sections: Vec::new(),
     };
+    // In Markdown the sentence stands behind the equations.
+    let stated = items.iter().find_map(|item| match item {
+        Item::Comment(text) if is_markdown => stated_digits(text).flatten(),
+        _ => None,
+    });
     // Equations in the lines of the text count where there are no others.
     for in_lines in [false, true] {
         if !document.sections.is_empty() {
             break;
         }
-        (document.digits, document.phase, document.starts_phase) = (None, None, false);
+        (document.digits, document.phase, document.starts_phase) = (stated, None, false);
         let alone = !has_indexed_left_side(file, &items, in_lines)?;
         for item in &items {
             match item {
@@ -106,7 +113,8 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
         at += 1;
         match &token.kind {
             Kind::Begin(name)
-                if is_one_of(LAYOUTS, name) || name == "array" && has_left_side(&tokens[at..]) =>
+                if is_one_of(LAYOUTS, name)
+                    && (!is_one_of(DISTINCTIONS, name) || has_left_side(&tokens[at..], name)) =>
             {
                 open.push(token);
                 if flat.len() >= 2 && flat[flat.len() - 2].is_command("left") {
@@ -131,7 +139,8 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
             }
             Kind::End(name)
                 if is_one_of(LAYOUTS, name)
-                    || name == "array" && open.last().is_some_and(|t| is_array(t)) =>
+                    && (!is_one_of(DISTINCTIONS, name)
+                        || open.last().is_some_and(|begin| is_distinction(begin))) =>
             {
                 if open.pop().map(|begin| &begin.kind) != Some(&Kind::Begin(name.clone())) {
                     let expected = "environments that end in the order in which they begin";
@@ -168,15 +177,28 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
     }
 }
 
-fn is_array(token: &Token) -> bool {
-    token.kind == Kind::Begin("array".to_owned())
+fn is_distinction(token: &Token) -> bool {
+    matches!(&token.kind, Kind::Begin(name) if is_one_of(DISTINCTIONS, name))
 }
 
-/// Whether the environment whose contents begin here has equations in it, and is no matrix.
-fn has_left_side(contents: &[Token]) -> bool {
-    let end = Kind::End("array".to_owned());
+/// Whether the environment of this name whose contents begin here has equations in it: it is then no matrix, and on no
+/// right side, where it would tell cases apart.
+fn has_left_side(contents: &[Token], name: &str) -> bool {
+    let end = Kind::End(name.to_owned());
     let inside = contents.iter().take_while(|token| token.kind != end);
     inside.into_iter().any(|token| token.is_command("ddot"))
+}
+
+/// The digits that a comment states, none in what is no such comment.
+fn stated_digits(comment: &str) -> Option<Option<Digits>> {
+    let rest = comment.trim().strip_prefix("Coefficients have ")?;
+    let mut words = rest.split_whitespace();
+    let count = words.next().and_then(|word| word.parse().ok());
+    Some(match (count, words.next()) {
+        (Some(count), Some("significant")) => Some(Digits::Significant(count)),
+        (Some(count), Some("decimals.")) => Some(Digits::Decimals(count)),
+        _ => None,
+    })
 }
 
 struct Document<'d> {
@@ -202,14 +224,8 @@ impl Document<'_> {
             self.phase = (!name.is_empty()).then(|| name.to_owned());
             self.starts_phase = self.phase.is_some();
         }
-        if let Some(rest) = text.strip_prefix("Coefficients have ") {
-            let mut words = rest.split_whitespace();
-            let count = words.next().and_then(|word| word.parse().ok());
-            self.digits = match (count, words.next()) {
-                (Some(count), Some("significant")) => Some(Digits::Significant(count)),
-                (Some(count), Some("decimals.")) => Some(Digits::Decimals(count)),
-                _ => None,
-            };
+        if let Some(digits) = stated_digits(text) {
+            self.digits = digits;
         }
     }
 

@@ -128,6 +128,10 @@ fn constructs_mean_what_they_print() {
         ),
         (r"- - z_1 + -z_2", "z1 - z2"),
         (
+            r"\frac12\frac{1}{3} z_1 + \frac{d}{dt} z_1 + 1/2 z_2",
+            "z1/6 + dz1 + z2/2",
+        ),
+        (
             r"\sec z_1 + \csc^2(z_2) + 2\cot(2 z_1)",
             "1/cos(z1) + 1/sin(z2)^2 + 2/tan(2*z1)",
         ),
@@ -191,6 +195,22 @@ fn unreadable_constructs_are_named_with_their_place() {
         (r"z_1 \text{if} z_2", 1, 27, "`z`"),
         (r"z_3", 1, 13, "`z3`"),
         (r"1 +", 1, 15, "the end of the equation"),
+        (r"1/2 \times 10^{-3} z_1", 1, 15, "`2`"),
+        (
+            r"\begin{cases} z_1 & \\ -z_1 & \end{cases}",
+            1,
+            13,
+            r"`\begin{cases}`",
+        ),
+        (r"z_1 & u_1", 1, 19, "`u`"),
+        (r"z_1 \\ z_2", 1, 20, "`z`"),
+        (r"z_1 - \\ &- z_2", 1, 23, "`-`"),
+        (r"\frac{d}{dt} z_1^2", 1, 19, "`d`"),
+        (r"\frac{d}{dt} z_1 z_2", 1, 19, "`d`"),
+        (r"0.36 \num{-0.16} z_1", 1, 18, r"`\num`"),
+        (r"\num{-0.5}^2", 1, 23, "`^`"),
+        (r"1\frac{1}{2} z_1", 1, 14, r"`\frac`"),
+        (r"{\sin z_1}^2", 1, 23, "`^`"),
     ] {
         let text = format!("\\[\\ddot z_1={latex}\\]\n\\[\\ddot z_2 = 0\\]");
         let error = named(&text, &[]).expect_err(latex);
