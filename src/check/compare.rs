@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::CheckOptions;
 use super::point::{Gap, Search, Sides, search};
-use super::side::{RightSide, Side, SidePhase, literal};
+use super::side::{Floats, RightSide, Side, SidePhase, literal};
 use crate::symbolic::{CanonicalForms, Coefficient, ExprId, ExprPool, Node, Number};
 
 /// Most terms that a difference names.
@@ -165,8 +165,30 @@ fn decide(
     phase: &str,
     options: &CheckOptions,
 ) -> (Verdict, Option<Gap>) {
+    let decided = decide_with(Floats::Exact, files, ddz, phase, options);
+    let are_models = ddz.map(|side| matches!(side, RightSide::Summands(_)));
+    match decided.0 {
+        // A text says 1/3, a model can not.
+        Verdict::Undecided(..) if are_models[0] != are_models[1] && !options.exact => {
+            let rounded = decide_with(Floats::Rounded, files, ddz, phase, options);
+            match rounded.0 {
+                Verdict::EqualAsPrinted(_) => rounded,
+                _ => decided,
+            }
+        }
+        _ => decided,
+    }
+}
+
+fn decide_with(
+    floats: Floats,
+    files: [&Side; 2],
+    ddz: [&RightSide; 2],
+    phase: &str,
+    options: &CheckOptions,
+) -> (Verdict, Option<Gap>) {
     let mut pool = ExprPool::exact();
-    let whole = [0, 1].map(|side| files[side].build(ddz[side], &mut pool));
+    let whole = [0, 1].map(|side| files[side].build(ddz[side], floats, &mut pool));
     let restrictions = pool.restrictions();
     let table = Table::of(&mut pool, whole);
     let rest = [0, 1].map(|side| table.sum(&mut pool, side, |_| true));

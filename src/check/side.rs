@@ -192,8 +192,14 @@ impl Side {
         Some(format!("{mark}{number}"))
     }
 
-    /// Builds a right side, with symbols for decimals.
-    pub(super) fn build(&self, right_side: &RightSide, pool: &mut ExprPool) -> ExprId {
+    /// Builds a right side, with symbols for decimals; where a model's `floats` count as rounded, those of as many digits
+    /// as floats have stand for all numbers near them.
+    pub(super) fn build(
+        &self,
+        right_side: &RightSide,
+        floats: Floats,
+        pool: &mut ExprPool,
+    ) -> ExprId {
         match right_side {
             RightSide::Text(_, text) => self
                 .parse(text, pool)
@@ -204,9 +210,16 @@ impl Side {
                         let term = self.parse(term, pool).expect("terms of a model parse");
                         let size = coefficient.abs();
                         let whole = Number::from_f64(size).filter(|number| number.is_exact());
+                        let text = format!("{size:?}");
+                        let (mark, text) = match floats {
+                            Floats::Rounded if has_all_digits(&text) => {
+                                (ROUNDED, format!("{size:.14e}"))
+                            }
+                            Floats::Rounded | Floats::Exact => (EXACT, text),
+                        };
                         let factor = match whole {
                             Some(number) => pool.constant(number),
-                            None => pool.symbol(&format!("{EXACT}{size:?}")),
+                            None => pool.symbol(&format!("{mark}{text}")),
                         };
                         let product = pool.mul(factor, term);
                         if *coefficient < 0.0 {
@@ -220,6 +233,22 @@ impl Side {
             }
         }
     }
+}
+
+/// What the coefficients of a model are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Floats {
+    /// The numbers that are there.
+    Exact,
+    /// Numbers such as 1/3 and sums that were rounded to floats: of those with 16 digits or more, 15 count.
+    Rounded,
+}
+
+/// Whether a decimal has as many digits as a rounded float.
+fn has_all_digits(decimal: &str) -> bool {
+    let mantissa = decimal.split(['e', 'E']).next().unwrap_or_default();
+    let digits = mantissa.trim_start_matches(['0', '.']);
+    digits.bytes().filter(u8::is_ascii_digit).count() >= 16
 }
 
 /// The decimal that a symbol stands for.

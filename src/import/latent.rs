@@ -231,9 +231,13 @@ fn union(
     found.sort_unstable();
     found.dedup();
     terms::sort(pool, latent_dim, &mut found);
-    let texts: Vec<String> = (found.iter())
+    let mut texts: Vec<String> = (found.iter())
         .map(|&term| pool.display(term).to_string())
         .collect();
+    if texts.is_empty() {
+        // Equations whose right sides are all zero need some term to have zero times of.
+        texts.push("1".to_owned());
+    }
     let library = Library::from_terms(latent_dim, &texts)
         .map_err(|source| ImportError::model(file, source))?;
     let row = |(index, &term): (usize, &ExprId)| (term, Row { index, factor: 1.0 });

@@ -189,3 +189,53 @@ fn numbers_beyond_floats_are_told_apart_and_equal_ones_proven() {
         assert_eq!(verdict(a, b), Some(0), "{a} and {b}");
     }
 }
+
+#[test]
+fn fractions_of_a_text_are_equal_to_the_floats_of_its_model_and_zeros_are_imported() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let romc = |arguments: &[&str]| {
+        let command = std::process::Command::new(env!("CARGO_BIN_EXE_romc"))
+            .args(arguments)
+            .output();
+        let output = command.expect("the binary runs");
+        (
+            output.status.code(),
+            String::from_utf8(output.stdout).expect("UTF-8"),
+        )
+    };
+    for (name, equations, said) in [
+        (
+            "thirds",
+            "ddz1 = z1/3 - dz1/1.1\nddz2 = (2*z1 + 1)/3 + 0.1*u1 + 0.2*u1\n",
+            "printed digits",
+        ),
+        ("zeros", "ddz1 = sin(-z1) + sin(z1)\n", "proven equal"),
+    ] {
+        let (text, model) = (at(&format!("{name}.txt")), at(&format!("{name}.json")));
+        std::fs::write(&text, equations).expect("written");
+        let (code, _) = romc(&[
+            "import",
+            &text,
+            "--phase",
+            "contact=any",
+            "--output",
+            &model,
+        ]);
+        assert_eq!(code, Some(0), "{name}");
+        let (code, stdout) = romc(&["check", &text, &model]);
+        assert_eq!(code, Some(0), "{name}: {stdout}");
+        assert!(stdout.contains(said), "{name}: {stdout}");
+        let wrong = at("wrong.txt");
+        std::fs::write(
+            &wrong,
+            equations
+                .replace("/3", "/3.0000001")
+                .replace("sin(z1)", "cos(z1)"),
+        )
+        .expect("written");
+        let (code, stdout) = romc(&["check", &wrong, &model]);
+        assert_eq!(code, Some(1), "{name}: {stdout}");
+        assert!(stdout.contains("different"), "{name}: {stdout}");
+    }
+}

@@ -14,6 +14,8 @@ const MAX_ROUNDS: usize = 4;
 /// Relative error that evaluation at a point may have.
 const EVALUATION: f64 = 1e-11;
 
+/// Ranges of points where exponentials are beyond floats.
+const FAR: [(f64, f64); 2] = [(990.0, 1010.0), (-1010.0, -990.0)];
 /// Ranges from which the variables of the points are taken.
 const POINTS: [(f64, f64); 6] = [
     (0.11, 1.03),
@@ -296,9 +298,14 @@ impl<'a> Shortener<'a> {
             let products = values.iter().zip(summands).map(|(value, (c, _))| value * c);
             products.fold((0.0, 0.0), |(sum, size), p: f64| (sum + p, size + p.abs()))
         };
-        POINTS.into_iter().all(|(low, high)| {
+        let near = POINTS.into_iter().all(|(low, high)| {
             let ((a, size_a), (b, size_b)) = (value(old, low, high), value(new, low, high));
             !a.is_finite() || (a - b).abs() <= EVALUATION * (size_a + size_b)
+        });
+        // `1 - 1/(1 + exp(z))` has values where `exp(z)/(1 + exp(z))` is infinity over infinity in floats.
+        near && FAR.into_iter().all(|(low, high)| {
+            let is_finite = |summands| value(summands, low, high).0.is_finite();
+            !is_finite(old) || is_finite(new)
         })
     }
 }
