@@ -1389,30 +1389,27 @@ fn held_out_jumps_and_repeated_recordings_are_said() {
         &model,
     ]);
     let said = done(&arguments);
-    let line = said
-        .lines()
-        .find(|line| line.starts_with("test, 1 jump: "))
-        .expect("the test set");
-    let held_out = jumps
-        .iter()
-        .find(|jump| line.contains(*jump))
-        .expect("one of them");
+    let first_of = |set: &str| {
+        let line = said.lines().find(|line| line.starts_with(set));
+        let line = line.expect("a line for each set");
+        let jump = jumps.iter().find(|jump| line.contains(*jump));
+        jump.expect("a jump of the set")
+    };
     let page = path(&folder, "page.html");
-    let of_test = done(&["report", &model, held_out, "--output", &page]);
-    assert!(
-        of_test.contains("Its training did not see it."),
-        "{of_test}"
-    );
-    let seen = said
-        .lines()
-        .find(|line| line.starts_with("training, "))
-        .expect("the training set");
-    let seen = jumps
-        .iter()
-        .find(|jump| seen.contains(*jump))
-        .expect("one of them");
-    let of_training = done(&["report", &model, seen, "--force", "--output", &page]);
-    assert!(of_training.contains("Its training saw it"), "{of_training}");
+    for (set, expected) in [
+        ("test, 1 jump: ", "Its training did not see it."),
+        ("training, ", "Its training saw it"),
+    ] {
+        let assessed = done(&[
+            "report",
+            &model,
+            first_of(set),
+            "--force",
+            "--output",
+            &page,
+        ]);
+        assert!(assessed.contains(expected), "{set}{assessed}");
+    }
 
     let other = path(&folder, "other.json");
     let output = romc(&[

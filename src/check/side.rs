@@ -246,7 +246,7 @@ pub(super) enum Floats {
 
 /// Whether a decimal has as many digits as a rounded float.
 fn has_all_digits(decimal: &str) -> bool {
-    let mantissa = decimal.split(['e', 'E']).next().unwrap_or_default();
+    let mantissa = (decimal.split_once('e')).map_or(decimal, |(mantissa, _)| mantissa);
     let digits = mantissa.trim_start_matches(['0', '.']);
     digits.bytes().filter(u8::is_ascii_digit).count() >= 16
 }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::MpcArguments;
 use super::output::{check_output, names, note, progress_bar, read_recordings, write_file};
-use crate::evaluate::{ReferenceInput, along_recording, control_metrics, remarks};
+use crate::evaluate::{ReferenceInput, STEP_SLACK, along_recording, control_metrics, remarks};
 use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::model::ReducedModel;
 use crate::mpc::{Controller, Lift, MpcSettings};
@@ -90,9 +90,6 @@ pub fn run_all(
     Ok(runs)
 }
 
-/// By how much samples may be apart for more than a stage, relative.
-const STEP_SLACK: f64 = 1e-3;
-
 /// Runs with default settings: with the plain lift, then with the consistent one. Recordings of fewer samples than a
 /// default stage has are followed at the rate of the slowest, which a note says.
 ///
@@ -106,8 +103,9 @@ pub fn run_with_both_lifts(
     let segments = recordings.iter().flat_map(|recording| &recording.segments);
     let steps = segments.filter(|segment| segment.len() >= 2);
     let slowest_s = steps.map(Segment::mean_step_s).fold(0.0, f64::max);
-    let step_s = default.step_s.max(slowest_s);
-    if step_s > default.step_s * (1.0 + STEP_SLACK) {
+    let is_slow = default.step_s < STEP_SLACK * slowest_s;
+    let step_s = if is_slow { slowest_s } else { default.step_s };
+    if is_slow {
         note(&format!(
             "the controller acts every {:.0} ms, as often as there are samples; {:.0} ms is usual",
             1e3 * step_s,

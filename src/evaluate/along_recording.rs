@@ -75,7 +75,7 @@ pub struct StepRow {
 }
 
 /// A step may be shorter than the time between samples by what rounds it.
-const STEP_SLACK: f64 = 0.99;
+pub const STEP_SLACK: f64 = 0.99;
 
 /// All steps along a recording, and what they come to.
 #[derive(Debug, Clone, PartialEq)]

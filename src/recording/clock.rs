@@ -8,7 +8,7 @@
 use nalgebra::DMatrix;
 
 use super::error::RecordingError;
-use super::preprocess::{differences, resampled};
+use super::preprocess::{differences, median, resampled};
 use super::segment::Segment;
 use crate::robot::{BODY_DIM, JOINT_DIM};
 
@@ -107,8 +107,12 @@ fn agreeing_coordinates(segment: &Segment) -> Vec<usize> {
     };
     let ratios: Vec<Option<f64>> = (0..COORDINATES).map(ratio).collect();
     let agrees = |ratio: f64, with: f64| (ratio - with).abs() <= AGREES * with.abs();
+    let middle = |ratios: &[Option<f64>]| {
+        let moving: Vec<f64> = ratios.iter().flatten().copied().collect();
+        (!moving.is_empty()).then(|| median(moving.into_iter()))
+    };
     let (joints, body) = ratios.split_at(JOINT_DIM);
-    let median = match (median(joints), median(body)) {
+    let median = match (middle(joints), middle(body)) {
         (None, None) => return (0..COORDINATES).collect(),
         (Some(joints), Some(body)) if !agrees(joints, body) => return Vec::new(),
         (Some(median), _) | (None, Some(median)) => median,
@@ -124,12 +128,6 @@ fn agreeing_coordinates(segment: &Segment) -> Vec<usize> {
     let all = 0..COORDINATES;
     all.filter(|&row| ratios[row].is_none_or(|ratio| agrees(ratio, median)))
         .collect()
-}
-
-fn median(ratios: &[Option<f64>]) -> Option<f64> {
-    let mut moving: Vec<f64> = ratios.iter().flatten().copied().collect();
-    moving.sort_by(f64::total_cmp);
-    moving.get(moving.len() / 2).copied()
 }
 
 /// Which times lie between samples that are more than [`LOST_STEPS`] apart.

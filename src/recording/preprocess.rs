@@ -150,6 +150,13 @@ fn interpolate(rows: &DMatrix<f64>, places: &[Place]) -> DMatrix<f64> {
     })
 }
 
+/// The middle of the values; 0 if there are none.
+pub(in crate::recording) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -192,17 +192,10 @@ fn numbers_beyond_floats_are_told_apart_and_equal_ones_proven() {
 
 #[test]
 fn fractions_of_a_text_are_equal_to_the_floats_of_its_model_and_zeros_are_imported() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let at = |name: &str| folder.path().join(name).display().to_string();
+    let folder = tempfile::tempdir().expect("a folder");
     let romc = |arguments: &[&str]| {
-        let command = std::process::Command::new(env!("CARGO_BIN_EXE_romc"))
-            .args(arguments)
-            .output();
-        let output = command.expect("the binary runs");
-        (
-            output.status.code(),
-            String::from_utf8(output.stdout).expect("UTF-8"),
-        )
+        let output = romc(folder.path(), arguments);
+        (output.status.code(), text(&output.stdout))
     };
     for (name, equations, said) in [
         (
@@ -212,29 +205,28 @@ fn fractions_of_a_text_are_equal_to_the_floats_of_its_model_and_zeros_are_import
         ),
         ("zeros", "ddz1 = sin(-z1) + sin(z1)\n", "proven equal"),
     ] {
-        let (text, model) = (at(&format!("{name}.txt")), at(&format!("{name}.json")));
-        std::fs::write(&text, equations).expect("written");
+        let [typed, model] = ["txt", "json"].map(|ending| format!("{name}.{ending}"));
+        fs::write(folder.path().join(&typed), equations).expect("written");
         let (code, _) = romc(&[
             "import",
-            &text,
+            &typed,
             "--phase",
             "contact=any",
             "--output",
             &model,
         ]);
         assert_eq!(code, Some(0), "{name}");
-        let (code, stdout) = romc(&["check", &text, &model]);
+        let (code, stdout) = romc(&["check", &typed, &model]);
         assert_eq!(code, Some(0), "{name}: {stdout}");
         assert!(stdout.contains(said), "{name}: {stdout}");
-        let wrong = at("wrong.txt");
-        std::fs::write(
-            &wrong,
+        fs::write(
+            folder.path().join("wrong.txt"),
             equations
                 .replace("/3", "/3.0000001")
                 .replace("sin(z1)", "cos(z1)"),
         )
         .expect("written");
-        let (code, stdout) = romc(&["check", &wrong, &model]);
+        let (code, stdout) = romc(&["check", "wrong.txt", &model]);
         assert_eq!(code, Some(1), "{name}: {stdout}");
         assert!(stdout.contains("different"), "{name}: {stdout}");
     }

@@ -4,7 +4,7 @@
 //! the slash, a number after a variable. Nesting is limited, so the machine's stack is safe.
 
 use super::super::equations::Equation;
-use super::reader::{BARE, INVISIBLE, Last, MAX_DEPTH, Read, Reader, Symbol, has};
+use super::reader::{BARE, Last, MAX_DEPTH, Read, Reader, Symbol, has};
 use super::token::{Kind, Token};
 use super::variables::function;
 use crate::model::LatentVariable;
@@ -206,76 +206,6 @@ impl Reader<'_> {
                 _ => return Ok(()),
             }
         }
-    }
-
-    /// Whether a row or column ends right before a place.
-    fn breaks_before(&self, at: usize) -> bool {
-        let is_blank = |kind: &Kind| match kind {
-            Kind::Align | Kind::Break | Kind::Comment(_) | Kind::Paragraph => true,
-            Kind::Character('~') => true,
-            Kind::Command(name) => name == " " || has(INVISIBLE, name),
-            _ => false,
-        };
-        let blanks = self.tokens[..at].iter().rev();
-        (blanks.take_while(|token| is_blank(&token.kind)))
-            .any(|token| matches!(token.kind, Kind::Align | Kind::Break))
-    }
-
-    /// Whether the number at a place was read with `\times 10^{-3}` behind it; goes back there if so.
-    fn number_takes_power_of_ten(&mut self, number: usize) -> bool {
-        let behind = self.tokens[number + 1..self.at].iter();
-        let takes = matches!(self.kind(number), Some(Kind::Number(_)))
-            && behind
-                .take_while(|token| token.kind != Kind::Superscript)
-                .any(|token| token.is_command("times") || token.is_command("cdot"));
-        if takes {
-            self.at = number;
-        }
-        takes
-    }
-
-    /// Whether a fraction of two integers follows.
-    fn is_fraction_of_integers(&self) -> bool {
-        let is_integer = |at: usize| match self.kind(at) {
-            Some(Kind::Number(text)) => text.bytes().all(|byte| byte.is_ascii_digit()),
-            _ => false,
-        };
-        let is_fraction = matches!(self.kind(self.at), Some(Kind::Command(name)) if has("frac dfrac tfrac cfrac", name));
-        let of_groups = [1, 3, 4, 6].map(|place| self.kind(self.at + place))
-            == [
-                Some(&Kind::Open),
-                Some(&Kind::Close),
-                Some(&Kind::Open),
-                Some(&Kind::Close),
-            ];
-        let places = if of_groups { [2, 5] } else { [1, 2] };
-        is_fraction && places.iter().all(|&place| is_integer(self.at + place))
-    }
-
-    /// Whether the last thing that follows is an integer alone in parentheses, as equations are numbered by hand.
-    fn is_lone_integer(&self) -> bool {
-        let is_one_of = |at: usize, all: &str| matches!(self.kind(at), Some(Kind::Character(c)) if all.contains(*c));
-        let is_integer = |at: usize| match self.kind(at) {
-            Some(Kind::Number(text)) => text.bytes().all(|byte| byte.is_ascii_digit()),
-            _ => false,
-        };
-        let is_last = match self.kind(self.at + 3) {
-            Some(Kind::Character(c)) => ".,".contains(*c),
-            Some(kind) => matches!(
-                kind,
-                Kind::Align
-                    | Kind::Break
-                    | Kind::Label(_)
-                    | Kind::Comment(_)
-                    | Kind::Paragraph
-                    | Kind::Close
-            ),
-            None => true,
-        };
-        is_one_of(self.at, "([")
-            && is_integer(self.at + 1)
-            && is_one_of(self.at + 2, ")]")
-            && is_last
     }
 
     pub(super) fn signs(&mut self) {

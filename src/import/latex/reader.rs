@@ -79,6 +79,16 @@ pub(super) fn has(list: &str, word: &str) -> bool {
     list.split_whitespace().any(|known| known == word)
 }
 
+/// Whether a token alone prints nothing.
+pub(super) fn is_blank(kind: &Kind) -> bool {
+    match kind {
+        Kind::Align | Kind::Break | Kind::Label(_) | Kind::Comment(_) | Kind::Paragraph => true,
+        Kind::Character(character) => *character == '~',
+        Kind::Command(name) => name == " " || has(INVISIBLE, name) || has(SIZES, name),
+        _ => false,
+    }
+}
+
 impl<'a> Reader<'a> {
     /// A reader of one display's tokens.
     ///
@@ -128,14 +138,8 @@ impl<'a> Reader<'a> {
     pub(super) fn peek(&mut self) -> Option<&Token> {
         while self.at < self.end {
             let after = match &self.tokens[self.at].kind {
-                Kind::Align | Kind::Break | Kind::Label(_) | Kind::Comment(_) | Kind::Paragraph => {
-                    self.at + 1
-                }
-                Kind::Character('~') => self.at + 1,
+                kind if is_blank(kind) => self.at + 1,
                 Kind::Open if self.closing[self.at] == self.at + 1 => self.at + 2,
-                Kind::Command(name) if name == " " || has(INVISIBLE, name) || has(SIZES, name) => {
-                    self.at + 1
-                }
                 Kind::Command(name) if has(INVISIBLE_WITH_ARGUMENT, name) => {
                     let star = usize::from(self.kind(self.at + 1) == Some(&Kind::Character('*')));
                     self.after_argument(self.at + 1 + star)

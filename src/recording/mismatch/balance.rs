@@ -2,9 +2,9 @@
 
 use nalgebra::{Rotation3, Unit, Vector3};
 
-use super::stance::median;
 use super::weight_n;
 use crate::recording::preprocess::differences;
+use crate::recording::preprocess::median;
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{BODY_NAMES, FOOT_DIM, JOINT_DIM, Leg, Robot};

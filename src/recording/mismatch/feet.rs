@@ -1,6 +1,7 @@
 //! Which column of contact belongs to which foot: while only some feet are on the ground, those in the air are higher.
 
-use super::stance::{foot_place, median, orders};
+use super::stance::{foot_place, orders};
+use crate::recording::preprocess::median;
 use crate::recording::{Recording, Segment};
 use crate::robot::{ContactFlags, FOOT_DIM, Leg, Robot};
 
