@@ -1,8 +1,8 @@
 //! Random models and boxes: no point of a box may be off by more than its certificate says.
 
 use nalgebra::{DMatrix, DVector};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+use chacha20::ChaCha8Rng;
+use chacha20::rand_core::{Rng, SeedableRng};
 
 use super::*;
 use crate::equations::Equations;

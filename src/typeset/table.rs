@@ -119,15 +119,19 @@ impl Table {
         unit: &str,
         cells: impl IntoIterator<Item = T>,
     ) -> &mut Self {
-        let cells: Vec<String> = cells.into_iter().map(|cell| cell.into().0).collect();
+        self.push_column(name, unit, cells.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// [`Table::column`] of cells of one type: compiled once.
+    fn push_column(&mut self, name: &str, unit: &str, cells: Vec<Cell>) {
         if self.columns.is_empty() && self.rows.is_empty() {
             self.rows.resize(cells.len(), Vec::new());
         }
         self.columns.push((name.to_owned(), unit.to_owned()));
         for (row, cell) in self.rows.iter_mut().zip(cells) {
-            row.push(cell);
+            row.push(cell.0);
         }
-        self
     }
 
     /// The table with a caption, which only HTML shows.

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use nalgebra::{DMatrix, DVector};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+use chacha20::ChaCha8Rng;
+use chacha20::rand_core::{Rng, SeedableRng};
 use romc::check::{CheckOptions, Comparison, Side, Verdict, compare};
 use romc::equations::Equations;
 use romc::import::SymbolNames;

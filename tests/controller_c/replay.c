@@ -46,12 +46,12 @@ int main(int argc, char **argv)
     static const double LIMITS[3] = {23.7, 23.7, 35.55};
     static FN(_controller) controller;
     long steps = 0, different = 0, iterations = 0, beyond = 0, active = 0, fallbacks = 0;
-    int64_t head[3];
+    int64_t head[4];
     input = argc > 1 ? fopen(argv[1], "rb") : NULL;
     if (input == NULL) {
         return 2;
     }
-    while (get(head, sizeof head[0], 3)) {
+    while (get(head, sizeof head[0], 4)) {
         const size_t count = (size_t)head[0];
         double chosen[4];
         need(chosen, sizeof chosen[0], 4);
@@ -66,7 +66,8 @@ int main(int argc, char **argv)
         settings.effectiveness_time_s = chosen[1];
         settings.drive_stiffness_nm_rad = chosen[2];
         settings.drive_damping_nm_s_rad = chosen[3];
-        if (FN(_controller_init)(&controller, &settings) != 0
+        const int is_next = head[3] != 0;
+        if ((!is_next && FN(_controller_init)(&controller, &settings) != 0)
             || FN(_controller_set_reference)(&controller, count, time_s, x, dx, u, feet) != 0) {
             fprintf(stderr, "refused\n");
             return 2;

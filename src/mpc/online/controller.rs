@@ -251,8 +251,9 @@ impl Controller {
 
     /// Prepares the step at a time ahead, for the feet that the reference has on the ground then: its
     /// stages are linearised and, with the Riccati solver, its gains computed. The step then does not
-    /// have to; its command is the same to the bit either way. To be called while nothing waits for a
-    /// command, if at all. Does nothing without a reference, or about the last plan.
+    /// have to; its command is the same to the bit either way, to rounding after a refused measurement or
+    /// a change of feet ahead of time. To be called while nothing waits for a command, if at all. Does
+    /// nothing without a reference, or about the last plan.
     pub fn prepare(&mut self, time_s: f64) {
         let Some(reference) = &self.reference else {
             return;
