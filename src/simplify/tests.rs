@@ -1,8 +1,8 @@
 //! Random models and boxes: no point of a box may be off by more than its certificate says.
 
-use nalgebra::{DMatrix, DVector};
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
+use nalgebra::{DMatrix, DVector};
 
 use super::*;
 use crate::equations::Equations;

@@ -134,7 +134,14 @@ fn division_of_numbers_rounds_once() {
     let quotient = pool.div(a, b);
     assert_eq!(
         pool.as_number(quotient).map(Number::to_f64),
-        Some(0.3 / 0.7)
+        Some(3.0 / 7.0)
+    );
+    assert_eq!(canonical("0.1*x + 0.2*x"), "0.3*x");
+    assert_eq!(canonical("0.1*x + 0.2*x - 0.3*x"), "0");
+    assert_eq!(canonical("0.1*0.1*x"), "0.01*x");
+    assert_eq!(
+        canonical("0.1234567890123456*x + 0.1*x"),
+        "0.2234567890123456*x"
     );
     assert_eq!(canonical("1/3"), "1/3");
     assert_eq!(canonical("6/4*x"), "3/2*x");

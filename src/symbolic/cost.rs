@@ -6,6 +6,7 @@
 //! | 3 | the name of a function |
 //! | 3 | a function among the factors of another one's argument, beside its name |
 //! | 2 | a pair of parentheses, a whole number before a term inside a sum |
+//! | 2 | a fraction below the bar of another |
 //! | 1 | a whole number before a term of an argument |
 //! | 1 | a symbol, a power, a fraction bar, a digit of a coefficient (at most three) |
 //!
@@ -16,6 +17,7 @@ use std::collections::HashMap;
 use super::intern::BuildIdHasher;
 use super::node::{ExprId, Function, Node};
 use super::number::Number;
+use super::order::Exponent;
 use super::pool::ExprPool;
 
 /// Of an added term, and of one inside a function's argument.
@@ -23,6 +25,8 @@ const TERM: u64 = 4;
 const INNER_TERM: u64 = 2;
 const FUNCTION: u64 = 3;
 const PARENTHESES: u64 = 2;
+/// Of a fraction in a divisor.
+const NESTED: u64 = 2;
 /// Digits that a reader sees of a coefficient.
 const MOST_DIGITS: usize = 3;
 
@@ -93,12 +97,23 @@ impl ExprPool {
                     Node::Apply(Function::Exp, _) => 1 + PARENTHESES,
                     _ => 1,
                 };
+                let is_below = |factor: &ExprId| {
+                    let (_, exponent) = self.base_and_exponent(*factor);
+                    matches!(exponent, Exponent::Number(number) if number.is_negative())
+                };
+                let nested = match (self.node(*base), self.as_number(*exponent)) {
+                    (Node::Sum(terms), Some(number)) if number.is_negative() => {
+                        let factors = terms.iter().flat_map(|term| self.factors_of(*term));
+                        NESTED * factors.filter(|factor| is_below(factor)).count() as u64
+                    }
+                    _ => 0,
+                };
                 let exponent = match self.as_number(*exponent).and_then(Number::as_integer) {
                     Some(1 | -1) => 1,
                     Some(integer) => power + u64::from(integer < 0),
                     None => FUNCTION + length_of(*exponent),
                 };
-                factor(*base).saturating_add(exponent)
+                factor(*base).saturating_add(exponent + nested)
             }
             Node::Apply(_, argument) => {
                 let connectors = INNER_TERM * (self.n_terms(*argument) - 1);
@@ -181,6 +196,7 @@ mod tests {
         assert_eq!(cost("x*y + x*z"), cost("x*(y + z)"));
         assert!(cost("x*(y + z + w)") < cost("x*y + x*z + x*w"));
         assert!(cost("x*y") < cost("x/y"));
+        assert!(cost("x/(1 + x)") < cost("1/(1 + 1/x)"));
         assert!(cost("sin(2*x)") < cost("2*sin(x)*cos(x)"));
         assert!(cost("sin(x + y)") < cost("sin(x)*cos(y) + cos(x)*sin(y)"));
         assert!(cost("0.123*x") == cost("0.123456789*x"));

@@ -2,7 +2,8 @@
 //!
 //! A learned coefficient is a float and keeps its bits; an integer exponent or the `1/2` of a
 //! derivative is exact. Sums and products of both follow the usual rule: one float makes the
-//! result a float, and a rational that outgrows `i64` becomes the nearest float.
+//! result a float, and a rational that outgrows `i64` becomes the nearest float. A float of at most
+//! 15 digits stands for the decimal fraction that is written for it, so that `0.1 + 0.2` is `0.3`.
 //!
 //! Only correctly rounded operations are folded (`+ - * /`, square roots, integer powers as
 //! multiplication chains), so that folding gives the same bits on every machine. An operation
@@ -13,6 +14,8 @@ use std::fmt;
 
 /// Largest magnitude below which every integer is a float: `2^53`.
 const EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
+/// Most digits of a decimal fraction that is taken as exact.
+const MAX_DECIMALS: usize = 15;
 
 /// A finite real constant: exact, or a float with its bits.
 ///
@@ -156,8 +159,46 @@ impl Number {
                 // |a d|, |c b| and b d stay below 2^126: their sum fits an i128.
                 Number::from_ratio(a * d + c * b, b * d)
             }
-            _ => Number::from_f64(self.to_f64() + other.to_f64()),
+            _ => self
+                .as_decimals(other, Number::checked_add)
+                .or_else(|| Number::from_f64(self.to_f64() + other.to_f64())),
         }
+    }
+
+    /// The decimal fraction that is written for a float, if it is short; an exact number itself.
+    pub(super) fn decimal(self) -> Option<Number> {
+        if self.is_exact() {
+            return Some(self);
+        }
+        let text = format!("{:e}", self.to_f64());
+        let (mantissa, exponent) = text.split_once('e')?;
+        let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+        if whole.len() + fraction.len() > MAX_DECIMALS {
+            return None;
+        }
+        let exponent = exponent.parse::<i32>().ok()? - fraction.len() as i32;
+        let digits: i64 = format!("{whole}{fraction}").parse().ok()?;
+        let power = 10_i64.checked_pow(exponent.unsigned_abs())?;
+        let exact = match exponent {
+            0.. => Number::integer(digits.checked_mul(power)?),
+            _ => Number::rational(digits, power)?,
+        };
+        (exact.is_exact() && exact.to_f64() == self.to_f64()).then_some(exact)
+    }
+
+    /// An operation on two decimal fractions, rounded once; nothing if one is none, or the result is
+    /// too long.
+    fn as_decimals(
+        self,
+        other: Number,
+        operation: fn(Number, Number) -> Option<Number>,
+    ) -> Option<Number> {
+        let exact = operation(self.decimal()?, other.decimal()?)?;
+        let (numerator, denominator) = exact.as_rational()?;
+        let is_short = |part: i64| part.unsigned_abs() <= EXACT_INTEGER as u64;
+        (is_short(numerator) && is_short(denominator))
+            .then(|| Number::from_f64(exact.to_f64()))
+            .flatten()
     }
 
     /// `self * other`; `None` when a float result overflows or loses digits to underflow.
@@ -167,7 +208,9 @@ impl Number {
                 Number::from_ratio(i128::from(a) * i128::from(c), i128::from(b) * i128::from(d))
             }
             _ if self.is_zero() || other.is_zero() => Some(Number::ZERO),
-            _ => normal(self.to_f64() * other.to_f64()),
+            _ => self
+                .as_decimals(other, Number::checked_mul)
+                .or_else(|| normal(self.to_f64() * other.to_f64())),
         }
     }
 
@@ -179,7 +222,9 @@ impl Number {
             }
             _ if other.is_zero() => None,
             _ if self.is_zero() => Some(Number::ZERO),
-            _ => normal(self.to_f64() / other.to_f64()),
+            _ => self
+                .as_decimals(other, Number::checked_div)
+                .or_else(|| normal(self.to_f64() / other.to_f64())),
         }
     }
 

@@ -92,10 +92,53 @@ impl ExprPool {
                 numerator = quotient;
                 left = left.checked_add(Number::MINUS_ONE).unwrap_or(Number::ZERO);
             }
+            // What is left may have a common divisor of fewer terms than either.
+            if left.is_one()
+                && let Some((above, below)) = self.without_common_divisor(numerator, base)
+            {
+                numerator = above;
+                factors.push(self.powi(below, -1));
+                continue;
+            }
             factors.push(self.pow_number(base, -left));
         }
         factors.push(numerator);
         self.product(&factors)
+    }
+
+    /// Both sums divided by their greatest common divisor, if that is not a number: found by exact
+    /// division of the lower one, or by Euclid's algorithm if both are in one base.
+    fn without_common_divisor(&mut self, above: ExprId, below: ExprId) -> Option<(ExprId, ExprId)> {
+        let is_sum = |expr| matches!(self.node(expr), Node::Sum(_));
+        if !is_sum(above) || !is_sum(below) {
+            return None;
+        }
+        if let Some(quotient) = self.divide_exactly(below, above) {
+            return Some((ExprId::ONE, quotient));
+        }
+        let terms = [self.terms_of(above), self.terms_of(below)];
+        let bases = bases_of(self, terms.iter().flatten());
+        let [_] = bases[..] else { return None };
+        let [mut a, mut b] = [
+            self.monomials(&terms[0], &bases)?,
+            self.monomials(&terms[1], &bases)?,
+        ];
+        while !b.is_empty() {
+            (a, b) = (b.clone(), remainder(a, &b)?);
+        }
+        let (degree, leading) = a.last_key_value()?;
+        if degree[0] == 0 {
+            return None;
+        }
+        let leading = *leading;
+        for coefficient in a.values_mut() {
+            *coefficient = coefficient.checked_div(leading)?;
+        }
+        let divisor = self.sum_of_monomials(&a, &bases);
+        Some((
+            self.divide_exactly(above, divisor)?,
+            self.divide_exactly(below, divisor)?,
+        ))
     }
 
     /// `dividend / divisor` if both are sums of products with exact coefficients and positive
@@ -164,6 +207,27 @@ impl ExprPool {
     }
 }
 
+/// What is left of a polynomial in one base when another is divided out; nothing if a coefficient is
+/// no longer exact.
+fn remainder(mut of: Monomials, divisor: &Monomials) -> Option<Monomials> {
+    let (degree, leading) = divisor.last_key_value()?;
+    for _ in 0..MAX_STEPS {
+        let Some((highest, coefficient)) = of.last_key_value() else {
+            return Some(of);
+        };
+        let step = highest[0] - degree[0];
+        if step < 0 {
+            return Some(of);
+        }
+        let factor = coefficient.checked_div(*leading)?;
+        for (exponents, coefficient) in divisor {
+            let term = -coefficient.checked_mul(factor)?;
+            add(&mut of, vec![exponents[0] + step], term)?;
+        }
+    }
+    None
+}
+
 /// The bases of the powers in some terms, in canonical order.
 pub(super) fn bases_of<'t>(
     pool: &ExprPool,
@@ -193,6 +257,17 @@ mod tests {
         assert_eq!(together("(x^2 - 1)/(x - 1)"), "1 + x");
         assert_eq!(together("1/(x + 1) - 1/(x + 2)"), "1/((1 + x)*(2 + x))");
         assert_eq!(together("1/x - 1/(x*(x + 1))"), "1/(1 + x)");
+        assert_eq!(together("(x + 1)/(x^2 - 1)"), "-1/(1 - x)");
+        assert_eq!(
+            together("(x^2 + 3*x + 2)/(x^2 + 4*x + 3)"),
+            "(2 + x)/(3 + x)"
+        );
+        assert_eq!(
+            together("(exp(x)^2 - 1)/(2*exp(x) + 2)"),
+            "-1/2 + 1/2*exp(x)"
+        );
+        assert_eq!(together("(x + y)/(x^2 - y^2)"), "1/(x - y)");
+        assert_eq!(together("(x^2 + 1)/(x^2 - 1)"), "-(1 + x^2)/(1 - x^2)");
         assert_eq!(
             together("(x^3 - y^3)/(x - y)^2"),
             "(x^2 + x*y + y^2)/(x - y)"

@@ -95,6 +95,15 @@ impl ExprPool {
     }
 
     fn split_log(&mut self, argument: ExprId) -> Option<ExprId> {
+        // A logarithm has a value only where the sign is one.
+        if let Node::Apply(Function::Sign, _) = self.node(argument) {
+            return Some(ExprId::ZERO);
+        }
+        if let Some((1, divisor @ 2..)) = self.as_number(argument).and_then(Number::as_rational) {
+            let divisor = self.integer(divisor);
+            let log = self.apply(Function::Log, divisor);
+            return Some(self.scale(Number::MINUS_ONE, log));
+        }
         if let (base, Exponent::Number(exponent)) = self.base_and_exponent(argument)
             && !exponent.is_one()
             && self.as_number(base).is_none()
@@ -327,7 +336,8 @@ impl ExprPool {
         logs.sort_by_key(|(cofactor, coefficient, _)| (*cofactor, coefficient.abs()));
         let mut parts = vec![self.sum_of_terms(others)];
         for group in logs.chunk_by(|a, b| a.0 == b.0) {
-            let (cofactor, unit) = (group[0].0, group[0].1.abs());
+            let cofactor = group[0].0;
+            let unit = common_unit(group.iter().map(|(_, coefficient, _)| *coefficient));
             let mut arguments = Vec::new();
             for &(_, coefficient, argument) in group {
                 let ratio = coefficient.checked_div(unit).and_then(Number::as_integer);
@@ -366,6 +376,18 @@ impl ExprPool {
     }
 }
 
+/// The largest fraction of the first number of which all are whole multiples; else the first.
+fn common_unit(numbers: impl Iterator<Item = Number> + Clone) -> Number {
+    let first = numbers.clone().next().unwrap_or(Number::ONE).abs();
+    let mut units =
+        (1..=MAX_LOG_POWER).filter_map(|parts| first.checked_div(Number::integer(parts)));
+    let is_common = |unit: &Number| {
+        let is_whole = |number: Number| number.checked_div(*unit)?.as_integer();
+        numbers.clone().all(|number| is_whole(number).is_some())
+    };
+    units.find(is_common).unwrap_or(first)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -391,6 +413,9 @@ mod tests {
             ("0.3*c*log(a) - 0.3*c*log(b)", "0.3*c*log(a/b)"),
             ("log(a) - 2*log(b) + c", "c + log(a/b^2)"),
             ("log(a) + 9*log(b)", "log(a) + 9*log(b)"),
+            ("3*log(a) - 2*log(b)", "log(a^3/b^2)"),
+            ("log(sign(a))", "0"),
+            ("log(1/2)", "-log(2)"),
             ("abs(a*b)", "abs(a)*abs(b)"),
             ("abs(a)^3", "a^2*abs(a)"),
             ("abs(a)*sign(a)", "a"),

@@ -1,8 +1,8 @@
 //! Seeded random numbers: the same on every machine and in every release.
 
-use nalgebra::DMatrix;
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
+use nalgebra::DMatrix;
 
 /// A seeded source of uniform numbers.
 #[derive(Debug)]

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use nalgebra::{DMatrix, DVector};
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
+use nalgebra::{DMatrix, DVector};
 use romc::check::{CheckOptions, Comparison, Side, Verdict, compare};
 use romc::equations::Equations;
 use romc::import::SymbolNames;

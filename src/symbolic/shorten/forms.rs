@@ -16,11 +16,11 @@ const MAX_GROUP: usize = 64;
 const MAX_CHOSEN: usize = 16;
 
 impl Shortener<'_> {
-    /// A shorter form of a sum, if one is found.
-    pub(super) fn shortest(&mut self, old: &Summands) -> Option<Summands> {
+    /// The shortest form of a sum that is shorter and agrees with what was written first, if there is one.
+    pub(super) fn shortest(&mut self, old: &Summands, original: &Summands) -> Option<Summands> {
         let (unit, scaled) = in_units(old);
         let before = self.length(unit, &scaled);
-        let mut best = ((before, 0), None);
+        let mut shorter = Vec::new();
         let singles: Scaled = (scaled.iter())
             .map(|&(number, expr)| (number, self.single(expr)))
             .collect();
@@ -29,14 +29,16 @@ impl Shortener<'_> {
             candidates.extend(self.candidates(unit, &singles));
         }
         let (n_terms, n_calls) = (self.all_terms(&scaled), self.calls(&scaled));
+        let n_numbers = self.n_numbers(unit, &scaled);
         let n_written = self.spread(unit, scaled).len();
         for candidate in candidates {
-            // Only a fraction whose sums become fewer, and a function of a function that goes, may be written as
-            // several terms.
+            // Only a fraction whose sums become fewer, a function of a function that goes, and a sum whose
+            // decimals become fewer, may be written as several terms.
             let is_resolved = || {
                 let is_fraction = !self.denominators(old[0].1).is_empty();
                 (is_fraction && self.all_terms(&candidate) < n_terms)
                     || self.calls(&candidate) < n_calls
+                    || (unit.is_exact() && self.n_numbers(unit, &candidate) < n_numbers)
             };
             if candidate.len() > n_written && (old.len() > 1 || !is_resolved()) {
                 continue;
@@ -45,11 +47,11 @@ impl Shortener<'_> {
             let length = self.length(unit, &candidate);
             let is_negative = |(number, _): &&(Number, ExprId)| in_f64(*number, unit) < 0.0;
             let rank = (length, candidate.iter().filter(is_negative).count());
-            if rank < best.0 {
-                best = (rank, Some(candidate));
+            if rank < (before, 0) {
+                shorter.push((rank, candidate));
             }
         }
-        let found = best.1?;
+        shorter.sort_by_key(|(rank, _)| *rank);
         let coefficient = |number: Number, expr: ExprId| {
             let value = in_f64(number, unit);
             let is_same = |&&(known, of): &&(f64, ExprId)| {
@@ -57,11 +59,14 @@ impl Shortener<'_> {
             };
             old.iter().find(is_same).map_or(value, |&(known, _)| known)
         };
-        let summands: Summands = (found.into_iter())
-            .map(|(number, expr)| (coefficient(number, expr), expr))
-            .collect();
         let is_usable = |&(value, _): &(f64, ExprId)| value.is_finite() && value != 0.0;
-        summands.iter().all(is_usable).then_some(summands)
+        let mut forms = shorter.into_iter().map(|(_, form)| -> Summands {
+            let terms = form.into_iter();
+            terms
+                .map(|(number, expr)| (coefficient(number, expr), expr))
+                .collect()
+        });
+        forms.find(|form| form.iter().all(is_usable) && self.agrees(original, form))
     }
 
     /// The summands with sums of coefficient 1 or -1 as terms of their own, as they are written.
@@ -98,6 +103,26 @@ impl Shortener<'_> {
             }
         }
         count
+    }
+
+    /// Coefficients that are written, with those of sums that are terms.
+    fn n_numbers(&self, unit: Number, summands: &Scaled) -> usize {
+        let is_written =
+            |(number, rest): &(Number, ExprId)| *rest == ExprId::ONE || !number.abs().is_one();
+        let of_term = |&(number, expr): &(Number, ExprId)| {
+            let inner = match self.pool.node(expr) {
+                Node::Sum(_) => self
+                    .pool
+                    .terms_of(expr)
+                    .iter()
+                    .filter(|t| is_written(t))
+                    .count(),
+                _ => 0,
+            };
+            let own = in_f64(number, unit).abs() != 1.0 || expr == ExprId::ONE;
+            usize::from(own) + inner
+        };
+        summands.iter().map(of_term).sum()
     }
 
     /// Functions that are written, each as often as it is.

@@ -7,6 +7,7 @@ use crate::symbolic::cost::Costs;
 use crate::symbolic::intern::BuildIdHasher;
 use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
 use crate::symbolic::number::Number;
+use crate::symbolic::order::Exponent;
 use crate::symbolic::pool::ExprPool;
 
 /// Most rounds of searching for groups.
@@ -14,10 +15,28 @@ const MAX_ROUNDS: usize = 4;
 /// Relative error that evaluation at a point may have.
 const EVALUATION: f64 = 1e-11;
 
-/// Ranges of points where exponentials are beyond floats.
-const FAR: [(f64, f64); 2] = [(990.0, 1010.0), (-1010.0, -990.0)];
+/// Relative error at points far out, where arguments of waves lose digits.
+const FAR_EVALUATION: f64 = 1e-3;
+
+/// Values below which one form may underflow where the other does not.
+const UNDERFLOW: f64 = 1e-150;
+
+/// A range that variables of a point are taken from.
+type Range = (f64, f64);
+
+/// Ranges where exponentials are beyond floats, and where their products are.
+const FAR: [Range; 4] = [
+    (990.0, 1010.0),
+    (-1010.0, -990.0),
+    (390.0, 410.0),
+    (-410.0, -390.0),
+];
+/// Ranges of the variables beside one that is far out.
+const BESIDE: [Range; 2] = [(0.11, 1.03), (-2.71, -0.2)];
+/// Most variables that are far out one by one.
+const MAX_FAR: usize = 8;
 /// Ranges from which the variables of the points are taken.
-const POINTS: [(f64, f64); 6] = [
+const POINTS: [Range; 6] = [
     (0.11, 1.03),
     (1.27, 2.9),
     (-1.03, 1.4),
@@ -53,6 +72,20 @@ pub(super) enum Reach {
     Near,
     /// Those that share a constant too, or have denominators of the same variables.
     Far,
+}
+
+/// Summands with variables for parts, and these parts.
+type Seen = (Summands, Vec<(SymbolId, ExprId)>);
+
+/// What of the terms is a variable while they are searched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum View {
+    /// Sums that are factors: `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
+    Factors,
+    /// Sums that are angles.
+    Angles,
+    /// Nothing.
+    Whole,
 }
 
 fn blocks_of(summands: &[(f64, ExprId)]) -> Vec<Block> {
@@ -96,19 +129,15 @@ impl<'a> Shortener<'a> {
             return Vec::new();
         }
         let mut blocks = blocks_of(summands);
-        if let Some((whole, angles)) = self.whole_angles(summands) {
-            blocks = blocks_of(&whole);
-            self.run(&mut blocks, &whole);
-            for block in &mut blocks {
-                for (_, expr) in &mut block.summands {
-                    *expr = self.pool.substitute(*expr, &angles);
-                }
-                if !block.is_new {
-                    block.summands = vec![summands[block.positions[0]]];
-                }
+        for _ in 0..MAX_ROUNDS {
+            let mut is_changed = false;
+            for view in [View::Factors, View::Angles, View::Whole] {
+                is_changed |= self.pass(&mut blocks, view);
+            }
+            if !is_changed {
+                break;
             }
         }
-        self.run(&mut blocks, summands);
         let new = blocks.into_iter().filter(|block| block.is_new);
         let mut found: Vec<Shortened> = new
             .map(|block| Shortened {
@@ -118,6 +147,63 @@ impl<'a> Shortener<'a> {
             .collect();
         found.sort_by(|a, b| a.replaced.cmp(&b.replaced));
         found
+    }
+
+    /// Shortens all blocks in one view; whether anything changed.
+    fn pass(&mut self, blocks: &mut Vec<Block>, view: View) -> bool {
+        let flat: Vec<(usize, (f64, ExprId))> = (blocks.iter().enumerate())
+            .flat_map(|(place, block)| block.summands.iter().map(move |&summand| (place, summand)))
+            .collect();
+        let written: Summands = flat.iter().map(|&(_, summand)| summand).collect();
+        let seen = match view {
+            View::Whole => Some((written.clone(), Vec::new())),
+            View::Angles => self.whole_angles(&written),
+            View::Factors => self.whole_factors(&written),
+        };
+        let Some((summands, parts)) = seen else {
+            return false;
+        };
+        let mut found = blocks_of(&summands);
+        self.run(&mut found, &summands);
+        let mut is_changed = false;
+        let mut moved: Vec<usize> = (0..blocks.len()).collect();
+        for new in found.into_iter().filter(|block| block.is_new) {
+            let mut by: Summands = (new.summands.into_iter())
+                .map(|(c, expr)| (c, self.pool.substitute(expr, &parts)))
+                .collect();
+            let lost: Summands = new.positions.iter().map(|&at| written[at]).collect();
+            let mut length =
+                |summands: &Summands| (self.costs).of_terms(self.pool, summands.iter().copied());
+            if length(&by) > length(&lost) {
+                continue;
+            }
+            is_changed = true;
+            // The blocks that lost a summand become one, with what they have left.
+            let mut places: Vec<usize> = (new.positions.iter())
+                .map(|&at| moved[flat[at].0])
+                .collect();
+            places.sort_unstable();
+            places.dedup();
+            for place in &mut moved {
+                if places.contains(place) {
+                    *place = places[0];
+                }
+            }
+            let mut positions = Vec::new();
+            for &place in &places {
+                positions.append(&mut blocks[place].positions);
+                let left = std::mem::take(&mut blocks[place].summands);
+                by.extend(left.into_iter().filter(|summand| !lost.contains(summand)));
+            }
+            positions.sort_unstable();
+            blocks[places[0]] = Block {
+                positions,
+                summands: by,
+                is_new: true,
+            };
+        }
+        blocks.retain(|block| !block.positions.is_empty());
+        is_changed
     }
 
     /// Shortens group after group: first those that share a term, then all that can interact.
@@ -139,10 +225,7 @@ impl<'a> Shortener<'a> {
 
     /// The summands with a variable of its own in the place of each sum that is an angle, and these sums;
     /// nothing if no angle is one. So what is true of one angle is found before angles are taken apart.
-    fn whole_angles(
-        &mut self,
-        summands: &[(f64, ExprId)],
-    ) -> Option<(Summands, Vec<(SymbolId, ExprId)>)> {
+    fn whole_angles(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
         let exprs: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
         let order = self.pool.reachable(&exprs);
         let mut families: Vec<(ExprId, Vec<(Number, ExprId)>)> = Vec::new();
@@ -174,6 +257,9 @@ impl<'a> Shortener<'a> {
         let mut replaced: HashMap<ExprId, ExprId, BuildIdHasher> = HashMap::default();
         for (place, (monic, angles)) in families.into_iter().enumerate() {
             let least = angles.iter().map(|(factor, _)| factor.abs()).min()?;
+            // `cos(2*a)` may be a square of `cos(a)`.
+            let half = least.checked_mul(Number::HALF);
+            let least = half.filter(|_| least.is_even()).unwrap_or(least);
             let angle: Option<Vec<ExprId>> = (self.pool.terms_of(monic).into_iter())
                 .map(|(number, rest)| Some(self.pool.scale(number.checked_mul(least)?, rest)))
                 .collect();
@@ -203,6 +289,39 @@ impl<'a> Shortener<'a> {
         }
         let whole = summands.iter().map(|(c, expr)| (*c, replaced[expr]));
         Some((whole.collect(), variables))
+    }
+
+    /// The summands with a variable of its own in the place of each sum that is a factor, and these
+    /// sums; nothing if there is none.
+    fn whole_factors(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
+        let mut sums: Vec<(SymbolId, ExprId)> = Vec::new();
+        let mut whole = Summands::new();
+        for &(coefficient, expr) in summands {
+            let mut factors = self.pool.factors_of(expr).to_vec();
+            for factor in &mut factors {
+                let (sum, exponent) = self.pool.base_and_exponent(*factor);
+                let Exponent::Number(exponent) = exponent else {
+                    continue;
+                };
+                if exponent.is_negative() || !matches!(self.pool.node(sum), Node::Sum(_)) {
+                    continue;
+                }
+                let known = sums.iter().find(|(_, known)| *known == sum);
+                let variable = match known {
+                    Some(&(variable, _)) => variable,
+                    None => {
+                        // No file has a variable of this name.
+                        let variable = self.pool.symbol_id(&format!(" factor {}", sums.len()));
+                        sums.push((variable, sum));
+                        variable
+                    }
+                };
+                let symbol = self.pool.symbol_expr(variable);
+                *factor = self.pool.pow_number(symbol, exponent);
+            }
+            whole.push((coefficient, self.pool.product(&factors)));
+        }
+        (!sums.is_empty()).then_some((whole, sums))
     }
 
     /// Whether the terms are distinct monomials that cannot interact.
@@ -266,13 +385,10 @@ impl<'a> Shortener<'a> {
             .flat_map(|&place| blocks[place].positions.iter().copied())
             .collect();
         positions.sort_unstable();
-        let Some(new) = self.shortest(&old) else {
+        let replaced: Summands = positions.iter().map(|&place| original[place]).collect();
+        let Some(new) = self.shortest(&old, &replaced) else {
             return false;
         };
-        let replaced: Summands = positions.iter().map(|&place| original[place]).collect();
-        if !self.agrees(&replaced, &new) {
-            return false;
-        }
         for &place in &group[1..] {
             blocks[place].positions.clear();
             blocks[place].is_new = false;
@@ -287,25 +403,59 @@ impl<'a> Shortener<'a> {
 
     /// Whether two sums have the same values, up to rounding, at all points tried where the first
     /// has one.
-    fn agrees(&self, old: &Summands, new: &Summands) -> bool {
-        let value = |summands: &Summands, low: f64, high: f64| {
-            let exprs: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
-            let values = self.pool.evaluate_all(&exprs, &|symbol| {
+    pub(super) fn agrees(&self, old: &Summands, new: &Summands) -> bool {
+        let exprs = |summands: &Summands| -> Vec<ExprId> {
+            summands.iter().map(|&(_, expr)| expr).collect()
+        };
+        let (before, after) = (exprs(old), exprs(new));
+        // Whole numbers that become too large are floats, and no longer exact.
+        if self.has_floats(&after) && !self.has_floats(&before) {
+            return false;
+        }
+        let point = |range: Range, special: Option<(SymbolId, Range)>| {
+            move |symbol: SymbolId| {
+                let (low, high) = match special {
+                    Some((far, range)) if far == symbol => range,
+                    _ => range,
+                };
                 // Multiples of the golden ratio fill an interval evenly.
                 let place = (symbol.index() as f64 + 1.0) * 0.618_033_988_749_894_9;
                 low + (high - low) * (place + low.abs()).fract()
-            });
+            }
+        };
+        let value = |exprs: &[ExprId], summands: &Summands, at: &dyn Fn(SymbolId) -> f64| {
+            let values = self.pool.evaluate_all(exprs, &at);
             let products = values.iter().zip(summands).map(|(value, (c, _))| value * c);
             products.fold((0.0, 0.0), |(sum, size), p: f64| (sum + p, size + p.abs()))
         };
-        let near = POINTS.into_iter().all(|(low, high)| {
-            let ((a, size_a), (b, size_b)) = (value(old, low, high), value(new, low, high));
-            !a.is_finite() || (a - b).abs() <= EVALUATION * (size_a + size_b)
-        });
+        let is_same = |tolerance: f64, at: &dyn Fn(SymbolId) -> f64| {
+            let ((a, size_a), (b, size_b)) = (value(&before, old, at), value(&after, new, at));
+            !a.is_finite() || (a - b).abs() <= tolerance * (size_a + size_b) + UNDERFLOW
+        };
+        let mut symbols = Vec::new();
+        for &expr in before.iter().chain(&after) {
+            for symbol in self.pool.symbols_of(expr) {
+                if !symbols.contains(&symbol) && symbols.len() < MAX_FAR {
+                    symbols.push(symbol);
+                }
+            }
+        }
         // `1 - 1/(1 + exp(z))` has values where `exp(z)/(1 + exp(z))` is infinity over infinity in floats.
-        near && FAR.into_iter().all(|(low, high)| {
-            let is_finite = |summands| value(summands, low, high).0.is_finite();
-            !is_finite(old) || is_finite(new)
+        (POINTS.iter()).all(|&range| is_same(EVALUATION, &point(range, None)))
+            && FAR.iter().all(|&far| {
+                let mut beside = (symbols.iter())
+                    .flat_map(|&symbol| BESIDE.map(|range| (range, Some((symbol, far)))));
+                is_same(FAR_EVALUATION, &point(far, None))
+                    && beside.all(|(range, far)| is_same(FAR_EVALUATION, &point(range, far)))
+            })
+    }
+
+    /// Whether a number among the expressions is a float.
+    fn has_floats(&self, exprs: &[ExprId]) -> bool {
+        let mut nodes = self.pool.reachable(exprs).into_iter();
+        nodes.any(|node| {
+            let number = self.pool.as_number(node);
+            number.is_some_and(|number| !number.is_exact())
         })
     }
 }

@@ -6,8 +6,6 @@ use crate::symbolic::number::Number;
 /// Largest numerator and denominator of a ratio of coefficients.
 const MAX_NUMERATOR: f64 = 4096.0;
 const MAX_DENOMINATOR: i32 = 64;
-/// Largest decimal fractions that are taken as exact.
-const MAX_DECIMALS: usize = 15;
 
 /// A unit, and the coefficients as multiples of it: small fractions if all are such.
 pub(super) fn in_units(summands: &Summands) -> (Number, Scaled) {
@@ -38,23 +36,8 @@ fn small_ratio(a: f64, b: f64) -> Option<Number> {
 
 /// The decimal fraction that is written for a float, if it is short; the float itself otherwise.
 fn decimal(value: f64) -> Number {
-    let exact = || {
-        let text = format!("{value:e}");
-        let (mantissa, exponent) = text.split_once('e')?;
-        let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
-        let exponent = exponent.parse::<i32>().ok()? - fraction.len() as i32;
-        if whole.len() + fraction.len() > MAX_DECIMALS {
-            return None;
-        }
-        let digits: i64 = format!("{whole}{fraction}").parse().ok()?;
-        let power = 10_i64.checked_pow(exponent.unsigned_abs())?;
-        match exponent {
-            0.. => Some(Number::integer(digits.checked_mul(power)?)),
-            _ => Number::rational(digits, power),
-        }
-    };
-    let number = exact().filter(|number| number.to_f64() == value);
-    number.unwrap_or_else(|| Number::from_f64(value).expect("coefficients are finite"))
+    let number = Number::from_f64(value).expect("coefficients are finite");
+    number.decimal().unwrap_or(number)
 }
 
 /// `number * unit`, rounded once if the unit is a short decimal fraction, else twice.
