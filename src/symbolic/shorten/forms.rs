@@ -27,6 +27,7 @@ impl Shortener<'_> {
         let mut candidates = vec![collected(self.pool, &singles, Keep::Sums)];
         if old.len() <= MAX_GROUP {
             candidates.extend(self.candidates(unit, &singles));
+            candidates.extend(self.beside_common_factors(unit, &singles));
         }
         let (n_terms, n_calls) = (self.all_terms(&scaled), self.calls(&scaled));
         let n_numbers = self.n_numbers(unit, &scaled);
@@ -176,6 +177,37 @@ impl Shortener<'_> {
         candidates.extend(self.waves_as_products(singles));
         candidates.extend(self.chosen(unit, singles));
         candidates
+    }
+
+    /// Forms of what is left of the terms beside the factors that all have: `z*tanh(a)` is found so.
+    fn beside_common_factors(&mut self, unit: Number, singles: &Scaled) -> Vec<Scaled> {
+        let [(_, first), others @ ..] = &singles[..] else {
+            return Vec::new();
+        };
+        let is_common = |factor: &ExprId| {
+            let mut others = others.iter();
+            *factor != ExprId::ONE
+                && others.all(|&(_, expr)| self.pool.factors_of(expr).contains(factor))
+        };
+        let factors = self.pool.factors_of(*first).iter().copied();
+        let common: Vec<ExprId> = factors.filter(is_common).collect();
+        if others.is_empty() || common.is_empty() {
+            return Vec::new();
+        }
+        let common = self.pool.product(&common);
+        let left: Scaled = (singles.iter())
+            .map(|&(number, expr)| (number, self.pool.div(expr, common)))
+            .collect();
+        let mut found = self.candidates(unit, &left);
+        for (number, expr) in found.iter_mut().flatten() {
+            let term = self.pool.product(&[common, *expr]);
+            let (factor, rest) = self.pool.split(term);
+            (*number, *expr) = match number.checked_mul(factor) {
+                Some(number) => (number, rest),
+                None => (*number, term),
+            };
+        }
+        found
     }
 
     /// Sums in which two waves are a product: `cos(a + b) + cos(a - b) = 2*cos(a)*cos(b)` and the like,

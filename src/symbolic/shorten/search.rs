@@ -24,12 +24,16 @@ const UNDERFLOW: f64 = 1e-150;
 /// A range that variables of a point are taken from.
 type Range = (f64, f64);
 
-/// Ranges where exponentials are beyond floats, and where their products are.
-const FAR: [Range; 4] = [
-    (990.0, 1010.0),
-    (-1010.0, -990.0),
+/// Ranges where exponentials are beyond floats, and where their products and powers are.
+const FAR: [Range; 8] = [
+    (9900.0, 10100.0),
+    (-10100.0, -9900.0),
     (390.0, 410.0),
     (-410.0, -390.0),
+    (195.0, 205.0),
+    (-205.0, -195.0),
+    (98.0, 102.0),
+    (-102.0, -98.0),
 ];
 /// Ranges of the variables beside one that is far out.
 const BESIDE: [Range; 2] = [(0.11, 1.03), (-2.71, -0.2)];
@@ -80,7 +84,8 @@ type Seen = (Summands, Vec<(SymbolId, ExprId)>);
 /// What of the terms is a variable while they are searched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum View {
-    /// Sums that are factors: `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
+    /// Sums that are factors, and functions other than waves that are factors of several terms:
+    /// `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
     Factors,
     /// Sums that are angles.
     Angles,
@@ -291,28 +296,40 @@ impl<'a> Shortener<'a> {
         Some((whole.collect(), variables))
     }
 
-    /// The summands with a variable of its own in the place of each sum that is a factor, and these
-    /// sums; nothing if there is none.
+    /// The summands with a variable of its own in the place of each factor of [`View::Factors`], and
+    /// these; nothing if there is none.
     fn whole_factors(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
-        let mut sums: Vec<(SymbolId, ExprId)> = Vec::new();
+        let mut n_terms: HashMap<ExprId, usize, BuildIdHasher> = HashMap::default();
+        for &(_, expr) in summands {
+            for &factor in self.pool.factors_of(expr) {
+                *n_terms.entry(factor).or_insert(0) += 1;
+            }
+        }
+        let mut parts: Vec<(SymbolId, ExprId)> = Vec::new();
         let mut whole = Summands::new();
         for &(coefficient, expr) in summands {
             let mut factors = self.pool.factors_of(expr).to_vec();
             for factor in &mut factors {
-                let (sum, exponent) = self.pool.base_and_exponent(*factor);
-                let Exponent::Number(exponent) = exponent else {
-                    continue;
+                let (base, exponent) = self.pool.base_and_exponent(*factor);
+                let (part, exponent) = match (self.pool.node(base), exponent) {
+                    (_, Exponent::Number(exponent)) if exponent.is_negative() => continue,
+                    (Node::Sum(_), Exponent::Number(exponent)) => (base, exponent),
+                    (Node::Apply(Function::Sin | Function::Cos | Function::Tan, _), _) => continue,
+                    (Node::Symbol(_), Exponent::Number(exponent))
+                        if exponent.as_integer().is_some() =>
+                    {
+                        continue;
+                    }
+                    _ if n_terms[factor] < 2 => continue,
+                    _ => (*factor, Number::ONE),
                 };
-                if exponent.is_negative() || !matches!(self.pool.node(sum), Node::Sum(_)) {
-                    continue;
-                }
-                let known = sums.iter().find(|(_, known)| *known == sum);
+                let known = parts.iter().find(|(_, known)| *known == part);
                 let variable = match known {
                     Some(&(variable, _)) => variable,
                     None => {
                         // No file has a variable of this name.
-                        let variable = self.pool.symbol_id(&format!(" factor {}", sums.len()));
-                        sums.push((variable, sum));
+                        let variable = self.pool.symbol_id(&format!(" factor {}", parts.len()));
+                        parts.push((variable, part));
                         variable
                     }
                 };
@@ -321,7 +338,7 @@ impl<'a> Shortener<'a> {
             }
             whole.push((coefficient, self.pool.product(&factors)));
         }
-        (!sums.is_empty()).then_some((whole, sums))
+        (!parts.is_empty()).then_some((whole, parts))
     }
 
     /// Whether the terms are distinct monomials that cannot interact.
