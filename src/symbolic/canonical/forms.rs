@@ -112,8 +112,9 @@ impl<'p> CanonicalForms<'p> {
         self.forms[&expr].clone()
     }
 
-    /// The form with all reciprocals of sums, tangents and hyperbolic tangents removed: times a
-    /// factor that is zero nowhere in the interior of the domain. `None` if it grows too large.
+    /// The form with all reciprocals of sums, tangents and hyperbolic tangents removed, and magnitudes
+    /// of sums whose signs occur: times a factor that is zero nowhere in the interior of the domain.
+    /// `None` if it grows too large.
     pub fn without_fractions(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
         let mut form = form.clone();
         for _ in 0..MAX_REMOVALS {
@@ -146,6 +147,10 @@ impl<'p> CanonicalForms<'p> {
             Atom::Tanh(argument) => {
                 let [plus, minus] = exponentials(&argument, false);
                 (plus.minus(&minus), plus.plus(&minus))
+            }
+            Atom::Abs(base) => {
+                let sign = self.atom(Atom::Sign(base.clone()));
+                (self.product(&base, &sign)?, one())
             }
             _ => return None,
         };
@@ -346,8 +351,15 @@ impl<'p> CanonicalForms<'p> {
     }
 
     fn is_removable(&self, atom: u32) -> bool {
-        let atom = &self.atoms[atom as usize];
-        matches!(atom, Atom::Sum(_) | Atom::Tan(_) | Atom::Tanh(_))
+        match &self.atoms[atom as usize] {
+            Atom::Sum(_) | Atom::Tan(_) | Atom::Tanh(_) => true,
+            // `|x + y| = (x + y) sign(x + y)`; what one atom is has rules of its own.
+            Atom::Abs(base) => {
+                let sign = Atom::Sign(base.clone());
+                base.as_atom().is_none() && self.numbers.contains_key(&sign)
+            }
+            _ => false,
+        }
     }
 }
 
