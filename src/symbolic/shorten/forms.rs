@@ -198,16 +198,15 @@ impl Shortener<'_> {
         let left: Scaled = (singles.iter())
             .map(|&(number, expr)| (number, self.pool.div(expr, common)))
             .collect();
-        let mut found = self.candidates(unit, &left);
-        for (number, expr) in found.iter_mut().flatten() {
-            let term = self.pool.product(&[common, *expr]);
-            let (factor, rest) = self.pool.split(term);
-            (*number, *expr) = match number.checked_mul(factor) {
-                Some(number) => (number, rest),
-                None => (*number, term),
-            };
-        }
-        found
+        let found = self.candidates(unit, &left).into_iter();
+        let with_factors = found.map(|form| {
+            let terms = form.into_iter();
+            let terms: Scaled = terms
+                .map(|(number, expr)| (number, self.pool.product(&[common, expr])))
+                .collect();
+            collected(self.pool, &terms, Keep::Sums)
+        });
+        with_factors.collect()
     }
 
     /// Sums in which two waves are a product: `cos(a + b) + cos(a - b) = 2*cos(a)*cos(b)` and the like,
@@ -349,14 +348,14 @@ impl Shortener<'_> {
 
 /// Whether sums among the terms stay terms.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Keep {
+pub(super) enum Keep {
     Sums,
     Nothing,
 }
 
 /// Summands with the numbers of their terms in the coefficients and like terms added, in the order
 /// of their first appearance.
-fn collected(pool: &ExprPool, summands: &[(Number, ExprId)], keep: Keep) -> Scaled {
+pub(super) fn collected(pool: &ExprPool, summands: &[(Number, ExprId)], keep: Keep) -> Scaled {
     let mut result = Scaled::new();
     let mut place: HashMap<ExprId, usize, BuildIdHasher> = HashMap::default();
     for &(number, expr) in summands {

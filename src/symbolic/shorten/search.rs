@@ -1,8 +1,9 @@
 //! The replacements of a sum, group by group.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
-use super::Summands;
+use super::forms::{Keep, collected};
+use super::{Scaled, Summands};
 use crate::symbolic::cost::Costs;
 use crate::symbolic::intern::BuildIdHasher;
 use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
@@ -173,9 +174,14 @@ impl<'a> Shortener<'a> {
         let mut is_changed = false;
         let mut moved: Vec<usize> = (0..blocks.len()).collect();
         for new in found.into_iter().filter(|block| block.is_new) {
-            let mut by: Summands = (new.summands.into_iter())
-                .map(|(c, expr)| (c, self.pool.substitute(expr, &parts)))
+            let written_out: Option<Scaled> = (new.summands.into_iter())
+                .map(|(c, expr)| Some((Number::from_f64(c)?, self.pool.substitute(expr, &parts))))
                 .collect();
+            let Some(written_out) = written_out else {
+                continue;
+            };
+            let by = collected(self.pool, &written_out, Keep::Sums).into_iter();
+            let mut by: Summands = by.map(|(number, expr)| (number.to_f64(), expr)).collect();
             let lost: Summands = new.positions.iter().map(|&at| written[at]).collect();
             let mut length =
                 |summands: &Summands| (self.costs).of_terms(self.pool, summands.iter().copied());
@@ -194,12 +200,17 @@ impl<'a> Shortener<'a> {
                     *place = places[0];
                 }
             }
-            let mut positions = Vec::new();
+            let (mut positions, mut left) = (Vec::new(), Summands::new());
             for &place in &places {
                 positions.append(&mut blocks[place].positions);
-                let left = std::mem::take(&mut blocks[place].summands);
-                by.extend(left.into_iter().filter(|summand| !lost.contains(summand)));
+                left.append(&mut blocks[place].summands);
             }
+            for summand in lost {
+                if let Some(at) = left.iter().position(|known| *known == summand) {
+                    left.remove(at);
+                }
+            }
+            by.extend(left);
             positions.sort_unstable();
             blocks[places[0]] = Block {
                 positions,
@@ -425,10 +436,6 @@ impl<'a> Shortener<'a> {
             summands.iter().map(|&(_, expr)| expr).collect()
         };
         let (before, after) = (exprs(old), exprs(new));
-        // Whole numbers that become too large are floats, and no longer exact.
-        if self.has_floats(&after) && !self.has_floats(&before) {
-            return false;
-        }
         let point = |range: Range, special: Option<(SymbolId, Range)>| {
             move |symbol: SymbolId| {
                 let (low, high) = match special {
@@ -449,30 +456,16 @@ impl<'a> Shortener<'a> {
             let ((a, size_a), (b, size_b)) = (value(&before, old, at), value(&after, new, at));
             !a.is_finite() || (a - b).abs() <= tolerance * (size_a + size_b) + UNDERFLOW
         };
-        let mut symbols = Vec::new();
-        for &expr in before.iter().chain(&after) {
-            for symbol in self.pool.symbols_of(expr) {
-                if !symbols.contains(&symbol) && symbols.len() < MAX_FAR {
-                    symbols.push(symbol);
-                }
-            }
-        }
+        let symbols: BTreeSet<SymbolId> = (before.iter().chain(&after))
+            .flat_map(|&expr| self.pool.symbols_of(expr))
+            .collect();
         // `1 - 1/(1 + exp(z))` has values where `exp(z)/(1 + exp(z))` is infinity over infinity in floats.
         (POINTS.iter()).all(|&range| is_same(EVALUATION, &point(range, None)))
             && FAR.iter().all(|&far| {
-                let mut beside = (symbols.iter())
+                let mut beside = (symbols.iter().take(MAX_FAR))
                     .flat_map(|&symbol| BESIDE.map(|range| (range, Some((symbol, far)))));
                 is_same(FAR_EVALUATION, &point(far, None))
                     && beside.all(|(range, far)| is_same(FAR_EVALUATION, &point(range, far)))
             })
-    }
-
-    /// Whether a number among the expressions is a float.
-    fn has_floats(&self, exprs: &[ExprId]) -> bool {
-        let mut nodes = self.pool.reachable(exprs).into_iter();
-        nodes.any(|node| {
-            let number = self.pool.as_number(node);
-            number.is_some_and(|number| !number.is_exact())
-        })
     }
 }

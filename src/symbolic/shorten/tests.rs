@@ -128,3 +128,9 @@ fn shorten_of_a_long_plain_sum_makes_no_expression() {
     assert_eq!(Shortener::new(&mut pool).shorten(&summands), []);
     assert_eq!(pool.len(), before);
 }
+
+#[test]
+fn replacements_of_equal_terms_count_each_once() {
+    let sum = [(0.5, "1"), (-0.5, "cos(2*x)"), (0.5, "1*y"), (0.5, "y")];
+    assert_eq!(shortest(&sum), "1 sin(x)^2 | 1 y");
+}
