@@ -57,6 +57,12 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
         Verdict::Trusted => {}
     }
     let mut answer = answer(arguments, &planned);
+    // Figures first: a folder that is refused leaves no plan behind.
+    draw(
+        arguments,
+        &plan_figures(&planned, model.robot()?),
+        &mut answer,
+    )?;
     if let Some(path) = &arguments.output {
         let recording = Recording {
             path: path.clone(),
@@ -65,11 +71,6 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
         recording::write(path, &recording)?;
         let _ = writeln!(answer.text, "\nthe plan: {}", path.display());
     }
-    draw(
-        arguments,
-        &plan_figures(&planned, model.robot()?),
-        &mut answer,
-    )?;
     Ok(answer)
 }
 
@@ -165,7 +166,7 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
         text,
         "cost {:.3}; largest deviation of the input from the recorded ones: {:.2} standard deviations\n\
          largest torque {:.0} % of its limit; feet on the ground move {:.1} mm along the floor and \
-         {:.1} mm above it beyond the recorded ones\n{} convex programs, {:.0} ms",
+         {:.1} mm above it beyond those of the training's mean jump to this goal\n{} convex programs, {:.0} ms",
         planned.cost,
         planned.input_deviation,
         100.0 * margins.torque_share,

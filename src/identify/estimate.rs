@@ -77,6 +77,7 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
     notes.extend(round.notes());
     let mut found = state.result(robot, &segments, &round.windows, notes)?;
     found.notes.extend(found.contradiction());
+    found.notes.extend(found.doubts(robot.mass_kg()));
     Ok(found)
 }
 

@@ -137,7 +137,34 @@ pub struct Identification {
 /// By how much the whole equation may fit less forwards than forces alone.
 const WORSE: f64 = 0.05;
 
+/// Gravity on the ground anywhere on Earth is within 0.4 % of this, m/s^2.
+const GRAVITY_M_S2: f64 = 9.81;
+/// Shares by which found gravity, and mass against the robot's, are farther off than recordings explain.
+const GRAVITY_SHARE: f64 = 0.04;
+const MASS_SHARE: f64 = 0.3;
+
 impl Identification {
+    /// What is known already and was found to be otherwise, for a robot of `mass_kg`.
+    pub(super) fn doubts(&self, mass_kg: f64) -> Vec<String> {
+        let mut doubts = Vec::new();
+        if (self.gravity_m_s2 / GRAVITY_M_S2 - 1.0).abs() > GRAVITY_SHARE {
+            doubts.push(format!(
+                "gravity is {:.2} m/s^2, expected {GRAVITY_M_S2} within {:.0} %: the body's velocities may be in its \
+                 own frame, its motion late, or the clock wrong",
+                self.gravity_m_s2,
+                100.0 * GRAVITY_SHARE
+            ));
+        }
+        if (self.mass_kg / mass_kg - 1.0).abs() > MASS_SHARE {
+            doubts.push(format!(
+                "the mass is {:.1} kg, and {mass_kg:.1} kg in the robot's description: torques in other units, \
+                 missing ones, or a payload",
+                self.mass_kg
+            ));
+        }
+        doubts
+    }
+
     /// Why these values are no robot's: the trunk moves against them, or forwards better by the feet's forces alone.
     /// Upwards forces alone may fit better: rounds weigh windows by their noise, and commanded torques are noisy there.
     pub fn contradiction(&self) -> Option<String> {

@@ -116,7 +116,9 @@ impl Goal {
         std::array::from_fn(|i| {
             let range = &prior.ranges()[i];
             let inset = share * (range.most - range.least);
-            values[i].clamp(range.least + inset, range.most - inset)
+            // Half a range from either end may be past the other by rounding.
+            let ends = [range.least + inset, range.most - inset];
+            values[i].clamp(ends[0].min(ends[1]), ends[0].max(ends[1]))
         })
     }
 }

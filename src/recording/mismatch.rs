@@ -325,7 +325,7 @@ fn weight(balance: &Balance, robot: &Robot) -> Option<Mismatch> {
         words: format!(
             "the torques carry {value:.3} of what {} kg need ({} to {} are accepted): torques in other units, of \
              other signs or other joints, or another robot",
-            robot.mass_kg(),
+            (1e6 * robot.mass_kg()).round() / 1e6,
             WEIGHT_SHARE.0,
             WEIGHT_SHARE.1
         ),

@@ -70,7 +70,8 @@ impl Number {
         }
     }
 
-    /// Reduces a ratio; what does not fit becomes a float, a zero denominator `None`.
+    /// Reduces a ratio; what does not fit becomes a float. `None` for a zero denominator, and for what
+    /// only rounding would make whole: whole numbers are exact.
     fn from_ratio(numerator: i128, denominator: i128) -> Option<Number> {
         if denominator == 0 {
             return None;
@@ -83,7 +84,10 @@ impl Number {
                 numerator: n,
                 denominator: d,
             })),
-            _ => Number::from_f64(numerator as f64 / denominator as f64),
+            _ => {
+                let rounded = Number::from_f64(numerator as f64 / denominator as f64);
+                rounded.filter(|rounded| !rounded.is_exact())
+            }
         }
     }
 

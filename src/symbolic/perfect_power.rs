@@ -4,7 +4,7 @@ use super::expand::Terms;
 use super::node::{ExprId, Node};
 use super::number::Number;
 use super::pool::ExprPool;
-use super::rational::{Monomials, bases_of};
+use super::rational::Monomials;
 
 /// Largest power that is looked for, and longest sum.
 pub(super) const MAX_POWER: i64 = 4;
@@ -17,13 +17,13 @@ impl ExprPool {
             Node::Sum(terms) if (3..=MAX_TERMS).contains(&terms.len()) => self.terms_of(expr),
             _ => return None,
         };
-        let bases = bases_of(self, &terms);
+        let bases = self.bases_of(&terms)?;
         let dividend = self.monomials(&terms, &bases)?;
         (2..=MAX_POWER).rev().find_map(|power| {
             let (content, root) = root_of(&dividend, power)?;
-            let root = self.sum_of_monomials(&root, &bases);
+            let root = self.sum_of_monomials(&root, &bases)?;
             let whole = self.pow_number(root, Number::integer(power));
-            Some(self.scale(content, whole))
+            Some(self.scale(bases.written(content), whole))
         })
     }
 
@@ -71,7 +71,7 @@ fn root_of(polynomial: &Monomials, power: i64) -> Option<(Number, Monomials)> {
             .map(|(exponent, first)| exponent - (power - 1) * first)
             .collect();
         let is_lower = root.first_key_value().is_some_and(|(last, _)| next < *last);
-        if !is_lower || next.iter().any(|exponent| *exponent < 0) || root.len() > most {
+        if !is_lower || root.len() > most {
             return None;
         }
         root.insert(next, (-*excess).checked_div(slope)?);
@@ -105,7 +105,9 @@ fn product(a: &Monomials, b: &Monomials) -> Option<Monomials> {
 /// Adds a term to a polynomial; nothing if a coefficient is no longer exact.
 pub(super) fn add(to: &mut Monomials, exponents: Vec<i64>, coefficient: Number) -> Option<()> {
     let entry = to.entry(exponents.clone()).or_insert(Number::ZERO);
-    *entry = (entry.checked_add(coefficient)).filter(|sum| sum.is_exact())?;
+    // Floats may cancel to an exact zero where what they stand for does not.
+    let sum = (entry.checked_add(coefficient)).filter(|sum| sum.is_exact());
+    *entry = sum.filter(|_| coefficient.is_exact())?;
     if entry.is_zero() {
         to.remove(&exponents);
     }
@@ -130,7 +132,10 @@ mod tests {
             ("sin(x)^2 + 2*x*sin(x) + x^2", "(x + sin(x))^2"),
             ("x^2 + 2*x + 2", "none"),
             ("x^2 + x*y + y^2", "none"),
-            ("0.1*x^2 + 0.2*x + 0.1", "none"),
+            ("0.1*x^2 + 0.2*x + 0.1", "0.1*(1 + x)^2"),
+            ("0.09*x^2 + 0.12*x + 0.04", "0.01*(2 + 3*x)^2"),
+            ("x + 2*sqrt(x) + 1", "(1 + sqrt(x))^2"),
+            ("exp(2*x) + 2 + exp(-2*x)", "(exp(-x) + exp(x))^2"),
             ("x^2 + 1", "none"),
         ] {
             let mut pool = ExprPool::new();

@@ -3,19 +3,41 @@
 use std::collections::BTreeMap;
 
 use super::expand::{MAX_TERMS, Terms};
-use super::node::{ExprId, Node};
+use super::node::{ExprId, Function, Node};
 use super::number::Number;
 use super::order::Exponent;
 use super::perfect_power::add;
 use super::pool::ExprPool;
+use super::rules::common_unit;
 
 /// Most steps of one polynomial division.
 const MAX_STEPS: usize = 500;
+/// Largest exponent of a monomial, in units of its base.
+const MAX_EXPONENT: i64 = 1 << 32;
 /// Most different denominators that are brought together: the numerator grows with all of them.
 const MAX_DENOMINATORS: usize = 12;
 
-/// Exact coefficients by the exponents of common bases.
+/// Exact coefficients by the exponents of common [`Bases`], in their units.
 pub(super) type Monomials = BTreeMap<Vec<i64>, Number>;
+
+/// What polynomials are in: `x` of `x^2 + x`, `x` with the unit 1/2 of `x + sqrt(x)`, `exp(x)` of
+/// `exp(2*x) + exp(-x)`.
+pub(super) struct Bases {
+    /// In canonical order; all exponents of a base are multiples of its unit.
+    units: Vec<(ExprId, Number)>,
+    /// Whether a coefficient is a float, so that results are written as such.
+    has_floats: bool,
+}
+
+impl Bases {
+    /// A coefficient as the float that it is written as, if one of the terms had a float.
+    pub(super) fn written(&self, coefficient: Number) -> Number {
+        let float = Number::from_f64(coefficient.to_f64());
+        let is_decimal = |float: &Number| float.decimal() == Some(coefficient);
+        let written = float.filter(|float| self.has_floats && is_decimal(float));
+        written.unwrap_or(coefficient)
+    }
+}
 
 impl ExprPool {
     /// The terms of a sum over one common denominator, with the numerator multiplied out and
@@ -117,11 +139,11 @@ impl ExprPool {
             return Some((ExprId::ONE, quotient));
         }
         let terms = [self.terms_of(above), self.terms_of(below)];
-        let bases = bases_of(self, terms.iter().flatten());
-        let [_] = bases[..] else { return None };
-        let [mut a, mut b] = [
-            self.monomials(&terms[0], &bases)?,
-            self.monomials(&terms[1], &bases)?,
+        let bases = self.bases_of(terms.iter().flatten())?;
+        let [_] = bases.units[..] else { return None };
+        let [(mut a, _), (mut b, _)] = [
+            lowered(self.monomials(&terms[0], &bases)?),
+            lowered(self.monomials(&terms[1], &bases)?),
         ];
         while !b.is_empty() {
             (a, b) = (b.clone(), remainder(a, &b)?);
@@ -134,25 +156,25 @@ impl ExprPool {
         for coefficient in a.values_mut() {
             *coefficient = coefficient.checked_div(leading)?;
         }
-        let divisor = self.sum_of_monomials(&a, &bases);
+        let divisor = self.sum_of_monomials(&a, &bases)?;
         Some((
             self.divide_exactly(above, divisor)?,
             self.divide_exactly(below, divisor)?,
         ))
     }
 
-    /// `dividend / divisor` if both are sums of products with exact coefficients and positive
-    /// integer powers, and the division leaves no remainder.
+    /// `dividend / divisor` if both are sums of products of powers with exact or decimal coefficients,
+    /// and the division leaves no remainder.
     fn divide_exactly(&mut self, dividend: ExprId, divisor: ExprId) -> Option<ExprId> {
         let (dividend, divisor) = (self.terms_of(dividend), self.terms_of(divisor));
-        let bases = bases_of(self, dividend.iter().chain(&divisor));
-        let mut remainder = self.monomials(&dividend, &bases)?;
-        let divisor = self.monomials(&divisor, &bases)?;
+        let bases = self.bases_of(dividend.iter().chain(&divisor))?;
+        let (mut remainder, least) = lowered(self.monomials(&dividend, &bases)?);
+        let (divisor, least_of_divisor) = lowered(self.monomials(&divisor, &bases)?);
         let (leading, leading_coefficient) = divisor.last_key_value()?;
         let mut quotient = Monomials::new();
         for _ in 0..MAX_STEPS {
             let Some((exponents, coefficient)) = remainder.last_key_value() else {
-                return Some(self.sum_of_monomials(&quotient, &bases));
+                return self.sum_of_monomials(&quotient, &bases);
             };
             let step: Vec<i64> = exponents.iter().zip(leading).map(|(a, b)| a - b).collect();
             if step.iter().any(|exponent| *exponent < 0) {
@@ -163,48 +185,116 @@ impl ExprPool {
                 let place: Vec<i64> = exponents.iter().zip(&step).map(|(a, b)| a + b).collect();
                 add(&mut remainder, place, -coefficient.checked_mul(factor)?)?;
             }
-            quotient.insert(step, factor);
+            let place = (step.iter().zip(&least)).zip(&least_of_divisor);
+            quotient.insert(place.map(|((step, a), b)| step + a - b).collect(), factor);
         }
         None
     }
 
-    /// Terms by exponents; `None` for floats, numeric roots and powers that are not positive
-    /// integers.
-    pub(super) fn monomials(&self, terms: &Terms, bases: &[ExprId]) -> Option<Monomials> {
+    /// The bases of the powers in some terms; `None` for roots of numbers and for exponents without
+    /// a common unit.
+    pub(super) fn bases_of<'t>(
+        &mut self,
+        terms: impl IntoIterator<Item = &'t (Number, ExprId)>,
+    ) -> Option<Bases> {
+        let mut powers = Vec::new();
+        let mut has_floats = false;
+        for &(coefficient, rest) in terms {
+            has_floats |= !coefficient.is_exact();
+            powers.append(&mut self.powers_of(rest)?);
+        }
+        powers.sort_by(|(a, _), (b, _)| self.compare(*a, *b));
+        let mut units = Vec::new();
+        for of_base in powers.chunk_by(|(a, _), (b, _)| a == b) {
+            let exponents = of_base.iter().map(|(_, exponent)| *exponent);
+            let is_whole = |exponent: Number| exponent.as_integer().is_some();
+            let unit = if exponents.clone().all(is_whole) {
+                Number::ONE
+            } else {
+                common_unit(exponents)
+            };
+            units.push((of_base[0].0, unit));
+        }
+        Some(Bases { units, has_floats })
+    }
+
+    /// The factors of a term as powers with constant exponents, where `exp(2*a - b)` is
+    /// `exp(a)^2*exp(b)^-1`; `None` for roots of numbers.
+    fn powers_of(&mut self, rest: ExprId) -> Option<Vec<(ExprId, Number)>> {
+        let mut powers = Vec::new();
+        for factor in self.factors_of(rest).to_vec() {
+            match self.base_and_exponent(factor) {
+                _ if factor == ExprId::ONE => {}
+                (base, Exponent::Number(exponent)) => match *self.node(base) {
+                    Node::Number(_) => return None,
+                    Node::Apply(Function::Exp, argument) => {
+                        for (coefficient, inner) in self.terms_of(argument) {
+                            let base = self.apply(Function::Exp, inner);
+                            powers.push((base, coefficient.checked_mul(exponent)?));
+                        }
+                    }
+                    _ => powers.push((base, exponent)),
+                },
+                (_, Exponent::Expr(_)) => powers.push((factor, Number::ONE)),
+            }
+        }
+        Some(powers)
+    }
+
+    /// Terms by exponents; `None` for floats that are not written as short decimals.
+    pub(super) fn monomials(&mut self, terms: &Terms, bases: &Bases) -> Option<Monomials> {
         let mut monomials = Monomials::new();
         for (coefficient, rest) in terms {
-            let powers = self.numeric_powers(*rest);
-            let n_factors = self
-                .factors_of(*rest)
-                .iter()
-                .filter(|f| **f != ExprId::ONE)
-                .count();
-            if !coefficient.is_exact() || powers.len() != n_factors {
-                return None;
+            let mut exponents = vec![0_i64; bases.units.len()];
+            for (base, exponent) in self.powers_of(*rest)? {
+                let place = (bases.units.iter()).position(|(known, _)| *known == base)?;
+                let multiple = exponent.checked_div(bases.units[place].1)?.as_integer()?;
+                exponents[place] = exponents[place]
+                    .checked_add(multiple)
+                    .filter(|exponent| exponent.abs() <= MAX_EXPONENT)?;
             }
-            let mut exponents = vec![0; bases.len()];
-            for (base, exponent) in powers {
-                let place = bases.iter().position(|known| *known == base)?;
-                exponents[place] = exponent.as_integer().filter(|exponent| *exponent > 0)?;
-            }
-            monomials.insert(exponents, *coefficient);
+            add(&mut monomials, exponents, coefficient.decimal()?)?;
         }
         Some(monomials)
     }
 
-    pub(super) fn sum_of_monomials(&mut self, monomials: &Monomials, bases: &[ExprId]) -> ExprId {
+    /// The sum of some monomials, exponentials being merged.
+    pub(super) fn sum_of_monomials(
+        &mut self,
+        monomials: &Monomials,
+        bases: &Bases,
+    ) -> Option<ExprId> {
         let mut terms = Vec::with_capacity(monomials.len());
-        for (exponents, coefficient) in monomials {
-            let powers: Vec<ExprId> = bases
-                .iter()
-                .zip(exponents)
-                .map(|(base, exponent)| self.pow_number(*base, Number::integer(*exponent)))
-                .collect();
+        for (exponents, &coefficient) in monomials {
+            let (mut powers, mut arguments) = (Vec::new(), Vec::new());
+            for (&(base, unit), exponent) in bases.units.iter().zip(exponents) {
+                let whole = Number::integer(*exponent);
+                let exponent = whole.checked_mul(unit)?;
+                match *self.node(base) {
+                    Node::Apply(Function::Exp, argument) => {
+                        arguments.push(self.scale(exponent, argument));
+                    }
+                    _ => powers.push(self.pow_number(base, exponent)),
+                }
+            }
+            let argument = self.sum(&arguments);
+            powers.push(self.apply(Function::Exp, argument));
             let product = self.product(&powers);
-            terms.push(self.scale(*coefficient, product));
+            terms.push(self.scale(bases.written(coefficient), product));
         }
-        self.sum(&terms)
+        Some(self.sum(&terms))
     }
+}
+
+/// A polynomial divided by the highest product of powers that leaves no negative exponent, and the
+/// exponents of that product.
+fn lowered(polynomial: Monomials) -> (Monomials, Vec<i64>) {
+    let least = (polynomial.keys().cloned())
+        .reduce(|a, b| a.iter().zip(&b).map(|(a, b)| *a.min(b)).collect());
+    let least = least.unwrap_or_default();
+    let lower = |exponents: Vec<i64>| exponents.iter().zip(&least).map(|(a, b)| a - b).collect();
+    let lowered = (polynomial.into_iter()).map(|(exponents, number)| (lower(exponents), number));
+    (lowered.collect(), least)
 }
 
 /// What is left of a polynomial in one base when another is divided out; nothing if a coefficient is
@@ -226,18 +316,6 @@ fn remainder(mut of: Monomials, divisor: &Monomials) -> Option<Monomials> {
         }
     }
     None
-}
-
-/// The bases of the powers in some terms, in canonical order.
-pub(super) fn bases_of<'t>(
-    pool: &ExprPool,
-    terms: impl IntoIterator<Item = &'t (Number, ExprId)>,
-) -> Vec<ExprId> {
-    let powers = (terms.into_iter()).flat_map(|(_, rest)| pool.numeric_powers(*rest));
-    let mut bases: Vec<ExprId> = powers.map(|(base, _)| base).collect();
-    bases.sort_by(|a, b| pool.compare(*a, *b));
-    bases.dedup();
-    bases
 }
 
 #[cfg(test)]
@@ -281,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn divide_exactly_refuses_remainders_and_floats() {
+    fn divide_exactly_refuses_remainders_and_long_floats() {
         let mut pool = ExprPool::new();
         let mut divide = |a: &str, b: &str| {
             let a = pool.parse(a, &|_| true).expect("test text parses");
@@ -291,8 +369,23 @@ mod tests {
         };
         assert_eq!(divide("x^2 + 2*x*y + y^2", "x + y"), Some("x + y".into()));
         assert_eq!(divide("2*x + 2", "3*x + 3"), Some("2/3".into()));
+        assert_eq!(divide("0.5*x^2 - 0.5", "x - 1"), Some("0.5 + 0.5*x".into()));
+        assert_eq!(divide("x - 1", "sqrt(x) - 1"), Some("1 + sqrt(x)".into()));
+        assert_eq!(
+            divide("x - y", "sqrt(x) - sqrt(y)"),
+            Some("sqrt(x) + sqrt(y)".into())
+        );
+        assert_eq!(divide("1/x - x", "1 - x"), Some("1 + 1/x".into()));
+        assert_eq!(
+            divide("exp(2*x + y) - exp(-y)", "exp(x + y) - 1"),
+            Some("exp(x) + exp(-y)".into())
+        );
+        assert_eq!(
+            divide("exp(0.6*x) - 1", "exp(0.3*x) - 1"),
+            Some("1 + exp(0.3*x)".into())
+        );
         assert_eq!(divide("x^2 + 1", "x + 1"), None);
-        assert_eq!(divide("0.5*x^2 - 0.5", "x - 1"), None);
-        assert_eq!(divide("1/x - x", "1 - x"), None);
+        assert_eq!(divide("exp(x) + 1", "exp(y) + 1"), None);
+        assert_eq!(divide("0.12345678901234567*x - 1", "x - 1"), None);
     }
 }

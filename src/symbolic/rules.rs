@@ -22,6 +22,7 @@
 //! | `abs(a)*abs(b)`, `abs(a)/a` | `abs(a*b)`, `sign(a)` |
 //! | `(exp(a) - exp(b))/(exp(a) + exp(b))` | `tanh((a - b)/2)` |
 
+use super::expand::MAX_PRODUCTS;
 use super::node::{ExprId, Function, Node};
 use super::number::Number;
 use super::order::Exponent;
@@ -353,6 +354,7 @@ impl ExprPool {
                 }
             }
             let product = self.product(&arguments);
+            let product = self.together(product, &mut MAX_PRODUCTS.clone());
             let log = self.apply(Function::Log, product);
             let term = self.product(&[cofactor, log]);
             parts.push(self.scale(unit, term));
@@ -377,7 +379,7 @@ impl ExprPool {
 }
 
 /// The largest fraction of the first number of which all are whole multiples; else the first.
-fn common_unit(numbers: impl Iterator<Item = Number> + Clone) -> Number {
+pub(super) fn common_unit(numbers: impl Iterator<Item = Number> + Clone) -> Number {
     let first = numbers.clone().next().unwrap_or(Number::ONE).abs();
     let mut units =
         (1..=MAX_LOG_POWER).filter_map(|parts| first.checked_div(Number::integer(parts)));

@@ -68,6 +68,10 @@ impl ExprPool {
         let normal = self.normal_form(region, budget);
         let mut plain = vec![normal];
         if self.has_waves(normal) {
+            let rational = self.rewrite_region(normal, ExprPool::without_sine_below);
+            if rational != normal {
+                plain.push(self.normal_form(rational, budget));
+            }
             plain.extend(self.with_sines(normal, budget));
             plain.push(self.combine_angles(normal));
         }
@@ -78,9 +82,10 @@ impl ExprPool {
         plain.push(region);
         // Sines and cosines may have become factors of one divisor only now.
         for form in plain.clone() {
-            let combined = self.combine_angles(form);
-            if !plain.contains(&combined) {
-                plain.push(combined);
+            for combined in [self.combine_angles(form), self.combine_all_angles(form)] {
+                if !plain.contains(&combined) {
+                    plain.push(combined);
+                }
             }
         }
         let mut forms = Vec::new();
@@ -200,6 +205,18 @@ mod tests {
             let expr = pool.parse(text, &|_| true).expect("test text parses");
             let result = pool.simplify(expr);
             assert!(pool.cost(result) <= pool.cost(expr), "{text}");
+        }
+    }
+
+    #[test]
+    fn fractions_whose_numbers_outgrow_their_type_keep_their_variable() {
+        let mut text = "x".to_string();
+        for depth in 1..100 {
+            text = format!("1/({text} + 1)");
+            let mut pool = ExprPool::new();
+            let expr = pool.parse(&text, &|_| true).expect("test text parses");
+            let result = pool.simplify(expr);
+            assert_eq!(pool.symbols_of(result).len(), 1, "at depth {depth}");
         }
     }
 

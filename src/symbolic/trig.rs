@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 
 use super::node::{ExprId, Function, Node};
 use super::number::Number;
+use super::order::Exponent;
 use super::pool::ExprPool;
 
 /// Largest multiple of an angle, and most angles in one argument, that are expanded.
@@ -191,6 +192,46 @@ impl ExprPool {
             combined.push(term);
         }
         self.sum(&combined)
+    }
+
+    /// As [`combine_angles`](ExprPool::combine_angles), in sums that are factors or divisors too.
+    pub(super) fn combine_all_angles(&mut self, expr: ExprId) -> ExprId {
+        let inside = self.rewrite_region(expr, |pool, node| match pool.node(node) {
+            Node::Sum(_) => pool.combine_angles(node),
+            _ => node,
+        });
+        self.combine_angles(inside)
+    }
+
+    /// `1/(a + b*sin(x)) = (a - b*sin(x))/(a^2 - b^2*(1 - cos(x)^2))`, for the first angle of a sum with
+    /// sines to the first power.
+    pub(super) fn without_sine_below(&mut self, expr: ExprId) -> ExprId {
+        let (base, Exponent::Number(Number::MINUS_ONE)) = self.base_and_exponent(expr) else {
+            return expr;
+        };
+        if !matches!(self.node(base), Node::Sum(_)) {
+            return expr;
+        }
+        let terms = self.terms_of(base);
+        let sine_of = |pool: &ExprPool, rest: ExprId| {
+            pool.factors_of(rest)
+                .iter()
+                .copied()
+                .find(|factor| matches!(pool.function_power(*factor), Some((Function::Sin, _, 1))))
+        };
+        let Some(sine) = terms.iter().find_map(|(_, rest)| sine_of(self, *rest)) else {
+            return expr;
+        };
+        let (with, without): (Vec<_>, Vec<_>) =
+            (terms.into_iter()).partition(|(_, rest)| self.factors_of(*rest).contains(&sine));
+        let (with, without) = (self.sum_of_terms(with), self.sum_of_terms(without));
+        let other = self.sub(without, with);
+        let product = self.mul(other, base);
+        let product = self.expand_node(product, MAX_TERMS, &mut MAX_TERMS.clone());
+        let product = self.sines_to_cosines(product);
+        let below = self.expand_region(product, &mut MAX_TERMS.clone());
+        let below = self.powi(below, -1);
+        self.mul(other, below)
     }
 
     fn combine_angles_of_term(&mut self, rest: ExprId) -> ExprId {
