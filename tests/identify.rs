@@ -229,4 +229,18 @@ fn values_that_the_motion_contradicts_are_told() {
         );
         assert!(wrong.notes.contains(&reason));
     }
+    let has_note = |found: &Identification, start: &str| {
+        found.notes.iter().any(|note| note.starts_with(start))
+    };
+    let right = identify(&right, go1).expect("jumps");
+    let half = spoiled(&|segment| segment.torque_nm /= 2.0);
+    let shrunk = spoiled(&|segment| {
+        for matrix in [&mut segment.x, &mut segment.dx, &mut segment.ddx] {
+            matrix.row_mut(14).scale_mut(0.9);
+        }
+    });
+    for (wrong, start) in [(half, "the mass is "), (shrunk, "gravity is ")] {
+        assert!(!has_note(&right, start), "{:?}", right.notes);
+        assert!(has_note(&wrong, start), "{start}: {:?}", wrong.notes);
+    }
 }

@@ -138,6 +138,10 @@ fn figures_and_settings_of_a_plan() {
         stderr.contains("bad.toml") && stderr.contains("no_such_weight"),
         "{stderr}"
     );
+    fs::create_dir(folder.join("mine")).expect("a folder");
+    fs::write(folder.join("mine/plan_path.svg"), "mine").expect("written");
+    let stderr = failed(folder, &[&plan[..], &goal, &["--figures", "mine"]].concat());
+    assert!(stderr.contains("plan_path.svg"), "{stderr}");
     let figures = [&plan[..], &goal, &["--figures", "figures"]].concat();
     done(folder, &figures);
     let files = fs::read_dir(folder.join("figures")).expect("figures");

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::robot::joints::LEG_JOINT_DIM;
-use crate::robot::{Actuators, JOINT_DIM};
+use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM};
 
 /// A value for each kind of joint.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -137,8 +137,6 @@ pub struct Identification {
 /// By how much the whole equation may fit less forwards than forces alone.
 const WORSE: f64 = 0.05;
 
-/// Gravity on the ground anywhere on Earth is within 0.4 % of this, m/s^2.
-const GRAVITY_M_S2: f64 = 9.81;
 /// Shares by which found gravity, and mass against the robot's, are farther off than recordings explain.
 const GRAVITY_SHARE: f64 = 0.04;
 const MASS_SHARE: f64 = 0.3;

@@ -28,7 +28,7 @@ use super::number::Number;
 use super::order::Exponent;
 use super::pool::ExprPool;
 
-/// Largest power that merging logarithms may create.
+/// Largest power that merging logarithms may create, and most parts of a number that are tried as unit.
 const MAX_LOG_POWER: i64 = 4;
 
 impl ExprPool {

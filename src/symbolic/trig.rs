@@ -6,6 +6,7 @@
 //! | [`sines_to_cosines`](ExprPool::sines_to_cosines) | `sin(x)^2` into `1 - cos(x)^2` |
 //! | [`cosines_to_sines`](ExprPool::cosines_to_sines) | `cos(x)^2` into `1 - sin(x)^2` |
 //! | [`combine_angles`](ExprPool::combine_angles) | products into sums: `2*sin(x)*cos(x)` into `sin(2*x)` |
+//! | [`without_sine_below`](ExprPool::without_sine_below) | `1/(1 + sin(x))` into `(1 - sin(x))/cos(x)^2` |
 //!
 //! All work on the outermost level (sums, products and integer powers), not inside arguments.
 
