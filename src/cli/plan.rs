@@ -166,12 +166,15 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
         text,
         "cost {:.3}; largest deviation of the input from the recorded ones: {:.2} standard deviations\n\
          largest torque {:.0} % of its limit; feet on the ground move {:.1} mm along the floor and \
-         {:.1} mm above it beyond those of the training's mean jump to this goal\n{} convex programs, {:.0} ms",
+         {:.1} mm above it beyond those of the training's mean jump to this goal, {:.1} mm along it and {:.1} mm \
+         below it in all\n{} convex programs, {:.0} ms",
         planned.cost,
         planned.input_deviation,
         100.0 * margins.torque_share,
         1e3 * margins.foot_slip_m[0],
         1e3 * margins.foot_slip_m[1],
+        1e3 * margins.foot_drift_m[0],
+        1e3 * margins.foot_drift_m[1],
         planned.programs,
         planned.solve_ms,
     );

@@ -63,6 +63,11 @@ impl Goal {
         self.apex_m
     }
 
+    /// Whether the start was given.
+    pub(super) fn has_start(&self) -> bool {
+        self.start.is_some()
+    }
+
     /// State and velocity at the start.
     pub(super) fn start(&self, prior: &JumpPrior) -> Start {
         let at_rest = || (prior.start.clone(), DVector::zeros(prior.start.len()));

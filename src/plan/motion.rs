@@ -6,13 +6,13 @@
 
 use std::path::PathBuf;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 
 use super::costs::moved_foot;
 use super::error::PlanError;
 use super::transcribe::Task;
 use crate::recording::Segment;
-use crate::robot::{JOINT_DIM, Leg, STATE_DIM};
+use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
 
 /// Name of a plan where a recording has that of its file.
 const SOURCE: &str = "plan";
@@ -29,6 +29,9 @@ pub struct Margins {
     /// Farthest that a foot on the ground moves beyond what it does in the prior, along and above the
     /// floor, at the nodes, m.
     pub foot_slip_m: [f64; 2],
+    /// Farthest that a foot on the ground is from where it came down, along the floor, and below its
+    /// height at the start, m.
+    pub foot_drift_m: [f64; 2],
 }
 
 /// The motion of a point, a sample every `sample_time_s`, and its margins.
@@ -116,6 +119,7 @@ fn margins(task: &Task<'_>, y: &[f64], (motion, input): (&Segment, &DMatrix<f64>
         beyond_joint_limit_rad: f64::NEG_INFINITY,
         beyond_friction_n: f64::NEG_INFINITY,
         foot_slip_m: [0.0; 2],
+        foot_drift_m: foot_drift(robot, motion),
     };
     for sample in 0..motion.len() {
         for joint in 0..JOINT_DIM {
@@ -152,6 +156,34 @@ fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
                     farthest[axis] = farthest[axis].max((moved[axis] - from[axis]).abs());
                 }
             }
+        }
+    }
+    farthest
+}
+
+/// Farthest that a foot on the ground is, at any sample, from its place at the first sample of that
+/// contact, along the floor, and below its height at the first of all samples.
+fn foot_drift(robot: &Robot, motion: &Segment) -> [f64; 2] {
+    let place = |leg: Leg, sample: usize| -> Vector3<f64> {
+        let x: [f64; STATE_DIM] = std::array::from_fn(|row| motion.x[(row, sample)]);
+        let [body_x, body_y, body_z, roll, pitch, yaw] = std::array::from_fn(|i| x[JOINT_DIM + i]);
+        let joints: [f64; JOINT_DIM] = std::array::from_fn(|i| x[i]);
+        let foot = robot.hip_position(leg) + robot.foot_position(leg, &leg.of_joints(&joints));
+        Vector3::new(body_x, body_y, body_z) + Rotation3::from_euler_angles(roll, pitch, yaw) * foot
+    };
+    let mut farthest = [0.0_f64; 2];
+    for leg in Leg::ALL {
+        let floor = place(leg, 0).z;
+        let mut down = None;
+        for sample in 0..motion.len() {
+            if !motion.feet[sample][leg.index()] {
+                down = None;
+                continue;
+            }
+            let now = place(leg, sample);
+            let from = *down.get_or_insert(now);
+            farthest[0] = farthest[0].max((now - from).xy().norm());
+            farthest[1] = farthest[1].max(floor - now.z);
         }
     }
     farthest

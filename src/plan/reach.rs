@@ -6,10 +6,8 @@ use super::settings::PlanSettings;
 use super::solve::{Plan, plan};
 use crate::model::ReducedModel;
 
-/// Goals per axis of a map.
-const GRID: [usize; 2] = [13, 9];
-/// How far the map goes beyond the recorded jumps, in widths of their range.
-const BEYOND: f64 = 1.0;
+/// Steps of a map across the recorded range of distances and of apexes; it goes on as far at either side.
+const STEPS: [i32; 2] = [4, 3];
 
 /// A goal of the map.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,11 +45,11 @@ pub fn reach(
     let prior = model.jump_prior()?;
     let axis = |i: usize| -> Vec<f64> {
         let range = &prior.ranges()[i];
-        let width = range.most - range.least;
-        let (least, most) = (range.least - BEYOND * width, range.most + BEYOND * width);
-        let steps = (GRID[i] - 1) as f64;
-        let values =
-            (0..GRID[i]).map(|k| least.max(0.0) + (most - least.max(0.0)) * k as f64 / steps);
+        let place = |k: i32| {
+            let share = f64::from(k) / f64::from(STEPS[i]);
+            range.least * (1.0 - share) + range.most * share
+        };
+        let values = (-STEPS[i]..=2 * STEPS[i]).map(place);
         values.filter(|value| *value > 0.0).collect()
     };
     let (distances_m, apexes_m) = (axis(0), axis(1));

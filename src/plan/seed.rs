@@ -7,7 +7,7 @@ use super::goal::{Goal, Start};
 use super::settings::PlanSettings;
 use crate::lower::CompiledModel;
 use crate::model::{JumpPart, JumpPrior, ReducedModel};
-use crate::robot::{FeetRule, InputRule, STATE_DIM};
+use crate::robot::{BODY_NAMES, FeetRule, InputRule, JOINT_DIM, JOINT_NAMES, STATE_DIM};
 
 /// Position of the body in the state.
 pub const BODY_X: usize = 12;
@@ -15,6 +15,11 @@ pub const BODY_X: usize = 12;
 pub const BODY_Z: usize = 14;
 /// Pitch of the body in the state.
 pub const PITCH: usize = 16;
+
+/// Difference of an angle of the start to its decoded one that is told, rad.
+const LOST_ANGLE_RAD: f64 = 0.15;
+/// Difference of a place of the body at the start to its decoded one that is told, m.
+const LOST_PLACE_M: f64 = 0.03;
 
 /// Everything that the program of one goal is made of.
 pub struct Seed<'a> {
@@ -24,6 +29,8 @@ pub struct Seed<'a> {
     pub goal: Goal,
     /// Latent position and velocity at the start.
     pub start: [DVector<f64>; 2],
+    /// What of a given start the latent coordinates do not hold, in words.
+    pub start_lost: Vec<String>,
     /// `x = decode z + decode_bias`, SI units.
     pub decode: DMatrix<f64>,
     pub decode_bias: DVector<f64>,
@@ -83,12 +90,18 @@ impl<'a> Seed<'a> {
             .map(|part| seed_part(model, prior, part, &features, &mut dynamics))
             .collect::<Result<_, PlanError>>()?;
         let zero = DVector::zeros(model.latent_dim());
+        let latent = model.encode(&start.0)?;
+        let start_lost = match goal.has_start() {
+            true => lost(&start.0, &model.decode(&latent)?),
+            false => Vec::new(),
+        };
         Ok(Self {
+            start_lost,
             prior,
             rule: model.input_rule()?,
             latent_dim: model.latent_dim(),
             goal: goal.clone(),
-            start: [model.encode(&start.0)?, &tangent.encode * &start.1],
+            start: [latent, &tangent.encode * &start.1],
             decode: model.decoder_jacobian(&zero)?,
             decode_bias: model.decode(&zero)?,
             lift: tangent.lift,
@@ -101,6 +114,26 @@ impl<'a> Seed<'a> {
         let x = &self.decode * z + &self.decode_bias;
         std::array::from_fn(|i| x[i])
     }
+}
+
+/// The three coordinates of a state that encoding and decoding moves farthest, of those that it moves
+/// farther than the limits.
+fn lost(x: &DVector<f64>, decoded: &DVector<f64>) -> Vec<String> {
+    let mut far: Vec<(f64, String)> = Vec::new();
+    for (row, (&given, &held)) in x.iter().zip(decoded).enumerate() {
+        let (name, unit, most) = match row.checked_sub(JOINT_DIM) {
+            None => (JOINT_NAMES[row], "rad", LOST_ANGLE_RAD),
+            Some(i) if i < 3 => (BODY_NAMES[i], "m", LOST_PLACE_M),
+            Some(i) => (BODY_NAMES[i], "rad", LOST_ANGLE_RAD),
+        };
+        let share = (given - held).abs() / most;
+        if share > 1.0 {
+            let text = format!("{name} {given:.3} {unit} is planned as {held:.3} {unit}");
+            far.push((share, text));
+        }
+    }
+    far.sort_by(|a, b| b.0.total_cmp(&a.0));
+    far.into_iter().map(|(_, text)| text).take(3).collect()
 }
 
 fn seed_part<'a>(

@@ -92,6 +92,7 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
         margins: &margins,
         outside: outside(&seed, goal_m),
         weight_share: weight_share(&Recording::from(motion.clone()), model.robot()?),
+        start_lost: seed.start_lost.clone(),
     };
     Ok(Plan {
         goal_m,

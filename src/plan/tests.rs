@@ -117,6 +117,40 @@ fn plan_starts_from_the_state_it_is_given() {
         .encode(&plan.motion.x.column(0).into_owned())
         .unwrap();
     assert!((z - started).amax() < 1e-4);
+    assert!(!format!("{:?}", plan.verdict).contains("begin at the recorded start"));
+}
+
+#[test]
+fn start_that_the_latent_coordinates_drop_is_told() {
+    let first = &recordings("test", 1)[0].segments[0];
+    let (mut x, dx) = (
+        first.x.column(0).into_owned(),
+        first.dx.column(0).into_owned(),
+    );
+    x[15] += 0.3;
+    let goal = Goal::new(0.3, 0.12).unwrap().from_start(x, dx);
+    let plan = plan(model(), &goal, &PlanSettings::default()).expect("a plan");
+    let Verdict::Extrapolates(reasons) = &plan.verdict else {
+        panic!("{:?}", plan.verdict)
+    };
+    let told = reasons.iter().find(|reason| reason.contains("begin"));
+    assert!(told.is_some_and(|reason| reason.contains("body.roll")));
+}
+
+#[test]
+fn plan_whose_feet_do_not_stand_is_not_trusted() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let shipped = |name: &str| artifact::read(&root.join("models").join(name)).expect("a model");
+    let farthest = |name: &str, distance: f64, apex: f64| {
+        let goal = Goal::new(distance, apex).unwrap();
+        let plan = plan(&shipped(name), &goal, &PlanSettings::default()).expect("a plan");
+        let told = format!("{:?}", plan.verdict).contains("feet on the ground move");
+        (plan.margins.foot_drift_m, told)
+    };
+    let ([along, below], told) = farthest("go1-d4.json", 0.3, 0.12);
+    assert!(along < 0.03 && below < 0.015 && !told);
+    let ([along, below], told) = farthest("go2-async-d4.json", 0.4, 0.14);
+    assert!(along > 0.05 && below > 0.025 && told);
 }
 
 #[test]

@@ -12,6 +12,9 @@ const NO_SLACK: f64 = 2e-3;
 const NO_JOINT: f64 = 2e-3;
 /// Force outside the friction cone between nodes beyond that allowed at them, N.
 const NO_FRICTION_N: f64 = 2.0;
+/// Farthest that standing feet may be from where they came down, along the floor, and below it, m:
+/// twice what plans and recordings with rolling, point-like feet show.
+const FOOT_DRIFT_M: [f64; 2] = [0.04, 0.02];
 
 /// What a plan is worth.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +55,8 @@ pub struct Findings<'a> {
     pub outside: [f64; 2],
     /// Impulse of the feet over what the robot's weight and change of velocity need.
     pub weight_share: Option<f64>,
+    /// What the latent coordinates do not hold of the start, in words.
+    pub start_lost: Vec<String>,
 }
 
 /// The verdict over the findings.
@@ -123,6 +128,21 @@ pub fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
         reasons.push(format!(
             "its input is {:.1} standard deviations from what was recorded",
             found.input_deviation
+        ));
+    }
+    let [along, below] = margins.foot_drift_m;
+    if along > FOOT_DRIFT_M[0] || below > FOOT_DRIFT_M[1] {
+        reasons.push(format!(
+            "feet on the ground move {:.0} mm along the floor and {:.0} mm below it: the model's latent coordinates \
+             do not hold them where they stand",
+            1e3 * along,
+            1e3 * below
+        ));
+    }
+    if !found.start_lost.is_empty() {
+        reasons.push(format!(
+            "the plan does not begin at the recorded start, which the model's latent coordinates cannot hold: {}",
+            found.start_lost.join(", ")
         ));
     }
     match reasons.is_empty() {

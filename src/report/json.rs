@@ -110,6 +110,7 @@ pub fn plan_json(planned: &Plan) -> Value {
             "beyond_joint_limit_rad": margins.beyond_joint_limit_rad,
             "beyond_friction_n": margins.beyond_friction_n,
             "foot_slip_m": margins.foot_slip_m,
+            "foot_drift_m": margins.foot_drift_m,
         },
         "programs": planned.programs,
         "solve_ms": planned.solve_ms,

@@ -170,16 +170,15 @@ pub fn reach_figure(reach: &Reach, prior: &JumpPrior) -> Figure {
     ];
     Figure {
         id: "plan_reach".to_owned(),
-        caption:
-            "Jumps that can be planned: within what was recorded, and beyond it with a warning."
-                .to_owned(),
+        caption: "Jumps that can be planned: those to be trusted, and those with a warning."
+            .to_owned(),
         x_label: "distance, m".to_owned(),
         panel_size: (420.0, 280.0),
         columns: 1,
         panels: vec![Panel::lines("apex above the start, m", series)],
         legend: vec![
             (Role::Recorded, "recorded".to_owned()),
-            (Role::Full, "within the recordings".to_owned()),
+            (Role::Full, "trusted".to_owned()),
             (Role::Restarted, "with a warning".to_owned()),
         ],
     }
