@@ -132,20 +132,20 @@ fn mapped<'f>(
     Ok(used)
 }
 
-/// The phases of the model: those given, or those whose coefficients the file has.
+/// The phases of the model: those given, then the others whose coefficients the file has.
 fn phases(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
     used: &[Assigned<'_>],
 ) -> Result<Vec<PhaseRule>, ImportError> {
-    if !options.phases.is_empty() {
-        return Ok(options.phases.clone());
-    }
-    let mut rules = Vec::new();
+    let mut rules = options.phases.clone();
     // Sorted by name; the rule `any` takes every pattern with a foot down, so that the order of the
     // two known phases is free.
     for assigned in used {
         if let Role::Xi(name) = &assigned.role {
+            if options.phases.iter().any(|rule| rule.name == *name) {
+                continue;
+            }
             let found = format!("the coefficients {}", assigned.info.describe());
             let feet = options.feet_of(name);
             let feet = feet.ok_or_else(|| no_feet(tensors.file(), name, &found))?;

@@ -165,7 +165,10 @@ fn phases_in_order<'s>(
             return Err(ImportError::option("--phase", found, expected));
         }
     }
-    let rank = |name: &str| options.phases.iter().position(|rule| rule.name == name);
+    // Those that `--phase` does not name come last, in the order of the file.
+    let given = &options.phases;
+    let rank =
+        |name: &str| (given.iter().position(|rule| rule.name == name)).unwrap_or(given.len());
     ordered.sort_by_key(|(rule, _)| rank(&rule.name));
     Ok(ordered)
 }

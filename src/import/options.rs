@@ -262,21 +262,20 @@ impl ImportOptions {
 
     /// The rule of a phase: as given, or for `contact` and `flight` as usual.
     pub(super) fn feet_of(&self, phase: &str) -> Option<FeetRule> {
+        let given = self.phases.iter().find(|rule| rule.name == phase);
         match phase {
-            _ if !self.phases.is_empty() => {
-                let given = self.phases.iter().find(|rule| rule.name == phase);
-                given.map(|rule| rule.feet.clone())
-            }
+            _ if given.is_some() => given.map(|rule| rule.feet.clone()),
             "contact" => Some(FeetRule::Any),
             "flight" => Some(FeetRule::None),
-            ONLY_PHASE => Some(FeetRule::always()),
+            ONLY_PHASE if self.phases.is_empty() => Some(FeetRule::always()),
             _ => None,
         }
     }
 
-    /// The note that a phase got the usual rule, unless the rules were given.
+    /// The note that a phase got the usual rule, unless its rule was given.
     pub(super) fn usual_feet(&self, phase: &str, feet: &FeetRule) -> Option<Note> {
-        self.phases.is_empty().then(|| Note::UsualFeet {
+        let is_given = self.phases.iter().any(|rule| rule.name == phase);
+        (!is_given).then(|| Note::UsualFeet {
             phase: phase.to_owned(),
             feet: feet.to_string(),
         })

@@ -180,6 +180,26 @@ fn import_tells_missing_and_doubtful_tensors() {
 }
 
 #[test]
+fn coefficients_of_a_phase_that_no_option_names_are_not_dropped() {
+    let mut stored = small();
+    stored.push(plain("xi.flight", &DMatrix::from_element(7, 2, 0.5)));
+    stored.push(plain("xi.rear", &DMatrix::from_element(7, 2, 0.2)));
+    let with = |rules: &[&str]| ImportOptions {
+        phases: rules.iter().map(|r| r.parse().expect("a rule")).collect(),
+        ..options()
+    };
+    let refused = run(&stored, &with(&["contact=any"])).unwrap_err();
+    assert!(
+        refused.to_string().contains("--phase rear=any"),
+        "{refused}"
+    );
+    let imported = run(&stored, &with(&["rear=0011"])).expect("three phases");
+    let names: Vec<&str> = (imported.model.phases().iter().map(|p| p.name.as_str())).collect();
+    assert_eq!(names, ["rear", "contact", "flight"]);
+    assert_eq!(imported.model.phases()[2].xi[(0, 0)], 0.5);
+}
+
+#[test]
 fn import_of_a_deeper_network_names_its_layers() {
     let deeper = |stored: &mut Vec<Stored>| {
         stored.retain(|tensor| !tensor.name.starts_with("encoder"));
@@ -316,10 +336,10 @@ fn import_tells_what_is_not_said_about_tensors() {
     assert_eq!(
         option_message(|options| {
             options.phases = vec!["contact=any".parse().expect("a rule")];
-            options.mapping = vec!["xi.flight=xi.contact".parse().expect("a mapping")];
+            options.mapping = vec!["xi.rear=xi.contact".parse().expect("a mapping")];
         }),
-        "--map: found xi.flight for a phase that no --phase names, expected one of the phases \
-         contact"
+        "m.safetensors: found the coefficients `xi.contact` (7 x 2) of phase `rear`, expected \
+         --phase rear=any (or none, always, or patterns such as 0011 in the order fr fl rr rl)"
     );
 }
 
