@@ -142,10 +142,9 @@ fn phases(
     // Sorted by name; the rule `any` takes every pattern with a foot down, so that the order of the
     // two known phases is free.
     for assigned in used {
-        if let Role::Xi(name) = &assigned.role {
-            if options.phases.iter().any(|rule| rule.name == *name) {
-                continue;
-            }
+        if let Role::Xi(name) = &assigned.role
+            && options.given(name).is_none()
+        {
             let found = format!("the coefficients {}", assigned.info.describe());
             let feet = options.feet_of(name);
             let feet = feet.ok_or_else(|| no_feet(tensors.file(), name, &found))?;

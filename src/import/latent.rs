@@ -166,10 +166,8 @@ fn phases_in_order<'s>(
         }
     }
     // Those that `--phase` does not name come last, in the order of the file.
-    let given = &options.phases;
-    let rank =
-        |name: &str| (given.iter().position(|rule| rule.name == name)).unwrap_or(given.len());
-    ordered.sort_by_key(|(rule, _)| rank(&rule.name));
+    let last = options.phases.len();
+    ordered.sort_by_key(|(rule, _)| options.given(&rule.name).unwrap_or(last));
     Ok(ordered)
 }
 

@@ -260,11 +260,17 @@ impl ImportOptions {
         }
     }
 
+    /// The place of a phase among those given.
+    pub(super) fn given(&self, phase: &str) -> Option<usize> {
+        self.phases.iter().position(|rule| rule.name == phase)
+    }
+
     /// The rule of a phase: as given, or for `contact` and `flight` as usual.
     pub(super) fn feet_of(&self, phase: &str) -> Option<FeetRule> {
-        let given = self.phases.iter().find(|rule| rule.name == phase);
+        if let Some(place) = self.given(phase) {
+            return Some(self.phases[place].feet.clone());
+        }
         match phase {
-            _ if given.is_some() => given.map(|rule| rule.feet.clone()),
             "contact" => Some(FeetRule::Any),
             "flight" => Some(FeetRule::None),
             ONLY_PHASE if self.phases.is_empty() => Some(FeetRule::always()),
@@ -274,8 +280,7 @@ impl ImportOptions {
 
     /// The note that a phase got the usual rule, unless its rule was given.
     pub(super) fn usual_feet(&self, phase: &str, feet: &FeetRule) -> Option<Note> {
-        let is_given = self.phases.iter().any(|rule| rule.name == phase);
-        (!is_given).then(|| Note::UsualFeet {
+        self.given(phase).is_none().then(|| Note::UsualFeet {
             phase: phase.to_owned(),
             feet: feet.to_string(),
         })

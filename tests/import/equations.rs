@@ -173,6 +173,20 @@ fn equations_follow_the_order_of_the_phases_given() {
     let names: Vec<&str> = imported.phases().iter().map(|p| p.name.as_str()).collect();
     assert_eq!(names, ["rear", "contact", "flight"]);
     assert_eq!(imported.phase_for([false, false, true, true]), Some(0));
+    // A phase that is not given has its usual rule and comes last.
+    let fewer = ImportOptions {
+        phases: options.phases[..1].to_vec(),
+        ..options
+    };
+    let imported = import(text, &fewer).expect("three phases").model;
+    assert_eq!(imported.phases()[0].name, "rear");
+    assert_eq!(imported.phases().len(), 3);
+    assert_eq!(
+        imported
+            .phase_for([true; 4])
+            .map(|k| &imported.phases()[k].name[..]),
+        Some("contact")
+    );
 }
 
 #[test]
