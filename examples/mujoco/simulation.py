@@ -153,6 +153,10 @@ class Simulation:
             log.other_contact.append(other)
             for _ in range(round(CONTROL_STEP_S / PHYSICS_STEP_S)):
                 mujoco.mj_step(self.robot.mj, self.data)
+            acting = self.data.actuator_force[self.robot.actuator_index]
+            if not np.array_equal(acting, torque):
+                # What is logged as torque would not be what moved the robot.
+                raise ValueError(f"the motors give {acting} N m, not the {torque} that they are told")
         return log.arrays()
 
 
