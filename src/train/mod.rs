@@ -40,6 +40,7 @@ mod seeds;
 mod smooth;
 mod split;
 mod task;
+mod thin;
 
 pub use assemble::{Origin, SourceFile, sha256};
 pub use closed_form::closed_form;

@@ -420,7 +420,7 @@ impl Default for RegressionOptions {
             windows: vec![0, 25, 50],
             ridges: vec![1e-4, 1e-3, 1e-2],
             prunings: eliminations.into_iter().chain(thresholds).collect(),
-            slack: 0.15,
+            slack: 0.1,
             sweeps: 3,
             rollout_weight: 0.2,
             refinements: 10,

@@ -14,7 +14,7 @@ use super::progress::Watch;
 use super::rollout::{Candidate, Change};
 
 /// Weight of relative changes of the coefficients, against squared errors that start at 1 for both kinds of windows.
-const PRIOR: f64 = 1e-3;
+pub(super) const PRIOR: f64 = 1e-3;
 /// Relative step of the difference quotients.
 const STEP: f64 = 1e-6;
 /// Dampings tried in one step before it is given up.
@@ -25,7 +25,7 @@ const TOGETHER: usize = 16;
 const LEAST_GAIN: f64 = 2e-3;
 
 /// Phase, term and latent coordinate of a coefficient.
-type Place = (usize, usize, usize);
+pub(super) type Place = (usize, usize, usize);
 
 /// Coefficients of all phases, `library_dim x latent_dim` each, and the score that judges them.
 #[derive(Clone, Debug)]
@@ -35,7 +35,7 @@ pub(super) struct Coefficients {
 }
 
 impl Coefficients {
-    fn at(&self, (phase, term, column): Place) -> f64 {
+    pub(super) fn at(&self, (phase, term, column): Place) -> f64 {
         self.xi[phase][(term, column)]
     }
 }
@@ -51,10 +51,10 @@ pub(super) struct Refiner<'a> {
 }
 
 /// The squared errors about some coefficients: `|r + J s|^2` for relative changes `s`.
-struct Model {
+pub(super) struct Model {
     squared_error: f64,
-    gram: DMatrix<f64>,
-    gradient: DVector<f64>,
+    pub gram: DMatrix<f64>,
+    pub gradient: DVector<f64>,
 }
 
 impl Refiner<'_> {
@@ -136,7 +136,7 @@ impl Refiner<'_> {
         best
     }
 
-    fn score(&self, xi: &[DMatrix<f64>]) -> f64 {
+    pub(super) fn score(&self, xi: &[DMatrix<f64>]) -> f64 {
         self.judge.score(Candidate {
             features: self.features,
             xi,
@@ -168,7 +168,7 @@ impl Refiner<'_> {
     }
 
     /// Weights under which the squared errors of both kinds of windows are 1; none if a rollout diverges.
-    fn weights(&self, xi: &[DMatrix<f64>]) -> Option<[f64; 2]> {
+    pub(super) fn weights(&self, xi: &[DMatrix<f64>]) -> Option<[f64; 2]> {
         let features = self.features;
         let mut squares = [0.0; 2];
         for part in self.training.parts() {
@@ -181,7 +181,7 @@ impl Refiner<'_> {
     }
 
     /// The squared errors about `xi`; none if a rollout diverges.
-    fn model(
+    pub(super) fn model(
         &self,
         xi: &[DMatrix<f64>],
         places: &[Place],
@@ -218,7 +218,7 @@ impl Refiner<'_> {
     }
 
     /// Every coefficient that may change.
-    fn free_places(&self, xi: &[DMatrix<f64>]) -> Vec<Place> {
+    pub(super) fn free_places(&self, xi: &[DMatrix<f64>]) -> Vec<Place> {
         let mut places = Vec::new();
         for (phase, (xi, knowledge)) in xi.iter().zip(self.knowledge).enumerate() {
             for column in 0..xi.ncols() {
@@ -234,7 +234,7 @@ impl Refiner<'_> {
 }
 
 /// Sizes of the coefficients, which relative changes are relative to.
-fn relative(coefficients: &Coefficients, places: &[Place]) -> Vec<f64> {
+pub(super) fn relative(coefficients: &Coefficients, places: &[Place]) -> Vec<f64> {
     places.iter().map(|&at| coefficients.at(at).abs()).collect()
 }
 

@@ -97,16 +97,17 @@ pub fn select(
             xi: pruned.xi,
             score: pruned.score,
         };
-        let Coefficients { xi, score } = refiner.refine(start, options.refinements, watch);
-        let active = xi.iter().map(active_terms).sum();
-        let choice = Choice {
-            score,
-            active,
-            ..choice
-        };
-        refined.push(Fitted { xi, choice, window });
+        let end = refiner.refine(start, options.refinements, watch);
+        refined.push(Fitted::of(end, &choice, window));
     }
     let limit = (1.0 + options.slack) * best_score(&refined)?;
+    if options.refinements > 0 {
+        let best = refined
+            .iter()
+            .min_by(|a, b| a.choice.score.total_cmp(&b.choice.score));
+        let thinned = best.map(|best| best.thinned(&refiner, limit, watch));
+        refined.extend(thinned);
+    }
     let within = refined
         .into_iter()
         .filter(|fitted| fitted.choice.score <= limit);
@@ -145,6 +146,27 @@ struct Fitted {
     xi: Vec<DMatrix<f64>>,
     choice: Choice,
     window: usize, // index into the windows of the options
+}
+
+impl Fitted {
+    /// Coefficients that began as a candidate's.
+    fn of(Coefficients { xi, score }: Coefficients, began: &Choice, window: usize) -> Self {
+        let choice = Choice {
+            score,
+            active: xi.iter().map(active_terms).sum(),
+            ..began.clone()
+        };
+        Self { xi, choice, window }
+    }
+
+    /// Without the terms that rollouts do not miss.
+    fn thinned(&self, refiner: &Refiner<'_>, limit: f64, watch: &mut Watch<'_>) -> Self {
+        let start = Coefficients {
+            xi: self.xi.clone(),
+            score: self.choice.score,
+        };
+        Self::of(refiner.thin(start, limit, watch), &self.choice, self.window)
+    }
 }
 
 /// Every combination of the options; where the library has terms that are not affine, also those without them, and the

@@ -1,0 +1,153 @@
+//! Dropping terms that the rollouts of the training jumps do not miss.
+//!
+//! About coefficients that are refined the squared errors are a quadratic form of their changes. Dropping one sets its
+//! change; the others take over what they can, and the form says what is lost (the optimal brain surgeon, Hassibi and
+//! Stork, Second order derivatives for network pruning, NIPS 1992).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::progress::Watch;
+use super::refine::{Coefficients, Model, PRIOR, Place, Refiner, relative};
+
+/// Damping of the changes, relative to each coefficient's own weight.
+const DAMPING: f64 = 1e-3;
+/// Terms tried about the same coefficients before it is taken that none can be dropped.
+const ATTEMPTS: usize = 8;
+/// Terms dropped about the same coefficients, after which the form is computed anew.
+const TOGETHER: usize = 4;
+
+impl Refiner<'_> {
+    /// Drops terms one at a time, those first that training misses least, while `judge` scores at most `limit`. What is
+    /// known stays, and so do inputs: a controller needs what they do, whether or not the recorded ones differ enough
+    /// for a prediction to miss them.
+    pub fn thin(&self, refined: Coefficients, limit: f64, watch: &mut Watch<'_>) -> Coefficients {
+        let Some(weights) = self.weights(&refined.xi) else {
+            return refined;
+        };
+        let mut thinned = refined;
+        let total = self.free_places(&thinned.xi).len();
+        watch.stage("dropping terms that rollouts do not miss", total);
+        while !watch.cancelled() {
+            let places = self.free_places(&thinned.xi);
+            let scales = relative(&thinned, &places);
+            let model = self.model(&thinned.xi, &places, &scales, weights);
+            let Some(mut about) =
+                model.and_then(|model| About::new(&thinned, places, scales, &model))
+            else {
+                break;
+            };
+            let before = about.places.len();
+            let Some(fewer) = self.drop_about(&mut about, &thinned, limit) else {
+                break;
+            };
+            thinned = fewer;
+            watch.done(total - before + 1, format!("score {:.4}", thinned.score));
+        }
+        thinned
+    }
+
+    /// The coefficients without the first terms that may go about them, at most [`TOGETHER`]; none if none may.
+    fn drop_about(
+        &self,
+        about: &mut About,
+        from: &Coefficients,
+        limit: f64,
+    ) -> Option<Coefficients> {
+        let mut best = None;
+        for _ in 0..TOGETHER {
+            let found = self.order(about).into_iter().take(ATTEMPTS).find_map(|i| {
+                let without = about.without(i);
+                let xi = without.xi(from);
+                let score = self.score(&xi);
+                (score <= limit).then_some((without, Coefficients { xi, score }))
+            });
+            let Some((without, coefficients)) = found else {
+                break;
+            };
+            *about = without;
+            best = Some(coefficients);
+        }
+        best
+    }
+
+    /// The places that may go, those first whose loss is least.
+    fn order(&self, about: &About) -> Vec<usize> {
+        let (features, d) = (self.features, self.features.latent_dim());
+        let inputs: Vec<_> = (2 * d..3 * d)
+            .filter_map(|i| features.variable_term(i))
+            .collect();
+        let mut order: Vec<usize> = (0..about.places.len())
+            .filter(|&i| !about.gone[i] && !inputs.contains(&about.places[i].1))
+            .collect();
+        order.sort_by(|&a, &b| about.loss(a).total_cmp(&about.loss(b)));
+        order
+    }
+}
+
+/// The quadratic form about some coefficients, some of them dropped.
+#[derive(Clone)]
+struct About {
+    places: Vec<Place>,
+    scales: Vec<f64>,
+    /// Relative changes that make the coefficients zero.
+    to_zero: Vec<f64>,
+    /// Where the form is lowest, with those that are gone at zero.
+    lowest: DVector<f64>,
+    /// Inverse of the form's matrix on those that are not gone.
+    inverse: DMatrix<f64>,
+    gone: Vec<bool>,
+}
+
+impl About {
+    fn new(
+        from: &Coefficients,
+        places: Vec<Place>,
+        scales: Vec<f64>,
+        model: &Model,
+    ) -> Option<Self> {
+        let mut system = model.gram.clone();
+        for i in 0..places.len() {
+            system[(i, i)] += PRIOR + DAMPING * model.gram[(i, i)];
+        }
+        let factor = system.cholesky()?;
+        let to_zero = (places.iter().zip(&scales)).map(|(&at, scale)| -from.at(at) / scale);
+        Some(Self {
+            to_zero: to_zero.collect(),
+            lowest: -factor.solve(&model.gradient),
+            inverse: factor.inverse(),
+            gone: vec![false; places.len()],
+            places,
+            scales,
+        })
+    }
+
+    /// What the form rises by without a term, the others where it is lowest then.
+    fn loss(&self, i: usize) -> f64 {
+        (self.to_zero[i] - self.lowest[i]).powi(2) / self.inverse[(i, i)]
+    }
+
+    /// The form without one more term.
+    fn without(&self, i: usize) -> Self {
+        let mut next = self.clone();
+        let column = self.inverse.column(i) / self.inverse[(i, i)];
+        next.lowest += &column * (self.to_zero[i] - self.lowest[i]);
+        next.inverse -= &column * self.inverse.row(i);
+        next.gone[i] = true;
+        next
+    }
+
+    /// The coefficients where the form is lowest.
+    fn xi(&self, from: &Coefficients) -> Vec<DMatrix<f64>> {
+        let mut xi = from.xi.clone();
+        for (i, &(phase, term, column)) in self.places.iter().enumerate() {
+            let change = self.lowest[i] * self.scales[i];
+            let coefficient = &mut xi[phase][(term, column)];
+            *coefficient = if self.gone[i] {
+                0.0
+            } else {
+                *coefficient + change
+            };
+        }
+        xi
+    }
+}
