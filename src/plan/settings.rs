@@ -51,7 +51,7 @@ pub struct PlanSettings {
 impl Default for PlanSettings {
     fn default() -> Self {
         Self {
-            input: 1.0,
+            input: 2.0,
             posture: 1.0,
             rate: 0.3,
             smoothness: 3.0,
