@@ -9,7 +9,10 @@ use romc::codegen::Precision;
 use romc::deploy::{EmitError, EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::model::ReducedModel;
-use romc::mpc::{Controller, Effectiveness, Measurement, MpcSettings, ReferenceSamples, Solver};
+use romc::mpc::{
+    ConsistentLift, Controller, Effectiveness, Lift, Measurement, MpcSettings, ReferenceSamples,
+    Solver, StanceState,
+};
 use romc::robot::WrenchFrame;
 
 #[path = "controller_c/analysers.rs"]
@@ -56,12 +59,12 @@ fn push_counts(bytes: &mut Vec<u8>, values: &[i64]) {
 }
 
 /// Steps of random measurements along random variations of recorded jumps, with what the library
-/// commands, as `replay.c` reads them; and how many latent inputs the estimate of the share that
-/// arrives has changed. Every second run has that estimate.
-fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize) {
+/// commands, as `replay.c` reads them; how many latent inputs the estimate of the share that
+/// arrives has changed, and how many consistent lifts limits have. Every second run has that estimate.
+fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize, usize) {
     let mut random = Random::new(seed);
     let mut bytes = Vec::new();
-    let (mut done, mut changed) = (0, 0);
+    let (mut done, mut changed, mut limited) = (0, 0, 0);
     let rule = model.input_rule().expect("a robot");
     for run in 0.. {
         if done >= steps {
@@ -93,6 +96,9 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize
             solver: Solver::Riccati,
             missing_input: romc::mpc::MissingInput::Mean,
             body_friction: (friction > 0.0).then_some(friction),
+            lift: [Lift::Transpose, Lift::Consistent][usize::from(run % 5 % 3 != 0)],
+            foot_friction: [0.6, 0.2][run % 2],
+            lift_prior_weight: [1e-3, 1e-2, 1e-4][run % 3],
             effectiveness,
             ..MpcSettings::default()
         };
@@ -122,12 +128,18 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize
             let head = [reference.time_s.len(), samples.len()].map(|count| count as i64);
             push_counts(&mut bytes, &head);
             push_counts(&mut bytes, &[i64::from(u.is_some()), i64::from(first > 0)]);
+            let is_consistent = settings.lift == Lift::Consistent;
+            push_counts(&mut bytes, &[i64::from(is_consistent), 0]);
             push(&mut bytes, &[friction]);
             push(
                 &mut bytes,
                 &effectiveness.map_or([0.0; 3], |e| {
                     [e.time_constant_s, e.stiffness_nm_rad, e.damping_nm_s_rad]
                 }),
+            );
+            push(
+                &mut bytes,
+                &[settings.foot_friction, settings.lift_prior_weight],
             );
             push(&mut bytes, reference.time_s);
             push(&mut bytes, reference.x);
@@ -142,13 +154,13 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize
                     sample,
                     roughness,
                     &mut random,
-                    &mut bytes,
+                    (&mut bytes, &mut limited),
                 ));
             }
         }
         done += segment.len() / 5;
     }
-    (bytes, changed)
+    (bytes, changed, limited)
 }
 
 /// Whether both controllers command different latent inputs.
@@ -158,7 +170,7 @@ fn one_step(
     sample: usize,
     roughness: f64,
     random: &mut Random,
-    bytes: &mut Vec<u8>,
+    (bytes, limited): (&mut Vec<u8>, &mut usize),
 ) -> bool {
     let mut x: [f64; 18] = std::array::from_fn(|i| segment.x[(i, sample)]);
     let mut dx: [f64; 18] = std::array::from_fn(|i| segment.dx[(i, sample)]);
@@ -192,6 +204,7 @@ fn one_step(
     };
     let command = controller.step(measurement);
     let is_changed = trusting.step(measurement).u_lat != command.u_lat;
+    *limited += usize::from(is_limited(controller, &measurement, &command));
     push(bytes, &[time_s]);
     push(bytes, &x);
     push(bytes, &dx);
@@ -211,9 +224,34 @@ fn one_step(
     is_changed
 }
 
-/// Steps of the comparison: 2000, or as many as `ROMC_CONTROLLER_STEPS` says.
+/// Whether the consistent lift of a step needed iterations: a torque limit or a friction pyramid is active.
+fn is_limited(
+    controller: &Controller,
+    measurement: &Measurement<'_>,
+    command: &romc::mpc::Command,
+) -> bool {
+    let settings = controller.settings();
+    let (Lift::Consistent, Some(phase), true) =
+        (settings.lift, command.phase, command.status.has_plan())
+    else {
+        return false;
+    };
+    let stance = StanceState {
+        joints_rad: std::array::from_fn(|joint| measurement.x[joint]),
+        attitude_rad: std::array::from_fn(|angle| measurement.x[15 + angle]),
+        feet: measurement.feet,
+        phase,
+        losses_nm: command.losses_nm,
+    };
+    let mut lift = ConsistentLift::new(controller.plant(), settings).expect("a sound program");
+    let torque = lift.lift(controller.plant(), &command.u_lat, &stance);
+    torque.expect("it was lifted before");
+    lift.iterations() > 0
+}
+
+/// Steps of the comparison: 4000, or as many as `ROMC_CONTROLLER_STEPS` says.
 fn step_count() -> usize {
-    std::env::var("ROMC_CONTROLLER_STEPS").map_or(2000, |text| text.parse().expect("a number"))
+    std::env::var("ROMC_CONTROLLER_STEPS").map_or(4000, |text| text.parse().expect("a number"))
 }
 
 #[test]
@@ -230,12 +268,13 @@ fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_
         let replay = root().join("tests/controller_c/replay.c");
         let program = emitted.program("cc", &[], replay.to_str().expect("UTF-8"));
         let file = emitted.scratch.path().join("steps");
-        let (steps, changed) = replay_file(&model, step_count() / 5, number as u64);
+        let (steps, changed, limited) = replay_file(&model, step_count() / 5, number as u64);
         assert!(changed > 50, "inputs hardly change: {changed}");
+        assert!(limited > 50, "the lift is hardly limited: {limited}");
         fs::write(&file, steps).expect("written");
         let output = succeed(Command::new(program).arg(&file));
         let text = String::from_utf8_lossy(&output.stdout);
-        println!("{}: {text}", model.name());
+        println!("{}: {limited} limited lifts, {text}", model.name());
         let words: Vec<&str> = text.split_whitespace().collect();
         let active: usize = words[words.iter().position(|w| *w == "with").expect("told") - 1]
             .parse()

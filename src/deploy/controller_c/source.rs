@@ -11,8 +11,9 @@ use crate::deploy::controller::texts;
 use crate::mpc::interface::Settings;
 use crate::mpc::problem::{Row, StageRows};
 use crate::mpc::shared::{
-    DEVIATION_FLOOR, EFFECTIVENESS_RANGE, LARGEST_WEIGHT, POSTURE_SHARE, PRIOR_WEIGHT, SLACK_PRICE,
-    SOFTENED_FROM, STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
+    DEVIATION_FLOOR, EFFECTIVENESS_RANGE, LARGEST_WEIGHT, LIFT_CURVATURE, LIFT_ITERATIONS,
+    POSTURE_SHARE, PRIOR_WEIGHT, SLACK_PRICE, SOFTENED_FROM, STATE_REACH, STILL_SHARE,
+    STILL_TIME_S, TOLERANCE,
 };
 use crate::mpc::{ControlModel, FallbackSettings, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
@@ -40,6 +41,11 @@ pub(super) struct Source<'a> {
     reference: ReferenceNumbers,
     effectiveness: EffectivenessNumbers,
     legs: Legs,
+    torque_mean: String,
+    torque_deviation: String,
+    weight_n: f64,
+    lift_curvature: f64,
+    lift_iterations: u32,
     fallback: FallbackSettings,
     softened_from: f64,
     defaults: Settings,
@@ -105,10 +111,11 @@ struct ReferenceNumbers {
 }
 
 impl<'a> Source<'a> {
+    /// The text of a plant, with deviations `C` of the torques by phase.
     pub(super) fn new(
         facts: &'a Facts<'a>,
         entries: &'a ModelInterface,
-        plant: &ControlModel,
+        (plant, deviations): (&ControlModel, &[[[f64; JOINT_DIM]; JOINT_DIM]]),
         rows: &StageRows,
         precision: Precision,
     ) -> Self {
@@ -154,6 +161,15 @@ impl<'a> Source<'a> {
                 range: EFFECTIVENESS_RANGE,
             },
             legs: Legs::of(robot, numbers),
+            torque_mean: numbers.matrix(
+                phases
+                    .iter()
+                    .map(|phase| phase.torque_mean.iter().copied().collect::<Vec<_>>()),
+            ),
+            torque_deviation: nested(deviations.iter().map(|rows| numbers.matrix(*rows))),
+            weight_n,
+            lift_curvature: LIFT_CURVATURE,
+            lift_iterations: LIFT_ITERATIONS,
             fallback: mpc.fallback,
             softened_from: SOFTENED_FROM,
             defaults: Settings::default(),
