@@ -43,7 +43,7 @@ int main(void)
     TRY(lift, -1);
     TRY(foot_friction, 0);
     TRY(lift_prior_weight, (double)NAN);
-    TRY(linearisation, 1);
+    TRY(linearisation, 2);
     TRY(step_s, (double)NAN);
     TRY(input_weight, 0);
     TRY(velocity_weight, -1);

@@ -16,10 +16,11 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 51] = sources![
+const SOURCES: [(&str, &str); 52] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
+    "mpc/online/dense.rs",
     "mpc/online/dynamics.rs",
     "mpc/online/effectiveness.rs",
     "mpc/online/engine.rs",

@@ -55,6 +55,8 @@ struct Facts<'a> {
     defaults: Settings,
     max_rows: usize,
     n_phases: usize,
+    /// Whether the model knows what its states say of its inputs, in all phases.
+    has_given_state: bool,
     n_torque_stored: usize,
     n_joint_stored: usize,
 }
@@ -181,6 +183,10 @@ fn facts<'a>(
         defaults: Settings::default(),
         max_rows: rows.torque.len() + rows.joint.len() + OTHER_ROWS,
         n_phases: plant.phases().len(),
+        has_given_state: plant
+            .phases()
+            .iter()
+            .all(|phase| phase.given_state.is_some()),
         n_torque_stored: rows.torque.len().max(1),
         n_joint_stored: rows.joint.len().max(1),
     }

@@ -11,11 +11,11 @@ use crate::deploy::controller::texts;
 use crate::mpc::interface::Settings;
 use crate::mpc::problem::{Row, StageRows};
 use crate::mpc::shared::{
-    DEVIATION_FLOOR, EFFECTIVENESS_RANGE, LARGEST_WEIGHT, LIFT_CURVATURE, LIFT_ITERATIONS,
-    POSTURE_SHARE, PRIOR_WEIGHT, SLACK_PRICE, SOFTENED_FROM, STATE_REACH, STILL_SHARE,
-    STILL_TIME_S, TOLERANCE,
+    DEVIATION_FLOOR, EFFECTIVENESS_RANGE, HALF_WINDOW_S, LARGEST_WEIGHT, LIFT_CURVATURE,
+    LIFT_ITERATIONS, POSTURE_SHARE, PRIOR_WEIGHT, SLACK_PRICE, SOFTENED_FROM, STATE_REACH,
+    STILL_SHARE, STILL_TIME_S, TOLERANCE,
 };
-use crate::mpc::{ControlModel, FallbackSettings, MpcSettings};
+use crate::mpc::{ControlModel, FallbackSettings, InputGivenState, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
 use crate::solver;
 
@@ -36,6 +36,11 @@ pub(super) struct Source<'a> {
     n_joint: usize,
     max_nnz: usize,
     has_actuators: bool,
+    has_given_state: bool,
+    given_state: String,
+    given_covariance: String,
+    acceleration_error: String,
+    half_window_s: f64,
     is_body_frame: bool,
     solver: SolverNumbers,
     reference: ReferenceNumbers,
@@ -133,6 +138,10 @@ impl<'a> Source<'a> {
         };
         let phases = plant.phases();
         let mpc = MpcSettings::default();
+        let of_given = |part: fn(&InputGivenState) -> &nalgebra::DMatrix<f64>| {
+            let given = phases.iter().filter_map(|phase| phase.given_state.as_ref());
+            nested(given.map(|given| matrix(part(given), facts.latent_dim)))
+        };
         Self {
             banner: &facts.banner,
             name: facts.name,
@@ -145,6 +154,11 @@ impl<'a> Source<'a> {
             max_nnz: (entries.phases.iter())
                 .map(|phase| phase.pattern.len())
                 .fold(1, usize::max),
+            has_given_state: facts.has_given_state,
+            given_state: of_given(|given| &given.mean),
+            given_covariance: of_given(|given| &given.covariance),
+            acceleration_error: of_given(|given| &given.acceleration_error),
+            half_window_s: HALF_WINDOW_S,
             has_actuators: plant.input_rule().actuators().is_some(),
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: SolverNumbers::new(precision, mpc.qp.accepted_residual),

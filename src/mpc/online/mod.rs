@@ -8,6 +8,7 @@
 mod command;
 mod control_model;
 mod controller;
+mod dense;
 mod dynamics;
 mod effectiveness;
 mod engine;
@@ -37,6 +38,7 @@ mod transcribe;
 pub mod shared {
     pub use super::controller::SOFTENED_FROM;
     pub use super::effectiveness::{LARGEST_WEIGHT, PRIOR_WEIGHT, RANGE as EFFECTIVENESS_RANGE};
+    pub use super::estimate::HALF_WINDOW_S;
     pub use super::lift::LIFT_ITERATIONS;
     pub use super::lift_pyramids::{CURVATURE as LIFT_CURVATURE, torque_deviation};
     pub use super::plan::POSTURE_SHARE;
