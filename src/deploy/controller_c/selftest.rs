@@ -11,11 +11,12 @@ use crate::codegen::Precision;
 use crate::deploy::EmitError;
 use crate::model::ReducedModel;
 use crate::mpc::{
-    Command, Controller, Lift, Measurement, MpcError, MpcSettings, ReferenceSamples, Solver,
+    Command, Controller, Lift, Linearisation, Measurement, MissingInput, MpcError, MpcSettings,
+    ReferenceSamples, Solver,
 };
 use crate::robot::{InputRule, JOINT_DIM, STATE_DIM};
 
-/// Steps of the self-test with each lift.
+/// Steps of each run of the self-test.
 const STEPS: usize = 120;
 /// How far measurements are pushed off the jump, times -2 to 2: height (m), pitch (rad), vertical
 /// velocity (m/s).
@@ -59,9 +60,27 @@ pub(super) fn text(
     jump: &Jump,
     precision: Precision,
 ) -> Result<String, EmitError> {
-    let [plain, consistent] =
-        [Lift::Transpose, Lift::Consistent].map(|lift| commands(model, jump, lift));
-    let runs = [plain?, consistent?];
+    let plain = MpcSettings {
+        solver: Solver::Riccati,
+        missing_input: match facts.has_given_state {
+            true => MissingInput::Estimate,
+            false => MissingInput::Mean,
+        },
+        ..MpcSettings::default()
+    };
+    let consistent = MpcSettings {
+        lift: Lift::Consistent,
+        ..plain
+    };
+    let about_plan = MpcSettings {
+        linearisation: Linearisation::LastPlan,
+        ..plain
+    };
+    let runs = [
+        commands(model, jump, plain, Torques::Known)?,
+        commands(model, jump, consistent, Torques::Known)?,
+        commands(model, jump, about_plan, Torques::Unknown)?,
+    ];
     let torques = runs.each_ref().map(|commands| {
         Numbers(Precision::Double).matrix(commands.iter().map(|command| command.torque_nm))
     });
@@ -86,20 +105,30 @@ pub(super) fn text(
     Ok(text.render()?)
 }
 
+/// Whether the controller is told the torques of the jump.
+#[derive(Clone, Copy)]
+enum Torques {
+    Known,
+    Unknown,
+}
+
 /// Commands along a jump for measurements that are pushed off it.
-fn commands(model: &ReducedModel, jump: &Jump, lift: Lift) -> Result<Vec<Command>, EmitError> {
-    let settings = MpcSettings {
-        solver: Solver::Riccati,
-        lift,
-        ..MpcSettings::default()
-    };
+fn commands(
+    model: &ReducedModel,
+    jump: &Jump,
+    settings: MpcSettings,
+    torques: Torques,
+) -> Result<Vec<Command>, EmitError> {
     let mut controller = Controller::new(model, settings)?;
     let u = inputs(controller.plant().input_rule(), jump)?;
     let reference = ReferenceSamples {
         time_s: &jump.time_s,
         x: &jump.x.concat(),
         dx: &jump.dx.concat(),
-        u: Some(&u),
+        u: match torques {
+            Torques::Known => Some(&u),
+            Torques::Unknown => None,
+        },
         feet: &jump.feet,
     };
     controller

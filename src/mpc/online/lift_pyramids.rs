@@ -1,4 +1,4 @@
-//! The consistent lift with friction pyramids, by the structured [`solver`].
+//! The consistent lift with friction pyramids, by the structured [`solver`](crate::solver).
 //!
 //! Torques are written by the standard deviations of the training's, `τ = m + C y` with `C Cᵀ = S`,
 //! and with `A = M C / √w` and `r = (u_lat − M m) / √w` the program becomes
