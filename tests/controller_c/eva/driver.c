@@ -1,6 +1,5 @@
 /* What Eva analyses: a controller of two latent coordinates with five stages, a reference of three samples, steps. Ranges:
- * states -4 to 4 (m, rad), velocities -40 to 40, inputs -1000 to 1000 or not known, times 0 to 1 s, any
- * feet; either lift, linearised about the reference or the last plan. */
+ * states -4 to 4 (m, rad), velocities -40 to 40, inputs -1000 to 1000, times 0 to 1 s, any feet. */
 #include "go1_d2_controller.h"
 
 #include "__fc_builtin.h"
@@ -30,18 +29,15 @@ int main(void)
     for (int i = 0; i < COUNT * 4; ++i) {
         feet[i] = (uint8_t)Frama_C_interval(0, 1);
     }
-    settings.lift = Frama_C_interval(0, 1);
-    settings.linearisation = Frama_C_interval(0, 1);
     settings.effectiveness_time_s = 1.0;
     settings.drive_stiffness_nm_rad = 20.0;
     settings.drive_damping_nm_s_rad = 0.8;
-    const double *known = Frama_C_interval(0, 1) ? u : 0;
     if (go1_d2_controller_init(&controller, &settings) != 0
-        || go1_d2_controller_set_reference(&controller, COUNT, time_s, x, dx, known, feet) != 0) {
+        || go1_d2_controller_set_reference(&controller, COUNT, time_s, x, dx, u, feet) != 0) {
         return 1;
     }
     /* What a reference that was taken has set already: Eva joins that state with those of refused ones. */
-    const go1_d2_reference taken = {COUNT, time_s, x, dx, known, 0, feet};
+    const go1_d2_reference taken = {COUNT, time_s, x, dx, u, 0, feet};
     controller.reference = taken;
     controller.has_reference = 1;
     for (int k = 0; k < 2; ++k) {
