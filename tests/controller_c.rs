@@ -9,8 +9,10 @@ use romc::codegen::Precision;
 use romc::deploy::{EmitError, EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::model::ReducedModel;
-use romc::mpc::{Controller, Effectiveness, Measurement, MpcSettings, ReferenceSamples, Solver};
-use romc::robot::WrenchFrame;
+use romc::mpc::{
+    ConsistentLift, ControlModel, Controller, Effectiveness, Lift, Linearisation, Measurement,
+    MissingInput, MpcSettings, ReferenceSamples, Solver, StanceState, Status,
+};
 
 #[path = "controller_c/analysers.rs"]
 mod analysers;
@@ -18,6 +20,8 @@ mod analysers;
 mod boards;
 #[path = "controller_c/emitted.rs"]
 mod emitted;
+#[path = "controller_c/legs.rs"]
+mod legs;
 #[path = "controller/programs.rs"]
 mod programs;
 #[path = "mpc/random.rs"]
@@ -25,22 +29,42 @@ mod random;
 #[path = "controller_c/ros2.rs"]
 mod ros2;
 mod tools;
-use emitted::{Emitted, STRICT};
+use emitted::Emitted;
 use programs::{has, root, shipped, succeed, with_losses};
 use random::Random;
 
 /// The shipped model with torques over 0.3 as large for the same latent input: its limits bind as if
 /// they were 30 % of what they are.
 fn with_tight_limits(name: &str) -> ReducedModel {
+    changed(name, |manifest| {
+        let scale = |value: &mut serde_json::Value| {
+            *value = (0.3 * value.as_f64().expect("a number")).into();
+        };
+        match &mut manifest["scaling"]["input"] {
+            serde_json::Value::Array(values) => values.iter_mut().for_each(scale),
+            value => scale(value),
+        }
+    })
+}
+
+/// The shipped model without what its states say of its inputs, as one that was imported.
+fn without_given_state(name: &str) -> ReducedModel {
+    changed(name, |manifest| {
+        let phases = manifest["input_statistics"]
+            .as_object_mut()
+            .expect("phases");
+        for statistics in phases.values_mut() {
+            let known = statistics.as_object_mut().expect("statistics");
+            known.remove("given_state").expect("a trained model");
+        }
+    })
+}
+
+/// A shipped model with its file changed.
+fn changed(name: &str, change: impl Fn(&mut serde_json::Value)) -> ReducedModel {
     let text = fs::read_to_string(root().join(format!("models/{name}.json"))).expect("shipped");
     let mut manifest: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-    let scale = |value: &mut serde_json::Value| {
-        *value = (0.3 * value.as_f64().expect("a number")).into();
-    };
-    match &mut manifest["scaling"]["input"] {
-        serde_json::Value::Array(values) => values.iter_mut().for_each(scale),
-        value => scale(value),
-    }
+    change(&mut manifest);
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("tight.json");
     fs::write(&path, manifest.to_string()).expect("written");
@@ -56,13 +80,19 @@ fn push_counts(bytes: &mut Vec<u8>, values: &[i64]) {
 }
 
 /// Steps of random measurements along random variations of recorded jumps, with what the library
-/// commands, as `replay.c` reads them; and how many latent inputs the estimate of the share that
-/// arrives has changed. Every second run has that estimate.
-fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize) {
+/// commands, as `replay.c` reads them; how many latent inputs the estimate of the share that
+/// arrives has changed, and how many consistent lifts are limited and
+/// how many fail. Every second run has that estimate.
+fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize, [usize; 2]) {
     let mut random = Random::new(seed);
     let mut bytes = Vec::new();
-    let (mut done, mut changed) = (0, 0);
+    let (mut done, mut changed, mut lifts) = (0, 0, [0; 2]);
     let rule = model.input_rule().expect("a robot");
+    let plant = ControlModel::new(model).expect("a complete model");
+    let knows_inputs = plant
+        .phases()
+        .iter()
+        .all(|phase| phase.given_state.is_some());
     for run in 0.. {
         if done >= steps {
             break;
@@ -91,8 +121,15 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize
         });
         let settings = MpcSettings {
             solver: Solver::Riccati,
-            missing_input: romc::mpc::MissingInput::Mean,
+            missing_input: match knows_inputs {
+                true => MissingInput::Estimate,
+                false => MissingInput::Mean,
+            },
             body_friction: (friction > 0.0).then_some(friction),
+            lift: [Lift::Transpose, Lift::Consistent][usize::from(run % 5 % 3 != 0)],
+            foot_friction: [0.6, 0.2][run % 2],
+            lift_prior_weight: [1e-3, 1e-2, 1e-4][run % 3],
+            linearisation: [Linearisation::Reference, Linearisation::LastPlan][run / 2 % 3 % 2],
             effectiveness,
             ..MpcSettings::default()
         };
@@ -122,12 +159,22 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize
             let head = [reference.time_s.len(), samples.len()].map(|count| count as i64);
             push_counts(&mut bytes, &head);
             push_counts(&mut bytes, &[i64::from(u.is_some()), i64::from(first > 0)]);
+            let is_consistent = settings.lift == Lift::Consistent;
+            let is_about_plan = settings.linearisation == Linearisation::LastPlan;
+            push_counts(
+                &mut bytes,
+                &[i64::from(is_consistent), i64::from(is_about_plan)],
+            );
             push(&mut bytes, &[friction]);
             push(
                 &mut bytes,
                 &effectiveness.map_or([0.0; 3], |e| {
                     [e.time_constant_s, e.stiffness_nm_rad, e.damping_nm_s_rad]
                 }),
+            );
+            push(
+                &mut bytes,
+                &[settings.foot_friction, settings.lift_prior_weight],
             );
             push(&mut bytes, reference.time_s);
             push(&mut bytes, reference.x);
@@ -142,13 +189,13 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize
                     sample,
                     roughness,
                     &mut random,
-                    &mut bytes,
+                    (&mut bytes, &mut lifts),
                 ));
             }
         }
         done += segment.len() / 5;
     }
-    (bytes, changed)
+    (bytes, changed, lifts)
 }
 
 /// Whether both controllers command different latent inputs.
@@ -158,7 +205,7 @@ fn one_step(
     sample: usize,
     roughness: f64,
     random: &mut Random,
-    bytes: &mut Vec<u8>,
+    (bytes, lifts): (&mut Vec<u8>, &mut [usize; 2]),
 ) -> bool {
     let mut x: [f64; 18] = std::array::from_fn(|i| segment.x[(i, sample)]);
     let mut dx: [f64; 18] = std::array::from_fn(|i| segment.dx[(i, sample)]);
@@ -180,6 +227,10 @@ fn one_step(
         controller.reset();
         trusting.reset();
     }
+    if resets && random.signed() > 0.0 {
+        // A stretched knee; the first measurement after a reset is believed.
+        x[5] = 0.0;
+    }
     let prepares = random.signed() > 0.0;
     if prepares {
         controller.prepare(time_s);
@@ -192,6 +243,8 @@ fn one_step(
     };
     let command = controller.step(measurement);
     let is_changed = trusting.step(measurement).u_lat != command.u_lat;
+    lifts[0] += usize::from(is_limited(controller, &measurement, &command));
+    lifts[1] += usize::from(command.status == Status::LiftFailed);
     push(bytes, &[time_s]);
     push(bytes, &x);
     push(bytes, &dx);
@@ -211,9 +264,34 @@ fn one_step(
     is_changed
 }
 
-/// Steps of the comparison: 2000, or as many as `ROMC_CONTROLLER_STEPS` says.
+/// Whether the consistent lift of a step needed iterations: a torque limit or a friction pyramid is active.
+fn is_limited(
+    controller: &Controller,
+    measurement: &Measurement<'_>,
+    command: &romc::mpc::Command,
+) -> bool {
+    let settings = controller.settings();
+    let (Lift::Consistent, Some(phase), true) =
+        (settings.lift, command.phase, command.status.has_plan())
+    else {
+        return false;
+    };
+    let stance = StanceState {
+        joints_rad: std::array::from_fn(|joint| measurement.x[joint]),
+        attitude_rad: std::array::from_fn(|angle| measurement.x[15 + angle]),
+        feet: measurement.feet,
+        phase,
+        losses_nm: command.losses_nm,
+    };
+    let mut lift = ConsistentLift::new(controller.plant(), settings).expect("a sound program");
+    let torque = lift.lift(controller.plant(), &command.u_lat, &stance);
+    torque.expect("it was lifted before");
+    lift.iterations() > 0
+}
+
+/// Steps of the comparison: 4000, or as many as `ROMC_CONTROLLER_STEPS` says.
 fn step_count() -> usize {
-    std::env::var("ROMC_CONTROLLER_STEPS").map_or(2000, |text| text.parse().expect("a number"))
+    std::env::var("ROMC_CONTROLLER_STEPS").map_or(4000, |text| text.parse().expect("a number"))
 }
 
 #[test]
@@ -224,18 +302,26 @@ fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_
         (with_tight_limits("go1-d6"), true),
         (with_losses(shipped("go1-d4")), false),
         (shipped("go1-d2"), false),
+        (without_given_state("go1-d4"), false),
     ];
+    let mut unlifted = 0;
     for (number, (model, is_tight)) in models.into_iter().enumerate() {
         let emitted = Emitted::new(&model, Precision::Double);
         let replay = root().join("tests/controller_c/replay.c");
         let program = emitted.program("cc", &[], replay.to_str().expect("UTF-8"));
         let file = emitted.scratch.path().join("steps");
-        let (steps, changed) = replay_file(&model, step_count() / 5, number as u64);
+        let (steps, changed, [limited, failed]) =
+            replay_file(&model, step_count() / 5, number as u64);
         assert!(changed > 50, "inputs hardly change: {changed}");
+        assert!(limited > 50, "the lift is hardly limited: {limited}");
         fs::write(&file, steps).expect("written");
         let output = succeed(Command::new(program).arg(&file));
         let text = String::from_utf8_lossy(&output.stdout);
-        println!("{}: {text}", model.name());
+        println!(
+            "{}: {limited} limited lifts, {failed} failed, {text}",
+            model.name()
+        );
+        unlifted += failed;
         let words: Vec<&str> = text.split_whitespace().collect();
         let active: usize = words[words.iter().position(|w| *w == "with").expect("told") - 1]
             .parse()
@@ -245,59 +331,7 @@ fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_
             "limits hardly bind: {text}"
         );
     }
-}
-
-/// The model on the robot of a file, with forces in one of the frames.
-fn on_robot(name: &str, frame: WrenchFrame) -> ReducedModel {
-    let path = root().join("examples/robots").join(name);
-    let robot = romc::robot_file::read(&path, &[]).expect("an example");
-    let builder = shipped("go1-d4").into_builder().robot(robot);
-    builder.wrench_frame(frame).build().expect("a sound model")
-}
-
-#[test]
-fn forces_of_the_drives_have_the_librarys_bits_for_planar_legs_and_chains_in_both_frames() {
-    let mut random = Random::new(5);
-    for model in [
-        on_robot("solo12.toml", WrenchFrame::Body),
-        on_robot("hare.urdf", WrenchFrame::World),
-        on_robot("anymal_c.toml", WrenchFrame::Body),
-        shipped("go1-d4"),
-    ] {
-        let rule = model.input_rule().expect("a robot");
-        let mut bytes = Vec::new();
-        for sample in 0..2000 {
-            // Every third posture is near a stretched knee.
-            let reach = if sample % 3 == 0 { 0.2 } else { 2.0 };
-            let x: [f64; 18] = std::array::from_fn(|i| match i % 3 {
-                2 if i < 12 => reach * random.signed(),
-                _ => 1.5 * random.signed(),
-            });
-            let torque: [f64; 12] = std::array::from_fn(|_| 20.0 * random.signed());
-            let feet: [bool; 4] = std::array::from_fn(|_| random.signed() > -0.5);
-            let wrench = rule.wrench(&x, &torque, feet).expect("finite");
-            push(&mut bytes, &x);
-            push(&mut bytes, &torque);
-            push(&mut bytes, wrench.as_slice());
-            bytes.extend(feet.map(u8::from));
-        }
-        let emitted = Emitted::new(&model, Precision::Double);
-        let file = emitted.scratch.path().join("samples");
-        fs::write(&file, bytes).expect("written");
-        let program = emitted.scratch.path().join("wrench");
-        succeed(
-            Command::new("cc")
-                .args(STRICT)
-                .args(["-O2", "-ffp-contract=off", "-I."])
-                .arg(format!("-DSOURCE=\"{}_controller.c\"", emitted.name))
-                .arg(root().join("tests/controller_c/wrench.c"))
-                .arg(format!("{}.c", emitted.name))
-                .args(["-lm", "-o"])
-                .arg(&program)
-                .current_dir(emitted.folder()),
-        );
-        println!("{}", Emitted::output(Command::new(program).arg(file)));
-    }
+    assert!(unlifted > 3, "lifts hardly fail: {unlifted}");
 }
 
 #[test]

@@ -4,6 +4,8 @@
 mod control;
 #[path = "mpc/failures.rs"]
 mod failures;
+#[path = "mpc/lift_pyramids.rs"]
+mod lift_pyramids;
 #[path = "mpc/lifts.rs"]
 mod lifts;
 #[path = "mpc/nonlinear.rs"]

@@ -43,5 +43,5 @@ pub use joints::{
     BODY_DIM, BODY_NAMES, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Leg,
     STATE_DIM,
 };
-pub use kinematics::PlanarLeg;
+pub use kinematics::{PlanarLeg, SINGULAR_BOUND};
 pub use registry::Robot;

@@ -4,9 +4,11 @@ use std::fs;
 use std::process::Command;
 
 use romc::codegen::Precision;
+use romc::robot::WrenchFrame;
 
 use crate::emitted::Emitted;
 use crate::programs::{has, shipped, succeed};
+use crate::without_given_state;
 
 #[test]
 fn self_tests_and_example_pass_in_both_precisions_with_sanitizers() {
@@ -49,6 +51,28 @@ fn self_tests_pass_under_clang_and_valgrind() {
             let built = emitted.program("cc", &["-g"], &source);
             let quiet = ["-q", "--error-exitcode=9", "--track-origins=yes"];
             succeed(Command::new("valgrind").args(quiet).arg(built));
+        }
+    }
+}
+
+#[test]
+fn self_tests_pass_without_the_consistent_lift() {
+    let imported = without_given_state("go1-d4");
+    let world = shipped("go1-d4")
+        .into_builder()
+        .wrench_frame(WrenchFrame::World);
+    let world = world.build().expect("a sound model");
+    for (model, precision) in [(imported, Precision::Single), (world, Precision::Double)] {
+        let emitted = Emitted::new(&model, precision);
+        let without = format!("-D{}_CONSISTENT_LIFT=0", emitted.name.to_ascii_uppercase());
+        let source = format!("{}_controller_selftest.c", emitted.name);
+        for compiler in ["cc", "clang"].into_iter().filter(|compiler| has(compiler)) {
+            let built = emitted.program(compiler, &[&without], &source);
+            let text = Emitted::output(&mut Command::new(built));
+            assert!(
+                text.contains("plain lift") && !text.contains("consistent"),
+                "{text}"
+            );
         }
     }
 }

@@ -9,7 +9,7 @@ use romc::deploy::{EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::model::ReducedModel;
 
-use crate::programs::succeed;
+use crate::programs::{root, succeed};
 
 /// Warnings that the sources must not raise.
 pub const STRICT: [&str; 9] = [
@@ -98,6 +98,26 @@ impl Emitted {
                 .arg(&program),
         );
         program
+    }
+
+    /// What a program of the tests prints that has the controller's source as part of it, fed with a file.
+    pub fn with_source(&self, source: &str, bytes: &[u8]) -> String {
+        let file = self.scratch.path().join("samples");
+        fs::write(&file, bytes).expect("written");
+        let program = self.scratch.path().join("with_source");
+        succeed(
+            Command::new("cc")
+                .args(STRICT)
+                .args(["-O2", "-ffp-contract=off", "-I."])
+                .arg(format!("-DNAME={}", self.name))
+                .arg(format!("-DSOURCE=\"{}_controller.c\"", self.name))
+                .arg(root().join("tests/controller_c").join(source))
+                .arg(format!("{}.c", self.name))
+                .args(["-lm", "-o"])
+                .arg(&program)
+                .current_dir(self.folder()),
+        );
+        Self::output(Command::new(program).arg(file))
     }
 
     /// Text of a command's standard output.

@@ -1,7 +1,8 @@
 /* Replays steps from a file through a generated controller and compares every command with the file's, bit for bit.
  * usage: replay FILE; prints steps, differing ones, the most iterations and torques beyond their limits. Native byte order:
  * runs until the end of the file, each of
- *   int64 samples, steps, has_u; double body_friction, effectiveness_time_s, stiffness and damping of the drives;
+ *   int64 samples, steps, has_u, is_next, lift, linearisation; double body_friction, effectiveness_time_s, stiffness and
+ *   damping of the drives, foot_friction, lift_prior_weight;
  *   double time_s[samples], x[18 samples], dx[18 samples], u[18 samples] if has_u; uint8 feet[4 samples]
  *   and for each step double time_s, x[18], dx[18]; uint8 feet[4], flags (1 prepare, 2 reset); double torque[12],
  *   joint_position[12], joint_velocity[12], u_lat[D]; int64 status, iterations. */
@@ -46,15 +47,15 @@ int main(int argc, char **argv)
     static const double LIMITS[3] = {23.7, 23.7, 35.55};
     static FN(_controller) controller;
     long steps = 0, different = 0, iterations = 0, beyond = 0, active = 0, fallbacks = 0;
-    int64_t head[4];
+    int64_t head[6];
     input = argc > 1 ? fopen(argv[1], "rb") : NULL;
     if (input == NULL) {
         return 2;
     }
-    while (get(head, sizeof head[0], 4)) {
+    while (get(head, sizeof head[0], 6)) {
         const size_t count = (size_t)head[0];
-        double chosen[4];
-        need(chosen, sizeof chosen[0], 4);
+        double chosen[6];
+        need(chosen, sizeof chosen[0], 6);
         double *time_s = array(sizeof(double), count), *x = array(sizeof(double), 18 * count);
         double *dx = array(sizeof(double), 18 * count), *u = NULL;
         if (head[2]) {
@@ -66,6 +67,10 @@ int main(int argc, char **argv)
         settings.effectiveness_time_s = chosen[1];
         settings.drive_stiffness_nm_rad = chosen[2];
         settings.drive_damping_nm_s_rad = chosen[3];
+        settings.foot_friction = chosen[4];
+        settings.lift_prior_weight = chosen[5];
+        settings.lift = (int32_t)head[4];
+        settings.linearisation = (int32_t)head[5];
         const int is_next = head[3] != 0;
         if ((!is_next && FN(_controller_init)(&controller, &settings) != 0)
             || FN(_controller_set_reference)(&controller, count, time_s, x, dx, u, feet) != 0) {

@@ -39,8 +39,11 @@ int main(void)
     TRY(horizon, 0);
     TRY(horizon, PASTE(UPPER, _MAX_HORIZON) + 1);
     TRY(max_iterations, 0);
-    TRY(lift, 1);
-    TRY(linearisation, 1);
+    TRY(lift, 2);
+    TRY(lift, -1);
+    TRY(foot_friction, 0);
+    TRY(lift_prior_weight, (double)NAN);
+    TRY(linearisation, 2);
     TRY(step_s, (double)NAN);
     TRY(input_weight, 0);
     TRY(velocity_weight, -1);

@@ -2,7 +2,7 @@
 
 use romc::evaluate::{ReferenceInput, along_recording};
 use romc::mpc::{
-    Cone, ConeProgram, Controller, MpcSettings, Outcome, QpSettings, QpSolver, Solver,
+    Cone, ConeProgram, Controller, Lift, MpcSettings, Outcome, QpSettings, QpSolver, Solver,
     SparseColumns,
 };
 use romc::solver::{self, Cost, Program, Real, RowMatrices, Settings, Shape, Stage};
@@ -257,7 +257,11 @@ fn riccati_finds_clarabels_optimum_of_random_programs_in_both_precisions() {
 #[test]
 fn riccati_commands_clarabels_torques_along_recordings_and_prepares_ahead() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    for name in ["go1-d4", "go1-d6"] {
+    for (name, lift) in [
+        ("go1-d4", Lift::Transpose),
+        ("go1-d6", Lift::Transpose),
+        ("go1-d4", Lift::Consistent),
+    ] {
         let model =
             romc::artifact::read(&root.join(format!("models/{name}.json"))).expect("shipped");
         let path = root.join("examples/recordings/go1/test_02.csv.gz");
@@ -265,6 +269,7 @@ fn riccati_commands_clarabels_torques_along_recordings_and_prepares_ahead() {
         let runs = [Solver::Clarabel, Solver::Riccati].map(|solver| {
             let mut settings = MpcSettings {
                 solver,
+                lift,
                 ..MpcSettings::default()
             };
             settings.qp.tolerance = 1e-9;
@@ -274,15 +279,18 @@ fn riccati_commands_clarabels_torques_along_recordings_and_prepares_ahead() {
         });
         let [conic, structured] = &runs;
         assert_eq!(conic.rows.len(), structured.rows.len());
+        let mut equal = 0;
         for (a, b) in conic.rows.iter().zip(&structured.rows) {
             assert_eq!((a.status, b.iterations), (b.status, 0));
-            for (a, b) in a.torque_nm.iter().zip(b.torque_nm) {
-                assert!(
-                    (a - b).abs() < 1e-6,
-                    "{name} at {}: {a} {b}",
-                    conic.rows[0].time_s
-                );
-            }
+            let off = a.torque_nm.iter().zip(b.torque_nm);
+            let off = off.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            equal += usize::from(off < 1e-6);
+            // In the few steps in which a foot would leave its pyramid torques are others, but not far.
+            assert!(off < 2.0, "{name} at {}: {off} N m", a.time_s);
+        }
+        match lift {
+            Lift::Transpose => assert_eq!(equal, conic.rows.len(), "{name}"),
+            Lift::Consistent => assert!(3 * equal > 2 * conic.rows.len(), "{name}: {equal}"),
         }
     }
 }

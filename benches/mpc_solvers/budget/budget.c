@@ -1,4 +1,4 @@
-/* Budgets of a generated controller. usage: budget STAGES IS_PUSHED STEPS; prints the bytes of its struct, the bytes of
+/* Budgets of a generated controller. usage: budget STAGES IS_PUSHED STEPS LIFT; prints the bytes of its struct, the bytes of
  * stack that a step took, and the iterations of all steps; `run.sh` beside it counts instructions. */
 #include HEADER
 #include JUMP
@@ -11,7 +11,7 @@
 #define PASTE(a, b) PASTE_(a, b)
 #define FN(suffix) PASTE(NAME, suffix)
 #define COUNT (int)(sizeof JUMP_TIME_S / sizeof JUMP_TIME_S[0])
-#define PAINTED 16384
+#define PAINTED 32768
 
 static FN(_controller) controller;
 static FN(_command) command;
@@ -37,10 +37,12 @@ int main(int argc, char **argv)
 {
     const int horizon = argc > 1 ? atoi(argv[1]) : 20, is_pushed = argc > 2 && atoi(argv[2]);
     const int steps = argc > 3 ? atoi(argv[3]) : 40;
+    const int lift = argc > 4 ? atoi(argv[4]) : 0;
     int deepest = 0;
     long iterations = 0;
     FN(_controller_settings) settings = FN(_controller_settings_default)();
     settings.horizon = horizon;
+    settings.lift = lift;
     if (FN(_controller_init)(&controller, &settings) != 0
         || FN(_controller_set_reference_torque)(&controller, COUNT, JUMP_TIME_S, JUMP_X[0], JUMP_DX[0], JUMP_TORQUE[0],
                                                 JUMP_FEET[0]) != 0) {

@@ -16,10 +16,11 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 49] = sources![
+const SOURCES: [(&str, &str); 52] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
+    "mpc/online/dense.rs",
     "mpc/online/dynamics.rs",
     "mpc/online/effectiveness.rs",
     "mpc/online/engine.rs",
@@ -34,6 +35,8 @@ const SOURCES: [(&str, &str); 49] = sources![
     "mpc/online/interface/values.rs",
     "mpc/online/layout.rs",
     "mpc/online/lift.rs",
+    "mpc/online/lift_cones.rs",
+    "mpc/online/lift_pyramids.rs",
     "mpc/online/linearise.rs",
     "mpc/online/mod.rs",
     "mpc/online/nonlinear.rs",

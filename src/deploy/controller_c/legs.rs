@@ -1,7 +1,7 @@
 //! The legs of a robot as constants of the controller in C.
 
 use super::numbers::{Numbers, integers, nested};
-use crate::robot::{ChainLeg, Leg, LegGeometry, PlanarLeg, Robot};
+use crate::robot::{ChainLeg, Leg, LegGeometry, PlanarLeg, Robot, SINGULAR_BOUND};
 
 /// Initialisers for the four legs, in the order of [`Leg::ALL`]; a leg of one kind is zeros in the
 /// table of the other.
@@ -13,6 +13,8 @@ pub(super) struct Legs {
     pub axes: String,
     pub links: String,
     pub least_levers: String,
+    pub volumes: String,
+    pub singular_bound: f64,
     pub hips: String,
 }
 
@@ -45,6 +47,8 @@ impl Legs {
             axes: table(0),
             links: table(1),
             least_levers: numbers.matrix(legs.map(LegGeometry::least_levers)),
+            volumes: numbers.vector(legs.map(LegGeometry::volume_m3)),
+            singular_bound: SINGULAR_BOUND,
             hips: numbers.matrix(Leg::ALL.map(|leg| {
                 let hip = robot.hip_position(leg);
                 [hip.x, hip.y, hip.z]

@@ -24,7 +24,8 @@ use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::mpc::interface::Settings;
 use crate::mpc::problem::StageRows;
-use crate::mpc::{ControlModel, MpcSettings};
+use crate::mpc::shared::torque_deviation;
+use crate::mpc::{ControlModel, ControlPhase, MpcError, MpcSettings};
 use crate::robot::{Robot, STATE_DIM};
 use jump::Jump;
 use numbers::Numbers;
@@ -54,6 +55,8 @@ struct Facts<'a> {
     defaults: Settings,
     max_rows: usize,
     n_phases: usize,
+    /// Whether the model knows what its states say of its inputs, in all phases.
+    has_given_state: bool,
     n_torque_stored: usize,
     n_joint_stored: usize,
 }
@@ -108,7 +111,14 @@ pub fn emit(
         }
     }
     let facts = &facts(&entries, &plant, &rows, options.precision, provenance);
-    let source = Source::new(facts, &entries, &plant, &rows, options.precision);
+    let deviation = |phase: &ControlPhase| {
+        torque_deviation(phase).ok_or_else(|| MpcError::Statistics {
+            phase: phase.name.clone(),
+        })
+    };
+    let deviations: Vec<_> = (plant.phases().iter().map(deviation)).collect::<Result<_, _>>()?;
+    let plant_of_lift = (&plant, deviations.as_slice());
+    let source = Source::new(facts, &entries, plant_of_lift, &rows, options.precision);
     let jump = match &options.plan {
         Some(plan) => Jump::planned(plan),
         None => Jump::shipped()?.within(model),
@@ -173,6 +183,10 @@ fn facts<'a>(
         defaults: Settings::default(),
         max_rows: rows.torque.len() + rows.joint.len() + OTHER_ROWS,
         n_phases: plant.phases().len(),
+        has_given_state: plant
+            .phases()
+            .iter()
+            .all(|phase| phase.given_state.is_some()),
         n_torque_stored: rows.torque.len().max(1),
         n_joint_stored: rows.joint.len().max(1),
     }

@@ -6,14 +6,17 @@ use askama::Template;
 
 use super::Facts;
 use super::jump::Jump;
-use super::numbers::{Numbers, integers};
+use super::numbers::{Numbers, integers, nested};
 use crate::codegen::Precision;
 use crate::deploy::EmitError;
 use crate::model::ReducedModel;
-use crate::mpc::{Controller, Measurement, MpcError, MpcSettings, ReferenceSamples, Solver};
+use crate::mpc::{
+    Command, Controller, Lift, Linearisation, Measurement, MissingInput, MpcError, MpcSettings,
+    ReferenceSamples, Solver,
+};
 use crate::robot::{InputRule, JOINT_DIM, STATE_DIM};
 
-/// Steps of the self-test.
+/// Steps of each run of the self-test.
 const STEPS: usize = 120;
 /// How far measurements are pushed off the jump, times -2 to 2: height (m), pitch (rad), vertical
 /// velocity (m/s).
@@ -57,24 +60,82 @@ pub(super) fn text(
     jump: &Jump,
     precision: Precision,
 ) -> Result<String, EmitError> {
-    let settings = MpcSettings {
+    let plain = MpcSettings {
         solver: Solver::Riccati,
+        missing_input: match facts.has_given_state {
+            true => MissingInput::Estimate,
+            false => MissingInput::Mean,
+        },
         ..MpcSettings::default()
     };
+    let consistent = MpcSettings {
+        lift: Lift::Consistent,
+        ..plain
+    };
+    let about_plan = MpcSettings {
+        linearisation: Linearisation::LastPlan,
+        ..plain
+    };
+    let runs = [
+        commands(model, jump, plain, Torques::Known)?,
+        commands(model, jump, consistent, Torques::Known)?,
+        commands(model, jump, about_plan, Torques::Unknown)?,
+    ];
+    let torques = runs.each_ref().map(|commands| {
+        Numbers(Precision::Double).matrix(commands.iter().map(|command| command.torque_nm))
+    });
+    let statuses = runs.each_ref().map(|commands| {
+        let codes = commands.iter().map(|command| command.status.code());
+        integers(codes.map(i64::from))
+    });
+    let text = SelfTest {
+        facts,
+        steps: runs[0].len(),
+        horizon: MpcSettings::default().horizon,
+        torques: nested(torques),
+        statuses: nested(statuses),
+        push_z: PUSH[0],
+        push_pitch: PUSH[1],
+        push_dz: PUSH[2],
+        tolerance: match precision {
+            Precision::Double => TOLERANCE_NM[0],
+            Precision::Single => TOLERANCE_NM[1],
+        },
+    };
+    Ok(text.render()?)
+}
+
+/// Whether the controller is told the torques of the jump.
+#[derive(Clone, Copy)]
+enum Torques {
+    Known,
+    Unknown,
+}
+
+/// Commands along a jump for measurements that are pushed off it.
+fn commands(
+    model: &ReducedModel,
+    jump: &Jump,
+    settings: MpcSettings,
+    torques: Torques,
+) -> Result<Vec<Command>, EmitError> {
     let mut controller = Controller::new(model, settings)?;
     let u = inputs(controller.plant().input_rule(), jump)?;
     let reference = ReferenceSamples {
         time_s: &jump.time_s,
         x: &jump.x.concat(),
         dx: &jump.dx.concat(),
-        u: Some(&u),
+        u: match torques {
+            Torques::Known => Some(&u),
+            Torques::Unknown => None,
+        },
         feet: &jump.feet,
     };
     controller
         .set_reference(reference)
         .map_err(MpcError::from)?;
     let steps = STEPS.min(jump.time_s.len());
-    let commands: Vec<_> = (0..steps)
+    Ok((0..steps)
         .map(|k| {
             let (mut x, mut dx) = (jump.x[k].clone(), jump.dx[k].clone());
             let push = (k / 8 % 5) as f64 - 2.0;
@@ -88,22 +149,7 @@ pub(super) fn text(
                 feet: jump.feet[k],
             })
         })
-        .collect();
-    let text = SelfTest {
-        facts,
-        steps,
-        horizon: controller.settings().horizon,
-        torques: Numbers(Precision::Double).matrix(commands.iter().map(|c| c.torque_nm)),
-        statuses: integers(commands.iter().map(|c| i64::from(c.status.code()))),
-        push_z: PUSH[0],
-        push_pitch: PUSH[1],
-        push_dz: PUSH[2],
-        tolerance: match precision {
-            Precision::Double => TOLERANCE_NM[0],
-            Precision::Single => TOLERANCE_NM[1],
-        },
-    };
-    Ok(text.render()?)
+        .collect())
 }
 
 /// Inputs of all samples as `set_reference_torque` makes them: the motors' accelerations by differences of the samples

@@ -11,10 +11,11 @@ use crate::deploy::controller::texts;
 use crate::mpc::interface::Settings;
 use crate::mpc::problem::{Row, StageRows};
 use crate::mpc::shared::{
-    DEVIATION_FLOOR, EFFECTIVENESS_RANGE, LARGEST_WEIGHT, POSTURE_SHARE, PRIOR_WEIGHT, SLACK_PRICE,
-    SOFTENED_FROM, STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
+    DEVIATION_FLOOR, EFFECTIVENESS_RANGE, HALF_WINDOW_S, LARGEST_WEIGHT, LIFT_CURVATURE,
+    LIFT_ITERATIONS, POSTURE_SHARE, PRIOR_WEIGHT, SLACK_PRICE, SOFTENED_FROM, STATE_REACH,
+    STILL_SHARE, STILL_TIME_S, TOLERANCE,
 };
-use crate::mpc::{ControlModel, FallbackSettings, MpcSettings};
+use crate::mpc::{ControlModel, FallbackSettings, InputGivenState, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
 use crate::solver;
 
@@ -35,11 +36,21 @@ pub(super) struct Source<'a> {
     n_joint: usize,
     max_nnz: usize,
     has_actuators: bool,
+    has_given_state: bool,
+    given_state: String,
+    given_covariance: String,
+    acceleration_error: String,
+    half_window_s: f64,
     is_body_frame: bool,
     solver: SolverNumbers,
     reference: ReferenceNumbers,
     effectiveness: EffectivenessNumbers,
     legs: Legs,
+    torque_mean: String,
+    torque_deviation: String,
+    weight_n: f64,
+    lift_curvature: f64,
+    lift_iterations: u32,
     fallback: FallbackSettings,
     softened_from: f64,
     defaults: Settings,
@@ -105,10 +116,11 @@ struct ReferenceNumbers {
 }
 
 impl<'a> Source<'a> {
+    /// The text of a plant, with deviations `C` of the torques by phase.
     pub(super) fn new(
         facts: &'a Facts<'a>,
         entries: &'a ModelInterface,
-        plant: &ControlModel,
+        (plant, deviations): (&ControlModel, &[[[f64; JOINT_DIM]; JOINT_DIM]]),
         rows: &StageRows,
         precision: Precision,
     ) -> Self {
@@ -126,6 +138,10 @@ impl<'a> Source<'a> {
         };
         let phases = plant.phases();
         let mpc = MpcSettings::default();
+        let of_given = |part: fn(&InputGivenState) -> &nalgebra::DMatrix<f64>| {
+            let given = phases.iter().filter_map(|phase| phase.given_state.as_ref());
+            nested(given.map(|given| matrix(part(given), facts.latent_dim)))
+        };
         Self {
             banner: &facts.banner,
             name: facts.name,
@@ -138,6 +154,11 @@ impl<'a> Source<'a> {
             max_nnz: (entries.phases.iter())
                 .map(|phase| phase.pattern.len())
                 .fold(1, usize::max),
+            has_given_state: facts.has_given_state,
+            given_state: of_given(|given| &given.mean),
+            given_covariance: of_given(|given| &given.covariance),
+            acceleration_error: of_given(|given| &given.acceleration_error),
+            half_window_s: HALF_WINDOW_S,
             has_actuators: plant.input_rule().actuators().is_some(),
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: SolverNumbers::new(precision, mpc.qp.accepted_residual),
@@ -154,6 +175,15 @@ impl<'a> Source<'a> {
                 range: EFFECTIVENESS_RANGE,
             },
             legs: Legs::of(robot, numbers),
+            torque_mean: numbers.matrix(
+                phases
+                    .iter()
+                    .map(|phase| phase.torque_mean.iter().copied().collect::<Vec<_>>()),
+            ),
+            torque_deviation: nested(deviations.iter().map(|rows| numbers.matrix(*rows))),
+            weight_n,
+            lift_curvature: LIFT_CURVATURE,
+            lift_iterations: LIFT_ITERATIONS,
             fallback: mpc.fallback,
             softened_from: SOFTENED_FROM,
             defaults: Settings::default(),

@@ -19,13 +19,14 @@
 //! `B S Bᵀ` leaves of the sample covariance (in units of the standard deviations of `y`, eigenvalues
 //! not below `RESIDUAL_FLOOR`). Latents whose acceleration the model hardly explains then hardly count.
 
-use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::control_model::{ControlModel, ControlPhase};
+use super::dense::{factorise, solve_lower, solve_upper};
 use super::dynamics::LatentDynamics;
 
 /// Half width of the window in which velocities are fitted by a straight line, s.
-const HALF_WINDOW_S: f64 = 0.016 + 1e-9;
+pub const HALF_WINDOW_S: f64 = 0.016 + 1e-9;
 /// Smallest eigenvalue of the residual's covariance in units of the deviations of `y`.
 const RESIDUAL_FLOOR: f64 = 0.03;
 
@@ -93,10 +94,13 @@ pub(super) fn estimate_input(
 fn expected_input(phase: &ControlPhase, state: &[f64]) -> DVector<f64> {
     match &phase.given_state {
         None => phase.latent_mean.clone(),
-        Some(given) => {
-            let gain = given.mean.columns(1, state.len());
-            given.mean.column(0) + gain * DVector::from_column_slice(state)
-        }
+        Some(given) => DVector::from_fn(given.mean.nrows(), |row, _| {
+            let mut sum = given.mean[(row, 0)];
+            for (col, value) in state.iter().enumerate() {
+                sum += given.mean[(row, 1 + col)] * value;
+            }
+            sum
+        }),
     }
 }
 
@@ -129,17 +133,54 @@ fn add_estimates(phase: &ControlPhase, evidence: &[Evidence], input: &mut [f64])
         gain,
     } in evidence
     {
-        let by_input = gain * &covariance * gain.transpose() + &residual;
-        let Some(factor) = Cholesky::new(by_input) else {
+        let Some(estimate) = correction(gain, &covariance, &residual, unexplained) else {
             continue;
         };
-        let estimate = &covariance * gain.transpose() * factor.solve(unexplained);
         if estimate.iter().all(|value| value.is_finite()) {
-            for (input, estimate) in input[sample * d..].iter_mut().zip(estimate.iter()) {
+            for (input, estimate) in input[sample * d..].iter_mut().zip(&estimate) {
                 *input += estimate;
             }
         }
     }
+}
+
+/// `S Bᵀ (B S Bᵀ + R)⁻¹ y`, or none if the sum in brackets is not positive definite. The order of operations is that of
+/// the controller in C.
+fn correction(
+    gain: &DMatrix<f64>,
+    covariance: &DMatrix<f64>,
+    residual: &DMatrix<f64>,
+    unexplained: &DVector<f64>,
+) -> Option<Vec<f64>> {
+    let d = unexplained.len();
+    let mut spread = vec![0.0; d * d];
+    let mut square = vec![0.0; d * d];
+    for i in 0..d {
+        for j in 0..d {
+            for k in 0..d {
+                spread[i * d + j] += gain[(i, k)] * covariance[(k, j)];
+            }
+        }
+        for j in 0..=i {
+            square[i * d + j] = residual[(i, j)];
+            for k in 0..d {
+                square[i * d + j] += spread[i * d + k] * gain[(j, k)];
+            }
+        }
+    }
+    if !factorise(&mut square, d) {
+        return None;
+    }
+    let mut solved = unexplained.as_slice().to_vec();
+    solve_lower(&square, d, &mut solved);
+    solve_upper(&square, d, &mut solved);
+    let mut estimate = vec![0.0; d];
+    for i in 0..d {
+        for j in 0..d {
+            estimate[j] += spread[i * d + j] * solved[i];
+        }
+    }
+    Some(estimate)
 }
 
 /// `R = Cov(y) − mean(B S Bᵀ)`, made positive definite; none if `y` is not finite.
@@ -206,21 +247,21 @@ fn acceleration(motion: &Motion<'_>, latent_dim: usize, sample: usize) -> DVecto
         first = first.saturating_sub(1);
         last = (last + 1).min(time_s.len() - 1);
     }
-    let window = first..=last;
-    let count = (last - first + 1) as f64;
-    let mean_s = window.clone().map(|other| time_s[other]).sum::<f64>() / count;
-    let spread: f64 = window
-        .clone()
-        .map(|other| (time_s[other] - mean_s).powi(2))
-        .sum();
-    DVector::from_fn(latent_dim, |latent, _| {
-        let velocity = |other: usize| motion.state[(2 * other + 1) * latent_dim + latent];
-        window
-            .clone()
-            .map(|other| (time_s[other] - mean_s) * velocity(other))
-            .sum::<f64>()
-            / spread
-    })
+    // Sums in the order in which the controller in C has them.
+    let mut mean_s = 0.0;
+    for other in first..=last {
+        mean_s += time_s[other];
+    }
+    mean_s /= (last - first + 1) as f64;
+    let (mut spread, mut slope) = (0.0, DVector::zeros(latent_dim));
+    for other in first..=last {
+        let off_s = time_s[other] - mean_s;
+        spread += off_s * off_s;
+        for latent in 0..latent_dim {
+            slope[latent] += off_s * motion.state[(2 * other + 1) * latent_dim + latent];
+        }
+    }
+    slope / spread
 }
 
 #[cfg(test)]

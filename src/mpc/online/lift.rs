@@ -15,26 +15,27 @@
 //! decides what the latent input leaves open, twelve torques against a few latent coordinates.
 //! `τ = 0` satisfies every constraint, as `ℓ` is never beyond the limits.
 //!
-//! If the optimum without constraints satisfies them it is the optimum; only otherwise is the
-//! conic program solved.
+//! If the optimum without constraints satisfies them it is the optimum; only otherwise is a program
+//! solved: by clarabel with these cones (`lift_cones`), or by the structured solver with the pyramid
+//! `|F_x|, |F_y| <= μ F_z / √2` inside each of them (`lift_pyramids`). Whichever it is, the optimum
+//! without constraints is checked against the constraints that the program has: torques are then the
+//! solution of one convex program for every latent input, and change continuously with it.
 
-use nalgebra::{Cholesky, Matrix3, SMatrix, SVector};
+use nalgebra::Matrix3;
 
-use super::control_model::{ControlModel, ControlPhase};
+use super::control_model::ControlModel;
 use super::error::ControlError;
+use super::lift_cones::ConeLift;
+use super::lift_pyramids::PyramidLift;
 use super::problem::upright;
-use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver};
-use super::settings::MpcSettings;
-use super::sparse::SparseColumns;
+use super::qp::{Outcome, QpSettings};
+use super::settings::{MpcSettings, Solver};
 use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Leg};
-
-type Torque = SVector<f64, JOINT_DIM>;
-type TorqueSquare = SMatrix<f64, JOINT_DIM, JOINT_DIM>;
 
 /// Gravity, m/s², for the weight that scales rows of forces.
 const GRAVITY: f64 = 9.81;
-/// Rows of the two sides of the torque limits.
-const BOUND_ROWS: usize = 2 * JOINT_DIM;
+/// Cap on the interior-point iterations of a lift.
+pub const LIFT_ITERATIONS: u32 = 60;
 
 /// Posture, contact and motion that a lift is made for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,53 +58,103 @@ pub struct StanceState {
 pub enum LiftFailure {
     /// A leg in contact is stretched: its torques do not determine its force.
     SingularLeg,
-    /// The conic program was not solved.
+    /// Its program was not solved.
     Solver(Outcome),
+}
+
+/// The constants of the constraints and of the prior.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LiftRules {
+    /// Torque limits, N m.
+    pub limit_nm: [f64; JOINT_DIM],
+    /// The robot's weight, N, in units of which forces are.
+    pub weight_n: f64,
+    /// Friction coefficient of each foot.
+    pub friction: f64,
+    /// Weight of the prior.
+    pub prior_weight: f64,
+}
+
+impl LiftRules {
+    /// The torque at the links nearest to one that keeps a joint's command within its limit.
+    pub(super) fn within_limit(
+        &self,
+        torque_nm: f64,
+        joint: usize,
+        losses_nm: &[f64; JOINT_DIM],
+    ) -> f64 {
+        let (loss, limit) = (losses_nm[joint], self.limit_nm[joint]);
+        torque_nm.clamp(-limit - loss, limit - loss)
+    }
+}
+
+/// One latent input to be lifted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LiftProblem<'a> {
+    /// `M`, a row per latent coordinate.
+    pub map: &'a [[f64; JOINT_DIM]],
+    /// The latent input.
+    pub u_lat: &'a [f64],
+    /// The upright force of each foot in contact by its leg's torques.
+    pub forces: &'a [Option<Matrix3<f64>>; FOOT_DIM],
+    /// What the joints take, N m.
+    pub losses_nm: &'a [f64; JOINT_DIM],
+}
+
+#[derive(Debug)]
+enum Method {
+    Cones(Box<ConeLift>),
+    Pyramids(Box<PyramidLift>),
 }
 
 /// The consistent lift of one model on its robot, with its own persistent solver.
 #[derive(Debug)]
 pub struct ConsistentLift {
-    solver: QpSolver,
+    method: Method,
     /// `pinv(W_eᵀ) s_u`, split into its columns for torques and for force and moment.
     by_torque: Vec<[f64; JOINT_DIM]>,
     by_wrench: Vec<[f64; 6]>,
-    limit_nm: Torque,
-    weight_n: f64,
-    friction: f64,
-    prior_weight: f64,
+    /// `M` of the last lift.
+    map: Vec<[f64; JOINT_DIM]>,
+    rules: LiftRules,
     iterations: u32,
 }
 
 impl ConsistentLift {
-    /// Prepares the lift.
+    /// Prepares the lift, for the solver that the settings name.
     ///
     /// # Errors
-    /// [`ControlError::Solver`] if the conic solver refuses the program.
+    /// [`ControlError::Solver`] if clarabel refuses the program.
     pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Result<Self, ControlError> {
-        let projection = plant.projection_matrix();
-        let row = |latent: usize| projection.row(latent);
-        Ok(Self {
-            solver: QpSolver::new(
-                empty_program(),
-                QpSettings {
-                    max_iterations: 60,
-                    tolerance: 1e-8,
-                    ..settings.qp
-                },
-            )?,
-            by_torque: (0..plant.latent_dim())
-                .map(|i| std::array::from_fn(|j| row(i)[j]))
-                .collect(),
-            by_wrench: (0..plant.latent_dim())
-                .map(|i| std::array::from_fn(|j| row(i)[JOINT_DIM + j]))
-                .collect(),
-            limit_nm: Torque::from(*plant.robot().torque_limit_nm()),
-            weight_n: plant.robot().mass_kg() * GRAVITY,
-            friction: settings.foot_friction,
-            prior_weight: settings.lift_prior_weight,
+        let d = plant.latent_dim();
+        let method = match settings.solver {
+            Solver::Clarabel => Method::Cones(Box::new(ConeLift::new(QpSettings {
+                max_iterations: LIFT_ITERATIONS,
+                tolerance: 1e-8,
+                ..settings.qp
+            })?)),
+            Solver::Riccati => Method::Pyramids(Box::new(PyramidLift::new(
+                d,
+                plant.phases(),
+                LIFT_ITERATIONS,
+                settings.qp.accepted_residual,
+            ))),
+        };
+        let mut lift = Self {
+            method,
+            by_torque: vec![[0.0; JOINT_DIM]; d],
+            by_wrench: vec![[0.0; 6]; d],
+            map: vec![[0.0; JOINT_DIM]; d],
+            rules: LiftRules {
+                limit_nm: *plant.robot().torque_limit_nm(),
+                weight_n: plant.robot().mass_kg() * GRAVITY,
+                friction: settings.foot_friction,
+                prior_weight: settings.lift_prior_weight,
+            },
             iterations: 0,
-        })
+        };
+        lift.take_projection(plant);
+        Ok(lift)
     }
 
     /// Takes the projection of another plant: that at the measured state, where it depends on it.
@@ -132,114 +183,35 @@ impl ConsistentLift {
             .wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet)
             .map_err(|_| LiftFailure::SingularLeg)?;
         let forces = foot_forces(plant, stance).ok_or(LiftFailure::SingularLeg)?;
-        let (hessian, gradient) = self.cost(&plant.phases()[stance.phase], &wrench, u_lat);
-        if let Some(factor) = Cholesky::new(hessian) {
-            let torque = factor.solve(&-gradient);
-            if self.is_allowed(&torque, &forces, &stance.losses_nm) {
-                return Ok(torque.into());
+        for (latent, row) in self.map.iter_mut().enumerate() {
+            for (joint, entry) in row.iter_mut().enumerate() {
+                let mut by_wrench = 0.0;
+                for (axis, factor) in self.by_wrench[latent].iter().enumerate() {
+                    by_wrench += wrench[(axis, joint)] * factor;
+                }
+                *entry = self.by_torque[latent][joint] + by_wrench;
             }
         }
-        self.solve(&hessian, &gradient, &forces, &stance.losses_nm)
+        let problem = LiftProblem {
+            map: &self.map,
+            u_lat,
+            forces: &forces,
+            losses_nm: &stance.losses_nm,
+        };
+        let phase = &plant.phases()[stance.phase];
+        let (torque, iterations) = match &mut self.method {
+            Method::Cones(cones) => cones.lift(phase, &problem, &self.rules),
+            Method::Pyramids(pyramids) => {
+                pyramids.lift((stance.phase, phase), &problem, &self.rules)
+            }
+        };
+        self.iterations = iterations;
+        torque
     }
 
     /// Interior-point iterations of the last lift; zero if no constraint was active.
     pub fn iterations(&self) -> u32 {
         self.iterations
-    }
-
-    /// Hessian and gradient at zero of half the cost, by torques in N m.
-    fn cost(
-        &self,
-        phase: &ControlPhase,
-        wrench: &SMatrix<f64, 6, JOINT_DIM>,
-        u_lat: &[f64],
-    ) -> (TorqueSquare, Torque) {
-        let mut hessian = phase.torque_precision * self.prior_weight;
-        let mut gradient = -(hessian * phase.torque_mean);
-        for (latent, &target) in u_lat.iter().enumerate() {
-            let direct = Torque::from(self.by_torque[latent]);
-            let row = direct + wrench.transpose() * SVector::<f64, 6>::from(self.by_wrench[latent]);
-            hessian += row * row.transpose();
-            gradient -= row * target;
-        }
-        (hessian, gradient)
-    }
-
-    fn is_allowed(
-        &self,
-        torque: &Torque,
-        forces: &[Option<Matrix3<f64>>; FOOT_DIM],
-        losses: &[f64; JOINT_DIM],
-    ) -> bool {
-        let within = (torque.iter().zip(losses))
-            .zip(self.limit_nm.iter())
-            .all(|((torque, loss), limit)| (torque + loss).abs() <= *limit);
-        within
-            && forces.iter().enumerate().all(|(leg, force)| match force {
-                None => true,
-                Some(map) => {
-                    let force = map * torque.fixed_rows::<3>(3 * leg);
-                    force.x.hypot(force.y) <= self.friction * force.z
-                }
-            })
-    }
-
-    fn solve(
-        &mut self,
-        hessian: &TorqueSquare,
-        gradient: &Torque,
-        forces: &[Option<Matrix3<f64>>; FOOT_DIM],
-        losses: &[f64; JOINT_DIM],
-    ) -> Result<[f64; JOINT_DIM], LiftFailure> {
-        let (friction, weight, limit) = (self.friction, self.weight_n, self.limit_nm);
-        let program = self.solver.program_mut();
-        // Torques as shares of their limits, the cost with a largest curvature of one.
-        let scaled = |row: usize, col: usize| hessian[(row, col)] * limit[row] * limit[col];
-        let cost_scale = 1.0
-            / (0..JOINT_DIM)
-                .map(|i| scaled(i, i))
-                .fold(f64::MIN_POSITIVE, f64::max);
-        for col in 0..JOINT_DIM {
-            for row in 0..=col {
-                program.p.set(row, col, cost_scale * scaled(row, col));
-            }
-            program.q[col] = cost_scale * gradient[col] * limit[col];
-            program.b[col] = 1.0 - losses[col] / limit[col];
-            program.b[JOINT_DIM + col] = 1.0 + losses[col] / limit[col];
-        }
-        for (leg, force) in forces.iter().enumerate() {
-            let first_row = BOUND_ROWS + 3 * leg;
-            for (number, (axis, factor)) in
-                [(2, friction), (0, 1.0), (1, 1.0)].into_iter().enumerate()
-            {
-                for joint in 0..3 {
-                    let entry = force.map_or(0.0, |map| factor * map[(axis, joint)] / weight);
-                    program.a.set(
-                        first_row + number,
-                        3 * leg + joint,
-                        -entry * limit[3 * leg + joint],
-                    );
-                }
-            }
-            // A foot in the air has the cone's axis as its slack: strictly inside.
-            program.b[first_row] = if force.is_some() { 0.0 } else { 1.0 };
-        }
-        let outcome = self.solver.solve();
-        self.iterations = self.solver.iterations();
-        match outcome {
-            Outcome::Solved => {
-                let solution = self.solver.solution();
-                Ok(std::array::from_fn(|joint| {
-                    let (loss, limit) = (losses[joint], limit[joint]);
-                    (solution[joint] * limit).clamp(-limit - loss, limit - loss)
-                }))
-            }
-            Outcome::Inaccurate
-            | Outcome::Infeasible
-            | Outcome::Unbounded
-            | Outcome::IterationCap
-            | Outcome::NumericalFailure => Err(LiftFailure::Solver(outcome)),
-        }
     }
 }
 
@@ -259,33 +231,4 @@ pub fn foot_forces(
         }
     }
     Some(forces)
-}
-
-/// Torque bounds, and a friction cone for each foot; costs and cones are filled at each lift.
-fn empty_program() -> ConeProgram {
-    let upper: Vec<(usize, usize)> = (0..JOINT_DIM)
-        .flat_map(|col| (0..=col).map(move |row| (row, col)))
-        .collect();
-    let mut entries: Vec<(usize, usize)> =
-        (0..BOUND_ROWS).map(|row| (row, row % JOINT_DIM)).collect();
-    for leg in 0..FOOT_DIM {
-        entries.extend((0..9).map(|k| (BOUND_ROWS + 3 * leg + k / 3, 3 * leg + k % 3)));
-    }
-    let n_rows = BOUND_ROWS + 3 * FOOT_DIM;
-    let mut a = SparseColumns::from_pattern(n_rows, JOINT_DIM, &entries);
-    let mut b = vec![0.0; n_rows];
-    for joint in 0..JOINT_DIM {
-        a.set(joint, joint, 1.0);
-        a.set(JOINT_DIM + joint, joint, -1.0);
-    }
-    b[..BOUND_ROWS].fill(1.0);
-    let mut cones = vec![Cone::Nonnegative(BOUND_ROWS)];
-    cones.extend([Cone::SecondOrder(3); FOOT_DIM]);
-    ConeProgram {
-        p: SparseColumns::from_pattern(JOINT_DIM, JOINT_DIM, &upper),
-        q: vec![0.0; JOINT_DIM],
-        a,
-        b,
-        cones,
-    }
 }

@@ -8,6 +8,7 @@
 mod command;
 mod control_model;
 mod controller;
+mod dense;
 mod dynamics;
 mod effectiveness;
 mod engine;
@@ -18,6 +19,8 @@ mod horizon;
 pub mod interface;
 mod layout;
 pub(super) mod lift;
+mod lift_cones;
+mod lift_pyramids;
 pub mod linearise;
 mod nonlinear;
 mod plan;
@@ -35,6 +38,9 @@ mod transcribe;
 pub mod shared {
     pub use super::controller::SOFTENED_FROM;
     pub use super::effectiveness::{LARGEST_WEIGHT, PRIOR_WEIGHT, RANGE as EFFECTIVENESS_RANGE};
+    pub use super::estimate::HALF_WINDOW_S;
+    pub use super::lift::LIFT_ITERATIONS;
+    pub use super::lift_pyramids::{CURVATURE as LIFT_CURVATURE, torque_deviation};
     pub use super::plan::POSTURE_SHARE;
     pub use super::problem::STATE_REACH;
     pub use super::reference::{DEVIATION_FLOOR, STILL_SHARE, STILL_TIME_S};

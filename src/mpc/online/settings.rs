@@ -145,7 +145,7 @@ pub struct MpcSettings {
     pub effectiveness: Option<Effectiveness>,
     /// Which rows of the constraints are kept.
     pub rows: RowSelection,
-    /// What solves the program of a step; the consistent lift's own cones are clarabel's.
+    /// What solves the program of a step, and that of the consistent lift.
     pub solver: Solver,
     /// The conic solver, and cap and accepted residual of the structured one.
     pub qp: QpSettings,

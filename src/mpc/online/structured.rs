@@ -15,7 +15,7 @@ use crate::solver::{self, Cost, Program, Report, RowMatrices, Settings, Shape, S
 /// Complementarity and violation of rows at which iterations end.
 pub const TOLERANCE: f64 = 1e-9;
 /// Rows of a friction pyramid.
-const PYRAMID_ROWS: usize = 4;
+pub(super) const PYRAMID_ROWS: usize = 4;
 /// Most latent coordinates that the solver is compiled for.
 pub const MAX_STRUCTURED_DIM: usize = 8;
 
@@ -238,6 +238,16 @@ pub fn solve<const NX: usize, const NU: usize>(
     program.solve(x0, is_warm, settings)
 }
 
+/// How a solve ended, in the words that all solvers share.
+pub(super) fn outcome_of(outcome: solver::Outcome) -> Outcome {
+    match outcome {
+        solver::Outcome::Solved => Outcome::Solved,
+        solver::Outcome::Inaccurate => Outcome::Inaccurate,
+        solver::Outcome::IterationCap => Outcome::IterationCap,
+        solver::Outcome::NumericalFailure => Outcome::NumericalFailure,
+    }
+}
+
 /// `row C` for a lower triangular `C`, and `row · input`.
 fn scaled<const NU: usize>(
     row: &[f64],
@@ -280,12 +290,7 @@ impl<const NX: usize, const NU: usize> StructuredProgram for Horizon<NX, NU> {
         let x0 = std::array::from_fn(|i| x0[i]);
         let (is_warm, settings) = (self.is_warm, self.settings);
         let report = solve(&mut self.program(), &x0, is_warm, &settings);
-        let outcome = match report.outcome {
-            solver::Outcome::Solved => Outcome::Solved,
-            solver::Outcome::Inaccurate => Outcome::Inaccurate,
-            solver::Outcome::IterationCap => Outcome::IterationCap,
-            solver::Outcome::NumericalFailure => Outcome::NumericalFailure,
-        };
+        let outcome = outcome_of(report.outcome);
         self.is_warm = outcome == Outcome::Solved;
         (outcome, report.iterations)
     }
