@@ -1,5 +1,7 @@
 //! The command line from outside: exit codes, JSON, files that appear whole, errors that name the place.
 
+#[path = "cli/failed_runs.rs"]
+mod failed_runs;
 mod outside;
 
 use std::fs;

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use super::Answer;
 use super::args::MpcArguments;
 use super::output::{check_output, names, note, progress_bar, read_recordings, write_file};
 use crate::evaluate::{ReferenceInput, STEP_SLACK, along_recording, control_metrics, remarks};
@@ -13,16 +12,16 @@ use crate::model::ReducedModel;
 use crate::mpc::{Controller, Lift, MpcSettings};
 use crate::recording::{Recording, Segment};
 use crate::report::figures::figure_files;
-use crate::report::{NamedRun, control_figures, control_table, failures, run_table};
+use crate::report::{NamedRun, control_figures, control_table, failed_runs, failures, run_table};
 use crate::robot::{JOINT_DIM, Robot};
 use crate::typeset::Table;
 use crate::{Error, artifact};
 
-/// Runs the controller along each recording.
+/// Runs the controller along each recording. The exit code is 1 if along one of them most steps have no plan.
 ///
 /// # Errors
 /// Whatever reading or the controller's set-up refuses; [`Error::Exists`] for the output file.
-pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
+pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_output(arguments.output.as_deref(), overwrite)?;
     let model = artifact::read(&arguments.model)?;
@@ -52,7 +51,12 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
             overwrite,
         )?;
     }
-    Ok(answer)
+    let code = if failed_runs(&runs).is_empty() {
+        DONE
+    } else {
+        FAILED
+    };
+    Ok((answer, code))
 }
 
 /// Runs a fresh controller along each recording.
@@ -135,6 +139,10 @@ fn answer(arguments: &MpcArguments, runs: &[NamedRun], remarks: &[String]) -> An
     for failure in failures(runs) {
         let _ = writeln!(text, "FAILED along {failure}");
     }
+    let failed = failed_runs(runs);
+    for reason in &failed {
+        let _ = writeln!(text, "FAILED along {reason}");
+    }
     for remark in remarks {
         let _ = writeln!(text, "note: {remark}");
     }
@@ -154,6 +162,7 @@ fn answer(arguments: &MpcArguments, runs: &[NamedRun], remarks: &[String]) -> An
             "horizon": arguments.horizon,
             "step_s": arguments.step,
             "remarks": remarks,
+            "failed": failed,
             "runs": runs.iter().map(run_json).collect::<Vec<_>>(),
             "output": arguments.output.as_ref().map(|path| path.display().to_string()),
         }),
