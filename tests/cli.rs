@@ -2,6 +2,8 @@
 
 #[path = "cli/failed_runs.rs"]
 mod failed_runs;
+#[path = "cli/outputs.rs"]
+mod outputs;
 mod outside;
 
 use std::fs;

@@ -9,6 +9,7 @@ use std::process::Command;
 use serde_json::json;
 
 use super::args::{CodeArguments, DemoArguments, EquationArguments};
+use super::destination::Inputs;
 use super::output::spinner;
 use super::{Answer, DONE, FAILED};
 use super::{compile, mpc as mpc_command, report};
@@ -91,7 +92,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     };
     let report = report::page_of(&content, REPORT_TOLERANCE, vec!["romc demo".to_owned()])?;
     files.push(EmittedFile::new("report.html", report.page));
-    let made = compile::write(&arguments.out_dir, &files, overwrite)?;
+    let made = compile::write(&arguments.out_dir, &files, &Inputs::default(), overwrite)?;
     progress.set_message("checking the C code");
     let self_test = self_test(&model, &arguments.out_dir);
     progress.finish_and_clear();

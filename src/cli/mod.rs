@@ -10,6 +10,7 @@ mod check;
 mod compile;
 mod convert;
 mod demo;
+mod destination;
 mod identify;
 mod import;
 mod import_check;

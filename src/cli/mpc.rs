@@ -5,9 +5,11 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use super::args::MpcArguments;
-use super::output::{check_output, names, note, progress_bar, read_recordings, write_file};
+use super::destination::{Format, Inputs, check_output, write_folder};
+use super::output::{names, note, progress_bar, read_recordings, write_file};
+use super::{Answer, DONE, FAILED};
 use crate::evaluate::{ReferenceInput, STEP_SLACK, along_recording, control_metrics, remarks};
-use crate::files::{EmittedFile, Overwrite, write_files};
+use crate::files::{EmittedFile, Overwrite};
 use crate::model::ReducedModel;
 use crate::mpc::{Controller, Lift, MpcSettings};
 use crate::recording::{Recording, Segment};
@@ -23,7 +25,16 @@ use crate::{Error, artifact};
 /// Whatever reading or the controller's set-up refuses; [`Error::Exists`] for the output file.
 pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_output(arguments.output.as_deref(), overwrite)?;
+    let inputs = Inputs::default()
+        .and([&arguments.model])
+        .and(&arguments.recordings)
+        .and(&arguments.reading.columns);
+    check_output(
+        arguments.output.as_deref(),
+        Format::Table,
+        &inputs,
+        overwrite,
+    )?;
     let model = artifact::read(&arguments.model)?;
     let settings = MpcSettings {
         horizon: arguments.horizon,
@@ -39,7 +50,7 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     if let Some(folder) = &arguments.figures {
         let figures = control_figures(&model, &settings, &runs);
         let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
-        let written = write_files(folder, &files, overwrite)?;
+        let written = write_folder(folder, &files, &inputs, overwrite)?;
         let count = figures.len();
         let _ = writeln!(answer.text, "{count} figures: {}", folder.display());
         answer.json["figures"] = names(&written).into();

@@ -9,7 +9,8 @@ use serde_json::json;
 use super::Answer;
 use super::actuators;
 use super::args::{TrainArguments, TrainSettings};
-use super::output::{check_output, names, note, note_repeated, spinner, stem};
+use super::destination::{Format, Inputs, check_output};
+use super::output::{names, note, note_repeated, spinner, stem};
 use super::prepared_recordings::{RecordedSets, read_all};
 use super::train_settings;
 use crate::files::Overwrite;
@@ -26,8 +27,16 @@ use crate::{Error, artifact, train};
 /// Whatever reading or training refuses; [`Error::Exists`] for the model file.
 pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_output(Some(&arguments.output), overwrite)?;
     let settings = train_settings::effective(arguments)?;
+    let inputs = Inputs::default()
+        .and(&arguments.recordings)
+        .and(&arguments.validation)
+        .and(&arguments.test)
+        .and(&arguments.config)
+        .and(&arguments.reading.columns)
+        .and_robot(settings.robot.as_deref())
+        .and(&settings.actuators);
+    check_output(Some(&arguments.output), Format::Model, &inputs, overwrite)?;
     let latent_dim = settings
         .latent_dim
         .expect("checked by clap, or with the file");
