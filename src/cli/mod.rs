@@ -30,6 +30,7 @@ mod study;
 mod train;
 mod train_settings;
 mod trajectory;
+mod whole_jumps;
 
 use std::borrow::Cow;
 use std::ffi::OsString;
