@@ -351,31 +351,6 @@ impl Reader<'_> {
         Ok(if is_number { Last::Number } else { Last::Other })
     }
 
-    pub(super) fn root(&mut self, place: (usize, usize)) -> Read<Last> {
-        self.at += 1;
-        let mut index = None;
-        if self.character('[') {
-            match self.peek().map(|token| token.kind.clone()) {
-                Some(Kind::Number(text)) if matches!(text.parse(), Ok(2..=99_u32)) => {
-                    index = Some(text)
-                }
-                _ => return self.unexpected("the index of the root, 2 to 99"),
-            }
-            self.at += 1;
-            if !self.character(']') {
-                return self.unexpected("`]`");
-            }
-        }
-        self.push(place, if index.is_some() { "((" } else { "sqrt(" });
-        self.inside(|reader| reader.sum(false))?;
-        self.push(
-            place,
-            index.map_or(")".to_owned(), |index| format!(")^(1/{index}))")),
-        );
-        self.powers(place)?;
-        Ok(Last::Other)
-    }
-
     pub(super) fn opens_bar(&self) -> bool {
         match self.kind(self.at + 1) {
             Some(Kind::Character('|')) => true,

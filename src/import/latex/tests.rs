@@ -99,8 +99,12 @@ fn constructs_mean_what_they_print() {
             "u1*abs(z2) + abs(z1) + abs(-1 + dz1)",
         ),
         (
-            r"\sqrt{z_1} + \sqrt[3]{z_2} + \ln z_1 + \log(z_2)",
-            "z2^(1/3) + log(z1) + log(z2) + sqrt(z1)",
+            r"\sqrt{z_1} + \sqrt[4]{z_2} + \ln z_1 + \log(z_2)",
+            "z2^(1/4) + log(z1) + log(z2) + sqrt(z1)",
+        ),
+        (
+            r"\sqrt[3]{z_1} + \sqrt[5]{z_2 - 1}^2",
+            "abs(z1)^(1/3)*sign(z1) + (abs(-1 + z2)^(1/5)*sign(-1 + z2))^2",
         ),
         (
             r"\operatorname{sgn}(z_1) + \mathop{\mathrm{sgn}}(\dot z_1)",
