@@ -118,7 +118,7 @@ fn constructs_mean_what_they_print() {
         ),
         (r"z_1 \quad \text{in contact,}", "z1"),
         (
-            r"z_1(t) + u_{\mathrm{lat},2} + z_1/2 + 1/2 z_2",
+            r"z_1(t) + u_{\mathrm{lat},2} + z_1/2 + \frac{1}{2} z_2",
             "z1 + z1/2 + z2/2 + u2",
         ),
         ("2z_1 − 3·z_2 % a comment\n + u_1", "2*z1 - 3*z2 + u1"),
@@ -132,7 +132,7 @@ fn constructs_mean_what_they_print() {
         ),
         (r"- - z_1 + -z_2", "z1 - z2"),
         (
-            r"\frac12\frac{1}{3} z_1 + \frac{d}{dt} z_1 + 1/2 z_2",
+            r"\frac12\frac{1}{3} z_1 + \frac{d}{dt} z_1 + 1/2 \cdot z_2",
             "z1/6 + dz1 + z2/2",
         ),
         (
@@ -200,6 +200,8 @@ fn unreadable_constructs_are_named_with_their_place() {
         (r"z_3", 1, 13, "`z3`"),
         (r"1 +", 1, 15, "the end of the equation"),
         (r"1/2 \times 10^{-3} z_1", 1, 15, "`2`"),
+        (r"2/3z_1", 1, 16, "`z`"),
+        (r"1/2 (z_1 + 1)", 1, 17, "`(`"),
         (
             r"\begin{cases} z_1 & \\ -z_1 & \end{cases}",
             1,
