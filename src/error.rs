@@ -3,7 +3,7 @@
 #![allow(missing_docs, reason = "each variant's message names its fields")]
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::artifact::ArtifactError;
 use crate::check::CheckError;
@@ -87,9 +87,16 @@ pub enum Error {
     /// An MCAP file holds one stretch of time.
     #[error("found {0} segments, expected one for an MCAP file")]
     OneSegment(usize),
-    /// The ending of a file says its format.
-    #[error("{path}: found {found}, expected a name that ends in .csv, .csv.gz or .mcap", path = path.display())]
-    Ending { path: PathBuf, found: String },
+    /// The ending of an output says its format.
+    #[error("{path}: found {found}, expected a name that ends in {expected}", path = path.display())]
+    Ending {
+        path: PathBuf,
+        found: String,
+        expected: String,
+    },
+    /// An output that would replace an input.
+    #[error("{path}: the command reads this file{other}, and does not replace it; choose another name for the output", path = path.display(), other = other_name(path, input))]
+    IsRead { path: PathBuf, input: PathBuf },
     /// A map is guessed of one log at a time.
     #[error("found {0} files, expected one log to guess a map of")]
     OneLog(usize),
@@ -133,6 +140,7 @@ impl Error {
             | Self::Check(_)
             | Self::OneLog(_)
             | Self::Ending { .. }
+            | Self::IsRead { .. }
             | Self::OneSegment(_) => true,
             Self::Recording(_)
             | Self::Identify(_)
@@ -158,6 +166,14 @@ impl Error {
             | Self::Read { .. }
             | Self::Write { .. } => false,
         }
+    }
+}
+
+/// The name by which a file is read, where it is not the one by which it is written.
+fn other_name(path: &Path, input: &Path) -> String {
+    match path == input {
+        true => String::new(),
+        false => format!(" as {}", input.display()),
     }
 }
 

@@ -91,6 +91,25 @@ fn plan_is_a_recording_that_other_commands_take() {
 }
 
 #[test]
+fn plan_ends_at_the_sum_of_its_durations_with_the_steps_of_the_model() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = model().replace("go1-d6", "go2-async-d4");
+    for (distance, output) in [("0.28", "a.csv"), ("0.3", "b.csv"), ("0.33", "c.csv")] {
+        let goal = ["--distance", distance, "--apex", "0.12", "--force"];
+        let plan = ["plan", &model, "--output", output, "--json"];
+        let said = done(folder.path(), &[&plan[..], &goal].concat());
+        let said: Value = serde_json::from_str(&said).expect("JSON");
+        let durations = said["durations_s"].as_object().expect("one per part");
+        let planned_s: f64 = durations.values().map(number).sum();
+        let recording = romc::recording::read(&folder.path().join(output)).expect("sound");
+        let segment = &recording.segments[0];
+        let end_s = segment.time_s[segment.len() - 1];
+        assert!((end_s - planned_s).abs() < 1e-9, "{end_s} {planned_s}");
+        assert!((segment.mean_step_s() - 0.002).abs() < 3e-6, "{output}");
+    }
+}
+
+#[test]
 fn absurd_goals_end_with_the_reason_and_without_a_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let model = model();

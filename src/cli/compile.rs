@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::{CodeArguments, CompileArguments, EquationArguments, UnitsChoice};
-use super::output::{check_output, names, note_mismatches, read_recordings};
+use super::destination::{Format, Inputs, check_name, check_output, write_folder};
+use super::output::{names, note_mismatches, read_recordings};
 use super::simplification::{self, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::{EquationForm, Equations, PhaseEquations};
@@ -23,9 +24,18 @@ use crate::{Error, artifact};
 pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     let save_model = arguments.simplification.save_model.as_deref();
+    let (simplification, model) = (&arguments.simplification, &arguments.model);
+    let inputs = Inputs::default()
+        .and([model])
+        .and(&arguments.plan)
+        .and(&simplification.domain)
+        .and(&simplification.reading.columns);
     // What would be the same file again may stay; it is compared once there is a model.
-    if save_model.and_then(Path::parent) != Some(&arguments.out_dir) {
-        check_output(save_model, Overwrite::Replace)?;
+    match save_model {
+        Some(path) if path.parent() == Some(&arguments.out_dir) => {
+            check_name(path, Format::Model, &inputs)?;
+        }
+        Some(_) | None => check_output(save_model, Format::Model, &inputs, Overwrite::Replace)?,
     }
     let read = artifact::read(&arguments.model)?;
     let form = match arguments.equations.as_learned {
@@ -60,7 +70,7 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     if let Some(path) = save_model {
         artifact::check_place(path, model, overwrite)?;
     }
-    let written = write(&arguments.out_dir, &files, overwrite)?;
+    let written = write(&arguments.out_dir, &files, &inputs, overwrite)?;
     let earlier = earlier_files(&arguments.out_dir, &files)?;
     if let Some(path) = save_model {
         artifact::write_with(path, model, overwrite)?;
@@ -211,13 +221,14 @@ pub fn emit(
 /// Writes files into a folder; the path of each, with its size in bytes.
 ///
 /// # Errors
-/// [`Error::Folder`] for a file of that name that romc did not make.
+/// As [`write_folder`].
 pub fn write(
     folder: &Path,
     files: &[EmittedFile],
+    inputs: &Inputs<'_>,
     overwrite: Overwrite,
 ) -> Result<Vec<(PathBuf, usize)>, Error> {
-    let paths = crate::files::write_files(folder, files, overwrite)?;
+    let paths = write_folder(folder, files, inputs, overwrite)?;
     let sizes = files.iter().map(|file| file.contents.len());
     Ok(paths.into_iter().zip(sizes).collect())
 }

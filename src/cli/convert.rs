@@ -7,7 +7,8 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::ConvertArguments;
-use super::output::{check_output, names, read_with, reader};
+use super::destination::{Format, Inputs, check_output};
+use super::output::{names, read_with, reader};
 use crate::files::Overwrite;
 use crate::recording::{Clocks, Recording, Segment, WriteOptions, write_inputs_with, write_mcap};
 use crate::{Error, artifact};
@@ -19,8 +20,16 @@ use crate::{Error, artifact};
 /// of several.
 pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_output(Some(&arguments.output), overwrite)?;
-    let format = format_of(&arguments.output)?;
+    let inputs = Inputs::default()
+        .and(&arguments.recordings)
+        .and(&arguments.inputs_of)
+        .and(&arguments.reading.columns);
+    check_output(
+        Some(&arguments.output),
+        Format::Recording,
+        &inputs,
+        overwrite,
+    )?;
     let rule = match &arguments.inputs_of {
         None => None,
         Some(path) => Some(artifact::read(path)?.input_rule()?),
@@ -39,7 +48,7 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
         segments.iter().map(Segment::len).sum::<usize>(),
         segments.len(),
     );
-    write((&arguments.output, format), segments, inputs.as_deref())?;
+    write_recording(&arguments.output, segments, inputs.as_deref())?;
     let output = arguments.output.display().to_string();
     Ok(Answer {
         text: format!("{output}: {samples} samples in {count} segments\n"),
@@ -52,36 +61,6 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
             "inputs": rule.is_some(),
         }),
     })
-}
-
-/// How an output is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Format {
-    Text,
-    Mcap,
-}
-
-/// The format that the ending of a name says; what is no file of a disk gets text.
-fn format_of(path: &Path) -> Result<Format, Error> {
-    let name = path
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_lowercase();
-    if name.ends_with(".mcap") {
-        return Ok(Format::Mcap);
-    }
-    let is_device = path.starts_with("/dev") || (path.exists() && !path.is_file());
-    match is_device || name.ends_with(".csv") || name.ends_with(".csv.gz") {
-        true => Ok(Format::Text),
-        false => Err(Error::Ending {
-            path: path.to_owned(),
-            found: match name.split_once('.') {
-                Some((_, ending)) => format!(".{ending}"),
-                None => "no ending".to_owned(),
-            },
-        }),
-    }
 }
 
 /// The segments one after the other; where there are several, each begins at 0 s.
@@ -99,12 +78,16 @@ fn chained(recordings: Vec<Recording>) -> Vec<Segment> {
     segments
 }
 
-fn write(
-    (path, format): (&Path, Format),
+/// Writes a recording in the format that the ending of its name says.
+///
+/// # Errors
+/// [`Error::OneSegment`] for an MCAP file of several, [`Error::Recording`] if the file system refuses.
+pub fn write_recording(
+    path: &Path,
     segments: Vec<Segment>,
     inputs: Option<&[DMatrix<f64>]>,
 ) -> Result<(), Error> {
-    if format == Format::Mcap {
+    if (path.extension()).is_some_and(|ending| ending.eq_ignore_ascii_case("mcap")) {
         let [segment] = &segments[..] else {
             return Err(Error::OneSegment(segments.len()));
         };

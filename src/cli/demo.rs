@@ -8,16 +8,19 @@ use std::process::Command;
 
 use serde_json::json;
 
-use super::Answer;
 use super::args::{CodeArguments, DemoArguments, EquationArguments};
+use super::destination::Inputs;
 use super::output::spinner;
+use super::{Answer, DONE, FAILED};
 use super::{compile, mpc as mpc_command, report};
 use crate::deploy::Target;
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::{EmittedFile, Overwrite};
 use crate::model::ReducedModel;
-use crate::report::{Content, assessment_json, baseline_table, control_table, failures, run_table};
+use crate::report::{
+    Content, assessment_json, baseline_table, control_table, failed_runs, failures, run_table,
+};
 use crate::simplify::Tolerance;
 use crate::train::sha256;
 use crate::typeset::Rounding;
@@ -48,12 +51,12 @@ const RESTART_S: f64 = 0.1;
 /// The tolerance within which the report lists changes.
 const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
-/// Runs the whole path and reports its files and metrics.
+/// Runs the whole path and reports its files and metrics. The exit code is 1 if the self-test or a run fails.
 ///
 /// # Errors
 /// [`Error::Folder`] for a file in the folder that romc did not make; nothing else should fail on
 /// the shipped files.
-pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
+pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     let progress = spinner("reading the shipped model and recordings");
     let model = artifact::read_from_bytes(MODEL.0, MODEL.1)?;
@@ -89,7 +92,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     };
     let report = report::page_of(&content, REPORT_TOLERANCE, vec!["romc demo".to_owned()])?;
     files.push(EmittedFile::new("report.html", report.page));
-    let made = compile::write(&arguments.out_dir, &files, overwrite)?;
+    let made = compile::write(&arguments.out_dir, &files, &Inputs::default(), overwrite)?;
     progress.set_message("checking the C code");
     let self_test = self_test(&model, &arguments.out_dir);
     progress.finish_and_clear();
@@ -105,6 +108,11 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     for failure in failures(&control[0]) {
         let _ = writeln!(text, "FAILED along {failure}");
     }
+    let failed: Vec<String> = control.iter().flat_map(|runs| failed_runs(runs)).collect();
+    for reason in &failed {
+        let _ = writeln!(text, "FAILED along {reason}");
+    }
+    let is_sound = failed.is_empty() && !matches!(self_test, SelfTest::Failed(_));
     let self_test = self_test.words();
     let _ = writeln!(text, "\nself-test of the emitted C: {self_test}\n");
     let _ = writeln!(text, "made in {}:", arguments.out_dir.display());
@@ -114,7 +122,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     }
     let [plain, consistent] =
         (control.each_ref()).map(|runs| runs.iter().map(mpc_command::run_json).collect::<Vec<_>>());
-    Ok(Answer {
+    let answer = Answer {
         text,
         json: json!({
             "command": "demo",
@@ -122,9 +130,11 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
             "rollouts": assessment_json(&model, &evaluation),
             "mpc": { "transpose": plain, "consistent": consistent },
             "self_test": self_test,
+            "failed": failed,
             "files": made.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
         }),
-    })
+    };
+    Ok((answer, if is_sound { DONE } else { FAILED }))
 }
 
 /// Outcome of the emitted self-test.

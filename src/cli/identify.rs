@@ -7,7 +7,8 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::IdentifyArguments;
-use super::output::{check_output, note_repeated, read_with, reader, spinner, write_file};
+use super::destination::{Format, Inputs, check_output};
+use super::output::{note_repeated, read_with, reader, spinner, write_file};
 use super::robot;
 use crate::Error;
 use crate::files::Overwrite;
@@ -23,7 +24,16 @@ use crate::typeset::{Table, significant};
 /// [`Error::Identify`] for recordings that do not say enough, [`Error::Exists`] for the output.
 pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_output(arguments.output.as_deref(), overwrite)?;
+    let inputs = Inputs::default()
+        .and(&arguments.recordings)
+        .and(&arguments.reading.columns)
+        .and_robot(Some(&arguments.robot));
+    check_output(
+        arguments.output.as_deref(),
+        Format::Toml,
+        &inputs,
+        overwrite,
+    )?;
     let robot = robot::chosen(&arguments.robot)?;
     let recordings = read_with(
         &reader(&arguments.reading, Clocks::Recorded)?,

@@ -6,8 +6,9 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::{ImportArguments, LibraryArgument};
+use super::destination::{Format, Inputs, check_output};
 use super::import_check;
-use super::output::{check_output, read_recordings, stem};
+use super::output::{read_recordings, stem};
 use super::robot;
 use crate::evaluate::RoundTrip;
 use crate::files::Overwrite;
@@ -27,7 +28,18 @@ use crate::{Error, artifact};
 /// Whatever the importer refuses; [`Error::Exists`] for the model file.
 pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_output(Some(&arguments.output), overwrite)?;
+    let library = match &arguments.library {
+        Some(LibraryArgument::File(path)) => Some(path),
+        Some(LibraryArgument::Shorthand(_)) | None => None,
+    };
+    let inputs = Inputs::default()
+        .and([&arguments.file])
+        .and(library)
+        .and(&arguments.actuators)
+        .and(&arguments.inputs_from)
+        .and(&arguments.reading.columns)
+        .and_robot(arguments.robot.as_deref());
+    check_output(Some(&arguments.output), Format::Model, &inputs, overwrite)?;
     let imported = import(&arguments.file, &options(arguments)?)?;
     let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();

@@ -6,7 +6,8 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::InspectArguments;
-use super::output::{check_output, note, reader, write_file};
+use super::destination::{Format, Inputs, check_output};
+use super::output::{note, reader, write_file};
 use super::{inspect_model, inspect_recording, robot};
 use crate::files::Overwrite;
 use crate::recording::foreign::guess::guess;
@@ -41,7 +42,15 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
         return Err(Error::OneLog(arguments.files.len()));
     };
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_output(arguments.output.as_deref(), overwrite)?;
+    let inputs = Inputs::default()
+        .and([log])
+        .and_robot(Some(&arguments.robot));
+    check_output(
+        arguments.output.as_deref(),
+        Format::Toml,
+        &inputs,
+        overwrite,
+    )?;
     let guess = guess(log, robot)?;
     let outcome = match &guess.outcome {
         Ok(samples) => format!("read by this map, the log has {samples} samples"),

@@ -10,6 +10,7 @@ mod check;
 mod compile;
 mod convert;
 mod demo;
+mod destination;
 mod identify;
 mod import;
 mod import_check;
@@ -29,6 +30,7 @@ mod study;
 mod train;
 mod train_settings;
 mod trajectory;
+mod whole_jumps;
 
 use std::borrow::Cow;
 use std::ffi::OsString;
@@ -99,12 +101,12 @@ const DONE: u8 = 0;
 const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 
-/// Runs a command; the exit code of one that ran is 0, 1 for files that `check` finds different, or
-/// 130 for a training that Ctrl-C cut short.
+/// Runs a command; the exit code of one that ran is 0, 1 for files that `check` finds different and for an `mpc` or
+/// `demo` whose controller or self-test fails, or 130 for a training that Ctrl-C cut short.
 fn execute(command: Command) -> Result<(Answer, u8), Error> {
     let answer = match command {
         Command::Check(arguments) => return check::run(&arguments),
-        Command::Demo(arguments) => demo::run(&arguments),
+        Command::Demo(arguments) => return demo::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Train(arguments) => return train::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
@@ -114,7 +116,7 @@ fn execute(command: Command) -> Result<(Answer, u8), Error> {
         Command::Robot(arguments) => robot::run(&arguments),
         Command::Compile(arguments) => compile::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
-        Command::Mpc(arguments) => mpc::run(&arguments),
+        Command::Mpc(arguments) => return mpc::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Manual(arguments) => manual::pages(&arguments),

@@ -4,27 +4,37 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use super::Answer;
 use super::args::MpcArguments;
-use super::output::{check_output, names, note, progress_bar, read_recordings, write_file};
+use super::destination::{Format, Inputs, check_output, write_folder};
+use super::output::{names, note, progress_bar, read_recordings, write_file};
+use super::{Answer, DONE, FAILED};
 use crate::evaluate::{ReferenceInput, STEP_SLACK, along_recording, control_metrics, remarks};
-use crate::files::{EmittedFile, Overwrite, write_files};
+use crate::files::{EmittedFile, Overwrite};
 use crate::model::ReducedModel;
 use crate::mpc::{Controller, Lift, MpcSettings};
 use crate::recording::{Recording, Segment};
 use crate::report::figures::figure_files;
-use crate::report::{NamedRun, control_figures, control_table, failures, run_table};
+use crate::report::{NamedRun, control_figures, control_table, failed_runs, failures, run_table};
 use crate::robot::{JOINT_DIM, Robot};
 use crate::typeset::Table;
 use crate::{Error, artifact};
 
-/// Runs the controller along each recording.
+/// Runs the controller along each recording. The exit code is 1 if along one of them most steps have no plan.
 ///
 /// # Errors
 /// Whatever reading or the controller's set-up refuses; [`Error::Exists`] for the output file.
-pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
+pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_output(arguments.output.as_deref(), overwrite)?;
+    let inputs = Inputs::default()
+        .and([&arguments.model])
+        .and(&arguments.recordings)
+        .and(&arguments.reading.columns);
+    check_output(
+        arguments.output.as_deref(),
+        Format::Table,
+        &inputs,
+        overwrite,
+    )?;
     let model = artifact::read(&arguments.model)?;
     let settings = MpcSettings {
         horizon: arguments.horizon,
@@ -40,7 +50,7 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     if let Some(folder) = &arguments.figures {
         let figures = control_figures(&model, &settings, &runs);
         let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
-        let written = write_files(folder, &files, overwrite)?;
+        let written = write_folder(folder, &files, &inputs, overwrite)?;
         let count = figures.len();
         let _ = writeln!(answer.text, "{count} figures: {}", folder.display());
         answer.json["figures"] = names(&written).into();
@@ -52,7 +62,12 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
             overwrite,
         )?;
     }
-    Ok(answer)
+    let code = if failed_runs(&runs).is_empty() {
+        DONE
+    } else {
+        FAILED
+    };
+    Ok((answer, code))
 }
 
 /// Runs a fresh controller along each recording.
@@ -135,6 +150,10 @@ fn answer(arguments: &MpcArguments, runs: &[NamedRun], remarks: &[String]) -> An
     for failure in failures(runs) {
         let _ = writeln!(text, "FAILED along {failure}");
     }
+    let failed = failed_runs(runs);
+    for reason in &failed {
+        let _ = writeln!(text, "FAILED along {reason}");
+    }
     for remark in remarks {
         let _ = writeln!(text, "note: {remark}");
     }
@@ -154,6 +173,7 @@ fn answer(arguments: &MpcArguments, runs: &[NamedRun], remarks: &[String]) -> An
             "horizon": arguments.horizon,
             "step_s": arguments.step,
             "remarks": remarks,
+            "failed": failed,
             "runs": runs.iter().map(run_json).collect::<Vec<_>>(),
             "output": arguments.output.as_ref().map(|path| path.display().to_string()),
         }),

@@ -15,36 +15,14 @@ use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, misma
 use crate::robot::Robot;
 use crate::train::sha256;
 
-/// Refuses an output that could not be written, before long work begins.
-///
-/// # Errors
-/// [`Error::IsFolder`] for a folder, [`Error::Exists`] if the file is there and may not be replaced,
-/// [`Error::NoFolder`] if its folder is not.
-pub fn check_output(path: Option<&Path>, overwrite: Overwrite) -> Result<(), Error> {
-    let Some(path) = path else { return Ok(()) };
-    if path.is_dir() || path.file_name().is_none() {
-        return Err(Error::IsFolder(path.to_owned()));
-    }
-    if !overwrite.allows(path) {
-        return Err(Error::Exists(path.to_owned()));
-    }
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
-            Err(Error::NoFolder {
-                path: path.to_owned(),
-                folder: folder.to_owned(),
-            })
-        }
-        Some(_) | None => Ok(()),
-    }
-}
-
 /// Writes a whole file.
 ///
 /// # Errors
-/// [`Error::Exists`] as [`check_output`], [`Error::Write`] if the file system refuses.
+/// [`Error::Exists`] if it is there and may not be replaced, [`Error::Write`] if the file system refuses.
 pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<(), Error> {
-    check_output(Some(path), overwrite)?;
+    if !overwrite.allows(path) {
+        return Err(Error::Exists(path.to_owned()));
+    }
     write_whole(path, |out| out.write_all(contents)).map_err(|source| Error::Write {
         path: path.to_owned(),
         source,

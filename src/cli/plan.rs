@@ -8,12 +8,14 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::{PlanArguments, ReadingArguments};
-use super::output::{check_output, names, note_mismatches, progress_bar, reader, spinner, warn};
+use super::convert::write_recording;
+use super::destination::{Format, Inputs, check_output, write_folder};
+use super::output::{names, note_mismatches, progress_bar, reader, spinner, warn};
 use super::train_settings::refused;
-use crate::files::{EmittedFile, Overwrite, write_files};
+use crate::files::{EmittedFile, Overwrite};
 use crate::model::ReducedModel;
 use crate::plan::{self, Goal, Plan, PlanSettings, Reach, Verdict};
-use crate::recording::{self, Clocks, Recording};
+use crate::recording::Clocks;
 use crate::report::figures::{Figure, figure_files};
 use crate::report::{plan_figures, plan_json, reach_figure};
 use crate::robot::Robot;
@@ -27,7 +29,13 @@ use crate::{Error, artifact};
 /// unless forced; [`Error::Exists`] for the output.
 pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_output(arguments.output.as_deref(), overwrite)?;
+    let inputs = inputs(arguments);
+    check_output(
+        arguments.output.as_deref(),
+        Format::Recording,
+        &inputs,
+        overwrite,
+    )?;
     let model = artifact::read(&arguments.model)?;
     let settings = settings(arguments.settings.as_deref())?;
     if arguments.reach {
@@ -64,14 +72,19 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
         &mut answer,
     )?;
     if let Some(path) = &arguments.output {
-        let recording = Recording {
-            path: path.clone(),
-            ..Recording::from(planned.motion.clone())
-        };
-        recording::write(path, &recording)?;
+        write_recording(path, vec![planned.motion.clone()], None)?;
         let _ = writeln!(answer.text, "\nthe plan: {}", path.display());
     }
     Ok(answer)
+}
+
+/// The files that planning reads.
+fn inputs(arguments: &PlanArguments) -> Inputs<'_> {
+    Inputs::default()
+        .and([&arguments.model])
+        .and(&arguments.start)
+        .and(&arguments.settings)
+        .and(&arguments.reading.columns)
 }
 
 /// Writes figures, if a folder for them is given.
@@ -83,7 +96,8 @@ fn draw(arguments: &PlanArguments, figures: &[Figure], answer: &mut Answer) -> R
         return Ok(());
     };
     let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
-    let written = write_files(folder, &files, Overwrite::when_forced(arguments.force))?;
+    let overwrite = Overwrite::when_forced(arguments.force);
+    let written = write_folder(folder, &files, &inputs(arguments), overwrite)?;
     let _ = writeln!(
         answer.text,
         "{} figures: {}",

@@ -7,11 +7,12 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::ReportArguments;
+use super::destination::{Format, Inputs, check_output, write_folder};
 use super::mpc::run_with_both_lifts;
-use super::output::{check_output, names, note_mismatches, read_recordings, spinner, write_file};
+use super::output::{names, note_mismatches, read_recordings, spinner, write_file};
 use super::simplification;
 use crate::evaluate::{Assessment, LAMBDA};
-use crate::files::{EmittedFile, Overwrite, write_files};
+use crate::files::{EmittedFile, Overwrite};
 use crate::model::ReducedModel;
 use crate::recording::Recording;
 use crate::report::figures::figure_files;
@@ -29,7 +30,12 @@ use crate::{Error, artifact};
 /// Whatever reading, simulating, controlling or writing refuses.
 pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_output(Some(&arguments.output), overwrite)?;
+    let inputs = Inputs::default()
+        .and([&arguments.model])
+        .and(&arguments.recordings)
+        .and(&arguments.plan)
+        .and(&arguments.reading.columns);
+    check_output(Some(&arguments.output), Format::Page, &inputs, overwrite)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let study = match &arguments.study {
@@ -52,7 +58,7 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     )?;
     // The figures come first: files that romc did not make are refused with nothing written.
     let written = match &arguments.figures {
-        Some(folder) => write_files(folder, &made.files, overwrite)?,
+        Some(folder) => write_folder(folder, &made.files, &inputs, overwrite)?,
         None => Vec::new(),
     };
     write_file(&arguments.output, made.page.as_bytes(), overwrite)?;

@@ -7,7 +7,8 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::RobotArguments;
-use super::output::{check_output, note, write_file};
+use super::destination::{Format, Inputs, check_output};
+use super::output::{note, write_file};
 use crate::Error;
 use crate::files::Overwrite;
 use crate::robot::{JOINT_NAMES, Leg, Robot};
@@ -48,7 +49,13 @@ fn matched(robot: &Robot) -> String {
 /// [`Error::RobotFile`], [`Error::Exists`] for the file to write.
 pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_output(arguments.output.as_deref(), overwrite)?;
+    let inputs = Inputs::default().and_robot(Some(&arguments.robot));
+    check_output(
+        arguments.output.as_deref(),
+        Format::Toml,
+        &inputs,
+        overwrite,
+    )?;
     let robot = match arguments.feet.as_slice() {
         [] => robot_file::find(&arguments.robot)?,
         feet => robot_file::read(Path::new(&arguments.robot), feet)?,

@@ -6,7 +6,8 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::SimulateArguments;
-use super::output::{check_output, read_recordings, spinner, write_file};
+use super::destination::{Format, Inputs, check_output};
+use super::output::{read_recordings, spinner, write_file};
 use super::trajectory::trajectory_table;
 use crate::evaluate::Assessment;
 use crate::files::Overwrite;
@@ -24,7 +25,16 @@ use crate::{Error, artifact};
 /// Whatever reading, encoding or integrating refuses; [`Error::Exists`] for the output file.
 pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_output(arguments.output.as_deref(), overwrite)?;
+    let inputs = Inputs::default()
+        .and([&arguments.model])
+        .and(&arguments.recordings)
+        .and(&arguments.reading.columns);
+    check_output(
+        arguments.output.as_deref(),
+        Format::Table,
+        &inputs,
+        overwrite,
+    )?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let progress = spinner("simulating");

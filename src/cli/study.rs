@@ -7,11 +7,12 @@ use serde_json::json;
 use super::Answer;
 use super::actuators;
 use super::args::{StudyArguments, TrainSettings};
+use super::destination::{Inputs, write_folder};
 use super::output::spinner;
 use super::prepared_recordings::{RecordedSets, read_all, reader_for};
 use super::train_settings;
 use crate::Error;
-use crate::files::{EmittedFile, Overwrite, check_folder, write_files};
+use crate::files::{EmittedFile, Overwrite, check_folder};
 use crate::recording::Recording;
 use crate::report::figures::figure_files;
 use crate::report::study_figures;
@@ -43,7 +44,13 @@ pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
         .map(|(name, table)| EmittedFile::new(*name, table.csv()))
         .collect();
     files.extend(study_figures(&summary).iter().flat_map(figure_files));
-    write_files(&arguments.out_dir, &files, overwrite)?;
+    let inputs = Inputs::default()
+        .and(&arguments.recordings)
+        .and(&arguments.validation)
+        .and(&arguments.config)
+        .and(&arguments.reading.columns)
+        .and_robot(arguments.robot.as_deref());
+    write_folder(&arguments.out_dir, &files, &inputs, overwrite)?;
     Ok(answer(&arguments.out_dir, &store, &summary))
 }
 

@@ -9,9 +9,11 @@ use serde_json::json;
 use super::Answer;
 use super::actuators;
 use super::args::{TrainArguments, TrainSettings};
-use super::output::{check_output, names, note, note_repeated, spinner, stem};
+use super::destination::{Format, Inputs, check_output};
+use super::output::{names, note, note_repeated, spinner, stem};
 use super::prepared_recordings::{RecordedSets, read_all};
 use super::train_settings;
+use super::whole_jumps::whole_jump_note;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::train::{
@@ -26,8 +28,16 @@ use crate::{Error, artifact, train};
 /// Whatever reading or training refuses; [`Error::Exists`] for the model file.
 pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_output(Some(&arguments.output), overwrite)?;
     let settings = train_settings::effective(arguments)?;
+    let inputs = Inputs::default()
+        .and(&arguments.recordings)
+        .and(&arguments.validation)
+        .and(&arguments.test)
+        .and(&arguments.config)
+        .and(&arguments.reading.columns)
+        .and_robot(settings.robot.as_deref())
+        .and(&settings.actuators);
+    check_output(Some(&arguments.output), Format::Model, &inputs, overwrite)?;
     let latent_dim = settings
         .latent_dim
         .expect("checked by clap, or with the file");
@@ -81,6 +91,24 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
         false => Some(train::assess(&trained.model, &recorded.test)?),
     };
     let mut answer = answer(arguments, &trained, tested.as_ref());
+    let report = &trained.report;
+    let validated = report.validation.as_ref();
+    let judged = [
+        ("validation", validated, &recorded.validation),
+        ("test", tested.as_ref(), &recorded.test),
+    ];
+    let trained_on = ("training", Some(&report.training), &recorded.training);
+    let judged = judged
+        .into_iter()
+        .chain(validated.is_none().then_some(trained_on));
+    let mut notes = Vec::new();
+    for (set, metrics, files) in judged {
+        if let Some(metrics) = metrics {
+            notes.extend(whole_jump_note(metrics, (set, files))?);
+        }
+    }
+    notes.iter().for_each(|text| note(text));
+    answer.json["notes"] = notes.into();
     answer.json["interrupted"] = is_interrupted.into();
     answer.json["recordings"] = recorded.findings_json();
     if let (Some(text), Some(json)) = (recorded.text(), recorded.json()) {

@@ -19,6 +19,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::control::{Summary, Tally};
@@ -87,6 +88,28 @@ pub struct Run {
     /// The model and its baselines, see [`control_metrics`](super::control_metrics); none where only the controller
     /// was at hand.
     pub metrics: Option<ControlMetrics>,
+}
+
+impl Run {
+    /// Why nothing was controlled, if so: most steps, or all that there are, have no plan of their own.
+    pub fn failure(&self) -> Option<String> {
+        let Summary { steps, failed, .. } = self.summary;
+        if steps > 0 && 2 * failed <= steps {
+            return None;
+        }
+        let mut statuses: BTreeMap<&str, usize> = BTreeMap::new();
+        for row in self.rows.iter().filter(|row| !row.status.has_plan()) {
+            *statuses.entry(row.status.word()).or_default() += 1;
+        }
+        let statuses = statuses
+            .iter()
+            .map(|(word, count)| format!("{word} {count}"));
+        let statuses: Vec<String> = statuses.collect();
+        Some(format!(
+            "{failed} of {steps} control steps have no plan of their own ({})",
+            statuses.join(", ")
+        ))
+    }
 }
 
 /// Runs the controller along a recording, one segment after the other.

@@ -34,7 +34,8 @@ pub struct Margins {
     pub foot_drift_m: [f64; 2],
 }
 
-/// The motion of a point, a sample every `sample_time_s`, and its margins.
+/// The motion of a point and its margins: samples at equal distances from the start to the planned end, as close to
+/// `sample_time_s` apart as a whole number of steps allows.
 ///
 /// # Errors
 /// [`PlanError::Recording`] if a sample makes no input.
@@ -49,11 +50,12 @@ pub fn motion(
         ends.push(ends.last().unwrap_or(&0.0) + duration);
     }
     let total = ends[ends.len() - 1];
-    let count = (total / sample_time_s).floor() as usize + 1;
+    let steps = (total / sample_time_s).round().max(1.0) as usize;
+    let count = steps + 1;
     let mut motion = empty(count);
     let mut input = DMatrix::zeros(STATE_DIM, count);
     for sample in 0..count {
-        let time = sample as f64 * sample_time_s;
+        let time = total * (sample as f64 / steps as f64);
         let part = ends.partition_point(|end| *end <= time).min(ends.len() - 1);
         let start = if part == 0 { 0.0 } else { ends[part - 1] };
         let at = at(task, y, part, (time - start, ends[part] - start));

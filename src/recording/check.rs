@@ -19,11 +19,11 @@ use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
 /// Torque over the robot's limit that is still accepted.
 const TORQUE_FACTOR: f64 = 1.1;
 /// Angle beyond a joint's limits that is still accepted, in rad.
-const JOINT_MARGIN_RAD: f64 = 0.05;
+pub const JOINT_MARGIN_RAD: f64 = 0.05;
 /// Speed over a joint's limit that is still accepted.
 const SPEED_FACTOR: f64 = 1.1;
 /// Largest speed of the body along an axis, in m/s.
-const BODY_SPEED_M_S: f64 = 10.0;
+pub const BODY_SPEED_M_S: f64 = 10.0;
 /// Largest rate of a body angle, in rad/s.
 const BODY_RATE_RAD_S: f64 = 30.0;
 /// Disagreement of a rate with differences, as a share of the 95th percentile of that rate, that is still accepted on

@@ -26,7 +26,7 @@ pub use jump::modelled;
 pub use page::{PageOptions, page};
 pub use plan::{plan_figures, reach_figure};
 pub use tables::{
-    NamedRun, baseline_table, control_table, coordinate_table, dynamics_table, failures,
-    invariance_table, phase_table, run_table, template_rms,
+    NamedRun, baseline_table, control_table, coordinate_table, dynamics_table, failed_runs,
+    failures, invariance_table, phase_table, run_table, template_rms,
 };
 pub use verdict::{Verdict, verdict};

@@ -236,6 +236,13 @@ pub fn failures(runs: &[NamedRun]) -> Vec<String> {
     failed.collect()
 }
 
+/// The runs that controlled nothing, and why.
+pub fn failed_runs(runs: &[NamedRun]) -> Vec<String> {
+    let failed = (runs.iter())
+        .filter_map(|(path, run)| Some(format!("{}: {}", file_name(path), run.failure()?)));
+    failed.collect()
+}
+
 fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default();
     name.to_string_lossy().into_owned()

@@ -15,6 +15,11 @@ const REMOVAL_SHARE: f64 = 0.75;
 /// A coefficient of this many significant digits reads back as itself.
 const MAX_DIGITS: usize = 17;
 
+/// Whether two floats are the same number but for the rounding of a product: `-0.9810000000000001` is 9.81 times -0.1.
+pub(super) fn is_same_decimal(before: f64, after: f64) -> bool {
+    (before - after).abs() <= 2.0 * f64::EPSILON * before.abs()
+}
+
 /// One change, by rows of the extended library.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Step {
@@ -60,20 +65,28 @@ pub(super) struct Equation {
     pub steps: Vec<Step>,
     /// Encloses the original equation minus the present one.
     pub spent: Interval,
+    /// The row whose coefficient is known, which keeps its value.
+    known: Option<usize>,
 }
 
 impl Equation {
-    /// Simplifies an equation so that the sum of its changes' errors stays within `allowed`.
-    pub fn simplified(terms: &mut Terms<'_>, xi: Vec<f64>, allowed: f64) -> Self {
-        let mut equation = Self {
+    /// An equation as it is.
+    pub fn new(xi: Vec<f64>, known: Option<usize>) -> Self {
+        Self {
             xi,
             steps: Vec::new(),
             spent: Interval::point(0.0),
-        };
+            known,
+        }
+    }
+
+    /// Simplifies an equation so that the sum of its changes' errors stays within `allowed`.
+    pub fn simplified(mut self, terms: &mut Terms<'_>, allowed: f64) -> Self {
+        let equation = &mut self;
         equation.remove_terms(terms, REMOVAL_SHARE * allowed);
         equation.fold_functions(terms, REMOVAL_SHARE * allowed);
         equation.round(terms, allowed);
-        equation
+        self
     }
 
     fn active(&self) -> Vec<usize> {
@@ -92,7 +105,8 @@ impl Equation {
                     let mut parts = rewrite.parts.iter();
                     let cost = size * rewrite.error.magnitude();
                     let is_better = best.is_none_or(|(least, _, _)| cost < least);
-                    if is_better && parts.all(|&(part, _)| self.xi[part] != 0.0) {
+                    let is_open = self.keeps_known(row, rewrite);
+                    if is_open && is_better && parts.all(|&(part, _)| self.xi[part] != 0.0) {
                         best = Some((cost, row, choice));
                     }
                 }
@@ -117,9 +131,8 @@ impl Equation {
                     continue;
                 }
                 let rewrites = terms.rewrites(row).to_vec();
-                let steps = rewrites
-                    .iter()
-                    .map(|rewrite| self.step(terms, row, rewrite));
+                let open = rewrites.iter().filter(|r| self.keeps_known(row, r));
+                let steps = open.map(|rewrite| self.step(terms, row, rewrite));
                 let steps: Vec<Step> = steps.collect();
                 let Some(step) = steps.into_iter().find(|step| self.fits(step, allowed)) else {
                     continue;
@@ -172,6 +185,9 @@ impl Equation {
             let mut last = before;
             for digits in (1..MAX_DIGITS).rev() {
                 let after = rounded(before, digits);
+                if self.known == Some(row) && !is_same_decimal(before, after) {
+                    break;
+                }
                 if after == last {
                     // fewer digits write the same number
                     if let Some(Step { kind, row: of, .. }) = steps.last_mut()
@@ -217,6 +233,13 @@ impl Equation {
             effects,
             bound,
         }
+    }
+
+    /// Whether a rewriting of the term in `row` leaves the known coefficient alone.
+    fn keeps_known(&self, row: usize, rewrite: &Rewrite) -> bool {
+        let mut rows = rewrite.parts.iter().map(|&(part, _)| part);
+        self.known
+            .is_none_or(|known| known != row && rows.all(|part| part != known))
     }
 
     fn fits(&self, step: &Step, allowed: f64) -> bool {

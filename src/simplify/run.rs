@@ -8,7 +8,7 @@ use super::certificate::{
 };
 use super::count::{digits, operations, variables};
 use super::domain::{Domain, Samples};
-use super::equation::{Equation, Step, Terms};
+use super::equation::{Equation, Step, Terms, is_same_decimal};
 use super::error::SimplifyError;
 use super::measure::Differences;
 use super::tolerance::Tolerance;
@@ -16,11 +16,14 @@ use super::workspace::Workspace;
 use crate::artifact;
 use crate::equations::Equations;
 use crate::model::{LatentVariable, ReducedModel};
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM};
 use crate::symbolic::Interval;
 
 /// What the search may use is lowered to this share of itself until the final evaluation confirms
 /// the tolerance.
 const RETREAT: f64 = 0.8;
+/// Row of the body's height among the coordinates of a robot.
+const BODY_Z: usize = JOINT_DIM + 2;
 const MAX_RETREATS: usize = 40;
 /// Relative error of evaluating a sample in floating point, with room to spare.
 const EVALUATION: f64 = 1e-9;
@@ -132,6 +135,12 @@ fn provenance_of(model: &ReducedModel, certificate: &Certificate) -> Value {
     entry
 }
 
+/// `-g` in the scaled units of a model with a robot's coordinates: what is known of free fall before any learning.
+fn gravity(model: &ReducedModel) -> Option<f64> {
+    let factors = model.state_factors().ok()?;
+    Some(-GRAVITY_M_S2 * factors[BODY_Z])
+}
+
 /// One phase with its box and samples.
 struct PhaseProblem<'a> {
     name: &'a str,
@@ -140,6 +149,8 @@ struct PhaseProblem<'a> {
     domain: Option<&'a [Interval]>,
     /// A row a sample in the box, a column a term.
     theta: DMatrix<f64>,
+    /// `-g` in the model's units, where it goes between these and those of the robot.
+    gravity: Option<f64>,
     samples_outside: usize,
 }
 
@@ -160,7 +171,21 @@ impl<'a> PhaseProblem<'a> {
             domain: domain.phase(phase),
             samples_outside: recorded - theta.nrows(),
             theta,
+            gravity: gravity(equations.model()),
         })
+    }
+
+    /// The equation as it is; known is the constant that is gravity.
+    fn equation(&self, output: usize) -> Equation {
+        let is_gravity = |row: &usize| {
+            let coefficient = self.xi[(*row, output)];
+            self.gravity
+                .is_some_and(|gravity| is_same_decimal(gravity, coefficient))
+        };
+        Equation::new(
+            self.coefficients(output),
+            self.workspace.constant().filter(is_gravity),
+        )
     }
 
     fn solve(
@@ -176,14 +201,9 @@ impl<'a> PhaseProblem<'a> {
                 Tolerance::Absolute(value) => value,
                 Tolerance::ShareOfRms(share) => share * rms.unwrap_or(0.0),
             };
-            let kept = || Equation {
-                xi: self.coefficients(output),
-                steps: Vec::new(),
-                spent: Interval::point(0.0),
-            };
             let (equation, bound) = match &mut terms {
                 Some(terms) if allowed > 0.0 => self.search(terms, output, allowed)?,
-                Some(_) | None => (kept(), Interval::point(0.0)),
+                Some(_) | None => (self.equation(output), Interval::point(0.0)),
             };
             xi.set_column(output, &nalgebra::DVector::from_column_slice(&equation.xi));
             equations.push(self.certified(output, &equation, bound, allowed, rms)?);
@@ -219,7 +239,7 @@ impl<'a> PhaseProblem<'a> {
         let mut budget = allowed;
         let mut largest = 0.0;
         for _ in 0..MAX_RETREATS {
-            let equation = Equation::simplified(terms, self.coefficients(output), budget);
+            let equation = self.equation(output).simplified(terms, budget);
             let differences = Differences::between(&self.coefficients(output), &equation.xi);
             let bound = differences.bound(&mut terms.ranges);
             largest = bound.magnitude();

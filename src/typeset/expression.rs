@@ -251,7 +251,8 @@ impl Layout<'_> {
             return self.factor(base);
         }
         let exponent = match exponent.as_rational() {
-            Some((1, index @ 2..=9)) => {
+            // Where a base may be negative its odd root is read as negative, its power is nothing.
+            Some((1, index @ (2 | 4 | 6 | 8))) => {
                 let inner = self.signed(base)?.into_math();
                 let index = (index != 2).then_some(index as u32);
                 return Ok((FactorKey::Function, Math::Root(Box::new(inner), index)));

@@ -51,7 +51,7 @@ impl Jump {
         Self::of("A jump of one's own", &plan.time_s, rows, &plan.feet)
     }
 
-    /// Every so many samples of states, velocities and torques.
+    /// Every so many samples of states, velocities and torques, and the last.
     fn of(
         what: &'static str,
         time_s: &[f64],
@@ -61,7 +61,8 @@ impl Jump {
         let (start, end) = (time_s[0], time_s[time_s.len() - 1]);
         let mean_step_s = (end - start) / (time_s.len().max(2) - 1) as f64;
         let stride = (STEP_S / mean_step_s).round().max(1.0) as usize;
-        let samples = || (0..time_s.len()).step_by(stride);
+        let last = time_s.len() - 1;
+        let samples = || (0..last).step_by(stride).chain([last]);
         let columns = |matrix: &DMatrix<f64>| -> Vec<Vec<f64>> {
             let column = |k| matrix.column(k).iter().copied().collect();
             samples().map(column).collect()

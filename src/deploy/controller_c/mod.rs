@@ -49,6 +49,9 @@ struct Facts<'a> {
     real: &'static str,
     /// Torque limits, an initialiser in double precision.
     torque_limit: String,
+    /// Joint limits, initialisers in double precision.
+    joint_lower: String,
+    joint_upper: String,
     /// Suffix of libm's functions.
     f: &'static str,
     codes: Vec<(String, i32)>,
@@ -156,6 +159,9 @@ fn facts<'a>(
     provenance: &str,
 ) -> Facts<'a> {
     let name = entries.identifier.as_str();
+    let joint_limit = |side: fn(&(f64, f64)) -> f64| {
+        Numbers(Precision::Double).vector(plant.robot().joint_limit_rad().iter().map(side))
+    };
     Facts {
         banner: format!("/* {provenance} */"),
         model: &entries.name,
@@ -173,6 +179,8 @@ fn facts<'a>(
         },
         torque_limit: Numbers(Precision::Double)
             .vector(plant.robot().torque_limit_nm().iter().copied()),
+        joint_lower: joint_limit(|limit| limit.0),
+        joint_upper: joint_limit(|limit| limit.1),
         f: match precision {
             Precision::Double => "",
             Precision::Single => "f",

@@ -3,6 +3,7 @@
 use std::ops::Deref;
 
 use crate::deploy::EmitError;
+use crate::recording::check::{BODY_SPEED_M_S, JOINT_MARGIN_RAD};
 
 /// What its files take besides the facts of the controller.
 struct Facts<'a> {
@@ -10,6 +11,11 @@ struct Facts<'a> {
     /// Name of the package, its namespace and its library.
     package: String,
     version: &'static str,
+    /// Bounds of a plan's values, those beyond which `recording` reports a sample as implausible.
+    joint_margin_rad: f64,
+    body_speed_m_s: f64,
+    /// Share of a plan's step that the controller's may be, as for `romc mpc`.
+    step_slack: f64,
 }
 
 impl<'a> Deref for Facts<'a> {
@@ -45,6 +51,9 @@ pub(super) fn files(
         controller,
         package: format!("{}_ros2_control", controller.name.to_ascii_lowercase()),
         version: env!("CARGO_PKG_VERSION"),
+        joint_margin_rad: JOINT_MARGIN_RAD,
+        body_speed_m_s: BODY_SPEED_M_S,
+        step_slack: 0.99,
     };
     let (hash, slashes) = (format!("# {provenance}"), format!("// {provenance}"));
     let texts = [

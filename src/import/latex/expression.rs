@@ -1,7 +1,7 @@
 //! One right side: from LaTeX to the grammar of candidate terms, each piece with its place.
 //!
-//! What is ambiguous in print is refused: `\sin z_1 u_1`, `1/2z_1u_1` with more than numbers around
-//! the slash, a number after a variable. Nesting is limited, so the machine's stack is safe.
+//! What is ambiguous in print is refused: `\sin z_1 u_1`, a product that goes on without a sign behind a slash (`2/3z_1`,
+//! `z_1/2u_1`), a number after a variable. Nesting is limited, so the machine's stack is safe.
 
 use super::super::equations::Equation;
 use super::reader::{BARE, Last, MAX_DEPTH, Read, Reader, Symbol, has};
@@ -159,13 +159,13 @@ impl Reader<'_> {
                     self.push(place, "/");
                     self.peek();
                     let number = self.at;
-                    let divisor = self.factor(false)?;
+                    self.factor(false)?;
                     if self.number_takes_power_of_ten(number) {
                         return self.unexpected(
                             "`\\frac`, or parentheses around the number that the slash divides by",
                         );
                     }
-                    after_slash = (last, divisor) != (Last::Number, Last::Number);
+                    after_slash = true;
                     last = Last::Other;
                 }
                 Some(kind) if self.starts_factor(&kind) => {
@@ -349,31 +349,6 @@ impl Reader<'_> {
         self.sum(leads)?;
         let is_number = self.at == first + 1 && matches!(self.tokens[first].kind, Kind::Number(_));
         Ok(if is_number { Last::Number } else { Last::Other })
-    }
-
-    pub(super) fn root(&mut self, place: (usize, usize)) -> Read<Last> {
-        self.at += 1;
-        let mut index = None;
-        if self.character('[') {
-            match self.peek().map(|token| token.kind.clone()) {
-                Some(Kind::Number(text)) if matches!(text.parse(), Ok(2..=99_u32)) => {
-                    index = Some(text)
-                }
-                _ => return self.unexpected("the index of the root, 2 to 99"),
-            }
-            self.at += 1;
-            if !self.character(']') {
-                return self.unexpected("`]`");
-            }
-        }
-        self.push(place, if index.is_some() { "((" } else { "sqrt(" });
-        self.inside(|reader| reader.sum(false))?;
-        self.push(
-            place,
-            index.map_or(")".to_owned(), |index| format!(")^(1/{index}))")),
-        );
-        self.powers(place)?;
-        Ok(Last::Other)
     }
 
     pub(super) fn opens_bar(&self) -> bool {

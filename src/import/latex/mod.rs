@@ -16,6 +16,7 @@ mod expression;
 mod names;
 mod numbers;
 mod reader;
+mod roots;
 mod sections;
 mod token;
 mod variables;

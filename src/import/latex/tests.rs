@@ -99,8 +99,12 @@ fn constructs_mean_what_they_print() {
             "u1*abs(z2) + abs(z1) + abs(-1 + dz1)",
         ),
         (
-            r"\sqrt{z_1} + \sqrt[3]{z_2} + \ln z_1 + \log(z_2)",
-            "z2^(1/3) + log(z1) + log(z2) + sqrt(z1)",
+            r"\sqrt{z_1} + \sqrt[4]{z_2} + \ln z_1 + \log(z_2)",
+            "z2^(1/4) + log(z1) + log(z2) + sqrt(z1)",
+        ),
+        (
+            r"\sqrt[3]{z_1} + \sqrt[5]{z_2 - 1}^2",
+            "abs(z1)^(1/3)*sign(z1) + (abs(-1 + z2)^(1/5)*sign(-1 + z2))^2",
         ),
         (
             r"\operatorname{sgn}(z_1) + \mathop{\mathrm{sgn}}(\dot z_1)",
@@ -114,7 +118,7 @@ fn constructs_mean_what_they_print() {
         ),
         (r"z_1 \quad \text{in contact,}", "z1"),
         (
-            r"z_1(t) + u_{\mathrm{lat},2} + z_1/2 + 1/2 z_2",
+            r"z_1(t) + u_{\mathrm{lat},2} + z_1/2 + \frac{1}{2} z_2",
             "z1 + z1/2 + z2/2 + u2",
         ),
         ("2z_1 − 3·z_2 % a comment\n + u_1", "2*z1 - 3*z2 + u1"),
@@ -128,7 +132,7 @@ fn constructs_mean_what_they_print() {
         ),
         (r"- - z_1 + -z_2", "z1 - z2"),
         (
-            r"\frac12\frac{1}{3} z_1 + \frac{d}{dt} z_1 + 1/2 z_2",
+            r"\frac12\frac{1}{3} z_1 + \frac{d}{dt} z_1 + 1/2 \cdot z_2",
             "z1/6 + dz1 + z2/2",
         ),
         (
@@ -196,6 +200,8 @@ fn unreadable_constructs_are_named_with_their_place() {
         (r"z_3", 1, 13, "`z3`"),
         (r"1 +", 1, 15, "the end of the equation"),
         (r"1/2 \times 10^{-3} z_1", 1, 15, "`2`"),
+        (r"2/3z_1", 1, 16, "`z`"),
+        (r"1/2 (z_1 + 1)", 1, 17, "`(`"),
         (
             r"\begin{cases} z_1 & \\ -z_1 & \end{cases}",
             1,

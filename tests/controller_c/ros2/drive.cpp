@@ -5,8 +5,10 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <memory>
 #include <new>
+#include <sstream>
 
 #include "controller.hpp"
 
@@ -280,6 +282,43 @@ void refuse()
     require(robot.activate(false) == CallbackReturn::ERROR, "interfaces in another order");
 }
 
+/// A plan whose second sample has another text in a column is refused by its place.
+void refuse_cell(const std::string & path, const std::string & column, const std::string & cell, const char * words)
+{
+    std::ifstream file(path);
+    std::string header, first, second;
+    std::getline(file, header);
+    std::getline(file, first);
+    std::getline(file, second);
+    std::stringstream names(header), values(second);
+    std::string changed, value;
+    for (std::string name; std::getline(names, name, ';') && std::getline(values, value, ';');) {
+        changed += (name == column ? cell : value) + ";";
+    }
+    const std::string bad = path + ".bad.csv";
+    std::ofstream(bad) << header << '\n' << first << '\n' << changed << '\n';
+    Robot robot({{"plan_file", bad}});
+    require(robot.configure() == CallbackReturn::FAILURE, words);
+    const std::string & said = *robot.plugin->get_node()->last;
+    const std::string place = bad + ": line 3, column `" + column + "`: found ";
+    if (said.find(place) == std::string::npos || said.find(words) == std::string::npos) {
+        std::fprintf(stderr, "%s\n", said.c_str());
+        require(false, words);
+    }
+}
+
+void refuse_implausible(const std::string & path)
+{
+    refuse_cell(path, "Time", "2,0", "2 s after 0 s, expected a step of 0.0001 s to that of the controller, 0.010101 s");
+    refuse_cell(path, "Time", "0,0", "0 s after 0 s");
+    refuse_cell(path, "Time", "inf", "`inf`, expected a finite number");
+    refuse_cell(path, "fr Foot", "0,4", "0.4, expected contact 0 or 1");
+    refuse_cell(path, "fl.kn Position", "-80,0", "-80, expected");
+    refuse_cell(path, "Body angular Position y", "3,0", "3, expected -1.5708 to 1.5708");
+    refuse_cell(path, "Body linear Position z", "300,0", "expected less than 10 m/s");
+    refuse_cell(path, "rl.hx Torque", "nan", "`nan`, expected a finite number");
+}
+
 void load(const std::string & path)
 {
     Robot robot({{"plan_file", path}});
@@ -305,5 +344,6 @@ int main(int argc, char ** argv)
     refuse();
     require(argc > 1, "a jump in a file");
     load(argv[1]);
+    refuse_implausible(argv[1]);
     return 0;
 }

@@ -1,0 +1,152 @@
+//! Where a command may write: its output says its format by its ending, and is none of the files that the command reads.
+
+use std::path::{Path, PathBuf};
+
+use crate::Error;
+use crate::files::{EmittedFile, Overwrite, write_files};
+use crate::robot::Robot;
+
+/// What an output file holds, which the ending of its name says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// A table as CSV.
+    Table,
+    /// A recording.
+    Recording,
+    /// A model file.
+    Model,
+    /// A robot, its actuators, a map of columns.
+    Toml,
+    /// A report.
+    Page,
+}
+
+impl Format {
+    fn endings(self) -> &'static [&'static str] {
+        match self {
+            Self::Table => &[".csv"],
+            Self::Recording => &[".csv", ".csv.gz", ".mcap"],
+            Self::Model => &[".json"],
+            Self::Toml => &[".toml"],
+            Self::Page => &[".html", ".htm"],
+        }
+    }
+
+    /// Refuses a name whose ending says another format. What is there and no file of a disk is refused elsewhere.
+    fn check(self, path: &Path) -> Result<(), Error> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let name = name.to_lowercase();
+        let is_device = path.exists() && !path.is_file();
+        if is_device || self.endings().iter().any(|ending| name.ends_with(ending)) {
+            return Ok(());
+        }
+        Err(Error::Ending {
+            path: path.to_owned(),
+            found: match path.extension() {
+                Some(ending) => format!(".{}", ending.to_string_lossy()),
+                None => "no ending".to_owned(),
+            },
+            expected: match self.endings() {
+                [all @ .., last] if !all.is_empty() => format!("{} or {last}", all.join(", ")),
+                all => all.concat(),
+            },
+        })
+    }
+}
+
+/// The files that a command reads, none of which it may replace, forced or not.
+#[derive(Debug, Clone, Default)]
+pub struct Inputs<'a>(Vec<&'a Path>);
+
+impl<'a> Inputs<'a> {
+    /// These and more.
+    pub fn and<P: AsRef<Path> + ?Sized + 'a>(
+        mut self,
+        more: impl IntoIterator<Item = &'a P>,
+    ) -> Self {
+        self.0.extend(more.into_iter().map(AsRef::as_ref));
+        self
+    }
+
+    /// These and the file of a robot, unless the name is that of one of romc's own.
+    pub fn and_robot(self, name: Option<&'a str>) -> Self {
+        let is_file = |name: &&str| !Robot::known_names().contains(name);
+        self.and(name.filter(is_file))
+    }
+
+    /// Refuses to write a file that is read, by whatever path: it, or the folder that it is in, is an input.
+    ///
+    /// # Errors
+    /// [`Error::IsRead`].
+    fn check(&self, output: &Path) -> Result<(), Error> {
+        let Ok(place) = output.canonicalize() else {
+            return Ok(()); // what is not there is not read
+        };
+        let is_read = |input: &&&Path| {
+            (input.canonicalize())
+                .is_ok_and(|input| input == place || Some(&*input) == place.parent())
+        };
+        match self.0.iter().find(is_read) {
+            Some(input) if place.is_file() => Err(Error::IsRead {
+                path: output.to_owned(),
+                input: input.to_path_buf(),
+            }),
+            Some(_) | None => Ok(()),
+        }
+    }
+}
+
+/// Refuses an output by its name alone.
+///
+/// # Errors
+/// [`Error::IsFolder`] for a folder, [`Error::Ending`] for a name that says another format, [`Error::IsRead`] for one of
+/// the inputs.
+pub fn check_name(path: &Path, format: Format, inputs: &Inputs<'_>) -> Result<(), Error> {
+    if path.is_dir() || path.file_name().is_none() {
+        return Err(Error::IsFolder(path.to_owned()));
+    }
+    format.check(path)?;
+    inputs.check(path)
+}
+
+/// Refuses an output that could not be written, before long work begins.
+///
+/// # Errors
+/// Those of [`check_name`], [`Error::Exists`] if the file is there and may not be replaced, [`Error::NoFolder`] if its folder is not.
+pub fn check_output(
+    path: Option<&Path>,
+    format: Format,
+    inputs: &Inputs<'_>,
+    overwrite: Overwrite,
+) -> Result<(), Error> {
+    let Some(path) = path else { return Ok(()) };
+    check_name(path, format, inputs)?;
+    if !overwrite.allows(path) {
+        return Err(Error::Exists(path.to_owned()));
+    }
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+            Err(Error::NoFolder {
+                path: path.to_owned(),
+                folder: folder.to_owned(),
+            })
+        }
+        Some(_) | None => Ok(()),
+    }
+}
+
+/// Writes files into a folder, none of them one of the inputs.
+///
+/// # Errors
+/// [`Error::IsRead`], [`Error::Folder`] for a file of that name that romc did not make.
+pub fn write_folder(
+    folder: &Path,
+    files: &[EmittedFile],
+    inputs: &Inputs<'_>,
+    overwrite: Overwrite,
+) -> Result<Vec<PathBuf>, Error> {
+    for file in files {
+        inputs.check(&folder.join(&file.path))?;
+    }
+    Ok(write_files(folder, files, overwrite)?)
+}
