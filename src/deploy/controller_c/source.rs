@@ -21,6 +21,8 @@ use crate::solver;
 
 /// Complementarity and residual in single precision, at which rounding ends the progress.
 const SINGLE: (f64, f64) = (1e-4, 1e-3);
+/// Complementarity of a lift in single precision: with that of the plan torques would be off by 0.1 N m.
+const SINGLE_LIFT: f64 = 1e-6;
 
 /// `NAME_controller.c`.
 #[derive(Template)]
@@ -90,6 +92,7 @@ struct PhaseNames<'a> {
 struct SolverNumbers {
     slack_price: String,
     tolerance: String,
+    lift_tolerance: String,
     accepted_residual: String,
     margin: (String, String),
     margin_factor: String,
@@ -246,6 +249,10 @@ impl SolverNumbers {
         Self {
             slack_price: one(SLACK_PRICE),
             tolerance: one(tolerance),
+            lift_tolerance: one(match precision {
+                Precision::Double => TOLERANCE,
+                Precision::Single => SINGLE_LIFT,
+            }),
             accepted_residual: one(accepted),
             margin: pair(solver::MARGIN),
             margin_factor: one(solver::MARGIN_FACTOR),
