@@ -91,22 +91,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
         false => Some(train::assess(&trained.model, &recorded.test)?),
     };
     let mut answer = answer(arguments, &trained, tested.as_ref());
-    let report = &trained.report;
-    let validated = report.validation.as_ref();
-    let judged = [
-        ("validation", validated, &recorded.validation),
-        ("test", tested.as_ref(), &recorded.test),
-    ];
-    let trained_on = ("training", Some(&report.training), &recorded.training);
-    let judged = judged
-        .into_iter()
-        .chain(validated.is_none().then_some(trained_on));
-    let mut notes = Vec::new();
-    for (set, metrics, files) in judged {
-        if let Some(metrics) = metrics {
-            notes.extend(whole_jump_note(metrics, (set, files))?);
-        }
-    }
+    let notes = notes(&trained.report, tested.as_ref(), &recorded)?;
     notes.iter().for_each(|text| note(text));
     answer.json["notes"] = notes.into();
     answer.json["interrupted"] = is_interrupted.into();
@@ -124,6 +109,28 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
          does not give it again"
     );
     Ok((answer, INTERRUPTED_CODE))
+}
+
+/// Where whole jumps are worse than standing still: of the validation, or else of the training, and of the test.
+///
+/// # Errors
+/// As [`whole_jump_note`].
+fn notes(
+    report: &TrainReport,
+    tested: Option<&SetMetrics>,
+    recorded: &RecordedSets,
+) -> Result<Vec<String>, Error> {
+    let judged = match &report.validation {
+        Some(validation) => ("validation", Some(validation), &recorded.validation),
+        None => ("training", Some(&report.training), &recorded.training),
+    };
+    let mut notes = Vec::new();
+    for (set, metrics, files) in [judged, ("test", tested, &recorded.test)] {
+        if let Some(metrics) = metrics {
+            notes.extend(whole_jump_note(metrics, (set, files))?);
+        }
+    }
+    Ok(notes)
 }
 
 /// Exit code of a process that Ctrl-C ended: 128 and the number of the signal.

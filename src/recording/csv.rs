@@ -12,8 +12,10 @@ use flate2::bufread::MultiGzDecoder;
 
 use super::columns::Layout;
 use super::error::{RecordingError, RecordingFault};
+use super::foreign::Assembled;
 use super::lines::{Lines, split_cells};
 use super::segment::Recording;
+use super::segments::DERIVED_DDX;
 use super::table::Table;
 
 pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
@@ -23,11 +25,19 @@ pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 /// # Errors
 /// [`RecordingError`], which names file, row and column.
 pub fn read(path: &Path) -> Result<Recording, RecordingError> {
+    read_noted(path).map(|assembled| assembled.recording)
+}
+
+/// [`read`], with a note of what the file leaves to be derived.
+///
+/// # Errors
+/// As [`read`].
+pub(super) fn read_noted(path: &Path) -> Result<Assembled, RecordingError> {
     let file = File::open(path).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => RecordingFault::Missing.of(path),
         _ => RecordingFault::io("open", source).of(path),
     })?;
-    read_from(path, file)
+    unpacked(path, file)
 }
 
 /// Reads a recording from memory; `name` stands for the file in messages.
@@ -42,7 +52,11 @@ pub fn read_from_bytes(name: &str, bytes: &[u8]) -> Result<Recording, RecordingE
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_from(path: &Path, mut source: impl Read) -> Result<Recording, RecordingError> {
+pub fn read_from(path: &Path, source: impl Read) -> Result<Recording, RecordingError> {
+    unpacked(path, source).map(|assembled| assembled.recording)
+}
+
+fn unpacked(path: &Path, mut source: impl Read) -> Result<Assembled, RecordingError> {
     let mut start = Vec::with_capacity(2);
     (&mut source)
         .take(2)
@@ -61,7 +75,7 @@ pub fn read_from(path: &Path, mut source: impl Read) -> Result<Recording, Record
 fn read_lines<R: BufRead>(
     path: &Path,
     mut lines: Lines<'_, R>,
-) -> Result<Recording, RecordingError> {
+) -> Result<Assembled, RecordingError> {
     let (delimiter, layout) = read_header(path, &mut lines)?;
     let mut table = Table::new(path, delimiter, &layout);
     let mut blank = None;
@@ -76,10 +90,14 @@ fn read_lines<R: BufRead>(
         }
         table.push(row, line)?;
     }
-    Ok(Recording {
-        path: path.to_owned(),
-        segments: table.finish()?,
-        ignored_columns: layout.ignored(),
+    let derived = (!layout.has_acceleration).then(|| DERIVED_DDX.to_owned());
+    Ok(Assembled {
+        recording: Recording {
+            path: path.to_owned(),
+            segments: table.finish()?,
+            ignored_columns: layout.ignored(),
+        },
+        notes: derived.into_iter().collect(),
     })
 }
 

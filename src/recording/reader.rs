@@ -86,10 +86,7 @@ impl Reader {
             Some(map) => assemble(path, &read_texts(path, map)?, map)?,
             None if path.is_dir() => return Err(RecordingFault::Folder.of(path)),
             None if is_mcap(path) => by_guess(path)?,
-            None => Assembled {
-                recording: csv::read(path)?,
-                notes: Vec::new(),
-            },
+            None => csv::read_noted(path)?,
         };
         let mut mended = Vec::new();
         if self.clocks == Clocks::Repaired {
@@ -211,6 +208,8 @@ impl ReadingNotes {
 mod tests {
     use super::*;
     use crate::recording::segment::tests::sample_segment;
+    use crate::recording::segments::DERIVED_DDX;
+    use crate::recording::{WriteOptions, write_with};
 
     fn reading(elapsed_ratio: Option<f64>, note: &str) -> Reading {
         let segment = sample_segment(3);
@@ -240,6 +239,26 @@ mod tests {
         assert!(lines[0].contains("1.10 to 1.24 s in a recorded second in 2 of 3 recordings"));
         assert!(lines[0].contains("uneven steps are resampled in 1 of 3 recordings"));
         assert_eq!(lines[1], "a in 2 of 3 recordings");
+    }
+
+    #[test]
+    fn accelerations_that_a_file_does_not_have_are_noted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("jump.csv");
+        let recording = Recording::from(sample_segment(3));
+        for accelerations in [true, false] {
+            let options = WriteOptions {
+                accelerations,
+                ..WriteOptions::default()
+            };
+            write_with(&path, &recording, &options).unwrap();
+            let notes = Reader::new(None, Clocks::Recorded)
+                .read(&path)
+                .unwrap()
+                .notes;
+            let expected = [DERIVED_DDX];
+            assert_eq!(notes, expected[usize::from(accelerations)..]);
+        }
     }
 
     #[test]

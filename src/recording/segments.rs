@@ -10,6 +10,8 @@ use super::preprocess::differences;
 use super::segment::Segment;
 use crate::robot::{BODY_DIM, ContactFlags, JOINT_DIM, STATE_DIM};
 
+/// The note on a recording whose accelerations are made here.
+pub(super) const DERIVED_DDX: &str = "accelerations are differences of velocities";
 /// A step this many times the one before it starts a new segment, as a jump
 /// back does: samples were left out between the two.
 const GAP_STEPS: f64 = 20.0;

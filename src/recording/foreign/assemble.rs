@@ -14,7 +14,7 @@ use super::signal::{Signal, Taker};
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::preprocess::differences;
 use crate::recording::segment::Recording;
-use crate::recording::segments::{EPOCH_S, Sample, SegmentBuilder, begins_segment};
+use crate::recording::segments::{DERIVED_DDX, EPOCH_S, Sample, SegmentBuilder, begins_segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM};
 
@@ -414,7 +414,7 @@ impl Rows<'_> {
         if has_acceleration {
             self.derive_accelerations();
         } else {
-            (self.notes).push("accelerations are differences of velocities".to_owned());
+            (self.notes).push(DERIVED_DDX.to_owned());
         }
         let mut builder = SegmentBuilder::new(self.path, has_acceleration, false);
         for i in kept {
