@@ -51,6 +51,7 @@
 )]
 
 mod interior;
+mod lower;
 mod problem;
 mod riccati;
 mod rows;
@@ -59,6 +60,8 @@ mod solve;
 #[cfg(target_arch = "x86_64")]
 mod wide;
 
-pub use interior::{AGAIN, COLD, MARGIN, MARGIN_FACTOR, PATIENCE, SHORT_STEP, WARM};
+pub use interior::{
+    AGAIN, COLD, FAR, FAR_CHANGE, LEFT, MARGIN, MARGIN_FACTOR, PATIENCE, SHORT_STEP, WARM,
+};
 pub use problem::{Cost, Outcome, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage};
 pub use scalar::Real;

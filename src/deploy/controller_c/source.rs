@@ -11,8 +11,8 @@ use crate::deploy::controller::texts;
 use crate::mpc::interface::Settings;
 use crate::mpc::problem::{Row, StageRows};
 use crate::mpc::shared::{
-    DEVIATION_FLOOR, EFFECTIVENESS_RANGE, LARGEST_WEIGHT, POSTURE_SHARE, PRIOR_WEIGHT, SLACK_PRICE,
-    SOFTENED_FROM, STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
+    DEVIATION_FLOOR, EFFECTIVENESS_RANGE, GAP, LARGEST_WEIGHT, POSTURE_SHARE, PRIOR_WEIGHT,
+    SLACK_PRICE, SOFTENED_FROM, STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
 };
 use crate::mpc::{ControlModel, FallbackSettings, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
@@ -79,11 +79,15 @@ struct PhaseNames<'a> {
 struct SolverNumbers {
     slack_price: String,
     tolerance: String,
+    gap: String,
+    left: String,
     accepted_residual: String,
     margin: (String, String),
     margin_factor: String,
     warm: (String, String),
     cold: (String, String),
+    far: (String, String),
+    far_change: String,
     again: (String, String),
     short_step: String,
     patience: u32,
@@ -216,11 +220,15 @@ impl SolverNumbers {
         Self {
             slack_price: one(SLACK_PRICE),
             tolerance: one(tolerance),
+            gap: one(GAP),
+            left: one(solver::LEFT),
             accepted_residual: one(accepted),
             margin: pair(solver::MARGIN),
             margin_factor: one(solver::MARGIN_FACTOR),
             warm: pair(solver::WARM),
             cold: pair(solver::COLD),
+            far: pair(solver::FAR),
+            far_change: one(solver::FAR_CHANGE),
             again: pair(solver::AGAIN),
             short_step: one(solver::SHORT_STEP),
             patience: solver::PATIENCE,
