@@ -180,6 +180,7 @@ fn run<const NX: usize, const NU: usize>(
     let settings = Settings {
         max_iterations: 60,
         tolerance: 1e-8,
+        gap: 5e-8,
         accepted_residual: 2e-5,
     };
     let mut reference = Conic::new::<NX, NU>(&shared);

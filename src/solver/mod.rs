@@ -38,7 +38,7 @@
 //!     program.bounds_mut(stage).copy_from_slice(&[1.0, 1.0]);
 //! }
 //! assert!(program.prepare());
-//! let settings = Settings { max_iterations: 40, tolerance: 1e-9, accepted_residual: 1e-6 };
+//! let settings = Settings { max_iterations: 40, tolerance: 1e-9, gap: 1e-8, accepted_residual: 1e-6 };
 //! let report = program.solve(&[1.0, 0.0], false, &settings);
 //! assert_eq!(report.outcome, Outcome::Solved);
 //! assert!((program.stages[0].v[0] + 1.0).abs() < 1e-8);
@@ -51,6 +51,7 @@
 )]
 
 mod interior;
+mod lower;
 mod problem;
 mod riccati;
 mod rows;
@@ -59,6 +60,8 @@ mod solve;
 #[cfg(target_arch = "x86_64")]
 mod wide;
 
-pub use interior::{AGAIN, COLD, MARGIN, MARGIN_FACTOR, PATIENCE, SHORT_STEP, WARM};
+pub use interior::{
+    AGAIN, COLD, FAR, FAR_CHANGE, LEFT, MARGIN, MARGIN_FACTOR, PATIENCE, SHORT_STEP, WARM,
+};
 pub use problem::{Cost, Outcome, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage};
 pub use scalar::Real;

@@ -35,6 +35,11 @@ pub struct Stage<T, const NX: usize, const NU: usize> {
     /// `Σ w_j E_j` of the soft rows and the inverse of the slack's own curvature.
     pub(super) soft_pull: [T; NU],
     pub(super) soft_inverse: T,
+    /// Input of the optimum without rows, of the last program.
+    pub(super) plain: [T; NU],
+    /// Columns of `a` and `b`, with which sums over rows are sums of vectors.
+    pub(super) a_columns: [[T; NX]; NX],
+    pub(super) b_columns: [[T; NX]; NU],
 }
 
 impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
@@ -59,6 +64,22 @@ impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
             dt: z,
             soft_pull: [z; NU],
             soft_inverse: z,
+            plain: [z; NU],
+            a_columns: [[z; NX]; NX],
+            b_columns: [[z; NX]; NU],
+        }
+    }
+
+    /// Writes the columns of the dynamics.
+    #[inline(always)]
+    pub(super) fn keep_columns(&mut self) {
+        for i in 0..NX {
+            for j in 0..NX {
+                self.a_columns[j][i] = self.a[i][j];
+            }
+            for j in 0..NU {
+                self.b_columns[j][i] = self.b[i][j];
+            }
         }
     }
 }
@@ -176,6 +197,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         let (last, new) = (self.at(self.stages.len() - 1), self.first);
         self.stages[new].v = self.stages[last].v;
         self.stages[new].t = self.stages[last].t;
+        self.stages[new].plain = self.stages[last].plain;
         let from = last * memory + 2 * rows;
         self.rows
             .copy_within(from..from + rows, new * memory + 2 * rows);
@@ -188,8 +210,11 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
 pub struct Settings<T> {
     /// Cap on interior-point iterations.
     pub max_iterations: u32,
-    /// Complementarity and violation of rows at which the iterations end.
+    /// Violation of rows and largest product of slack and multiplier at which the iterations end.
     pub tolerance: T,
+    /// Sum of these products, in units of `Σ vᵀ R v + xᵀ Q x` or of one where that is less, at which the
+    /// iterations end as well; zero for the largest product to decide.
+    pub gap: T,
     /// Largest residual of the optimality conditions with which a point counts as solved.
     pub accepted_residual: T,
 }

@@ -12,26 +12,70 @@
 use super::problem::Stage;
 use super::scalar::Real;
 
+/// Most inputs, and the width of rows of `NU` numbers that are filled up with zeros: vectors of four
+/// then have no odd ends.
+pub(super) const WIDE: usize = 12;
+
 /// `P` of one stage's end to `P` of its beginning, without the costs there; gain and factor of the
-/// stage are overwritten. False if the input's Hessian is not positive definite.
+/// stage are overwritten. Of `hvv`, the input's own Hessian, the lower triangle is read. False if the
+/// whole Hessian of the input is not positive definite.
 #[inline(always)]
 pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
     stage: &mut Stage<T, NX, NU>,
     p: &mut [[T; NX]; NX],
-    mut hvv: [[T; NU]; NU],
+    mut hvv: [[T; WIDE]; NU],
+    Products { pa, pb, b, hvx, z }: &mut Products<T, NX, NU>,
 ) -> bool {
-    let (a, b) = (&stage.a, &stage.b);
-    let mut pa = [[T::ZERO; NX]; NX];
-    let mut pb = [[T::ZERO; NU]; NX];
-    for i in 0..NX {
+    let a = &stage.a;
+    let wide = NU.div_ceil(4) * 4;
+    for k in 0..NX {
+        for j in 0..NU {
+            b[k][j] = stage.b[k][j];
+        }
+    }
+    // Two rows at a time: what is read of A and B serves both.
+    for i in (0..NX - NX % 2).step_by(2) {
+        let (mut first_a, mut second_a) = ([T::ZERO; NX], [T::ZERO; NX]);
+        let (mut first_b, mut second_b) = ([T::ZERO; WIDE], [T::ZERO; WIDE]);
+        for k in 0..NX {
+            add_multiple(p[i][k], &a[k], &mut first_a);
+            add_multiple(p[i + 1][k], &a[k], &mut second_a);
+            for j in 0..wide {
+                first_b[j] += p[i][k] * b[k][j];
+            }
+            for j in 0..wide {
+                second_b[j] += p[i + 1][k] * b[k][j];
+            }
+        }
+        (pa[i], pa[i + 1]) = (first_a, second_a);
+        (pb[i], pb[i + 1]) = (first_b, second_b);
+    }
+    for i in NX - NX % 2..NX {
+        (pa[i], pb[i]) = ([T::ZERO; NX], [T::ZERO; WIDE]);
         for k in 0..NX {
             add_multiple(p[i][k], &a[k], &mut pa[i]);
             add_multiple(p[i][k], &b[k], &mut pb[i]);
         }
     }
-    let mut hvx = [[T::ZERO; NX]; NU];
-    for k in 0..NX {
-        for i in 0..NU {
+    for i in (0..NU - NU % 2).step_by(2) {
+        let (mut first_x, mut second_x) = ([T::ZERO; NX], [T::ZERO; NX]);
+        let (mut first_v, mut second_v) = (hvv[i], hvv[i + 1]);
+        for k in 0..NX {
+            add_multiple(b[k][i], &pa[k], &mut first_x);
+            add_multiple(b[k][i + 1], &pa[k], &mut second_x);
+            for j in 0..wide {
+                first_v[j] += b[k][i] * pb[k][j];
+            }
+            for j in 0..wide {
+                second_v[j] += b[k][i + 1] * pb[k][j];
+            }
+        }
+        (hvx[i], hvx[i + 1]) = (first_x, second_x);
+        (hvv[i], hvv[i + 1]) = (first_v, second_v);
+    }
+    for i in NU - NU % 2..NU {
+        hvx[i] = [T::ZERO; NX];
+        for k in 0..NX {
             add_multiple(b[k][i], &pa[k], &mut hvx[i]);
             add_multiple(b[k][i], &pb[k], &mut hvv[i]);
         }
@@ -41,7 +85,7 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
     }
     // Y = L⁻¹ H_vx, Z = D⁻¹ Y; P = H_xx − Yᵀ Z; K = L⁻ᵀ Z.
     let factor = &stage.factor;
-    let mut y = hvx;
+    let y = hvx;
     for i in 1..NU {
         for k in 0..i {
             let entry = factor[i][k];
@@ -50,13 +94,18 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
             }
         }
     }
-    let mut z = y;
     for i in 0..NU {
         for j in 0..NX {
             z[i][j] = factor[i][i] * y[i][j];
         }
     }
-    for i in 0..NX {
+    lower_rows::<T, NX, NU, 4>(a, pa, y, z, p);
+    lower_rows::<T, NX, NU, 8>(a, pa, y, z, p);
+    lower_rows::<T, NX, NU, 12>(a, pa, y, z, p);
+    lower_rows::<T, NX, NU, 16>(a, pa, y, z, p);
+    lower_rows::<T, NX, NU, 20>(a, pa, y, z, p);
+    lower_rows::<T, NX, NU, 24>(a, pa, y, z, p);
+    for i in (NX - NX % 4).min(24)..NX {
         let mut row = [T::ZERO; NX];
         for k in 0..NX {
             add_multiple(a[k][i], &pa[k], &mut row);
@@ -82,14 +131,17 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
             }
         }
     }
-    stage.gain = z;
+    stage.gain = *z;
     true
 }
 
 /// `L D Lᵀ` of a symmetric matrix, of which the lower triangle is read; false if it is not positive
 /// definite.
 #[inline(always)]
-fn factorise<T: Real, const NU: usize>(matrix: &[[T; NU]; NU], factor: &mut [[T; NU]; NU]) -> bool {
+fn factorise<T: Real, const NU: usize>(
+    matrix: &[[T; WIDE]; NU],
+    factor: &mut [[T; NU]; NU],
+) -> bool {
     for j in 0..NU {
         let mut pivot = matrix[j][j];
         let mut scaled = [T::ZERO; NU];
@@ -209,4 +261,76 @@ pub(super) fn answer<T: Real, const NX: usize, const NU: usize>(
         v[i] = -sum;
     }
     v
+}
+
+/// `out + M x` for a matrix given by its columns: each row is summed in the order of its entries.
+#[inline(always)]
+pub(super) fn plus_columns<T: Real, const ROWS: usize, const COLS: usize>(
+    columns: &[[T; ROWS]; COLS],
+    x: &[T; COLS],
+    mut out: [T; ROWS],
+) -> [T; ROWS] {
+    for j in 0..COLS {
+        add_multiple(x[j], &columns[j], &mut out);
+    }
+    out
+}
+
+/// Four rows of `P` whose last is row `W - 1`, up to that column.
+#[inline(always)]
+fn lower_rows<T: Real, const NX: usize, const NU: usize, const W: usize>(
+    a: &[[T; NX]; NX],
+    pa: &[[T; NX]; NX],
+    y: &[[T; NX]; NU],
+    z: &[[T; NX]; NU],
+    p: &mut [[T; NX]; NX],
+) {
+    if W > NX {
+        return;
+    }
+    for i in [W - 4, W - 2] {
+        let (mut first, mut second) = ([T::ZERO; W], [T::ZERO; W]);
+        for k in 0..NX {
+            for j in 0..W {
+                first[j] += a[k][i] * pa[k][j];
+            }
+            for j in 0..W {
+                second[j] += a[k][i + 1] * pa[k][j];
+            }
+        }
+        for k in 0..NU {
+            for j in 0..W {
+                first[j] = first[j] - y[k][i] * z[k][j];
+            }
+            for j in 0..W {
+                second[j] = second[j] - y[k][i + 1] * z[k][j];
+            }
+        }
+        p[i][..W].copy_from_slice(&first);
+        p[i + 1][..W].copy_from_slice(&second);
+    }
+}
+
+/// Products of [`eliminate`], kept from stage to stage so that they need not be cleared.
+pub(super) struct Products<T, const NX: usize, const NU: usize> {
+    pa: [[T; NX]; NX],
+    pb: [[T; WIDE]; NX],
+    b: [[T; WIDE]; NX],
+    hvx: [[T; NX]; NU],
+    z: [[T; NX]; NU],
+}
+
+impl<T: Real, const NX: usize, const NU: usize> Products<T, NX, NU> {
+    /// Zeros.
+    #[inline(always)]
+    pub fn new() -> Self {
+        let z = T::ZERO;
+        Self {
+            pa: [[z; NX]; NX],
+            pb: [[z; WIDE]; NX],
+            b: [[z; WIDE]; NX],
+            hvx: [[z; NX]; NU],
+            z: [[z; NX]; NU],
+        }
+    }
 }

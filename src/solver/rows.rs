@@ -1,6 +1,8 @@
 //! The rows of a stage: their numbers, their products with a point, and their share of gradients.
 
+use super::lower::Lower;
 use super::problem::Program;
+use super::riccati::add_multiple;
 use super::scalar::Real;
 
 /// The numbers of one stage's rows.
@@ -38,6 +40,21 @@ impl<'a, T> Rows<'a, T> {
             dslack,
             dmultiplier,
             inverse,
+        }
+    }
+
+    /// Weights of the rows, and multipliers aimed at by a step that does not centre, in `dmultiplier`.
+    #[inline(always)]
+    pub fn weigh(&mut self, left: T)
+    where
+        T: Real,
+    {
+        for i in 0..self.slack.len() {
+            let inverse = T::ONE / self.slack[i];
+            let weight = self.multiplier[i] * inverse;
+            self.inverse[i] = inverse;
+            self.weight[i] = weight;
+            self.dmultiplier[i] = weight * (left * self.residual[i]);
         }
     }
 }
@@ -119,7 +136,10 @@ pub(super) fn part<T, const NX: usize, const NU: usize>(x: &[T; NX], first: usiz
 }
 
 #[inline(always)]
-fn part_mut<T, const NX: usize, const NU: usize>(x: &mut [T; NX], first: usize) -> &mut [T; NU] {
+pub(super) fn part_mut<T, const NX: usize, const NU: usize>(
+    x: &mut [T; NX],
+    first: usize,
+) -> &mut [T; NU] {
     x[first..]
         .first_chunk_mut()
         .expect("rows on states begin at least NU before their end")
@@ -138,6 +158,23 @@ fn add_rows<T: Real, const N: usize>(y: &[T], rows: &[[T; N]], sum: &mut [T; N])
     *sum = local;
 }
 
+/// `square += Σ w row rowᵀ` and `sum += Σ y row`.
+#[inline(always)]
+pub(super) fn add_weighted<T: Real, const N: usize>(
+    w: &[T],
+    y: &[T],
+    rows: &[[T; N]],
+    square: &mut Lower<T, N>,
+    sum: &mut [T; N],
+) {
+    let (mut local, mut local_sum) = (*square, *sum);
+    for ((w, y), row) in w.iter().zip(y).zip(rows) {
+        local.add_square(*w, row);
+        add_multiple(*y, row, &mut local_sum);
+    }
+    (*square, *sum) = (local, local_sum);
+}
+
 #[inline(always)]
 pub(super) fn dot<T: Real, const N: usize>(row: &[T; N], x: &[T; N]) -> T {
     let mut sum = row[0] * x[0];
@@ -145,28 +182,4 @@ pub(super) fn dot<T: Real, const N: usize>(row: &[T; N], x: &[T; N]) -> T {
         sum += row[j] * x[j];
     }
     sum
-}
-
-/// `M += w r rᵀ`.
-#[inline(always)]
-pub(super) fn add_square<T: Real, const N: usize>(w: T, row: &[T; N], matrix: &mut [[T; N]; N]) {
-    for i in 0..N {
-        let factor = w * row[i];
-        for j in 0..N {
-            matrix[i][j] += factor * row[j];
-        }
-    }
-}
-
-#[inline(always)]
-pub(super) fn add_block<T: Real, const N: usize, const NX: usize>(
-    block: &[[T; N]; N],
-    first: usize,
-    matrix: &mut [[T; NX]; NX],
-) {
-    for i in 0..N {
-        for j in 0..N {
-            matrix[first + i][first + j] += block[i][j];
-        }
-    }
 }

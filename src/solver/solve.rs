@@ -1,8 +1,8 @@
 //! The solve: the linear-quadratic optimum if it keeps every row, otherwise iterations from a guess.
 
-use super::interior::{AGAIN, COLD, PATIENCE, SHORT_STEP, WARM};
+use super::interior::{AGAIN, COLD, FAR, FAR_CHANGE, PATIENCE, SHORT_STEP, WARM};
 use super::problem::{Outcome, Program, Report, Residuals, Settings};
-use super::riccati::{add_transposed, answer, eliminate, plus_product, pull};
+use super::riccati::{Products, WIDE, add_transposed, answer, eliminate, plus_product, pull};
 use super::scalar::Real;
 
 impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
@@ -11,6 +11,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     #[inline(always)]
     pub fn prepare(&mut self) -> bool {
         let horizon = self.stages.len();
+        let mut products = Products::new();
         let mut p = [[T::ZERO; NX]; NX];
         let mut linear = [T::ZERO; NX];
         for k in (0..horizon).rev() {
@@ -21,11 +22,11 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             let at = self.at(k);
             let stage = &mut self.stages[at];
             linear = plus_product(&p, &stage.c, linear);
-            let mut hessian = [[T::ZERO; NU]; NU];
+            let mut hessian = [[T::ZERO; WIDE]; NU];
             for i in 0..NU {
                 hessian[i][i] = self.cost.input[i];
             }
-            if !eliminate(stage, &mut p, hessian) {
+            if !eliminate(stage, &mut p, hessian, &mut products) {
                 return false;
             }
             pull(stage, &mut linear, [T::ZERO; NU]);
@@ -49,17 +50,18 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             self.take_gains();
         } else {
             self.start(x0, is_warm);
+            let is_far = self.change_of_gains() > T::of(FAR_CHANGE);
             let mut may_restart = is_warm;
-            let mut centred = Some(if is_warm { WARM } else { COLD });
+            let mut point = self.centre(match (is_warm, is_far) {
+                (false, _) => COLD,
+                (true, true) => FAR,
+                (true, false) => WARM,
+            });
             loop {
-                if let Some(least) = centred.take() {
-                    self.centre(least);
-                }
-                let (infeasibility, complementarity, largest) = self.measure();
-                if !(infeasibility + complementarity).is_finite_number() {
+                if !(point.infeasibility() + point.sum).is_finite_number() {
                     return self.broken(iterations);
                 }
-                if infeasibility <= settings.tolerance && largest <= settings.tolerance {
+                if point.is_optimal(settings) {
                     break;
                 }
                 is_capped = iterations == settings.max_iterations;
@@ -68,12 +70,12 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 }
                 iterations += 1;
                 // Where rounding ends the progress the residuals decide what the point is worth.
-                let Some(length) = self.step(complementarity) else {
+                let Some(length) = self.step(&mut point, settings) else {
                     break;
                 };
                 let is_poor = may_restart && length < T::of(SHORT_STEP);
                 if is_poor || iterations % PATIENCE == 0 {
-                    centred = Some(AGAIN);
+                    point = self.centre(AGAIN);
                 }
                 may_restart = false;
             }
@@ -140,6 +142,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             let at = self.at(k);
             let stage = &mut self.stages[at];
             stage.v = stage.dv;
+            stage.plain = stage.dv;
             stage.x = stage.dx;
             stage.t = T::ZERO;
             let price = self.cost.slack;

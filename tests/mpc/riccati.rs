@@ -121,6 +121,7 @@ impl RandomProgram {
         let settings = Settings {
             max_iterations: 60,
             tolerance: to(tolerance),
+            gap: T::ZERO,
             accepted_residual: to(accepted),
         };
         let report = program.solve(&self.x0.map(to), false, &settings);

@@ -16,7 +16,7 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 52] = sources![
+const SOURCES: [(&str, &str); 53] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
@@ -62,6 +62,7 @@ const SOURCES: [(&str, &str); 52] = sources![
     "robot/registry.rs",
     "robot/wrench.rs",
     "solver/interior.rs",
+    "solver/lower.rs",
     "solver/mod.rs",
     "solver/problem.rs",
     "solver/riccati.rs",

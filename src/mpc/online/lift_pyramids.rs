@@ -84,6 +84,8 @@ impl PyramidLift {
             settings: Settings {
                 max_iterations,
                 tolerance: TOLERANCE,
+                // Torques are at stake: the largest product alone decides.
+                gap: 0.0,
                 accepted_residual,
             },
         }

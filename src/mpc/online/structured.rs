@@ -14,6 +14,8 @@ use crate::solver::{self, Cost, Program, Report, RowMatrices, Settings, Shape, S
 
 /// Complementarity and violation of rows at which iterations end.
 pub const TOLERANCE: f64 = 1e-9;
+/// Gap between primal and dual cost, relative to the cost, at which they end as well.
+pub const GAP: f64 = 1e-8;
 /// Rows of a friction pyramid.
 pub(super) const PYRAMID_ROWS: usize = 4;
 /// Most latent coordinates that the solver is compiled for.
@@ -125,6 +127,7 @@ impl<const NX: usize, const NU: usize> Horizon<NX, NU> {
             settings: Settings {
                 max_iterations: settings.qp.max_iterations,
                 tolerance: TOLERANCE,
+                gap: GAP,
                 accepted_residual: settings.qp.accepted_residual,
             },
             is_warm: false,
