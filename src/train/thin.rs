@@ -151,3 +151,57 @@ impl About {
         xi
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+    use crate::train::judge::Judge;
+    use crate::train::knowledge::Knowledge;
+    use crate::train::oscillator;
+    use crate::train::progress::Progress;
+
+    /// What is left of the known system with a few terms too many; how often its score the limit is.
+    fn left_of_too_many(limit: f64) -> Vec<DMatrix<f64>> {
+        let (dataset, latent) = oscillator::jumps(3);
+        let judge = Judge::new(&dataset, &latent, 0.2);
+        let (features, truth) = oscillator::known();
+        let refiner = Refiner {
+            features: &features,
+            knowledge: &vec![Knowledge::nothing(7, 2); 2],
+            training: &judge,
+            judge: &judge,
+        };
+        let mut xi = truth;
+        (xi[0][(2, 0)], xi[0][(4, 0)], xi[0][(4, 1)]) = (0.3, 0.02, -0.05);
+        (xi[0][(5, 1)], xi[1][(1, 0)]) = (0.01, 0.02);
+        let score = refiner.score(&xi);
+        let (mut nothing, cancel) = (|_: Progress| {}, AtomicBool::new(false));
+        let mut watch = Watch::new(&mut nothing, &cancel);
+        let thinned = refiner.thin(Coefficients { xi, score }, limit * score, &mut watch);
+        assert!(thinned.score <= limit * score);
+        thinned.xi
+    }
+
+    #[test]
+    fn terms_too_many_go_and_those_of_the_system_stay() {
+        let (_, truth) = oscillator::known();
+        let left = left_of_too_many(1.0);
+        for (left, truth) in left.iter().zip(&truth) {
+            for (place, (left, truth)) in left.iter().zip(truth.iter()).enumerate() {
+                let is_input = place % 7 >= 5;
+                assert!(*truth == 0.0 || (left - truth).abs() <= 0.05 * truth.abs());
+                assert!(*truth != 0.0 || is_input || *left == 0.0, "{place}: {left}");
+            }
+        }
+        assert_ne!(left[0][(5, 1)], 0.0); // an input
+    }
+
+    #[test]
+    fn inputs_stay_whatever_may_be_lost() {
+        let left = left_of_too_many(1e9);
+        assert_eq!(left[0].rows(0, 5).amax(), 0.0);
+        assert!(left[0][(5, 0)] != 0.0 && left[0][(6, 1)] != 0.0);
+    }
+}
