@@ -162,14 +162,14 @@ mod tests {
     use crate::train::oscillator;
     use crate::train::progress::Progress;
 
-    /// What is left of the known system with a few terms too many; how often its score the limit is.
+    /// What is left of the known system with a few terms too many, the limit as a share of its score.
     fn left_of_too_many(limit: f64) -> Vec<DMatrix<f64>> {
         let (dataset, latent) = oscillator::jumps(3);
         let judge = Judge::new(&dataset, &latent, 0.2);
         let (features, truth) = oscillator::known();
         let refiner = Refiner {
             features: &features,
-            knowledge: &vec![Knowledge::nothing(7, 2); 2],
+            knowledge: &[Knowledge::nothing(7, 2), Knowledge::nothing(7, 2)],
             training: &judge,
             judge: &judge,
         };
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn terms_too_many_go_and_those_of_the_system_stay() {
         let (_, truth) = oscillator::known();
-        let left = left_of_too_many(1.0);
+        let left = left_of_too_many(0.1);
         for (left, truth) in left.iter().zip(&truth) {
             for (place, (left, truth)) in left.iter().zip(truth.iter()).enumerate() {
                 let is_input = place % 7 >= 5;
