@@ -20,7 +20,7 @@ const JUMPS: [&str; 2] = [
 
 /// Counts, times, what maps and lift alone make of recorded inputs, and what others do: named for what they are, and
 /// not figures of the dynamics.
-const OTHERS: [&str; 10] = [
+const OTHERS: [&str; 11] = [
     "steps",
     "solved",
     "softened",
@@ -29,6 +29,7 @@ const OTHERS: [&str; 10] = [
     "friction_violations",
     "implausible_steps",
     "step_us",
+    "prepare_us",
     "lift",
     "baseline",
 ];

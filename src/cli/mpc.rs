@@ -182,7 +182,7 @@ fn answer(arguments: &MpcArguments, runs: &[NamedRun], remarks: &[String]) -> An
 
 /// One run: what the model is worth, and what happened.
 ///
-/// `steps` to `step_us` count and time the solver's work, `lift` is what the maps and the lift make of recorded inputs:
+/// `steps` to `prepare_us` count and time the solver's work, `lift` is what the maps and the lift make of recorded inputs:
 /// none of these depends on whether the dynamics are right.
 pub fn run_json((path, run): &NamedRun) -> Value {
     let summary = &run.summary;
