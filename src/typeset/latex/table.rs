@@ -6,6 +6,8 @@ use super::document::Fit;
 use super::escape::{TexText, label};
 use super::math::{TexMath, TexNumber, TexSymbol, TexUnit};
 
+/// The word above the terms.
+const TERM_HEAD_EM: f64 = 2.31;
 /// Space around a column, in em: twice LaTeX's `\tabcolsep` at 10 pt.
 const COLUMN_SPACE_EM: f64 = 1.2;
 /// Width of a unit beside a term, in em.
@@ -110,7 +112,7 @@ fn groups(table: &CoefficientTable, width_em: f64) -> Vec<Vec<usize>> {
         let unit = row.unit.map_or(0.0, |_| UNIT_EM);
         width(&row.term.clone().into_math()) + unit
     });
-    let terms = terms.fold(0.0, f64::max) + COLUMN_SPACE_EM;
+    let terms = terms.fold(TERM_HEAD_EM, f64::max) + COLUMN_SPACE_EM;
     let widths: Vec<f64> = (0..table.columns.len())
         .map(|column| {
             let cells = table.rows.iter().map(|row| &row.coefficients[column]);
