@@ -131,6 +131,7 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize
             lift_prior_weight: [1e-3, 1e-2, 1e-4][run % 3],
             linearisation: [Linearisation::Reference, Linearisation::LastPlan][run / 2 % 3 % 2],
             effectiveness,
+            swing_turn: [1.0, 0.0, 0.5][run / 3 % 3],
             ..MpcSettings::default()
         };
         let trusting = MpcSettings {
@@ -174,7 +175,11 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize
             );
             push(
                 &mut bytes,
-                &[settings.foot_friction, settings.lift_prior_weight],
+                &[
+                    settings.foot_friction,
+                    settings.lift_prior_weight,
+                    settings.swing_turn,
+                ],
             );
             push(&mut bytes, reference.time_s);
             push(&mut bytes, reference.x);

@@ -50,6 +50,7 @@ int main(void)
     TRY(terminal_weight, (double)INFINITY);
     TRY(joint_penalty, 0);
     TRY(body_friction, -0.5);
+    TRY(swing_turn, -0.1);
     TRY(effectiveness_time_s, -1);
     TRY(effectiveness_time_s, (double)NAN);
     settings.effectiveness_time_s = 1;

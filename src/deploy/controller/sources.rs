@@ -16,7 +16,7 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 53] = sources![
+const SOURCES: [(&str, &str); 54] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
@@ -49,6 +49,7 @@ const SOURCES: [(&str, &str); 53] = sources![
     "mpc/online/sparse.rs",
     "mpc/online/step.rs",
     "mpc/online/structured.rs",
+    "mpc/online/swing.rs",
     "mpc/online/transcribe.rs",
     "robot/actuators.rs",
     "robot/chain.rs",

@@ -12,8 +12,8 @@ use crate::mpc::interface::Settings;
 use crate::mpc::problem::{Row, StageRows};
 use crate::mpc::shared::{
     DEVIATION_FLOOR, EFFECTIVENESS_RANGE, GAP, HALF_WINDOW_S, LARGEST_WEIGHT, LIFT_CURVATURE,
-    LIFT_ITERATIONS, POSTURE_SHARE, PRIOR_WEIGHT, SLACK_PRICE, SOFTENED_FROM, STATE_REACH,
-    STILL_SHARE, STILL_TIME_S, TOLERANCE,
+    LIFT_ITERATIONS, MOST_TURN_RAD, POSTURE_SHARE, PRIOR_WEIGHT, SLACK_PRICE, SOFTENED_FROM,
+    STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
 };
 use crate::mpc::{ControlModel, FallbackSettings, InputGivenState, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
@@ -51,6 +51,7 @@ pub(super) struct Source<'a> {
     torque_mean: String,
     torque_deviation: String,
     weight_n: f64,
+    most_turn_rad: f64,
     lift_curvature: f64,
     lift_iterations: u32,
     fallback: FallbackSettings,
@@ -189,6 +190,7 @@ impl<'a> Source<'a> {
             ),
             torque_deviation: nested(deviations.iter().map(|rows| numbers.matrix(*rows))),
             weight_n,
+            most_turn_rad: MOST_TURN_RAD,
             lift_curvature: LIFT_CURVATURE,
             lift_iterations: LIFT_ITERATIONS,
             fallback: mpc.fallback,

@@ -32,6 +32,7 @@ mod settings;
 mod sparse;
 mod step;
 mod structured;
+mod swing;
 mod transcribe;
 
 /// Numbers that the controller in C shares, which are no settings.
@@ -45,6 +46,7 @@ pub mod shared {
     pub use super::problem::STATE_REACH;
     pub use super::reference::{DEVIATION_FLOOR, STILL_SHARE, STILL_TIME_S};
     pub use super::structured::{GAP, TOLERANCE};
+    pub use super::swing::MOST_TURN_RAD;
     pub use super::transcribe::SLACK_PRICE;
 }
 

@@ -143,6 +143,9 @@ pub struct MpcSettings {
     pub torque_rate_nm_s: Option<f64>,
     /// Estimates how much of the input arrives, and makes up for it; none trusts the motors.
     pub effectiveness: Option<Effectiveness>,
+    /// Share of the body's error of pitch that the commanded legs are turned against in flight: 0 leaves
+    /// them where the reference has them from the body, 1 where it has them from the ground.
+    pub swing_turn: f64,
     /// Which rows of the constraints are kept.
     pub rows: RowSelection,
     /// What solves the program of a step, and that of the consistent lift.
@@ -171,6 +174,7 @@ impl Default for MpcSettings {
             lift_prior_weight: 1e-3,
             torque_rate_nm_s: None,
             effectiveness: None,
+            swing_turn: 1.0,
             rows: RowSelection::Needed,
             solver: Solver::Clarabel,
             qp: QpSettings::default(),
@@ -224,7 +228,10 @@ impl MpcSettings {
                 });
             }
         }
-        let mut not_negative = vec![("fallback.damping_nm_s", self.fallback.damping_nm_s)];
+        let mut not_negative = vec![
+            ("fallback.damping_nm_s", self.fallback.damping_nm_s),
+            ("swing_turn", self.swing_turn),
+        ];
         if let Some(effectiveness) = &self.effectiveness {
             not_negative.push(("drive_stiffness_nm_rad", effectiveness.stiffness_nm_rad));
             not_negative.push(("drive_damping_nm_s_rad", effectiveness.damping_nm_s_rad));

@@ -144,7 +144,18 @@ impl Controller {
         }
         let input = command.u_lat.as_slice();
         command.phase = Some(self.plan.phase());
-        command.joint_position_rad = self.plant.clamp_joints(self.plant.decode_joints(z));
+        let mut joints = self.plant.decode_joints(z);
+        let in_flight = !self.plant.phases()[self.plan.phase()].is_grounded;
+        if let (true, Some(stance)) = (
+            in_flight && self.settings.swing_turn > 0.0,
+            &self.memory.stance,
+        ) {
+            let error = stance.attitude_rad[1] - reference.attitude_at(time_s)[1];
+            joints = self
+                .plant
+                .turned_legs(&joints, self.settings.swing_turn * error);
+        }
+        command.joint_position_rad = self.plant.clamp_joints(joints);
         command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
         let lifted = self.local_plant().lift(input);
         let (start, end) = (self.plan.start(stage), self.plan.end(stage));

@@ -41,6 +41,8 @@ pub struct Settings {
     pub drive_stiffness_nm_rad: f64,
     /// Its damping, N m s/rad.
     pub drive_damping_nm_s_rad: f64,
+    /// Share of the error of pitch that legs in flight are turned against.
+    pub swing_turn: f64,
 }
 
 impl Default for Settings {
@@ -74,6 +76,7 @@ impl Default for Settings {
             effectiveness_time_s: estimate.map_or(0.0, |estimate| estimate.time_constant_s),
             drive_stiffness_nm_rad: estimate.map_or(0.0, |estimate| estimate.stiffness_nm_rad),
             drive_damping_nm_s_rad: estimate.map_or(0.0, |estimate| estimate.damping_nm_s_rad),
+            swing_turn: settings.swing_turn,
         }
     }
 }
@@ -125,6 +128,7 @@ impl Settings {
                 stiffness_nm_rad: self.drive_stiffness_nm_rad,
                 damping_nm_s_rad: self.drive_damping_nm_s_rad,
             }),
+            swing_turn: self.swing_turn,
             ..MpcSettings::default()
         };
         settings.qp.max_iterations = u32::try_from(self.max_iterations)
