@@ -147,8 +147,8 @@ pub fn predict_changed(
 }
 
 fn write(prediction: &mut DMatrix<f64>, step: usize, position: impl Iterator<Item = f64>) {
-    for (out, z) in prediction.column_mut(step).iter_mut().zip(position) {
-        *out = z;
+    for (i, z) in position.enumerate() {
+        prediction[(i, step)] = z;
     }
 }
 

@@ -139,7 +139,7 @@ impl<'a> Stepper<'a> {
 
     /// Inputs, phases and step lengths of step `step`.
     fn load_inputs(&mut self, step: usize) {
-        let mut first = 0;
+        let (n, mut first) = (self.rows.len(), 0);
         for of_window in self.rows.chunk_by(|a, b| a.window == b.window) {
             let Window { jump, start, .. } = of_window[0].window;
             let rows = first..first + of_window.len();
@@ -152,7 +152,7 @@ impl<'a> Stepper<'a> {
                 let (before, after) = (u[(i, sample)], u[(i, sample + 1)]);
                 let values = [before, 0.5 * (before + after), after];
                 for (input, value) in self.input.iter_mut().zip(values) {
-                    input.view_range_mut(rows.clone(), i).fill(value);
+                    input.as_mut_slice()[i * n..][rows.clone()].fill(value);
                 }
             }
         }
