@@ -1,7 +1,6 @@
 //! Steps of rollouts, many at once: the classical Runge-Kutta method with the vector units of the machine.
 //!
 //! Loops go over indices: iterators of several slices at once are calls in code for other vector units than the rest.
-#![expect(clippy::needless_range_loop, reason = "see above")]
 
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
