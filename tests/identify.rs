@@ -107,6 +107,25 @@ fn shipped_go1_training_jumps_return_the_same_robot() {
 }
 
 #[test]
+fn eight_jumps_have_errors_that_cover_the_simulated_robot_and_its_legs() {
+    let names = [1, 2, 3, 4, 5, 6, 7, 8].map(|i| format!("go1-other/jump_0{i}.csv.gz"));
+    let names = names.each_ref().map(String::as_str);
+    is_the_go1(&names);
+    let Identification {
+        legs,
+        standard_error,
+        ..
+    } = found("go1", &names);
+    let errors = standard_error.legs;
+    for (value, error, truth) in [
+        (legs.thigh_kg_m, errors.thigh_kg_m, 0.0725),
+        (legs.calf_kg_m, errors.calf_kg_m, 0.0286),
+    ] {
+        assert!((value - truth).abs() < 3.0 * error, "{value} ± {error}");
+    }
+}
+
+#[test]
 fn noisy_sensors_and_an_unrecorded_push_widen_the_errors_and_keep_the_robot() {
     let names = [1, 2, 3, 4].map(|i| format!("go1-noisy/train_0{i}.csv.gz"));
     let noisy = found("go1", &names.each_ref().map(String::as_str));

@@ -50,7 +50,7 @@ pub struct Baselines {
 }
 
 /// Figures of the model that knows nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KnowsNothing {
     /// See [`ControlMetrics::prediction_rms`].
     pub prediction_rms: Option<PredictionError>,
@@ -70,7 +70,7 @@ pub struct Pushed {
 }
 
 /// Figures of a baseline that only predicts.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ConstantVelocity {
     /// See [`ControlMetrics::prediction_rms`].
     pub prediction_rms: Option<PredictionError>,
@@ -147,17 +147,17 @@ fn failure(metrics: &ControlMetrics) -> Option<String> {
     let predictions = [
         (
             "a constant velocity",
-            baseline.constant_velocity.prediction_rms,
+            &baseline.constant_velocity.prediction_rms,
         ),
         (
             "a model that knows nothing",
-            baseline.knows_nothing.prediction_rms,
+            &baseline.knows_nothing.prediction_rms,
         ),
     ];
     let mut reasons = Vec::new();
     for (name, other) in predictions {
-        if let (Some(own), Some(other)) = (metrics.prediction_rms, other) {
-            let share = own.share_of(&other);
+        if let (Some(own), Some(other)) = (&metrics.prediction_rms, other) {
+            let share = own.share_of(other);
             if share.is_nan() || share > NO_BETTER {
                 reasons.push(format!(
                     "it predicts one stage ahead with {share:.2} of the error of {name}"

@@ -228,14 +228,14 @@ impl State {
             |step: f64, prepared: &Prepared| step.max(prepared.segment.mean_step_s());
         let step_s = segments.iter().fold(0.0, longest_step);
         let within_step_s = step_s / 12_f64.sqrt();
-        let covariance = self.iteration.covariance(
+        let variances = self.iteration.variances(
             &windows.rows,
-            windows.blocks,
+            &windows.groupings(),
             &priors,
             self.mass_kg,
             within_step_s,
         );
-        let deviation = |i: usize| covariance.map_or(f64::INFINITY, |c| c[(i, i)].sqrt());
+        let deviation = |i: usize| variances.map_or(f64::INFINITY, |all| all[i].sqrt());
         let per_mass = |i: usize| deviation(i) * self.mass_kg;
         let kinds = |first: usize, of: &dyn Fn(usize) -> f64| {
             PerKind::from_array(std::array::from_fn(|kind| of(first + kind)))

@@ -2,8 +2,9 @@
 //!
 //! Rows of a group (contact, flight, joints in the air; by axis or kind) share one residual
 //! deviation, estimated with the unknowns; residuals beyond three deviations count less (Huber).
-//! Residuals of neighbouring windows are alike, so standard errors come from leaving out blocks of 0.1 s in turn
-//! (jackknife), not from the residuals as if they were independent.
+//! Residuals of neighbouring windows are alike, and those of one jump may be, so standard errors come from leaving out
+//! blocks of 0.1 s in turn and, where there are enough, whole jumps (jackknife), not from the residuals as if they were
+//! independent.
 
 use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 
@@ -79,6 +80,18 @@ impl Normal {
             out[*unknown] = solution[place] / scale(*unknown);
         }
         Some(out)
+    }
+
+    /// By how much the free unknowns change when the delay is one unit longer.
+    fn change_by_delay(&self, free: &[usize]) -> Option<Estimate> {
+        let others: Vec<usize> = free.iter().copied().filter(|i| *i != DELAY).collect();
+        let held = Self {
+            matrix: self.matrix,
+            side: -self.matrix.column(DELAY).into_owned(),
+        };
+        let mut change = held.solve(&others)?;
+        change[DELAY] = 1.0;
+        Some(change)
     }
 
     /// Solution with no negative loss, and its free unknowns: an active set that starts from all.
@@ -166,41 +179,53 @@ impl Iteration {
         Some(())
     }
 
-    /// Covariance of the unknowns by leaving out blocks, with the uncertainty of a delay of
+    /// Variances of the unknowns: the largest that leaving out the groups of one of the `groupings` in turn gives
+    /// ([`Windows::groupings`](super::windows::Windows::groupings)), and that of a delay that is uncertain by
     /// `delay_deviation_s` beside the estimated one; `None` as for [`Iteration::step`].
     ///
     /// Unknowns at zero have the variance that they have when they are free.
-    pub fn covariance(
+    pub fn variances(
         &self,
         rows: &[Row],
-        blocks: usize,
+        groupings: &[Vec<usize>],
         priors: &[Prior],
         mass_kg: f64,
         delay_deviation_s: f64,
-    ) -> Option<Square> {
+    ) -> Option<Estimate> {
         let whole = self.normal(rows, priors, mass_kg, |_| true);
-        let mut parts = vec![Normal::ZERO; blocks];
-        for row in rows.iter().filter(|row| row.moving) {
-            parts[row.block].add(row, left(row, mass_kg), self.weight(row, mass_kg));
-        }
-        let parts: Vec<Normal> = parts
-            .into_iter()
-            .filter(|part| part.matrix.trace() > 0.0)
-            .map(Normal::symmetric)
-            .collect();
         let (_, bounded) = whole.solve_not_negative()?;
         let everything: Vec<usize> = (0..PARAMETER_DIM).collect();
-        let tight = spread(&whole, &parts, &bounded, mass_kg, delay_deviation_s)?;
-        if bounded.len() == PARAMETER_DIM {
-            return Some(tight);
-        }
-        let mut covariance = spread(&whole, &parts, &everything, mass_kg, delay_deviation_s)?;
-        for &i in &bounded {
-            for &j in &bounded {
-                covariance[(i, j)] = tight[(i, j)];
+        let parts = groupings
+            .iter()
+            .map(|grouping| self.parts(rows, grouping, mass_kg));
+        let parts: Vec<Vec<Normal>> = parts.collect();
+        let over = |free: &[usize]| {
+            let mut largest = Estimate::zeros();
+            for parts in &parts {
+                largest = largest.sup(&spread(&whole, parts, free)?);
+            }
+            let by_delay = whole.change_by_delay(free)? * (delay_deviation_s / mass_kg);
+            Some(largest + by_delay.component_mul(&by_delay))
+        };
+        let mut variances = over(&bounded)?;
+        if bounded.len() < PARAMETER_DIM {
+            let free = over(&everything)?;
+            for at_zero in (0..PARAMETER_DIM).filter(|i| !bounded.contains(i)) {
+                variances[at_zero] = free[at_zero];
             }
         }
-        Some(covariance)
+        Some(variances)
+    }
+
+    /// The normal equations of every group that has rows.
+    fn parts(&self, rows: &[Row], grouping: &[usize], mass_kg: f64) -> Vec<Normal> {
+        let count = grouping.iter().max().map_or(0, |last| last + 1);
+        let mut parts = vec![Normal::ZERO; count];
+        for row in rows.iter().filter(|row| row.moving) {
+            parts[grouping[row.block]].add(row, left(row, mass_kg), self.weight(row, mass_kg));
+        }
+        let used = (parts.into_iter()).filter(|part| part.matrix.trace() > 0.0);
+        used.map(Normal::symmetric).collect()
     }
 
     fn normal(
@@ -246,36 +271,23 @@ fn huber(residual: f64) -> f64 {
     HUBER / residual.abs().max(HUBER)
 }
 
-/// Jackknife covariance of the free unknowns over blocks.
-fn spread(
-    whole: &Normal,
-    parts: &[Normal],
-    free: &[usize],
-    mass_kg: f64,
-    delay_deviation_s: f64,
-) -> Option<Square> {
+/// Jackknife variances of the free unknowns over groups.
+///
+/// With `n` groups `(n - 1)/n` of the sum of squared changes. This holds for groups of different sizes, too: what a
+/// group changes grows with what it contributes (MacKinnon, Nielsen and Webb, J. Econometrics 232, 2023, CV3).
+fn spread(whole: &Normal, parts: &[Normal], free: &[usize]) -> Option<Estimate> {
     let center = whole.solve(free)?;
-    let mut sum = Square::zeros();
+    let mut sum = Estimate::zeros();
     for part in parts {
         let without = Normal {
             matrix: whole.matrix - part.matrix,
             side: whole.side - part.side,
         };
         let change = without.solve(free)? - center;
-        sum += change * change.transpose();
+        sum += change.component_mul(&change);
     }
     let count = parts.len().max(1) as f64;
-    let mut covariance = sum * ((count - 1.0) / count);
-    let others: Vec<usize> = free.iter().copied().filter(|i| *i != DELAY).collect();
-    let mut by_delay = Normal {
-        matrix: whole.matrix,
-        side: -whole.matrix.column(DELAY).into_owned(),
-    }
-    .solve(&others)?;
-    by_delay[DELAY] = 1.0;
-    by_delay *= delay_deviation_s / mass_kg;
-    covariance += by_delay * by_delay.transpose();
-    Some(covariance)
+    Some(sum * ((count - 1.0) / count))
 }
 
 /// Gravity and inverse mass by the feet's forces alone, over rows in contact; `None` without any.
@@ -300,4 +312,68 @@ pub fn explained(rows: &[Row], estimate: &Estimate, axis: usize) -> f64 {
         .map(|row| residual(row, estimate, 1.0).powi(2))
         .sum();
     1.0 - rest / total
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows that measure gravity: ten blocks in each jump, with the offset of the jump and of a block.
+    fn rows(jumps: &[f64], blocks: &[f64; 10]) -> (Vec<Row>, Vec<Vec<usize>>) {
+        let mut coefficients = [0.0; PARAMETER_DIM];
+        coefficients[GRAVITY] = 1.0;
+        let (mut rows, mut jump_of) = (Vec::new(), Vec::new());
+        for (jump, offset) in jumps.iter().enumerate() {
+            for of_block in blocks {
+                rows.push(Row {
+                    coefficients,
+                    left: 9.8 + offset + of_block,
+                    group: Group::Contact(2),
+                    block: rows.len(),
+                    moving: true,
+                });
+                jump_of.push(jump);
+            }
+        }
+        let blocks = (0..rows.len()).collect();
+        (rows, vec![blocks, jump_of])
+    }
+
+    fn gravity_variance(rows: &[Row], groupings: &[Vec<usize>]) -> f64 {
+        let single = |unknown| Prior {
+            terms: vec![(unknown, 1.0)],
+            deviation: 1.0,
+        };
+        let priors: Vec<Prior> = (1..PARAMETER_DIM).map(single).collect();
+        let mut iteration = Iteration::default();
+        iteration.step(rows, &priors, 1.0).expect("solvable");
+        let variances = iteration.variances(rows, groupings, &priors, 1.0, 0.0);
+        variances.expect("solvable")[GRAVITY]
+    }
+
+    /// Variance of the mean of independent numbers.
+    fn variance_of_mean(numbers: &[f64]) -> f64 {
+        let n = numbers.len() as f64;
+        let mean = numbers.iter().sum::<f64>() / n;
+        numbers.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))
+    }
+
+    #[test]
+    fn errors_that_a_jump_has_in_common_count_once_a_jump() {
+        let jumps = [0.1, -0.2, 0.15, -0.05, 0.1, -0.1];
+        let (same, groupings) = rows(&jumps, &[0.0; 10]);
+        let expected = variance_of_mean(&jumps);
+        let found = gravity_variance(&same, &groupings);
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+        assert!(gravity_variance(&same, &groupings[..1]) < 0.2 * expected);
+    }
+
+    #[test]
+    fn errors_that_jumps_do_not_have_in_common_count_once_a_block() {
+        let blocks = [0.1, -0.2, 0.15, -0.05, 0.1, -0.1, 0.2, -0.1, -0.15, 0.05];
+        let (other, groupings) = rows(&[0.0; 6], &blocks);
+        let expected = variance_of_mean(&blocks.repeat(6));
+        let found = gravity_variance(&other, &groupings);
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    }
 }

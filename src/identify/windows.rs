@@ -23,6 +23,9 @@ const MARGIN_S: f64 = 0.02;
 pub const OVERLAP: usize = 4;
 /// Length of the blocks that are left out in turn for standard errors, s.
 const BLOCK_S: f64 = 0.1;
+/// Fewest jumps that are left out in turn, too, and the largest share of all equations that one of them may have.
+const LEAST_JUMPS: usize = 6;
+const LARGEST_SHARE: f64 = 1.0 / 3.0;
 /// Mean speed of the bearing joints from which their dry friction has a direction, rad/s.
 const MOVING_RAD_S: f64 = 0.1;
 /// Speed that a joint in the air keeps over a window for the same reason, rad/s.
@@ -73,14 +76,16 @@ pub struct Row {
 pub struct Windows {
     /// All equations.
     pub rows: Vec<Row>,
-    /// Number of blocks.
-    pub blocks: usize,
+    /// The segment that each block lies in, counted from zero.
+    pub blocks: Vec<usize>,
     /// Samples with a foot on the ground in windows.
     pub contact_samples: usize,
     /// Samples in flight in windows.
     pub flight_samples: usize,
     /// Samples left out because a leg on the ground was close to a singular posture.
     pub singular_samples: usize,
+    /// Number of segments.
+    segments: usize,
 }
 
 impl Windows {
@@ -99,6 +104,8 @@ impl Windows {
         let window = (samples(WINDOW_S) | 1).max(3);
         let filter = SavitzkyGolay::new(window, 1)?;
         let per_block = samples(BLOCK_S).max(1);
+        let number = self.segments;
+        self.segments += 1;
         for stance in stances(segment) {
             let margin = samples(MARGIN_S);
             let inner = stance.start + margin..stance.end.saturating_sub(margin).max(stance.start);
@@ -110,12 +117,10 @@ impl Windows {
                 let centres = (window / 2..span.len() - window / 2)
                     .step_by((window / OVERLAP).max(1))
                     .collect::<Vec<_>>();
-                let first_block = self.blocks;
+                let first_block = self.blocks.len();
                 let block = |centre: usize| first_block + (centre - window / 2) / per_block;
-                self.blocks = 1 + centres
-                    .iter()
-                    .map(|c| block(*c))
-                    .fold(first_block, usize::max);
+                let last = centres.last().map_or(first_block, |centre| block(*centre));
+                self.blocks.resize(last + 1, number);
                 let averaged = Averaged {
                     filter: &filter,
                     span,
@@ -126,6 +131,24 @@ impl Windows {
             }
         }
         Ok(())
+    }
+
+    /// Ways to divide the blocks into groups that are left out in turn for standard errors: the group of every block.
+    /// Blocks by themselves; and whole segments, which are jumps, where there are at least [`LEAST_JUMPS`] and none has
+    /// more than [`LARGEST_SHARE`] of the equations of the fit.
+    pub fn groupings(&self) -> Vec<Vec<usize>> {
+        let mut groupings = vec![(0..self.blocks.len()).collect()];
+        let mut counts = vec![0; self.segments];
+        for row in self.rows.iter().filter(|row| row.moving) {
+            counts[self.blocks[row.block]] += 1;
+        }
+        let total: usize = counts.iter().sum();
+        let is_large = |count: &usize| *count as f64 > LARGEST_SHARE * total as f64;
+        let n_jumps = counts.iter().filter(|count| **count > 0).count();
+        if n_jumps >= LEAST_JUMPS && !counts.iter().any(is_large) {
+            groupings.push(self.blocks.clone());
+        }
+        groupings
     }
 
     fn add_body(
@@ -242,4 +265,46 @@ fn runs(range: Range<usize>, keep: impl Fn(usize) -> bool) -> Vec<Range<usize>> 
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Windows of segments with so many blocks of one equation each.
+    fn windows(blocks: &[usize]) -> Windows {
+        let mut windows = Windows::default();
+        for (segment, count) in blocks.iter().enumerate() {
+            for _ in 0..*count {
+                windows.rows.push(Row {
+                    coefficients: [0.0; PARAMETER_DIM],
+                    left: 0.0,
+                    group: Group::Contact(0),
+                    block: windows.blocks.len(),
+                    moving: true,
+                });
+                windows.blocks.push(segment);
+            }
+        }
+        windows.segments = blocks.len();
+        windows
+    }
+
+    #[test]
+    fn six_jumps_are_left_out_whole_too() {
+        let six = windows(&[2, 1, 2, 1, 1, 2]);
+        let blocks: Vec<usize> = (0..9).collect();
+        assert_eq!(six.groupings(), [blocks, vec![0, 0, 1, 2, 2, 3, 4, 5, 5]]);
+        for five in [windows(&[2, 1, 2, 1, 2]), windows(&[2, 1, 0, 2, 1, 2])] {
+            assert_eq!(five.groupings(), [vec![0, 1, 2, 3, 4, 5, 6, 7]]);
+        }
+    }
+
+    #[test]
+    fn jumps_of_which_one_has_more_than_a_third_of_the_equations_are_not_left_out() {
+        let mut uneven = windows(&[3, 2, 1, 1, 1, 1]);
+        assert_eq!(uneven.groupings().len(), 2);
+        uneven.rows[4].moving = false;
+        assert_eq!(uneven.groupings().len(), 1);
+    }
 }

@@ -156,10 +156,10 @@ pub fn invariance_table(invariance: &Invariance) -> Table {
 }
 
 /// A row of [`control_table`]: the recording's name, what drives, and its figures.
-struct Driven {
+struct Driven<'a> {
     recording: String,
     controller: &'static str,
-    prediction: Option<PredictionError>,
+    prediction: Option<&'a PredictionError>,
     torque_r2: ByContact,
     recovery_rms_m: Option<f64>,
 }
@@ -169,7 +169,7 @@ pub fn control_table(runs: &[NamedRun]) -> Table {
     let judged = runs
         .iter()
         .filter_map(|(path, run)| Some((path, run.metrics.as_ref()?)));
-    let rows: Vec<Driven> = judged
+    let rows: Vec<Driven<'_>> = judged
         .flat_map(|(path, metrics)| driven(path, metrics))
         .collect();
     let millimetres = |metres: Option<f64>| metres.map(|metres| 1e3 * metres);
@@ -195,7 +195,7 @@ pub fn control_table(runs: &[NamedRun]) -> Table {
         .table()
 }
 
-fn driven(path: &Path, metrics: &ControlMetrics) -> [Driven; 5] {
+fn driven<'a>(path: &Path, metrics: &'a ControlMetrics) -> [Driven<'a>; 5] {
     let baseline = &metrics.baseline;
     let row = |controller, prediction, torque_r2, recovery_rms_m| Driven {
         recording: file_name(path),
@@ -206,18 +206,18 @@ fn driven(path: &Path, metrics: &ControlMetrics) -> [Driven; 5] {
     };
     let none = ByContact::default();
     let blind = &baseline.knows_nothing;
-    let constant = baseline.constant_velocity.prediction_rms;
+    let constant = baseline.constant_velocity.prediction_rms.as_ref();
     let [off, replay] = [baseline.feedback_off, baseline.replay].map(|b| b.recovery_rms_m);
     [
         row(
             "model",
-            metrics.prediction_rms,
+            metrics.prediction_rms.as_ref(),
             metrics.torque_r2,
             metrics.recovery_rms_m,
         ),
         row(
             "knows nothing",
-            blind.prediction_rms,
+            blind.prediction_rms.as_ref(),
             blind.torque_r2,
             blind.recovery_rms_m,
         ),

@@ -297,6 +297,11 @@ impl ExprPool {
         self.facts[expr.index()].symbols & symbol_bit(symbol) != 0
     }
 
+    /// Whether the same symbols occur in both, those beyond the pool's first 63 taken as one.
+    pub(super) fn have_same_symbols(&self, a: ExprId, b: ExprId) -> bool {
+        self.facts[a.index()].symbols == self.facts[b.index()].symbols
+    }
+
     pub(super) fn grade(&self, expr: ExprId) -> u32 {
         self.facts[expr.index()].grade
     }

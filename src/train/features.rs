@@ -125,6 +125,7 @@ impl Features {
     }
 
     /// Values of one term after [`Self::forward`], one per sample.
+    #[inline(always)]
     pub fn term<'a>(&self, values: &'a FeatureValues, term: usize) -> &'a [f64] {
         &values.values[self.tape.terms[term]]
     }

@@ -61,8 +61,13 @@ impl<'a> Judge<'a> {
 
     /// Score of a candidate, see [`Choice::score`](super::select::Choice::score); infinite if a rollout diverges.
     pub fn score(&self, candidate: Candidate<'_>) -> f64 {
+        self.score_within(candidate, f64::MAX)
+    }
+
+    /// The same, or a number above `limit` if the score is: whole jumps are left out if 0.1 s are enough to know.
+    pub fn score_within(&self, candidate: Candidate<'_>, limit: f64) -> f64 {
         let short = self.error(candidate, SHORT);
-        if !short.is_finite() || self.rollout_weight == 0.0 {
+        if short > limit || self.rollout_weight == 0.0 {
             return short;
         }
         short + self.rollout_weight * self.error(candidate, LONG)
@@ -73,61 +78,63 @@ impl<'a> Judge<'a> {
         0..self.parts.len()
     }
 
-    /// For the candidate with each of the `changes`, one at a time: errors of 0.1 s predictions and of whole jumps of a
-    /// part in standard deviations, every [`THINNED`]th sample; none if a rollout diverges.
-    pub fn errors(
+    /// Errors of 0.1 s predictions and of whole jumps of a part in standard deviations, every [`THINNED`]th sample;
+    /// none if a rollout diverges.
+    pub fn errors(&self, candidate: Candidate<'_>, part: usize) -> Option<[DVector<f64>; 2]> {
+        let errors = [SHORT, LONG].map(|kind| {
+            let windows = self.windows_of(part, kind);
+            let predictions = predict(candidate, self.dataset, self.latent, windows);
+            let mut errors = Vec::new();
+            for (window, prediction) in windows.iter().zip(&predictions) {
+                self.add_errors(window, prediction, &mut errors);
+            }
+            DVector::from_vec(errors)
+        });
+        are_finite(&errors).then_some(errors)
+    }
+
+    /// The same for the candidate with each of the `changes`, one at a time.
+    pub fn errors_changed(
         &self,
         candidate: Candidate<'_>,
-        changes: &[Option<Change>],
+        changes: &[Change],
         part: usize,
     ) -> Option<Vec<[DVector<f64>; 2]>> {
         let of_kind = |kind: usize| {
-            let windows = &self.windows[kind][self.parts[part][kind].clone()];
-            self.errors_over(candidate, changes, windows)
-        };
-        let (short, long) = (of_kind(SHORT), of_kind(LONG));
-        let pairs = short
-            .into_iter()
-            .zip(long)
-            .map(|(short, long)| [short, long]);
-        let finite =
-            |pair: &[DVector<f64>; 2]| pair.iter().flatten().all(|error| error.is_finite());
-        pairs.map(|pair| finite(&pair).then_some(pair)).collect()
-    }
-
-    fn errors_over(
-        &self,
-        candidate: Candidate<'_>,
-        changes: &[Option<Change>],
-        windows: &[Window],
-    ) -> Vec<DVector<f64>> {
-        let each = changes
-            .iter()
-            .flat_map(|change| vec![*change; windows.len()]);
-        let repeated = windows.repeat(changes.len());
-        let changed: Vec<_> = each.collect();
-        let predictions =
-            predict_changed(candidate, &changed, self.dataset, self.latent, &repeated);
-        let errors_of = |predictions: &[DMatrix<f64>]| {
-            let mut errors = Vec::new();
-            for (window, prediction) in windows.iter().zip(predictions) {
-                let z = &self.latent[window.jump].z;
-                for step in (THINNED - 1..window.steps).step_by(THINNED) {
-                    for (row, scale) in self.inverse_std.iter().enumerate() {
-                        let truth = z[(row, window.start + 1 + step)];
-                        errors.push((prediction[(row, step)] - truth) * scale);
-                    }
+            let mut errors = vec![Vec::new(); changes.len()];
+            for window in self.windows_of(part, kind) {
+                let predictions =
+                    predict_changed(candidate, changes, self.dataset, self.latent, *window);
+                for (errors, prediction) in errors.iter_mut().zip(&predictions) {
+                    self.add_errors(window, prediction, errors);
                 }
             }
-            DVector::from_vec(errors)
+            errors.into_iter().map(DVector::from_vec)
         };
-        predictions.chunks(windows.len()).map(errors_of).collect()
+        let pairs = of_kind(SHORT).zip(of_kind(LONG));
+        let finite = |errors: [DVector<f64>; 2]| are_finite(&errors).then_some(errors);
+        pairs.map(|(short, long)| finite([short, long])).collect()
+    }
+
+    fn windows_of(&self, part: usize, kind: usize) -> &[Window] {
+        &self.windows[kind][self.parts[part][kind].clone()]
+    }
+
+    /// Adds every [`THINNED`]th error of a window's prediction, in standard deviations.
+    fn add_errors(&self, window: &Window, prediction: &DMatrix<f64>, errors: &mut Vec<f64>) {
+        let z = &self.latent[window.jump].z;
+        for step in (THINNED - 1..window.steps).step_by(THINNED) {
+            for (row, scale) in self.inverse_std.iter().enumerate() {
+                let truth = z[(row, window.start + 1 + step)];
+                errors.push((prediction[(row, step)] - truth) * scale);
+            }
+        }
     }
 
     fn error(&self, candidate: Candidate<'_>, kind: usize) -> f64 {
         let (mut square, mut count) = (0.0, 0);
-        for part in &self.parts {
-            let windows = &self.windows[kind][part[kind].clone()];
+        for part in self.parts() {
+            let windows = self.windows_of(part, kind);
             let predictions = predict(candidate, self.dataset, self.latent, windows);
             for (window, prediction) in windows.iter().zip(&predictions) {
                 let truth = self.latent[window.jump]
@@ -146,6 +153,10 @@ impl<'a> Judge<'a> {
             f64::INFINITY
         }
     }
+}
+
+fn are_finite(errors: &[DVector<f64>; 2]) -> bool {
+    errors.iter().flatten().all(|error| error.is_finite())
 }
 
 /// Consecutive jumps of at most so many samples, or of one jump.
@@ -181,6 +192,22 @@ mod tests {
     use crate::train::oscillator;
 
     #[test]
+    fn score_within_a_limit_is_the_score_or_above_the_limit() {
+        let (dataset, latent) = oscillator::jumps(3);
+        let (features, truth) = oscillator::known();
+        let judge = Judge::new(&dataset, &latent, 0.2);
+        let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();
+        let candidate = Candidate {
+            features: &features,
+            xi: &off,
+        };
+        let (score, short) = (judge.score(candidate), judge.error(candidate, SHORT));
+        assert_eq!(judge.score_within(candidate, score), score);
+        assert_eq!(judge.score_within(candidate, 0.99 * short), short);
+        assert!(judge.score_within(candidate, 0.99 * score) > 0.99 * score);
+    }
+
+    #[test]
     fn errors_in_parts_are_those_of_all_jumps_together() {
         let (dataset, latent) = oscillator::jumps(5);
         let (features, truth) = oscillator::known();
@@ -189,23 +216,24 @@ mod tests {
             features: &features,
             xi: &off,
         };
-        let change = Some(Change {
+        let change = Change {
             place: (0, 1, 0),
             by: 0.01,
-        });
+        };
+        let errors = |judge: &Judge<'_>, part| {
+            let changed = judge.errors_changed(candidate, &[change], part)?;
+            Some([judge.errors(candidate, part)?, changed[0].clone()])
+        };
         let together = Judge::new(&dataset, &latent, 0.2);
         assert_eq!(together.parts(), 0..1);
-        let all = together.errors(candidate, &[None, change], 0);
-        let all = all.expect("no rollout diverges");
+        let all = errors(&together, 0).expect("no rollout diverges");
         assert_ne!(all[0], all[1]);
         for (samples, n_parts) in [(2 * dataset.jumps[0].len(), 3), (1, 5)] {
             let judge = Judge::in_parts(&dataset, &latent, 0.2, samples);
             assert_eq!(judge.parts(), 0..n_parts);
-            let parts = judge.parts().map(|part| {
-                let errors = judge.errors(candidate, &[None, change], part);
-                errors.expect("no rollout diverges")
-            });
-            let parts: Vec<_> = parts.collect();
+            let parts = judge.parts().map(|part| errors(&judge, part));
+            let parts: Option<Vec<_>> = parts.collect();
+            let parts = parts.expect("no rollout diverges");
             for (moved, all) in all.iter().enumerate() {
                 for (kind, all) in all.iter().enumerate() {
                     let found = parts.iter().flat_map(|part| part[moved][kind].iter());

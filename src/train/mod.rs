@@ -39,6 +39,7 @@ mod report;
 mod seeds;
 mod smooth;
 mod split;
+mod stepper;
 mod task;
 mod thin;
 

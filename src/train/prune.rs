@@ -52,10 +52,11 @@ impl Refined<'_> {
             let fitted = self.regressions[phase].fit_column(column, &support, self.ridge);
             let before = self.xi[phase].column(column).into_owned();
             self.xi[phase].set_column(column, &fitted);
-            let score = judge.score(Candidate {
+            let candidate = Candidate {
                 features,
                 xi: &self.xi,
-            });
+            };
+            let score = judge.score_within(candidate, limit);
             if score <= limit {
                 self.score = score;
             } else {
@@ -82,8 +83,9 @@ impl Refined<'_> {
                 support[(row, column)] = true;
                 let fitted = self.regressions[phase].fit_column(column, &support, self.ridge);
                 xi[phase].set_column(column, &fitted);
-                let score = judge.score(Candidate { features, xi: &xi });
-                if score <= (1.0 - LEAST_GAIN) * self.score {
+                let limit = (1.0 - LEAST_GAIN) * self.score;
+                let score = judge.score_within(Candidate { features, xi: &xi }, limit);
+                if score <= limit {
                     self.xi = xi;
                     self.score = score;
                 }

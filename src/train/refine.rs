@@ -20,7 +20,7 @@ const STEP: f64 = 1e-6;
 /// Dampings tried in one step before it is given up.
 const ATTEMPTS: usize = 6;
 /// Coefficients whose rollouts are computed together.
-const TOGETHER: usize = 16;
+const TOGETHER: usize = 64;
 /// Share of the squared errors that a step must lower them by to be followed by another.
 const LEAST_GAIN: f64 = 2e-3;
 
@@ -143,27 +143,21 @@ impl Refiner<'_> {
         })
     }
 
-    /// Errors of a part with each of the changes, weighted and stacked.
-    fn residuals(
+    /// Errors of a part, weighted and stacked; none if a rollout diverges.
+    fn residual(
         &self,
         xi: &[DMatrix<f64>],
-        changes: &[Option<Change>],
         weights: [f64; 2],
         part: usize,
-    ) -> Option<Vec<DVector<f64>>> {
+    ) -> Option<DVector<f64>> {
         let features = self.features;
-        let errors = (self.training).errors(Candidate { features, xi }, changes, part)?;
-        let stacked = errors.into_iter().map(|pair| {
-            let each = pair.iter().zip(weights);
-            let values = each.flat_map(|(errors, weight)| errors.iter().map(move |e| e * weight));
-            DVector::from_vec(values.collect())
-        });
-        Some(stacked.collect())
+        let errors = (self.training).errors(Candidate { features, xi }, part)?;
+        Some(stacked(&errors, weights))
     }
 
     /// Squared errors of all parts; none if a rollout diverges.
     fn squared_error(&self, xi: &[DMatrix<f64>], weights: [f64; 2]) -> Option<f64> {
-        let of_part = |part| Some(self.residuals(xi, &[None], weights, part)?[0].norm_squared());
+        let of_part = |part| Some(self.residual(xi, weights, part)?.norm_squared());
         self.training.parts().map(of_part).sum()
     }
 
@@ -172,8 +166,8 @@ impl Refiner<'_> {
         let features = self.features;
         let mut squares = [0.0; 2];
         for part in self.training.parts() {
-            let errors = (self.training).errors(Candidate { features, xi }, &[None], part)?;
-            for (square, errors) in squares.iter_mut().zip(&errors[0]) {
+            let errors = (self.training).errors(Candidate { features, xi }, part)?;
+            for (square, errors) in squares.iter_mut().zip(&errors) {
                 *square += errors.norm_squared();
             }
         }
@@ -193,25 +187,26 @@ impl Refiner<'_> {
             gram: DMatrix::zeros(places.len(), places.len()),
             gradient: DVector::zeros(places.len()),
         };
+        let features = self.features;
         for part in self.training.parts() {
-            let residual = self.residuals(xi, &[None], weights, part)?.pop()?;
+            let residual = self.residual(xi, weights, part)?;
             let mut sensitivity = DMatrix::zeros(residual.len(), places.len());
             for first in (0..places.len()).step_by(TOGETHER) {
-                let last = (first + TOGETHER).min(places.len());
-                let change = |i: usize| {
-                    Some(Change {
-                        place: places[i],
-                        by: STEP * scales[i],
-                    })
+                let change = |(&place, scale): (&Place, &f64)| Change {
+                    place,
+                    by: STEP * scale,
                 };
-                let changes: Vec<_> = (first..last).map(change).collect();
-                let moved = self.residuals(xi, &changes, weights, part)?;
-                for (column, moved) in (first..last).zip(moved) {
-                    sensitivity.set_column(column, &((moved - &residual) / STEP));
+                let each = places.iter().zip(scales).skip(first).take(TOGETHER);
+                let changes: Vec<_> = each.map(change).collect();
+                let candidate = Candidate { features, xi };
+                let moved = (self.training).errors_changed(candidate, &changes, part)?;
+                for (column, moved) in (first..).zip(&moved) {
+                    let difference = stacked(moved, weights) - &residual;
+                    sensitivity.set_column(column, &(difference / STEP));
                 }
             }
             model.squared_error += residual.norm_squared();
-            model.gram += sensitivity.tr_mul(&sensitivity);
+            add_gram(&mut model.gram, &sensitivity);
             model.gradient += sensitivity.tr_mul(&residual);
         }
         Some(model)
@@ -230,6 +225,26 @@ impl Refiner<'_> {
             }
         }
         places
+    }
+}
+
+/// Errors of both kinds of windows, weighted, one below the other.
+fn stacked(errors: &[DVector<f64>; 2], weights: [f64; 2]) -> DVector<f64> {
+    let each = errors.iter().zip(weights);
+    let values = each.flat_map(|(errors, weight)| errors.iter().map(move |e| e * weight));
+    DVector::from_vec(values.collect())
+}
+
+/// Adds `A^T A`, whose halves are the same.
+fn add_gram(gram: &mut DMatrix<f64>, a: &DMatrix<f64>) {
+    for i in 0..a.ncols() {
+        for j in 0..=i {
+            let product = a.column(i).dot(&a.column(j));
+            gram[(i, j)] += product;
+            if i != j {
+                gram[(j, i)] += product;
+            }
+        }
     }
 }
 

@@ -1,10 +1,13 @@
 //! Light rollouts of candidate models, many at once, for choosing between them.
 
+use std::cmp::Reverse;
+
 use nalgebra::DMatrix;
 
 use super::dataset::Dataset;
-use super::features::{FeatureValues, Features};
+use super::features::Features;
 use super::latent::Latent;
+use super::stepper::{Row, Stepper};
 use crate::sim::{Restart, restart_windows};
 
 /// Latent dynamics under trial: `ddz = Xi_phase^T theta(z, dz, u_lat)`.
@@ -76,177 +79,76 @@ pub fn predict(
     latent: &[Latent],
     windows: &[Window],
 ) -> Vec<DMatrix<f64>> {
-    predict_changed(
-        candidate,
-        &vec![None; windows.len()],
-        dataset,
-        latent,
-        windows,
-    )
-}
-
-/// As [`predict`], each window with its own change of the candidate; many at once cost less than one by one.
-pub fn predict_changed(
-    candidate: Candidate<'_>,
-    changes: &[Option<Change>],
-    dataset: &Dataset,
-    latent: &[Latent],
-    windows: &[Window],
-) -> Vec<DMatrix<f64>> {
     let d = candidate.features.latent_dim();
-    let longest = windows.iter().map(|window| window.steps).max().unwrap_or(0);
     let mut predictions: Vec<_> = windows
         .iter()
         .map(|window| DMatrix::zeros(d, window.steps))
         .collect();
-    let mut state = DMatrix::zeros(windows.len(), 2 * d);
-    for (row, window) in windows.iter().enumerate() {
-        let start = &latent[window.jump];
-        for i in 0..d {
-            state[(row, i)] = start.z[(i, window.start)];
-            state[(row, d + i)] = start.dz[(i, window.start)];
-        }
-    }
-    let mut stepper = Stepper::new(candidate, changes);
+    // The longest first, so that those which still go on are the first rows.
+    let mut order: Vec<usize> = (0..windows.len()).collect();
+    order.sort_by_key(|&window| Reverse(windows[window].steps));
+    let rows = order.iter().map(|&window| Row {
+        window: windows[window],
+        change: None,
+    });
+    let mut stepper = Stepper::new(candidate, dataset, latent, rows.collect());
+    let longest = order.first().map_or(0, |&window| windows[window].steps);
     for step in 0..longest {
-        stepper.load_inputs(dataset, latent, windows, step);
-        stepper.advance(&mut state);
-        for (row, prediction) in predictions.iter_mut().enumerate() {
-            if step < windows[row].steps {
-                (0..d).for_each(|i| prediction[(i, step)] = state[(row, i)]);
-            }
+        let going = order.partition_point(|&window| windows[window].steps > step);
+        stepper.keep(going);
+        stepper.advance(step);
+        for (row, &window) in order[..going].iter().enumerate() {
+            write(&mut predictions[window], step, stepper.position(row));
         }
     }
     predictions
 }
 
-/// RK4 over a batch of windows; rows are windows.
-struct Stepper<'a> {
-    candidate: Candidate<'a>,
-    active: Vec<Vec<Vec<(usize, f64)>>>, // a phase and output: active terms and their coefficients
-    changes: Vec<(usize, Change)>,       // window and its change
-    values: FeatureValues,
-    phase: Vec<usize>,
-    step_s: Vec<f64>,
-    input: [DMatrix<f64>; 3], // at the start, middle and end of the step
-    variables: DMatrix<f64>,  // z, dz, u_lat
-    rates: [DMatrix<f64>; 4], // dz, ddz at the four stages
+/// As [`predict`] for one window, once with each of the changes.
+///
+/// They are computed together, each change from the first sample whose phase has it: until then the candidate is what
+/// it is without.
+pub fn predict_changed(
+    candidate: Candidate<'_>,
+    changes: &[Change],
+    dataset: &Dataset,
+    latent: &[Latent],
+    window: Window,
+) -> Vec<DMatrix<f64>> {
+    let phase = &dataset.jumps[window.jump].phase[window.start..][..window.steps];
+    let first_step = |change: &Change| phase.iter().position(|&phase| phase == change.place.0);
+    let mut joining: Vec<(usize, usize)> = (changes.iter().enumerate())
+        .filter_map(|(number, change)| Some((first_step(change)?, number)))
+        .collect();
+    joining.sort_unstable();
+    let row_of = |number: Option<usize>| Row {
+        window,
+        change: number.map(|number| changes[number]),
+    };
+    let mut stepper = Stepper::new(candidate, dataset, latent, vec![row_of(None)]);
+    let d = candidate.features.latent_dim();
+    let mut predictions = vec![DMatrix::zeros(d, window.steps); changes.len()];
+    let mut rows = vec![0; changes.len()]; // of the candidate without a change until it joins
+    let mut joined = 0;
+    for step in 0..window.steps {
+        let joins = joining.partition_point(|(first, _)| *first <= step);
+        let new = &joining[joined..joins];
+        stepper.join(new.iter().map(|(_, number)| row_of(Some(*number))));
+        for (_, number) in new {
+            joined += 1;
+            rows[*number] = joined;
+        }
+        stepper.advance(step);
+        for (prediction, row) in predictions.iter_mut().zip(&rows) {
+            write(prediction, step, stepper.position(*row));
+        }
+    }
+    predictions
 }
 
-impl<'a> Stepper<'a> {
-    /// A stepper for as many windows as there are `changes`.
-    fn new(candidate: Candidate<'a>, changes: &[Option<Change>]) -> Self {
-        let d = candidate.features.latent_dim();
-        let n_windows = changes.len();
-        let changed = changes.iter().enumerate();
-        let active_of = |xi: &DMatrix<f64>| {
-            let active = |column: usize| {
-                (0..xi.nrows())
-                    .map(|term| (term, xi[(term, column)]))
-                    .filter(|(_, coefficient)| *coefficient != 0.0)
-                    .collect()
-            };
-            (0..d).map(active).collect()
-        };
-        Self {
-            candidate,
-            active: candidate.xi.iter().map(active_of).collect(),
-            changes: changed
-                .filter_map(|(row, change)| Some((row, (*change)?)))
-                .collect(),
-            values: FeatureValues::default(),
-            phase: vec![0; n_windows],
-            step_s: vec![0.0; n_windows],
-            input: std::array::from_fn(|_| DMatrix::zeros(n_windows, d)),
-            variables: DMatrix::zeros(n_windows, 3 * d),
-            rates: std::array::from_fn(|_| DMatrix::zeros(n_windows, 2 * d)),
-        }
-    }
-
-    /// Inputs, phases and step lengths of step `step`; finished windows stand still.
-    fn load_inputs(
-        &mut self,
-        dataset: &Dataset,
-        latent: &[Latent],
-        windows: &[Window],
-        step: usize,
-    ) {
-        for (row, window) in windows.iter().enumerate() {
-            let sample = window.start + step;
-            if step >= window.steps {
-                self.step_s[row] = 0.0;
-                continue;
-            }
-            let jump = &dataset.jumps[window.jump];
-            self.phase[row] = jump.phase[sample];
-            self.step_s[row] = jump.time_s[sample + 1] - jump.time_s[sample];
-            let u = &latent[window.jump].u_lat;
-            for i in 0..u.nrows() {
-                let (first, last) = (u[(i, sample)], u[(i, sample + 1)]);
-                self.input[0][(row, i)] = first;
-                self.input[1][(row, i)] = 0.5 * (first + last);
-                self.input[2][(row, i)] = last;
-            }
-        }
-    }
-
-    fn advance(&mut self, state: &mut DMatrix<f64>) {
-        self.rate(state, 0, 0, 0.0);
-        self.rate(state, 1, 1, 0.5);
-        self.rate(state, 2, 1, 0.5);
-        self.rate(state, 3, 2, 1.0);
-        let [k1, k2, k3, k4] = &self.rates;
-        for column in 0..state.ncols() {
-            for row in 0..state.nrows() {
-                let at = (row, column);
-                let mean = (k1[at] + 2.0 * k2[at] + 2.0 * k3[at] + k4[at]) / 6.0;
-                let next = state[at] + self.step_s[row] * mean;
-                state[at] = if next.abs() < 1e6 {
-                    next
-                } else {
-                    f64::INFINITY
-                };
-            }
-        }
-    }
-
-    /// Rates `[dz; ddz]` of stage `stage`, taken `share` of the step along the rates of the stage before.
-    fn rate(&mut self, state: &DMatrix<f64>, stage: usize, input: usize, share: f64) {
-        let d = self.candidate.features.latent_dim();
-        for column in 0..2 * d {
-            for row in 0..state.nrows() {
-                let moved = match stage {
-                    0 => 0.0,
-                    _ => share * self.step_s[row] * self.rates[stage - 1][(row, column)],
-                };
-                self.variables[(row, column)] = state[(row, column)] + moved;
-            }
-        }
-        self.variables
-            .columns_mut(2 * d, d)
-            .copy_from(&self.input[input]);
-        self.candidate
-            .features
-            .forward(&self.variables, &mut self.values);
-        let rates = &mut self.rates[stage];
-        rates
-            .columns_mut(0, d)
-            .copy_from(&self.variables.columns(d, d));
-        for row in 0..state.nrows() {
-            for (output, active) in self.active[self.phase[row]].iter().enumerate() {
-                let products = active.iter().map(|&(term, coefficient)| {
-                    coefficient * self.candidate.features.term(&self.values, term)[row]
-                });
-                rates[(row, d + output)] = products.sum();
-            }
-        }
-        for &(row, Change { place, by }) in &self.changes {
-            let (phase, term, output) = place;
-            if self.phase[row] == phase {
-                rates[(row, d + output)] +=
-                    by * self.candidate.features.term(&self.values, term)[row];
-            }
-        }
+fn write(prediction: &mut DMatrix<f64>, step: usize, position: impl Iterator<Item = f64>) {
+    for (i, z) in position.enumerate() {
+        prediction[(i, step)] = z;
     }
 }
 
@@ -294,6 +196,57 @@ mod tests {
                 .collect::<Vec<_>>(),
             [0, 50, 100, 150]
         );
+    }
+
+    #[test]
+    fn windows_of_several_lengths_are_predicted_as_each_by_itself() {
+        let (dataset, latent) = oscillator::jumps(2);
+        let (features, xi) = oscillator::known();
+        let candidate = Candidate {
+            features: &features,
+            xi: &xi,
+        };
+        let of = |(jump, start, steps)| Window { jump, start, steps };
+        let windows = [(0, 110, 20), (1, 0, 199), (0, 0, 1), (1, 130, 60)].map(of);
+        let together = predict(candidate, &dataset, &latent, &windows);
+        for (window, prediction) in windows.iter().zip(&together) {
+            let alone = predict(candidate, &dataset, &latent, &[*window]);
+            assert_eq!(prediction, &alone[0], "{window:?}");
+        }
+        assert!(predict(candidate, &dataset, &latent, &[]).is_empty());
+    }
+
+    #[test]
+    fn changes_predict_what_the_changed_coefficients_predict() {
+        let (dataset, latent) = oscillator::jumps(1);
+        let (features, xi) = oscillator::known();
+        let predicted = |xi: &[DMatrix<f64>], window| {
+            let features = &features;
+            let candidate = Candidate { features, xi };
+            predict(candidate, &dataset, &latent, &[window]).remove(0)
+        };
+        let changes = [((1, 0, 1), 0.3), ((0, 1, 0), -2.0), ((0, 2, 1), 0.5)];
+        let changes = changes.map(|(place, by)| Change { place, by });
+        for (start, phases) in [(0, [true, true]), (20, [true, false]), (150, [false, true])] {
+            let window = Window {
+                jump: 0,
+                start,
+                steps: if phases[1] { 199 - start } else { 50 },
+            };
+            let candidate = Candidate {
+                features: &features,
+                xi: &xi,
+            };
+            let found = predict_changed(candidate, &changes, &dataset, &latent, window);
+            let unchanged = predicted(&xi, window);
+            for (Change { place, by }, found) in changes.iter().zip(&found) {
+                let mut changed = xi.clone();
+                changed[place.0][(place.1, place.2)] += by;
+                let expected = predicted(&changed, window);
+                assert!((found - &expected).amax() < 1e-12, "{place:?} {window:?}");
+                assert_eq!(*found != unchanged, phases[place.0], "{place:?} {window:?}");
+            }
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::progress::Watch;
 use super::refine::{Coefficients, Model, PRIOR, Place, Refiner, relative};
+use super::rollout::Candidate;
 
 /// Damping of the changes, relative to each coefficient's own weight.
 const DAMPING: f64 = 1e-3;
@@ -58,7 +59,11 @@ impl Refiner<'_> {
             let found = self.order(about).into_iter().take(ATTEMPTS).find_map(|i| {
                 let without = about.without(i);
                 let xi = without.xi(from);
-                let score = self.score(&xi);
+                let candidate = Candidate {
+                    features: self.features,
+                    xi: &xi,
+                };
+                let score = self.judge.score_within(candidate, limit);
                 (score <= limit).then_some((without, Coefficients { xi, score }))
             });
             let Some((without, coefficients)) = found else {
