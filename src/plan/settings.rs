@@ -56,7 +56,7 @@ impl Default for PlanSettings {
             rate: 0.3,
             smoothness: 3.0,
             feet: 3.0,
-            foot_m: [0.005, 0.0126],
+            foot_m: [0.005, 0.005],
             duration: [4.0, 0.0],
             first_duration: 400.0,
             inset: 0.3,
@@ -68,7 +68,7 @@ impl Default for PlanSettings {
             height_slack_m: 0.02,
             programs: 8,
             warn_deviation: 0.6,
-            refuse_deviation: 1.0,
+            refuse_deviation: 1.2,
             reach: 1.5,
         }
     }
