@@ -19,7 +19,7 @@ use std::io::Write as _;
 
 use romc::mpc::widest::{prepare, solve};
 use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, SparseColumns, needed_rows_of};
-use romc::solver::{Cost, Outcome, Program, RowMatrices, Settings, Shape, Stage};
+use romc::solver::{Cost, Links, Outcome, Program, RowMatrices, Settings, Shape, Stage};
 
 #[path = "shared/clock.rs"]
 mod clock;
@@ -198,6 +198,7 @@ fn run<const NX: usize, const NU: usize>(
                 soft: &[],
                 hard: &hard,
             },
+            links: Links::none(),
             cost,
         };
         let mut report = None;
@@ -254,7 +255,7 @@ fn run<const NX: usize, const NU: usize>(
 }
 
 fn write<const NX: usize, const NU: usize>(
-    program: &mut Program<'_, f64, NX, NU>,
+    program: &mut Program<'_, f64, NX, NU, false>,
     shared: &Loop<NU>,
     step: &Step,
 ) {

@@ -57,9 +57,43 @@ impl<'a, T> Rows<'a, T> {
             self.dmultiplier[i] = weight * (left * self.residual[i]);
         }
     }
+
+    /// The same of rows that are softened.
+    #[inline(always)]
+    pub fn weigh_softened(&mut self, softness: T)
+    where
+        T: Real,
+    {
+        for i in 0..self.slack.len() {
+            let yield_of_row = softness * self.multiplier[i];
+            let inverse = T::ONE / (self.slack[i] + yield_of_row);
+            let weight = self.multiplier[i] * inverse;
+            self.inverse[i] = inverse;
+            self.weight[i] = weight;
+            self.dmultiplier[i] = weight * (self.residual[i] + yield_of_row);
+        }
+    }
+
+    /// Changes of slacks and multipliers of rows that are softened, from the products of the rows in `target` and
+    /// the multipliers aimed at in `dmultiplier`; into `target`, how often they go into what is left of each.
+    #[inline(always)]
+    pub fn change_softened(&mut self, softness: T)
+    where
+        T: Real,
+    {
+        for i in 0..self.slack.len() {
+            let change = self.target[i];
+            let dmultiplier = self.dmultiplier[i] - self.multiplier[i] + self.weight[i] * change;
+            let dslack = softness * dmultiplier - (self.residual[i] + change);
+            self.dslack[i] = dslack;
+            self.dmultiplier[i] = dmultiplier;
+            let to_multiplier = -dmultiplier / self.multiplier[i];
+            self.target[i] = (-dslack / self.slack[i]).or_larger(to_multiplier);
+        }
+    }
 }
 
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     #[inline(always)]
     pub(super) fn rows_of(&mut self, stage: usize) -> Rows<'_, T> {
         let (count, memory) = (self.shape.rows(), self.shape.memory());
@@ -67,10 +101,17 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         Rows::of(&mut self.rows[first..][..memory], count)
     }
 
-    /// The rows of a stage times a point, into their `target`.
+    /// The rows of a stage times a point, into their `target`; `before` is the input of the stage before.
     #[inline(always)]
-    pub(super) fn rows_times(&mut self, k: usize, v: &[T; NU], x: &[T; NX], t: T) -> Rows<'_, T> {
+    pub(super) fn rows_times(
+        &mut self,
+        k: usize,
+        (before, v): (&[T; NU], &[T; NU]),
+        x: &[T; NX],
+        t: T,
+    ) -> Rows<'_, T> {
         let place = self.at(k);
+        let (own, earlier) = self.link_pairs(k);
         let (shape, stage, matrices) = (self.shape, &self.stages[place], self.matrices);
         let (count, memory) = (shape.rows(), shape.memory());
         let rows = Rows::of(&mut self.rows[place * memory..][..memory], count);
@@ -88,9 +129,18 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         }
         if shape.hard > 0 {
             let z: &[T; NU] = part(x, shape.hard_offset);
-            let hard = &mut rest[usize::from(shape.soft > 0)..];
+            let hard = &mut rest[usize::from(shape.soft > 0)..][..shape.hard];
             for (out, row) in hard.iter_mut().zip(&matrices.hard[stage.hard_rows..]) {
                 *out = dot(row, z);
+            }
+        }
+        if LINKED {
+            let link = &mut rows.target[count - shape.link..];
+            for (out, row) in link.iter_mut().zip(own) {
+                *out = dot(row, v);
+            }
+            for (out, row) in link.iter_mut().zip(earlier) {
+                *out = *out - dot(row, before);
             }
         }
         rows
@@ -120,9 +170,12 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             by_t -= rest[shape.soft];
         }
         if shape.hard > 0 {
-            let y = &rest[shape.soft + usize::from(shape.soft > 0)..];
+            let y = &rest[shape.soft + usize::from(shape.soft > 0)..][..shape.hard];
             let hard = &matrices.hard[stage.hard_rows..];
             add_rows(y, hard, part_mut(by_x, shape.hard_offset));
+        }
+        if LINKED {
+            add_rows(&y[y.len() - shape.link..], self.link_rows(k), by_v);
         }
         by_t
     }
@@ -182,4 +235,38 @@ pub(super) fn dot<T: Real, const N: usize>(row: &[T; N], x: &[T; N]) -> T {
         sum += row[j] * x[j];
     }
     sum
+}
+
+/// The largest of numbers and one more, four at a time.
+#[inline(always)]
+pub(super) fn largest_of<T: Real>(values: &[T], so_far: T) -> T {
+    let mut lanes = [so_far; 4];
+    let (fours, rest) = values.as_chunks::<4>();
+    for four in fours {
+        for j in 0..4 {
+            lanes[j] = four[j].or_larger(lanes[j]);
+        }
+    }
+    for (lane, value) in lanes.iter_mut().zip(rest) {
+        *lane = value.or_larger(*lane);
+    }
+    lanes[0]
+        .or_larger(lanes[1])
+        .or_larger(lanes[2].or_larger(lanes[3]))
+}
+
+/// The sum of numbers in four parts, those of every fourth one.
+#[inline(always)]
+pub(super) fn sum_of<T: Real>(values: &[T]) -> T {
+    let mut parts = [T::ZERO; 4];
+    let (fours, rest) = values.as_chunks::<4>();
+    for four in fours {
+        for j in 0..4 {
+            parts[j] += four[j];
+        }
+    }
+    for (part, value) in parts.iter_mut().zip(rest) {
+        *part += *value;
+    }
+    (parts[0] + parts[1]) + (parts[2] + parts[3])
 }

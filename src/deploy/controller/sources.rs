@@ -16,7 +16,7 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 53] = sources![
+const SOURCES: [(&str, &str); 55] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
@@ -62,8 +62,10 @@ const SOURCES: [(&str, &str); 53] = sources![
     "robot/registry.rs",
     "robot/wrench.rs",
     "solver/interior.rs",
+    "solver/links.rs",
     "solver/lower.rs",
     "solver/mod.rs",
+    "solver/point.rs",
     "solver/problem.rs",
     "solver/riccati.rs",
     "solver/rows.rs",

@@ -158,7 +158,15 @@ impl StageRows {
         };
         let rate = match settings.torque_rate_nm_s {
             None => Vec::new(),
-            Some(rate) => select(both_sides(plant, |_| rate * settings.step_s, 0.0)),
+            Some(rate) => {
+                // Which rows are needed does not depend on the rate: they are chosen for 1 N m a stage.
+                let limit_nm = rate * settings.step_s;
+                let mut rows = select(both_sides(plant, |_| 1.0, 0.0));
+                for entry in rows.iter_mut().flat_map(|row| &mut row.row) {
+                    *entry /= limit_nm;
+                }
+                rows
+            }
         };
         Self {
             torque,
