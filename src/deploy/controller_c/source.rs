@@ -12,8 +12,8 @@ use crate::mpc::interface::Settings;
 use crate::mpc::problem::{Row, StageRows};
 use crate::mpc::shared::{
     DEVIATION_FLOOR, EFFECTIVENESS_RANGE, GAP, HALF_WINDOW_S, LARGEST_WEIGHT, LIFT_CURVATURE,
-    LIFT_ITERATIONS, POSTURE_SHARE, PRIOR_WEIGHT, SLACK_PRICE, SOFTENED_FROM, STATE_REACH,
-    STILL_SHARE, STILL_TIME_S, TOLERANCE,
+    LIFT_ITERATIONS, POSTURE_SHARE, PRIOR_WEIGHT, RATE_SOFTNESS, RATE_TOLERANCE, SLACK_PRICE,
+    SOFTENED_FROM, STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
 };
 use crate::mpc::{ControlModel, FallbackSettings, InputGivenState, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
@@ -23,6 +23,10 @@ use crate::solver;
 const SINGLE: (f64, f64) = (1e-4, 1e-3);
 /// Complementarity of a lift in single precision: with that of the plan torques would be off by 0.1 N m.
 const SINGLE_LIFT: f64 = 1e-6;
+
+/// Complementarity and softness of rows with limits on torque rates in single precision: weights of rows stay below the
+/// inverse of its rounding.
+const SINGLE_RATE: (f64, f64) = (1e-4, 1e-5);
 
 /// `NAME_controller.c`.
 #[derive(Template)]
@@ -72,6 +76,8 @@ pub(super) struct Source<'a> {
     torque_bound: String,
     torque_per_loss: String,
     torque_joint: String,
+    n_rate: usize,
+    rate_rows: String,
     joint_rows: String,
     joint_bound: String,
     joint_lower: String,
@@ -94,6 +100,8 @@ struct SolverNumbers {
     tolerance: String,
     lift_tolerance: String,
     gap: String,
+    rate_tolerance: String,
+    rate_softness: String,
     left: String,
     accepted_residual: String,
     margin: (String, String),
@@ -223,6 +231,8 @@ impl<'a> Source<'a> {
             torque_bound: numbers.vector(rows.torque.iter().map(|row| row.bound)),
             torque_per_loss: numbers.vector(rows.torque.iter().map(|row| row.per_loss)),
             torque_joint: integers(rows.torque.iter().map(|row| row.joint as i64)),
+            n_rate: rows.rate.len(),
+            rate_rows: row_matrix(&rows.rate),
             joint_rows: row_matrix(&rows.joint),
             joint_bound: numbers.vector(rows.joint.iter().map(|row| row.bound)),
             joint_lower: numbers.vector(limits.iter().map(|limit| limit.0)),
@@ -248,6 +258,10 @@ impl SolverNumbers {
             Precision::Double => (TOLERANCE, accepted_residual),
             Precision::Single => SINGLE,
         };
+        let (rate_tolerance, rate_softness) = match precision {
+            Precision::Double => (RATE_TOLERANCE, RATE_SOFTNESS),
+            Precision::Single => SINGLE_RATE,
+        };
         let one = |value: f64| format!("{value:?}");
         let pair = |(first, second)| (one(first), one(second));
         Self {
@@ -258,6 +272,8 @@ impl SolverNumbers {
                 Precision::Single => SINGLE_LIFT,
             }),
             gap: one(GAP),
+            rate_tolerance: one(rate_tolerance),
+            rate_softness: one(rate_softness),
             left: one(solver::LEFT),
             accepted_residual: one(accepted),
             margin: pair(solver::MARGIN),
