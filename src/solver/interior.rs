@@ -178,10 +178,11 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             }
             let mut hessian = Lower::diagonal(&self.cost.input);
             let input = &self.matrices.input[stage.input_rows..];
+            let input_numbers = (&w[..shape.input], &y[..shape.input]);
             add_weighted(
-                &w[..shape.input],
-                &y[..shape.input],
+                input_numbers,
                 input,
+                shape.pairs.input,
                 &mut hessian,
                 &mut by_v,
             );
@@ -200,7 +201,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
                     by_t -= *y;
                     add_multiple(*w, row, &mut pull);
                 }
-                add_weighted(&w[..shape.soft], &y[..shape.soft], soft, &mut square, by_z);
+                let numbers = (&w[..shape.soft], &y[..shape.soft]);
+                add_weighted(numbers, soft, 0, &mut square, by_z);
                 stage.soft_pull = pull;
                 stage.soft_inverse = T::ONE / (curvature + w[shape.soft]);
                 stage.dt = -(by_t - y[shape.soft]) * stage.soft_inverse;
@@ -215,8 +217,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
                 let hard = &self.matrices.hard[stage.hard_rows..];
                 let mut square = Lower::zeros();
                 let by_z = part_mut(&mut by_x, shape.hard_offset);
-                let (w, y) = (&w[own..][..shape.hard], &y[own..]);
-                add_weighted(w, y, hard, &mut square, by_z);
+                let numbers = (&w[own..][..shape.hard], &y[own..][..shape.hard]);
+                add_weighted(numbers, hard, shape.pairs.hard, &mut square, by_z);
                 square.add_to(shape.hard_offset, &mut p);
             }
             if !LINKED {
@@ -226,7 +228,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
                 pull(stage, &mut by_x, by_v);
                 continue;
             }
-            add_weighted(links.0, links.1, own_links, &mut hessian, &mut by_v);
+            add_weighted(links, own_links, 0, &mut hessian, &mut by_v);
             let hessian = after.add_to(stage, &hessian, &mut by_v, &mut products.hvx);
             if !eliminate::<T, NX, NU, true>(stage, &mut p, hessian, &mut products) {
                 return false;

@@ -68,5 +68,7 @@ pub use links::Links;
 pub use point::{
     AGAIN, COLD, FAR, FAR_CHANGE, LEFT, MARGIN, MARGIN_FACTOR, PATIENCE, SHORT_STEP, WARM,
 };
-pub use problem::{Cost, Outcome, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage};
+pub use problem::{
+    Cost, Outcome, Pairs, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage,
+};
 pub use scalar::Real;

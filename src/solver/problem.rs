@@ -98,6 +98,18 @@ pub struct Shape {
     pub hard_offset: usize,
     /// Rows that link the input to that of the stage before; none unless the program has [`Links`].
     pub link: usize,
+    /// How many pairs of opposite rows come first, the two sides of a limit: `row, −row`. Each takes the
+    /// products and squares of one row.
+    pub pairs: Pairs,
+}
+
+/// Pairs of opposite rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Pairs {
+    /// Among the rows on the input.
+    pub input: usize,
+    /// Among the hard rows.
+    pub hard: usize,
 }
 
 impl Shape {

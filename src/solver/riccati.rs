@@ -57,11 +57,11 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize, const BEGUN: 
             add_multiple(p[i][k], &b[k], &mut pb[i]);
         }
     }
-    if !BEGUN {
-        *hvx = [[T::ZERO; NX]; NU];
-    }
     for i in (0..NU - NU % 2).step_by(2) {
-        let (mut first_x, mut second_x) = (hvx[i], hvx[i + 1]);
+        let (mut first_x, mut second_x) = match BEGUN {
+            true => (hvx[i], hvx[i + 1]),
+            false => ([T::ZERO; NX], [T::ZERO; NX]),
+        };
         let (mut first_v, mut second_v) = (hvv[i], hvv[i + 1]);
         for k in 0..NX {
             add_multiple(b[k][i], &pa[k], &mut first_x);
@@ -77,6 +77,9 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize, const BEGUN: 
         (hvv[i], hvv[i + 1]) = (first_v, second_v);
     }
     for i in NU - NU % 2..NU {
+        if !BEGUN {
+            hvx[i] = [T::ZERO; NX];
+        }
         for k in 0..NX {
             add_multiple(b[k][i], &pa[k], &mut hvx[i]);
             add_multiple(b[k][i], &pb[k], &mut hvv[i]);

@@ -116,9 +116,12 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         let (count, memory) = (shape.rows(), shape.memory());
         let rows = Rows::of(&mut self.rows[place * memory..][..memory], count);
         let (input, rest) = rows.target.split_at_mut(shape.input);
-        for (out, row) in input.iter_mut().zip(&matrices.input[stage.input_rows..]) {
-            *out = dot(row, v);
-        }
+        times(
+            &matrices.input[stage.input_rows..],
+            shape.pairs.input,
+            v,
+            input,
+        );
         let (soft, rest) = rest.split_at_mut(shape.soft);
         if shape.soft > 0 {
             let z: &[T; NU] = part(x, 0);
@@ -130,15 +133,11 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         if shape.hard > 0 {
             let z: &[T; NU] = part(x, shape.hard_offset);
             let hard = &mut rest[usize::from(shape.soft > 0)..][..shape.hard];
-            for (out, row) in hard.iter_mut().zip(&matrices.hard[stage.hard_rows..]) {
-                *out = dot(row, z);
-            }
+            times(&matrices.hard[stage.hard_rows..], shape.pairs.hard, z, hard);
         }
         if LINKED {
             let link = &mut rows.target[count - shape.link..];
-            for (out, row) in link.iter_mut().zip(own) {
-                *out = dot(row, v);
-            }
+            times(own, 0, v, link);
             for (out, row) in link.iter_mut().zip(earlier) {
                 *out = *out - dot(row, before);
             }
@@ -158,7 +157,12 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     ) -> T {
         let (shape, stage, matrices) = (self.shape, &self.stages[self.at(k)], self.matrices);
         let (input, rest) = y.split_at(shape.input);
-        add_rows(input, &matrices.input[stage.input_rows..], by_v);
+        add_rows(
+            input,
+            &matrices.input[stage.input_rows..],
+            shape.pairs.input,
+            by_v,
+        );
         let mut by_t = T::ZERO;
         if shape.soft > 0 {
             by_t = self.cost.slack;
@@ -166,16 +170,16 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
                 by_t -= *y;
             }
             let soft = &matrices.soft[stage.soft_rows..];
-            add_rows(&rest[..shape.soft], soft, part_mut(by_x, 0));
+            add_rows(&rest[..shape.soft], soft, 0, part_mut(by_x, 0));
             by_t -= rest[shape.soft];
         }
         if shape.hard > 0 {
             let y = &rest[shape.soft + usize::from(shape.soft > 0)..][..shape.hard];
             let hard = &matrices.hard[stage.hard_rows..];
-            add_rows(y, hard, part_mut(by_x, shape.hard_offset));
+            add_rows(y, hard, shape.pairs.hard, part_mut(by_x, shape.hard_offset));
         }
         if LINKED {
-            add_rows(&y[y.len() - shape.link..], self.link_rows(k), by_v);
+            add_rows(&y[y.len() - shape.link..], self.link_rows(k), 0, by_v);
         }
         by_t
     }
@@ -198,30 +202,60 @@ pub(super) fn part_mut<T, const NX: usize, const NU: usize>(
         .expect("rows on states begin at least NU before their end")
 }
 
-/// `sum += Σ y row`.
+/// Pairs of numbers, and the numbers behind them.
 #[inline(always)]
-fn add_rows<T: Real, const N: usize>(y: &[T], rows: &[[T; N]], sum: &mut [T; N]) {
+fn paired<V>(values: &[V], pairs: usize) -> (&[[V; 2]], &[V]) {
+    let (paired, single) = values.split_at(2 * pairs);
+    (paired.as_chunks().0, single)
+}
+
+/// `out = rows x`, of which so many pairs of opposite rows come first.
+#[inline(always)]
+fn times<T: Real, const N: usize>(rows: &[[T; N]], pairs: usize, x: &[T; N], out: &mut [T]) {
+    let (row_pairs, row_singles) = paired(rows, pairs);
+    let (out_pairs, out_singles) = out.split_at_mut(2 * pairs);
+    for (out, [row, _]) in out_pairs.as_chunks_mut().0.iter_mut().zip(row_pairs) {
+        let product = dot(row, x);
+        *out = [product, -product];
+    }
+    for (out, row) in out_singles.iter_mut().zip(row_singles) {
+        *out = dot(row, x);
+    }
+}
+
+/// `sum += Σ y row`, of which so many pairs of opposite rows come first.
+#[inline(always)]
+fn add_rows<T: Real, const N: usize>(y: &[T], rows: &[[T; N]], pairs: usize, sum: &mut [T; N]) {
     // A local sum stays in registers.
     let mut local = *sum;
-    for (y, row) in y.iter().zip(rows) {
-        for j in 0..N {
-            local[j] += *y * row[j];
-        }
+    let (row_pairs, row_singles) = paired(rows, pairs);
+    let (y_pairs, y_singles) = paired(y, pairs);
+    for ([y, opposite], [row, _]) in y_pairs.iter().zip(row_pairs) {
+        add_multiple(*y - *opposite, row, &mut local);
+    }
+    for (y, row) in y_singles.iter().zip(row_singles) {
+        add_multiple(*y, row, &mut local);
     }
     *sum = local;
 }
 
-/// `square += Σ w row rowᵀ` and `sum += Σ y row`.
+/// `square += Σ w row rowᵀ` and `sum += Σ y row`, of which so many pairs of opposite rows come first.
 #[inline(always)]
 pub(super) fn add_weighted<T: Real, const N: usize>(
-    w: &[T],
-    y: &[T],
+    (w, y): (&[T], &[T]),
     rows: &[[T; N]],
+    pairs: usize,
     square: &mut Lower<T, N>,
     sum: &mut [T; N],
 ) {
     let (mut local, mut local_sum) = (*square, *sum);
-    for ((w, y), row) in w.iter().zip(y).zip(rows) {
+    let (row_pairs, row_singles) = paired(rows, pairs);
+    let ((w_pairs, w_singles), (y_pairs, y_singles)) = (paired(w, pairs), paired(y, pairs));
+    for (([w, other_w], [y, other_y]), [row, _]) in w_pairs.iter().zip(y_pairs).zip(row_pairs) {
+        local.add_square(*w + *other_w, row);
+        add_multiple(*y - *other_y, row, &mut local_sum);
+    }
+    for ((w, y), row) in w_singles.iter().zip(y_singles).zip(row_singles) {
         local.add_square(*w, row);
         add_multiple(*y, row, &mut local_sum);
     }

@@ -5,7 +5,7 @@ use romc::mpc::{
     Cone, ConeProgram, Controller, Lift, MpcSettings, Outcome, QpSettings, QpSolver, Solver,
     SparseColumns,
 };
-use romc::solver::{self, Cost, Links, Program, Real, RowMatrices, Settings, Shape, Stage};
+use romc::solver::{self, Cost, Links, Pairs, Program, Real, RowMatrices, Settings, Shape, Stage};
 
 use crate::random::Random;
 
@@ -18,6 +18,7 @@ const SHAPE: Shape = Shape {
     hard: 2,
     hard_offset: 3,
     link: 0,
+    pairs: Pairs { input: 2, hard: 1 },
 };
 /// Rows of a stage, and those that link its input to the one before.
 const ROWS: usize = 11;
@@ -42,6 +43,16 @@ struct RandomProgram {
 
 const PRICE: f64 = 8.0;
 
+/// The rows of all stages, `count` each, with so many pairs of opposite rows first.
+fn with_opposites(mut rows: Vec<[f64; NU]>, count: usize, pairs: usize) -> Vec<[f64; NU]> {
+    for stage in rows.chunks_exact_mut(count) {
+        for [row, opposite] in stage[..2 * pairs].as_chunks_mut::<2>().0 {
+            *opposite = row.map(|entry| -entry);
+        }
+    }
+    rows
+}
+
 impl RandomProgram {
     fn new(random: &mut Random, tightness: f64) -> Self {
         let row = |random: &mut Random| std::array::from_fn::<f64, NU, _>(|_| random.signed());
@@ -62,6 +73,10 @@ impl RandomProgram {
                 bounds.push(scale * (0.3 + random.signed().abs()));
             }
         }
+        let (input, hard): (Vec<_>, Vec<_>) = (
+            rows(SHAPE.input * HORIZON, random),
+            rows(SHAPE.hard * HORIZON, random),
+        );
         Self {
             a: (stages.clone())
                 .map(|_| std::array::from_fn(|i| std::array::from_fn(|j| near_one(i, j, random))))
@@ -72,9 +87,9 @@ impl RandomProgram {
             c: stages
                 .map(|_| std::array::from_fn(|_| 0.1 * random.signed()))
                 .collect(),
-            input: rows(SHAPE.input * HORIZON, random),
+            input: with_opposites(input, SHAPE.input, SHAPE.pairs.input),
             soft: rows(SHAPE.soft, random),
-            hard: rows(SHAPE.hard * HORIZON, random),
+            hard: with_opposites(hard, SHAPE.hard, SHAPE.pairs.hard),
             bounds,
             link: Vec::new(),
             link_bounds: Vec::new(),

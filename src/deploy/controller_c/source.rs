@@ -9,7 +9,7 @@ use crate::codegen::Precision;
 use crate::codegen::interface::ModelInterface;
 use crate::deploy::controller::texts;
 use crate::mpc::interface::Settings;
-use crate::mpc::problem::{Row, StageRows};
+use crate::mpc::problem::{Row, StageRows, pairs};
 use crate::mpc::shared::{
     DEVIATION_FLOOR, EFFECTIVENESS_RANGE, GAP, HALF_WINDOW_S, LARGEST_WEIGHT, LIFT_CURVATURE,
     LIFT_ITERATIONS, POSTURE_SHARE, PRIOR_WEIGHT, RATE_SOFTNESS, RATE_TOLERANCE, SLACK_PRICE,
@@ -24,9 +24,9 @@ const SINGLE: (f64, f64) = (1e-4, 1e-3);
 /// Complementarity of a lift in single precision: with that of the plan torques would be off by 0.1 N m.
 const SINGLE_LIFT: f64 = 1e-6;
 
-/// Complementarity and softness of rows with limits on torque rates in single precision: weights of rows stay below the
-/// inverse of its rounding.
-const SINGLE_RATE: (f64, f64) = (1e-4, 1e-5);
+/// Complementarity and softness of rows with limits on torque rates in single precision: weights of rows stay far below
+/// the inverse of its rounding.
+const SINGLE_RATE: (f64, f64) = (1e-5, 1e-4);
 
 /// `NAME_controller.c`.
 #[derive(Template)]
@@ -39,6 +39,7 @@ pub(super) struct Source<'a> {
     f: &'static str,
     n_phases: usize,
     n_torque: usize,
+    n_torque_pairs: usize,
     n_joint: usize,
     max_nnz: usize,
     has_actuators: bool,
@@ -165,6 +166,7 @@ impl<'a> Source<'a> {
             f: facts.f,
             n_phases: facts.n_phases,
             n_torque: rows.torque.len(),
+            n_torque_pairs: pairs(&rows.torque),
             n_joint: rows.joint.len(),
             max_nnz: (entries.phases.iter())
                 .map(|phase| phase.pattern.len())

@@ -6,11 +6,13 @@
 
 use std::fmt::Debug;
 
-use super::problem::StageRows;
+use super::problem::{StageRows, pairs};
 use super::qp::Outcome;
 use super::settings::MpcSettings;
 use super::transcribe::{SLACK_PRICE, Stage as StageData, Weights};
-use crate::solver::{self, Cost, Links, Program, Report, RowMatrices, Settings, Shape, Stage};
+use crate::solver::{
+    self, Cost, Links, Pairs, Program, Report, RowMatrices, Settings, Shape, Stage,
+};
 
 /// Complementarity and violation of rows at which iterations end.
 pub const TOLERANCE: f64 = 1e-9;
@@ -116,6 +118,10 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             input: rows.torque.len() + pyramid,
             soft: rows.joint.len(),
             link: rows.rate.len(),
+            pairs: Pairs {
+                input: pairs(&rows.torque),
+                hard: 0,
+            },
             ..Shape::default()
         };
         let scale = SLACK_PRICE / weights.joint_penalty;
