@@ -19,7 +19,7 @@ use std::io::Write as _;
 
 use romc::mpc::widest::{prepare, solve};
 use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, SparseColumns, needed_rows_of};
-use romc::solver::{Cost, Outcome, Program, RowMatrices, Settings, Shape, Stage};
+use romc::solver::{Cost, Links, Outcome, Pairs, Program, RowMatrices, Settings, Shape, Stage};
 
 #[path = "shared/clock.rs"]
 mod clock;
@@ -134,11 +134,26 @@ fn read_loop<const NU: usize>(reader: &mut Reader, horizon: usize) -> Loop<NU> {
     }
 }
 
-/// The rows without those that the others imply.
+/// The rows without those that the others imply; opposite rows come first, in pairs.
 fn needed<const NU: usize>(rows: Vec<([f64; NU], f64)>) -> Vec<([f64; NU], f64)> {
     let all: Vec<(Vec<f64>, f64)> = rows.iter().map(|(row, b)| (row.to_vec(), *b)).collect();
-    let kept = needed_rows_of(&all, 0.0);
-    kept.into_iter().map(|index| rows[index]).collect()
+    let kept: Vec<_> = (needed_rows_of(&all, 0.0).into_iter())
+        .map(|index| rows[index])
+        .collect();
+    let is_paired = |(row, _): &&([f64; NU], f64)| {
+        let opposite = row.map(|entry| -entry);
+        kept.iter().any(|(other, _)| *other == opposite)
+    };
+    let (paired, single): (Vec<_>, Vec<_>) = kept.iter().partition(is_paired);
+    paired.into_iter().chain(single).copied().collect()
+}
+
+/// How many pairs of opposite rows come first.
+fn pairs<const NU: usize>(rows: &[[f64; NU]]) -> usize {
+    let (twos, _) = rows.as_chunks::<2>();
+    (twos.iter())
+        .take_while(|[row, other]| row.map(|entry| -entry) == *other)
+        .count()
 }
 
 fn read_step<const NX: usize, const NU: usize>(reader: &mut Reader, horizon: usize) -> Step {
@@ -166,6 +181,10 @@ fn run<const NX: usize, const NU: usize>(
     let shape = Shape {
         input: input.len(),
         hard: hard.len(),
+        pairs: Pairs {
+            input: pairs(&input),
+            hard: pairs(&hard),
+        },
         ..Shape::default()
     };
     let state: [f64; NX] = std::array::from_fn(|i| 2.0 * shared.state_weight[i]);
@@ -198,6 +217,7 @@ fn run<const NX: usize, const NU: usize>(
                 soft: &[],
                 hard: &hard,
             },
+            links: Links::none(),
             cost,
         };
         let mut report = None;
@@ -254,7 +274,7 @@ fn run<const NX: usize, const NU: usize>(
 }
 
 fn write<const NX: usize, const NU: usize>(
-    program: &mut Program<'_, f64, NX, NU>,
+    program: &mut Program<'_, f64, NX, NU, false>,
     shared: &Loop<NU>,
     step: &Step,
 ) {

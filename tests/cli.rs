@@ -985,6 +985,40 @@ fn mpc_commands_stay_inside_the_torque_limits() {
 }
 
 #[test]
+fn mpc_limits_how_fast_torques_change_with_either_solver() {
+    let folder = folder();
+    let largest_change = |more: &[&str]| {
+        let table = path(&folder, "commands.csv");
+        done(&[&["mpc", MODEL, JUMP, "--output", &table, "--force"], more].concat());
+        let rows = fs::read_to_string(&table).expect("a table");
+        let header: Vec<&str> = rows.lines().next().expect("a header").split(',').collect();
+        let names = &romc::robot::Robot::input_names()[..12];
+        let is_lifted = |column: &usize| names.iter().any(|name| *name == header[*column]);
+        let columns: Vec<usize> = (0..header.len()).filter(is_lifted).collect();
+        assert_eq!(columns.len(), 12);
+        let torques: Vec<Vec<f64>> = (rows.lines().skip(1))
+            .map(|row| {
+                let cells: Vec<&str> = row.split(',').collect();
+                let torque = |column: &usize| cells[*column].parse().expect("a number");
+                columns.iter().map(torque).collect()
+            })
+            .collect();
+        let changes = torques.windows(2).flat_map(|pair| {
+            let pairs = pair[0].iter().zip(&pair[1]);
+            pairs.map(|(a, b)| (b - a).abs()).collect::<Vec<_>>()
+        });
+        changes.fold(0.0, f64::max)
+    };
+    let free = largest_change(&[]);
+    assert!(free > 4.0, "{free} N m in 10 ms");
+    for solver in ["clarabel", "riccati"] {
+        let limited = largest_change(&["--torque-rate", "100", "--solver", solver]);
+        // Rows that others imply to within 2 % are left out.
+        assert!(limited < 1.03, "{solver}: {limited} N m in 10 ms");
+    }
+}
+
+#[test]
 fn inspect_tells_findings_of_a_recording_and_parts_of_a_model() {
     let value = json(&["inspect", MODEL, JUMP]);
     assert_eq!(value["files"][0]["latent_dim"], 4);

@@ -79,11 +79,23 @@ fn push_counts(bytes: &mut Vec<u8>, values: &[i64]) {
     bytes.extend(values.iter().flat_map(|value| value.to_ne_bytes()));
 }
 
+/// Whether most of the runs have limits on torque rates.
+#[derive(Clone, Copy, PartialEq)]
+enum Rates {
+    Free,
+    Limited,
+}
+
 /// Steps of random measurements along random variations of recorded jumps, with what the library
 /// commands, as `replay.c` reads them; how many latent inputs the estimate of the share that
 /// arrives has changed, and how many consistent lifts are limited and
 /// how many fail. Every second run has that estimate.
-fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize, [usize; 2]) {
+fn replay_file(
+    model: &ReducedModel,
+    steps: usize,
+    seed: u64,
+    rates: Rates,
+) -> (Vec<u8>, usize, [usize; 2]) {
     let mut random = Random::new(seed);
     let mut bytes = Vec::new();
     let (mut done, mut changed, mut lifts) = (0, 0, [0; 2]);
@@ -132,6 +144,10 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize
             linearisation: [Linearisation::Reference, Linearisation::LastPlan][run / 2 % 3 % 2],
             effectiveness,
             swing_turn: [1.0, 0.0, 0.5][run / 3 % 3],
+            torque_rate_nm_s: match rates {
+                Rates::Free => None,
+                Rates::Limited => [Some(300.0), Some(100.0), None, Some(1000.0)][run % 4],
+            },
             ..MpcSettings::default()
         };
         let trusting = MpcSettings {
@@ -178,6 +194,7 @@ fn replay_file(model: &ReducedModel, steps: usize, seed: u64) -> (Vec<u8>, usize
                 &[
                     settings.foot_friction,
                     settings.lift_prior_weight,
+                    settings.torque_rate_nm_s.unwrap_or(0.0),
                     settings.swing_turn,
                 ],
             );
@@ -316,7 +333,7 @@ fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_
         let program = emitted.program("cc", &[], replay.to_str().expect("UTF-8"));
         let file = emitted.scratch.path().join("steps");
         let (steps, changed, [limited, failed]) =
-            replay_file(&model, step_count() / 5, number as u64);
+            replay_file(&model, step_count() / 5, number as u64, Rates::Free);
         assert!(changed > 50, "inputs hardly change: {changed}");
         assert!(limited > 50, "the lift is hardly limited: {limited}");
         fs::write(&file, steps).expect("written");
@@ -340,17 +357,48 @@ fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_
 }
 
 #[test]
+fn controller_in_c_repeats_the_library_bit_for_bit_with_limits_on_torque_rates() {
+    for (number, name) in ["go1-d2", "go1-d4", "go1-d6"].into_iter().enumerate() {
+        let emitted = Emitted::new(&shipped(name), Precision::Double);
+        let replay = root().join("tests/controller_c/replay.c");
+        let rates = format!("-D{}_TORQUE_RATES=1", emitted.name.to_ascii_uppercase());
+        let program = emitted.program("cc", &[&rates], replay.to_str().expect("UTF-8"));
+        let file = emitted.scratch.path().join("steps");
+        let (steps, ..) = replay_file(
+            &shipped(name),
+            step_count() / 5,
+            7 + number as u64,
+            Rates::Limited,
+        );
+        fs::write(&file, steps).expect("written");
+        let output = succeed(Command::new(program).arg(&file));
+        let text = String::from_utf8_lossy(&output.stdout);
+        println!("{name}: {text}");
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let count = |word: &str, before: usize| -> usize {
+            let at = words.iter().position(|other| *other == word);
+            words[at.expect("reported") - before]
+                .parse()
+                .expect("a count")
+        };
+        let (done, active, fallbacks) =
+            (count("steps,", 1), count("with", 1), count("fallbacks,", 1));
+        assert!(
+            active > done / [20, 3, 3][number],
+            "rates hardly bind: {text}"
+        );
+        assert!(2 * fallbacks < done, "hardly any plans: {text}");
+    }
+}
+
+#[test]
 fn settings_that_are_refused_are_named() {
     let emitted = Emitted::new(&shipped("go1-d2"), Precision::Double);
-    let program = emitted.program(
-        "cc",
-        &[],
-        root()
-            .join("tests/controller_c/settings.c")
-            .to_str()
-            .expect("UTF-8"),
-    );
-    succeed(&mut Command::new(program));
+    let source = root().join("tests/controller_c/settings.c");
+    for rates in ["-DGO1_D2_TORQUE_RATES=0", "-DGO1_D2_TORQUE_RATES=1"] {
+        let program = emitted.program("cc", &[rates], source.to_str().expect("UTF-8"));
+        succeed(&mut Command::new(program));
+    }
 }
 
 #[test]

@@ -41,6 +41,7 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
         step_s: arguments.step,
         lift: arguments.lift,
         solver: arguments.solver,
+        torque_rate_nm_s: arguments.torque_rate,
         ..MpcSettings::default()
     };
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;

@@ -51,6 +51,8 @@ pub const LAMBDA: Range = Range::real("lambda", 0.0, 1e6);
 pub const HORIZON: Range = Range::whole("horizon", 1, 500);
 /// Length of a stage in seconds.
 pub const STEP: Range = Range::real("step", 1e-4, 1.0);
+/// Largest change of a commanded torque in N m/s.
+pub const TORQUE_RATE: Range = Range::real("torque-rate", 1e-3, 1e9);
 /// Time between restarts of rollouts in seconds.
 pub const RESTART_EVERY: Range = Range::real("restart-every", 1e-3, 1e4);
 /// Reach of a domain beyond the recordings, as a share of each variable's range.

@@ -1,67 +1,12 @@
 //! One iteration of the interior point, and where iterations begin.
 
+use super::links::{Before, answer_before, pull_before, take_answer};
 use super::lower::Lower;
+use super::point::{Point, boundary_share};
 use super::problem::{Program, Settings};
 use super::riccati::{Products, add_multiple, answer, eliminate, plus_columns, plus_product, pull};
-use super::rows::{Rows, add_weighted, dot, part, part_mut};
+use super::rows::{Rows, add_weighted, dot, largest_of, part, part_mut, sum_of};
 use super::scalar::Real;
-
-/// Share of the way to the boundary that a step leaves: the least and the most.
-pub const MARGIN: (f64, f64) = (1e-3, 5e-3);
-/// The share between the two, in units of the mean complementarity: near the optimum steps may go further.
-pub const MARGIN_FACTOR: f64 = 10.0;
-/// Smallest slack and smallest product of slack and multiplier at a start from the gains.
-pub const COLD: (f64, f64) = (3e-1, 3.0);
-/// The same at a start from a guess.
-pub const WARM: (f64, f64) = (1e-2, 1e-3);
-/// The same at a start from a guess at the solution of quite another program.
-pub const FAR: (f64, f64) = (3e-1, 1.0);
-/// The same where a guess turned out to be poor, or the iterations go round in a circle.
-pub const AGAIN: (f64, f64) = (1e-1, 2e-1);
-/// A guess is of quite another program if the optimum without rows moved further than this, in units of
-/// the input's rows.
-pub const FAR_CHANGE: f64 = 3.0;
-/// A first step from a guess that is shorter than this shows that the guess is not near a solution.
-pub const SHORT_STEP: f64 = 0.4;
-/// Iterations after which slacks and multipliers are centred again: now and then the method goes round
-/// in a circle.
-pub const PATIENCE: u32 = 16;
-
-/// Share of the residuals at the last centring, those of the gradient among them, that may be left.
-pub const LEFT: f64 = 1e-6;
-
-/// How far a point is from the optimum.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Point<T> {
-    /// Share of the rows' residuals that the steps since the last centring have left.
-    pub left: T,
-    /// Largest residual of a row at the last centring.
-    pub residual: T,
-    /// Sum of the products of slacks and multipliers.
-    pub sum: T,
-    /// The largest of them.
-    pub largest: T,
-    /// `Σ vᵀ R v + xᵀ Q x`, one before the first step.
-    pub value: T,
-}
-
-impl<T: Real> Point<T> {
-    /// Largest residual of a row.
-    #[inline(always)]
-    pub fn infeasibility(&self) -> T {
-        self.left * self.residual
-    }
-
-    /// Whether the iterations may end here: gradient and rows hold, and each product, or the gap between primal
-    /// and dual cost, is small.
-    #[inline(always)]
-    pub fn is_optimal(&self, settings: &Settings<T>) -> bool {
-        self.left <= T::of(LEFT)
-            && self.infeasibility() <= settings.tolerance
-            && (self.largest <= settings.tolerance
-                || self.sum <= settings.gap * T::ONE.or_larger(self.value))
-    }
-}
 
 /// How far a change of all unknowns may go, and the products of the changes of slacks and multipliers.
 struct Reach<T> {
@@ -73,11 +18,12 @@ struct Reach<T> {
     second_largest: T,
 }
 
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     /// First point of the iterations, to be centred: the guess, or the point of the gains.
     #[inline(always)]
     pub(super) fn start(&mut self, x0: &[T; NX], is_warm: bool) {
-        let (price, slack_row) = (self.cost.slack, self.shape.input + self.shape.soft);
+        let (price, soft) = (self.cost.slack, self.shape.soft);
+        let slack_row = self.shape.input + soft;
         let mut x = *x0;
         for k in 0..self.stages.len() {
             let at = self.at(k);
@@ -94,7 +40,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 for multiplier in rows.multiplier.iter_mut() {
                     *multiplier = T::ZERO;
                 }
-                if slack_row < rows.multiplier.len() {
+                if soft > 0 {
                     rows.multiplier[slack_row] = price;
                 }
             }
@@ -108,6 +54,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         let mut largest = T::ZERO;
         for k in 0..self.stages.len() {
             let at = self.at(k);
+            let links = self.link_rows(k);
             let stage = &mut self.stages[at];
             let mut change = stage.dv;
             for i in 0..NU {
@@ -115,7 +62,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             }
             stage.plain = stage.dv;
             let matrix = &self.matrices.input[stage.input_rows..][..shape.input];
-            for row in matrix {
+            for row in matrix.iter().chain(links) {
                 largest = dot(row, &change).magnitude().or_larger(largest);
             }
         }
@@ -128,10 +75,12 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     pub(super) fn centre(&mut self, (smallest, product): (f64, f64)) -> Point<T> {
         let (smallest, product) = (T::of(smallest), T::of(product));
         let (mut residual, mut sum, mut largest) = (T::ZERO, T::ZERO, T::ZERO);
+        let mut before = [T::ZERO; NU];
         for k in 0..self.stages.len() {
             let stage = &self.stages[self.at(k)];
             let (v, x, t) = (stage.v, stage.x, stage.t);
-            let rows = self.rows_times(k, &v, &x, t);
+            let rows = self.rows_times(k, (&before, &v), &x, t);
+            before = v;
             for i in 0..rows.bound.len() {
                 let room = rows.bound[i] - rows.target[i];
                 let slack = smallest.or_larger(room);
@@ -148,6 +97,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         }
         Point {
             left: T::ONE,
+            kept: T::ONE,
             residual,
             sum,
             largest,
@@ -158,7 +108,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     /// One step of Mehrotra's method; its length, none if a Hessian is not positive definite.
     #[inline(always)]
     pub(super) fn step(&mut self, point: &mut Point<T>, settings: &Settings<T>) -> Option<T> {
-        if !self.predict(point.left) {
+        if !self.predict(point.kept) {
             return None;
         }
         let count = T::of((self.shape.rows() * self.stages.len()) as f64);
@@ -170,9 +120,9 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         let mut aim = T::ZERO;
         for is_corrected in [false, true] {
             if is_corrected {
-                self.pull_all(point.left, aim);
+                self.pull_all(point.kept, aim);
             }
-            let reach = self.advance(point.left, is_corrected);
+            let reach = self.advance(point.kept, is_corrected);
             longest = share / reach.times.or_larger(share);
             if !is_corrected {
                 // What is left of the products, exactly: a change that does not centre cancels their
@@ -180,6 +130,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 let (rest, square) = (T::ONE - longest, longest * longest);
                 let predicted = Point {
                     left: rest * point.left,
+                    kept: rest * point.kept,
                     sum: rest * point.sum + square * reach.second_sum,
                     largest: rest * point.largest + square * reach.second_largest,
                     ..*point
@@ -202,14 +153,19 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     #[inline(always)]
     fn predict(&mut self, left: T) -> bool {
         let (horizon, shape) = (self.stages.len(), self.shape);
+        let mut after = Before::none();
         let mut products = Products::new();
         let mut p = [[T::ZERO; NX]; NX];
         let mut by_x = [T::ZERO; NX];
         for k in (0..horizon).rev() {
             let weight = self.cost.state_at(k, horizon);
             let (at, memory) = (self.at(k), shape.memory());
+            let (own_links, earlier_links) = self.link_pairs(k);
             let mut rows = Rows::of(&mut self.rows[at * memory..][..memory], shape.rows());
-            rows.weigh(left);
+            match LINKED {
+                true => rows.weigh_softened(self.links.softness),
+                false => rows.weigh(left),
+            }
             let (w, y) = (&*rows.weight, &*rows.dmultiplier);
             let stage = &mut self.stages[at];
             let mut by_v = [T::ZERO; NU];
@@ -222,13 +178,16 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             }
             let mut hessian = Lower::diagonal(&self.cost.input);
             let input = &self.matrices.input[stage.input_rows..];
+            let input_numbers = (&w[..shape.input], &y[..shape.input]);
             add_weighted(
-                &w[..shape.input],
-                &y[..shape.input],
+                input_numbers,
                 input,
+                shape.pairs.input,
                 &mut hessian,
                 &mut by_v,
             );
+            let first_link = w.len() - shape.link;
+            let links = (&w[first_link..], &y[first_link..]);
             let (w, y) = (&w[shape.input..], &y[shape.input..]);
             if shape.soft > 0 {
                 let soft = &self.matrices.soft[stage.soft_rows..];
@@ -242,7 +201,8 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                     by_t -= *y;
                     add_multiple(*w, row, &mut pull);
                 }
-                add_weighted(&w[..shape.soft], &y[..shape.soft], soft, &mut square, by_z);
+                let numbers = (&w[..shape.soft], &y[..shape.soft]);
+                add_weighted(numbers, soft, 0, &mut square, by_z);
                 stage.soft_pull = pull;
                 stage.soft_inverse = T::ONE / (curvature + w[shape.soft]);
                 stage.dt = -(by_t - y[shape.soft]) * stage.soft_inverse;
@@ -257,13 +217,27 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 let hard = &self.matrices.hard[stage.hard_rows..];
                 let mut square = Lower::zeros();
                 let by_z = part_mut(&mut by_x, shape.hard_offset);
-                add_weighted(&w[own..], &y[own..], hard, &mut square, by_z);
+                let numbers = (&w[own..][..shape.hard], &y[own..][..shape.hard]);
+                add_weighted(numbers, hard, shape.pairs.hard, &mut square, by_z);
                 square.add_to(shape.hard_offset, &mut p);
             }
-            if !eliminate(stage, &mut p, hessian.rows(), &mut products) {
+            if !LINKED {
+                if !eliminate::<T, NX, NU, false>(stage, &mut p, hessian.rows(), &mut products) {
+                    return false;
+                }
+                pull(stage, &mut by_x, by_v);
+                continue;
+            }
+            add_weighted(links, own_links, 0, &mut hessian, &mut by_v);
+            let hessian = after.add_to(stage, &hessian, &mut by_v, &mut products.hvx);
+            if !eliminate::<T, NX, NU, true>(stage, &mut p, hessian, &mut products) {
                 return false;
             }
-            pull(stage, &mut by_x, by_v);
+            let h = pull(stage, &mut by_x, by_v);
+            if k > 0 {
+                let gain = &mut self.links.gains[at];
+                after = Before::of_stage(stage, gain, links, (own_links, earlier_links), &h);
+            }
         }
         true
     }
@@ -273,13 +247,18 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     #[inline(always)]
     fn pull_all(&mut self, left: T, aim: T) {
         let (horizon, shape) = (self.stages.len(), self.shape);
+        let softness = self.links.softness;
         let mut p = [T::ZERO; NX];
+        let mut by_after = [T::ZERO; NU];
         for k in (0..horizon).rev() {
             let rows = self.rows_of(k);
             for i in 0..rows.slack.len() {
                 let second = rows.dslack[i] * rows.dmultiplier[i];
-                rows.dmultiplier[i] =
-                    rows.weight[i] * (left * rows.residual[i]) + (aim - second) * rows.inverse[i];
+                let residual = match LINKED {
+                    true => rows.residual[i] + softness * rows.multiplier[i],
+                    false => left * rows.residual[i],
+                };
+                rows.dmultiplier[i] = rows.weight[i] * residual + (aim - second) * rows.inverse[i];
             }
             let stage = &self.stages[self.at(k)];
             let weight = self.cost.state_at(k, horizon);
@@ -303,7 +282,19 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 }
             }
             p = by_x;
-            pull(stage, &mut p, by_v);
+            if !LINKED {
+                pull(stage, &mut p, by_v);
+                continue;
+            }
+            for i in 0..NU {
+                by_v[i] += by_after[i];
+            }
+            let h = pull(stage, &mut p, by_v);
+            if k > 0 {
+                let aims = &self.rows[at * memory + 8 * count - shape.link..][..shape.link];
+                by_after = pull_before(aims, self.link_pairs(k).1);
+                take_answer(&self.links.gains[at], &h, &mut by_after);
+            }
         }
     }
 
@@ -313,11 +304,16 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     fn advance(&mut self, left: T, is_corrected: bool) -> Reach<T> {
         let shape = self.shape;
         let (mut times, mut second_sum, mut second_largest) = (T::ZERO, T::ZERO, T::ZERO);
+        let softness = self.links.softness;
         let mut dx = [T::ZERO; NX];
+        let mut before = [T::ZERO; NU];
         for k in 0..self.stages.len() {
             let at = self.at(k);
             let stage = &mut self.stages[at];
             stage.dv = answer(stage, &dx);
+            if LINKED && k > 0 {
+                answer_before(&self.links.gains[at], &before, &mut stage.dv);
+            }
             dx = plus_columns(&stage.a_columns, &dx, [T::ZERO; NX]);
             dx = plus_columns(&stage.b_columns, &stage.dv, dx);
             stage.dx = dx;
@@ -328,8 +324,15 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 stage.dt += pulled * stage.soft_inverse;
             }
             let (dv, dt) = (stage.dv, stage.dt);
-            let rows = self.rows_times(k, &dv, &dx, dt);
-            if is_corrected {
+            let mut rows = self.rows_times(k, (&before, &dv), &dx, dt);
+            before = dv;
+            if LINKED {
+                rows.change_softened(softness);
+                times = largest_of(rows.target, times);
+                if is_corrected {
+                    continue;
+                }
+            } else if is_corrected {
                 for i in 0..rows.target.len() {
                     let change = rows.target[i];
                     let dslack = -(left * rows.residual[i]) - change;
@@ -343,16 +346,17 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 }
                 times = largest_of(rows.target, times);
                 continue;
+            } else {
+                for i in 0..rows.target.len() {
+                    let dslack = -(left * rows.residual[i]) - rows.target[i];
+                    rows.dslack[i] = dslack;
+                    rows.dmultiplier[i] = -rows.multiplier[i] - rows.weight[i] * dslack;
+                    // The relative changes of slack and multiplier have the sum of minus one.
+                    let to_slack = -dslack * rows.inverse[i];
+                    rows.target[i] = to_slack.or_larger(T::ONE - to_slack);
+                }
+                times = largest_of(rows.target, times);
             }
-            for i in 0..rows.target.len() {
-                let dslack = -(left * rows.residual[i]) - rows.target[i];
-                rows.dslack[i] = dslack;
-                rows.dmultiplier[i] = -rows.multiplier[i] - rows.weight[i] * dslack;
-                // The relative changes of slack and multiplier have the sum of minus one.
-                let to_slack = -dslack * rows.inverse[i];
-                rows.target[i] = to_slack.or_larger(T::ONE - to_slack);
-            }
-            times = largest_of(rows.target, times);
             for i in 0..rows.target.len() {
                 rows.target[i] = rows.dslack[i] * rows.dmultiplier[i];
             }
@@ -370,7 +374,8 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     #[inline(always)]
     fn move_by(&mut self, length: T, point: &mut Point<T>) {
         let (mut sum, mut largest, mut value) = (T::ZERO, T::ZERO, T::ZERO);
-        let horizon = self.stages.len();
+        let mut residual = T::ZERO;
+        let (horizon, softness) = (self.stages.len(), self.links.softness);
         for k in 0..horizon {
             let weight = self.cost.state_at(k, horizon);
             let at = self.at(k);
@@ -392,60 +397,27 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             }
             sum += sum_of(rows.target);
             largest = largest_of(rows.target, largest);
+            if LINKED {
+                for i in 0..rows.residual.len() {
+                    rows.residual[i] = (T::ONE - length) * rows.residual[i]
+                        + length * (softness * rows.dmultiplier[i]);
+                    residual = rows.residual[i].magnitude().or_larger(residual);
+                }
+            }
         }
         // The rows are linear: each step takes its share of all residuals.
+        let rest = T::ONE - length;
         *point = Point {
-            left: (T::ONE - length) * point.left,
-            residual: point.residual,
+            left: rest * point.left,
+            kept: if LINKED {
+                point.kept
+            } else {
+                rest * point.kept
+            },
+            residual: if LINKED { residual } else { point.residual },
             sum,
             largest,
             value,
         };
     }
-}
-
-/// Share of the way to the boundary that a step goes at a mean complementarity.
-#[inline(always)]
-fn boundary_share<T: Real>(complementarity: T) -> T {
-    let (least, most) = (T::of(MARGIN.0), T::of(MARGIN.1));
-    let margin = T::of(MARGIN_FACTOR) * complementarity;
-    if margin < most {
-        T::ONE - least.or_larger(margin)
-    } else {
-        T::ONE - most
-    }
-}
-
-/// The largest of numbers and one more, four at a time.
-#[inline(always)]
-fn largest_of<T: Real>(values: &[T], so_far: T) -> T {
-    let mut lanes = [so_far; 4];
-    let (fours, rest) = values.as_chunks::<4>();
-    for four in fours {
-        for j in 0..4 {
-            lanes[j] = four[j].or_larger(lanes[j]);
-        }
-    }
-    for (lane, value) in lanes.iter_mut().zip(rest) {
-        *lane = value.or_larger(*lane);
-    }
-    lanes[0]
-        .or_larger(lanes[1])
-        .or_larger(lanes[2].or_larger(lanes[3]))
-}
-
-/// The sum of numbers in four parts, those of every fourth one.
-#[inline(always)]
-fn sum_of<T: Real>(values: &[T]) -> T {
-    let mut parts = [T::ZERO; 4];
-    let (fours, rest) = values.as_chunks::<4>();
-    for four in fours {
-        for j in 0..4 {
-            parts[j] += four[j];
-        }
-    }
-    for (part, value) in parts.iter_mut().zip(rest) {
-        *part += *value;
-    }
-    (parts[0] + parts[1]) + (parts[2] + parts[3])
 }

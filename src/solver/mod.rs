@@ -4,6 +4,7 @@
 //! minimise   Σ_k ½ v_kᵀ R v_k + ½ x_{k+1}ᵀ Q x_{k+1} + price t_k
 //! subject to x_{k+1} = A_k x_k + B_k v_k + c_k,   x_0 given
 //!            G_k v_k <= g_k,   E_k x_{k+1} − t_k <= e_k,   t_k >= 0,   F_k x_{k+1} <= f_k
+//!            L_k v_k − L_{k−1} v_{k−1} <= l_k,   L_0 v_0 <= l_0
 //! ```
 //!
 //! In: a [`Program`], stages and rows in memory that the caller lends. Out: inputs, states and
@@ -17,7 +18,7 @@
 //! controller-c` makes has the same bits. Read `problem` first, then `solve`.
 //!
 //! ```
-//! use romc::solver::{Cost, Outcome, Program, RowMatrices, Settings, Shape, Stage};
+//! use romc::solver::{Cost, Links, Outcome, Program, RowMatrices, Settings, Shape, Stage};
 //!
 //! // A point mass that is pushed back to zero with a force of at most one, ten steps of 0.1 s.
 //! let mut stages = [Stage::<f64, 2, 1>::zeros(); 10];
@@ -32,6 +33,7 @@
 //!     first: 0,
 //!     shape,
 //!     matrices: RowMatrices { input: &[[1.0], [-1.0]], soft: &[], hard: &[] },
+//!     links: Links::none(),
 //!     cost: Cost { state: [1.0, 0.1], terminal: [10.0, 1.0], input: [0.01], slack: 0.0 },
 //! };
 //! for stage in 0..10 {
@@ -51,7 +53,9 @@
 )]
 
 mod interior;
+mod links;
 mod lower;
+mod point;
 mod problem;
 mod riccati;
 mod rows;
@@ -60,8 +64,11 @@ mod solve;
 #[cfg(target_arch = "x86_64")]
 mod wide;
 
-pub use interior::{
+pub use links::Links;
+pub use point::{
     AGAIN, COLD, FAR, FAR_CHANGE, LEFT, MARGIN, MARGIN_FACTOR, PATIENCE, SHORT_STEP, WARM,
 };
-pub use problem::{Cost, Outcome, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage};
+pub use problem::{
+    Cost, Outcome, Pairs, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage,
+};
 pub use scalar::Real;

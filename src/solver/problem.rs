@@ -1,5 +1,6 @@
 //! A quadratic program over the stages of a horizon.
 
+use super::links::Links;
 use super::scalar::Real;
 
 /// One stage: its dynamics, where its rows stand, and the memory of the solver.
@@ -95,12 +96,26 @@ pub struct Shape {
     pub hard: usize,
     /// First state of the hard rows.
     pub hard_offset: usize,
+    /// Rows that link the input to that of the stage before; none unless the program has [`Links`].
+    pub link: usize,
+    /// How many pairs of opposite rows come first, the two sides of a limit: `row, −row`. Each takes the
+    /// products and squares of one row.
+    pub pairs: Pairs,
+}
+
+/// Pairs of opposite rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Pairs {
+    /// Among the rows on the input.
+    pub input: usize,
+    /// Among the hard rows.
+    pub hard: usize,
 }
 
 impl Shape {
     /// Rows of a stage; a slack's own `t >= 0` follows its soft rows.
     pub fn rows(&self) -> usize {
-        self.input + self.soft + usize::from(self.soft > 0) + self.hard
+        self.input + self.soft + usize::from(self.soft > 0) + self.hard + self.link
     }
 
     /// Numbers that a stage's rows need of `Memory::rows`.
@@ -148,9 +163,9 @@ impl<T: Real, const NX: usize, const NU: usize> Cost<T, NX, NU> {
     }
 }
 
-/// A program with the memory to solve it, all lent by the caller.
+/// A program with the memory to solve it, all lent by the caller; `LINKED` if it has [`Links`].
 #[derive(Debug)]
-pub struct Program<'m, T, const NX: usize, const NU: usize> {
+pub struct Program<'m, T, const NX: usize, const NU: usize, const LINKED: bool> {
     /// Stages of the horizon.
     pub stages: &'m mut [Stage<T, NX, NU>],
     /// [`Shape::memory`] numbers for each stage; bounds first, see [`Program::bounds_mut`].
@@ -161,11 +176,13 @@ pub struct Program<'m, T, const NX: usize, const NU: usize> {
     pub shape: Shape,
     /// Coefficients of the rows.
     pub matrices: RowMatrices<'m, T, NU>,
+    /// Rows that link the inputs of consecutive stages.
+    pub links: Links<'m, T, NU, LINKED>,
     /// The cost.
     pub cost: Cost<T, NX, NU>,
 }
 
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     /// Where a stage of the horizon stands in the ring.
     #[inline(always)]
     pub fn at(&self, stage: usize) -> usize {
@@ -177,7 +194,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         }
     }
 
-    /// Right-hand sides of a stage's rows: input, soft, hard; the one of `t >= 0` in between is zero.
+    /// Right-hand sides of a stage's rows: input, soft, hard, link; the one of `t >= 0` in between is zero.
     pub fn bounds_mut(&mut self, stage: usize) -> &mut [T] {
         let (rows, memory) = (self.shape.rows(), self.shape.memory());
         let place = self.at(stage);

@@ -18,9 +18,9 @@ pub(super) const WIDE: usize = 12;
 
 /// `P` of one stage's end to `P` of its beginning, without the costs there; gain and factor of the
 /// stage are overwritten. Of `hvv`, the input's own Hessian, the lower triangle is read. False if the
-/// whole Hessian of the input is not positive definite.
+/// whole Hessian of the input is not positive definite. `H_vx` begins at what is there if `BEGUN`, else at zero.
 #[inline(always)]
-pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
+pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize, const BEGUN: bool>(
     stage: &mut Stage<T, NX, NU>,
     p: &mut [[T; NX]; NX],
     mut hvv: [[T; WIDE]; NU],
@@ -58,7 +58,10 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
         }
     }
     for i in (0..NU - NU % 2).step_by(2) {
-        let (mut first_x, mut second_x) = ([T::ZERO; NX], [T::ZERO; NX]);
+        let (mut first_x, mut second_x) = match BEGUN {
+            true => (hvx[i], hvx[i + 1]),
+            false => ([T::ZERO; NX], [T::ZERO; NX]),
+        };
         let (mut first_v, mut second_v) = (hvv[i], hvv[i + 1]);
         for k in 0..NX {
             add_multiple(b[k][i], &pa[k], &mut first_x);
@@ -74,7 +77,9 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
         (hvv[i], hvv[i + 1]) = (first_v, second_v);
     }
     for i in NU - NU % 2..NU {
-        hvx[i] = [T::ZERO; NX];
+        if !BEGUN {
+            hvx[i] = [T::ZERO; NX];
+        }
         for k in 0..NX {
             add_multiple(b[k][i], &pa[k], &mut hvx[i]);
             add_multiple(b[k][i], &pb[k], &mut hvv[i]);
@@ -227,13 +232,14 @@ pub(super) fn plus_product<T: Real, const ROWS: usize, const COLS: usize>(
 }
 
 /// Gradient pass of one stage: from `p` at its end, with the cost's gradient there added already, to
-/// `p` at its beginning; the stage's constant part of the input is overwritten.
+/// `p` at its beginning; the stage's constant part of the input is overwritten. Returns the whole gradient by the
+/// input.
 #[inline(always)]
 pub(super) fn pull<T: Real, const NX: usize, const NU: usize>(
     stage: &mut Stage<T, NX, NU>,
     p: &mut [T; NX],
     mut h: [T; NU],
-) {
+) -> [T; NU] {
     add_transposed(&stage.b, p, &mut h);
     stage.feed = solve_factored(&stage.factor, h);
     let mut next = [T::ZERO; NX];
@@ -244,6 +250,7 @@ pub(super) fn pull<T: Real, const NX: usize, const NU: usize>(
         }
     }
     *p = next;
+    h
 }
 
 /// Input of a stage from the state at its beginning: `−feed − K x`.
@@ -316,7 +323,7 @@ pub(super) struct Products<T, const NX: usize, const NU: usize> {
     pa: [[T; NX]; NX],
     pb: [[T; WIDE]; NX],
     b: [[T; WIDE]; NX],
-    hvx: [[T; NX]; NU],
+    pub hvx: [[T; NX]; NU],
     z: [[T; NX]; NU],
 }
 

@@ -57,9 +57,43 @@ impl<'a, T> Rows<'a, T> {
             self.dmultiplier[i] = weight * (left * self.residual[i]);
         }
     }
+
+    /// The same of rows that are softened.
+    #[inline(always)]
+    pub fn weigh_softened(&mut self, softness: T)
+    where
+        T: Real,
+    {
+        for i in 0..self.slack.len() {
+            let yield_of_row = softness * self.multiplier[i];
+            let inverse = T::ONE / (self.slack[i] + yield_of_row);
+            let weight = self.multiplier[i] * inverse;
+            self.inverse[i] = inverse;
+            self.weight[i] = weight;
+            self.dmultiplier[i] = weight * (self.residual[i] + yield_of_row);
+        }
+    }
+
+    /// Changes of slacks and multipliers of rows that are softened, from the products of the rows in `target` and
+    /// the multipliers aimed at in `dmultiplier`; into `target`, how often they go into what is left of each.
+    #[inline(always)]
+    pub fn change_softened(&mut self, softness: T)
+    where
+        T: Real,
+    {
+        for i in 0..self.slack.len() {
+            let change = self.target[i];
+            let dmultiplier = self.dmultiplier[i] - self.multiplier[i] + self.weight[i] * change;
+            let dslack = softness * dmultiplier - (self.residual[i] + change);
+            self.dslack[i] = dslack;
+            self.dmultiplier[i] = dmultiplier;
+            let to_multiplier = -dmultiplier / self.multiplier[i];
+            self.target[i] = (-dslack / self.slack[i]).or_larger(to_multiplier);
+        }
+    }
 }
 
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     #[inline(always)]
     pub(super) fn rows_of(&mut self, stage: usize) -> Rows<'_, T> {
         let (count, memory) = (self.shape.rows(), self.shape.memory());
@@ -67,17 +101,27 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         Rows::of(&mut self.rows[first..][..memory], count)
     }
 
-    /// The rows of a stage times a point, into their `target`.
+    /// The rows of a stage times a point, into their `target`; `before` is the input of the stage before.
     #[inline(always)]
-    pub(super) fn rows_times(&mut self, k: usize, v: &[T; NU], x: &[T; NX], t: T) -> Rows<'_, T> {
+    pub(super) fn rows_times(
+        &mut self,
+        k: usize,
+        (before, v): (&[T; NU], &[T; NU]),
+        x: &[T; NX],
+        t: T,
+    ) -> Rows<'_, T> {
         let place = self.at(k);
+        let (own, earlier) = self.link_pairs(k);
         let (shape, stage, matrices) = (self.shape, &self.stages[place], self.matrices);
         let (count, memory) = (shape.rows(), shape.memory());
         let rows = Rows::of(&mut self.rows[place * memory..][..memory], count);
         let (input, rest) = rows.target.split_at_mut(shape.input);
-        for (out, row) in input.iter_mut().zip(&matrices.input[stage.input_rows..]) {
-            *out = dot(row, v);
-        }
+        times(
+            &matrices.input[stage.input_rows..],
+            shape.pairs.input,
+            v,
+            input,
+        );
         let (soft, rest) = rest.split_at_mut(shape.soft);
         if shape.soft > 0 {
             let z: &[T; NU] = part(x, 0);
@@ -88,9 +132,14 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         }
         if shape.hard > 0 {
             let z: &[T; NU] = part(x, shape.hard_offset);
-            let hard = &mut rest[usize::from(shape.soft > 0)..];
-            for (out, row) in hard.iter_mut().zip(&matrices.hard[stage.hard_rows..]) {
-                *out = dot(row, z);
+            let hard = &mut rest[usize::from(shape.soft > 0)..][..shape.hard];
+            times(&matrices.hard[stage.hard_rows..], shape.pairs.hard, z, hard);
+        }
+        if LINKED {
+            let link = &mut rows.target[count - shape.link..];
+            times(own, 0, v, link);
+            for (out, row) in link.iter_mut().zip(earlier) {
+                *out = *out - dot(row, before);
             }
         }
         rows
@@ -108,7 +157,12 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     ) -> T {
         let (shape, stage, matrices) = (self.shape, &self.stages[self.at(k)], self.matrices);
         let (input, rest) = y.split_at(shape.input);
-        add_rows(input, &matrices.input[stage.input_rows..], by_v);
+        add_rows(
+            input,
+            &matrices.input[stage.input_rows..],
+            shape.pairs.input,
+            by_v,
+        );
         let mut by_t = T::ZERO;
         if shape.soft > 0 {
             by_t = self.cost.slack;
@@ -116,13 +170,16 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 by_t -= *y;
             }
             let soft = &matrices.soft[stage.soft_rows..];
-            add_rows(&rest[..shape.soft], soft, part_mut(by_x, 0));
+            add_rows(&rest[..shape.soft], soft, 0, part_mut(by_x, 0));
             by_t -= rest[shape.soft];
         }
         if shape.hard > 0 {
-            let y = &rest[shape.soft + usize::from(shape.soft > 0)..];
+            let y = &rest[shape.soft + usize::from(shape.soft > 0)..][..shape.hard];
             let hard = &matrices.hard[stage.hard_rows..];
-            add_rows(y, hard, part_mut(by_x, shape.hard_offset));
+            add_rows(y, hard, shape.pairs.hard, part_mut(by_x, shape.hard_offset));
+        }
+        if LINKED {
+            add_rows(&y[y.len() - shape.link..], self.link_rows(k), 0, by_v);
         }
         by_t
     }
@@ -145,30 +202,60 @@ pub(super) fn part_mut<T, const NX: usize, const NU: usize>(
         .expect("rows on states begin at least NU before their end")
 }
 
-/// `sum += Σ y row`.
+/// Pairs of numbers, and the numbers behind them.
 #[inline(always)]
-fn add_rows<T: Real, const N: usize>(y: &[T], rows: &[[T; N]], sum: &mut [T; N]) {
+fn paired<V>(values: &[V], pairs: usize) -> (&[[V; 2]], &[V]) {
+    let (paired, single) = values.split_at(2 * pairs);
+    (paired.as_chunks().0, single)
+}
+
+/// `out = rows x`, of which so many pairs of opposite rows come first.
+#[inline(always)]
+fn times<T: Real, const N: usize>(rows: &[[T; N]], pairs: usize, x: &[T; N], out: &mut [T]) {
+    let (row_pairs, row_singles) = paired(rows, pairs);
+    let (out_pairs, out_singles) = out.split_at_mut(2 * pairs);
+    for (out, [row, _]) in out_pairs.as_chunks_mut().0.iter_mut().zip(row_pairs) {
+        let product = dot(row, x);
+        *out = [product, -product];
+    }
+    for (out, row) in out_singles.iter_mut().zip(row_singles) {
+        *out = dot(row, x);
+    }
+}
+
+/// `sum += Σ y row`, of which so many pairs of opposite rows come first.
+#[inline(always)]
+fn add_rows<T: Real, const N: usize>(y: &[T], rows: &[[T; N]], pairs: usize, sum: &mut [T; N]) {
     // A local sum stays in registers.
     let mut local = *sum;
-    for (y, row) in y.iter().zip(rows) {
-        for j in 0..N {
-            local[j] += *y * row[j];
-        }
+    let (row_pairs, row_singles) = paired(rows, pairs);
+    let (y_pairs, y_singles) = paired(y, pairs);
+    for ([y, opposite], [row, _]) in y_pairs.iter().zip(row_pairs) {
+        add_multiple(*y - *opposite, row, &mut local);
+    }
+    for (y, row) in y_singles.iter().zip(row_singles) {
+        add_multiple(*y, row, &mut local);
     }
     *sum = local;
 }
 
-/// `square += Σ w row rowᵀ` and `sum += Σ y row`.
+/// `square += Σ w row rowᵀ` and `sum += Σ y row`, of which so many pairs of opposite rows come first.
 #[inline(always)]
 pub(super) fn add_weighted<T: Real, const N: usize>(
-    w: &[T],
-    y: &[T],
+    (w, y): (&[T], &[T]),
     rows: &[[T; N]],
+    pairs: usize,
     square: &mut Lower<T, N>,
     sum: &mut [T; N],
 ) {
     let (mut local, mut local_sum) = (*square, *sum);
-    for ((w, y), row) in w.iter().zip(y).zip(rows) {
+    let (row_pairs, row_singles) = paired(rows, pairs);
+    let ((w_pairs, w_singles), (y_pairs, y_singles)) = (paired(w, pairs), paired(y, pairs));
+    for (([w, other_w], [y, other_y]), [row, _]) in w_pairs.iter().zip(y_pairs).zip(row_pairs) {
+        local.add_square(*w + *other_w, row);
+        add_multiple(*y - *other_y, row, &mut local_sum);
+    }
+    for ((w, y), row) in w_singles.iter().zip(y_singles).zip(row_singles) {
         local.add_square(*w, row);
         add_multiple(*y, row, &mut local_sum);
     }
@@ -182,4 +269,38 @@ pub(super) fn dot<T: Real, const N: usize>(row: &[T; N], x: &[T; N]) -> T {
         sum += row[j] * x[j];
     }
     sum
+}
+
+/// The largest of numbers and one more, four at a time.
+#[inline(always)]
+pub(super) fn largest_of<T: Real>(values: &[T], so_far: T) -> T {
+    let mut lanes = [so_far; 4];
+    let (fours, rest) = values.as_chunks::<4>();
+    for four in fours {
+        for j in 0..4 {
+            lanes[j] = four[j].or_larger(lanes[j]);
+        }
+    }
+    for (lane, value) in lanes.iter_mut().zip(rest) {
+        *lane = value.or_larger(*lane);
+    }
+    lanes[0]
+        .or_larger(lanes[1])
+        .or_larger(lanes[2].or_larger(lanes[3]))
+}
+
+/// The sum of numbers in four parts, those of every fourth one.
+#[inline(always)]
+pub(super) fn sum_of<T: Real>(values: &[T]) -> T {
+    let mut parts = [T::ZERO; 4];
+    let (fours, rest) = values.as_chunks::<4>();
+    for four in fours {
+        for j in 0..4 {
+            parts[j] += four[j];
+        }
+    }
+    for (part, value) in parts.iter_mut().zip(rest) {
+        *part += *value;
+    }
+    (parts[0] + parts[1]) + (parts[2] + parts[3])
 }

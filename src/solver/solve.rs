@@ -1,11 +1,12 @@
 //! The solve: the linear-quadratic optimum if it keeps every row, otherwise iterations from a guess.
 
-use super::interior::{AGAIN, COLD, FAR, FAR_CHANGE, PATIENCE, SHORT_STEP, WARM};
+use super::links::pull_before;
+use super::point::{AGAIN, COLD, FAR, FAR_CHANGE, PATIENCE, SHORT_STEP, WARM};
 use super::problem::{Outcome, Program, Report, Residuals, Settings};
 use super::riccati::{Products, WIDE, add_transposed, answer, eliminate, plus_product, pull};
 use super::scalar::Real;
 
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     /// Eliminates all stages without their rows: gains and constant parts of the linear-quadratic
     /// optimum from any initial state. False if a Hessian is not positive definite.
     #[inline(always)]
@@ -26,7 +27,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             for i in 0..NU {
                 hessian[i][i] = self.cost.input[i];
             }
-            if !eliminate(stage, &mut p, hessian, &mut products) {
+            if !eliminate::<T, NX, NU, false>(stage, &mut p, hessian, &mut products) {
                 return false;
             }
             pull(stage, &mut linear, [T::ZERO; NU]);
@@ -112,6 +113,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         let horizon = self.stages.len();
         let mut worst = T::ZERO;
         let mut x = *x0;
+        let mut before = [T::ZERO; NU];
         for k in 0..horizon {
             let at = self.at(k);
             let stage = &mut self.stages[at];
@@ -119,7 +121,8 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             stage.dx = plus_product(&stage.b, &stage.dv, plus_product(&stage.a, &x, stage.c));
             x = stage.dx;
             let (v, x) = (stage.dv, stage.dx);
-            let rows = self.rows_times(k, &v, &x, T::ZERO);
+            let rows = self.rows_times(k, (&before, &v), &x, T::ZERO);
+            before = v;
             for (product, bound) in rows.target.iter().zip(rows.bound.iter()) {
                 let violation = *product - *bound;
                 // Written so that a violation that is not a number is kept.
@@ -163,6 +166,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         let (horizon, shape) = (self.stages.len(), self.shape);
         let (mut primal, mut dual, mut gap) = (T::ZERO, T::ZERO, T::ZERO);
         let (mut size, mut multipliers, mut value) = (T::ONE, T::ONE, T::ZERO);
+        let mut v_before = [T::ZERO; NU];
         for k in 0..horizon {
             let stage = &self.stages[self.at(k)];
             let before = if k == 0 {
@@ -176,7 +180,8 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
                 primal = kept_larger((next[i] - x[i]).magnitude(), primal);
                 size = kept_larger(x[i].magnitude(), size);
             }
-            let rows = self.rows_times(k, &v, &x, t);
+            let rows = self.rows_times(k, (&v_before, &v), &x, t);
+            v_before = v;
             for i in 0..rows.bound.len() {
                 let (room, multiplier) = (rows.bound[i] - rows.target[i], rows.multiplier[i]);
                 primal = kept_larger(-room, primal);
@@ -186,6 +191,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             }
         }
         let mut p = [T::ZERO; NX];
+        let mut by_before = [T::ZERO; NU];
         for k in (0..horizon).rev() {
             let weight = self.cost.state_at(k, horizon);
             let stage = &self.stages[self.at(k)];
@@ -203,6 +209,12 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             let (count, memory) = (shape.rows(), shape.memory());
             let y = &self.rows[self.at(k) * memory + 2 * count..][..count];
             let by_t = self.add_rows_pull(k, y, &mut by_v, &mut p);
+            if LINKED {
+                for i in 0..NU {
+                    by_v[i] += by_before[i];
+                }
+                by_before = pull_before(&y[count - shape.link..], self.link_pairs(k).1);
+            }
             dual = kept_larger(by_t.magnitude(), dual);
             add_transposed(&stage.b, &p, &mut by_v);
             for entry in by_v {

@@ -4,7 +4,7 @@
 use super::problem::{Program, Report, Settings};
 use super::scalar::Real;
 
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     /// [`Program::prepare`] on a processor with AVX2.
     ///
     /// # Safety

@@ -12,9 +12,13 @@ use crate::without_given_state;
 
 #[test]
 fn self_tests_and_example_pass_in_both_precisions_with_sanitizers() {
-    for (model, precision) in [("go1-d2", Precision::Double), ("go1-d4", Precision::Single)] {
+    for (model, precision, macros) in [
+        ("go1-d2", Precision::Double, "-DGO1_D2_TORQUE_RATES=0"),
+        ("go1-d4", Precision::Single, "-DGO1_D4_TORQUE_RATES=1"),
+    ] {
         let emitted = Emitted::new(&shipped(model), precision);
         let sanitize = [
+            macros,
             "-g",
             "-O1",
             "-fsanitize=address,undefined",

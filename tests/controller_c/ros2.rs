@@ -13,8 +13,8 @@ fn stubs() -> PathBuf {
     root().join("tests/controller_c/ros2")
 }
 
-/// The plugin, its driver and the controller as one program.
-fn drive(emitted: &Emitted, compiler: &str, flags: &[&str]) -> PathBuf {
+/// The plugin, its driver and the controller as one program, all with the same macros.
+fn drive(emitted: &Emitted, compiler: &str, flags: &[&str], macros: &[&str]) -> PathBuf {
     let (name, package) = (&emitted.name, emitted.folder().join("ros2_control"));
     let program = emitted.scratch.path().join("drive");
     succeed(
@@ -22,12 +22,14 @@ fn drive(emitted: &Emitted, compiler: &str, flags: &[&str]) -> PathBuf {
             .args(WARNINGS)
             .args(["-std=c++17", "-g", "-O1"])
             .args(flags)
+            .args(macros)
             .arg(format!("-DNAME={name}"))
+            .arg(format!("-DUPPER={}", name.to_ascii_uppercase()))
             .arg(format!("-DJUMP=\"{name}_jump.h\""))
             .arg(format!("-I{}", stubs().join("include").display()))
             .args(["-I..", "-Isrc", "src/controller.cpp", "src/plan.cpp"])
             .arg(stubs().join("drive.cpp"))
-            .args(emitted.objects("cc", &[]))
+            .args(emitted.objects("cc", macros))
             .args(["-lm", "-o"])
             .arg(&program)
             .current_dir(package),
@@ -50,14 +52,21 @@ fn plugin_gives_the_controllers_efforts_without_allocating_with_both_interfaces_
     let jump = jump_file(emitted.scratch.path());
     let sanitize = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
     let humble = [&sanitize[..], &["-DROMC_STUB_HUMBLE"]].concat();
-    let builds = [("c++", &sanitize[..]), ("c++", &humble), ("clang++", &[])];
-    for (compiler, flags) in builds {
+    let other_choices = ["-DGO1_D4_CONSISTENT_LIFT=0", "-DGO1_D4_TORQUE_RATES=1"];
+    let builds = [
+        ("c++", &sanitize[..], &[][..]),
+        ("c++", &humble, &other_choices),
+        ("clang++", &[], &[]),
+    ];
+    for (compiler, flags, macros) in builds {
         if compiler == "clang++" && !has(compiler) {
             continue;
         }
-        let program = drive(&emitted, compiler, flags);
+        let program = drive(&emitted, compiler, flags, macros);
         let text = Emitted::output(Command::new(program).arg(&jump));
-        println!("{compiler} {flags:?}: {text}");
+        println!("{compiler} {flags:?} {macros:?}: {text}");
+        let is_consistent = text.contains("consistent");
+        assert_eq!(is_consistent, !macros.contains(&other_choices[0]), "{text}");
     }
 }
 

@@ -51,6 +51,11 @@ int main(void)
     TRY(joint_penalty, 0);
     TRY(body_friction, -0.5);
     TRY(swing_turn, -0.1);
+    TRY(torque_rate_nm_s, -1);
+    TRY(torque_rate_nm_s, (double)NAN);
+    settings.torque_rate_nm_s = 100;
+    expect(settings, PASTE(UPPER, _TORQUE_RATES) ? NULL : "torque_rate_nm_s");
+    settings.torque_rate_nm_s = 0;
     TRY(effectiveness_time_s, -1);
     TRY(effectiveness_time_s, (double)NAN);
     settings.effectiveness_time_s = 1;

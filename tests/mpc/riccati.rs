@@ -5,7 +5,7 @@ use romc::mpc::{
     Cone, ConeProgram, Controller, Lift, MpcSettings, Outcome, QpSettings, QpSolver, Solver,
     SparseColumns,
 };
-use romc::solver::{self, Cost, Program, Real, RowMatrices, Settings, Shape, Stage};
+use romc::solver::{self, Cost, Links, Pairs, Program, Real, RowMatrices, Settings, Shape, Stage};
 
 use crate::random::Random;
 
@@ -17,8 +17,12 @@ const SHAPE: Shape = Shape {
     soft: 3,
     hard: 2,
     hard_offset: 3,
+    link: 0,
+    pairs: Pairs { input: 2, hard: 1 },
 };
+/// Rows of a stage, and those that link its input to the one before.
 const ROWS: usize = 11;
+const LINKS: usize = 4;
 const WIDTH: usize = NX + NU + 1;
 
 /// A random program, in double precision.
@@ -29,13 +33,25 @@ struct RandomProgram {
     input: Vec<[f64; NU]>,
     soft: Vec<[f64; NU]>,
     hard: Vec<[f64; NU]>,
+    link: Vec<[f64; NU]>,
     bounds: Vec<f64>,
+    link_bounds: Vec<f64>,
     x0: [f64; NX],
     state: [f64; NX],
     weight: [f64; NU],
 }
 
 const PRICE: f64 = 8.0;
+
+/// The rows of all stages, `count` each, with so many pairs of opposite rows first.
+fn with_opposites(mut rows: Vec<[f64; NU]>, count: usize, pairs: usize) -> Vec<[f64; NU]> {
+    for stage in rows.chunks_exact_mut(count) {
+        for [row, opposite] in stage[..2 * pairs].as_chunks_mut::<2>().0 {
+            *opposite = row.map(|entry| -entry);
+        }
+    }
+    rows
+}
 
 impl RandomProgram {
     fn new(random: &mut Random, tightness: f64) -> Self {
@@ -57,6 +73,10 @@ impl RandomProgram {
                 bounds.push(scale * (0.3 + random.signed().abs()));
             }
         }
+        let (input, hard): (Vec<_>, Vec<_>) = (
+            rows(SHAPE.input * HORIZON, random),
+            rows(SHAPE.hard * HORIZON, random),
+        );
         Self {
             a: (stages.clone())
                 .map(|_| std::array::from_fn(|i| std::array::from_fn(|j| near_one(i, j, random))))
@@ -67,33 +87,71 @@ impl RandomProgram {
             c: stages
                 .map(|_| std::array::from_fn(|_| 0.1 * random.signed()))
                 .collect(),
-            input: rows(SHAPE.input * HORIZON, random),
+            input: with_opposites(input, SHAPE.input, SHAPE.pairs.input),
             soft: rows(SHAPE.soft, random),
-            hard: rows(SHAPE.hard * HORIZON, random),
+            hard: with_opposites(hard, SHAPE.hard, SHAPE.pairs.hard),
             bounds,
+            link: Vec::new(),
+            link_bounds: Vec::new(),
             x0: std::array::from_fn(|_| 2.0 * random.signed()),
             state: std::array::from_fn(|_| 0.5 + random.signed().abs()),
             weight: std::array::from_fn(|_| 0.1 + random.signed().abs()),
         }
     }
 
-    /// Solves with the structured solver; inputs of all stages and the report.
-    fn structured<T: Real>(&self, tolerance: f64, accepted: f64) -> (Vec<f64>, solver::Report<T>) {
+    /// The same with rows that link the inputs of consecutive stages.
+    fn linked(random: &mut Random, tightness: f64) -> Self {
+        let mut program = Self::new(random, tightness);
+        for _ in 0..LINKS * HORIZON {
+            let row = std::array::from_fn(|_| random.signed());
+            program.link.push(row);
+            let bound = (0.3 + random.signed().abs()) / tightness;
+            program.link_bounds.push(bound);
+        }
+        program
+    }
+
+    /// Links of a stage.
+    fn links(&self) -> usize {
+        self.link.len() / HORIZON
+    }
+
+    /// Solves with the structured solver, `LINKED` if it has links; inputs of all stages and the report.
+    fn structured<T: Real, const LINKED: bool>(
+        &self,
+        tolerance: f64,
+        accepted: f64,
+        softness: f64,
+    ) -> (Vec<f64>, solver::Report<T>) {
+        const FIRST: usize = 5;
+        let shape = Shape {
+            link: self.links(),
+            ..SHAPE
+        };
         let to = |value: f64| T::of(value);
         let all = |rows: &[[f64; NU]]| rows.iter().map(|row| row.map(to)).collect::<Vec<_>>();
         let (input, soft, hard) = (all(&self.input), all(&self.soft), all(&self.hard));
         let mut stages = vec![Stage::<T, NX, NU>::zeros(); HORIZON];
-        let mut memory = vec![T::ZERO; HORIZON * SHAPE.memory()];
+        let mut memory = vec![T::ZERO; HORIZON * shape.memory()];
+        // Links stand by places of the ring, of which the first stage has another than the first.
+        let mut link = all(&self.link);
+        link.rotate_right(FIRST * self.links());
+        let mut gains = vec![[[T::ZERO; NU]; NU]; HORIZON];
         let state = self.state.map(to);
         let mut program = Program {
             stages: &mut stages,
             rows: &mut memory,
-            first: 5,
-            shape: SHAPE,
+            first: FIRST,
+            shape,
             matrices: RowMatrices {
                 input: &input,
                 soft: &soft,
                 hard: &hard,
+            },
+            links: Links::<'_, T, NU, LINKED> {
+                rows: &link,
+                gains: &mut gains,
+                softness: to(softness),
             },
             cost: Cost {
                 state,
@@ -110,7 +168,9 @@ impl RandomProgram {
             stage.c = self.c[k].map(to);
             stage.input_rows = k * SHAPE.input;
             stage.hard_rows = k * SHAPE.hard;
-            let bounds = self.bounds[k * ROWS..][..ROWS].iter().copied().map(to);
+            let links = &self.link_bounds[k * self.links()..][..self.links()];
+            let bounds = self.bounds[k * ROWS..][..ROWS].iter().chain(links);
+            let bounds = bounds.copied().map(to);
             program
                 .bounds_mut(k)
                 .iter_mut()
@@ -134,7 +194,8 @@ impl RandomProgram {
     /// Solves with clarabel: unknowns `v_0, x_1, t_1, v_1, ...`; none if no inputs keep the rows.
     fn conic(&self) -> Option<Vec<f64>> {
         let equalities = NX * HORIZON;
-        let (n, m) = (WIDTH * HORIZON, (NX + ROWS) * HORIZON);
+        let unlinked = (NX + ROWS) * HORIZON;
+        let (n, m) = (WIDTH * HORIZON, unlinked + self.link.len());
         let mut entries = Vec::new();
         let mut add = |row: usize, col: usize, value: f64| entries.push((row, col, value));
         let mut b = vec![0.0; m];
@@ -170,6 +231,14 @@ impl RandomProgram {
                 }
             }
         }
+        for (number, bound) in self.link_bounds.iter().enumerate() {
+            let (k, row) = (number / LINKS, unlinked + number);
+            b[row] = *bound;
+            (0..NU).for_each(|j| add(row, k * WIDTH + j, self.link[number][j]));
+            if k > 0 {
+                (0..NU).for_each(|j| add(row, (k - 1) * WIDTH + j, -self.link[number - LINKS][j]));
+            }
+        }
         let places: Vec<(usize, usize)> = entries.iter().map(|entry| (entry.0, entry.1)).collect();
         let mut a = SparseColumns::from_pattern(m, n, &places);
         entries
@@ -192,7 +261,7 @@ impl RandomProgram {
             q,
             a,
             b,
-            cones: vec![Cone::Zero(equalities), Cone::Nonnegative(ROWS * HORIZON)],
+            cones: vec![Cone::Zero(equalities), Cone::Nonnegative(m - equalities)],
         };
         let settings = QpSettings {
             tolerance: 1e-10,
@@ -227,7 +296,7 @@ fn riccati_finds_clarabels_optimum_of_random_programs_in_both_precisions() {
             let pairs = found.iter().zip(&expected);
             pairs.fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs())) / size
         };
-        let (found, report) = program.structured::<f64>(1e-11, 1e-7);
+        let (found, report) = program.structured::<f64, false>(1e-11, 1e-7, 0.0);
         assert_eq!(
             report.outcome,
             solver::Outcome::Solved,
@@ -236,7 +305,7 @@ fn riccati_finds_clarabels_optimum_of_random_programs_in_both_precisions() {
         without += usize::from(report.iterations == 0);
         most = most.max(report.iterations);
         worst = worst.max(off(&found));
-        let (found, report) = program.structured::<f32>(1e-5, 3e-3);
+        let (found, report) = program.structured::<f32, false>(1e-5, 3e-3, 0.0);
         assert_eq!(
             report.outcome,
             solver::Outcome::Solved,
@@ -253,6 +322,48 @@ fn riccati_finds_clarabels_optimum_of_random_programs_in_both_precisions() {
         "{worst:e} {worst_single:e}"
     );
     assert!((5..55).contains(&without) && most <= 30, "{without} {most}");
+}
+
+#[test]
+fn riccati_finds_clarabels_optimum_of_programs_whose_inputs_are_linked_in_both_precisions() {
+    let mut random = Random::new(29);
+    let (mut worst, mut worst_single, mut most, mut infeasible) = (0.0_f64, 0.0_f64, 0, 0);
+    for number in 0..60 {
+        let tightness = [1.0, 2.0, 4.0][number % 3];
+        let program = RandomProgram::linked(&mut random, tightness);
+        let Some(expected) = program.conic() else {
+            infeasible += 1;
+            continue;
+        };
+        let size = expected.iter().fold(1.0_f64, |size, v| size.max(v.abs()));
+        let off = |found: &[f64]| {
+            let pairs = found.iter().zip(&expected);
+            pairs.fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs())) / size
+        };
+        let (found, report) = program.structured::<f64, true>(1e-12, 1e-7, 1e-8);
+        assert_eq!(
+            report.outcome,
+            solver::Outcome::Solved,
+            "{number}: {report:?}"
+        );
+        most = most.max(report.iterations);
+        worst = worst.max(off(&found));
+        let (found, report) = program.structured::<f32, true>(1e-4, 3e-3, 1e-5);
+        assert_eq!(
+            report.outcome,
+            solver::Outcome::Solved,
+            "{number}: {report:?}"
+        );
+        worst_single = worst_single.max(off(&found));
+    }
+    println!(
+        "f64 {worst:.1e}, f32 {worst_single:.1e}, {infeasible} of 60 infeasible, at most {most}"
+    );
+    assert!(infeasible < 30, "{infeasible} of 60 have no solution");
+    assert!(
+        worst < 2e-5 && worst_single < 3e-2 && most <= 30,
+        "{worst:e} {worst_single:e} {most}"
+    );
 }
 
 #[test]
@@ -297,12 +408,45 @@ fn riccati_commands_clarabels_torques_along_recordings_and_prepares_ahead() {
 }
 
 #[test]
-fn riccati_refuses_a_limit_on_rates_by_name() {
-    let settings = MpcSettings {
-        solver: Solver::Riccati,
-        torque_rate_nm_s: Some(100.0),
-        ..MpcSettings::default()
-    };
-    let refused = settings.check().expect_err("no rates").to_string();
-    assert!(refused.contains("torque_rate_nm_s"), "{refused}");
+fn riccati_commands_clarabels_torques_under_limits_on_their_rates() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    for (name, rates) in [
+        ("go1-d2", [20.0, 10.0]),
+        ("go1-d4", [500.0, 100.0]),
+        ("go1-d6", [500.0, 100.0]),
+    ] {
+        let model =
+            romc::artifact::read(&root.join(format!("models/{name}.json"))).expect("shipped");
+        for (number, rate) in rates.into_iter().enumerate() {
+            let path = root.join(format!(
+                "examples/recordings/go1/test_0{}.csv.gz",
+                1 + number
+            ));
+            let recording = romc::recording::read(&path).expect("shipped");
+            let [conic, structured] = [Solver::Clarabel, Solver::Riccati].map(|solver| {
+                let mut settings = MpcSettings {
+                    solver,
+                    torque_rate_nm_s: Some(rate),
+                    ..MpcSettings::default()
+                };
+                settings.qp.tolerance = 1e-12;
+                let mut controller = Controller::new(&model, settings).expect("complete");
+                let input = ReferenceInput::Recorded;
+                along_recording(&mut controller, &recording, input, |_, _| {}).expect("sound")
+            });
+            let (mut active, mut worst) = (0, 0.0_f64);
+            for (a, b) in conic.rows.iter().zip(&structured.rows) {
+                assert_eq!(a.status, b.status, "{name} at {}", a.time_s);
+                active += usize::from(b.iterations > 0);
+                let off = a.torque_nm.iter().zip(b.torque_nm);
+                worst = off.fold(worst, |worst, (a, b)| worst.max((a - b).abs()));
+            }
+            println!(
+                "{name}, {rate} N m/s: {active} of {} active, {worst:.1e} N m",
+                conic.rows.len()
+            );
+            assert!(worst < 1e-6, "{name}, {rate} N m/s: {worst:e} N m");
+            assert!(active > 10, "{name}, {rate} N m/s: {active}");
+        }
+    }
 }

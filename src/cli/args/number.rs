@@ -37,6 +37,7 @@ mod tests {
             table::LAMBDA,
             table::HORIZON,
             table::STEP,
+            table::TORQUE_RATE,
             table::RESTART_EVERY,
             table::MARGIN,
             table::WIDTH,

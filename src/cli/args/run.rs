@@ -9,7 +9,7 @@ use super::number::{count, real};
 use super::reading::ReadingArguments;
 use super::robot::RobotParser;
 use crate::evaluate::ReferenceInput;
-use crate::limits::table::{HORIZON, RESTART_EVERY, STEP};
+use crate::limits::table::{HORIZON, RESTART_EVERY, STEP, TORQUE_RATE};
 use crate::mpc::{Lift, Solver};
 use crate::simplify::Tolerance;
 
@@ -133,6 +133,9 @@ pub struct MpcArguments {
     /// What solves the quadratic program of a step
     #[arg(long, value_enum, default_value = "clarabel")]
     pub solver: Solver,
+    /// Largest change of a torque that the transpose lift gives, in N m/s [default: none]
+    #[arg(long, value_name = "N_M_PER_S", value_parser = real(&TORQUE_RATE))]
+    pub torque_rate: Option<f64>,
     /// Write one row per control step to this CSV file
     #[arg(long, value_name = "FILE.csv")]
     pub output: Option<PathBuf>,

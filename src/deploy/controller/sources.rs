@@ -16,7 +16,7 @@ macro_rules! sources {
 }
 
 /// Path below `src` and text.
-const SOURCES: [(&str, &str); 54] = sources![
+const SOURCES: [(&str, &str); 56] = sources![
     "mpc/online/command.rs",
     "mpc/online/control_model.rs",
     "mpc/online/controller.rs",
@@ -63,8 +63,10 @@ const SOURCES: [(&str, &str); 54] = sources![
     "robot/registry.rs",
     "robot/wrench.rs",
     "solver/interior.rs",
+    "solver/links.rs",
     "solver/lower.rs",
     "solver/mod.rs",
+    "solver/point.rs",
     "solver/problem.rs",
     "solver/riccati.rs",
     "solver/rows.rs",

@@ -62,6 +62,9 @@ struct Facts<'a> {
     has_given_state: bool,
     n_torque_stored: usize,
     n_joint_stored: usize,
+    /// Rows of the rates of torques.
+    n_rate: usize,
+    n_rate_stored: usize,
 }
 
 templates! {
@@ -91,7 +94,13 @@ pub fn emit(
         });
     }
     let plant = ControlModel::new(model)?;
-    let rows = StageRows::new(&plant, &MpcSettings::default());
+    // Rates are chosen when it runs: the rows are those of 1 N m a stage.
+    let unit_rate = MpcSettings {
+        torque_rate_nm_s: Some(1.0),
+        step_s: 1.0,
+        ..MpcSettings::default()
+    };
+    let rows = StageRows::new(&plant, &unit_rate);
     let mut entries = ModelInterface::new(equations, &options.lower, Units::Si)?;
     options.precision.check(&entries)?;
     if options.precision == Precision::Single {
@@ -197,5 +206,7 @@ fn facts<'a>(
             .all(|phase| phase.given_state.is_some()),
         n_torque_stored: rows.torque.len().max(1),
         n_joint_stored: rows.joint.len().max(1),
+        n_rate: rows.rate.len(),
+        n_rate_stored: rows.rate.len().max(1),
     }
 }

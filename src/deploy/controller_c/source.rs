@@ -9,11 +9,11 @@ use crate::codegen::Precision;
 use crate::codegen::interface::ModelInterface;
 use crate::deploy::controller::texts;
 use crate::mpc::interface::Settings;
-use crate::mpc::problem::{Row, StageRows};
+use crate::mpc::problem::{Row, StageRows, pairs};
 use crate::mpc::shared::{
     DEVIATION_FLOOR, EFFECTIVENESS_RANGE, GAP, HALF_WINDOW_S, LARGEST_WEIGHT, LIFT_CURVATURE,
-    LIFT_ITERATIONS, MOST_TURN_RAD, POSTURE_SHARE, PRIOR_WEIGHT, SLACK_PRICE, SOFTENED_FROM,
-    STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
+    LIFT_ITERATIONS, MOST_TURN_RAD, POSTURE_SHARE, PRIOR_WEIGHT, RATE_SOFTNESS, RATE_TOLERANCE,
+    SLACK_PRICE, SOFTENED_FROM, STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
 };
 use crate::mpc::{ControlModel, FallbackSettings, InputGivenState, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
@@ -23,6 +23,10 @@ use crate::solver;
 const SINGLE: (f64, f64) = (1e-4, 1e-3);
 /// Complementarity of a lift in single precision: with that of the plan torques would be off by 0.1 N m.
 const SINGLE_LIFT: f64 = 1e-6;
+
+/// Complementarity and softness of rows with limits on torque rates in single precision: weights of rows stay far below
+/// the inverse of its rounding.
+const SINGLE_RATE: (f64, f64) = (1e-5, 1e-4);
 
 /// `NAME_controller.c`.
 #[derive(Template)]
@@ -35,6 +39,7 @@ pub(super) struct Source<'a> {
     f: &'static str,
     n_phases: usize,
     n_torque: usize,
+    n_torque_pairs: usize,
     n_joint: usize,
     max_nnz: usize,
     has_actuators: bool,
@@ -73,6 +78,8 @@ pub(super) struct Source<'a> {
     torque_bound: String,
     torque_per_loss: String,
     torque_joint: String,
+    n_rate: usize,
+    rate_rows: String,
     joint_rows: String,
     joint_bound: String,
     joint_lower: String,
@@ -95,6 +102,8 @@ struct SolverNumbers {
     tolerance: String,
     lift_tolerance: String,
     gap: String,
+    rate_tolerance: String,
+    rate_softness: String,
     left: String,
     accepted_residual: String,
     margin: (String, String),
@@ -158,6 +167,7 @@ impl<'a> Source<'a> {
             f: facts.f,
             n_phases: facts.n_phases,
             n_torque: rows.torque.len(),
+            n_torque_pairs: pairs(&rows.torque),
             n_joint: rows.joint.len(),
             max_nnz: (entries.phases.iter())
                 .map(|phase| phase.pattern.len())
@@ -225,6 +235,8 @@ impl<'a> Source<'a> {
             torque_bound: numbers.vector(rows.torque.iter().map(|row| row.bound)),
             torque_per_loss: numbers.vector(rows.torque.iter().map(|row| row.per_loss)),
             torque_joint: integers(rows.torque.iter().map(|row| row.joint as i64)),
+            n_rate: rows.rate.len(),
+            rate_rows: row_matrix(&rows.rate),
             joint_rows: row_matrix(&rows.joint),
             joint_bound: numbers.vector(rows.joint.iter().map(|row| row.bound)),
             joint_lower: numbers.vector(limits.iter().map(|limit| limit.0)),
@@ -250,6 +262,10 @@ impl SolverNumbers {
             Precision::Double => (TOLERANCE, accepted_residual),
             Precision::Single => SINGLE,
         };
+        let (rate_tolerance, rate_softness) = match precision {
+            Precision::Double => (RATE_TOLERANCE, RATE_SOFTNESS),
+            Precision::Single => SINGLE_RATE,
+        };
         let one = |value: f64| format!("{value:?}");
         let pair = |(first, second)| (one(first), one(second));
         Self {
@@ -260,6 +276,8 @@ impl SolverNumbers {
                 Precision::Single => SINGLE_LIFT,
             }),
             gap: one(GAP),
+            rate_tolerance: one(rate_tolerance),
+            rate_softness: one(rate_softness),
             left: one(solver::LEFT),
             accepted_residual: one(accepted),
             margin: pair(solver::MARGIN),

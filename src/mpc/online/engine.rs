@@ -152,7 +152,7 @@ impl Engine {
                 for (index, start) in start.iter_mut().enumerate() {
                     *start = (step.measured[index] - reference[index]) / step.deviation[index];
                 }
-                let (outcome, iterations) = program.solve(start);
+                let (outcome, iterations) = program.solve(start, &step.stages[0], step.last_input);
                 *has_gains = iterations == 0;
                 (outcome, iterations)
             }

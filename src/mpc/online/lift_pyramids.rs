@@ -23,7 +23,7 @@ use super::lift::{LiftFailure, LiftProblem, LiftRules};
 use super::qp::Outcome;
 use super::structured::{PYRAMID_ROWS, TOLERANCE, outcome_of, prepare, solve};
 use crate::robot::{FOOT_DIM, JOINT_DIM};
-use crate::solver::{Cost, Program, RowMatrices, Settings, Shape, Stage};
+use crate::solver::{Cost, Links, Program, RowMatrices, Settings, Shape, Stage};
 
 type Torque = [f64; JOINT_DIM];
 
@@ -250,6 +250,7 @@ impl PyramidLift {
                 soft: &[],
                 hard: &[],
             },
+            links: Links::none(),
             cost: Cost {
                 state: [0.0],
                 terminal: [0.0],

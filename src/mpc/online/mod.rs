@@ -45,7 +45,7 @@ pub mod shared {
     pub use super::plan::POSTURE_SHARE;
     pub use super::problem::STATE_REACH;
     pub use super::reference::{DEVIATION_FLOOR, STILL_SHARE, STILL_TIME_S};
-    pub use super::structured::{GAP, TOLERANCE};
+    pub use super::structured::{GAP, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE};
     pub use super::swing::MOST_TURN_RAD;
     pub use super::transcribe::SLACK_PRICE;
 }

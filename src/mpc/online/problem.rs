@@ -153,12 +153,20 @@ impl StageRows {
             (Lift::Transpose, RowSelection::Needed) => {
                 let mut rows = torque_rows(plant);
                 rows.retain(|row| is_reachable(plant, row));
-                select(rows)
+                pairs_first(select(rows))
             }
         };
         let rate = match settings.torque_rate_nm_s {
             None => Vec::new(),
-            Some(rate) => select(both_sides(plant, |_| rate * settings.step_s, 0.0)),
+            Some(rate) => {
+                // Which rows are needed does not depend on the rate: they are chosen for 1 N m a stage.
+                let limit_nm = rate * settings.step_s;
+                let mut rows = select(both_sides(plant, |_| 1.0, 0.0));
+                for entry in rows.iter_mut().flat_map(|row| &mut row.row) {
+                    *entry /= limit_nm;
+                }
+                rows
+            }
         };
         Self {
             torque,
@@ -168,6 +176,29 @@ impl StageRows {
                 .body_friction
                 .map(|coefficient| BodyFriction::new(plant, coefficient)),
         }
+    }
+}
+
+/// The rows with both sides of a limit first, side by side; else the order stays.
+fn pairs_first(rows: Vec<Row>) -> Vec<Row> {
+    let is_paired = |row: &&Row| rows.iter().any(|other| other.is_opposite(row));
+    let (paired, single): (Vec<_>, Vec<_>) = rows.iter().partition(is_paired);
+    paired.into_iter().chain(single).cloned().collect()
+}
+
+/// How many pairs of opposite rows come first.
+pub fn pairs(rows: &[Row]) -> usize {
+    let (twos, _) = rows.as_chunks::<2>();
+    (twos.iter())
+        .take_while(|[row, other]| row.is_opposite(other))
+        .count()
+}
+
+impl Row {
+    /// Whether another row is the other side of a limit.
+    fn is_opposite(&self, other: &Row) -> bool {
+        let opposite = other.row.iter().map(|entry| -entry);
+        self.joint == other.joint && self.row.iter().copied().eq(opposite)
     }
 }
 

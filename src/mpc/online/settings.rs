@@ -62,7 +62,7 @@ pub enum Solver {
     Clarabel,
     /// The structured [`solver`](crate::solver): Riccati's recursion where no row is active, else an
     /// interior point of it; for at most [`MAX_STRUCTURED_DIM`](super::MAX_STRUCTURED_DIM) latent
-    /// coordinates, friction pyramids inside the cones, and without a limit on torque rates.
+    /// coordinates, with friction pyramids inside the cones.
     Riccati,
 }
 
@@ -244,13 +244,6 @@ impl MpcSettings {
                     expected: "zero or a positive number",
                 });
             }
-        }
-        if let (Solver::Riccati, Some(found)) = (self.solver, self.torque_rate_nm_s) {
-            return Err(ControlError::Setting {
-                name: "torque_rate_nm_s",
-                found,
-                expected: "none with the Riccati solver",
-            });
         }
         Ok(())
     }

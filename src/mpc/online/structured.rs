@@ -6,16 +6,23 @@
 
 use std::fmt::Debug;
 
-use super::problem::StageRows;
+use super::problem::{StageRows, pairs};
 use super::qp::Outcome;
 use super::settings::MpcSettings;
 use super::transcribe::{SLACK_PRICE, Stage as StageData, Weights};
-use crate::solver::{self, Cost, Program, Report, RowMatrices, Settings, Shape, Stage};
+use crate::solver::{
+    self, Cost, Links, Pairs, Program, Report, RowMatrices, Settings, Shape, Stage,
+};
 
 /// Complementarity and violation of rows at which iterations end.
 pub const TOLERANCE: f64 = 1e-9;
 /// Gap between primal and dual cost, relative to the cost, at which they end as well.
 pub const GAP: f64 = 1e-8;
+/// Complementarity and violation of rows at which iterations end if torque rates are limited: their rows tie the
+/// inputs of all stages together, so that each is as good as the worst.
+pub const RATE_TOLERANCE: f64 = 1e-12;
+/// How soft the rows of such a program are within a step, see [`Links`].
+pub const RATE_SOFTNESS: f64 = 1e-8;
 /// Rows of a friction pyramid.
 pub(super) const PYRAMID_ROWS: usize = 4;
 /// Most latent coordinates that the solver is compiled for.
@@ -48,8 +55,9 @@ pub(super) trait StructuredProgram: Debug + Send {
     /// Gains of all stages, for the next [`StructuredProgram::solve`]; false if there are none.
     fn prepare(&mut self) -> bool;
 
-    /// Solves from a scaled state; the iterations that it took.
-    fn solve(&mut self, x0: &[f64]) -> (Outcome, u32);
+    /// Solves from a scaled state, after a latent input that the rates of the first stage count from; the iterations
+    /// that it took.
+    fn solve(&mut self, x0: &[f64], first: &StageData, last_input: &[f64]) -> (Outcome, u32);
 
     /// Scaled input of a stage.
     fn input(&self, stage: usize) -> &[f64];
@@ -67,8 +75,13 @@ pub(super) fn structured_program(
 ) -> Option<Box<dyn StructuredProgram>> {
     macro_rules! of_dimension {
         ($($dim:literal),*) => {
-            match latent_dim {
-                $($dim => Some(Box::new(Horizon::<{ 2 * $dim }, $dim>::new(rows, weights, settings))),)*
+            match (latent_dim, rows.rate.is_empty()) {
+                $(($dim, true) => Some(Box::new(
+                    Horizon::<{ 2 * $dim }, $dim, false>::new(rows, weights, settings)
+                )),)*
+                $(($dim, false) => Some(Box::new(
+                    Horizon::<{ 2 * $dim }, $dim, true>::new(rows, weights, settings)
+                )),)*
                 _ => None,
             }
         };
@@ -76,14 +89,18 @@ pub(super) fn structured_program(
     of_dimension!(1, 2, 3, 4, 5, 6, 7, 8)
 }
 
-/// Memory of a program; `NX` is twice `NU`.
+/// Memory of a program; `NX` is twice `NU`, `LINKED` if torque rates are limited.
 #[derive(Debug)]
-struct Horizon<const NX: usize, const NU: usize> {
+struct Horizon<const NX: usize, const NU: usize, const LINKED: bool> {
     stages: Vec<Stage<f64, NX, NU>>,
     memory: Vec<f64>,
     /// Rows on the inputs, those of a stage one after the other; the same for the states.
     input_rows: Vec<[f64; NU]>,
     soft_rows: Vec<[f64; NU]>,
+    /// Rows of the rates, and their products with the reference's input: place by place.
+    rate_rows: Vec<[f64; NU]>,
+    rate_at_reference: Vec<f64>,
+    rate_gains: Vec<[[f64; NU]; NU]>,
     rows: StageRows,
     first: usize,
     shape: Shape,
@@ -93,13 +110,18 @@ struct Horizon<const NX: usize, const NU: usize> {
     is_warm: bool,
 }
 
-impl<const NX: usize, const NU: usize> Horizon<NX, NU> {
+impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKED> {
     fn new(rows: &StageRows, weights: &Weights<'_>, settings: &MpcSettings) -> Self {
         let horizon = settings.horizon;
         let pyramid = rows.friction.as_ref().map_or(0, |_| PYRAMID_ROWS);
         let shape = Shape {
             input: rows.torque.len() + pyramid,
             soft: rows.joint.len(),
+            link: rows.rate.len(),
+            pairs: Pairs {
+                input: pairs(&rows.torque),
+                hard: 0,
+            },
             ..Shape::default()
         };
         let scale = SLACK_PRICE / weights.joint_penalty;
@@ -115,6 +137,9 @@ impl<const NX: usize, const NU: usize> Horizon<NX, NU> {
             memory: vec![0.0; horizon * shape.memory()],
             input_rows: vec![[0.0; NU]; horizon * shape.input],
             soft_rows: vec![[0.0; NU]; horizon * shape.soft],
+            rate_rows: vec![[0.0; NU]; horizon * shape.link],
+            rate_at_reference: vec![0.0; horizon * shape.link],
+            rate_gains: vec![[[0.0; NU]; NU]; if LINKED { horizon } else { 0 }],
             rows: rows.clone(),
             first: 0,
             shape,
@@ -126,15 +151,15 @@ impl<const NX: usize, const NU: usize> Horizon<NX, NU> {
             },
             settings: Settings {
                 max_iterations: settings.qp.max_iterations,
-                tolerance: TOLERANCE,
-                gap: GAP,
+                tolerance: if LINKED { RATE_TOLERANCE } else { TOLERANCE },
+                gap: if LINKED { 0.0 } else { GAP },
                 accepted_residual: settings.qp.accepted_residual,
             },
             is_warm: false,
         }
     }
 
-    fn program(&mut self) -> Program<'_, f64, NX, NU> {
+    fn program(&mut self) -> Program<'_, f64, NX, NU, LINKED> {
         Program {
             stages: &mut self.stages,
             rows: &mut self.memory,
@@ -144,6 +169,11 @@ impl<const NX: usize, const NU: usize> Horizon<NX, NU> {
                 input: &self.input_rows,
                 soft: &self.soft_rows,
                 hard: &[],
+            },
+            links: Links {
+                rows: &self.rate_rows,
+                gains: &mut self.rate_gains,
+                softness: RATE_SOFTNESS,
             },
             cost: self.cost,
         }
@@ -203,6 +233,13 @@ impl<const NX: usize, const NU: usize> Horizon<NX, NU> {
                 bounds[number] = if is_free { 1.0 } else { -at_reference };
             }
         }
+        let first = place * self.shape.link;
+        for (number, row) in own.rate.iter().enumerate() {
+            (
+                self.rate_rows[first + number],
+                self.rate_at_reference[first + number],
+            ) = scaled(&row.row, input_cholesky, &data.input);
+        }
         let matrix = &mut self.soft_rows[place * self.shape.soft..][..self.shape.soft];
         let bounds = &mut bounds[self.shape.input..];
         for (number, row) in own.joint.iter().enumerate() {
@@ -214,10 +251,31 @@ impl<const NX: usize, const NU: usize> Horizon<NX, NU> {
             bounds[number] = row.bound - at_reference;
         }
     }
+
+    /// Bounds of the rates: those of a stage depend on the stage before, those of the first on the last command.
+    fn write_rate_bounds(&mut self, first: &StageData, last_input: &[f64]) {
+        let (count, memory, link) = (self.shape.rows(), self.shape.memory(), self.shape.link);
+        let own = first.rows.as_ref().unwrap_or(&self.rows);
+        for number in 0..link {
+            let mut before = 0.0;
+            for (entry, input) in own.rate[number].row.iter().zip(last_input) {
+                before += entry * input;
+            }
+            for stage in 0..self.stages.len() {
+                let place = self.place(stage);
+                let at_reference = self.rate_at_reference[place * link + number];
+                let bound = &mut self.memory[place * memory + count - link + number];
+                *bound = self.rows.rate[number].bound - at_reference + before;
+                before = at_reference;
+            }
+        }
+    }
 }
 
 /// [`Program::prepare`] with the widest vectors that the processor has; the bits are the same with all.
-pub fn prepare<const NX: usize, const NU: usize>(program: &mut Program<'_, f64, NX, NU>) -> bool {
+pub fn prepare<const NX: usize, const NU: usize, const LINKED: bool>(
+    program: &mut Program<'_, f64, NX, NU, LINKED>,
+) -> bool {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has what this is compiled for.
@@ -227,8 +285,8 @@ pub fn prepare<const NX: usize, const NU: usize>(program: &mut Program<'_, f64, 
 }
 
 /// [`Program::solve`] with the widest vectors that the processor has; the bits are the same with all.
-pub fn solve<const NX: usize, const NU: usize>(
-    program: &mut Program<'_, f64, NX, NU>,
+pub fn solve<const NX: usize, const NU: usize, const LINKED: bool>(
+    program: &mut Program<'_, f64, NX, NU, LINKED>,
     x0: &[f64; NX],
     is_warm: bool,
     settings: &Settings<f64>,
@@ -268,7 +326,9 @@ fn scaled<const NU: usize>(
     (out, at_reference)
 }
 
-impl<const NX: usize, const NU: usize> StructuredProgram for Horizon<NX, NU> {
+impl<const NX: usize, const NU: usize, const LINKED: bool> StructuredProgram
+    for Horizon<NX, NU, LINKED>
+{
     fn shift(&mut self) {
         let mut program = self.program();
         program.shift();
@@ -289,7 +349,8 @@ impl<const NX: usize, const NU: usize> StructuredProgram for Horizon<NX, NU> {
         prepare(&mut self.program())
     }
 
-    fn solve(&mut self, x0: &[f64]) -> (Outcome, u32) {
+    fn solve(&mut self, x0: &[f64], first: &StageData, last_input: &[f64]) -> (Outcome, u32) {
+        self.write_rate_bounds(first, last_input);
         let x0 = std::array::from_fn(|i| x0[i]);
         let (is_warm, settings) = (self.is_warm, self.settings);
         let report = solve(&mut self.program(), &x0, is_warm, &settings);

@@ -189,14 +189,15 @@ struct Robot
 };
 
 /// Efforts along the jump are those of the controller in C with a joint PD; the largest difference, N m.
-double follow_jump(double effectiveness_time_s, bool torque_in_flight)
+double follow_jump(double effectiveness_time_s, bool torque_in_flight, const std::string & lift = "plain")
 {
     const double stiffness = 20, damping = 0.8;
-    Robot robot({{"effectiveness_time_s", effectiveness_time_s}, {"torque_in_flight", torque_in_flight}});
+    Robot robot({{"effectiveness_time_s", effectiveness_time_s}, {"torque_in_flight", torque_in_flight}, {"lift", lift}});
     require(robot.configure() == CallbackReturn::SUCCESS, "on_configure");
     require(robot.activate() == CallbackReturn::SUCCESS, "on_activate");
     static FN(_controller) beside;
     FN(_controller_settings) settings = FN(_controller_settings_default)();
+    settings.lift = lift == "plain" ? PASTE(UPPER, _LIFT_TRANSPOSE) : PASTE(UPPER, _LIFT_CONSISTENT);
     settings.effectiveness_time_s = effectiveness_time_s;
     settings.drive_stiffness_nm_rad = stiffness;
     settings.drive_damping_nm_s_rad = damping;
@@ -277,6 +278,11 @@ void refuse()
     faults("effectiveness_time_s", -1.0, "effectiveness_time_s");
     faults("body_friction", std::nan(""), "body_friction");
     faults("stiffness", -2.0, "stiffness");
+    faults("torque_rate_nm_s", PASTE(UPPER, _TORQUE_RATES) ? -1.0 : 100.0, "torque_rate_nm_s");
+    faults("lift", std::string("Consistent"), "lift: plain or consistent, not `Consistent`");
+    if (!PASTE(UPPER, _CONSISTENT_LIFT)) {
+        faults("lift", std::string("consistent"), "lift: plain alone");
+    }
     Robot robot;
     require(robot.configure() == CallbackReturn::SUCCESS, "on_configure");
     require(robot.activate(false) == CallbackReturn::ERROR, "interfaces in another order");
@@ -340,6 +346,11 @@ int main(int argc, char ** argv)
     const double trusting = follow_jump(0, false), estimating = follow_jump(1, true);
     std::printf("efforts within %.1e and, with the estimate, %.1e N m\n", trusting, estimating);
     require(trusting < 1e-6 && estimating < 1e-6, "efforts are those of the controller in C");
+    if (PASTE(UPPER, _CONSISTENT_LIFT)) {
+        const double consistent = follow_jump(0, false, "consistent");
+        std::printf("efforts of the consistent lift within %.1e N m\n", consistent);
+        require(consistent < 1e-6, "efforts are those of the controller in C with the consistent lift");
+    }
     survive_undefined_values();
     refuse();
     require(argc > 1, "a jump in a file");

@@ -1,0 +1,212 @@
+//! Rows that link the inputs of consecutive stages, `L_k v_k − L_{k−1} v_{k−1} <= bound`.
+//!
+//! The recursion then goes over the state and the input before it: with `w` the weights of a stage's
+//! links and `V(x, v_before) = ½ xᵀ P x + v_beforeᵀ M x + ½ v_beforeᵀ N v_before + …`,
+//!
+//! ```text
+//! H_vv = R + L_kᵀ w L_k + Bᵀ P B + M B + (M B)ᵀ + N,   H_vx = Bᵀ P A + M A,   C = −L_kᵀ w L_{k−1}
+//! v = −K x − K_before v_before − H_vv⁻¹ h,              K_before = H_vv⁻¹ C
+//! M ← −Cᵀ K,   N ← L_{k−1}ᵀ w L_{k−1} − Cᵀ K_before
+//! ```
+//!
+//! `N` is the difference of two matrices of the weights' size, and near the optimum the weight of an active
+//! row grows without bound: what is left of `N` would be rounding. Rows of a linked program are
+//! therefore softened: the equation of a row is `row · dv + ds − softness dy = −residual`, its weight
+//! `y / (s + softness y)` at most `1 / softness`. A step then leaves `softness dy` of a row, which
+//! vanishes with the steps, so that the optimum is that of the rows as they stand.
+
+use super::lower::Lower;
+use super::problem::{Program, Stage};
+use super::riccati::{WIDE, add_multiple};
+use super::scalar::Real;
+
+/// Rows that link inputs, and memory for their gains.
+#[derive(Debug)]
+pub struct Links<'m, T, const NU: usize, const LINKED: bool> {
+    /// `L`: [`Shape::link`](super::Shape::link) rows for each place of the ring of stages.
+    pub rows: &'m [[T; NU]],
+    /// Memory of the solver, one for each place.
+    pub gains: &'m mut [[[T; NU]; NU]],
+    /// How much a multiplier's change moves its row in one step.
+    pub softness: T,
+}
+
+impl<T: Real, const NU: usize> Links<'_, T, NU, false> {
+    /// No rows of the kind.
+    pub fn none() -> Self {
+        Self {
+            rows: &[],
+            gains: &mut [],
+            softness: T::ZERO,
+        }
+    }
+}
+
+/// Cost of the input before a stage, from the stage on, but for a constant.
+pub(super) struct Before<T, const NX: usize, const NU: usize> {
+    /// `M`, by the state.
+    by_state: [[T; NX]; NU],
+    /// `N`, of which the lower triangle is written.
+    square: [[T; NU]; NU],
+    /// Gradient.
+    pub linear: [T; NU],
+}
+
+impl<T: Real, const NX: usize, const NU: usize> Before<T, NX, NU> {
+    /// No cost, as after the last stage.
+    #[inline(always)]
+    pub fn none() -> Self {
+        Self {
+            by_state: [[T::ZERO; NX]; NU],
+            square: [[T::ZERO; NU]; NU],
+            linear: [T::ZERO; NU],
+        }
+    }
+
+    /// Hessian of a stage's input with this cost of it, and beginnings of its gradient and of `H_vx`.
+    #[inline(always)]
+    pub fn add_to(
+        &self,
+        stage: &Stage<T, NX, NU>,
+        hessian: &Lower<T, NU>,
+        by_v: &mut [T; NU],
+        hvx: &mut [[T; NX]; NU],
+    ) -> [[T; WIDE]; NU] {
+        let mut rows = hessian.rows();
+        let mut product = [[T::ZERO; NU]; NU];
+        for i in 0..NU {
+            hvx[i] = [T::ZERO; NX];
+            for j in 0..NX {
+                add_multiple(self.by_state[i][j], &stage.a[j], &mut hvx[i]);
+                add_multiple(self.by_state[i][j], &stage.b[j], &mut product[i]);
+            }
+        }
+        for i in 0..NU {
+            by_v[i] += self.linear[i];
+            for j in 0..=i {
+                rows[i][j] += self.square[i][j] + (product[i][j] + product[j][i]);
+            }
+        }
+        rows
+    }
+
+    /// The cost of the input before a stage that was eliminated, with weights and multipliers of its links, the rows
+    /// of both stages, and the gradient `h` by the stage's own input. Writes the gain.
+    #[inline(always)]
+    pub fn of_stage(
+        stage: &Stage<T, NX, NU>,
+        gain: &mut [[T; NU]; NU],
+        (w, y): (&[T], &[T]),
+        (own, earlier): (&[[T; NU]], &[[T; NU]]),
+        h: &[T; NU],
+    ) -> Self {
+        let mut before = Self::none();
+        let mut square = Lower::zeros();
+        let mut cross = [[T::ZERO; NU]; NU];
+        for (w, (own, earlier)) in w.iter().zip(own.iter().zip(earlier)) {
+            square.add_square(*w, earlier);
+            for i in 0..NU {
+                add_multiple(-(*w * own[i]), earlier, &mut cross[i]);
+            }
+        }
+        for i in 0..NU {
+            for j in 0..NU {
+                add_multiple(-cross[i][j], &stage.gain[i], &mut before.by_state[j]);
+            }
+        }
+        // Y = L⁻¹ C, Z = D⁻¹ Y; N = … − Yᵀ Z; K_before = L⁻ᵀ Z.
+        let factor = &stage.factor;
+        for i in 1..NU {
+            for k in 0..i {
+                for j in 0..NU {
+                    cross[i][j] = cross[i][j] - factor[i][k] * cross[k][j];
+                }
+            }
+        }
+        for i in 0..NU {
+            for j in 0..NU {
+                gain[i][j] = factor[i][i] * cross[i][j];
+            }
+        }
+        let rows = square.rows();
+        for i in 0..NU {
+            for j in 0..=i {
+                let mut entry = rows[i][j];
+                for k in 0..NU {
+                    entry = entry - cross[k][i] * gain[k][j];
+                }
+                before.square[i][j] = entry;
+            }
+        }
+        for i in (0..NU).rev() {
+            for k in i + 1..NU {
+                for j in 0..NU {
+                    gain[i][j] = gain[i][j] - factor[k][i] * gain[k][j];
+                }
+            }
+        }
+        before.linear = pull_before(y, earlier);
+        take_answer(gain, h, &mut before.linear);
+        before
+    }
+}
+
+/// Share of links with multipliers `y` in the gradient by the input before their stage.
+#[inline(always)]
+pub(super) fn pull_before<T: Real, const NU: usize>(y: &[T], earlier: &[[T; NU]]) -> [T; NU] {
+    let mut sum = [T::ZERO; NU];
+    for (y, row) in y.iter().zip(earlier) {
+        add_multiple(-*y, row, &mut sum);
+    }
+    sum
+}
+
+/// Takes what a stage's input answers off the gradient by the input before: `− K_beforeᵀ h`.
+#[inline(always)]
+pub(super) fn take_answer<T: Real, const NU: usize>(
+    gain: &[[T; NU]; NU],
+    h: &[T; NU],
+    by_before: &mut [T; NU],
+) {
+    for i in 0..NU {
+        for j in 0..NU {
+            by_before[j] = by_before[j] - gain[i][j] * h[i];
+        }
+    }
+}
+
+/// Takes the answer to the input before a stage off its own: `− K_before v_before`.
+#[inline(always)]
+pub(super) fn answer_before<T: Real, const NU: usize>(
+    gain: &[[T; NU]; NU],
+    before: &[T; NU],
+    v: &mut [T; NU],
+) {
+    for i in 0..NU {
+        for j in 0..NU {
+            v[i] = v[i] - gain[i][j] * before[j];
+        }
+    }
+}
+
+impl<'m, T: Real, const NX: usize, const NU: usize, const LINKED: bool>
+    Program<'m, T, NX, NU, LINKED>
+{
+    /// `L` of a stage; nothing of a program without links.
+    #[inline(always)]
+    pub(super) fn link_rows(&self, k: usize) -> &'m [[T; NU]] {
+        match LINKED {
+            true => &self.links.rows[self.at(k) * self.shape.link..][..self.shape.link],
+            false => &[],
+        }
+    }
+
+    /// `L` of a stage and of the one before; nothing of a program without links.
+    #[inline(always)]
+    pub(super) fn link_pairs(&self, k: usize) -> (&'m [[T; NU]], &'m [[T; NU]]) {
+        match LINKED && k > 0 {
+            true => (self.link_rows(k), self.link_rows(k - 1)),
+            false => (self.link_rows(k), &[]),
+        }
+    }
+}

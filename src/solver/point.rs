@@ -1,0 +1,75 @@
+//! How far a point of the iterations is from the optimum, and the numbers by which they begin and end.
+
+use super::problem::Settings;
+use super::scalar::Real;
+
+/// Share of the way to the boundary that a step leaves: the least and the most.
+pub const MARGIN: (f64, f64) = (1e-3, 5e-3);
+/// The share between the two, in units of the mean complementarity: near the optimum steps may go further.
+pub const MARGIN_FACTOR: f64 = 10.0;
+/// Smallest slack and smallest product of slack and multiplier at a start from the gains.
+pub const COLD: (f64, f64) = (3e-1, 3.0);
+/// The same at a start from a guess.
+pub const WARM: (f64, f64) = (1e-2, 1e-3);
+/// The same at a start from a guess at the solution of quite another program.
+pub const FAR: (f64, f64) = (3e-1, 1.0);
+/// The same where a guess turned out to be poor, or the iterations go round in a circle.
+pub const AGAIN: (f64, f64) = (1e-1, 2e-1);
+/// A guess is of quite another program if the optimum without rows moved further than this, in units of
+/// the input's rows.
+pub const FAR_CHANGE: f64 = 3.0;
+/// A first step from a guess that is shorter than this shows that the guess is not near a solution.
+pub const SHORT_STEP: f64 = 0.4;
+/// Iterations after which slacks and multipliers are centred again: now and then the method goes round
+/// in a circle.
+pub const PATIENCE: u32 = 16;
+
+/// Share of the residuals at the last centring, those of the gradient among them, that may be left.
+pub const LEFT: f64 = 1e-6;
+
+/// How far a point is from the optimum.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Point<T> {
+    /// Share of the gradient that the steps since the last centring have left.
+    pub left: T,
+    /// The same share of the rows' residuals; one where these are kept up to date.
+    pub kept: T,
+    /// Largest residual of a row at the last centring, or the present one.
+    pub residual: T,
+    /// Sum of the products of slacks and multipliers.
+    pub sum: T,
+    /// The largest of them.
+    pub largest: T,
+    /// `Σ vᵀ R v + xᵀ Q x`, one before the first step.
+    pub value: T,
+}
+
+impl<T: Real> Point<T> {
+    /// Largest residual of a row.
+    #[inline(always)]
+    pub fn infeasibility(&self) -> T {
+        self.kept * self.residual
+    }
+
+    /// Whether the iterations may end here: gradient and rows hold, and each product, or the gap between primal
+    /// and dual cost, is small.
+    #[inline(always)]
+    pub fn is_optimal(&self, settings: &Settings<T>) -> bool {
+        self.left <= T::of(LEFT)
+            && self.infeasibility() <= settings.tolerance
+            && (self.largest <= settings.tolerance
+                || self.sum <= settings.gap * T::ONE.or_larger(self.value))
+    }
+}
+
+/// Share of the way to the boundary that a step goes at a mean complementarity.
+#[inline(always)]
+pub(super) fn boundary_share<T: Real>(complementarity: T) -> T {
+    let (least, most) = (T::of(MARGIN.0), T::of(MARGIN.1));
+    let margin = T::of(MARGIN_FACTOR) * complementarity;
+    if margin < most {
+        T::ONE - least.or_larger(margin)
+    } else {
+        T::ONE - most
+    }
+}
