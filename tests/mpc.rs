@@ -19,5 +19,7 @@ mod random;
 mod recordings;
 #[path = "mpc/riccati.rs"]
 mod riccati;
+#[path = "mpc/swing.rs"]
+mod swing;
 #[path = "mpc/synthetic.rs"]
 mod synthetic;
