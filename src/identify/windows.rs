@@ -134,8 +134,8 @@ impl Windows {
     }
 
     /// Ways to divide the blocks into groups that are left out in turn for standard errors: the group of every block.
-    /// Blocks by themselves; and whole segments, which are jumps, where there are at least [`LEAST_JUMPS`] and none has
-    /// more than [`LARGEST_SHARE`] of the equations of the fit.
+    /// Blocks by themselves; and whole segments, which are jumps, where there are at least six and none has more than
+    /// a third of the equations of the fit.
     pub fn groupings(&self) -> Vec<Vec<usize>> {
         let mut groupings = vec![(0..self.blocks.len()).collect()];
         let mut counts = vec![0; self.segments];
