@@ -272,12 +272,13 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
     }
 }
 
-/// [`Program::prepare`] with the widest vectors that the processor has; the bits are the same with all.
+/// [`Program::prepare`] with the widest vectors that the processor has; the bits are the same with all. Programs
+/// with rates, which are rare, make do with the narrowest: a copy less to compile.
 pub fn prepare<const NX: usize, const NU: usize, const LINKED: bool>(
     program: &mut Program<'_, f64, NX, NU, LINKED>,
 ) -> bool {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
+    if !LINKED && is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has what this is compiled for.
         return unsafe { program.prepare_avx2() };
     }
@@ -292,7 +293,7 @@ pub fn solve<const NX: usize, const NU: usize, const LINKED: bool>(
     settings: &Settings<f64>,
 ) -> Report<f64> {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
+    if !LINKED && is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has what this is compiled for.
         return unsafe { program.solve_avx2(x0, is_warm, settings) };
     }
