@@ -279,6 +279,13 @@ impl RandomProgram {
     }
 }
 
+/// Largest difference of two solutions, relative to the larger of 1 and the largest expected number.
+fn off(found: &[f64], expected: &[f64]) -> f64 {
+    let size = expected.iter().fold(1.0_f64, |size, v| size.max(v.abs()));
+    let pairs = found.iter().zip(expected);
+    pairs.fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs())) / size
+}
+
 #[test]
 fn riccati_finds_clarabels_optimum_of_random_programs_in_both_precisions() {
     let mut random = Random::new(11);
@@ -291,11 +298,7 @@ fn riccati_finds_clarabels_optimum_of_random_programs_in_both_precisions() {
             infeasible += 1;
             continue;
         };
-        let size = expected.iter().fold(1.0_f64, |size, v| size.max(v.abs()));
-        let off = |found: &[f64]| {
-            let pairs = found.iter().zip(&expected);
-            pairs.fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs())) / size
-        };
+        let off = |found: &[f64]| off(found, &expected);
         let (found, report) = program.structured::<f64, false>(1e-11, 1e-7, 0.0);
         assert_eq!(
             report.outcome,
@@ -335,11 +338,7 @@ fn riccati_finds_clarabels_optimum_of_programs_whose_inputs_are_linked_in_both_p
             infeasible += 1;
             continue;
         };
-        let size = expected.iter().fold(1.0_f64, |size, v| size.max(v.abs()));
-        let off = |found: &[f64]| {
-            let pairs = found.iter().zip(&expected);
-            pairs.fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs())) / size
-        };
+        let off = |found: &[f64]| off(found, &expected);
         let (found, report) = program.structured::<f64, true>(1e-12, 1e-7, 1e-8);
         assert_eq!(
             report.outcome,

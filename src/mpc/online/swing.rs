@@ -13,7 +13,7 @@
 use super::control_model::ControlModel;
 use crate::robot::{JOINT_DIM, Leg};
 
-/// Errors of pitch beyond which legs turn no further, rad.
+/// Most that legs are turned, rad.
 pub const MOST_TURN_RAD: f64 = 0.3;
 
 impl ControlModel {
