@@ -37,7 +37,7 @@ EXAMPLE = """example:
 draws 12 goals inside the range of the training jumps and 6 outside (up to 35 % further, 40 % higher
 than any of them) from the seed, plans each from the start of a test jump, and drives the simulated
 robot: the plan with the model's generated controller and with joint PD alone, and beside it replays,
-blends and regressions of the training jumps. --variants adds rows of plans by changed models: the
+blends and regressions of the training jumps. --ablations adds rows of plans by changed models: the
 ablations. Writes plan_jumps.csv (one row per run), plan_jumps.json, table.txt, every plan and, with
 --strips (and MUJOCO_GL=egl where there is no display), film strips."""
 
@@ -66,7 +66,6 @@ ABLATIONS = (
     "Xi of deviations random",
     "no goal in the prior",
     "no prior: standing still",
-    "no ballistic flight",
 )
 
 
@@ -148,8 +147,8 @@ def parse_arguments():
     parser.add_argument("--settings", type=pathlib.Path, help="weights of the plan, a TOML file")
     parser.add_argument(
         "--setting", type=named_number, action="append", metavar="NAME=NUMBER",
-        help="a setting of the controller (default: those of the library, the share of the input that "
-        "arrives estimated with the gains of the joint PD)",
+        help="a setting of the controller (default: effectiveness_time_s=1, the gains of the joint PD, "
+        "terminal_weight=30, input_weight=20, else those of the library)",
     )
     parser.add_argument(
         "--strips", action="store_true",
@@ -163,6 +162,8 @@ def parse_arguments():
             ("effectiveness_time_s", 1.0),
             ("drive_stiffness_nm_rad", POSITION_GAIN),
             ("drive_damping_nm_s_rad", VELOCITY_GAIN),
+            ("terminal_weight", 30.0),
+            ("input_weight", 20.0),
         ]
     arguments.out_dir, arguments.romc = arguments.out_dir.resolve(), arguments.romc.resolve()
     return arguments
@@ -328,11 +329,6 @@ def ablated(arguments, name):
                 if key == "u_lat":
                     rows[:, :d] = np.array(part[key])[:, :d].mean(axis=0)
                 part[key] = rows.tolist()
-    if name.startswith("no ballistic"):
-        # An equation that is not a constant is not taken for free fall.
-        flight = next(phase for phase in model["phases"] if phase["feet"] == "none")
-        term = 1 if isinstance(model["library"], dict) else model["library"].index("z1")
-        flight["xi"][term] = [1e-12] * d
     path = arguments.out_dir / "models" / ("".join(c for c in name if c.isalnum()) + ".json")
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(model), encoding="utf-8")

@@ -7,7 +7,7 @@ use super::goal::{Goal, Start};
 use super::settings::PlanSettings;
 use crate::lower::CompiledModel;
 use crate::model::{JumpPart, JumpPrior, ReducedModel};
-use crate::robot::{BODY_NAMES, FeetRule, InputRule, JOINT_DIM, JOINT_NAMES, STATE_DIM};
+use crate::robot::{BODY_NAMES, InputRule, JOINT_DIM, JOINT_NAMES, STATE_DIM};
 
 /// Position of the body in the state.
 pub const BODY_X: usize = 12;
@@ -181,11 +181,6 @@ fn seed_part<'a>(
         };
         slope.push(by_latent * &scales);
     }
-    for coordinate in falling_freely(model, part.phase)? {
-        slope
-            .iter_mut()
-            .for_each(|m| m.row_mut(coordinate).fill(0.0));
-    }
     Ok(SeedPart {
         part,
         duration_s,
@@ -208,27 +203,4 @@ fn scales(prior: &JumpPrior, root: &DMatrix<f64>, d: usize) -> DMatrix<f64> {
     }
     scales.view_mut((2 * d, 2 * d), (d, d)).copy_from(root);
     scales
-}
-
-/// Latent coordinates that nothing moves in a phase without contact but gravity, by the model's
-/// equations: those that alone hold the body's x or z, and whose equation is a constant. Deviations
-/// do not move them; their accelerations stay the prior's, which include the last contact at take-off.
-fn falling_freely(model: &ReducedModel, phase: usize) -> Result<Vec<usize>, PlanError> {
-    if model.phases()[phase].feet != FeetRule::None {
-        return Ok(Vec::new());
-    }
-    let encoder = model.encoder()?.weights();
-    let mut falling = Vec::new();
-    for of_body in [BODY_X, BODY_Z] {
-        let column = encoder.column(of_body);
-        let mut holding = (0..column.len()).filter(|&i| column[i] != 0.0);
-        let (Some(coordinate), None) = (holding.next(), holding.next()) else {
-            continue;
-        };
-        let terms = model.active_terms(phase, coordinate)?;
-        if terms.iter().all(|(_, term)| term.text() == "1") {
-            falling.push(coordinate);
-        }
-    }
-    Ok(falling)
 }

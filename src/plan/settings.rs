@@ -52,11 +52,11 @@ impl Default for PlanSettings {
     fn default() -> Self {
         Self {
             input: 2.0,
-            posture: 1.0,
-            rate: 0.3,
+            posture: 0.5,
+            rate: 0.1,
             smoothness: 3.0,
             feet: 3.0,
-            foot_m: [0.005, 0.005],
+            foot_m: [0.005, 0.004],
             duration: [4.0, 0.0],
             first_duration: 400.0,
             inset: 0.3,
