@@ -31,14 +31,22 @@ ROBOT = "go1"
 INSIDE, OUTSIDE = 12, 6
 STRIP_MARGIN_S = 0.14  # of a film strip, before take-off and after landing
 CONDITIONS = (NOMINAL, *(p for p in PERTURBATIONS if p.short in ("+1 kg", "tau 0.9")))
+# Of the controller, where they are not the library's: a plan keeps what the model says, unlike a recorded jump.
+SETTINGS = {
+    "effectiveness_time_s": 1.0,
+    "drive_stiffness_nm_rad": POSITION_GAIN,
+    "drive_damping_nm_s_rad": VELOCITY_GAIN,
+    "terminal_weight": 30.0,
+    "input_weight": 20.0,
+}
 EXAMPLE = """example:
   cargo build --release
   python plan_jumps.py --seed 1 --out-dir ../../out/plan_jumps
 draws 12 goals inside the range of the training jumps and 6 outside (up to 35 % further, 40 % higher
 than any of them) from the seed, plans each from the start of a test jump, and drives the simulated
 robot: the plan with the model's generated controller and with joint PD alone, and beside it replays,
-blends and regressions of the training jumps. --ablations adds rows of plans by changed models: the
-ablations. Writes plan_jumps.csv (one row per run), plan_jumps.json, table.txt, every plan and, with
+blends and regressions of the training jumps. --ablations adds rows of plans by changed models.
+Writes plan_jumps.csv (one row per run), plan_jumps.json, table.txt, every plan and, with
 --strips (and MUJOCO_GL=egl where there is no display), film strips."""
 
 
@@ -146,9 +154,8 @@ def parse_arguments():
     parser.add_argument("--nominal", action="store_true", help="no payload, no weak motors")
     parser.add_argument("--settings", type=pathlib.Path, help="weights of the plan, a TOML file")
     parser.add_argument(
-        "--setting", type=named_number, action="append", metavar="NAME=NUMBER",
-        help="a setting of the controller (default: effectiveness_time_s=1, the gains of the joint PD, "
-        "terminal_weight=30, input_weight=20, else those of the library)",
+        "--setting", type=named_number, action="append", default=[], metavar="NAME=NUMBER",
+        help=f"a setting of the controller, beside those for plans: {SETTINGS}",
     )
     parser.add_argument(
         "--strips", action="store_true",
@@ -157,14 +164,7 @@ def parse_arguments():
     parser.add_argument("--json", action="store_true", help="print JSON, not the table")
     parser.add_argument("--jobs", type=int, help="runs at a time (default: one per core)")
     arguments = parser.parse_args()
-    if arguments.setting is None:
-        arguments.setting = [
-            ("effectiveness_time_s", 1.0),
-            ("drive_stiffness_nm_rad", POSITION_GAIN),
-            ("drive_damping_nm_s_rad", VELOCITY_GAIN),
-            ("terminal_weight", 30.0),
-            ("input_weight", 20.0),
-        ]
+    arguments.setting = SETTINGS | dict(arguments.setting)
     arguments.out_dir, arguments.romc = arguments.out_dir.resolve(), arguments.romc.resolve()
     return arguments
 
@@ -263,7 +263,7 @@ def run(task):
     )
     controller = None
     if method.controller:
-        controller = made_controller(crate, dict(arguments.setting))
+        controller = made_controller(crate, arguments.setting)
         u = inputs.of(reference)
         controller.set_reference(reference.time_s, reference.x, reference.dx, u, reference.feet)
         follower = LatentMpc(controller)
