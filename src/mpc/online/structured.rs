@@ -66,7 +66,8 @@ pub(super) trait StructuredProgram: Debug + Send {
     fn state(&self, stage: usize) -> &[f64];
 }
 
-/// A program, or none for a latent dimension above [`MAX_STRUCTURED_DIM`].
+/// A program, or none for a latent dimension above [`MAX_STRUCTURED_DIM`]. An odd dimension is filled up to the next
+/// even one with inputs and states that nothing moves, which changes no bit and halves what has to be compiled.
 pub(super) fn structured_program(
     latent_dim: usize,
     rows: &StageRows,
@@ -75,23 +76,25 @@ pub(super) fn structured_program(
 ) -> Option<Box<dyn StructuredProgram>> {
     macro_rules! of_dimension {
         ($($dim:literal),*) => {
-            match (latent_dim, rows.rate.is_empty()) {
+            match (latent_dim.next_multiple_of(2), rows.rate.is_empty()) {
                 $(($dim, true) => Some(Box::new(
-                    Horizon::<{ 2 * $dim }, $dim, false>::new(rows, weights, settings)
+                    Horizon::<{ 2 * $dim }, $dim, false>::new(latent_dim, rows, weights, settings)
                 )),)*
                 $(($dim, false) => Some(Box::new(
-                    Horizon::<{ 2 * $dim }, $dim, true>::new(rows, weights, settings)
+                    Horizon::<{ 2 * $dim }, $dim, true>::new(latent_dim, rows, weights, settings)
                 )),)*
                 _ => None,
             }
         };
     }
-    of_dimension!(1, 2, 3, 4, 5, 6, 7, 8)
+    of_dimension!(2, 4, 6, 8)
 }
 
 /// Memory of a program; `NX` is twice `NU`, `LINKED` if torque rates are limited.
 #[derive(Debug)]
 struct Horizon<const NX: usize, const NU: usize, const LINKED: bool> {
+    /// Inputs that the model has; what is beyond them, up to `NU`, and beyond twice as many states stays zero.
+    latent_dim: usize,
     stages: Vec<Stage<f64, NX, NU>>,
     memory: Vec<f64>,
     /// Rows on the inputs, those of a stage one after the other; the same for the states.
@@ -111,7 +114,12 @@ struct Horizon<const NX: usize, const NU: usize, const LINKED: bool> {
 }
 
 impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKED> {
-    fn new(rows: &StageRows, weights: &Weights<'_>, settings: &MpcSettings) -> Self {
+    fn new(
+        latent_dim: usize,
+        rows: &StageRows,
+        weights: &Weights<'_>,
+        settings: &MpcSettings,
+    ) -> Self {
         let horizon = settings.horizon;
         let pyramid = rows.friction.as_ref().map_or(0, |_| PYRAMID_ROWS);
         let shape = Shape {
@@ -125,7 +133,10 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             ..Shape::default()
         };
         let scale = SLACK_PRICE / weights.joint_penalty;
-        let state = std::array::from_fn(|i| scale * weights.state[i]);
+        let mut state = [0.0; NX];
+        for (entry, weight) in state.iter_mut().zip(weights.state) {
+            *entry = scale * weight;
+        }
         let stage = |index: usize| {
             let mut stage = Stage::zeros();
             stage.input_rows = index * shape.input;
@@ -133,6 +144,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             stage
         };
         Self {
+            latent_dim,
             stages: (0..horizon).map(stage).collect(),
             memory: vec![0.0; horizon * shape.memory()],
             input_rows: vec![[0.0; NU]; horizon * shape.input],
@@ -186,16 +198,17 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
     fn write_dynamics(&mut self, place: usize, values: &StageValues<'_>) {
         let (model, deviation) = (&values.data.model, values.deviation);
         let stage = &mut self.stages[place];
-        for row in 0..NX {
+        let dim = self.latent_dim;
+        for row in 0..2 * dim {
             let scale = 1.0 / deviation[row];
-            for col in 0..NU {
+            for col in 0..dim {
                 let mut sum = 0.0;
-                for k in col..NU {
+                for k in col..dim {
                     sum += model.b[(row, k)] * values.input_cholesky[(k, col)];
                 }
                 stage.b[row][col] = scale * sum;
             }
-            for col in 0..NX {
+            for col in 0..2 * dim {
                 stage.a[row][col] = scale * model.a[(row, col)] * deviation[col];
             }
             stage.c[row] = scale * values.data.defect[row];
@@ -210,6 +223,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             input_cholesky,
         } = *values;
         let own = data.rows.as_ref().unwrap_or(&self.rows);
+        let dim = self.latent_dim;
         let (count, memory) = (self.shape.rows(), self.shape.memory());
         let bounds = &mut self.memory[place * memory..][..count];
         let matrix = &mut self.input_rows[place * self.shape.input..][..self.shape.input];
@@ -222,10 +236,11 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             let pull = std::f64::consts::FRAC_1_SQRT_2;
             for side in 0..PYRAMID_ROWS {
                 let (axis, sign) = (1 + side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });
-                let row: [f64; NU] = std::array::from_fn(|j| {
-                    sign * data.force[axis * NU + j] - pull * data.force[j]
+                let row: [f64; NU] = std::array::from_fn(|j| match j < dim {
+                    true => sign * data.force[axis * dim + j] - pull * data.force[j],
+                    false => 0.0,
                 });
-                let (scaled, at_reference) = scaled(&row, input_cholesky, &data.input);
+                let (scaled, at_reference) = scaled(&row[..dim], input_cholesky, &data.input);
                 let number = own.torque.len() + side;
                 matrix[number] = scaled;
                 // Without contact nothing is asked for.
@@ -244,7 +259,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
         let bounds = &mut bounds[self.shape.input..];
         for (number, row) in own.joint.iter().enumerate() {
             let mut at_reference = 0.0;
-            for j in 0..NU {
+            for j in 0..dim {
                 matrix[number][j] = row.row[j] * deviation[j];
                 at_reference += row.row[j] * end[j];
             }
@@ -318,8 +333,8 @@ fn scaled<const NU: usize>(
 ) -> ([f64; NU], f64) {
     let mut out = [0.0; NU];
     let mut at_reference = 0.0;
-    for col in 0..NU {
-        for k in col..NU {
+    for col in 0..row.len() {
+        for k in col..row.len() {
             out[col] += row[k] * root[(k, col)];
         }
         at_reference += row[col] * input[col];
@@ -352,7 +367,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StructuredProgram
 
     fn solve(&mut self, x0: &[f64], first: &StageData, last_input: &[f64]) -> (Outcome, u32) {
         self.write_rate_bounds(first, last_input);
-        let x0 = std::array::from_fn(|i| x0[i]);
+        let x0 = std::array::from_fn(|i| x0.get(i).copied().unwrap_or(0.0));
         let (is_warm, settings) = (self.is_warm, self.settings);
         let report = solve(&mut self.program(), &x0, is_warm, &settings);
         let outcome = outcome_of(report.outcome);
@@ -361,10 +376,10 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StructuredProgram
     }
 
     fn input(&self, stage: usize) -> &[f64] {
-        &self.stages[self.place(stage)].v
+        &self.stages[self.place(stage)].v[..self.latent_dim]
     }
 
     fn state(&self, stage: usize) -> &[f64] {
-        &self.stages[self.place(stage)].x
+        &self.stages[self.place(stage)].x[..2 * self.latent_dim]
     }
 }
