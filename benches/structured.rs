@@ -13,7 +13,8 @@
 //! makes such files, and runs PIQP on them beside this program.
 //!
 //! Rows that the others imply are left out first, by linear programs; each step starts from the last
-//! step's solution, and its time has all that depends on the step in it: writing, gains, solve.
+//! step's solution, and its time has all that depends on the step in it: writing, gains, solve. A loop is
+//! run [`REPEATS`] times; a step's time is its smallest, without what else the machine did meanwhile.
 
 use std::io::Write as _;
 
@@ -26,6 +27,9 @@ mod clock;
 
 /// Weight of the robot, N, by which rows of forces are divided.
 const WEIGHT_N: f64 = 118.0;
+
+/// How often a loop is run.
+const REPEATS: usize = 3;
 
 /// Reads numbers of a file one after the other.
 struct Reader {
@@ -194,70 +198,80 @@ fn run<const NX: usize, const NU: usize>(
         input: std::array::from_fn(|j| 2.0 * shared.input_weight[j]),
         slack: 0.0,
     };
-    let mut stages = vec![Stage::<f64, NX, NU>::zeros(); horizon];
-    let mut memory = vec![0.0; horizon * shape.memory()];
     let settings = Settings {
         max_iterations: 60,
         tolerance: 1e-8,
-        gap: 5e-8,
+        gap: 2e-7,
         accepted_residual: 2e-5,
     };
     let mut reference = Conic::new::<NX, NU>(&shared);
-    let (mut first, mut times, mut iterations) = (0, Vec::new(), Vec::new());
+    let steps: Vec<Step> = (0..ticks)
+        .map(|_| read_step::<NX, NU>(&mut reader, horizon))
+        .collect();
+    let (mut times, mut iterations) = (vec![f64::INFINITY; ticks], Vec::new());
     let (mut off, mut cost_off, mut unsolved) = (0.0_f64, 0.0_f64, 0);
-    for tick in 0..ticks {
-        let step = read_step::<NX, NU>(&mut reader, horizon);
-        let mut program = Program {
-            stages: &mut stages,
-            rows: &mut memory,
-            first,
-            shape,
-            matrices: RowMatrices {
-                input: &input,
-                soft: &[],
-                hard: &hard,
-            },
-            links: Links::none(),
-            cost,
-        };
-        let mut report = None;
-        times.push(clock::timed(|| {
-            if tick > 0 {
-                program.shift();
-            }
-            write(&mut program, &shared, &step);
-            let x0 = std::array::from_fn(|i| step.x0[i] - step.reference[i]);
-            prepare(&mut program);
-            report = Some(solve(&mut program, &x0, tick > 0, &settings));
-        }));
-        let report = report.expect("solved or not");
-        iterations.push(f64::from(report.iterations));
-        unsolved += usize::from(report.outcome != Outcome::Solved);
-        let solution = reference.solve::<NX, NU>(&shared, &step);
-        for k in 0..horizon {
-            let stage = &program.stages[program.at(k)];
-            for (found, expected) in stage.v.iter().zip(&solution[k * (NX + NU)..]) {
-                off = off.max((found - expected).abs());
-            }
-        }
-        let value = |part: &dyn Fn(usize, usize) -> f64| -> f64 {
-            let weight = |k: usize, i: usize| match (i < NU, k + 1 == horizon) {
-                (true, _) => cost.input[i],
-                (false, true) => cost.terminal[i - NU],
-                (false, false) => cost.state[i - NU],
+    for repeat in 0..REPEATS {
+        let mut stages = vec![Stage::<f64, NX, NU>::zeros(); horizon];
+        let mut memory = vec![0.0; horizon * shape.memory()];
+        let (mut first, mut is_warm) = (0, false);
+        for (tick, step) in steps.iter().enumerate() {
+            let mut program = Program {
+                stages: &mut stages,
+                rows: &mut memory,
+                first,
+                shape,
+                matrices: RowMatrices {
+                    input: &input,
+                    soft: &[],
+                    hard: &hard,
+                },
+                links: Links::none(),
+                cost,
             };
-            (0..horizon)
-                .flat_map(|k| (0..NU + NX).map(move |i| (k, i)))
-                .map(|(k, i)| 0.5 * weight(k, i) * part(k, i).powi(2))
-                .sum()
-        };
-        let ours = value(&|k, i| {
-            let stage = &program.stages[program.at(k)];
-            if i < NU { stage.v[i] } else { stage.x[i - NU] }
-        });
-        let theirs = value(&|k, i| solution[k * (NX + NU) + i]);
-        cost_off = cost_off.max((ours - theirs).abs() / theirs.abs().max(1.0));
-        first = program.first;
+            let mut report = None;
+            let time = clock::timed(|| {
+                if tick > 0 {
+                    program.shift();
+                }
+                write(&mut program, &shared, step);
+                let x0 = std::array::from_fn(|i| step.x0[i] - step.reference[i]);
+                prepare(&mut program);
+                report = Some(solve(&mut program, &x0, is_warm, &settings));
+            });
+            times[tick] = time.min(times[tick]);
+            first = program.first;
+            let report = report.expect("solved or not");
+            is_warm = report.outcome == Outcome::Solved;
+            if repeat > 0 {
+                continue;
+            }
+            iterations.push(f64::from(report.iterations));
+            unsolved += usize::from(report.outcome != Outcome::Solved);
+            let solution = reference.solve::<NX, NU>(&shared, step);
+            for k in 0..horizon {
+                let stage = &program.stages[program.at(k)];
+                for (found, expected) in stage.v.iter().zip(&solution[k * (NX + NU)..]) {
+                    off = off.max((found - expected).abs());
+                }
+            }
+            let value = |part: &dyn Fn(usize, usize) -> f64| -> f64 {
+                let weight = |k: usize, i: usize| match (i < NU, k + 1 == horizon) {
+                    (true, _) => cost.input[i],
+                    (false, true) => cost.terminal[i - NU],
+                    (false, false) => cost.state[i - NU],
+                };
+                (0..horizon)
+                    .flat_map(|k| (0..NU + NX).map(move |i| (k, i)))
+                    .map(|(k, i)| 0.5 * weight(k, i) * part(k, i).powi(2))
+                    .sum()
+            };
+            let ours = value(&|k, i| {
+                let stage = &program.stages[program.at(k)];
+                if i < NU { stage.v[i] } else { stage.x[i - NU] }
+            });
+            let theirs = value(&|k, i| solution[k * (NX + NU) + i]);
+            cost_off = cost_off.max((ours - theirs).abs() / theirs.abs().max(1.0));
+        }
     }
     let line = format!(
         "d {NU}, N {horizon}, {} + {} rows a stage: median {:.1} us, 99 % {:.1} us; iterations {} / {} / {}; \

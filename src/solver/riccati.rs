@@ -10,6 +10,7 @@
 //! All loops have a fixed number of turns and a fixed order of additions: the generated C has the same.
 
 use super::problem::Stage;
+use super::rows::part;
 use super::scalar::Real;
 
 /// Most inputs, and the width of rows of `NU` numbers that are filled up with zeros: vectors of four
@@ -104,13 +105,15 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize, const BEGUN: 
             z[i][j] = factor[i][i] * y[i][j];
         }
     }
-    lower_rows::<T, NX, NU, 4>(a, pa, y, z, p);
-    lower_rows::<T, NX, NU, 8>(a, pa, y, z, p);
-    lower_rows::<T, NX, NU, 12>(a, pa, y, z, p);
-    lower_rows::<T, NX, NU, 16>(a, pa, y, z, p);
-    lower_rows::<T, NX, NU, 20>(a, pa, y, z, p);
-    lower_rows::<T, NX, NU, 24>(a, pa, y, z, p);
-    for i in (NX - NX % 4).min(24)..NX {
+    for i in (0..NX - NX % 4).step_by(4) {
+        for j in (0..i + 4).step_by(8) {
+            match j + 8 <= i + 4 {
+                true => lower_block::<T, NX, NU, 8>((i, j), a, pa, y, z, p),
+                false => lower_block::<T, NX, NU, 4>((i, j), a, pa, y, z, p),
+            }
+        }
+    }
+    for i in NX - NX % 4..NX {
         let mut row = [T::ZERO; NX];
         for k in 0..NX {
             add_multiple(a[k][i], &pa[k], &mut row);
@@ -283,38 +286,33 @@ pub(super) fn plus_columns<T: Real, const ROWS: usize, const COLS: usize>(
     out
 }
 
-/// Four rows of `P` whose last is row `W - 1`, up to that column.
+/// `W` columns of four rows of `P`, from this row and column on: a block that stays in registers.
 #[inline(always)]
-fn lower_rows<T: Real, const NX: usize, const NU: usize, const W: usize>(
+fn lower_block<T: Real, const NX: usize, const NU: usize, const W: usize>(
+    (i, j): (usize, usize),
     a: &[[T; NX]; NX],
     pa: &[[T; NX]; NX],
     y: &[[T; NX]; NU],
     z: &[[T; NX]; NU],
     p: &mut [[T; NX]; NX],
 ) {
-    if W > NX {
-        return;
+    let mut block = [[T::ZERO; W]; 4];
+    for k in 0..NX {
+        let row = part(&pa[k], j);
+        for r in 0..4 {
+            add_multiple(a[k][i + r], row, &mut block[r]);
+        }
     }
-    for i in [W - 4, W - 2] {
-        let (mut first, mut second) = ([T::ZERO; W], [T::ZERO; W]);
-        for k in 0..NX {
-            for j in 0..W {
-                first[j] += a[k][i] * pa[k][j];
-            }
-            for j in 0..W {
-                second[j] += a[k][i + 1] * pa[k][j];
+    for k in 0..NU {
+        let row: &[T; W] = part(&z[k], j);
+        for r in 0..4 {
+            for c in 0..W {
+                block[r][c] = block[r][c] - y[k][i + r] * row[c];
             }
         }
-        for k in 0..NU {
-            for j in 0..W {
-                first[j] = first[j] - y[k][i] * z[k][j];
-            }
-            for j in 0..W {
-                second[j] = second[j] - y[k][i + 1] * z[k][j];
-            }
-        }
-        p[i][..W].copy_from_slice(&first);
-        p[i + 1][..W].copy_from_slice(&second);
+    }
+    for r in 0..4 {
+        p[i + r][j..][..W].copy_from_slice(&block[r]);
     }
 }
 

@@ -185,11 +185,12 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     }
 }
 
+/// Entries of a vector from this one on.
 #[inline(always)]
 pub(super) fn part<T, const NX: usize, const NU: usize>(x: &[T; NX], first: usize) -> &[T; NU] {
     x[first..]
         .first_chunk()
-        .expect("rows on states begin at least NU before their end")
+        .expect("a part ends before its vector")
 }
 
 #[inline(always)]
@@ -199,7 +200,7 @@ pub(super) fn part_mut<T, const NX: usize, const NU: usize>(
 ) -> &mut [T; NU] {
     x[first..]
         .first_chunk_mut()
-        .expect("rows on states begin at least NU before their end")
+        .expect("a part ends before its vector")
 }
 
 /// Pairs of numbers, and the numbers behind them.
