@@ -250,7 +250,8 @@ def compare(path):
                 value, best_value = (problem.value(*plan, step[2]) for plan in ((states, inputs), solution))
                 worst = max(worst, abs(value - best_value) / max(best_value, 1.0))
         ranks = np.percentile(np.min(found, axis=0)[1:], [50, 99])
-        print(f"  PIQP {name}: median {ranks[0]:.0f} us, 99 % {ranks[1]:.0f} us; cost within {worst:.1e} of its own at 1e-9; {solver.unsolved} unsolved")
+        times = f"median {ranks[0]:.0f} us, 99 % {ranks[1]:.0f} us"
+        print(f"  PIQP {name}: {times}; cost within {worst:.1e} of its own at 1e-9; {solver.unsolved} unsolved")
         best = ranks if best is None else np.minimum(best, ranks)
     ratio = best / np.percentile(ours, [50, 99])
     print(f"  faster than the best of PIQP by {ratio[0]:.1f} (median), {ratio[1]:.1f} (99 %)")
