@@ -12,7 +12,7 @@ pub(super) const WIDTH_EM: f64 = 30.5;
 /// before its sign.
 const INDENT: f64 = 2.3;
 /// What the brace of `cases` takes of the line, in em.
-const BRACE: f64 = 1.0;
+const BRACE: f64 = 1.8;
 /// Lines from which [`Form::Automatic`] prefers an environment that breaks across pages: no page holds many more.
 pub(super) const CASES_LINES: usize = 30;
 
