@@ -16,7 +16,8 @@ const WINDOW_S: f64 = 0.05;
 const TRIM: usize = 4;
 /// Fewest averaged accelerations in flight that tell the centre of mass.
 const LEAST_WINDOWS: usize = 50;
-/// Ridge on the normalised joint accelerations: joints that move together share what they do.
+/// Ridge, relative to the mean square of all joints' accelerations: joints that move together share what they do, and
+/// one that hardly moves, whose part would be made of noise, has hardly any.
 const RIDGE: f64 = 1e-2;
 
 /// Rows of an encoder `W_e` before they are chosen, in scaled units.
@@ -131,24 +132,19 @@ fn centre_of_mass(training: &Dataset, robot: &Robot) -> Result<DMatrix<f64>, Tra
     }
     let samples = DMatrix::from_columns(&accelerations);
     let (of_joints, n) = (joints.tr_mul(&samples), samples.ncols() as f64);
-    let rms = DVector::from_iterator(
-        joints.ncols(),
-        of_joints
-            .row_iter()
-            .map(|row| (row.norm_squared() / n).sqrt().max(f64::MIN_POSITIVE)),
-    );
-    let normalised = DMatrix::from_diagonal(&rms.map(f64::recip)) * of_joints;
-    let gram = &normalised * normalised.transpose() / n
-        + DMatrix::identity(joints.ncols(), joints.ncols()) * RIDGE;
+    let mean_square = of_joints.norm_squared() / of_joints.len() as f64;
+    if mean_square <= 0.0 {
+        return Ok(body);
+    }
+    let gram = &of_joints * of_joints.transpose() / n
+        + DMatrix::identity(joints.ncols(), joints.ncols()) * (RIDGE * mean_square);
     let factor = gram
         .cholesky()
         .expect("invariant: a Gram matrix plus a ridge");
     let falling = GRAVITY_M_S2 * training.scaling.state[BODY_Z];
     for (column, (row, fall)) in [(BODY_X, 0.0), (BODY_Z, falling)].into_iter().enumerate() {
         let target = samples.row(row).transpose().add_scalar(fall);
-        let part = factor
-            .solve(&(&normalised * target / n))
-            .component_div(&rms);
+        let part = factor.solve(&(&of_joints * target / n));
         let moved = body.column(column) - &joints * part;
         body.set_column(column, &moved);
     }
@@ -238,6 +234,8 @@ mod tests {
         assert!(mean.abs() < 0.1 && spread < 0.3, "{mean} {spread}");
         let (_, of_body) = in_flight(&other, unit(BODY_Z));
         assert!(of_body > 2.0 * spread, "{of_body}");
+        // No leg is so heavy that a radian of a joint moves the whole robot by more than 2 cm.
+        assert!(rows.rows(0, JOINT_DIM).amax() < 0.02, "{rows}");
     }
 
     #[test]

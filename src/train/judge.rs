@@ -12,17 +12,20 @@ use super::rollout::{Candidate, Change, Window, predict, predict_changed, restar
 const THINNED: usize = 5;
 /// Samples of a part, of which there are several only for more recordings than fit into little memory.
 const PART: usize = 32_768;
+/// Standard deviations that errors are not taken to be below where others are relative to them.
+const LEAST_ERROR: f64 = 1e-3;
 /// Kinds of windows: 0.1 s, and whole jumps.
 const SHORT: usize = 0;
 const LONG: usize = 1;
 
 /// Samples to judge candidates on.
+#[derive(Clone)]
 pub struct Judge<'a> {
     dataset: &'a Dataset,
     latent: &'a [Latent],
     windows: [Vec<Window>; 2],     // short and long
     parts: Vec<[Range<usize>; 2]>, // those of consecutive jumps
-    inverse_std: Vec<f64>,
+    scales: [Vec<f64>; 2],         // what errors are multiplied by, a coordinate
     rollout_weight: f64,
 }
 
@@ -39,7 +42,7 @@ impl<'a> Judge<'a> {
         samples: usize,
     ) -> Self {
         let d = latent.first().map_or(0, |first| first.z.nrows());
-        let inverse_std = (0..d)
+        let inverse_std: Vec<f64> = (0..d)
             .map(|row| 1.0 / row_std(latent, row).max(f64::MIN_POSITIVE))
             .collect();
         let windows = [restarted(dataset, 0.1), whole(dataset)];
@@ -54,9 +57,27 @@ impl<'a> Judge<'a> {
             dataset,
             latent,
             windows,
-            inverse_std,
+            scales: [inverse_std.clone(), inverse_std],
             rollout_weight,
         }
+    }
+
+    /// Judges by errors relative to those of `candidate`, each coordinate's over 0.1 s and over whole jumps by itself.
+    ///
+    /// In standard deviations a millimetre of a body that jumps half a metre is nothing beside a leg's error, though
+    /// both are a tenth of what can be predicted: this way a tenth less counts the same wherever it is.
+    pub fn relative_to(&self, candidate: Candidate<'_>) -> Self {
+        let mut relative = self.clone();
+        for kind in [SHORT, LONG] {
+            let squares = self.mean_squares(candidate, kind);
+            for (scale, square) in relative.scales[kind].iter_mut().zip(&squares) {
+                let error = square.sqrt().max(LEAST_ERROR / *scale);
+                if error.is_finite() {
+                    *scale = 1.0 / error;
+                }
+            }
+        }
+        relative
     }
 
     /// Score of a candidate, see [`Choice::score`](super::select::Choice::score); infinite if a rollout diverges.
@@ -78,7 +99,7 @@ impl<'a> Judge<'a> {
         0..self.parts.len()
     }
 
-    /// Errors of 0.1 s predictions and of whole jumps of a part in standard deviations, every [`THINNED`]th sample;
+    /// Scaled errors of 0.1 s predictions and of whole jumps of a part, every [`THINNED`]th sample;
     /// none if a rollout diverges.
     pub fn errors(&self, candidate: Candidate<'_>, part: usize) -> Option<[DVector<f64>; 2]> {
         let errors = [SHORT, LONG].map(|kind| {
@@ -86,7 +107,7 @@ impl<'a> Judge<'a> {
             let predictions = predict(candidate, self.dataset, self.latent, windows);
             let mut errors = Vec::new();
             for (window, prediction) in windows.iter().zip(&predictions) {
-                self.add_errors(window, prediction, &mut errors);
+                self.add_errors(kind, window, prediction, &mut errors);
             }
             DVector::from_vec(errors)
         });
@@ -106,7 +127,7 @@ impl<'a> Judge<'a> {
                 let predictions =
                     predict_changed(candidate, changes, self.dataset, self.latent, *window);
                 for (errors, prediction) in errors.iter_mut().zip(&predictions) {
-                    self.add_errors(window, prediction, errors);
+                    self.add_errors(kind, window, prediction, errors);
                 }
             }
             errors.into_iter().map(DVector::from_vec)
@@ -120,19 +141,39 @@ impl<'a> Judge<'a> {
         &self.windows[kind][self.parts[part][kind].clone()]
     }
 
-    /// Adds every [`THINNED`]th error of a window's prediction, in standard deviations.
-    fn add_errors(&self, window: &Window, prediction: &DMatrix<f64>, errors: &mut Vec<f64>) {
+    /// Adds every [`THINNED`]th error of a window's prediction, scaled.
+    fn add_errors(
+        &self,
+        kind: usize,
+        window: &Window,
+        prediction: &DMatrix<f64>,
+        errors: &mut Vec<f64>,
+    ) {
         let z = &self.latent[window.jump].z;
         for step in (THINNED - 1..window.steps).step_by(THINNED) {
-            for (row, scale) in self.inverse_std.iter().enumerate() {
+            for (row, scale) in self.scales[kind].iter().enumerate() {
                 let truth = z[(row, window.start + 1 + step)];
                 errors.push((prediction[(row, step)] - truth) * scale);
             }
         }
     }
 
+    /// Root mean square of the scaled errors; infinite if a rollout diverges.
     fn error(&self, candidate: Candidate<'_>, kind: usize) -> f64 {
-        let (mut square, mut count) = (0.0, 0);
+        let squares = self.mean_squares(candidate, kind);
+        let scaled = squares.iter().zip(&self.scales[kind]);
+        let sum: f64 = scaled.map(|(square, scale)| square * scale * scale).sum();
+        let error = (sum / squares.len().max(1) as f64).sqrt();
+        if error.is_finite() {
+            error
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// Mean squares of the errors, a coordinate.
+    fn mean_squares(&self, candidate: Candidate<'_>, kind: usize) -> Vec<f64> {
+        let (mut squares, mut count) = (vec![0.0; self.scales[kind].len()], 0);
         for part in self.parts() {
             let windows = self.windows_of(part, kind);
             let predictions = predict(candidate, self.dataset, self.latent, windows);
@@ -140,18 +181,16 @@ impl<'a> Judge<'a> {
                 let truth = self.latent[window.jump]
                     .z
                     .columns(window.start + 1, window.steps);
-                for (row, scale) in self.inverse_std.iter().enumerate() {
-                    square += (prediction.row(row) - truth.row(row)).norm_squared() * scale * scale;
+                for (row, square) in squares.iter_mut().enumerate() {
+                    *square += (prediction.row(row) - truth.row(row)).norm_squared();
                 }
-                count += prediction.len();
+                count += window.steps;
             }
         }
-        let error = (square / count.max(1) as f64).sqrt();
-        if error.is_finite() {
-            error
-        } else {
-            f64::INFINITY
-        }
+        squares
+            .iter()
+            .map(|square| square / count.max(1) as f64)
+            .collect()
     }
 }
 
@@ -190,6 +229,29 @@ fn row_std(latent: &[Latent], row: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::train::oscillator;
+
+    #[test]
+    fn relative_errors_of_a_candidate_are_one_and_of_the_truth_none() {
+        let (dataset, latent) = oscillator::jumps(3);
+        let (features, truth) = oscillator::known();
+        let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();
+        let of = |xi| Candidate {
+            features: &features,
+            xi,
+        };
+        let judge = Judge::new(&dataset, &latent, 0.2).relative_to(of(&off));
+        assert!((judge.score(of(&off)) - 1.2).abs() < 1e-12);
+        assert!(judge.score(of(&truth)) < 0.05);
+        let errors = judge.errors(of(&off), 0).expect("no divergence");
+        for errors in errors {
+            // Every fifth error of a window, which begins with the least.
+            let mean_square = errors.norm_squared() / errors.len() as f64;
+            assert!((0.5..2.0).contains(&mean_square), "{mean_square}");
+        }
+        // What cannot be told apart from none is not divided by.
+        let exact = Judge::new(&dataset, &latent, 0.2).relative_to(of(&truth));
+        assert!(exact.score(of(&off)).is_finite());
+    }
 
     #[test]
     fn score_within_a_limit_is_the_score_or_above_the_limit() {

@@ -1,5 +1,7 @@
 //! What is known of the dynamics before any regression.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use super::dataset::Dataset;
@@ -7,6 +9,9 @@ use super::features::Features;
 use super::frame::Frame;
 use super::metrics::BODY_Z;
 use crate::robot::{FeetRule, GRAVITY_M_S2};
+
+/// Rows that a frame holds: the centre of mass forwards and upwards.
+const HELD: usize = 2;
 
 /// Coefficients of one phase that are known, those that a regression may choose, and those that it must keep.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +22,8 @@ pub struct Knowledge {
     pub free: DMatrix<bool>,
     /// Whether a free coefficient stays whatever it explains, `library_dim x latent_dim`.
     pub kept: DMatrix<bool>,
+    /// Whether a free coefficient is at most 0 once it is refined, `library_dim x latent_dim`.
+    pub braking: DMatrix<bool>,
 }
 
 impl Knowledge {
@@ -26,42 +33,72 @@ impl Knowledge {
             known: DMatrix::zeros(library_dim, latent_dim),
             free: DMatrix::from_element(library_dim, latent_dim, true),
             kept: DMatrix::from_element(library_dim, latent_dim, false),
+            braking: DMatrix::from_element(library_dim, latent_dim, false),
+        }
+    }
+
+    /// Coefficients that would drive where they may only brake, set to 0.
+    pub fn brake(&self, xi: &mut DMatrix<f64>) {
+        for (coefficient, braking) in xi.iter_mut().zip(self.braking.iter()) {
+            if *braking && *coefficient > 0.0 {
+                *coefficient = 0.0;
+            }
         }
     }
 
     /// What is known of each phase in a frame that holds the centre of mass as `z1` (forwards) and `z2` (upwards),
     /// nothing in any other.
     ///
-    /// The floor is the same everywhere, so no term depends on `z1`; in flight `ddz1 = 0` and `ddz2 = -g`; with feet
-    /// on the ground the constant of `ddz2` is `-g`; and an input acts on its own coordinate.
+    /// The floor is the same everywhere, so no term depends on `z1`. Forces move a centre of mass and losses brake it,
+    /// wherever it and the legs are (Newton's second law): no term of `ddz1` and `ddz2` depends on a position, and each
+    /// keeps its own velocity, with a coefficient of at most 0. With feet on the ground the constant of `ddz2` is `-g`. In flight `ddz1 = 0`,
+    /// `ddz2 = -g`, and there are no forces that any term could depend on. An input acts on its own coordinate.
     pub fn of_phases(training: &Dataset, features: &Features, frame: &Frame) -> Vec<Self> {
         let (p, d) = (features.library_dim(), features.latent_dim());
         let each = training.phases.patterns.iter();
-        if frame.held.ncols() < 2 {
+        if frame.held.ncols() < HELD {
             return each.map(|_| Self::nothing(p, d)).collect();
         }
         let gravity = -GRAVITY_M_S2 * training.scaling.state[BODY_Z];
-        let shifted = features.depend_on(0);
+        let depending = |variables: Range<usize>| {
+            let of_each: Vec<_> = variables.map(|i| features.depend_on(i)).collect();
+            (0..p).filter(move |&term| of_each.iter().any(|depends| depends[term]))
+        };
         let one = features.constant_term();
         each.map(|phase| {
             let mut knowledge = Self::nothing(p, d);
-            for term in (0..p).filter(|&term| shifted[term]) {
+            for term in depending(0..1) {
                 knowledge.free.row_mut(term).fill(false);
+            }
+            for term in depending(0..d) {
+                knowledge
+                    .free
+                    .row_mut(term)
+                    .columns_mut(0, HELD)
+                    .fill(false);
             }
             if let Some(one) = one {
                 knowledge.known[(one, 1)] = gravity;
                 knowledge.free[(one, 1)] = false;
             }
-            let flies = phase.feet == FeetRule::None;
-            if flies {
+            if phase.feet == FeetRule::None {
+                for term in depending(2 * d..2 * d + HELD) {
+                    knowledge.free.row_mut(term).fill(false);
+                }
                 knowledge.free.column_mut(0).fill(false);
+                if one.is_some() {
+                    knowledge.free.column_mut(1).fill(false);
+                }
             }
-            if flies && one.is_some() {
-                knowledge.free.column_mut(1).fill(false);
+            for k in 0..d {
+                if let Some(term) = features.variable_term(2 * d + k) {
+                    knowledge.kept[(term, k)] = knowledge.free[(term, k)];
+                }
             }
-            for coordinate in 0..d {
-                if let Some(term) = features.variable_term(2 * d + coordinate) {
-                    knowledge.kept[(term, coordinate)] = knowledge.free[(term, coordinate)];
+            for k in 0..HELD {
+                if let Some(term) = features.variable_term(d + k) {
+                    knowledge.kept[(term, k)] = knowledge.free[(term, k)];
+                    knowledge.braking[(term, k)] = knowledge.free[(term, k)];
                 }
             }
             knowledge
@@ -74,6 +111,8 @@ impl Knowledge {
 mod tests {
     use super::*;
     use crate::model::{Library, StandardLibrary};
+    use crate::robot::STATE_DIM;
+    use crate::train::oscillator;
     use crate::train::sparse::{Pruning, Regression};
 
     /// Terms 1, z1, z2, dz1, dz2, u1, u2.
@@ -101,6 +140,44 @@ mod tests {
             (curved.depend_on(0), curved.constant_term()),
             (vec![true, false], None)
         );
+    }
+
+    #[test]
+    fn centre_of_mass_is_moved_by_forces_alone_and_in_flight_by_none() {
+        let (dataset, _) = oscillator::jumps(1);
+        let standard = StandardLibrary {
+            degree: 2,
+            trigonometric: true,
+            inputs: true,
+        };
+        let library = Library::standard(3, standard).expect("small library");
+        let features = Features::new(&library);
+        let frame = Frame {
+            held: DMatrix::zeros(STATE_DIM, HELD),
+            free: DMatrix::zeros(STATE_DIM, 1),
+        };
+        let [contact, flight] = &Knowledge::of_phases(&dataset, &features, &frame)[..] else {
+            panic!("two phases");
+        };
+        let term = |variable| features.variable_term(variable).expect("a linear library");
+        let (z2, z3, dz2, u1, u2, u3) = (term(1), term(2), term(4), term(6), term(7), term(8));
+        let one = features.constant_term().expect("a standard library");
+        let gravity = -GRAVITY_M_S2 * dataset.scaling.state[BODY_Z];
+        for phase in [contact, flight] {
+            assert_eq!(phase.known[(one, 1)], gravity);
+            assert!(phase.free.row(term(0)).iter().all(|free| !free));
+            assert!(!phase.free[(z2, 0)] && !phase.free[(z3, 1)]);
+            assert!(phase.free[(z2, 2)] && phase.free[(z3, 2)] && phase.kept[(u3, 2)]);
+        }
+        assert!(contact.free[(u1, 1)] && contact.free[(u1, 2)] && contact.free[(dz2, 0)]);
+        assert!(contact.kept[(u2, 1)] && contact.kept[(dz2, 1)] && !contact.kept[(dz2, 0)]);
+        assert!(
+            contact.braking[(dz2, 1)] && !contact.braking[(u2, 1)] && !flight.braking[(dz2, 1)]
+        );
+        assert!(!flight.free[(u1, 2)] && !flight.free[(u2, 2)]);
+        assert!(!flight.free.columns(0, HELD).iter().any(|free| *free));
+        let nothing = Knowledge::of_phases(&dataset, &features, &Frame::plain(&[0, 1, 2]));
+        assert_eq!(nothing[0], Knowledge::nothing(features.library_dim(), 3));
     }
 
     #[test]

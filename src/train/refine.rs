@@ -87,11 +87,12 @@ impl Refiner<'_> {
         let cost = |squared_error: f64, xi: &[DMatrix<f64>]| {
             squared_error + PRIOR * moved(xi).norm_squared()
         };
-        let mut best = Coefficients {
-            score: self.score(&start.xi),
-            xi: start.xi.clone(),
-        };
         let mut current = start.xi.clone();
+        self.brake(&mut current);
+        let mut best = Coefficients {
+            score: self.score(&current),
+            xi: current.clone(),
+        };
         let mut damping = 1e-3;
         for step in 0..steps {
             if watch.cancelled() {
@@ -112,6 +113,7 @@ impl Refiner<'_> {
                 for ((at, scale), change) in places.iter().zip(&scales).zip(change.iter()) {
                     trial[at.0][(at.1, at.2)] += change * scale;
                 }
+                self.brake(&mut trial);
                 let squared_error = self.squared_error(&trial, weights);
                 let after = squared_error.map_or(f64::INFINITY, |error| cost(error, &trial));
                 damping *= if after < before { 0.1 } else { 10.0 };
@@ -134,6 +136,13 @@ impl Refiner<'_> {
             }
         }
         best
+    }
+
+    /// Coefficients that would drive where they may only brake, set to 0.
+    pub(super) fn brake(&self, xi: &mut [DMatrix<f64>]) {
+        for (knowledge, xi) in self.knowledge.iter().zip(xi) {
+            knowledge.brake(xi);
+        }
     }
 
     pub(super) fn score(&self, xi: &[DMatrix<f64>]) -> f64 {

@@ -59,6 +59,8 @@ pub struct Target<'a> {
 
 /// Fits all combinations of the options and takes, among those within the slack of the best, the sparsest.
 ///
+/// The best by `judge` sets the scale: from there on errors are relative to its own ([`Judge::relative_to`]).
+///
 /// # Errors
 /// [`TrainError::TermValue`] for a term without a finite value at a sample,
 /// [`TrainError::NoStableModel`] if every candidate diverges. If cancelled, the search ends as soon as one does not.
@@ -70,16 +72,28 @@ pub fn select(
 ) -> Result<Selected, TrainError> {
     let features = target.features;
     let regressions = regressions(target, &options.windows)?;
-    let tried = try_all(&regressions, features, judge, options, watch);
+    let mut tried = try_all(&regressions, features, judge, options, watch);
     let candidates = tried.len();
-    let best = best_score(&tried)?;
-    let limit = (1.0 + options.slack) * best;
-    let training = Judge::new(target.dataset, target.latent, options.rollout_weight);
+    let reference = best_of(&tried)?.xi.clone();
+    let reference = Candidate {
+        features,
+        xi: &reference,
+    };
+    let training =
+        Judge::new(target.dataset, target.latent, options.rollout_weight).relative_to(reference);
+    let relative = judge.relative_to(reference);
+    for fitted in tried.iter_mut().filter(|fitted| fitted.is_stable()) {
+        fitted.choice.score = relative.score(Candidate {
+            features,
+            xi: &fitted.xi,
+        });
+    }
+    let limit = (1.0 + options.slack) * best_of(&tried)?.choice.score;
     let refiner = Refiner {
         features,
         knowledge: target.knowledge,
         training: &training,
-        judge,
+        judge: &relative,
     };
     let mut refined = Vec::new();
     for start in starts(tried, &options.windows, limit, options.sweeps) {
@@ -91,7 +105,7 @@ pub fn select(
             score: choice.score,
         };
         if options.sweeps > 0 {
-            pruned.sweep(features, judge, limit, watch);
+            pruned.sweep(features, &relative, limit, watch);
         }
         let start = Coefficients {
             xi: pruned.xi,
@@ -100,19 +114,18 @@ pub fn select(
         let end = refiner.refine(start, options.refinements, watch);
         refined.push(Fitted::of(end, &choice, window));
     }
-    let limit = (1.0 + options.slack) * best_score(&refined)?;
+    let best = best_of(&refined)?;
+    let limit = (1.0 + options.slack) * best.choice.score;
     if options.refinements > 0 {
-        let best = refined
-            .iter()
-            .min_by(|a, b| a.choice.score.total_cmp(&b.choice.score));
-        let thinned = best.map(|best| best.thinned(&refiner, limit, watch));
-        refined.extend(thinned);
+        let thinned = best.thinned(&refiner, limit, watch);
+        refined.push(thinned);
     }
     let within = refined
         .into_iter()
         .filter(|fitted| fitted.choice.score <= limit);
     let sparsest = within.min_by_key(|fitted| fitted.choice.active);
-    let Fitted { xi, choice, .. } = sparsest.ok_or(TrainError::NoStableModel { candidates })?;
+    let Fitted { xi, mut choice, .. } = sparsest.ok_or(TrainError::NoStableModel { candidates })?;
+    choice.score = judge.score(Candidate { features, xi: &xi });
     Ok(Selected {
         xi,
         choice,
@@ -157,6 +170,11 @@ impl Fitted {
             ..began.clone()
         };
         Self { xi, choice, window }
+    }
+
+    /// Whether its rollouts stay finite.
+    fn is_stable(&self) -> bool {
+        self.choice.score.is_finite()
     }
 
     /// Without the terms that rollouts do not miss.
@@ -251,10 +269,7 @@ impl Attempt<'_> {
 
     /// The best of these with terms added that its predictions gain by; none if they all diverge.
     fn grown(&self, tame: &[Fitted], watch: &mut Watch<'_>) -> Option<Fitted> {
-        let best = tame
-            .iter()
-            .filter(|fitted| fitted.choice.score.is_finite())
-            .min_by(|a, b| a.choice.score.total_cmp(&b.choice.score))?;
+        let best = best_of(tame).ok()?;
         let mut refined = Refined {
             regressions: &self.regressions[best.window],
             ridge: best.choice.ridge,
@@ -277,20 +292,16 @@ impl Attempt<'_> {
 
 /// Whether the rollouts of a candidate stay finite.
 fn any_stable(tried: &[Fitted]) -> bool {
-    tried.iter().any(|fitted| fitted.choice.score.is_finite())
+    tried.iter().any(Fitted::is_stable)
 }
 
-fn best_score(tried: &[Fitted]) -> Result<f64, TrainError> {
-    let best = tried
-        .iter()
-        .map(|fitted| fitted.choice.score)
-        .fold(f64::INFINITY, f64::min);
-    match best.is_finite() {
-        true => Ok(best),
-        false => Err(TrainError::NoStableModel {
-            candidates: tried.len(),
-        }),
-    }
+/// The candidate with the best score.
+fn best_of(tried: &[Fitted]) -> Result<&Fitted, TrainError> {
+    let best = (tried.iter().filter(|fitted| fitted.is_stable()))
+        .min_by(|a, b| a.choice.score.total_cmp(&b.choice.score));
+    best.ok_or(TrainError::NoStableModel {
+        candidates: tried.len(),
+    })
 }
 
 /// Candidates to prune and refine, at most `count` or one: of every window the one with the best score, then all others

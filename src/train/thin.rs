@@ -19,8 +19,8 @@ const TOGETHER: usize = 4;
 
 impl Refiner<'_> {
     /// Drops terms one at a time, those first that training misses least, while `judge` scores at most `limit`. What is
-    /// known stays, and so do inputs: a controller needs what they do, whether or not the recorded ones differ enough
-    /// for a prediction to miss them.
+    /// known and what must be kept stay, and so do inputs: a controller needs what they do, whether or not the recorded
+    /// ones differ enough for a prediction to miss them.
     pub fn thin(&self, refined: Coefficients, limit: f64, watch: &mut Watch<'_>) -> Coefficients {
         let Some(weights) = self.weights(&refined.xi) else {
             return refined;
@@ -58,7 +58,8 @@ impl Refiner<'_> {
         for _ in 0..TOGETHER {
             let found = self.order(about).into_iter().take(ATTEMPTS).find_map(|i| {
                 let without = about.without(i);
-                let xi = without.xi(from);
+                let mut xi = without.xi(from);
+                self.brake(&mut xi);
                 let candidate = Candidate {
                     features: self.features,
                     xi: &xi,
@@ -81,8 +82,11 @@ impl Refiner<'_> {
         let inputs: Vec<_> = (2 * d..3 * d)
             .filter_map(|i| features.variable_term(i))
             .collect();
+        let may_go = |(phase, term, column): Place| {
+            !inputs.contains(&term) && !self.knowledge[phase].kept[(term, column)]
+        };
         let mut order: Vec<usize> = (0..about.places.len())
-            .filter(|&i| !about.gone[i] && !inputs.contains(&about.places[i].1))
+            .filter(|&i| !about.gone[i] && may_go(about.places[i]))
             .collect();
         order.sort_by(|&a, &b| about.loss(a).total_cmp(&about.loss(b)));
         order
@@ -172,9 +176,11 @@ mod tests {
         let (dataset, latent) = oscillator::jumps(3);
         let judge = Judge::new(&dataset, &latent, 0.2);
         let (features, truth) = oscillator::known();
+        let mut knowledge = [Knowledge::nothing(7, 2), Knowledge::nothing(7, 2)];
+        knowledge[0].kept[(3, 0)] = true;
         let refiner = Refiner {
             features: &features,
-            knowledge: &[Knowledge::nothing(7, 2), Knowledge::nothing(7, 2)],
+            knowledge: &knowledge,
             training: &judge,
             judge: &judge,
         };
@@ -204,9 +210,9 @@ mod tests {
     }
 
     #[test]
-    fn inputs_stay_whatever_may_be_lost() {
+    fn inputs_and_what_is_kept_stay_whatever_may_be_lost() {
         let left = left_of_too_many(1e9);
-        assert_eq!(left[0].rows(0, 5).amax(), 0.0);
-        assert!(left[0][(5, 0)] != 0.0 && left[0][(6, 1)] != 0.0);
+        assert_eq!(left[0].rows(0, 5).map(|c| (c != 0.0) as usize).sum(), 1);
+        assert!(left[0][(3, 0)] != 0.0 && left[0][(5, 0)] != 0.0 && left[0][(6, 1)] != 0.0);
     }
 }

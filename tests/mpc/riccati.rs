@@ -410,7 +410,7 @@ fn riccati_commands_clarabels_torques_along_recordings_and_prepares_ahead() {
 fn riccati_commands_clarabels_torques_under_limits_on_their_rates() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     for (name, rates) in [
-        ("go1-d2", [20.0, 10.0]),
+        ("go1-d2", [3.0, 2.0]),
         ("go1-d4", [500.0, 100.0]),
         ("go1-d6", [500.0, 100.0]),
     ] {
