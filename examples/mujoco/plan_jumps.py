@@ -37,7 +37,7 @@ SETTINGS = {
     "drive_stiffness_nm_rad": POSITION_GAIN,
     "drive_damping_nm_s_rad": VELOCITY_GAIN,
     "terminal_weight": 30.0,
-    "input_weight": 20.0,
+    "input_weight": 30.0,
 }
 EXAMPLE = """example:
   cargo build --release
