@@ -59,7 +59,7 @@ pub struct Target<'a> {
 
 /// Fits all combinations of the options and takes, among those within the slack of the best, the sparsest.
 ///
-/// The best by `judge` sets the scale: from there on errors are relative to its own ([`Judge::relative_to`]).
+/// The best by `judge` sets the scale: from there on errors are relative to its own.
 ///
 /// # Errors
 /// [`TrainError::TermValue`] for a term without a finite value at a sample,
