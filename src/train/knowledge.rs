@@ -51,8 +51,9 @@ impl Knowledge {
     ///
     /// The floor is the same everywhere, so no term depends on `z1`. Forces move a centre of mass and losses brake it,
     /// wherever it and the legs are (Newton's second law): no term of `ddz1` and `ddz2` depends on a position, and each
-    /// keeps its own velocity, with a coefficient of at most 0. With feet on the ground the constant of `ddz2` is `-g`. In flight `ddz1 = 0`,
-    /// `ddz2 = -g`, and there are no forces that any term could depend on. An input acts on its own coordinate.
+    /// keeps its own velocity, with a coefficient of at most 0. With feet on the ground the constant of `ddz2` is `-g`.
+    /// In flight `ddz1 = 0`, `ddz2 = -g`, and there are no forces that any term could depend on. An input acts on its
+    /// own coordinate.
     pub fn of_phases(training: &Dataset, features: &Features, frame: &Frame) -> Vec<Self> {
         let (p, d) = (features.library_dim(), features.latent_dim());
         let each = training.phases.patterns.iter();

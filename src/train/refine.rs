@@ -59,7 +59,8 @@ pub(super) struct Model {
 
 impl Refiner<'_> {
     /// Lowers the errors that `training` measures in at most `steps` steps, and gives the coefficients that `judge`
-    /// scores best on the way. Which terms are active does not change, nor do coefficients that are known.
+    /// scores best on the way. Which terms are active does not change, but for those that would drive where they may
+    /// only brake, nor do coefficients that are known.
     pub fn refine(&self, start: Coefficients, steps: usize, watch: &mut Watch<'_>) -> Coefficients {
         let places = self.free_places(&start.xi);
         let Some(weights) = self.weights(&start.xi).filter(|_| !places.is_empty()) else {
@@ -306,6 +307,21 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn coefficients_that_may_only_brake_never_drive() {
+        let (_, truth) = oscillator::known();
+        let mut knowledge = vec![Knowledge::nothing(7, 2); 2];
+        (knowledge[0].braking[(3, 0)], knowledge[1].braking[(0, 1)]) = (true, true);
+        let mut start = truth.clone();
+        start[0][(3, 0)] = 0.5; // truth is -3
+        let (_, found) = refined(start, &knowledge);
+        assert!((found.xi[0][(3, 0)] + 3.0).abs() < 0.3, "{}", found.xi[0]);
+        let mut driven = vec![Knowledge::nothing(7, 2); 2];
+        driven[0].braking[(6, 1)] = true; // truth is 8
+        let (_, found) = refined(truth, &driven);
+        assert_eq!(found.xi[0][(6, 1)], 0.0);
     }
 
     #[test]
