@@ -67,9 +67,8 @@ fn is_the_go1(names: &[&str]) {
             "gravity" => (0.995, 1.005),
             "mass" => (0.98, 1.02),
             "viscous hy" | "viscous kn" => (0.9, 1.1),
-            "viscous hx" => (0.4, 1.6),
-            // Hips that hardly turn tell the sum of their losses, not the parts.
-            "dry hx" => (0.35, 2.0),
+            "viscous hx" => (0.85, 1.15),
+            "dry hx" => (0.75, 1.25),
             _ => (0.5, 2.0),
         };
         let ratio = value / truth;

@@ -26,8 +26,11 @@ const BLOCK_S: f64 = 0.1;
 /// Fewest jumps that are left out in turn, too, and the largest share of all equations that one of them may have.
 const LEAST_JUMPS: usize = 6;
 const LARGEST_SHARE: f64 = 1.0 / 3.0;
-/// Mean speed of the bearing joints from which their dry friction has a direction, rad/s.
+/// Mean speed of the bearing joints from which their dry friction has a direction, rad/s: of hips and knees, and for
+/// accelerations sideways of the abductions, too, for a joint at rest holds any torque up to that friction.
 const MOVING_RAD_S: f64 = 0.1;
+/// Axis along which abductions push.
+const SIDEWAYS: usize = 1;
 /// Speed that a joint in the air keeps over a window for the same reason, rad/s.
 const TURNING_RAD_S: f64 = 0.15;
 
@@ -166,20 +169,26 @@ impl Windows {
             &mut self.flight_samples
         };
         *count += averaged.span.len();
-        let bearing: Vec<usize> = (0..JOINT_DIM)
-            .filter(|joint| joint % 3 != 0 && feet[joint / 3])
-            .collect();
-        let speed = DMatrix::from_fn(1, segment.len(), |_, sample| {
-            let speeds = bearing
-                .iter()
-                .map(|joint| segment.dx[(*joint, sample)].abs());
-            speeds.sum::<f64>() / bearing.len().max(1) as f64
-        });
-        let speed = averaged.of(&speed);
+        let mean_speed = |is_meant: fn(usize) -> bool| {
+            let bearing: Vec<usize> = (0..JOINT_DIM)
+                .filter(|joint| is_meant(*joint) && feet[joint / 3])
+                .collect();
+            let speed = DMatrix::from_fn(1, segment.len(), |_, sample| {
+                let speeds = bearing
+                    .iter()
+                    .map(|joint| segment.dx[(*joint, sample)].abs());
+                speeds.sum::<f64>() / bearing.len().max(1) as f64
+            });
+            averaged.of(&speed)
+        };
+        let flexion = mean_speed(|joint| joint % 3 != 0);
+        let abduction = mean_speed(|joint| joint % 3 == 0);
         let means = averaged.of(&equations.body);
         for &centre in averaged.centres {
             for axis in 0..3 {
                 let row = axis * BODY_ROWS;
+                let turning = |speed: &DMatrix<f64>| speed[centre] > MOVING_RAD_S;
+                let moving = turning(&flexion) && (axis != SIDEWAYS || turning(&abduction));
                 self.rows.push(Row {
                     coefficients: std::array::from_fn(|i| means[(row + i, centre)]),
                     left: means[(row + PARAMETER_DIM, centre)],
@@ -189,7 +198,7 @@ impl Windows {
                         Group::Flight(axis)
                     },
                     block: block(centre),
-                    moving: !in_contact || speed[centre] > MOVING_RAD_S,
+                    moving: !in_contact || moving,
                 });
             }
         }
