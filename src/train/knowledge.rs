@@ -51,9 +51,10 @@ impl Knowledge {
     ///
     /// The floor is the same everywhere, so no term depends on `z1`. Forces move a centre of mass and losses brake it,
     /// wherever it and the legs are (Newton's second law): no term of `ddz1` and `ddz2` depends on a position, and each
-    /// keeps its own velocity, with a coefficient of at most 0. With feet on the ground the constant of `ddz2` is `-g`.
-    /// In flight `ddz1 = 0`, `ddz2 = -g`, and there are no forces that any term could depend on. An input acts on its
-    /// own coordinate.
+    /// keeps its own velocity, with a coefficient of at most 0. With feet on the ground `ddz2` depends on its own force
+    /// and velocity alone, and keeps its constant: gravity, less what the ground carries of the legs' weight, which
+    /// forces that come from torques leave out. In flight `ddz1 = 0`, `ddz2 = -g`, and there are no forces that any term
+    /// could depend on. An input acts on its own coordinate.
     pub fn of_phases(training: &Dataset, features: &Features, frame: &Frame) -> Vec<Self> {
         let (p, d) = (features.library_dim(), features.latent_dim());
         let each = training.phases.patterns.iter();
@@ -61,34 +62,45 @@ impl Knowledge {
             return each.map(|_| Self::nothing(p, d)).collect();
         }
         let gravity = -GRAVITY_M_S2 * training.scaling.state[BODY_Z];
-        let depending = |variables: Range<usize>| {
-            let of_each: Vec<_> = variables.map(|i| features.depend_on(i)).collect();
+        let depending = |variables: &[Range<usize>]| {
+            let each = variables.iter().cloned().flatten();
+            let of_each: Vec<_> = each.map(|i| features.depend_on(i)).collect();
             (0..p).filter(move |&term| of_each.iter().any(|depends| depends[term]))
         };
+        let (upwards, force_upwards) = (d + 1, 2 * d + 1);
         let one = features.constant_term();
         each.map(|phase| {
             let mut knowledge = Self::nothing(p, d);
-            for term in depending(0..1) {
+            for term in depending(&[0..1]) {
                 knowledge.free.row_mut(term).fill(false);
             }
-            for term in depending(0..d) {
+            for term in depending(&[0..d]) {
                 knowledge
                     .free
                     .row_mut(term)
                     .columns_mut(0, HELD)
                     .fill(false);
             }
-            if let Some(one) = one {
-                knowledge.known[(one, 1)] = gravity;
-                knowledge.free[(one, 1)] = false;
-            }
             if phase.feet == FeetRule::None {
-                for term in depending(2 * d..2 * d + HELD) {
+                for term in depending(&[2 * d..2 * d + HELD]) {
                     knowledge.free.row_mut(term).fill(false);
                 }
                 knowledge.free.column_mut(0).fill(false);
-                if one.is_some() {
+                if let Some(one) = one {
+                    knowledge.known[(one, 1)] = gravity;
                     knowledge.free.column_mut(1).fill(false);
+                }
+            } else {
+                let others = [
+                    0..upwards,
+                    upwards + 1..force_upwards,
+                    force_upwards + 1..3 * d,
+                ];
+                for term in depending(&others) {
+                    knowledge.free[(term, 1)] = false;
+                }
+                if let Some(one) = one {
+                    knowledge.kept[(one, 1)] = true;
                 }
             }
             for k in 0..d {
@@ -164,13 +176,19 @@ mod tests {
         let (z2, z3, dz2, u1, u2, u3) = (term(1), term(2), term(4), term(6), term(7), term(8));
         let one = features.constant_term().expect("a standard library");
         let gravity = -GRAVITY_M_S2 * dataset.scaling.state[BODY_Z];
+        assert_eq!(flight.known[(one, 1)], gravity);
+        assert!(contact.known[(one, 1)] == 0.0 && contact.kept[(one, 1)]);
         for phase in [contact, flight] {
-            assert_eq!(phase.known[(one, 1)], gravity);
             assert!(phase.free.row(term(0)).iter().all(|free| !free));
             assert!(!phase.free[(z2, 0)] && !phase.free[(z3, 1)]);
             assert!(phase.free[(z2, 2)] && phase.free[(z3, 2)] && phase.kept[(u3, 2)]);
         }
-        assert!(contact.free[(u1, 1)] && contact.free[(u1, 2)] && contact.free[(dz2, 0)]);
+        assert!(contact.free[(u1, 2)] && contact.free[(u2, 0)] && contact.free[(dz2, 0)]);
+        let affine = features.affine_terms();
+        let upwards: Vec<usize> = (0..affine.len())
+            .filter(|&term| contact.free[(term, 1)] && affine[term])
+            .collect();
+        assert_eq!(upwards, [one, dz2, u2]);
         assert!(contact.kept[(u2, 1)] && contact.kept[(dz2, 1)] && !contact.kept[(dz2, 0)]);
         assert!(
             contact.braking[(dz2, 1)] && !contact.braking[(u2, 1)] && !flight.braking[(dz2, 1)]

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::{JUMP, MODEL, folder, path, romc, text};
 
-/// A model whose every step overflows: coefficients a million times as large.
+/// A model whose every step overflows: coefficients 1e12 times as large.
 fn overflowing(at: &str) {
     let shipped = fs::read_to_string(MODEL).expect("the shipped model");
     let mut model: Value = serde_json::from_str(&shipped).expect("JSON");
@@ -15,7 +15,7 @@ fn overflowing(at: &str) {
         .iter_mut()
         .flat_map(|phase| phase["xi"].as_array_mut().expect("rows"));
     for value in rows.flat_map(|row| row.as_array_mut().expect("a row")) {
-        *value = (1e6 * value.as_f64().expect("a number")).into();
+        *value = (1e12 * value.as_f64().expect("a number")).into();
     }
     fs::write(at, model.to_string()).expect("writable");
 }
