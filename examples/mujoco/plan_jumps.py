@@ -36,7 +36,7 @@ SETTINGS = {
     "effectiveness_time_s": 1.0,
     "drive_stiffness_nm_rad": POSITION_GAIN,
     "drive_damping_nm_s_rad": VELOCITY_GAIN,
-    "terminal_weight": 30.0,
+    "terminal_weight": 200.0,
     "input_weight": 30.0,
 }
 EXAMPLE = """example:
