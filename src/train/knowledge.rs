@@ -1,7 +1,5 @@
 //! What is known of the dynamics before any regression.
 
-use std::ops::Range;
-
 use nalgebra::DMatrix;
 
 use super::dataset::Dataset;
@@ -62,19 +60,19 @@ impl Knowledge {
             return each.map(|_| Self::nothing(p, d)).collect();
         }
         let gravity = -GRAVITY_M_S2 * training.scaling.state[BODY_Z];
-        let depending = |variables: &[Range<usize>]| {
-            let each = variables.iter().cloned().flatten();
-            let of_each: Vec<_> = each.map(|i| features.depend_on(i)).collect();
+        let depending = |is_meant: &dyn Fn(usize) -> bool| {
+            let variables = (0..3 * d).filter(|&i| is_meant(i));
+            let of_each: Vec<_> = variables.map(|i| features.depend_on(i)).collect();
             (0..p).filter(move |&term| of_each.iter().any(|depends| depends[term]))
         };
         let (upwards, force_upwards) = (d + 1, 2 * d + 1);
         let one = features.constant_term();
         each.map(|phase| {
             let mut knowledge = Self::nothing(p, d);
-            for term in depending(&[0..1]) {
+            for term in depending(&|i| i == 0) {
                 knowledge.free.row_mut(term).fill(false);
             }
-            for term in depending(&[0..d]) {
+            for term in depending(&|i| i < d) {
                 knowledge
                     .free
                     .row_mut(term)
@@ -82,7 +80,7 @@ impl Knowledge {
                     .fill(false);
             }
             if phase.feet == FeetRule::None {
-                for term in depending(&[2 * d..2 * d + HELD]) {
+                for term in depending(&|i| (2 * d..2 * d + HELD).contains(&i)) {
                     knowledge.free.row_mut(term).fill(false);
                 }
                 knowledge.free.column_mut(0).fill(false);
@@ -91,12 +89,7 @@ impl Knowledge {
                     knowledge.free.column_mut(1).fill(false);
                 }
             } else {
-                let others = [
-                    0..upwards,
-                    upwards + 1..force_upwards,
-                    force_upwards + 1..3 * d,
-                ];
-                for term in depending(&others) {
+                for term in depending(&|i| i != upwards && i != force_upwards) {
                     knowledge.free[(term, 1)] = false;
                 }
                 if let Some(one) = one {
