@@ -101,7 +101,10 @@ def main():
     goals = drawn_goals(arguments.seed)
     models = {"plan": arguments.model}
     copy = arguments.out_dir / "models/uninformed.json"
-    inputs = ModelInputs.compiled(arguments.model, arguments.out_dir / "inputs", arguments.romc)
+    folder = arguments.out_dir / "controllers"
+    inputs = ModelInputs.compiled(
+        arguments.model, folder / f"{arguments.model.stem}-inputs", arguments.romc
+    )
     training = sorted(RECORDINGS.glob("train_*.csv.gz"))
     write_uninformed(arguments.model, copy, training, inputs.of)
     models["uninformed"] = copy
@@ -110,9 +113,7 @@ def main():
         for name in ABLATIONS:
             models[name] = ablated(arguments, name)
             methods[name] = Method(name, True)
-    crate = romc_controller.build(
-        arguments.model, arguments.out_dir / "controllers", arguments.romc
-    )
+    crate = romc_controller.build(arguments.model, folder / arguments.model.stem, arguments.romc)
     tasks = [
         (arguments, models, inputs, crate, name, method, goal, condition)
         for name, method in methods.items()

@@ -212,7 +212,7 @@ pub struct TrainSettings {
     #[arg(long, value_name = "SHARE", value_parser = finite(&table::MASK_INPUT_SHARE))]
     pub mask_input_share: Option<Finite>,
     /// Rows of a linear encoder: named (the centre of mass, then joints and pitch, left and right alike; the dynamics
-    /// obey gravity, free fall and the invariances) or free [default: named; free with --paper or hidden layers]
+    /// obey Newton's second law and the invariances) or free [default: named; free with --paper or hidden layers]
     #[arg(long, value_name = "KIND")]
     pub coordinates: Option<Coordinates>,
     /// Keep the latent basis as trained, without varimax rotation
