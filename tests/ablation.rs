@@ -6,10 +6,10 @@ use std::path::Path;
 use std::process::Command;
 
 use nalgebra::DMatrix;
-use romc::artifact;
-use romc::evaluate::Invariance;
+use romc::evaluate::{Invariance, remarks};
 use romc::files::Overwrite;
 use romc::model::ReducedModel;
+use romc::{artifact, recording};
 use serde_json::Value;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -222,4 +222,22 @@ fn invariance_finds_a_model_that_depends_on_the_place() {
             .sum::<f64>()
     };
     assert!((at(1.0) - at(0.0)).abs() > 1e-3);
+}
+
+/// Each jump alone, as a user has one; a model of accelerations ten times as large explains none of them.
+#[test]
+fn shipped_models_have_no_remark_on_a_right_jump_and_wrong_ones_do() {
+    let mut wrong_noticed = 0;
+    for name in ["go1-d4", "go1-d6"] {
+        let model = shipped(name);
+        let wrong = with_xi(&model, |_, xi| 10.0 * xi);
+        for jump in 1..=8 {
+            let path = format!("examples/recordings/go1-other/jump_{jump:02}.csv.gz");
+            let recording = [recording::read(&Path::new(ROOT).join(&path)).expect("shipped")];
+            let found = remarks(&model, &recording).expect("encodes");
+            assert!(found.is_empty(), "{name} on {path}: {found:?}");
+            wrong_noticed += remarks(&wrong, &recording).expect("encodes").len();
+        }
+    }
+    assert_eq!(wrong_noticed, 16);
 }

@@ -22,6 +22,7 @@ TABLES = {
         for flags in (
             "",
             "--refinements 0",
+            "--growth 1000",
             "--slack 0.2",
             "--slack 0.05",
             "--slack 0.05 --body-weight 150000",
@@ -45,7 +46,9 @@ TABLES = {
         (2, FREE_BODY),
         (6, ""),
         (6, "--refinements 0"),
+        (6, "--growth 1000"),
         (6, "--slack 0.2"),
+        (6, "--slack 0.15"),
         (6, "--slack 0.05"),
         (6, "--coordinates free"),
         (6, FREE_BODY),

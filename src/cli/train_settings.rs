@@ -56,6 +56,8 @@ pub(super) fn options(
     encoder.rotate &= !settings.no_rotation;
     set(&mut options.regression.slack, settings.slack);
     set(&mut options.regression.refinements, settings.refinements);
+    let growth = settings.growth.map(|rate| Some(f64::from(rate)));
+    set(&mut options.regression.growth_per_s, growth);
     set(&mut options.regression.smoothing, settings.moving_average);
     set(&mut options.wrench_frame, settings.wrench_frame);
     if !settings.paper {

@@ -1,6 +1,6 @@
 //! The phases' linearisations at their mean point: stability and gain of the inputs.
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, Schur};
 
 use crate::lower::CompiledModel;
 use crate::sim::LatentSegment;
@@ -77,13 +77,7 @@ fn linearise_phase(
     let (z, rest) = mean.split_at(d);
     let (dz, u_lat) = rest.split_at(d);
     model.jacobian(phase, z, dz, u_lat, &mut ddz, &mut jacobian);
-    if jacobian.iter().any(|value| !value.is_finite()) {
-        return None;
-    }
-    let mut state = DMatrix::zeros(2 * d, 2 * d);
-    state.view_mut((0, d), (d, d)).fill_with_identity();
-    (state.view_mut((d, 0), (d, 2 * d))).copy_from(&jacobian.columns(0, 2 * d));
-    let mut eigenvalues: Vec<_> = state.complex_eigenvalues().iter().copied().collect();
+    let mut eigenvalues = eigenvalues(state_matrix(&jacobian.columns(0, 2 * d).into_owned()))?;
     eigenvalues.sort_by(|a, b| b.re.total_cmp(&a.re).then(b.im.total_cmp(&a.im)));
     let gain = jacobian.columns(2 * d, d).into_owned();
     let mut input_singular_values: Vec<f64> = gain.singular_values().iter().copied().collect();
@@ -93,6 +87,36 @@ fn linearise_phase(
         eigenvalues,
         input_singular_values,
     })
+}
+
+/// `[0 I; J]`, the matrix of the state `(z, dz)` whose `ddz` has the Jacobian `J` (`d x 2d`).
+pub fn state_matrix(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+    let d = jacobian.nrows();
+    let mut state = DMatrix::zeros(2 * d, 2 * d);
+    state.view_mut((0, d), (d, d)).fill_with_identity();
+    state.rows_mut(d, d).copy_from(jacobian);
+    state
+}
+
+/// Eigenvalues of a square matrix; none if one of its entries is not finite, or if they cannot be computed.
+///
+/// Entries of very different size, such as stiff joints beside ones, can keep the iteration from converging: entries
+/// below ever larger shares of their neighbours count as 0 until it does.
+pub fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
+    let size = matrix.amax();
+    if !size.is_finite() || matrix.iter().any(|value| value.is_nan()) {
+        return None;
+    }
+    if size == 0.0 {
+        return Some(vec![Complex::default(); matrix.nrows()]);
+    }
+    let matrix = matrix / size;
+    let iterations = 100 * matrix.nrows().max(1);
+    let schur = [f64::EPSILON, 1e-14, 1e-12, 1e-10]
+        .iter()
+        .find_map(|share| Schur::try_new(matrix.clone(), *share, iterations))?;
+    let values = schur.complex_eigenvalues();
+    Some(values.iter().map(|value| value * size).collect())
 }
 
 #[cfg(test)]
@@ -130,5 +154,38 @@ mod tests {
         assert_eq!(phase.input_singular_values, [3.0]);
         assert_eq!(phase.input_condition(), Some(1.0));
         assert_eq!(phase.input_effective_rank(), 1);
+    }
+
+    /// Known eigenvalues of stiff chains, which the plain iteration does not find.
+    #[test]
+    fn eigenvalues_of_stiff_and_sparse_dynamics_are_found() {
+        let mut random = 1u64;
+        let mut next = || {
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (random >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let mut hung = 0;
+        for d in 2..=8 {
+            for _ in 0..300 {
+                let jacobian = DMatrix::from_fn(d, 2 * d, |_, _| match next() < 0.3 {
+                    true => (next() - 0.7) * 10f64.powf(5.0 * next()),
+                    false => 0.0,
+                });
+                let matrix = state_matrix(&jacobian);
+                let plain = Schur::try_new(matrix.clone(), f64::EPSILON, 1000);
+                hung += usize::from(plain.is_none());
+                let found = eigenvalues(matrix.clone()).expect("finite");
+                let sum: Complex<f64> = found.iter().sum();
+                let trace = matrix.trace();
+                let size = found.iter().map(|value| value.norm()).fold(1.0, f64::max);
+                assert!((sum.re - trace).abs() < 1e-9 * size && sum.im.abs() < 1e-9 * size);
+            }
+        }
+        assert!(
+            hung > 0,
+            "the plain iteration finds them all: larger shares are needed no more"
+        );
     }
 }

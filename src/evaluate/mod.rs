@@ -38,7 +38,9 @@ pub use coordinates::{CoordinateSums, PointwiseSums};
 pub use error::EvaluateError;
 pub use invariance::{Invariance, PhaseInvariance};
 pub use lift::{LAMBDA, LiftSums, combined_loss};
-pub use linearised::{LinearisedPhase, RANK_THRESHOLD, linearise_phases};
+pub use linearised::{
+    LinearisedPhase, RANK_THRESHOLD, eigenvalues, linearise_phases, state_matrix,
+};
 pub use metrics::{Fit, FitSums};
 pub use prediction::PredictionError;
 pub use remarks::remarks;

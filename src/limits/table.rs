@@ -20,6 +20,8 @@ pub const BPTT_WEIGHT: Range = Range::real("bptt-weight", 0.0, 1e6);
 pub const BPTT_WINDOW: Range = Range::whole("bptt-window", 1, 1000);
 /// Steps of the refinement by rollouts.
 pub const REFINEMENTS: Range = Range::whole("refinements", 0, 1000);
+/// Growth rate of deviations, 1/s.
+pub const GROWTH: Range = Range::real("growth", 1e-2, 1e6);
 /// Samples per step of that window.
 pub const BPTT_STRIDE: Range = Range::whole("bptt-stride", 1, 1000);
 /// Weight of a prediction relative to the previous one.
@@ -76,7 +78,7 @@ pub const DISTANCE: Range = Range::real("distance", -1000.0, 1000.0);
 pub const APEX: Range = Range::real("apex", -1000.0, 1000.0);
 
 /// The settings of `romc train`, as flags and in files.
-pub static TRAINING: [Range; 19] = [
+pub static TRAINING: [Range; 20] = [
     LATENT_DIM,
     SEEDS,
     EPOCHS,
@@ -85,6 +87,7 @@ pub static TRAINING: [Range; 19] = [
     BPTT_WEIGHT,
     BPTT_WINDOW,
     REFINEMENTS,
+    GROWTH,
     BPTT_STRIDE,
     BPTT_DECAY,
     SLACK,

@@ -33,6 +33,8 @@ const CONSISTENCY_SHARE: f64 = 0.3;
 const VELOCITY_FLOOR: [f64; 3] = [1.0, 0.2, 0.5];
 /// The same for accelerations.
 const ACCELERATION_FLOOR: [f64; 3] = [100.0, 10.0, 50.0];
+/// Coordinates of the body along the floor.
+const BODY_XY: Range<usize> = JOINT_DIM..JOINT_DIM + 2;
 /// Equal consecutive velocities at an extreme that count as clipped.
 const CLIPPED_SAMPLES: usize = 5;
 /// Departure of a time step from the median, as a share of it.
@@ -316,7 +318,9 @@ impl Scan<'_> {
             if extreme == 0.0 {
                 continue;
             }
-            let at_extreme = |j: usize| segment.dx[(i, j)].abs() == extreme;
+            // In flight nothing pushes the body forwards or sideways: a velocity that does not change is right there.
+            let glides = |j: usize| BODY_XY.contains(&i) && segment.feet[j] == [false; 4];
+            let at_extreme = |j: usize| segment.dx[(i, j)].abs() == extreme && !glides(j);
             let mut start = 0;
             let mut clipped = vec![false; n];
             while start < n {

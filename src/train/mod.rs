@@ -9,6 +9,7 @@ pub mod closed_form;
 pub mod dataset;
 pub mod features;
 pub mod frame;
+mod growth;
 pub mod joint;
 pub mod jumps;
 pub mod knowledge;

@@ -180,6 +180,9 @@ pub struct RegressionOptions {
     /// Steps by which rollouts of the training jumps refine the coefficients chosen; 0 leaves the regression's.
     #[serde(default)]
     pub refinements: usize,
+    /// Largest rate in 1/s at which deviations may grow, in every phase and through their sequence; none for no bound.
+    #[serde(default)]
+    pub growth_per_s: Option<f64>,
 }
 
 impl TrainOptions {
@@ -230,6 +233,7 @@ impl TrainOptions {
             regression: RegressionOptions {
                 smoothing: 1,
                 refinements: 0,
+                growth_per_s: None,
                 ..RegressionOptions::default()
             },
             joint: JointOptions {
@@ -294,6 +298,9 @@ impl TrainOptions {
         self.joint.maps.check(self.latent_dim)?;
         self.joint.check_predictions()?;
         table::SLACK.check(self.regression.slack)?;
+        if let Some(rate) = self.regression.growth_per_s {
+            table::GROWTH.check(rate)?;
+        }
         at_least_zero("rollout-weight", self.regression.rollout_weight)?;
         for ridge in &self.regression.ridges {
             above_zero("ridge", *ridge)?;
@@ -424,6 +431,7 @@ impl Default for RegressionOptions {
             sweeps: 3,
             rollout_weight: 0.2,
             refinements: 10,
+            growth_per_s: Some(3.0),
         }
     }
 }

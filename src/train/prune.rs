@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::features::Features;
+use super::growth::Growth;
 use super::judge::Judge;
 use super::progress::Watch;
 use super::rollout::Candidate;
@@ -26,6 +27,8 @@ pub(super) struct Refined<'a> {
     pub ridge: f64,
     /// `library_dim x latent_dim` for each phase.
     pub xi: Vec<DMatrix<f64>>,
+    /// What they keep to.
+    pub growth: &'a Growth,
     /// Score of `xi`.
     pub score: f64,
 }
@@ -57,7 +60,7 @@ impl Refined<'_> {
                 xi: &self.xi,
             };
             let score = judge.score_within(candidate, limit);
-            if score <= limit {
+            if score <= limit && self.growth.admits(&self.xi) {
                 self.score = score;
             } else {
                 self.xi[phase].set_column(column, &before);
@@ -85,7 +88,7 @@ impl Refined<'_> {
                 xi[phase].set_column(column, &fitted);
                 let limit = (1.0 - LEAST_GAIN) * self.score;
                 let score = judge.score_within(Candidate { features, xi: &xi }, limit);
-                if score <= limit {
+                if score <= limit && self.growth.admits(&xi) {
                     self.xi = xi;
                     self.score = score;
                 }

@@ -8,6 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::features::Features;
+use super::growth::Growth;
 use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::progress::Watch;
@@ -44,6 +45,8 @@ impl Coefficients {
 pub(super) struct Refiner<'a> {
     pub features: &'a Features,
     pub knowledge: &'a [Knowledge],
+    /// What the coefficients keep to.
+    pub growth: &'a Growth,
     /// Whose errors are lowered.
     pub training: &'a Judge<'a>,
     /// Which of the coefficients on the way are kept.
@@ -89,7 +92,7 @@ impl Refiner<'_> {
             squared_error + PRIOR * moved(xi).norm_squared()
         };
         let mut current = start.xi.clone();
-        self.brake(&mut current);
+        self.admit(&mut current, (places, &scales), Clone::clone);
         let mut best = Coefficients {
             score: self.score(&current),
             xi: current.clone(),
@@ -109,12 +112,15 @@ impl Refiner<'_> {
                 for i in 0..places.len() {
                     system[(i, i)] += PRIOR + damping * model.gram[(i, i)];
                 }
-                let change = -system.cholesky()?.solve(&gradient);
+                let factor = system.cholesky()?;
+                let change = -factor.solve(&gradient);
                 let mut trial = current.clone();
                 for ((at, scale), change) in places.iter().zip(&scales).zip(change.iter()) {
                     trial[at.0][(at.1, at.2)] += change * scale;
                 }
-                self.brake(&mut trial);
+                self.admit(&mut trial, (places, &scales), |gradient| {
+                    factor.solve(gradient)
+                });
                 let squared_error = self.squared_error(&trial, weights);
                 let after = squared_error.map_or(f64::INFINITY, |error| cost(error, &trial));
                 damping *= if after < before { 0.1 } else { 10.0 };
@@ -139,6 +145,28 @@ impl Refiner<'_> {
         best
     }
 
+    /// Moves coefficients to where they brake where they may only brake, and keep the bound on growth: the least, where
+    /// `inverse` applies that of the matrix which weighs relative changes of the coefficients at `places`.
+    fn admit(
+        &self,
+        xi: &mut [DMatrix<f64>],
+        (places, scales): (&[Place], &[f64]),
+        inverse: impl Fn(&DVector<f64>) -> DVector<f64>,
+    ) {
+        self.growth.hold(xi, |gradient| {
+            let each = places.iter().zip(scales);
+            let relative =
+                each.map(|(&(phase, term, k), scale)| gradient[phase][(term, k)] * scale);
+            let change = inverse(&DVector::from_iterator(places.len(), relative));
+            let mut all: Vec<_> = gradient.iter().map(|each| each.map(|_| 0.0)).collect();
+            for ((&(phase, term, k), scale), change) in places.iter().zip(scales).zip(&change) {
+                all[phase][(term, k)] = change * scale;
+            }
+            all
+        });
+        self.brake(xi);
+    }
+
     /// Coefficients that would drive where they may only brake, set to 0.
     pub(super) fn brake(&self, xi: &mut [DMatrix<f64>]) {
         for (knowledge, xi) in self.knowledge.iter().zip(xi) {
@@ -146,11 +174,18 @@ impl Refiner<'_> {
         }
     }
 
+    /// Score of coefficients, infinite if they grow faster than they may or diverge.
     pub(super) fn score(&self, xi: &[DMatrix<f64>]) -> f64 {
-        self.judge.score(Candidate {
-            features: self.features,
-            xi,
-        })
+        self.score_within(xi, f64::MAX)
+    }
+
+    /// The same, or a number above `limit` if the score is.
+    pub(super) fn score_within(&self, xi: &[DMatrix<f64>], limit: f64) -> f64 {
+        let features = self.features;
+        match self.growth.admits(xi) {
+            true => self.judge.score_within(Candidate { features, xi }, limit),
+            false => f64::INFINITY,
+        }
     }
 
     /// Errors of a part, weighted and stacked; none if a rollout diverges.
@@ -275,9 +310,11 @@ mod tests {
         let (dataset, latent) = oscillator::jumps(3);
         let judge = Judge::new(&dataset, &latent, 0.2);
         let (features, _) = oscillator::known();
+        let growth = Growth::of_jumps(Some(1.0), &dataset, &latent, &features);
         let refiner = Refiner {
             features: &features,
             knowledge,
+            growth: &growth,
             training: &judge,
             judge: &judge,
         };

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::dataset::Dataset;
 use super::error::TrainError;
 use super::features::Features;
+use super::growth::Growth;
 use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::latent::Latent;
@@ -72,7 +73,20 @@ pub fn select(
 ) -> Result<Selected, TrainError> {
     let features = target.features;
     let regressions = regressions(target, &options.windows)?;
-    let mut tried = try_all(&regressions, features, judge, options, watch);
+    let growth = &Growth::of_jumps(
+        options.growth_per_s,
+        target.dataset,
+        target.latent,
+        features,
+    );
+    let attempt = Attempt {
+        regressions: &regressions,
+        features,
+        growth,
+        judge,
+        options,
+    };
+    let mut tried = attempt.all(watch);
     let candidates = tried.len();
     let reference = best_of(&tried)?.xi.clone();
     let reference = Candidate {
@@ -92,17 +106,24 @@ pub fn select(
     let refiner = Refiner {
         features,
         knowledge: target.knowledge,
+        growth,
         training: &training,
         judge: &relative,
     };
     let mut refined = Vec::new();
     for start in starts(tried, &options.windows, limit, options.sweeps) {
-        let Fitted { xi, choice, window } = start;
+        let Fitted {
+            mut xi,
+            choice,
+            window,
+        } = start;
+        hold(growth, &regressions[window], choice.ridge, &mut xi);
         let mut pruned = Refined {
             regressions: &regressions[window],
             ridge: choice.ridge,
+            growth,
+            score: relative.score(Candidate { features, xi: &xi }),
             xi,
-            score: choice.score,
         };
         if options.sweeps > 0 {
             pruned.sweep(features, &relative, limit, watch);
@@ -131,6 +152,17 @@ pub fn select(
         choice,
         candidates,
     })
+}
+
+/// Changes the coefficients of regressions until their growth keeps the bound, the least as their normal equations weigh
+/// it.
+fn hold(growth: &Growth, regressions: &[Regression], ridge: f64, xi: &mut [DMatrix<f64>]) {
+    let before = xi.to_vec();
+    growth.hold(xi, |gradient| {
+        let each = regressions.iter().zip(&before).zip(gradient);
+        each.map(|((regression, xi), gradient)| regression.change(xi, gradient, ridge))
+            .collect()
+    });
 }
 
 /// For every window the regression of every phase.
@@ -187,44 +219,33 @@ impl Fitted {
     }
 }
 
-/// Every combination of the options; where the library has terms that are not affine, also those without them, and the
-/// best of these grown by such terms: rollouts of full libraries diverge more often than not.
-fn try_all(
-    regressions: &[Vec<Regression>],
-    features: &Features,
-    judge: &Judge<'_>,
-    options: &RegressionOptions,
-    watch: &mut Watch<'_>,
-) -> Vec<Fitted> {
-    let affine = features.affine_terms();
-    let attempt = Attempt {
-        regressions,
-        features,
-        judge,
-        options,
-    };
-    let has_nonlinear = affine.contains(&false);
-    // The affine terms are still to come where full libraries diverge.
-    let enough = |tried: &[Fitted]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
-    let mut tried = attempt.fit_all(&vec![true; affine.len()], enough, watch);
-    if has_nonlinear && !(watch.cancelled() && any_stable(&tried)) {
-        let tame = attempt.fit_all(&affine, any_stable, watch);
-        let grown = attempt.grown(&tame, watch);
-        tried.extend(tame);
-        tried.extend(grown);
-    }
-    tried
-}
-
 /// What candidates are fitted from and judged by.
 struct Attempt<'a> {
     regressions: &'a [Vec<Regression>],
     features: &'a Features,
+    growth: &'a Growth,
     judge: &'a Judge<'a>,
     options: &'a RegressionOptions,
 }
 
 impl Attempt<'_> {
+    /// Every combination of the options; where the library has terms that are not affine, also those without them, and
+    /// the best of these grown by such terms: rollouts of full libraries diverge more often than not.
+    fn all(&self, watch: &mut Watch<'_>) -> Vec<Fitted> {
+        let affine = self.features.affine_terms();
+        let has_nonlinear = affine.contains(&false);
+        // The affine terms are still to come where full libraries diverge.
+        let enough = |tried: &[Fitted]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
+        let mut tried = self.fit_all(&vec![true; affine.len()], enough, watch);
+        if has_nonlinear && !(watch.cancelled() && any_stable(&tried)) {
+            let tame = self.fit_all(&affine, any_stable, watch);
+            let grown = self.grown(&tame, watch);
+            tried.extend(tame);
+            tried.extend(grown);
+        }
+        tried
+    }
+
     /// Every combination of the options with the terms that are `allowed`; if cancelled, those until there are
     /// `enough`.
     fn fit_all(
@@ -249,8 +270,12 @@ impl Attempt<'_> {
                     .map(|regression| regression.fit_each(ridge, &options.prunings, allowed))
                     .collect();
                 for (number, &pruning) in options.prunings.iter().enumerate() {
-                    let xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
-                    let score = self.judge.score(Candidate { features, xi: &xi });
+                    let mut xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
+                    let mut score = self.judge.score(Candidate { features, xi: &xi });
+                    if score.is_infinite() {
+                        hold(self.growth, phases, ridge, &mut xi);
+                        score = self.judge.score(Candidate { features, xi: &xi });
+                    }
                     let active = xi.iter().map(active_terms).sum();
                     watch.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
                     let choice = Choice {
@@ -273,6 +298,7 @@ impl Attempt<'_> {
         let mut refined = Refined {
             regressions: &self.regressions[best.window],
             ridge: best.choice.ridge,
+            growth: self.growth,
             xi: best.xi.clone(),
             score: best.choice.score,
         };

@@ -220,6 +220,27 @@ impl Regression {
         xi.column(column).into_owned()
     }
 
+    /// What the active terms of `xi` would change by for this gradient: the inverse of the normal equations applied to
+    /// it, column by column, each relative to the energy of its accelerations.
+    pub fn change(&self, xi: &DMatrix<f64>, gradient: &DMatrix<f64>, ridge: f64) -> DMatrix<f64> {
+        let mut change = DMatrix::zeros(xi.nrows(), xi.ncols());
+        for column in 0..xi.ncols() {
+            let active = (self.free_terms(column))
+                .filter(|&i| xi[(i, column)] != 0.0 && self.theta_rms[i] > 0.0);
+            let support: Vec<usize> = active.collect();
+            let normalised = support
+                .iter()
+                .map(|&i| gradient[(i, column)] / self.theta_rms[i]);
+            let right = DVector::from_iterator(support.len(), normalised);
+            let solution = self.ridged_gram(&support, ridge).solve(&right);
+            self.store(&mut change, column, &support, &solution);
+        }
+        for (mut column, rms) in change.column_iter_mut().zip(self.target_rms.iter()) {
+            column *= rms.powi(2);
+        }
+        change
+    }
+
     /// For every active term of a column that may go: its row, and the share of the acceleration's energy lost
     /// without it.
     pub fn losses(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> Vec<(usize, f64)> {

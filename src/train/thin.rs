@@ -8,7 +8,6 @@ use nalgebra::{DMatrix, DVector};
 
 use super::progress::Watch;
 use super::refine::{Coefficients, Model, PRIOR, Place, Refiner, relative};
-use super::rollout::Candidate;
 
 /// Damping of the changes, relative to each coefficient's own weight.
 const DAMPING: f64 = 1e-3;
@@ -60,11 +59,7 @@ impl Refiner<'_> {
                 let without = about.without(i);
                 let mut xi = without.xi(from);
                 self.brake(&mut xi);
-                let candidate = Candidate {
-                    features: self.features,
-                    xi: &xi,
-                };
-                let score = self.judge.score_within(candidate, limit);
+                let score = self.score_within(&xi, limit);
                 (score <= limit).then_some((without, Coefficients { xi, score }))
             });
             let Some((without, coefficients)) = found else {
@@ -166,6 +161,7 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
+    use crate::train::growth::Growth;
     use crate::train::judge::Judge;
     use crate::train::knowledge::Knowledge;
     use crate::train::oscillator;
@@ -178,9 +174,11 @@ mod tests {
         let (features, truth) = oscillator::known();
         let mut knowledge = [Knowledge::nothing(7, 2), Knowledge::nothing(7, 2)];
         knowledge[0].kept[(3, 0)] = true;
+        let growth = Growth::of_jumps(None, &dataset, &latent, &features);
         let refiner = Refiner {
             features: &features,
             knowledge: &knowledge,
+            growth: &growth,
             training: &judge,
             judge: &judge,
         };

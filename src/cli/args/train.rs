@@ -171,6 +171,10 @@ pub struct TrainSettings {
     /// (10 unless given, 0 with --paper)
     #[arg(long, value_name = "STEPS", value_parser = count(&table::REFINEMENTS))]
     pub refinements: Option<usize>,
+    /// Bound on the rate at which deviations grow, in every phase and through their sequence, 1/s (3 unless given, none
+    /// with --paper)
+    #[arg(long, value_name = "RATE", value_parser = finite(&table::GROWTH))]
+    pub growth: Option<Finite>,
     /// Highest degree of the polynomial candidate terms
     #[arg(long, value_name = "P", value_parser = |text: &str| table::DEGREE.parse::<u32>(text))]
     pub degree: Option<u32>,

@@ -144,6 +144,23 @@ fn check_clipped_velocity_is_found() {
 }
 
 #[test]
+fn check_sideways_velocity_may_stay_at_its_extreme_in_flight_alone() {
+    let mut recording = smooth(400);
+    let segment = &mut recording.segments[0];
+    (100..110).for_each(|j| segment.dx[(13, j)] = 5.0);
+    let clips = |recording: &Recording| {
+        let found = findings(recording);
+        found.iter().any(|f| f.kind == Implausible::Clipped)
+    };
+    assert!(clips(&recording));
+    recording.segments[0].feet[95..115].fill([false; 4]);
+    assert!(!clips(&recording));
+    let segment = &mut recording.segments[0];
+    (100..110).for_each(|j| segment.dx[(14, j)] = 5.0);
+    assert!(clips(&recording));
+}
+
+#[test]
 fn check_lost_sample_is_found_as_a_time_step() {
     let mut recording = smooth(100);
     for time in &mut recording.segments[0].time_s[70..] {

@@ -1,0 +1,426 @@
+//! A bound on the growth of deviations: dynamics that run away are not regressed in the first place.
+//!
+//! About the mean state of a phase a deviation moves by `A = [0 I; d ddz/dz  d ddz/d dz]`, so it grows at most at the
+//! largest real part of the eigenvalues of `A`. Through phases of durations `T_1 ... T_k` it is multiplied by
+//! `M = e^(A_k T_k) ... e^(A_1 T_1)`, which makes rates `ln|mu| / sum T` of the eigenvalues `mu` of `M`: feedback that
+//! is stable in every phase may still grow through their sequence. Both are smooth in Xi but where eigenvalues meet.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::dataset::Dataset;
+use super::features::{FeatureValues, Features};
+use super::latent::Latent;
+use crate::evaluate::{eigenvalues, state_matrix};
+
+/// Steps of least change before coefficients are scaled down instead.
+const STEPS: usize = 30;
+/// Halvings after which nothing is left that could grow.
+const HALVINGS: usize = 100;
+/// Halvings of a step until it makes growth slower.
+const SHORTENED: i32 = 6;
+/// Share of the bound that steps aim at.
+const AIM: f64 = 0.99;
+/// Difference of the quotients, relative to the largest value that is moved.
+const DIFFERENCE: f64 = 1e-6;
+
+/// What the dynamics of a training must keep to.
+#[derive(Clone, Debug)]
+pub struct Growth {
+    bound_per_s: Option<f64>,
+    slopes: Vec<DMatrix<f64>>, // a phase: d theta / d (z, dz) at its mean state
+    sequence: Vec<(usize, f64)>, // phases and their durations in s
+}
+
+/// An eigenvalue that grows too fast, and how its rate changes with the lower half of every phase's `A`.
+struct Mode {
+    value: Complex<f64>,
+    of_sequence: bool,
+    excess: f64, // of its rate above what is aimed at
+    slopes: Vec<DMatrix<f64>>,
+}
+
+impl Growth {
+    /// Of these jumps: the mean state of each phase, and the most frequent order of phases with its mean durations.
+    pub fn of_jumps(
+        bound_per_s: Option<f64>,
+        dataset: &Dataset,
+        latent: &[Latent],
+        features: &Features,
+    ) -> Self {
+        let phases = 0..dataset.phases.patterns.len();
+        Self {
+            bound_per_s,
+            slopes: phases
+                .map(|phase| slopes_at(&mean_of(phase, dataset, latent), features))
+                .collect(),
+            sequence: usual_sequence(dataset),
+        }
+    }
+
+    /// Whether no phase grows faster than the bound, nor the sequence of phases.
+    pub fn admits(&self, xi: &[DMatrix<f64>]) -> bool {
+        self.excess(&self.lower_halves(xi)) == [0.0; 2]
+    }
+
+    /// Changes the coefficients until the bound admits them, each time by the least that does to first order.
+    ///
+    /// `inverse` applies the inverse of the matrix that weighs changes (`library_dim x latent_dim` a phase), and makes
+    /// no change where there must not be one. Where such steps do not end, what depends on the state is scaled down.
+    pub fn hold(
+        &self,
+        xi: &mut [DMatrix<f64>],
+        inverse: impl Fn(&[DMatrix<f64>]) -> Vec<DMatrix<f64>>,
+    ) {
+        for _ in 0..STEPS {
+            let lower = self.lower_halves(xi);
+            let excess = self.excess(&lower);
+            if excess == [0.0; 2] {
+                return;
+            }
+            let change = self.least_change(&self.modes(&lower), &inverse);
+            let slower = (0..SHORTENED).find_map(|halvings| {
+                let share = 0.5f64.powi(halvings);
+                let each = xi.iter().zip(&change);
+                let moved: Vec<_> = each.map(|(xi, change)| xi - change * share).collect();
+                (self.excess(&self.lower_halves(&moved)) < excess).then_some(moved)
+            });
+            let Some(slower) = slower else { break };
+            xi.clone_from_slice(&slower);
+        }
+        for _ in 0..HALVINGS {
+            if self.admits(xi) {
+                return;
+            }
+            for (xi, slopes) in xi.iter_mut().zip(&self.slopes) {
+                for (mut row, slopes) in xi.row_iter_mut().zip(slopes.row_iter()) {
+                    if slopes.iter().any(|slope| *slope != 0.0) {
+                        row *= 0.5;
+                    }
+                }
+            }
+        }
+    }
+
+    /// `d ddz / d (z, dz)` of every phase, `latent_dim x 2 latent_dim`.
+    fn lower_halves(&self, xi: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
+        let each = xi.iter().zip(&self.slopes);
+        each.map(|(xi, slopes)| xi.tr_mul(slopes)).collect()
+    }
+
+    /// What the fastest phase grows too fast by, 1/s, and what their sequence does; that is not computed before every
+    /// phase keeps the bound.
+    fn excess(&self, lower: &[DMatrix<f64>]) -> [f64; 2] {
+        let Some(bound) = self.bound_per_s else {
+            return [0.0; 2];
+        };
+        let above = |values: Vec<Complex<f64>>, of_sequence: bool| {
+            let rates = values.iter().map(|value| self.rate(*value, of_sequence));
+            rates.fold(0.0, |most: f64, rate| most.max(rate - bound))
+        };
+        let each = lower.iter().map(|lower| above(of_phase(lower), false));
+        match each.fold(0.0, f64::max) {
+            0.0 => [0.0, above(of_sequence(&self.transitions(lower)), true)],
+            excess => [excess, f64::INFINITY],
+        }
+    }
+
+    /// 1/s.
+    fn rate(&self, value: Complex<f64>, of_sequence: bool) -> f64 {
+        if !of_sequence {
+            return value.re;
+        }
+        let duration_s: f64 = self.sequence.iter().map(|(_, duration_s)| duration_s).sum();
+        value.norm().max(f64::MIN_POSITIVE).ln() / duration_s.max(f64::MIN_POSITIVE)
+    }
+
+    /// What each phase of the sequence multiplies deviations by.
+    fn transitions(&self, lower: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
+        let each = self.sequence.iter();
+        each.map(|&step| transition(lower, step)).collect()
+    }
+
+    /// The eigenvalues that grow faster than what is aimed at: those of the phases, and those of the sequence once every
+    /// phase keeps the bound.
+    fn modes(&self, lower: &[DMatrix<f64>]) -> Vec<Mode> {
+        let mut all = Vec::new();
+        for phase in 0..lower.len() {
+            let mut modes = self.fast(of_phase(&lower[phase]), false, lower);
+            self.add_slopes(&mut modes, phase, lower, |changed| {
+                of_phase(&changed[phase])
+            });
+            all.extend(modes);
+        }
+        if self.excess(lower)[0] == 0.0 {
+            let transitions = self.transitions(lower);
+            let mut modes = self.fast(of_sequence(&transitions), true, lower);
+            for phase in 0..lower.len() {
+                self.add_slopes(&mut modes, phase, lower, |changed| {
+                    let mut transitions = transitions.clone();
+                    for (transition, &step) in transitions.iter_mut().zip(&self.sequence) {
+                        if step.0 == phase {
+                            *transition = self::transition(changed, step);
+                        }
+                    }
+                    of_sequence(&transitions)
+                });
+            }
+            all.extend(modes);
+        }
+        let is_finite = |slopes: &DMatrix<f64>| slopes.iter().all(|slope| slope.is_finite());
+        all.retain(|mode| mode.slopes.iter().all(is_finite));
+        all
+    }
+
+    /// The eigenvalues that grow too fast, one of each conjugate pair, with slopes of 0.
+    fn fast(
+        &self,
+        values: Vec<Complex<f64>>,
+        of_sequence: bool,
+        lower: &[DMatrix<f64>],
+    ) -> Vec<Mode> {
+        let aim = AIM * self.bound_per_s.unwrap_or(f64::INFINITY);
+        let each = values.into_iter().filter(|value| value.im >= 0.0);
+        let modes = each.map(|value| Mode {
+            value,
+            of_sequence,
+            excess: self.rate(value, of_sequence) - aim,
+            slopes: lower.iter().map(|lower| lower.map(|_| 0.0)).collect(),
+        });
+        modes
+            .filter(|mode| mode.excess.is_finite() && mode.excess > 0.0)
+            .collect()
+    }
+
+    /// How the rates of `modes` change with a phase's lower half, by differences of the nearest eigenvalues.
+    fn add_slopes(
+        &self,
+        modes: &mut [Mode],
+        phase: usize,
+        lower: &[DMatrix<f64>],
+        values: impl Fn(&[DMatrix<f64>]) -> Vec<Complex<f64>>,
+    ) {
+        if modes.is_empty() {
+            return;
+        }
+        let step = DIFFERENCE * lower[phase].amax().max(1.0);
+        let mut changed = lower.to_vec();
+        for place in 0..lower[phase].len() {
+            changed[phase][place] += step;
+            let values = values(&changed);
+            changed[phase][place] = lower[phase][place];
+            for mode in &mut *modes {
+                let apart = |value: &Complex<f64>| (value - mode.value).norm();
+                let nearest = values.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+                let moved = nearest.map_or(f64::NAN, |value| self.rate(*value, mode.of_sequence));
+                let rate = self.rate(mode.value, mode.of_sequence);
+                mode.slopes[phase][place] = (moved - rate) / step;
+            }
+        }
+    }
+
+    /// The least change, as `inverse` weighs it, that takes the excess off the modes to first order.
+    fn least_change(
+        &self,
+        modes: &[Mode],
+        inverse: impl Fn(&[DMatrix<f64>]) -> Vec<DMatrix<f64>>,
+    ) -> Vec<DMatrix<f64>> {
+        let of_xi = |mode: &Mode| -> Vec<DMatrix<f64>> {
+            let each = self.slopes.iter().zip(&mode.slopes);
+            each.map(|(theta, slopes)| theta * slopes.transpose())
+                .collect()
+        };
+        let gradients: Vec<_> = modes.iter().map(of_xi).collect();
+        let changes: Vec<_> = gradients.iter().map(|gradient| inverse(gradient)).collect();
+        let n = modes.len();
+        let mut system = DMatrix::from_fn(n, n, |i, j| dot(&gradients[i], &changes[j]));
+        // Rates that change alike are as good as one.
+        let least = 1e-9 * system.diagonal().amax().max(f64::MIN_POSITIVE);
+        (0..n).for_each(|i| system[(i, i)] += least);
+        let excess = DVector::from_iterator(n, modes.iter().map(|mode| mode.excess));
+        let weights = system.cholesky().map(|system| system.solve(&excess));
+        let mut total: Vec<_> = (self.slopes.iter())
+            .map(|slopes| DMatrix::zeros(slopes.nrows(), slopes.ncols() / 2))
+            .collect();
+        for (changes, weight) in changes.iter().zip(weights.iter().flatten()) {
+            for (total, change) in total.iter_mut().zip(changes) {
+                *total += change * *weight;
+            }
+        }
+        total
+    }
+}
+
+/// `e^(A T)` of a phase.
+fn transition(lower: &[DMatrix<f64>], (phase, duration_s): (usize, f64)) -> DMatrix<f64> {
+    (state_matrix(&lower[phase]) * duration_s).exp()
+}
+
+/// The eigenvalues of a phase; an infinite one if they cannot be computed.
+fn of_phase(lower: &DMatrix<f64>) -> Vec<Complex<f64>> {
+    eigenvalues(state_matrix(lower)).unwrap_or_else(|| vec![f64::INFINITY.into()])
+}
+
+/// The same of a sequence.
+fn of_sequence(transitions: &[DMatrix<f64>]) -> Vec<Complex<f64>> {
+    let product = (transitions.iter().cloned()).reduce(|before, next| next * before);
+    let values = product.map_or_else(|| Some(Vec::new()), eigenvalues);
+    values.unwrap_or_else(|| vec![f64::INFINITY.into()])
+}
+
+fn dot(a: &[DMatrix<f64>], b: &[DMatrix<f64>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}
+
+/// Mean of `z`, `dz`, `u_lat` over the samples of a phase, 0 if there are none.
+fn mean_of(phase: usize, dataset: &Dataset, latent: &[Latent]) -> Vec<f64> {
+    let d = latent.first().map_or(0, |first| first.z.nrows());
+    let (mut mean, mut samples) = (vec![0.0; 3 * d], 0usize);
+    for (jump, latent) in dataset.jumps.iter().zip(latent) {
+        for sample in (0..jump.len()).filter(|&sample| jump.phase[sample] == phase) {
+            for (i, total) in mean.iter_mut().enumerate() {
+                *total += [&latent.z, &latent.dz, &latent.u_lat][i / d][(i % d, sample)];
+            }
+            samples += 1;
+        }
+    }
+    mean.iter_mut()
+        .for_each(|total| *total /= samples.max(1) as f64);
+    mean
+}
+
+/// `d theta / d (z, dz)` (`library_dim x 2 latent_dim`) at a state and input, by central differences; 0 where a term has
+/// no finite one.
+fn slopes_at(mean: &[f64], features: &Features) -> DMatrix<f64> {
+    let d = features.latent_dim();
+    let step = DIFFERENCE
+        * mean
+            .iter()
+            .fold(1.0, |most: f64, value| most.max(value.abs()));
+    let variables = DMatrix::from_fn(4 * d, 3 * d, |row, i| match (row / 2 == i, row % 2) {
+        (true, 0) => mean[i] + step,
+        (true, _) => mean[i] - step,
+        (false, _) => mean[i],
+    });
+    let theta = features.evaluate(&variables, &mut FeatureValues::default());
+    DMatrix::from_fn(theta.ncols(), 2 * d, |term, i| {
+        let slope = (theta[(2 * i, term)] - theta[(2 * i + 1, term)]) / (2.0 * step);
+        if slope.is_finite() { slope } else { 0.0 }
+    })
+}
+
+/// The order of phases that most jumps have, with their mean durations.
+fn usual_sequence(dataset: &Dataset) -> Vec<(usize, f64)> {
+    let mut orders: BTreeMap<Vec<usize>, (usize, Vec<f64>)> = BTreeMap::new();
+    for jump in &dataset.jumps {
+        let order = jump.spans.iter().map(|(phase, _)| *phase).collect();
+        let (jumps, total_s) = (orders.entry(order)).or_insert((0, vec![0.0; jump.spans.len()]));
+        *jumps += 1;
+        for (total_s, (_, span)) in total_s.iter_mut().zip(&jump.spans) {
+            *total_s += jump.time_s[span.end - 1] - jump.time_s[span.start];
+        }
+    }
+    let usual = orders
+        .into_iter()
+        .rev()
+        .max_by_key(|(_, (jumps, _))| *jumps);
+    let (order, (jumps, total_s)) = usual.unwrap_or_default();
+    let mean_s = total_s.iter().map(|total_s| total_s / jumps as f64);
+    order.into_iter().zip(mean_s).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::oscillator;
+
+    /// The known system's phases under a bound of 1/s.
+    fn growth() -> (Growth, Vec<DMatrix<f64>>) {
+        let (dataset, latent) = oscillator::jumps(3);
+        let (features, truth) = oscillator::known();
+        (
+            Growth::of_jumps(Some(1.0), &dataset, &latent, &features),
+            truth,
+        )
+    }
+
+    /// Changes weigh the same in all coefficients.
+    fn alike(gradient: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
+        gradient.to_vec()
+    }
+
+    #[test]
+    fn rates_are_those_of_the_eigenvalues_and_of_their_sequence() {
+        let (growth, truth) = growth();
+        assert!(growth.admits(&truth));
+        let mut driven = truth.clone();
+        (driven[0][(1, 0)], driven[0][(3, 0)]) = (0.0, 2.0); // ddz1 = 2 dz1
+        assert!((growth.excess(&growth.lower_halves(&driven))[0] - 1.0).abs() < 1e-9);
+        // Contact for 0.238 s, flight for 0.158 s with ddz1 = -0.5 dz1: the same eigenvector.
+        let values = of_sequence(&growth.transitions(&growth.lower_halves(&driven)));
+        let fastest = values.iter().map(|value| growth.rate(*value, true));
+        let expected = (2.0 * 0.238 - 0.5 * 0.158) / (0.238 + 0.158);
+        let found = fastest.fold(f64::NEG_INFINITY, f64::max);
+        assert!((found - expected).abs() < 1e-9, "{found} for {expected}");
+        // Two oscillators, each stable, whose sequence is not.
+        let mut switched = truth;
+        let turn = std::f64::consts::FRAC_PI_2;
+        (switched[0][(1, 0)], switched[0][(3, 0)]) = (-(turn / 0.238).powi(2), 0.0);
+        (switched[1][(1, 0)], switched[1][(3, 0)]) = (-(turn / 0.158).powi(2), 0.0);
+        assert!(!growth.admits(&switched));
+    }
+
+    #[test]
+    fn held_coefficients_keep_the_bound_and_change_little() {
+        let (growth, truth) = growth();
+        let mut kept = truth.clone();
+        growth.hold(&mut kept, alike);
+        assert_eq!(kept, truth);
+        let mut driven = truth.clone();
+        (driven[0][(1, 0)], driven[0][(3, 0)]) = (-1.0, 4.0);
+        (driven[1][(2, 0)], driven[1][(3, 1)]) = (20.0, 20.0);
+        let mut held = driven.clone();
+        growth.hold(&mut held, alike);
+        assert!(growth.admits(&held));
+        let change: f64 = held.iter().zip(&driven).map(|(a, b)| (a - b).norm()).sum();
+        assert!(change > 1.0 && change < 60.0, "{change}");
+        for (held, driven) in held.iter().zip(&driven) {
+            assert_eq!(held.rows(5, 2), driven.rows(5, 2)); // inputs
+            assert_eq!(held.row(0), driven.row(0)); // constants
+        }
+    }
+
+    #[test]
+    fn coefficients_that_must_stay_stay_and_the_others_make_up_for_them() {
+        let (growth, mut xi) = growth();
+        (xi[0][(1, 0)], xi[0][(3, 0)]) = (-1.0, 4.0);
+        let before = xi.clone();
+        growth.hold(&mut xi, |gradient| {
+            let mut change = gradient.to_vec();
+            change[0][(1, 0)] = 0.0;
+            change
+        });
+        assert!(growth.admits(&xi) && xi[0][(1, 0)] == before[0][(1, 0)]);
+        assert!(xi[0][(3, 0)] < before[0][(3, 0)]);
+    }
+
+    #[test]
+    fn where_nothing_may_change_what_depends_on_the_state_is_scaled_down() {
+        let (growth, mut xi) = growth();
+        xi[0][(3, 0)] = 50.0;
+        let inputs = xi[0].rows(5, 2).into_owned();
+        growth.hold(&mut xi, |gradient| {
+            gradient.iter().map(|g| g * 0.0).collect()
+        });
+        assert!(growth.admits(&xi) && xi[0].rows(5, 2) == inputs);
+        let unbounded = Growth {
+            bound_per_s: None,
+            ..growth
+        };
+        xi[0][(3, 0)] = 50.0;
+        let before = xi.clone();
+        unbounded.hold(&mut xi, alike);
+        assert!(unbounded.admits(&xi) && xi == before);
+    }
+}
