@@ -206,7 +206,9 @@ impl Growth {
         }
         let step = DIFFERENCE * lower[phase].amax().max(1.0);
         let mut changed = lower.to_vec();
-        for place in 0..lower[phase].len() {
+        // Where no term is active there is none to change.
+        let active = (0..lower[phase].len()).filter(|&place| lower[phase][place] != 0.0);
+        for place in active {
             changed[phase][place] += step;
             let values = values(&changed);
             changed[phase][place] = lower[phase][place];
