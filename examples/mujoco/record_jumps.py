@@ -1,6 +1,7 @@
 """Records simulated quadruped jumps as CSV, for training and testing reduced-order models."""
 
 import argparse
+import dataclasses
 import pathlib
 import sys
 
@@ -39,6 +40,10 @@ def main():
     arguments = parse_arguments()
     jump_set = SETS[arguments.set]
     folder = arguments.out_dir or RECORDINGS / arguments.set
+    if arguments.seed is not None:
+        if arguments.out_dir is None:
+            raise SystemExit("--seed draws other jumps than those of the repository: give an --out-dir, too")
+        jump_set = dataclasses.replace(jump_set, seed=arguments.seed)
     ours = {f"{jump.stem}.csv.gz" for jump in jumps_of(jump_set)}
     refuse_foreign_files(folder, ours, arguments.force)
     folder.mkdir(parents=True, exist_ok=True)
@@ -79,6 +84,7 @@ def parse_arguments():
     parser.add_argument(
         "--out-dir", type=pathlib.Path, help="folder to write (default: ../recordings/SET)"
     )
+    parser.add_argument("--seed", type=int, help="draw other jumps of the set (needs --out-dir)")
     parser.add_argument(
         "--force", action="store_true", help="write even into a folder that holds other files"
     )
