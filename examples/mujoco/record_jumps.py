@@ -42,7 +42,7 @@ def main():
     folder = arguments.out_dir or RECORDINGS / arguments.set
     if arguments.seed is not None:
         if arguments.out_dir is None:
-            raise SystemExit("--seed draws other jumps than those of the repository: give an --out-dir, too")
+            raise SystemExit("--seed draws other jumps than the repository has: give an --out-dir")
         jump_set = dataclasses.replace(jump_set, seed=arguments.seed)
     ours = {f"{jump.stem}.csv.gz" for jump in jumps_of(jump_set)}
     refuse_foreign_files(folder, ours, arguments.force)
