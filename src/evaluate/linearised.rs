@@ -219,7 +219,9 @@ mod tests {
                     let any = DVector::from_fn(2 * d, |i, _| Complex::from(1.0 + (i as f64).sin()));
                     let solved = shifted.lu().solve(&any);
                     let grown = solved.map_or(f64::MAX, |solved| solved.norm() / any.norm());
-                    assert!(grown >= 1e6 / size, "{value} of {matrix}");
+                    // A pivot near 0 overflows to a number that is none.
+                    let singular = grown.is_nan() || grown >= 1e6 / size;
+                    assert!(singular, "{value} of {matrix}");
                 }
             }
         }
