@@ -44,33 +44,21 @@
 //! `examples/train_model.rs` trains one, `examples/latent_mpc.rs` runs the controller. `ARCHITECTURE.md`
 //! has the rooms and who may import whom, `docs/mathematics.md` the equations.
 
-pub mod artifact;
 pub mod check;
 pub mod cli;
-pub mod codegen;
 pub mod deploy;
-pub mod equations;
 mod error;
-pub mod evaluate;
-pub mod files;
-pub mod identify;
 pub mod import;
-pub mod ir;
-pub mod limits;
-pub mod lower;
-pub mod model;
-pub mod mpc;
-pub mod plan;
-pub mod recording;
 pub mod report;
-pub mod robot;
-pub mod robot_file;
-pub mod sim;
 pub mod simplify;
-pub mod solver;
 pub mod study;
-pub mod symbolic;
-pub mod train;
-pub mod typeset;
+
+#[doc(inline)]
+pub use romc_algebra::{
+    artifact, codegen, equations, files, ir, limits, lower, model, robot, robot_file, symbolic,
+    typeset,
+};
+#[doc(inline)]
+pub use romc_motion::{evaluate, identify, mpc, plan, recording, sim, solver, train};
 
 pub use error::Error;

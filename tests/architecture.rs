@@ -1,9 +1,12 @@
-//! The rooms of `src` import only what the table of ARCHITECTURE.md allows, and only from rows above
+//! The rooms of `src` and of the crates in it import only what the table of ARCHITECTURE.md allows, and only from rows above
 //! their own.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+
+/// The sources of romc's crates, in each of which a room is a folder.
+const CRATES: [&str; 3] = ["src/algebra", "src/motion", "src"];
 
 /// A row of the table: which rooms a room may import.
 struct Row {
@@ -178,16 +181,16 @@ fn rooms_import_only_what_the_table_of_architecture_allows() {
     let mut faults = Vec::new();
     let mut imports: BTreeMap<&str, BTreeSet<String>> = BTreeMap::new();
     for row in &rows {
-        let folder = root.join("src").join(&row.room);
-        if !folder.is_dir() {
+        let places = CRATES.map(|place| root.join(place).join(&row.room));
+        let Some(folder) = places.iter().find(|folder| folder.is_dir()) else {
             faults.push(format!(
                 "the table has `{}`, src has no such folder",
                 row.room
             ));
             continue;
-        }
+        };
         let used = imports.entry(&row.room).or_default();
-        visit(&folder, 1, &mut |path, code, depth| {
+        visit(folder, 1, &mut |path, code, depth| {
             let path = path.strip_prefix(root).expect("below the root").display();
             for room in imported_rooms(code) {
                 if room != row.room && !row.may_import.contains(&room) {
@@ -198,18 +201,23 @@ fn rooms_import_only_what_the_table_of_architecture_allows() {
                 }
                 used.insert(room);
             }
+            if code.contains("romc_algebra::") || code.contains("romc_motion::") {
+                faults.push(format!("{path} names a crate, expected `crate::`"));
+            }
             if supers(code) >= depth {
                 faults.push(format!("{path} leaves its room by `super::`"));
             }
         });
     }
-    for entry in fs::read_dir(root.join("src")).expect("src") {
+    let entries = CRATES.map(|place| fs::read_dir(root.join(place)).expect("a folder"));
+    for entry in entries.into_iter().flatten() {
         let path = entry.expect("an entry").path();
         let name = path
             .file_name()
             .and_then(|name| name.to_str())
             .expect("a name");
-        if path.is_dir() && rows.iter().all(|row| row.room != name) {
+        let is_crate = path.join("Cargo.toml").is_file();
+        if path.is_dir() && !is_crate && rows.iter().all(|row| row.room != name) {
             faults.push(format!("src has `{name}`, the table has no such room"));
         }
     }

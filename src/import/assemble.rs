@@ -6,7 +6,7 @@ mod units;
 use nalgebra::{DMatrix, DVector};
 
 use super::assign::{Assigned, Assignment, assign};
-use super::error::{ImportError, shape_text};
+use super::error::{ImportError, ImportFault, shape_text};
 use super::library;
 use super::options::{ImportOptions, LibraryChoice, XiLayout};
 use super::report::{Layout, Note, ReadEquation, UnusedTensor, UsedTensor};
@@ -104,7 +104,7 @@ impl<'a> Assembly<'a, '_> {
         found: impl Into<Box<str>>,
         expected: impl Into<Box<str>>,
     ) -> ImportError {
-        ImportError::at(self.tensors.file(), assigned.place(&[]), found, expected)
+        ImportFault::at(self.tensors.file(), assigned.place(&[]), found, expected)
     }
 
     fn wrong_shape(&self, assigned: &Assigned<'_>, expected: String) -> ImportError {
@@ -189,7 +189,7 @@ impl<'a> Assembly<'a, '_> {
         }
         let latent_dim = phases[0].xi.ncols();
         let library = library::build(choice, latent_dim)
-            .map_err(|source| ImportError::model(self.tensors.file(), source))?;
+            .map_err(|source| ImportFault::model(self.tensors.file(), source))?;
         Ok((library, phases))
     }
 
@@ -211,7 +211,7 @@ impl<'a> Assembly<'a, '_> {
                 _ => assigned.place(&[row, column]),
             };
             let found = mask[position].to_string();
-            return Err(ImportError::at(self.tensors.file(), place, found, "0 or 1"));
+            return Err(ImportFault::at(self.tensors.file(), place, found, "0 or 1"));
         }
         self.note_used(assigned, layout);
         let off = |(value, flag): &(&f64, &f64)| **flag == 0.0 && **value != 0.0;
@@ -291,7 +291,7 @@ impl<'a> Assembly<'a, '_> {
             expected += &suggestions.join(" or ");
         }
         let found = format!("no candidate terms for {}", first.info.describe());
-        ImportError::at(self.tensors.file(), Place::Whole, found, expected)
+        ImportFault::at(self.tensors.file(), Place::Whole, found, expected)
     }
 
     /// Both tensors of a pair, or none.

@@ -1,6 +1,6 @@
 //! The use of each tensor: as mapped, else by its name.
 
-use super::error::ImportError;
+use super::error::{ImportError, ImportFault};
 use super::options::{ImportOptions, PhaseRule, no_feet};
 use super::report::Chosen;
 use super::role::{ONLY_PHASE, Role};
@@ -83,7 +83,7 @@ fn named<'f>(
             let (a, b) = (earlier.info.describe(), info.describe());
             let found = format!("{a}, {b} for {role}");
             let expected = format!("one: name it with --map {role}=TENSOR");
-            return Err(ImportError::at(
+            return Err(ImportFault::at(
                 tensors.file(),
                 Place::Whole,
                 found,
@@ -114,12 +114,12 @@ fn mapped<'f>(
         let (role, tensor) = (&mapping.role, &mapping.tensor);
         if let Some(earlier) = used.iter().find(|assigned| assigned.role == *role) {
             let found = format!("both `{}` and `{tensor}` for {role}", earlier.info.name);
-            return Err(ImportError::option("--map", found, "one tensor"));
+            return Err(ImportFault::option("--map", found, "one tensor"));
         }
         let Some(info) = tensors.infos().iter().find(|info| info.name == *tensor) else {
             let found = format!("no tensor `{tensor}` for {role}");
             let expected = format!("one of {}", tensors.listing());
-            return Err(ImportError::at(
+            return Err(ImportFault::at(
                 tensors.file(),
                 Place::Whole,
                 found,
@@ -174,7 +174,7 @@ fn check_mapped_phases(options: &ImportOptions, phases: &[PhaseRule]) -> Result<
             let names: Vec<&str> = phases.iter().map(|rule| rule.name.as_str()).collect();
             let found = format!("{role} for a phase that no --phase names");
             let expected = format!("one of the phases {}", names.join(", "));
-            Err(ImportError::option("--map", found, expected))
+            Err(ImportFault::option("--map", found, expected))
         }
     }
 }

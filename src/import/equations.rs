@@ -82,7 +82,7 @@ pub(super) fn refused(
     found: impl Into<Box<str>>,
     expected: impl Into<Box<str>>,
 ) -> ImportError {
-    ImportError::at(file, Place::Character(line, column), found, expected)
+    ImportFault::at(file, Place::Character(line, column), found, expected)
 }
 
 /// The start of a text in quotes, for messages.
@@ -135,7 +135,7 @@ impl Reader<'_> {
             if section.phase.is_none() {
                 let expected = "the name of its phase in brackets before the first equation";
                 let place = Place::Character(section.line, 1);
-                return Err(ImportError::at(self.file, place, "an equation", expected));
+                return Err(ImportFault::at(self.file, place, "an equation", expected));
             }
             if section.phase.as_deref() == Some(name) {
                 let found = format!("`[{name}]` again, as in line {}", section.line);

@@ -49,16 +49,16 @@ pub enum ImportFault {
     Model(#[source] Box<ModelError>),
 }
 
-impl ImportError {
+impl ImportFault {
     /// `found` at a place, where `expected` should be.
     pub(super) fn at(
         file: &str,
         place: Place,
         found: impl Into<Box<str>>,
         expected: impl Into<Box<str>>,
-    ) -> Self {
+    ) -> ImportError {
         let (found, expected) = (found.into(), expected.into());
-        Located::new(file, place, ImportFault::Unexpected { found, expected })
+        Located::new(file, place, Self::Unexpected { found, expected })
     }
 
     /// An option that cannot be followed.
@@ -66,18 +66,18 @@ impl ImportError {
         option: &'static str,
         found: impl Into<Box<str>>,
         expected: impl Into<Box<str>>,
-    ) -> Self {
-        ImportError::at("", Place::Option(option), found, expected)
+    ) -> ImportError {
+        Self::at("", Place::Option(option), found, expected)
     }
 
     /// Parts that do not make a model.
-    pub(super) fn model(file: &str, source: impl Into<ModelError>) -> Self {
+    pub(super) fn model(file: &str, source: impl Into<ModelError>) -> ImportError {
         let fault = ImportFault::Model(Box::new(source.into()));
         Located::new(file, Place::Whole, fault)
     }
 
     /// A file with more than `max` of `unit`.
-    pub(super) fn too_large(file: &str, max: u64, unit: &'static str) -> Self {
+    pub(super) fn too_large(file: &str, max: u64, unit: &'static str) -> ImportError {
         Located::new(file, Place::Whole, ImportFault::TooLarge { max, unit })
     }
 }

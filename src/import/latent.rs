@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use nalgebra::DMatrix;
 
 use super::equations::{Equation, Section, Sections, refused};
-use super::error::ImportError;
+use super::error::{ImportError, ImportFault};
 use super::library;
 use super::options::{ImportOptions, PhaseRule, no_feet};
 use super::report::{Note, ReadEquation};
@@ -36,7 +36,7 @@ pub(super) fn latent(
     let given = (options.library.as_ref())
         .map(|choice| library::build(choice, latent_dim))
         .transpose()
-        .map_err(|source| ImportError::model(file, source))?;
+        .map_err(|source| ImportFault::model(file, source))?;
     let mut separation = Separation {
         file,
         latent_dim,
@@ -111,7 +111,7 @@ fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), Impor
     match options.latent_dim {
         Some(expected) if expected != latent_dim => {
             let found = format!("{latent_dim}, as the equations have");
-            return Err(ImportError::option(
+            return Err(ImportFault::option(
                 "--latent-dim",
                 expected.to_string(),
                 found,
@@ -126,7 +126,7 @@ fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), Impor
     ];
     match given.iter().find(|(_, is_given)| *is_given) {
         None => Ok(()),
-        Some((option, _)) => Err(ImportError::option(
+        Some((option, _)) => Err(ImportFault::option(
             option,
             "a file of equations",
             "a file of tensors",
@@ -162,7 +162,7 @@ fn phases_in_order<'s>(
         if ordered.iter().all(|(rule, _)| rule.name != *name) {
             let found = format!("{name}, which {file} has no equations for");
             let expected = format!("`[{name}]` in the file");
-            return Err(ImportError::option("--phase", found, expected));
+            return Err(ImportFault::option("--phase", found, expected));
         }
     }
     // Those that `--phase` does not name come last, in the order of the file.
@@ -240,7 +240,7 @@ fn union(
         texts.push("1".to_owned());
     }
     let library = Library::from_terms(latent_dim, &texts)
-        .map_err(|source| ImportError::model(file, source))?;
+        .map_err(|source| ImportFault::model(file, source))?;
     let row = |(index, &term): (usize, &ExprId)| (term, Row { index, factor: 1.0 });
     Ok((library, found.iter().enumerate().map(row).collect()))
 }

@@ -5,7 +5,7 @@ use std::{fs, io};
 
 use serde_json::Value;
 
-use super::error::ImportError;
+use super::error::{ImportError, ImportFault};
 use super::options::{LibraryChoice, standard_text};
 use super::pysindy;
 use crate::files::{Located, Place};
@@ -68,7 +68,7 @@ pub fn read_terms(path: &Path) -> Result<Vec<String>, ImportError> {
     let file = path.display().to_string();
     let io = |source: io::Error| Located::new(&file, Place::Whole, source);
     if fs::metadata(path).map_err(io)?.len() > MAX_TERMS_BYTES {
-        return Err(ImportError::too_large(&file, MAX_TERMS_BYTES, "bytes"));
+        return Err(ImportFault::too_large(&file, MAX_TERMS_BYTES, "bytes"));
     }
     let bytes = fs::read(path).map_err(io)?;
     parse_terms(&file, &String::from_utf8_lossy(&bytes))
@@ -77,7 +77,7 @@ pub fn read_terms(path: &Path) -> Result<Vec<String>, ImportError> {
 fn parse_terms(file: &str, text: &str) -> Result<Vec<String>, ImportError> {
     let text = text.trim_start_matches('\u{feff}');
     let refused = |line, column, found: &str, expected: &str| {
-        ImportError::at(file, Place::Character(line, column), found, expected)
+        ImportFault::at(file, Place::Character(line, column), found, expected)
     };
     if !text.trim_start().starts_with(['[', '{']) {
         let lines = (text.lines()).map(|line| line.split('#').next().unwrap_or("").trim());

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use sha2::digest::Output;
 use sha2::{Digest as _, Sha256};
 
-use super::error::{ImportError, shape_text};
+use super::error::{ImportError, ImportFault, shape_text};
 use super::tensors::{Element, TensorFile, TensorInfo};
 use crate::files::Place;
 
@@ -34,7 +34,7 @@ pub(super) fn open<'t>(
             let place = Place::Entry(format!("`{}`", tensor.name).into());
             let found = format!("{} numbers", tensor.values.len());
             let expected = format!("{expected} ({})", shape_text(&tensor.shape));
-            return Err(ImportError::at(source, place, found, expected));
+            return Err(ImportFault::at(source, place, found, expected));
         }
         infos.push(TensorInfo {
             name: tensor.name.clone(),

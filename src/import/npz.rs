@@ -27,7 +27,7 @@ type Archive<'b> = ZipArchive<Cursor<&'b [u8]>>;
 pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, ImportError> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, e))?;
     if archive.len() > MAX_MEMBERS {
-        return Err(ImportError::too_large(file, MAX_MEMBERS as u64, "arrays"));
+        return Err(ImportFault::too_large(file, MAX_MEMBERS as u64, "arrays"));
     }
     let mut infos = Vec::new();
     for member in 0..archive.len() {
@@ -62,7 +62,7 @@ fn describe(
         })),
         Err((found, expected)) => {
             let place = Place::Entry(format!("`{name}`").into());
-            Err(ImportError::at(file, place, found, expected))
+            Err(ImportFault::at(file, place, found, expected))
         }
     }
 }
@@ -77,7 +77,7 @@ fn numbers(
     let refused = |found: String| {
         let place = Place::Entry(format!("`{}`", info.name).into());
         let expected = "as many bytes as its shape and type need";
-        ImportError::at(file, place, found, expected)
+        ImportFault::at(file, place, found, expected)
     };
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, e))?;
     let member = (archive.by_index(info.member)).map_err(|error| refused(error.to_string()))?;

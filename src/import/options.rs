@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use nalgebra::DVector;
 use serde::Serialize;
 
-use super::error::ImportError;
+use super::error::{ImportError, ImportFault};
 use super::latex::SymbolNames;
 use super::report::Note;
 use super::role::{Mapping, ONLY_PHASE};
@@ -66,7 +66,7 @@ impl Format {
             None => "no ending".to_owned(),
         };
         let file = path.display().to_string();
-        Err(ImportError::at(&file, Place::Whole, found, expected))
+        Err(ImportFault::at(&file, Place::Whole, found, expected))
     }
 
     /// Name for messages.
@@ -115,7 +115,7 @@ pub fn parse_standard(text: &str) -> Result<StandardLibrary, ImportError> {
     let refused = |part: &str| {
         let expected = "degree=N, then trigonometric and inputs if the library has them, separated \
                         by commas; or a file with the list of terms";
-        ImportError::option("--library", format!("{part:?}"), expected)
+        ImportFault::option("--library", format!("{part:?}"), expected)
     };
     let mut degree = None;
     let (mut trigonometric, mut inputs) = (false, false);
@@ -164,7 +164,7 @@ impl FromStr for PhaseRule {
         let refused = || {
             let expected = "NAME=any, NAME=none, NAME=always, or NAME= and foot patterns in the order fr fl rr \
                             rl, such as rear=0011,0001";
-            ImportError::option("--phase", format!("{text:?}"), expected)
+            ImportFault::option("--phase", format!("{text:?}"), expected)
         };
         let (name, feet) = text.split_once('=').ok_or_else(refused)?;
         let feet = match feet.trim() {
@@ -292,7 +292,7 @@ pub(super) fn no_feet(file: &str, phase: &str, found: &str) -> ImportError {
     let expected = format!(
         "--phase {phase}=any (or none, always, or patterns such as 0011 in the order fr fl rr rl)"
     );
-    ImportError::at(
+    ImportFault::at(
         file,
         Place::Whole,
         format!("{found} of phase `{phase}`"),

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::error::ImportError;
+use super::error::{ImportError, ImportFault};
 
 /// One of the two maps between robot and latent coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -85,7 +85,7 @@ impl FromStr for Role {
     /// Reads the name of a part; underscores may stand for its dots.
     fn from_str(text: &str) -> Result<Self, ImportError> {
         read_role(text)
-            .ok_or_else(|| ImportError::option("--map", format!("the part {text:?}"), EXPECTED))
+            .ok_or_else(|| ImportFault::option("--map", format!("the part {text:?}"), EXPECTED))
     }
 }
 
@@ -180,7 +180,7 @@ impl FromStr for Mapping {
                 role: role.trim().parse()?,
                 tensor: tensor.to_owned(),
             }),
-            _ => Err(ImportError::option(
+            _ => Err(ImportFault::option(
                 "--map",
                 format!("{text:?}"),
                 "PART=TENSOR, such as encoder.weight=net.enc.0.weight",

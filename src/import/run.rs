@@ -9,7 +9,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::assemble::{self, ImportNotes, Parts};
 use super::equations::{self, Sections};
-use super::error::ImportError;
+use super::error::{ImportError, ImportFault};
 use super::latent;
 use super::latex;
 use super::memory::{self, Tensor};
@@ -66,7 +66,7 @@ pub fn import_from_bytes(
         Format::Safetensors | Format::Npz => MAX_FILE_BYTES,
     };
     if bytes.len() as u64 > max {
-        return Err(ImportError::too_large(file, max, "bytes"));
+        return Err(ImportFault::too_large(file, max, "bytes"));
     }
     let (parts, notes) = match format {
         Format::Safetensors => assemble::parts(&safetensors::open(file, bytes)?, options)?,
@@ -206,12 +206,12 @@ fn build(
         let expected = "--scaling FACTOR (scaled value = factor times SI value: 0.1 for the \
                         published models, 1 for SI units)";
         let found = format!("{map} without scale factors");
-        return Err(ImportError::at(file, Place::Whole, found, expected));
+        return Err(ImportFault::at(file, Place::Whole, found, expected));
     }
     if options.robot.is_none() && options.actuators.is_some() {
         let found = "losses of joints without a robot";
         let expected = "--robot as well: go1, go2, a1, or a .toml or .urdf file";
-        return Err(ImportError::option("--actuators", found, expected));
+        return Err(ImportFault::option("--actuators", found, expected));
     }
     let mut builder = ReducedModel::builder(options.name.clone(), parts.library)
         .description(options.description.clone())
@@ -249,5 +249,5 @@ fn build(
     if let Some(sample_time_s) = options.sample_time_s {
         builder = builder.sample_time_s(sample_time_s);
     }
-    (builder.build()).map_err(|source| ImportError::model(file, source))
+    (builder.build()).map_err(|source| ImportFault::model(file, source))
 }

@@ -1,7 +1,7 @@
 //! Equations of a file as text, for those who compare them.
 
 use super::equations::{self, MAX_TEXT_BYTES};
-use super::error::ImportError;
+use super::error::{ImportError, ImportFault};
 use super::latex::{self, SymbolNames};
 use super::options::Format;
 use crate::symbolic::ExprPool;
@@ -38,7 +38,7 @@ pub fn read_equations(
     known: &[String],
 ) -> Result<ReadEquations, ImportError> {
     if bytes.len() as u64 > MAX_TEXT_BYTES {
-        return Err(ImportError::too_large(file, MAX_TEXT_BYTES, "bytes"));
+        return Err(ImportFault::too_large(file, MAX_TEXT_BYTES, "bytes"));
     }
     let read = match format {
         Format::Latex => latex::read(file, bytes, symbols, known)?,

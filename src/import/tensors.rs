@@ -118,7 +118,7 @@ impl<'b> TensorFile<'b> {
         if let Some(pair) = infos.windows(2).find(|pair| pair[0].name == pair[1].name) {
             let place = Place::Entry(format!("`{}`", pair[0].name).into());
             let found = "two tensors of this name";
-            return Err(ImportError::at(file, place, found, "different names"));
+            return Err(ImportFault::at(file, place, found, "different names"));
         }
         let file = file.to_owned();
         Ok(TensorFile { file, infos, bytes })
@@ -150,7 +150,7 @@ impl<'b> TensorFile<'b> {
     pub(super) fn missing(&self, role: &dyn std::fmt::Display) -> ImportError {
         let found = format!("no tensor for {role} among {}", self.listing());
         let expected = format!("a tensor of that name, or --map {role}=TENSOR");
-        ImportError::at(&self.file, Place::Whole, found, expected)
+        ImportFault::at(&self.file, Place::Whole, found, expected)
     }
 
     /// The numbers of a tensor for one use, which `place` names in errors; all are finite.
@@ -161,7 +161,7 @@ impl<'b> TensorFile<'b> {
     ) -> Result<Array, ImportError> {
         let Some(size) = info.element.size() else {
             let found = format!("numbers of type {}", info.element.name());
-            return Err(ImportError::at(&self.file, place(&[]), found, "f32 or f64"));
+            return Err(ImportFault::at(&self.file, place(&[]), found, "f32 or f64"));
         };
         let count = (info.shape.iter()).try_fold(1usize, |count, &dim| count.checked_mul(dim));
         let Some(count) = count.filter(|&count| count <= MAX_ELEMENTS) else {
@@ -178,7 +178,7 @@ impl<'b> TensorFile<'b> {
         };
         match array.values.iter().position(|value| !value.is_finite()) {
             None => Ok(array),
-            Some(position) => Err(ImportError::at(
+            Some(position) => Err(ImportFault::at(
                 &self.file,
                 place(&array.index_of(position)),
                 array.values[position].to_string(),

@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::builder::PossibleValue;
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::number::{count, real};
 use super::reading::ReadingArguments;
@@ -73,37 +72,6 @@ pub struct SimulateArguments {
     pub force: bool,
     #[command(flatten)]
     pub reading: ReadingArguments,
-}
-
-impl ValueEnum for Lift {
-    fn value_variants<'a>() -> &'a [Self] {
-        &[Self::Transpose, Self::Consistent]
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(match self {
-            Self::Transpose => {
-                PossibleValue::new("transpose").help("`u = W_e^T u_lat`, the paper's")
-            }
-            Self::Consistent => PossibleValue::new("consistent")
-                .help("Torques whose own ground reaction forces reproduce the latent input"),
-        })
-    }
-}
-
-impl ValueEnum for Solver {
-    fn value_variants<'a>() -> &'a [Self] {
-        &[Self::Clarabel, Self::Riccati]
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(match self {
-            Self::Clarabel => PossibleValue::new("clarabel").help("General interior point"),
-            Self::Riccati => PossibleValue::new("riccati").help(
-                "Gains prepared ahead where no limit is active, else an interior point stage by stage",
-            ),
-        })
-    }
 }
 
 /// `romc mpc`

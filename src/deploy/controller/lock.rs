@@ -98,14 +98,14 @@ impl<'a> Lock<'a> {
         format!("{banner}\nversion = 4\n{packages}")
     }
 
-    /// A direct dependency of romc as its own entry spells it, with a version if it needs one.
+    /// A direct dependency of the crate with the controller, as its own entry spells it, with a version if it needs one.
     fn direct(&self, name: &str) -> String {
-        let own = self.find(env!("CARGO_PKG_NAME"));
+        let own = self.find("romc-motion");
         own.dependencies
             .iter()
             .find(|dependency| dependency.split(' ').next() == Some(name))
             .map(|dependency| (*dependency).to_owned())
-            .expect("romc depends on it")
+            .expect("the controller depends on it")
     }
 
     fn position(&self, spelled: &str) -> usize {

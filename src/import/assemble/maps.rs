@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::super::assign::Assigned;
-use super::super::error::ImportError;
+use super::super::error::{ImportError, ImportFault};
 use super::super::options::WeightVectors;
 use super::super::report::{Layout, Note};
 use super::super::role::{Part, Role};
@@ -23,7 +23,7 @@ impl<'a> Assembly<'a, '_> {
             Some(activation) if !maps.0.iter().chain(&maps.1).any(is_deep) => {
                 let found = format!("{activation}, but no map with several layers");
                 let expected = "tensors of layers, such as encoder.0.weight and encoder.2.weight";
-                return Err(ImportError::option("--activation", found, expected));
+                return Err(ImportFault::option("--activation", found, expected));
             }
             _ => {}
         }
@@ -64,7 +64,7 @@ impl<'a> Assembly<'a, '_> {
                           sigmoid) to say what is between them"
                     .to_owned(),
             };
-            return Err(ImportError::at(
+            return Err(ImportFault::at(
                 self.tensors.file(),
                 Place::Whole,
                 found,
@@ -105,7 +105,7 @@ impl<'a> Assembly<'a, '_> {
                 false => part_name.to_owned(),
             };
             let map = AffineMap::new(&name, matrix, bias);
-            let map = map.map_err(|source| ImportError::model(self.tensors.file(), source))?;
+            let map = map.map_err(|source| ImportFault::model(self.tensors.file(), source))?;
             let activation = match self.options.activation {
                 Some(activation) if place < last => activation,
                 _ => Activation::Linear,
@@ -113,7 +113,7 @@ impl<'a> Assembly<'a, '_> {
             layers.push(Layer { map, activation });
         }
         let map = StateMap::new(part_name, layers)
-            .map_err(|source| ImportError::model(self.tensors.file(), source))?;
+            .map_err(|source| ImportFault::model(self.tensors.file(), source))?;
         if is_deep {
             let (part, layers) = (part_name, map.summary());
             self.notes.notes.push(Note::Layers { part, layers });

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::super::assign::Assigned;
-use super::super::error::ImportError;
+use super::super::error::{ImportError, ImportFault};
 use super::super::report::Note;
 use super::super::role::Role;
 use super::{Assembly, Parts};
@@ -24,13 +24,13 @@ impl<'a> Assembly<'a, '_> {
                 if given.is_some() {
                     let found = "factors of the inputs alone";
                     let expected = "--scaling, or a tensor scaling.state or std.state";
-                    return Err(ImportError::option("--input-scaling", found, expected));
+                    return Err(ImportFault::option("--input-scaling", found, expected));
                 }
                 return Ok(scaling.clone());
             }
             (_, _, Some(_)) => {
                 let found = "factors here and in tensors";
-                return Err(ImportError::option("--scaling", found, "one of the two"));
+                return Err(ImportFault::option("--scaling", found, "one of the two"));
             }
             (None, Some(_), None) => return Err(self.tensors.missing(&Role::StateScaling)),
             (Some(state), input, None) => (state, input),
@@ -39,7 +39,7 @@ impl<'a> Assembly<'a, '_> {
             (Some(_), Some(_)) => {
                 let found = "factors here and in a tensor";
                 let expected = "one of the two";
-                return Err(ImportError::option("--input-scaling", found, expected));
+                return Err(ImportFault::option("--input-scaling", found, expected));
             }
             (Some(input), None) => self.factors(input)?,
             (None, Some(given)) => given,
@@ -84,7 +84,7 @@ impl<'a> Assembly<'a, '_> {
                 let expected =
                     "a positive standard deviation (1 for a coordinate that never moved)";
                 let place = assigned.place(&[index]);
-                return Err(ImportError::at(self.tensors.file(), place, found, expected));
+                return Err(ImportFault::at(self.tensors.file(), place, found, expected));
             }
             values.apply(|value| *value = 1.0 / *value);
         }
@@ -122,7 +122,7 @@ impl<'a> Assembly<'a, '_> {
         &self,
         map: Result<StateMap, crate::model::ModelError>,
     ) -> Result<StateMap, ImportError> {
-        map.map_err(|source| ImportError::model(self.tensors.file(), source))
+        map.map_err(|source| ImportFault::model(self.tensors.file(), source))
     }
 
     /// Brings everything that is over the robot's coordinates into the robot's order.
@@ -137,7 +137,7 @@ impl<'a> Assembly<'a, '_> {
                 None => "no encoder or decoder".to_owned(),
                 Some(dim) => format!("an encoder or decoder of {dim} coordinates"),
             };
-            return Err(ImportError::option(
+            return Err(ImportFault::option(
                 "--order",
                 found,
                 "one of 18 coordinates",

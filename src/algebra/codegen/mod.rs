@@ -1,0 +1,38 @@
+//! From programs to source code: C, Rust, Python, CasADi, MATLAB.
+//!
+//! A [`ModelInterface`] enters: every function that is generated for a model, as a program. Text leaves.
+//! `interface` lists the functions, `translate` turns programs into the statements of `code`, `printer`
+//! prints them with what a `dialect` spells, templates place them. Nothing mathematical is decided here.
+
+pub mod c;
+mod code;
+mod dialect;
+mod error;
+mod fours;
+mod functions;
+mod ident;
+pub mod interface;
+mod lanes;
+pub mod line_wrapping;
+mod literal;
+mod map_equations;
+mod precision;
+mod printer;
+mod requirements;
+pub mod rust;
+pub mod script;
+mod sin_cos;
+mod sines;
+mod storage;
+mod tables;
+mod test_points;
+mod test_vectors;
+mod translate;
+mod translate_arrays;
+mod units;
+
+pub use error::CodegenError;
+pub use interface::ModelInterface;
+pub use precision::{Precision, worst_errors};
+pub use sines::SineCosine;
+pub use units::Units;

@@ -1,0 +1,141 @@
+//! In which floating-point numbers generated code computes.
+
+use super::error::CodegenError;
+use super::interface::{FunctionSpec, ModelInterface};
+use crate::ir::{Program, Range, Statement, rounding_errors};
+
+/// Floating-point numbers of generated code.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Precision {
+    /// 64 bits: `double` and `f64`.
+    #[default]
+    #[value(name = "f64")]
+    Double,
+    /// 32 bits: `float` and `f32`; each function states the bound of its rounding errors.
+    #[value(name = "f32")]
+    Single,
+}
+
+impl Precision {
+    /// Points of a block of a batch: what the widest common registers hold.
+    pub fn lanes(self) -> usize {
+        match self {
+            Self::Double => 8,
+            Self::Single => 16,
+        }
+    }
+
+    /// A number as a program in this precision holds it.
+    pub fn nearest(self, value: f64) -> f64 {
+        match self {
+            Self::Double => value,
+            Self::Single => f64::from(value as f32),
+        }
+    }
+
+    /// Whether a number is finite, and well within the range of this precision.
+    pub fn holds(self, value: f64) -> bool {
+        let largest = match self {
+            Self::Double => f64::MAX,
+            Self::Single => f64::from(f32::MAX) / 16.0,
+        };
+        value.abs() <= largest
+    }
+
+    /// Whether every constant of the functions is finite in this precision.
+    ///
+    /// # Errors
+    /// [`CodegenError::BeyondSingle`] for the first that is not.
+    pub fn check(self, entries: &ModelInterface) -> Result<(), CodegenError> {
+        if self == Self::Double {
+            return Ok(());
+        }
+        for entry in entries.all() {
+            if let Some(value) = beyond_single(&entry.program) {
+                return Err(CodegenError::BeyondSingle {
+                    function: entry.name.clone(),
+                    value,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn beyond_single(program: &Program) -> Option<f64> {
+    let constants = program.statements().iter().filter_map(|s| match s {
+        Statement::Constant(value) => Some(*value),
+        _ => None,
+    });
+    let entries = program.tables().iter().flat_map(|table| table.entries());
+    let inner = program.callees().iter().find_map(beyond_single);
+    constants
+        .chain(entries.copied())
+        .find(|value| (*value as f32).is_infinite())
+        .or(inner)
+}
+
+/// Longest step for which the bound of a Runge-Kutta step is stated, in seconds.
+const LONGEST_STEP_S: f64 = 0.01;
+
+/// Magnitudes of inputs for which bounds are stated.
+const MAGNITUDES: [f64; 2] = [1.0, 10.0];
+
+/// A sentence that bounds what single precision loses in a function, for its documentation.
+///
+/// The bounds are those of [`rounding_errors`] over all inputs up to a magnitude.
+pub fn stated_bounds(entry: &FunctionSpec) -> String {
+    let has_step = entry.parameters.iter().any(|p| p.name == "h");
+    let of_magnitude = |magnitude: f64| -> String {
+        let outputs = worst_errors(&entry.program, |name| match name {
+            "h" => Range {
+                low: 0.0,
+                high: LONGEST_STEP_S,
+            },
+            _ => Range::within(magnitude),
+        });
+        let bounds = outputs.iter().map(|(name, bound)| match bound {
+            Some(bound) => format!("{name} {}", rounded_up(*bound)),
+            None => format!("{name} without bound"),
+        });
+        bounds.collect::<Vec<_>>().join(", ")
+    };
+    let [small, large] = MAGNITUDES.map(of_magnitude);
+    let step = if has_step {
+        format!(" and h up to {LONGEST_STEP_S}")
+    } else {
+        String::new()
+    };
+    format!(
+        "Largest error of single precision, for inputs up to {} in magnitude{step}: {small}; up to {}: {large}.",
+        MAGNITUDES[0], MAGNITUDES[1]
+    )
+}
+
+/// Largest error of single precision in each output of a program, over the given ranges of the inputs; outputs
+/// without elements are left out.
+pub fn worst_errors(
+    program: &Program,
+    range: impl Fn(&str) -> Range,
+) -> Vec<(String, Option<f64>)> {
+    let ranges: Vec<Vec<Range>> = program
+        .inputs()
+        .iter()
+        .map(|slot| vec![range(&slot.name); slot.len])
+        .collect();
+    rounding_errors(program, &ranges)
+        .into_iter()
+        .zip(program.outputs())
+        .map(|(bounds, slot)| {
+            let worst = bounds
+                .into_iter()
+                .try_fold(0.0, |worst: f64, bound| bound.map(|bound| worst.max(bound)));
+            (slot.name.clone(), worst)
+        })
+        .collect()
+}
+
+/// Two significant digits, never less than the number.
+pub fn rounded_up(bound: f64) -> String {
+    format!("{:.1e}", crate::typeset::rounded_up(bound, 2))
+}

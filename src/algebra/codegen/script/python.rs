@@ -1,0 +1,438 @@
+//! Python: `NAME.py` on NumPy, `NAME_casadi.py` with functions of CasADi.
+
+use askama::Template;
+
+use super::functions::{FunctionText, ModelText, Script, list};
+use crate::codegen::code::{Argument, ConstTable, Function, MathFunction, Parameter, Span};
+use crate::codegen::dialect::Dialect;
+use crate::codegen::error::CodegenError;
+use crate::codegen::functions::ModelFunctions;
+use crate::codegen::ident::Namer;
+use crate::codegen::interface::{ModelInterface, PhaseInterface};
+use crate::codegen::line_wrapping::tidy;
+use crate::codegen::literal::Literal;
+use crate::codegen::printer::Printer;
+use crate::files::EmittedFile;
+
+/// On which numbers the functions work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Library {
+    /// Arrays of NumPy.
+    NumPy,
+    /// Symbolic scalars of CasADi.
+    Casadi,
+}
+
+/// Python with the elementary functions of a library.
+#[derive(Clone, Copy, Debug)]
+struct PythonDialect {
+    library: Library,
+}
+
+/// Keywords of Python and the names that generated modules use themselves.
+const RESERVED: [&str; 49] = [
+    "False", "None", "True", "and", "as", "assert", "async", "await", "break", "class", "continue",
+    "def", "del", "elif", "else", "except", "finally", "for", "from", "global", "if", "import",
+    "in", "is", "lambda", "nonlocal", "not", "or", "pass", "raise", "return", "try", "while",
+    "with", "yield", "match", "case", "type", "np", "casadi", "range", "list", "shape", "zip",
+    "len", "float", "print", "_rows", "_sin_cos",
+];
+
+/// Modules that a file of the same name would hide from NumPy, CasADi and the file itself.
+const MODULES: [&str; 95] = [
+    "numpy",
+    "abc",
+    "argparse",
+    "array",
+    "ast",
+    "atexit",
+    "base64",
+    "bisect",
+    "builtins",
+    "bz2",
+    "calendar",
+    "cmath",
+    "code",
+    "codecs",
+    "collections",
+    "concurrent",
+    "contextlib",
+    "contextvars",
+    "copy",
+    "copyreg",
+    "csv",
+    "ctypes",
+    "dataclasses",
+    "datetime",
+    "decimal",
+    "dis",
+    "email",
+    "encodings",
+    "enum",
+    "errno",
+    "fnmatch",
+    "fractions",
+    "functools",
+    "gc",
+    "genericpath",
+    "getpass",
+    "glob",
+    "gzip",
+    "hashlib",
+    "heapq",
+    "hmac",
+    "html",
+    "http",
+    "importlib",
+    "inspect",
+    "io",
+    "itertools",
+    "json",
+    "keyword",
+    "linecache",
+    "locale",
+    "logging",
+    "lzma",
+    "marshal",
+    "math",
+    "mmap",
+    "multiprocessing",
+    "numbers",
+    "opcode",
+    "operator",
+    "os",
+    "pathlib",
+    "pickle",
+    "pkgutil",
+    "platform",
+    "posixpath",
+    "pprint",
+    "queue",
+    "random",
+    "re",
+    "secrets",
+    "select",
+    "selectors",
+    "shutil",
+    "signal",
+    "site",
+    "socket",
+    "stat",
+    "statistics",
+    "string",
+    "struct",
+    "subprocess",
+    "sys",
+    "sysconfig",
+    "tempfile",
+    "textwrap",
+    "threading",
+    "time",
+    "token",
+    "tokenize",
+    "traceback",
+    "types",
+    "typing",
+    "unittest",
+    "urllib",
+];
+
+impl Dialect for PythonDialect {
+    fn reserved(&self) -> &'static [&'static str] {
+        &RESERVED
+    }
+
+    fn literal(&self, literal: Literal) -> String {
+        literal.to_string()
+    }
+
+    fn terminator(&self) -> &'static str {
+        ""
+    }
+
+    fn loop_ends(&self) -> (&'static str, Option<&'static str>) {
+        (":", None)
+    }
+
+    fn continuation(&self) -> &'static str {
+        " \\"
+    }
+
+    fn apply(&self, function: MathFunction, argument: &str) -> String {
+        let library = match self.library {
+            Library::NumPy => "np",
+            Library::Casadi => "casadi",
+        };
+        let name = match (function, self.library) {
+            (MathFunction::Sqrt, _) => "sqrt",
+            (MathFunction::Abs, Library::NumPy) => "abs",
+            (MathFunction::Abs, Library::Casadi) => "fabs",
+            (MathFunction::Sign, _) => "sign",
+            (MathFunction::Tan, _) => "tan",
+            (MathFunction::Tanh, _) => "tanh",
+            (MathFunction::Exp, _) => "exp",
+            (MathFunction::Log, _) => "log",
+        };
+        format!("{library}.{name}({argument})")
+    }
+
+    fn let_scalar(&self, name: &str, value: &str) -> String {
+        format!("{name} = {value}")
+    }
+
+    fn let_array(&self, name: &str, elements: &[String]) -> String {
+        format!("{name} = [{}]", elements.join(", "))
+    }
+
+    fn declare(&self, name: &str, len: usize) -> String {
+        format!("{name} = [0.0] * {len}")
+    }
+
+    fn for_loop(&self, variable: &str, count: usize) -> String {
+        format!("for {variable} in range({count})")
+    }
+
+    fn table_base(&self, _prefix: &str) -> String {
+        "TABLE".to_owned()
+    }
+
+    fn discard(&self, _parameter: &str) -> String {
+        String::new()
+    }
+
+    fn multiply_add(&self) -> Option<&'static str> {
+        None
+    }
+
+    fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String {
+        let callee = match (callee, self.library) {
+            (None, _) => "_sin_cos".to_owned(),
+            (Some(callee), Library::NumPy) => callee.to_owned(),
+            (Some(callee), Library::Casadi) => private(callee),
+        };
+        let (mut read, mut written) = (Vec::new(), Vec::new());
+        for argument in arguments {
+            match argument {
+                Argument::Read(span) if span.is_whole() => read.push(span.array.to_string()),
+                Argument::Read(span) => read.push(slice(span)),
+                Argument::Write(span) => written.push(slice(span)),
+            }
+        }
+        format!("{} = {callee}({})", written.join(", "), read.join(", "))
+    }
+
+    fn sin_cos_lane(&self, _: &str, _: &[String; 2], _: [bool; 2]) -> Vec<String> {
+        // Blocks of lanes are for compilers: scripts run many points as columns.
+        Vec::new()
+    }
+
+    fn table(&self, table: &ConstTable) -> String {
+        let rows = table.entries.chunks(table.cols).map(|row| {
+            let row: Vec<String> = row.iter().map(Literal::to_string).collect();
+            let lines: Vec<String> = row.chunks(8).map(|line| line.join(", ")).collect();
+            format!("    [{}],\n", lines.join(",\n     "))
+        });
+        format!("{} = [\n{}]", table.name, rows.collect::<String>())
+    }
+
+    fn parameter(&self, parameter: &Parameter) -> String {
+        parameter.name.to_string()
+    }
+
+    fn signature(&self, function: &Function) -> String {
+        format!("def {}", function.name)
+    }
+
+    fn docs(&self, _lines: &[String]) -> String {
+        // The template places documentation.
+        String::new()
+    }
+}
+
+fn slice(span: &Span) -> String {
+    format!("{}[{}:{}]", span.array, span.offset, span.offset + span.len)
+}
+
+#[derive(Template)]
+#[template(path = "script/numpy.askama", config = "../../templates/askama.toml")]
+struct NumPyModule {
+    banner: String,
+    m: ModelText<String>,
+}
+
+#[derive(Template)]
+#[template(
+    path = "script/numpy_function.askama",
+    config = "../../templates/askama.toml"
+)]
+struct NumPyFunction<'a> {
+    name: &'a str,
+    parameters: String,
+    docs: Vec<String>,
+    /// Names of the arrays, and each with its length.
+    arrays: String,
+    lengths: String,
+    created: Vec<(&'a str, usize)>,
+    body: &'a str,
+    results: String,
+}
+
+#[derive(Template)]
+#[template(path = "script/casadi.askama", config = "../../templates/askama.toml")]
+struct CasadiModule<'a> {
+    banner: String,
+    module: &'a str,
+    /// Functions are expressions, and the function made of them.
+    m: ModelText<(String, String)>,
+}
+
+#[derive(Template)]
+#[template(
+    path = "script/casadi_function.askama",
+    config = "../../templates/askama.toml"
+)]
+struct CasadiFunction<'a> {
+    name: String,
+    parameters: String,
+    docs: Vec<String>,
+    copied: Vec<&'a str>,
+    created: Vec<(&'a str, usize)>,
+    body: &'a str,
+    results: String,
+}
+
+/// The module of a model on NumPy; `provenance` is the text of the first line.
+///
+/// # Errors
+/// [`CodegenError::Template`] if a template fails.
+pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
+    let dialect = PythonDialect {
+        library: Library::NumPy,
+    };
+    let functions = ModelFunctions::new(entries, &dialect, "");
+    let script = Script {
+        printer: Printer::new(&dialect),
+        print: &|function, _| numpy_function(function),
+        numbers: tuple,
+    };
+    let module = NumPyModule {
+        banner: format!("# {provenance}"),
+        m: script.model(entries, &functions)?,
+    };
+    let path = format!("{}.py", stem(entries));
+    Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
+}
+
+/// The module of a model on CasADi; `provenance` is the text of the first line.
+///
+/// # Errors
+/// [`CodegenError::Template`] if a template fails.
+pub fn emit_casadi(
+    entries: &ModelInterface,
+    provenance: &str,
+) -> Result<Vec<EmittedFile>, CodegenError> {
+    let dialect = PythonDialect {
+        library: Library::Casadi,
+    };
+    // Expressions are private functions; the functions made of them have the plain names.
+    let functions = ModelFunctions::new(entries, &dialect, "");
+    let model = entries.identifier.as_str();
+    let script = Script {
+        printer: Printer::new(&dialect),
+        print: &|function, phase| casadi_function(model, function, phase),
+        numbers: tuple,
+    };
+    let module_name = format!("{}_casadi", stem(entries));
+    let module = CasadiModule {
+        banner: format!("# {provenance}"),
+        module: &module_name,
+        m: script.model(entries, &functions)?,
+    };
+    let path = format!("{module_name}.py");
+    Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
+}
+
+fn stem(entries: &ModelInterface) -> String {
+    let mut namer = Namer::new(&RESERVED);
+    for module in MODULES {
+        namer.mint(module);
+    }
+    namer.mint(&entries.identifier).to_string()
+}
+
+fn numpy_function(function: &FunctionText) -> Result<String, CodegenError> {
+    let arrays = function.arrays();
+    let template = NumPyFunction {
+        name: &function.name,
+        parameters: function.parameters(),
+        docs: escaped(&function.docs),
+        arrays: list(&arrays, |(name, _)| (*name).to_owned()),
+        lengths: list(&arrays, |(name, len)| format!("({name}, {len})")),
+        created: function.created(),
+        body: &function.body,
+        results: list(&function.outputs, |output| {
+            format!("_rows({}, shape)", output.name)
+        }),
+    };
+    Ok(template.render()?)
+}
+
+/// The expressions of a function, and the definition of the CasADi function made of them.
+fn casadi_function(
+    model: &str,
+    function: &FunctionText,
+    phase: Option<&PhaseInterface>,
+) -> Result<(String, String), CodegenError> {
+    let copied = function.copied();
+    let template = CasadiFunction {
+        name: private(&function.name),
+        parameters: function.parameters(),
+        docs: escaped(&function.docs),
+        copied: copied.clone(),
+        created: function.created(),
+        body: &function.body,
+        results: list(&function.outputs, |output| output.name.clone()),
+    };
+    let name = &function.name;
+    let inputs = list(&function.inputs, |input| {
+        format!("(\"{}\", {})", input.name, input.len)
+    });
+    let outputs = list(&function.outputs, |output| {
+        match copied.contains(&output.name.as_str()) {
+            true => format!("\"{}_next\"", output.name),
+            false => format!("\"{}\"", output.name),
+        }
+    });
+    let pattern = match phase {
+        Some(phase) if phase.jacobian.name == *name => {
+            let upper = phase.identifier.to_ascii_uppercase();
+            format!(",\n    ({upper}_JACOBIAN_ROWS, {upper}_JACOBIAN_COLS)")
+        }
+        Some(_) | None => String::new(),
+    };
+    let definition = format!(
+        "{name} = _function(\n    \"{model}_{name}\", {}, [{inputs}], [{outputs}]{pattern})",
+        private(name)
+    );
+    Ok((template.render()?, definition))
+}
+
+/// Name of the expressions of a function.
+fn private(name: &str) -> String {
+    format!("_{name}")
+}
+
+/// Lines inside a documentation string.
+fn escaped(lines: &[String]) -> Vec<String> {
+    let escaped = |line: &String| line.replace('\\', "\\\\").replace('"', "\\\"");
+    lines.iter().map(escaped).collect()
+}
+
+/// Numbers of a tuple, which needs a comma even after its only element.
+fn tuple(numbers: &[usize]) -> String {
+    let text = list(numbers, usize::to_string);
+    match numbers.len() {
+        1 => format!("({text},)"),
+        _ => format!("({text})"),
+    }
+}

@@ -1,0 +1,469 @@
+//! The library Theta: ordered candidate terms over `z`, `dz` and `u`.
+
+use std::fmt;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::error::{ModelError, check_shape};
+use super::evaluation::Tape;
+use super::library_error::LibraryError;
+use super::standard_library::StandardLibrary;
+use super::variable::LatentVariable;
+use crate::symbolic::{ExprId, ExprPool, SymbolId};
+
+/// Largest number of latent coordinates.
+pub const MAX_LATENT_DIM: usize = 64;
+/// Largest number of candidate terms.
+pub const MAX_LIBRARY_DIM: usize = 20_000;
+/// Longest candidate term in bytes.
+pub const MAX_TERM_LEN: usize = 1_000;
+
+/// Index of a candidate term: a row of Xi.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TermId(usize);
+
+impl TermId {
+    pub(super) fn new(index: usize) -> Self {
+        Self(index)
+    }
+
+    /// The row of Xi.
+    pub fn index(self) -> usize {
+        self.0
+    }
+}
+
+/// One column of Theta.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CandidateTerm {
+    text: String,
+    expr: ExprId,
+}
+
+impl CandidateTerm {
+    /// A term of a pool with its text in the syntax of the model file.
+    pub fn new(text: String, expr: ExprId) -> Self {
+        Self { text, expr }
+    }
+
+    /// The term as the model file writes it.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The term in the library's pool.
+    pub fn expr(&self) -> ExprId {
+        self.expr
+    }
+}
+
+/// How a library was given; the model file keeps the form.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LibrarySource {
+    /// A list of terms.
+    Terms,
+    /// The shorthand.
+    Standard(StandardLibrary),
+}
+
+/// Candidate terms in order, over `z1..zd`, `dz1..dzd`, `u1..ud`.
+#[derive(Clone)]
+pub struct Library {
+    latent_dim: usize,
+    source: LibrarySource,
+    pool: ExprPool,
+    symbols: Vec<SymbolId>,
+    terms: Vec<CandidateTerm>,
+    tape: Tape,
+}
+
+impl Library {
+    /// The library with these terms, in the expression syntax of the model file.
+    ///
+    /// # Errors
+    /// Each variant of [`LibraryError`] except [`LibraryError::Degree`] and
+    /// [`LibraryError::Duplicate`].
+    pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self, LibraryError> {
+        Self::build(latent_dim, texts.to_vec(), LibrarySource::Terms)
+    }
+
+    /// The standard library, in the order of the published arrays.
+    ///
+    /// # Errors
+    /// [`LibraryError::LatentDim`], [`LibraryError::Degree`], [`LibraryError::TooManyTerms`].
+    pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self, LibraryError> {
+        check_latent_dim(latent_dim)?;
+        let texts = standard.texts(latent_dim)?;
+        Self::build(latent_dim, texts, LibrarySource::Standard(standard))
+    }
+
+    fn build(
+        latent_dim: usize,
+        texts: Vec<String>,
+        source: LibrarySource,
+    ) -> Result<Self, LibraryError> {
+        check_latent_dim(latent_dim)?;
+        if texts.is_empty() {
+            return Err(LibraryError::Empty);
+        }
+        if texts.len() > MAX_LIBRARY_DIM {
+            return Err(LibraryError::TooManyTerms { found: texts.len() });
+        }
+        let mut pool = ExprPool::new();
+        let symbols: Vec<SymbolId> = LatentVariable::all(latent_dim)
+            .map(|variable| pool.symbol_id(&variable.to_string()))
+            .collect();
+        let zero = pool.number(0.0);
+        let mut terms: Vec<CandidateTerm> = Vec::with_capacity(texts.len());
+        for (index, text) in texts.into_iter().enumerate() {
+            let expr = parse_term(&mut pool, latent_dim, index, &text)?;
+            if expr == zero {
+                return Err(LibraryError::Zero { index, text });
+            }
+            if !constants_are_finite(&pool, expr) {
+                return Err(LibraryError::NotFinite { index, text });
+            }
+            terms.push(CandidateTerm { text, expr });
+        }
+        let exprs: Vec<ExprId> = terms.iter().map(CandidateTerm::expr).collect();
+        let tape = Tape::new(&pool, &exprs, &symbols);
+        Ok(Self {
+            latent_dim,
+            source,
+            pool,
+            symbols,
+            terms,
+            tape,
+        })
+    }
+
+    /// Refuses a library in which a term equals an earlier one under another spelling: its
+    /// coefficients cannot be learned.
+    ///
+    /// # Errors
+    /// [`LibraryError::Duplicate`] for the first such term.
+    pub fn check_distinct(&self) -> Result<(), LibraryError> {
+        let mut first_use = std::collections::HashMap::new();
+        for (second, term) in self.terms.iter().enumerate() {
+            if let Some(first) = first_use.insert(term.expr, second) {
+                return Err(LibraryError::Duplicate {
+                    first,
+                    second,
+                    text: term.text.clone(),
+                    earlier: self.terms[first].text.clone(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The terms as steps of one pass over their subexpressions.
+    pub fn tape(&self) -> &Tape {
+        &self.tape
+    }
+
+    /// Number of latent coordinates, `d`.
+    pub fn latent_dim(&self) -> usize {
+        self.latent_dim
+    }
+
+    /// Number of terms: the rows of Xi.
+    pub fn len(&self) -> usize {
+        self.terms.len()
+    }
+
+    /// Whether there is no term; never true of a library that was built.
+    pub fn is_empty(&self) -> bool {
+        self.terms.is_empty()
+    }
+
+    /// Whether the library was given as a list or by the shorthand.
+    pub fn source(&self) -> LibrarySource {
+        self.source
+    }
+
+    /// The terms in order.
+    pub fn terms(&self) -> &[CandidateTerm] {
+        &self.terms
+    }
+
+    /// One term.
+    pub fn term(&self, id: TermId) -> &CandidateTerm {
+        &self.terms[id.index()]
+    }
+
+    /// The pool in which the terms live. Clone it to build on them: ids stay valid in the clone.
+    pub fn pool(&self) -> &ExprPool {
+        &self.pool
+    }
+
+    /// The symbol of a variable in the library's pool, and in clones of it.
+    ///
+    /// `None` if its index is not below `latent_dim`.
+    pub fn symbol(&self, variable: LatentVariable) -> Option<SymbolId> {
+        let (block, index) = match variable {
+            LatentVariable::Z(index) => (0, index),
+            LatentVariable::Dz(index) => (1, index),
+            LatentVariable::U(index) => (2, index),
+        };
+        (index < self.latent_dim).then(|| self.symbols[block * self.latent_dim + index])
+    }
+
+    /// The variable that a symbol of the library's pool stands for.
+    pub fn variable(&self, symbol: SymbolId) -> Option<LatentVariable> {
+        let position = self.symbols.binary_search(&symbol).ok()?;
+        let index = position % self.latent_dim;
+        Some(match position / self.latent_dim {
+            0 => LatentVariable::Z(index),
+            1 => LatentVariable::Dz(index),
+            _ => LatentVariable::U(index),
+        })
+    }
+
+    /// Theta at one point: the value of each term, in order.
+    ///
+    /// # Errors
+    /// [`ModelError::Dimension`] if an argument is not `latent_dim` long.
+    pub fn evaluate(
+        &self,
+        z: &DVector<f64>,
+        dz: &DVector<f64>,
+        u_lat: &DVector<f64>,
+    ) -> Result<DVector<f64>, ModelError> {
+        let d = self.latent_dim;
+        ModelError::check_dimension("latent state z", z.len(), d)?;
+        ModelError::check_dimension("latent velocity dz", dz.len(), d)?;
+        ModelError::check_dimension("latent input u_lat", u_lat.len(), d)?;
+        let variables: Vec<f64> = z.iter().chain(dz).chain(u_lat).copied().collect();
+        let mut values = vec![0.0; self.tape.steps.len()];
+        let mut theta = DVector::zeros(self.len());
+        self.tape.run(&variables, &mut values, theta.as_mut_slice());
+        Ok(theta)
+    }
+
+    /// Theta at many points: one row a point, one column a term.
+    ///
+    /// `z`, `dz` and `u_lat` hold one point a column (`latent_dim x n`), as recordings do.
+    ///
+    /// # Errors
+    /// [`ModelError::Invalid`] if an argument has not `latent_dim` rows, or not as many columns as
+    /// `z`.
+    pub fn evaluate_points(
+        &self,
+        z: &DMatrix<f64>,
+        dz: &DMatrix<f64>,
+        u_lat: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>, ModelError> {
+        let expected = (self.latent_dim, z.ncols());
+        check_shape("z", z.shape(), expected)?;
+        check_shape("dz", dz.shape(), expected)?;
+        check_shape("u_lat", u_lat.shape(), expected)?;
+        let mut variables = vec![0.0; 3 * self.latent_dim];
+        let mut values = vec![0.0; self.tape.steps.len()];
+        let mut theta = vec![0.0; self.len()];
+        let mut all = DMatrix::zeros(z.ncols(), self.len());
+        for point in 0..z.ncols() {
+            let blocks = [z, dz, u_lat].map(|block| block.column(point));
+            let of_point = blocks.iter().flat_map(|block| block.iter());
+            for (variable, value) in variables.iter_mut().zip(of_point) {
+                *variable = *value;
+            }
+            self.tape.run(&variables, &mut values, &mut theta);
+            for (term, value) in theta.iter().enumerate() {
+                all[(point, term)] = *value;
+            }
+        }
+        Ok(all)
+    }
+}
+
+impl PartialEq for Library {
+    /// Equal as given: same dimension, form and texts.
+    fn eq(&self, other: &Self) -> bool {
+        self.latent_dim == other.latent_dim
+            && self.source == other.source
+            && self.terms.len() == other.terms.len()
+            && self
+                .terms
+                .iter()
+                .zip(&other.terms)
+                .all(|(a, b)| a.text == b.text)
+    }
+}
+
+impl fmt::Debug for Library {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Library")
+            .field("latent_dim", &self.latent_dim)
+            .field("source", &self.source)
+            .field("terms", &self.terms)
+            .finish_non_exhaustive()
+    }
+}
+
+fn check_latent_dim(latent_dim: usize) -> Result<(), LibraryError> {
+    if (1..=MAX_LATENT_DIM).contains(&latent_dim) {
+        Ok(())
+    } else {
+        Err(LibraryError::LatentDim { found: latent_dim })
+    }
+}
+
+fn parse_term(
+    pool: &mut ExprPool,
+    latent_dim: usize,
+    index: usize,
+    text: &str,
+) -> Result<ExprId, LibraryError> {
+    if text.len() > MAX_TERM_LEN || text.chars().any(char::is_control) {
+        return Err(LibraryError::TermText {
+            index,
+            found: text.len(),
+        });
+    }
+    let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
+    pool.parse(text, &known)
+        .map_err(|source| LibraryError::Parse {
+            index,
+            text: text.to_owned(),
+            source: Box::new(source),
+        })
+}
+
+/// Whether every part without variables has a finite value.
+fn constants_are_finite(pool: &ExprPool, expr: ExprId) -> bool {
+    let constants: Vec<ExprId> = pool
+        .reachable(&[expr])
+        .into_iter()
+        .filter(|&part| pool.is_constant(part))
+        .collect();
+    let no_symbol = |_| f64::NAN;
+    let values = pool.evaluate_all(&constants, &no_symbol);
+    values.into_iter().all(f64::is_finite)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn terms(texts: &[&str]) -> Vec<String> {
+        texts.iter().map(|&text| text.to_owned()).collect()
+    }
+
+    #[test]
+    fn library_symbols_map_to_variables_and_back() {
+        let library = Library::from_terms(3, &terms(&["u3*dz2", "z1"])).unwrap();
+        for variable in LatentVariable::all(3) {
+            let symbol = library.symbol(variable).unwrap();
+            assert_eq!(library.variable(symbol), Some(variable));
+        }
+        assert_eq!(library.symbol(LatentVariable::U(3)), None);
+    }
+
+    #[test]
+    fn library_with_equal_terms_is_accepted_but_not_distinct() {
+        let library = Library::from_terms(2, &terms(&["1", "z1*z2", "u1", "z2*z1"])).unwrap();
+        assert_eq!(library.len(), 4);
+        let error = library.check_distinct().unwrap_err();
+        assert!(matches!(
+            error,
+            LibraryError::Duplicate {
+                first: 1,
+                second: 3,
+                ..
+            }
+        ));
+    }
+
+    #[test]
+    fn library_with_term_that_does_not_parse_is_refused_with_its_place() {
+        for text in [
+            "z1 +",
+            "z3",
+            "sin z1",
+            "sinh(z1)",
+            "\\input{x}",
+            "x; system(\"x\")",
+            "",
+        ] {
+            let error = Library::from_terms(2, &terms(&["1", text])).unwrap_err();
+            match error {
+                LibraryError::Parse { index, .. } => assert_eq!(index, 1, "{text}"),
+                other => panic!("{text}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn library_with_vanishing_oversized_or_missing_terms_is_refused() {
+        assert!(matches!(
+            Library::from_terms(1, &terms(&["z1 - z1"])),
+            Err(LibraryError::Zero { index: 0, .. })
+        ));
+        for text in ["z1/0", "log(0)*z1", "z1^(1/0)", "sqrt(-1) + z1"] {
+            let error = Library::from_terms(1, &terms(&[text])).unwrap_err();
+            assert!(
+                matches!(error, LibraryError::NotFinite { index: 0, .. }),
+                "{text}: {error:?}"
+            );
+        }
+        assert!(matches!(
+            Library::from_terms(1, &["z1+".repeat(400) + "z1"]),
+            Err(LibraryError::TermText { index: 0, .. })
+        ));
+        assert!(matches!(
+            Library::from_terms(1, &terms(&["z1\n+1"])),
+            Err(LibraryError::TermText { index: 0, .. })
+        ));
+        assert_eq!(Library::from_terms(1, &[]), Err(LibraryError::Empty));
+        assert_eq!(
+            Library::from_terms(0, &terms(&["1"])),
+            Err(LibraryError::LatentDim { found: 0 })
+        );
+        assert_eq!(
+            Library::from_terms(65, &terms(&["1"])),
+            Err(LibraryError::LatentDim { found: 65 })
+        );
+    }
+
+    #[test]
+    fn library_values_agree_with_the_pool_for_every_node() {
+        let texts = [
+            "z1^7 - 2/z1^3",
+            "abs(z1)^dz1",
+            "tanh(log(2 + u1^2))^1.5",
+            "cos(tan(z1)*sqrt(2))",
+            "0.1*z1*dz1*u1",
+        ];
+        let library = Library::from_terms(1, &terms(&texts)).unwrap();
+        let points = [[0.3, -0.7, 2.0], [-1.25, 0.5, -0.1], [2.0, 3.0, 0.0]];
+        let block = |row: usize| DMatrix::from_fn(1, 3, |_, point| points[point][row]);
+        let all = library
+            .evaluate_points(&block(0), &block(1), &block(2))
+            .unwrap();
+        for (point, values) in points.iter().enumerate() {
+            let exprs: Vec<ExprId> = library.terms().iter().map(CandidateTerm::expr).collect();
+            let expected = library
+                .pool()
+                .evaluate_all(&exprs, &|symbol| values[symbol.index()]);
+            for (term, expected) in expected.iter().enumerate() {
+                assert_eq!(all[(point, term)], *expected, "{}", texts[term]);
+            }
+        }
+    }
+
+    #[test]
+    fn library_values_are_those_of_the_terms() {
+        let library = Library::from_terms(
+            1,
+            &terms(&["1", "z1*dz1", "sin(dz1)", "exp(-z1^2)", "u1/2"]),
+        )
+        .unwrap();
+        let at = |value| DVector::from_element(1, value);
+        let theta = library.evaluate(&at(0.5), &at(-2.0), &at(3.0)).unwrap();
+        let expected = [1.0, -1.0, (-2.0f64).sin(), (-0.25f64).exp(), 1.5];
+        for (value, expected) in theta.iter().zip(expected) {
+            assert!((value - expected).abs() < 1e-15, "{value} {expected}");
+        }
+    }
+}

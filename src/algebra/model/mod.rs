@@ -1,0 +1,88 @@
+//! The reduced-order model: encoder, decoder, library, coefficients, phases.
+//!
+//! What enters: matrices, candidate terms as text, phases; what leaves: a [`ReducedModel`] whose
+//! every shape, rank, name and number has been checked, so that no later stage has to doubt it.
+//! Read `rom.rs` first: it states the equations and the units.
+//!
+//! ```
+//! use nalgebra::{DMatrix, DVector};
+//! use romc::model::{FeetRule, Library, Phase, ReducedModel};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // A mass on a spring, pushed by u1: ddz1 = -4 z1 - 0.1 dz1 + 2 u1.
+//! let library = Library::from_terms(1, &["z1".into(), "dz1".into(), "u1".into()])?;
+//! let model = ReducedModel::builder("spring", library)
+//!     .phase(Phase {
+//!         name: "contact".into(),
+//!         feet: FeetRule::Any,
+//!         xi: DMatrix::from_column_slice(3, 1, &[-4.0, -0.1, 2.0]),
+//!     })
+//!     .build()?;
+//! let ddz = model.ddz(
+//!     0,
+//!     &DVector::from_element(1, 0.5),
+//!     &DVector::from_element(1, 1.0),
+//!     &DVector::from_element(1, 0.25),
+//! )?;
+//! assert_eq!(ddz[0], -4.0 * 0.5 - 0.1 * 1.0 + 2.0 * 0.25);
+//!
+//! // What a latent-only model cannot do, it says.
+//! assert!(model.encode(&DVector::zeros(18)).is_err());
+//! # Ok(())
+//! # }
+//! ```
+
+mod activation;
+mod affine;
+mod builder;
+mod checks;
+mod coordinate_names;
+mod error;
+mod evaluation;
+mod given_state;
+mod identifier;
+mod jump_prior;
+mod library;
+mod library_error;
+mod maps;
+mod normal;
+mod order;
+mod phase;
+mod projection;
+mod rom;
+mod scaling;
+mod standard_library;
+mod state_map;
+mod statistics;
+mod tangent;
+mod variable;
+
+#[cfg(test)]
+mod tests;
+
+pub use crate::robot::FeetRule;
+pub use activation::{Activation, GELU_CUBIC, GELU_RATE};
+pub use affine::AffineMap;
+pub use builder::ModelBuilder;
+pub use checks::check_name;
+pub use coordinate_names::CoordinateNames;
+pub use error::ModelError;
+pub use evaluation::{Step, Tape};
+pub use given_state::InputGivenState;
+pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN};
+pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior};
+pub use library::{
+    CandidateTerm, Library, LibrarySource, MAX_LATENT_DIM, MAX_LIBRARY_DIM, MAX_TERM_LEN, TermId,
+};
+pub use library_error::LibraryError;
+pub use normal::{DENSITY_AT_ZERO, TAIL};
+pub use order::CoordinateOrder;
+pub use phase::Phase;
+pub use projection::{RANK_TOLERANCE, complement};
+pub use rom::ReducedModel;
+pub use scaling::{ScaleFactors, Scaling};
+pub use standard_library::{MAX_DEGREE, StandardLibrary};
+pub use state_map::{Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};
+pub use statistics::InputStatistics;
+pub use tangent::Tangent;
+pub use variable::LatentVariable;

@@ -1,0 +1,122 @@
+//! Equations as `math` elements, and a page that shows them.
+
+use askama::Template;
+
+use crate::equations::{Equations, Unit};
+use crate::files::EmittedFile;
+use crate::typeset::latex::tex_cases;
+use crate::typeset::page::{Markup, Page, rendered};
+use crate::typeset::words::Spelling;
+use crate::typeset::{
+    Decimal, EQUALS, EquationSystem, Math, PrintOptions, Symbol, TypesetError, break_lines,
+    symbol_width,
+};
+
+use super::escape::HtmlText;
+use super::math::{Mathml, MathmlNumber, MathmlSymbol, MathmlTerms};
+
+/// What a continued line is set in by, in em.
+const INDENT: f64 = 2.0;
+
+/// One phase as a `math` element: a brace before its equations, each broken into
+/// lines of `width_em`. The LaTeX of the same equations stands in an annotation,
+/// where tools for copying find it.
+pub fn system(system: &EquationSystem, width_em: f64) -> String {
+    let mut rows = String::new();
+    for equation in &system.equations {
+        let left = MathmlSymbol(&equation.left);
+        let first = symbol_width(&equation.left) + EQUALS;
+        let lines = break_lines(&equation.terms, width_em, first, INDENT);
+        let relation = if equation.is_approximate { "≈" } else { "=" };
+        let mut head = format!("{left}<mo>{relation}</mo>");
+        if lines.is_empty() {
+            let zero = equation.right();
+            rows.push_str(&row(&head, &Mathml(&zero).to_string(), 0.0));
+        }
+        for (place, terms) in lines.into_iter().enumerate() {
+            let continues = place > 0;
+            let indent = if continues { INDENT } else { 0.0 };
+            let right = MathmlTerms { terms, continues }.to_string();
+            rows.push_str(&row(&head, &right, indent));
+            head.clear();
+        }
+    }
+    let tex = tex_cases(system, width_em);
+    format!(
+        "<math display=\"block\"><semantics><mrow><mo fence=\"true\" form=\"prefix\" \
+         stretchy=\"true\">{{</mo><mtable displaystyle=\"true\">{rows}</mtable></mrow>\
+         <annotation encoding=\"application/x-tex\">{}</annotation></semantics></math>",
+        HtmlText(&tex)
+    )
+}
+
+fn row(left: &str, right: &str, indent: f64) -> String {
+    let space = if indent > 0.0 {
+        format!("<mspace width=\"{indent}em\"/>")
+    } else {
+        String::new()
+    };
+    format!(
+        "<mtr><mtd style=\"text-align:right;padding-right:0\"><mrow>{left}</mrow></mtd>\
+         <mtd style=\"text-align:left;padding-left:0\"><mrow>{space}{right}</mrow></mtd></mtr>"
+    )
+}
+
+/// The page `NAME.html`: each phase's equations and the table of coefficients,
+/// without scripts or anything from elsewhere.
+///
+/// # Errors
+/// [`TypesetError`] if a candidate term has a variable without a symbol.
+pub fn emit(
+    equations: &Equations<'_>,
+    options: &PrintOptions,
+) -> Result<Vec<EmittedFile>, TypesetError> {
+    let page = Page::new::<Html>(equations, options)?;
+    let path = format!("{}.html", equations.model().identifier());
+    Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])
+}
+
+#[derive(Template)]
+#[template(path = "mathml/page.askama", config = "../../templates/askama.toml")]
+struct Document {
+    page: Page,
+}
+
+/// Text and mathematics for the content of an element.
+#[derive(Clone, Copy, Debug)]
+pub struct Html;
+
+impl Spelling for Html {
+    fn text(text: &str) -> String {
+        HtmlText(text).to_string()
+    }
+
+    fn number(number: &Decimal) -> String {
+        format!("<math>{}</math>", MathmlNumber(number))
+    }
+
+    fn term(math: &Math, _: &str) -> String {
+        format!("<math>{}</math>", Mathml(math))
+    }
+
+    fn left(symbol: &Symbol, _: &str) -> String {
+        format!("<math>{}</math>", MathmlSymbol(symbol))
+    }
+}
+
+impl Markup for Html {
+    fn system(equations: &EquationSystem, width_em: f64) -> String {
+        system(equations, width_em)
+    }
+
+    fn head(symbol: &Symbol, phase: &str, unit: Option<Unit>) -> String {
+        let (symbol, phase) = (MathmlSymbol(symbol), HtmlText(phase));
+        let unit = unit.map_or(String::new(), |unit| format!(", {unit}"));
+        format!("<math>{symbol}</math><br><small>{phase}{unit}</small>")
+    }
+
+    fn row_head(term: &Math, unit: Option<Unit>) -> String {
+        let unit = unit.map(|unit| format!("<small>, {unit}</small>"));
+        format!("<math>{}</math>{}", Mathml(term), unit.unwrap_or_default())
+    }
+}

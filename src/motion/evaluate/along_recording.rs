@@ -1,0 +1,403 @@
+//! The controller along a recording: each control step sees the measured state, its reference is
+//! the recording itself.
+//!
+//! This is not a closed loop, the robot does not feel the commands. It asks what the controller
+//! would have commanded where the robot really was, and compares with what was commanded then.
+//!
+//! ```
+//! use std::path::Path;
+//! use romc::evaluate::{ReferenceInput, along_recording};
+//! use romc::mpc::{Controller, MpcSettings};
+//!
+//! let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+//! let model = romc::artifact::read(&root.join("models/go1-d4.json"))?;
+//! let jump = romc::recording::read(&root.join("examples/recordings/go1/test_01.csv.gz"))?;
+//! let mut controller = Controller::new(&model, MpcSettings::default())?;
+//! let run = along_recording(&mut controller, &jump, ReferenceInput::Recorded, |_, _| {})?;
+//! assert_eq!(run.summary.limit_violations, 0);
+//! assert!(run.summary.torque_r2.contact > Some(0.85));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use super::control::{Summary, Tally};
+use super::control_metrics::ControlMetrics;
+use super::torque::{Comparison, exceeds, is_plausible};
+use crate::mpc::{
+    Command, ControlError, Controller, Lift, Measurement, MpcError, ReferenceSamples, Source,
+    StanceState, Status, foot_forces, to_upright,
+};
+use crate::recording::{Recording, Segment};
+use crate::robot::{ContactFlags, GRAVITY_M_S2, JOINT_DIM, STATE_DIM};
+
+/// Where the controller's input reference comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
+pub enum ReferenceInput {
+    /// The recorded torques and forces, projected into the latent space.
+    Recorded,
+    /// None: the controller finds the input itself.
+    None,
+}
+
+/// One control step along a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepRow {
+    /// Segment of the recording, from zero.
+    pub segment: usize,
+    /// Time of the measurement, s.
+    pub time_s: f64,
+    /// Index of the phase of the first stage, if there was a plan.
+    pub phase: Option<usize>,
+    /// How the step ended.
+    pub status: Status,
+    /// Where the command comes from.
+    pub source: Source,
+    /// Wall time of the step, µs.
+    pub solve_us: f64,
+    /// Interior-point iterations.
+    pub iterations: u32,
+    /// Latent input.
+    pub u_lat: Vec<f64>,
+    /// Lifted input in SI units: with the transpose lift `W_eᵀ u_lat`, with the consistent lift the
+    /// torques at the links and the force that they produce.
+    pub input: [f64; STATE_DIM],
+    /// Commanded torques, N m.
+    pub torque_nm: [f64; JOINT_DIM],
+    /// Recorded torques, N m, averaged over the time that the command is held.
+    pub recorded_torque_nm: [f64; JOINT_DIM],
+    /// Reference in latent coordinates.
+    pub z_reference: Vec<f64>,
+    /// Measurement in latent coordinates.
+    pub z: Vec<f64>,
+    /// Latent position that the step's own plan expects at the end of its horizon.
+    pub z_planned: Option<Vec<f64>>,
+}
+
+/// A step may be shorter than the time between samples by what rounds it.
+pub const STEP_SLACK: f64 = 0.99;
+
+/// All steps along a recording, and what they come to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// The steps, segment by segment.
+    pub rows: Vec<StepRow>,
+    /// The summary.
+    pub summary: Summary,
+    /// The model and its baselines, see [`control_metrics`](super::control_metrics); none where only the controller
+    /// was at hand.
+    pub metrics: Option<ControlMetrics>,
+}
+
+impl Run {
+    /// Why nothing was controlled, if so: most steps, or all that there are, have no plan of their own.
+    pub fn failure(&self) -> Option<String> {
+        let Summary { steps, failed, .. } = self.summary;
+        if steps > 0 && 2 * failed <= steps {
+            return None;
+        }
+        let mut statuses: BTreeMap<&str, usize> = BTreeMap::new();
+        for row in self.rows.iter().filter(|row| !row.status.has_plan()) {
+            *statuses.entry(row.status.word()).or_default() += 1;
+        }
+        let statuses = statuses
+            .iter()
+            .map(|(word, count)| format!("{word} {count}"));
+        let statuses: Vec<String> = statuses.collect();
+        Some(format!(
+            "{failed} of {steps} control steps have no plan of their own ({})",
+            statuses.join(", ")
+        ))
+    }
+}
+
+/// Runs the controller along a recording, one segment after the other.
+///
+/// Recorded torques beyond twice the robot's limits are no torques of the robot: steps with one are
+/// left out of the comparison and counted. As reference input torques are clamped to the limits.
+/// `progress(done, total)` is called once a control step.
+///
+/// # Errors
+/// Those of [`Controller::set_reference`], [`MpcError::Step`] if the controller's step is shorter
+/// than the recording's, [`MpcError::NoStep`] if no segment is as long as one step, and [`MpcError::Recording`] if the recording's inputs cannot be computed.
+pub fn along_recording(
+    controller: &mut Controller,
+    recording: &Recording,
+    reference_input: ReferenceInput,
+    mut progress: impl FnMut(usize, usize),
+) -> Result<Run, MpcError> {
+    let step_s = controller.settings().step_s;
+    for segment in recording.segments.iter().filter(|s| s.len() >= 2) {
+        let recorded_s = segment.mean_step_s();
+        if step_s < STEP_SLACK * recorded_s {
+            return Err(MpcError::Step {
+                path: recording.path.clone(),
+                found_s: step_s,
+                recorded_s,
+            });
+        }
+    }
+    let schedules: Vec<Vec<usize>> = recording
+        .segments
+        .iter()
+        .map(|segment| control_samples(&segment.time_s, step_s))
+        .collect();
+    let total = schedules.iter().map(Vec::len).sum();
+    if total == 0 {
+        let duration = |segment: &Segment| segment.time_s[segment.len() - 1] - segment.time_s[0];
+        let durations = recording
+            .segments
+            .iter()
+            .filter(|s| !s.is_empty())
+            .map(duration);
+        return Err(MpcError::NoStep {
+            path: recording.path.clone(),
+            found_s: step_s,
+            longest_s: durations.fold(0.0, f64::max),
+        });
+    }
+    let mut rows = Vec::with_capacity(total);
+    let mut tally = Tally::default();
+    for (number, (segment, schedule)) in recording.segments.iter().zip(&schedules).enumerate() {
+        if segment.len() < 2 {
+            continue;
+        }
+        let input = segment.input_within_limits(controller.plant().input_rule())?;
+        set_reference(controller, segment, reference_input, input.as_slice())?;
+        for &sample in schedule {
+            let started = Instant::now();
+            controller.prepare(segment.time_s[sample]);
+            let preparation_us = started.elapsed().as_secs_f64() * 1e6;
+            tally.preparations_us.push(preparation_us);
+            rows.push(one_step(controller, segment, number, sample, &mut tally));
+            progress(rows.len(), total);
+        }
+    }
+    tally.lift = lift_comparison(controller, recording)?;
+    Ok(Run {
+        summary: tally.summary(),
+        rows,
+        metrics: None,
+    })
+}
+
+/// R² of the torques that the controller's lift makes of exactly projected recorded inputs, at
+/// every sample: what the lift alone loses.
+///
+/// # Errors
+/// [`MpcError::Recording`] if the recording's inputs cannot be computed.
+pub fn lift_comparison(
+    controller: &mut Controller,
+    recording: &Recording,
+) -> Result<Comparison, MpcError> {
+    let mut comparison = Comparison::default();
+    let mut u_lat = vec![0.0; controller.plant().latent_dim()];
+    for segment in &recording.segments {
+        let input = segment.input_within_limits(controller.plant().input_rule())?;
+        let losses = segment.losses(controller.plant().input_rule());
+        for (sample, u) in input.as_slice().chunks_exact(STATE_DIM).enumerate() {
+            let recorded = segment.torque(sample);
+            if !is_plausible(controller.plant().robot(), &recorded) {
+                continue;
+            }
+            let x = segment.x.column(sample);
+            controller.stand_at(x.as_slice());
+            controller
+                .local_plant()
+                .project(x.as_slice(), u, &mut u_lat);
+            let Some(mut stance) = stance(controller, segment, sample) else {
+                continue;
+            };
+            let losses = std::array::from_fn(|joint| losses[(joint, sample)]);
+            stance.losses_nm = controller.plant().clamp_torque(losses);
+            if let Ok(torque) = controller.lift(&u_lat, &stance) {
+                comparison.add(segment.feet[sample], &torque, &recorded);
+            }
+        }
+    }
+    Ok(comparison)
+}
+
+/// Samples at which a controller with period `step_s` acts: the first at or after each multiple,
+/// as long as the command's whole hold lies within the recording.
+pub(super) fn control_samples(time_s: &[f64], step_s: f64) -> Vec<usize> {
+    let mut samples = Vec::new();
+    let (Some(&first), Some(&last)) = (time_s.first(), time_s.last()) else {
+        return samples;
+    };
+    let mut sample = 0;
+    for step in 0.. {
+        let due = first + step as f64 * step_s;
+        if due + step_s > last + 1e-9 {
+            return samples;
+        }
+        while time_s[sample] < due - 1e-9 {
+            sample += 1;
+        }
+        samples.push(sample);
+    }
+    samples
+}
+
+fn one_step(
+    controller: &mut Controller,
+    segment: &Segment,
+    number: usize,
+    sample: usize,
+    tally: &mut Tally,
+) -> StepRow {
+    let time_s = segment.time_s[sample];
+    let feet = segment.feet[sample];
+    let (x, dx) = (segment.x.column(sample), segment.dx.column(sample));
+    let measurement = Measurement {
+        time_s,
+        x: x.as_slice(),
+        dx: dx.as_slice(),
+        feet,
+    };
+    let command = controller.step(measurement);
+    let recorded = held_torque(segment, sample, controller.settings().step_s);
+    let d = controller.plant().latent_dim();
+    let mut z = vec![0.0; d];
+    controller.plant().encode(x.as_slice(), &mut z);
+    let mut reference = vec![0.0; 2 * d];
+    if let Some(trajectory) = controller.reference() {
+        trajectory.state_at(time_s, &mut reference);
+    }
+    tally.count(&command);
+    match recorded {
+        Some(recorded) if is_plausible(controller.plant().robot(), &recorded) => {
+            tally.torque.add(feet, &command.torque_nm, &recorded);
+        }
+        Some(_) | None => tally.implausible += 1,
+    }
+    let limits = controller.plant().robot().torque_limit_nm();
+    tally.limit_violations += usize::from(exceeds(&command.torque_nm, limits, 1.0));
+    if command.status.has_plan() {
+        tally.tracking.extend(controller.planned_deviations());
+    }
+    let stance = stance(controller, segment, sample);
+    if let Some(violated) = friction_violated(controller, &command, stance.as_ref()) {
+        *tally.friction_violations.get_or_insert(0) += usize::from(violated);
+    }
+    StepRow {
+        segment: number,
+        time_s,
+        phase: command.phase,
+        status: command.status,
+        source: command.source,
+        solve_us: command.solve_us,
+        iterations: command.iterations,
+        input: lifted_input(controller, &command, segment, sample),
+        torque_nm: command.torque_nm,
+        recorded_torque_nm: recorded.unwrap_or([0.0; JOINT_DIM]),
+        z_reference: reference[..d].to_vec(),
+        u_lat: command.u_lat,
+        z,
+        z_planned: (command.status.has_plan())
+            .then(|| controller.plan().end(controller.settings().horizon - 1)[..d].to_vec()),
+    }
+}
+
+pub(super) fn set_reference(
+    controller: &mut Controller,
+    segment: &Segment,
+    reference_input: ReferenceInput,
+    input: &[f64],
+) -> Result<(), ControlError> {
+    controller.set_reference(ReferenceSamples {
+        time_s: &segment.time_s,
+        x: segment.x.as_slice(),
+        dx: segment.dx.as_slice(),
+        u: match reference_input {
+            ReferenceInput::Recorded => Some(input),
+            ReferenceInput::None => None,
+        },
+        feet: &segment.feet,
+    })
+}
+
+/// Mean recorded torques over the time that a command is held; none if one is not finite.
+fn held_torque(segment: &Segment, sample: usize, step_s: f64) -> Option<[f64; JOINT_DIM]> {
+    let until = segment.time_s[sample] + step_s - 1e-9;
+    let count = segment.time_s[sample..]
+        .iter()
+        .take_while(|&&time_s| time_s < until)
+        .count();
+    let mut mean = [0.0; JOINT_DIM];
+    for held in sample..sample + count {
+        for (mean, torque) in mean.iter_mut().zip(segment.torque(held)) {
+            *mean += torque / count as f64;
+        }
+    }
+    mean.iter().all(|torque| torque.is_finite()).then_some(mean)
+}
+
+fn stance(controller: &Controller, segment: &Segment, sample: usize) -> Option<StanceState> {
+    let feet: ContactFlags = segment.feet[sample];
+    Some(StanceState {
+        joints_rad: segment.joints(sample),
+        attitude_rad: std::array::from_fn(|angle| segment.x[(15 + angle, sample)]),
+        feet,
+        phase: controller.plant().phase_for(feet)?,
+        losses_nm: [0.0; JOINT_DIM],
+    })
+}
+
+fn lifted_input(
+    controller: &Controller,
+    command: &Command,
+    segment: &Segment,
+    sample: usize,
+) -> [f64; STATE_DIM] {
+    let mut input = controller.local_plant().lift(&command.u_lat);
+    match controller.settings().lift {
+        Lift::Transpose => {}
+        Lift::Consistent => {
+            let net = command.net_torque_nm();
+            input[..JOINT_DIM].copy_from_slice(&net);
+            let rule = controller.plant().input_rule();
+            let wrench = rule.wrench(&segment.state(sample), &net, segment.feet[sample]);
+            if let Ok(wrench) = wrench {
+                input[JOINT_DIM..].copy_from_slice(wrench.as_slice());
+            }
+        }
+    }
+    input
+}
+
+/// Whether a command leaves a friction cone that the controller constrains, by more than a
+/// thousandth of the robot's weight; none if it constrains none here.
+fn friction_violated(
+    controller: &Controller,
+    command: &Command,
+    stance: Option<&StanceState>,
+) -> Option<bool> {
+    let stance = stance.filter(|stance| stance.feet.contains(&true))?;
+    let (plant, settings) = (controller.plant(), controller.settings());
+    let tolerance_n = 1e-3 * plant.robot().mass_kg() * GRAVITY_M_S2;
+    match settings.lift {
+        Lift::Consistent => {
+            let forces = foot_forces(plant, stance)?;
+            Some(forces.iter().enumerate().any(|(leg, force)| {
+                force.is_some_and(|map| {
+                    let net = command.net_torque_nm();
+                    let torque = std::array::from_fn::<f64, 3, _>(|joint| net[3 * leg + joint]);
+                    let force = map * nalgebra::Vector3::from(torque);
+                    force.x.hypot(force.y) > settings.foot_friction * force.z + tolerance_n
+                })
+            }))
+        }
+        Lift::Transpose => {
+            let coefficient = settings.body_friction?;
+            let lifted = controller.local_plant().lift(&command.u_lat);
+            let [roll, pitch, _] = stance.attitude_rad;
+            let frame = plant.input_rule().wrench_frame();
+            let rotation = to_upright(frame, [roll, pitch]);
+            let force =
+                rotation.map(|row| (0..3).map(|k| row[k] * lifted[JOINT_DIM + k]).sum::<f64>());
+            Some(force[0].hypot(force[1]) > coefficient * force[2] + tolerance_n)
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! What the plain lift `u = W_e^T u_lat` alone loses, without any controller.
+
+use nalgebra::DVector;
+
+use super::torque::{ByContact, Comparison, is_plausible};
+use crate::model::ReducedModel;
+use crate::recording::Segment;
+use crate::robot::{InputRule, JOINT_DIM};
+use crate::sim::SimError;
+
+/// Lifted force and moment, in N and N m together, below which their inconsistency means nothing.
+const SMALL_FORCE_N: f64 = 1.0;
+/// Torques of exactly projected and lifted inputs against the recorded ones.
+///
+/// Per sample `u_lat = pinv(W_e^T) s_u u`, `u_lift = W_e^T u_lat / s_u`; what the joints take at the
+/// recorded velocities and accelerations is added to the lifted torques.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LiftSums {
+    torque: Comparison,
+    inconsistency: (f64, usize),
+}
+
+impl LiftSums {
+    /// Adds every sample of a segment whose torques can be the robot's.
+    ///
+    /// # Errors
+    /// [`SimError::Model`] for a latent-only model, [`SimError::Recording`] if the body wrench cannot
+    /// be computed.
+    pub fn add(&mut self, model: &ReducedModel, segment: &Segment) -> Result<(), SimError> {
+        let robot = model.robot()?;
+        let rule = model.input_rule()?;
+        let input = segment.input(&rule)?;
+        let losses = segment.losses(&rule);
+        for sample in 0..segment.len() {
+            let torque = segment.torque(sample);
+            if !is_plausible(robot, &torque) {
+                continue;
+            }
+            let x = segment.x.column(sample).into_owned();
+            let tangent = model.tangent(&x)?;
+            let lifted = tangent.lift * (tangent.project * input.column(sample));
+            let feet = segment.feet[sample];
+            let of_joints = std::array::from_fn(|joint| lifted[joint] + losses[(joint, sample)]);
+            self.torque.add(feet, &of_joints, &torque);
+            if feet.contains(&true) {
+                self.add_inconsistency(&rule, segment, sample, &lifted);
+            }
+        }
+        Ok(())
+    }
+
+    fn add_inconsistency(
+        &mut self,
+        rule: &InputRule,
+        segment: &Segment,
+        sample: usize,
+        lifted: &DVector<f64>,
+    ) {
+        let torque = std::array::from_fn(|joint| lifted[joint]);
+        let feet = segment.feet[sample];
+        let Ok(produced) = rule.wrench(&segment.state(sample), &torque, feet) else {
+            return;
+        };
+        let force = lifted.rows(JOINT_DIM, 6).into_owned();
+        if force.norm() > SMALL_FORCE_N {
+            self.inconsistency.0 += (&force - produced).norm() / force.norm();
+            self.inconsistency.1 += 1;
+        }
+    }
+
+    /// Coefficients of determination of the torques over all joints jointly, see [`Comparison::r2`].
+    pub fn torque_r2(&self) -> ByContact {
+        self.torque.r2()
+    }
+
+    /// The same over all samples, see [`Comparison::r2_all`].
+    pub fn torque_r2_all(&self) -> Option<f64> {
+        self.torque.r2_all()
+    }
+
+    /// Mean of `|F_lift - G tau_lift| / |F_lift|` over samples with a foot down: how far the lifted
+    /// body wrench is from what the lifted torques produce.
+    pub fn inconsistency(&self) -> Option<f64> {
+        let (sum, count) = self.inconsistency;
+        (count > 0).then(|| sum / count as f64)
+    }
+}
+
+/// The published weight of complexity in the combined loss (29).
+pub const LAMBDA: f64 = 0.001;
+
+/// The combined loss `L_mod = 2 E_dec + 2 lambda ln |Xi|` (equation 29), of the decoder's mean square
+/// (scaled units) and the number of active terms in all phases.
+/// None for a model without terms.
+pub fn combined_loss(decoder_mean_square: f64, active_terms: usize, lambda: f64) -> Option<f64> {
+    let logarithm = (active_terms > 0).then(|| (active_terms as f64).ln())?;
+    Some(2.0 * decoder_mean_square + 2.0 * lambda * logarithm)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{artifact, recording};
+
+    #[test]
+    fn combined_loss_follows_equation_29() {
+        let loss = combined_loss(0.01, 10, LAMBDA).expect("terms");
+        assert!((loss - (0.02 + 0.002 * 10f64.ln())).abs() < 1e-15);
+        assert_eq!(combined_loss(0.01, 0, LAMBDA), None);
+    }
+
+    #[test]
+    fn more_latent_coordinates_lose_less_of_the_torques() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let jump = recording::read(&root.join("examples/recordings/go1/test_01.csv.gz"));
+        let jump = jump.expect("shipped");
+        let [two, six] = ["go1-d2", "go1-d6"].map(|name| {
+            let model = artifact::read(&root.join(format!("models/{name}.json"))).expect("shipped");
+            let mut sums = LiftSums::default();
+            for segment in &jump.segments {
+                sums.add(&model, segment).expect("legs are bent");
+            }
+            sums
+        });
+        assert!(six.torque_r2().contact > two.torque_r2().contact);
+        assert!(six.torque_r2().contact.expect("contact") > 0.9);
+        assert!(six.inconsistency().expect("contact") < 1.0);
+    }
+}

@@ -1,0 +1,173 @@
+//! Predictions one stage ahead: the recorded state and input in, where the robot is one control step later out.
+
+use nalgebra::DVector;
+use serde::Serialize;
+
+use super::error::EvaluateError;
+use crate::lower::CompiledModel;
+use crate::model::ReducedModel;
+use crate::recording::Recording;
+use crate::robot::JOINT_DIM;
+use crate::sim::LatentSegment;
+
+/// Root mean squares of predicted minus recorded positions one stage ahead, in the robot's coordinates. What the
+/// decoder alone loses does not count: both are decoded from latent positions.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PredictionError {
+    /// Body x, m.
+    #[serde(rename = "body.x")]
+    pub body_x_m: f64,
+    /// Body z, m.
+    #[serde(rename = "body.z")]
+    pub body_z_m: f64,
+    /// Pitch, rad.
+    #[serde(rename = "body.pitch")]
+    pub pitch_rad: f64,
+    /// All joints together, rad.
+    #[serde(rename = "joints")]
+    pub joints_rad: f64,
+    /// Each latent position, scaled units.
+    pub latent: Vec<f64>,
+}
+
+impl PredictionError {
+    /// The mean over the latent positions of this error as a share of another's: below 1 if this one predicts better.
+    ///
+    /// These are what the dynamics predict. The robot's coordinates are made of them by the decoder: one for which no
+    /// latent coordinate stands, such as pitch in a model of legs, can be off by much where it hardly moves.
+    pub fn share_of(&self, other: &Self) -> f64 {
+        let shares = self.latent.iter().zip(&other.latent);
+        shares.map(|(own, other)| own / other).sum::<f64>() / self.latent.len() as f64
+    }
+}
+
+/// One stage of a recording in latent coordinates.
+#[derive(Debug, Clone)]
+pub(super) struct RecordedStage {
+    pub phase: usize,
+    pub duration_s: f64,
+    /// `(z, dz)` at the beginning and at the end.
+    pub start: (DVector<f64>, DVector<f64>),
+    pub end: (DVector<f64>, DVector<f64>),
+    /// Mean latent input.
+    pub input: DVector<f64>,
+}
+
+/// The stages of a recording that lie within one phase, one after the other.
+///
+/// # Errors
+/// As [`LatentSegment::encode`].
+pub(super) fn recorded_stages(
+    model: &ReducedModel,
+    recording: &Recording,
+    step_s: f64,
+) -> Result<Vec<RecordedStage>, EvaluateError> {
+    let mut stages = Vec::new();
+    for segment in &recording.segments {
+        let latent = LatentSegment::encode(model, segment)?;
+        let at = |sample: usize| {
+            let column = |rows: &nalgebra::DMatrix<f64>| rows.column(sample).into_owned();
+            (column(&latent.z), column(&latent.dz))
+        };
+        let samples = super::along_recording::control_samples(&latent.time_s, step_s);
+        for pair in samples.windows(2) {
+            let (first, last) = (pair[0], pair[1]);
+            let phase = latent.phase[first];
+            if latent.phase[first..=last]
+                .iter()
+                .any(|other| *other != phase)
+            {
+                continue;
+            }
+            let held = latent.u_lat.columns(first, last - first);
+            stages.push(RecordedStage {
+                phase,
+                duration_s: latent.time_s[last] - latent.time_s[first],
+                start: at(first),
+                end: at(last),
+                input: held.column_mean(),
+            });
+        }
+    }
+    Ok(stages)
+}
+
+/// How a stage's end is predicted from its beginning.
+pub(super) enum Predictor<'a> {
+    /// By a model's dynamics, the input held at its mean.
+    Model(&'a ReducedModel),
+    /// The velocity stays what it is.
+    ConstantVelocity,
+}
+
+/// The error of predictions over all stages, decoded by `maps`; none without stages.
+///
+/// # Errors
+/// [`EvaluateError::Lower`] if the dynamics do not compile, [`EvaluateError::Model`] for a latent-only model.
+pub(super) fn prediction_error(
+    maps: &ReducedModel,
+    predictor: &Predictor<'_>,
+    stages: &[RecordedStage],
+) -> Result<Option<PredictionError>, EvaluateError> {
+    let mut compiled = match predictor {
+        Predictor::Model(model) => Some(CompiledModel::new(model)?),
+        Predictor::ConstantVelocity => None,
+    };
+    let mut squares = DVector::zeros(maps.decoder_map()?.output_dim());
+    let mut latent = DVector::zeros(maps.latent_dim());
+    for stage in stages {
+        let (mut z, mut dz) = stage.start.clone();
+        match &mut compiled {
+            None => z += &dz * stage.duration_s,
+            Some(compiled) => compiled.rk4_step(
+                stage.phase,
+                z.as_mut_slice(),
+                dz.as_mut_slice(),
+                stage.input.as_slice(),
+                stage.duration_s,
+            ),
+        }
+        let error = maps.decode(&z)? - maps.decode(&stage.end.0)?;
+        squares += error.component_mul(&error);
+        let error = z - &stage.end.0;
+        latent += error.component_mul(&error);
+    }
+    let count = stages.len() as f64;
+    let rms = |first: usize, rows: usize| {
+        (squares.rows(first, rows).sum() / (count * rows as f64)).sqrt()
+    };
+    Ok((!stages.is_empty()).then(|| PredictionError {
+        body_x_m: rms(JOINT_DIM, 1),
+        body_z_m: rms(JOINT_DIM + 2, 1),
+        pitch_rad: rms(JOINT_DIM + 4, 1),
+        joints_rad: rms(0, JOINT_DIM),
+        latent: latent.iter().map(|sum| (sum / count).sqrt()).collect(),
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{artifact, recording};
+
+    #[test]
+    fn pitch_without_a_latent_coordinate_does_not_make_right_predictions_fail() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let model = artifact::read(&root.join("models/go1-d6.json")).expect("shipped");
+        let jump = root.join("examples/recordings/go1-other/jump_04.csv.gz");
+        let jump = recording::read(&jump).expect("shipped");
+        let stages = recorded_stages(&model, &jump, 0.01).expect("of its robot");
+        let error = |predictor| {
+            let error = prediction_error(&model, &predictor, &stages);
+            error.expect("complete").expect("stages")
+        };
+        let own = error(Predictor::Model(&model));
+        let constant = error(Predictor::ConstantVelocity);
+        assert!(own.pitch_rad > 2.0 * constant.pitch_rad, "{own:?}");
+        assert_eq!(own.latent.len(), 6);
+        let share = own.share_of(&constant);
+        assert!(share < 0.7, "{share}: {own:?} {constant:?}");
+    }
+}

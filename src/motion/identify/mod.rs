@@ -1,0 +1,36 @@
+//! What recordings say of the robot: gravity, mass, the joints' losses, the legs' own inertia.
+//!
+//! Enters: recordings and the robot's geometry. Leaves: an [`Identification`], each value with its
+//! standard error, and the file that keeps it. [`clock`](crate::recording::clock) mends segments whose time
+//! stamps disagree with their motion, [`motion`] has the directions of the links and their accelerations,
+//! [`equations`] the linear equations that these obey at every sample, [`windows`] their averages
+//! over short windows, [`fit`] the weighted least squares, [`estimate`] the loop around it,
+//! [`file`](mod@file) the result on disk. Read [`estimate`] first;
+//! `docs/identify.md` has the method and measured figures.
+//!
+//! ```
+//! use std::path::Path;
+//! use romc::identify::identify;
+//! use romc::robot::Robot;
+//!
+//! let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/recordings/go1/test_01.csv.gz");
+//! let found = identify(&[romc::recording::read(&path)?], Robot::by_name("go1")?)?;
+//! assert!((found.gravity_m_s2 - 9.81).abs() < 0.2);
+//! assert!((found.mass_kg - 12.74).abs() < 0.6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod equations;
+pub mod estimate;
+pub mod file;
+pub mod fit;
+pub mod identification;
+pub mod motion;
+pub mod parameters;
+pub mod windows;
+
+mod error;
+
+pub use error::{IdentifyError, IdentifyFault};
+pub use estimate::identify;
+pub use identification::{Fit, Identification, Legs, PerKind, StandardError};

@@ -1,0 +1,30 @@
+//! The latent-space model-predictive controller: measured state in, joint torques out.
+//!
+//! In: a [`ReducedModel`](crate::model::ReducedModel) with encoder, decoder, robot and input
+//! statistics; a reference trajectory; measurements. Out: a [`Command`] a control step, whose torques
+//! are within the robot's limits whatever happened, and a [`Status`] that says what did.
+//!
+//! `of_model` takes from the model what the controller needs; `online` is the controller itself,
+//! the folder that is emitted for a robot. Read `online/problem` first, which states the optimal
+//! control problem. From there one torque is made by `reference` (what to follow, encoded), `horizon` (phases and linearised dynamics of the stages,
+//! with `linearise`), `layout` and `transcribe` (the conic program), `qp` (clarabel, and the check of what it
+//! returns), `controller` (plan to command; what to do without a plan) and, if asked for, `lift`
+//! (torques that the ground can answer).
+//! [`evaluate::along_recording()`](crate::evaluate::along_recording()) runs it all on recorded jumps.
+
+mod error;
+mod named;
+mod of_model;
+mod online;
+
+pub use error::MpcError;
+pub use online::*;
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_range_of_the_horizon_ends_where_the_controller_does() {
+        let ends = crate::limits::table::HORIZON.ends();
+        assert_eq!(ends[1] as usize, super::MAX_HORIZON);
+    }
+}

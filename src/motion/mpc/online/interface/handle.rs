@@ -1,0 +1,408 @@
+//! A controller that C holds by its address.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use super::super::command::{Command, Status};
+use super::super::controller::{Controller, Measurement};
+use super::super::error::ControlError;
+use super::super::reference::ReferenceSamples;
+use super::super::settings::MpcSettings;
+use super::codes::{BAD_POINTER, INTERNAL, guarded, report};
+use super::settings::Settings;
+use super::values::{RawCommand, RawMeasurement, RawReference};
+use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM};
+
+/// A controller with the memory that its interface needs; `D` latent coordinates.
+#[derive(Debug)]
+pub struct Handle<const D: usize> {
+    controller: Controller,
+    command: Command,
+    last: RawCommand<D>,
+    /// A panic was caught: what the controller holds may contradict itself.
+    is_broken: bool,
+}
+
+impl<const D: usize> Handle<D> {
+    /// Builds a controller with `build`, from settings or the defaults; a message is left for
+    /// [`last_error`](super::last_error) if there is none to be made.
+    pub fn create(
+        settings: Option<&Settings>,
+        build: impl FnOnce(MpcSettings) -> Result<Controller, ControlError>,
+    ) -> Option<Box<Self>> {
+        let made = guarded(|| {
+            let settings = settings.copied().unwrap_or_default().to_mpc()?;
+            let controller = build(settings)?;
+            let last = RawCommand::at_rest(controller.plant().robot(), Status::NoReference.code());
+            Ok(Box::new(Self {
+                command: Command::zeros(controller.plant().latent_dim()),
+                controller,
+                last,
+                is_broken: false,
+            }))
+        });
+        made.ok()
+    }
+
+    /// Takes a trajectory to follow; 0, or a code with a message for [`last_error`](super::last_error). A refused
+    /// trajectory leaves the old one.
+    pub fn set_reference(&mut self, raw: &RawReference<'_>) -> i32 {
+        let is_missing = |name: &str| {
+            report(&format!("reference: `{name}` is null or not aligned"));
+            BAD_POINTER
+        };
+        let Some(time_s) = raw.time_s else {
+            return is_missing("time_s");
+        };
+        let Some(x) = raw.x else {
+            return is_missing("x");
+        };
+        let Some(dx) = raw.dx else {
+            return is_missing("dx");
+        };
+        let Some(feet) = raw.feet else {
+            return is_missing("feet");
+        };
+        let u = match raw.u {
+            None => None,
+            Some(Some(u)) => Some(u),
+            Some(None) => return is_missing("u"),
+        };
+        let controller = &mut self.controller;
+        let taken = guarded(|| {
+            let feet: Vec<ContactFlags> = feet.chunks_exact(FOOT_DIM).map(contact).collect();
+            controller.set_reference(ReferenceSamples {
+                time_s,
+                x,
+                dx,
+                u,
+                feet: &feet,
+            })
+        });
+        match taken {
+            Ok(()) => {
+                self.is_broken = false;
+                Status::Solved.code()
+            }
+            Err(code) => {
+                self.is_broken |= code == INTERNAL;
+                code
+            }
+        }
+    }
+
+    /// Computes the command for a measurement; returns its status.
+    pub fn step(&mut self, raw: &RawMeasurement<'_>, out: &mut RawCommand<D>) -> i32 {
+        if self.is_broken {
+            *out = self.safe(INTERNAL);
+            return INTERNAL;
+        }
+        let has_all = raw.x.is_some() && raw.dx.is_some() && raw.feet.is_some();
+        let measurement = Measurement {
+            time_s: raw.time_s,
+            // No values are the wrong number of them: the controller falls back.
+            x: raw.x.filter(|_| has_all).unwrap_or(&[]),
+            dx: raw.dx.filter(|_| has_all).unwrap_or(&[]),
+            feet: raw.feet.map_or([false; FOOT_DIM], contact),
+        };
+        let (controller, command) = (&mut self.controller, &mut self.command);
+        let stepped = catch_unwind(AssertUnwindSafe(|| {
+            controller.step_into(measurement, command);
+        }));
+        if stepped.is_err() {
+            self.is_broken = true;
+            *out = self.safe(INTERNAL);
+            return INTERNAL;
+        }
+        *out = RawCommand {
+            torque: command.torque_nm,
+            joint_position: command.joint_position_rad,
+            joint_velocity: command.joint_velocity_rad_s,
+            u_lat: std::array::from_fn(|latent| command.u_lat[latent]),
+            status: match has_all {
+                true => command.status.code(),
+                false => BAD_POINTER,
+            },
+            iterations: command.iterations as i32,
+            solve_us: command.solve_us,
+        };
+        self.last = *out;
+        out.status
+    }
+
+    /// Forgets plan and past measurements, but not the reference.
+    pub fn reset(&mut self) {
+        let controller = &mut self.controller;
+        if catch_unwind(AssertUnwindSafe(|| controller.reset())).is_err() {
+            self.is_broken = true;
+        }
+    }
+
+    /// No torque, at the posture of the last command.
+    fn safe(&self, status: i32) -> RawCommand<D> {
+        RawCommand {
+            torque: [0.0; JOINT_DIM],
+            joint_velocity: [0.0; JOINT_DIM],
+            u_lat: [0.0; D],
+            iterations: 0,
+            solve_us: 0.0,
+            status,
+            ..self.last
+        }
+    }
+}
+
+/// Feet in contact of four flags; zero is in the air.
+fn contact(flags: &[u8]) -> ContactFlags {
+    std::array::from_fn(|foot| flags.get(foot).is_some_and(|&flag| flag != 0))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ffi::CStr;
+
+    use nalgebra::DMatrix;
+
+    use super::super::codes::{TIME_ORDER, last_error};
+    use super::*;
+    use crate::mpc::online::LatentDynamics;
+
+    /// Equations that panic.
+    #[derive(Debug)]
+    struct Broken;
+
+    impl LatentDynamics for Broken {
+        fn jacobian(
+            &mut self,
+            _: usize,
+            _: &[f64],
+            _: &[f64],
+            _: &[f64],
+            _: &mut [f64],
+            _: &mut DMatrix<f64>,
+        ) {
+            panic!("equations that panic");
+        }
+    }
+
+    fn handle(is_broken: bool) -> Box<Handle<4>> {
+        let path =
+            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/go1-d4.json");
+        let model = crate::artifact::read(&path).expect("a shipped model");
+        Handle::create(None, |settings| {
+            let controller = Controller::new(&model, settings).expect("a complete model");
+            if !is_broken {
+                return Ok(controller);
+            }
+            Controller::with_plant(controller.plant().clone(), Box::new(Broken), settings)
+        })
+        .expect("default settings")
+    }
+
+    /// A robot that stands for 0.2 s.
+    struct Stand {
+        time_s: Vec<f64>,
+        x: Vec<f64>,
+        zeros: Vec<f64>,
+        feet: Vec<u8>,
+    }
+
+    impl Stand {
+        fn new() -> Self {
+            let stand = [0.0, 0.8, -1.6].repeat(4);
+            let x = [stand, vec![0.0, 0.0, 0.3, 0.0, 0.0, 0.0]].concat();
+            Self {
+                time_s: (0..100).map(|sample| 0.002 * f64::from(sample)).collect(),
+                x: x.repeat(100),
+                zeros: vec![0.0; 1800],
+                feet: vec![1; 400],
+            }
+        }
+
+        fn reference(&self) -> RawReference<'_> {
+            RawReference {
+                time_s: Some(&self.time_s),
+                x: Some(&self.x),
+                dx: Some(&self.zeros),
+                u: Some(Some(&self.zeros)),
+                feet: Some(&self.feet),
+            }
+        }
+
+        fn measurement(&self) -> RawMeasurement<'_> {
+            RawMeasurement {
+                time_s: 0.0,
+                x: Some(&self.x[..18]),
+                dx: Some(&self.zeros[..18]),
+                feet: Some(&self.feet[..4]),
+            }
+        }
+    }
+
+    fn message() -> String {
+        // SAFETY: the text lives until the next refusal on this thread.
+        let text = unsafe { CStr::from_ptr(last_error()) };
+        text.to_string_lossy().into_owned()
+    }
+
+    #[test]
+    fn settings_out_of_range_make_no_controller_and_say_which() {
+        let base = Settings::default();
+        let bad = [
+            (
+                "horizon",
+                Settings {
+                    horizon: -1,
+                    ..base
+                },
+            ),
+            ("horizon", Settings { horizon: 0, ..base }),
+            ("lift", Settings { lift: 2, ..base }),
+            (
+                "linearisation",
+                Settings {
+                    linearisation: -1,
+                    ..base
+                },
+            ),
+            (
+                "max_iterations",
+                Settings {
+                    max_iterations: -3,
+                    ..base
+                },
+            ),
+            (
+                "step_s",
+                Settings {
+                    step_s: f64::NAN,
+                    ..base
+                },
+            ),
+            (
+                "body_friction",
+                Settings {
+                    body_friction: -0.6,
+                    ..base
+                },
+            ),
+        ];
+        for (name, settings) in bad {
+            let found = Handle::<4>::create(Some(&settings), |settings| {
+                settings.check()?;
+                panic!("{name} was accepted");
+            });
+            assert!(found.is_none());
+            assert!(message().contains(name), "{name}: {}", message());
+        }
+    }
+
+    #[test]
+    fn reference_with_a_fault_is_refused_with_its_code_and_the_old_one_stays() {
+        let stand = Stand::new();
+        let mut handle = handle(false);
+        assert_eq!(handle.set_reference(&stand.reference()), 0);
+        let sound = stand.reference();
+        let mut nan = stand.x.clone();
+        nan[20] = f64::NAN;
+        let mut repeated = stand.time_s.clone();
+        repeated[7] = repeated[6];
+        let faults = [
+            (BAD_POINTER, RawReference { x: None, ..sound }),
+            (
+                BAD_POINTER,
+                RawReference {
+                    feet: None,
+                    ..sound
+                },
+            ),
+            (
+                BAD_POINTER,
+                RawReference {
+                    u: Some(None),
+                    ..sound
+                },
+            ),
+            (
+                -1,
+                RawReference {
+                    x: Some(&nan),
+                    ..sound
+                },
+            ),
+            (
+                -2,
+                RawReference {
+                    x: Some(&stand.x[1..]),
+                    ..sound
+                },
+            ),
+            (
+                -2,
+                RawReference {
+                    time_s: Some(&[]),
+                    ..sound
+                },
+            ),
+            (
+                TIME_ORDER,
+                RawReference {
+                    time_s: Some(&repeated),
+                    ..sound
+                },
+            ),
+        ];
+        for (expected, reference) in faults {
+            assert_eq!(handle.set_reference(&reference), expected, "{}", message());
+        }
+        let mut command = RawCommand::at_rest(handle.controller.plant().robot(), 99);
+        assert_eq!(handle.step(&stand.measurement(), &mut command), 0);
+        assert_eq!(handle.set_reference(&RawReference { u: None, ..sound }), 0);
+    }
+
+    #[test]
+    fn measurement_without_values_gets_a_safe_command_and_the_next_one_a_plan() {
+        let stand = Stand::new();
+        let mut handle = handle(false);
+        let mut command = RawCommand::at_rest(handle.controller.plant().robot(), 99);
+        assert_eq!(handle.step(&stand.measurement(), &mut command), -3);
+        assert_eq!(handle.set_reference(&stand.reference()), 0);
+        let sound = stand.measurement();
+        let no_state = RawMeasurement { x: None, ..sound };
+        assert_eq!(handle.step(&no_state, &mut command), BAD_POINTER);
+        assert!(command.torque.iter().all(|torque| torque.abs() <= 23.7));
+        let no_feet = RawMeasurement {
+            feet: None,
+            ..sound
+        };
+        assert_eq!(handle.step(&no_feet, &mut command), BAD_POINTER);
+        let not_finite = RawMeasurement {
+            time_s: f64::NAN,
+            ..sound
+        };
+        assert_eq!(handle.step(&not_finite, &mut command), -1);
+        assert_eq!(handle.step(&sound, &mut command), 0);
+        handle.reset();
+        assert_eq!(handle.step(&sound, &mut command), 0);
+    }
+
+    #[test]
+    fn panic_inside_a_step_becomes_a_code_with_the_last_posture_and_no_torque() {
+        let stand = Stand::new();
+        let mut handle = handle(true);
+        assert_eq!(handle.set_reference(&stand.reference()), 0);
+        let mut command = RawCommand::at_rest(handle.controller.plant().robot(), 99);
+        let rest = command.joint_position;
+        for _ in 0..2 {
+            assert_eq!(handle.step(&stand.measurement(), &mut command), INTERNAL);
+            assert_eq!((command.status, command.torque), (INTERNAL, [0.0; 12]));
+            assert_eq!(command.joint_position, rest);
+        }
+        // Without an input the reference asks the equations for one.
+        let no_input = RawReference {
+            u: None,
+            ..stand.reference()
+        };
+        assert_eq!(handle.set_reference(&no_input), INTERNAL);
+        assert!(message().contains("broke down"));
+    }
+}

@@ -1,0 +1,355 @@
+//! Recordings that are read when they are needed: memory holds a few of them, however many there are.
+
+use std::path::PathBuf;
+use std::sync::mpsc::sync_channel;
+use std::sync::{Arc, OnceLock};
+
+use super::check::{Finding, check};
+use super::condition::{
+    ConditionOptions, Conditioned, ImplausibleSamples, SmoothedRows, conditioned,
+};
+use super::error::RecordingError;
+use super::mismatch::{Mismatch, mismatches};
+use super::reader::{Reader, Reading, ReadingNotes};
+use super::segment::{Recording, Segment};
+use super::smoothing::SavitzkyGolay;
+use crate::robot::Robot;
+
+/// Half the window over which rows of late samples are smoothed, in s.
+const HALF_SMOOTHING_S: f64 = 0.015;
+/// Degree of the polynomials that smooth them.
+const SMOOTHING_ORDER: usize = 3;
+
+/// Recordings, held in memory or read from their files again each time.
+#[derive(Clone, Debug)]
+pub enum Source<'a> {
+    /// Held in memory.
+    Held(&'a [Recording]),
+    /// Read when they are needed.
+    Files(Arc<RecordingFiles>),
+}
+
+impl<'a> From<&'a [Recording]> for Source<'a> {
+    fn from(recordings: &'a [Recording]) -> Self {
+        Self::Held(recordings)
+    }
+}
+
+impl<'a> From<&'a Vec<Recording>> for Source<'a> {
+    fn from(recordings: &'a Vec<Recording>) -> Self {
+        Self::Held(recordings)
+    }
+}
+
+impl<'a, const N: usize> From<&'a [Recording; N]> for Source<'a> {
+    fn from(recordings: &'a [Recording; N]) -> Self {
+        Self::Held(recordings)
+    }
+}
+
+impl From<&Arc<RecordingFiles>> for Source<'_> {
+    fn from(files: &Arc<RecordingFiles>) -> Self {
+        Self::Files(Arc::clone(files))
+    }
+}
+
+impl Source<'_> {
+    /// Passes every recording to `take`, in order.
+    ///
+    /// # Errors
+    /// The first that reading, conditioning or `take` has.
+    pub fn for_each<E: From<RecordingError>>(
+        &self,
+        mut take: impl FnMut(&Recording) -> Result<(), E>,
+    ) -> Result<(), E> {
+        match self {
+            Self::Held(recordings) => recordings.iter().try_for_each(take),
+            Self::Files(files) => files.for_each(|recording| take(&recording)),
+        }
+    }
+}
+
+/// Files of recordings, checked and conditioned each time they are read.
+#[derive(Debug)]
+pub struct RecordingFiles {
+    files: Vec<RecordingFile>,
+    robot: &'static Robot,
+    options: ConditionOptions,
+    reader: Reader,
+    notes: OnceLock<Notes>,
+}
+
+/// A file, or some of its segments.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordingFile {
+    /// Where it is.
+    pub path: PathBuf,
+    /// The segments to take, each as a recording of its own; `None` for the whole file as one recording.
+    pub segments: Option<Vec<usize>>,
+}
+
+/// What the checks found when the files were first read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Notes {
+    /// Implausible runs of samples with their files.
+    pub findings: Vec<(PathBuf, Finding)>,
+    /// What cannot be true of the robot, with the files.
+    pub mismatches: Vec<(PathBuf, Mismatch)>,
+    /// Number of samples that were left out.
+    pub left_out: usize,
+    /// What reading did besides reading.
+    pub reading: ReadingNotes,
+}
+
+impl RecordingFiles {
+    /// Files of recordings of `robot`; nothing is read yet.
+    pub fn new(
+        files: Vec<RecordingFile>,
+        robot: &'static Robot,
+        options: ConditionOptions,
+    ) -> Self {
+        Self {
+            files,
+            robot,
+            options,
+            reader: Reader::default(),
+            notes: OnceLock::new(),
+        }
+    }
+
+    /// The same files, read by this reader.
+    pub fn read_by(self, reader: Reader) -> Self {
+        Self { reader, ..self }
+    }
+
+    /// The files.
+    pub fn files(&self) -> &[RecordingFile] {
+        &self.files
+    }
+
+    /// Whether there is no file.
+    pub fn is_empty(&self) -> bool {
+        self.files.is_empty()
+    }
+
+    /// What the first reading found, also if it ended early; empty before it.
+    pub fn notes(&self) -> Notes {
+        self.notes.get().cloned().unwrap_or_default()
+    }
+
+    /// The recordings of the first `count` files, neither checked nor conditioned, with clocks as recorded.
+    ///
+    /// # Errors
+    /// As [`Reader::read`].
+    pub fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
+        let mut recordings = Vec::new();
+        for file in self.files.iter().take(count) {
+            let reading = self.reader.as_stamped().read(&file.path)?;
+            recordings.extend(chosen(file, reading.recording));
+        }
+        Ok(recordings)
+    }
+
+    /// Reads all files and passes every recording to `take`, in order. Two files at a time are decoded on threads of
+    /// their own where there are two cores.
+    ///
+    /// # Errors
+    /// The first that reading, conditioning or `take` has.
+    pub fn for_each<E: From<RecordingError>>(
+        &self,
+        mut take: impl FnMut(Recording) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut notes = Notes::default();
+        let result = self.in_order(|recordings| {
+            let (recordings, reading) = recordings?;
+            notes.reading.add(&reading);
+            for ready in recordings {
+                let path = &ready.recording.path;
+                let found = ready.findings.into_iter();
+                (notes.findings).extend(found.map(|finding| (path.clone(), finding)));
+                let unlike = ready.mismatches.into_iter();
+                (notes.mismatches).extend(unlike.map(|mismatch| (path.clone(), mismatch)));
+                notes.left_out += ready.left_out;
+                take(ready.recording)?;
+            }
+            Ok(())
+        });
+        self.notes.get_or_init(|| notes);
+        result
+    }
+
+    fn in_order<E: From<RecordingError>>(
+        &self,
+        mut take: impl FnMut(Result<Ready, RecordingError>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = threads.clamp(1, 2);
+        if threads == 1 || self.files.len() < 2 {
+            return (self.files.iter()).try_for_each(|file| take(self.read(file)));
+        }
+        std::thread::scope(|scope| {
+            let readers = (0..threads).map(|first| {
+                let (sender, receiver) = sync_channel(1);
+                scope.spawn(move || {
+                    let own = self.files.iter().skip(first).step_by(threads);
+                    // nobody listens any more after an error
+                    own.map(|file| sender.send(self.read(file)))
+                        .find(Result::is_err)
+                });
+                receiver
+            });
+            let readers: Vec<_> = readers.collect();
+            (0..self.files.len()).try_for_each(|index| {
+                let next = readers[index % threads].recv();
+                take(next.expect("invariant: a thread sends each of its files"))
+            })
+        })
+    }
+
+    /// The steps for one recording: where times were rebuilt, which is where samples came late or were lost, rows are
+    /// smoothed unless a filter is asked for.
+    fn options_for(
+        &self,
+        reading: &mut Reading,
+        recording: &Recording,
+    ) -> Result<ConditionOptions, RecordingError> {
+        let mut options = self.options.clone();
+        let rebuilt = reading
+            .mended
+            .iter()
+            .any(|mended| mended.elapsed_ratio.is_some());
+        let step_s = recording
+            .segments
+            .iter()
+            .map(Segment::mean_step_s)
+            .fold(0.0, f64::max);
+        let half = (HALF_SMOOTHING_S / step_s).round();
+        let window = if half.is_finite() {
+            2 * half as usize + 1
+        } else {
+            1
+        };
+        let fits = recording
+            .segments
+            .iter()
+            .all(|segment| segment.len() >= window);
+        if options.smoothing.is_none() && rebuilt && window > SMOOTHING_ORDER && fits {
+            let filter = SavitzkyGolay::new(window, SMOOTHING_ORDER)?;
+            options.smoothing = Some((filter, SmoothedRows::All));
+            reading.notes.push(format!(
+                "rows are smoothed (--smooth {window},{SMOOTHING_ORDER} --smooth-rows all)"
+            ));
+        }
+        Ok(options)
+    }
+
+    /// The recordings of one file, and its reading without samples. Checks that only report are made once.
+    fn read(&self, file: &RecordingFile) -> Result<Ready, RecordingError> {
+        let mut reading = self.reader.read(&file.path)?;
+        let empty = Recording {
+            path: file.path.clone(),
+            segments: Vec::new(),
+            ignored_columns: Vec::new(),
+        };
+        let recording = std::mem::replace(&mut reading.recording, empty);
+        let options = self.options_for(&mut reading, &recording)?;
+        let keeps = self.options.implausible == ImplausibleSamples::Keep;
+        let is_first = self.notes.get().is_none();
+        let ready = chosen(file, recording).into_iter().map(|recording| {
+            let findings = match keeps && !is_first {
+                true => Vec::new(),
+                false => check(&recording, self.robot),
+            };
+            let unlike = match is_first {
+                true => mismatches(&recording, self.robot),
+                false => Vec::new(),
+            };
+            Ok::<_, RecordingError>(Conditioned {
+                mismatches: unlike,
+                ..conditioned(recording, findings, &options)?
+            })
+        });
+        Ok((ready.collect::<Result<_, _>>()?, reading))
+    }
+}
+
+/// The recordings of one file, conditioned, and what reading did.
+type Ready = (Vec<Conditioned>, Reading);
+
+/// The whole recording of a file, or the segments that are asked for.
+fn chosen(file: &RecordingFile, recording: Recording) -> Vec<Recording> {
+    match &file.segments {
+        None => vec![recording],
+        Some(chosen) => single_segments(recording, chosen),
+    }
+}
+
+/// A recording for each chosen segment.
+fn single_segments(recording: Recording, chosen: &[usize]) -> Vec<Recording> {
+    let single = |segment| Recording {
+        path: recording.path.clone(),
+        segments: vec![segment],
+        ignored_columns: recording.ignored_columns.clone(),
+    };
+    let segments = recording.segments.into_iter().enumerate();
+    segments
+        .filter(|(index, _)| chosen.contains(index))
+        .map(|(_, segment)| single(segment))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn files(names: &[&str], segments: Option<Vec<usize>>) -> RecordingFiles {
+        let folder =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/recordings/go1-noisy");
+        let file = |name: &&str| RecordingFile {
+            path: folder.join(name),
+            segments: segments.clone(),
+        };
+        let go1 = Robot::by_name("go1").expect("known");
+        let files = names.iter().map(file).collect();
+        RecordingFiles::new(files, go1, ConditionOptions::default())
+    }
+
+    #[test]
+    fn recordings_come_in_the_order_of_their_files_and_are_the_same_again() {
+        let names = [1, 2, 3, 4].map(|i| format!("train_0{i}.csv.gz"));
+        let files = Arc::new(files(&names.each_ref().map(String::as_str), Some(vec![0])));
+        let source = Source::from(&files);
+        let all = || {
+            let mut all = Vec::new();
+            let kept = source.for_each(|recording| {
+                all.push(recording.clone());
+                Ok::<_, RecordingError>(())
+            });
+            kept.expect("shipped recordings");
+            all
+        };
+        let (first, second) = (all(), all());
+        for (recording, name) in first.iter().zip(&names) {
+            assert!(recording.path.ends_with(name));
+            assert_eq!(recording.segments.len(), 1);
+        }
+        assert_eq!(first.len(), 4);
+        assert_eq!(first, second);
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_read_ends_the_visit_at_its_place() {
+        let files = files(&["train_01.csv.gz", "missing.csv", "train_02.csv.gz"], None);
+        let mut seen = 0;
+        let error = files.for_each(|_| {
+            seen += 1;
+            Ok::<_, RecordingError>(())
+        });
+        let error = error.expect_err("no such file");
+        let error = error.to_string();
+        assert!(error.ends_with("missing.csv: no such file"), "{error}");
+        assert_eq!(seen, 1);
+    }
+}

@@ -1,0 +1,480 @@
+//! The candidate library over whole batches of samples, forwards and backwards.
+//!
+//! Each step of the library's tape is computed for all samples of a batch before the next one starts, with the vector
+//! units of the machine. The reverse sweep turns the gradient with respect to the terms into the gradient with respect
+//! to `z`, `dz` and `u_lat`, exactly.
+
+use nalgebra::DMatrix;
+
+use crate::ir::sin_cos::{LIMIT, reduced_sin_cos, sin_cos};
+use crate::model::{Library, Step, Tape};
+use crate::symbolic::Function;
+use crate::train::vectors::{self, Loop};
+
+/// A library over batches.
+#[derive(Clone, Debug)]
+pub struct Features {
+    tape: Tape,
+    texts: Vec<String>, // every term as the model file writes it
+    latent_dim: usize,
+}
+
+/// Values of all steps on one batch, reused between batches.
+#[derive(Clone, Debug, Default)]
+pub struct FeatureValues {
+    values: Vec<Vec<f64>>,
+    adjoints: Vec<Vec<f64>>,
+}
+
+impl Features {
+    /// Prepares the terms of `library`.
+    pub fn new(library: &Library) -> Self {
+        let texts = library.terms().iter().map(|term| term.text().to_owned());
+        Self {
+            tape: library.tape().clone(),
+            texts: texts.collect(),
+            latent_dim: library.latent_dim(),
+        }
+    }
+
+    /// Number of terms.
+    pub fn library_dim(&self) -> usize {
+        self.tape.terms.len()
+    }
+
+    /// A term as the model file writes it.
+    pub fn text(&self, term: usize) -> &str {
+        &self.texts[term]
+    }
+
+    /// Number of latent coordinates.
+    pub fn latent_dim(&self) -> usize {
+        self.latent_dim
+    }
+
+    /// For every term whether it is affine in `z`, `dz` and `u_lat`: dynamics of such terms do not run away within the
+    /// time of a jump.
+    pub fn affine_terms(&self) -> Vec<bool> {
+        // 0 constant, 1 affine, 2 anything else
+        let mut degree: Vec<u32> = Vec::with_capacity(self.tape.steps.len());
+        for step in &self.tape.steps {
+            let of = |at: &usize| degree[*at];
+            let bent = |inside: u32| if inside == 0 { 0 } else { 2 };
+            degree.push(match step {
+                Step::Number(_) => 0,
+                Step::Variable(_) => 1,
+                Step::Sum(parts) => parts.iter().map(of).max().unwrap_or(0),
+                Step::Product(parts) => parts.iter().map(of).sum::<u32>().min(2),
+                Step::Integer(base, 1) => of(base),
+                Step::Integer(inner, _)
+                | Step::Sine(inner)
+                | Step::Cosine(inner)
+                | Step::Apply(_, inner) => bent(of(inner)),
+                Step::Power(base, exponent) => bent(of(base).max(of(exponent))),
+            });
+        }
+        self.tape
+            .terms
+            .iter()
+            .map(|&step| degree[step] < 2)
+            .collect()
+    }
+
+    /// For every term whether it depends on a variable, counted over `z`, `dz`, `u_lat`.
+    pub fn depend_on(&self, variable: usize) -> Vec<bool> {
+        let mut depends: Vec<bool> = Vec::with_capacity(self.tape.steps.len());
+        for step in &self.tape.steps {
+            let of = |at: &usize| depends[*at];
+            depends.push(match step {
+                Step::Number(_) => false,
+                Step::Variable(own) => *own == variable,
+                Step::Sum(parts) | Step::Product(parts) => parts.iter().any(of),
+                Step::Integer(inner, _)
+                | Step::Sine(inner)
+                | Step::Cosine(inner)
+                | Step::Apply(_, inner) => of(inner),
+                Step::Power(base, exponent) => of(base) || of(exponent),
+            });
+        }
+        self.tape.terms.iter().map(|&step| depends[step]).collect()
+    }
+
+    /// The term that is 1.
+    pub fn constant_term(&self) -> Option<usize> {
+        self.term_of(|step| matches!(step, Step::Number(value) if *value == 1.0))
+    }
+
+    /// The term that is a variable, counted over `z`, `dz`, `u_lat`.
+    pub fn variable_term(&self, variable: usize) -> Option<usize> {
+        self.term_of(|step| matches!(step, Step::Variable(own) if *own == variable))
+    }
+
+    fn term_of(&self, wanted: impl Fn(&Step) -> bool) -> Option<usize> {
+        let mut terms = self.tape.terms.iter();
+        terms.position(|&step| wanted(&self.tape.steps[step]))
+    }
+
+    /// `Theta` (`n x library_dim`) from `variables` (`n x 3 latent_dim`, columns z, dz, u_lat).
+    pub fn evaluate(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) -> DMatrix<f64> {
+        self.forward(variables, values);
+        let mut theta = DMatrix::zeros(variables.nrows(), self.tape.terms.len());
+        for (mut column, &step) in theta.column_iter_mut().zip(&self.tape.terms) {
+            column.copy_from_slice(&values.values[step]);
+        }
+        theta
+    }
+
+    /// Values of one term after [`Self::forward`], one per sample.
+    #[inline(always)]
+    pub fn term<'a>(&self, values: &'a FeatureValues, term: usize) -> &'a [f64] {
+        &values.values[self.tape.terms[term]]
+    }
+
+    /// Adds to `gradient` (`n x 3 latent_dim`) what `theta_gradient` (`n x library_dim`) means for the variables.
+    ///
+    /// `values` must hold the forward pass of the same batch.
+    pub fn backward(
+        &self,
+        theta_gradient: &DMatrix<f64>,
+        values: &mut FeatureValues,
+        gradient: &mut DMatrix<f64>,
+    ) {
+        values.adjoints.resize(self.tape.steps.len(), Vec::new());
+        for adjoint in &mut values.adjoints {
+            adjoint.resize(theta_gradient.nrows(), 0.0);
+        }
+        vectors::run(Backward {
+            features: self,
+            theta_gradient,
+            values,
+            gradient: gradient.as_mut_slice(),
+        });
+    }
+
+    /// Computes every step for all samples; see [`Self::evaluate`] for the shape of `variables`.
+    pub fn forward(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) {
+        vectors::run(Forward {
+            steps: &self.tape.steps,
+            variables,
+            values: &mut values.values,
+        });
+    }
+}
+
+/// All steps in their order, compiled for several vector units.
+struct Forward<'a> {
+    steps: &'a [Step],
+    variables: &'a DMatrix<f64>,
+    values: &'a mut Vec<Vec<f64>>,
+}
+
+impl Loop for Forward<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self {
+            steps,
+            variables,
+            values,
+        } = self;
+        let n = variables.nrows();
+        values.resize(steps.len(), Vec::new());
+        for (index, step) in steps.iter().enumerate() {
+            let (earlier, rest) = values.split_at_mut(index);
+            if let Step::Cosine(_) = step {
+                continue;
+            }
+            let out = &mut rest[0];
+            out.clear();
+            match step {
+                Step::Number(value) => out.resize(n, *value),
+                Step::Variable(column) => {
+                    out.extend_from_slice(variables.column(*column).as_slice())
+                }
+                Step::Sum(parts) => fold(out, earlier, parts, n, 0.0, |a, b| a + b),
+                Step::Product(parts) if let [a, b] = parts[..] => {
+                    out.extend(earlier[a].iter().zip(&earlier[b]).map(|(a, b)| a * b))
+                }
+                Step::Product(parts) => fold(out, earlier, parts, n, 1.0, |a, b| a * b),
+                Step::Integer(base, 2) => out.extend(earlier[*base].iter().map(|v| v * v)),
+                Step::Integer(base, exponent) => {
+                    out.extend(earlier[*base].iter().map(|v| v.powi(*exponent)))
+                }
+                Step::Power(base, exponent) => {
+                    out.extend(
+                        earlier[*base]
+                            .iter()
+                            .zip(&earlier[*exponent])
+                            .map(|(b, e)| b.powf(*e)),
+                    );
+                }
+                Step::Sine(argument) => {
+                    let (sines, cosines) = rest.split_at_mut(1);
+                    both(&earlier[*argument], &mut sines[0], &mut cosines[0]);
+                }
+                Step::Cosine(_) => {} // done with its sine
+                Step::Apply(function, argument) => {
+                    out.extend(earlier[*argument].iter().map(|v| function.evaluate(*v)))
+                }
+            }
+        }
+    }
+}
+
+/// All steps in the opposite order, compiled for several vector units.
+struct Backward<'a> {
+    features: &'a Features,
+    theta_gradient: &'a DMatrix<f64>,
+    values: &'a mut FeatureValues,
+    gradient: &'a mut [f64],
+}
+
+impl Loop for Backward<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let FeatureValues { values, adjoints } = self.values;
+        let n = self.theta_gradient.nrows();
+        for adjoint in adjoints.iter_mut() {
+            adjoint.fill(0.0);
+        }
+        let columns = self.theta_gradient.as_slice().chunks_exact(n);
+        for (column, &step) in columns.zip(&self.features.tape.terms) {
+            add(&mut adjoints[step], column);
+        }
+        for (index, step) in self.features.tape.steps.iter().enumerate().rev() {
+            let (earlier, rest) = adjoints.split_at_mut(index);
+            add_adjoints(step, values, index, &rest[0], earlier);
+            if let Step::Variable(column) = *step {
+                add(&mut self.gradient[n * column..n * (column + 1)], &rest[0]);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn fold(
+    out: &mut Vec<f64>,
+    earlier: &[Vec<f64>],
+    parts: &[usize],
+    n: usize,
+    start: f64,
+    join: impl Fn(f64, f64) -> f64,
+) {
+    out.resize(n, start);
+    for &part in parts {
+        out.iter_mut()
+            .zip(&earlier[part])
+            .for_each(|(o, v)| *o = join(*o, *v));
+    }
+}
+
+#[inline(always)]
+fn add(out: &mut [f64], values: &[f64]) {
+    for (o, v) in out.iter_mut().zip(values) {
+        *o += v;
+    }
+}
+
+/// Sines and cosines of all arguments.
+#[inline(always)]
+fn both(arguments: &[f64], sines: &mut Vec<f64>, cosines: &mut Vec<f64>) {
+    sines.resize(arguments.len(), 0.0);
+    cosines.resize(arguments.len(), 0.0);
+    let each = arguments.iter().zip(sines).zip(cosines);
+    if arguments.iter().fold(0.0, |m: f64, v| m.max(v.abs())) <= LIMIT {
+        each.for_each(|((v, sine), cosine)| (*sine, *cosine) = reduced_sin_cos(*v));
+    } else {
+        each.for_each(|((v, sine), cosine)| (*sine, *cosine) = sin_cos(*v));
+    }
+}
+
+/// Adds a step's adjoint, times its derivatives, to the adjoints of its operands.
+#[inline(always)]
+fn add_adjoints(
+    step: &Step,
+    values: &[Vec<f64>],
+    own: usize,
+    adjoint: &[f64],
+    earlier: &mut [Vec<f64>],
+) {
+    match step {
+        Step::Number(_) | Step::Variable(_) => {}
+        Step::Sum(parts) => {
+            for &part in parts {
+                add(&mut earlier[part], adjoint);
+            }
+        }
+        Step::Product(parts) => {
+            for (position, &part) in parts.iter().enumerate() {
+                let mut others = parts.clone();
+                others.remove(position);
+                add_times(&mut earlier[part], adjoint, values, &others);
+            }
+        }
+        Step::Integer(base, 2) => {
+            add_times(&mut earlier[*base], adjoint, values, &[*base]);
+            add_times(&mut earlier[*base], adjoint, values, &[*base]);
+        }
+        Step::Integer(base, exponent) => {
+            for (i, a) in adjoint.iter().enumerate() {
+                earlier[*base][i] += a * f64::from(*exponent) * values[*base][i].powi(exponent - 1);
+            }
+        }
+        Step::Power(base, exponent) => {
+            for (i, a) in adjoint.iter().enumerate() {
+                let (b, e) = (values[*base][i], values[*exponent][i]);
+                earlier[*base][i] += a * e * b.powf(e - 1.0);
+                if b > 0.0 {
+                    earlier[*exponent][i] += a * values[own][i] * b.ln();
+                }
+            }
+        }
+        Step::Sine(argument) => {
+            add_times(&mut earlier[*argument], adjoint, values, &[own + 1]);
+        }
+        Step::Cosine(argument) => {
+            for ((e, a), sine) in earlier[*argument]
+                .iter_mut()
+                .zip(adjoint)
+                .zip(&values[own - 1])
+            {
+                *e -= a * sine;
+            }
+        }
+        Step::Apply(function, argument) => {
+            for (i, a) in adjoint.iter().enumerate() {
+                earlier[*argument][i] += a * slope(*function, values[*argument][i], values[own][i]);
+            }
+        }
+    }
+}
+
+/// Adds to `out` the adjoint times the values of the steps `factors`.
+#[inline(always)]
+fn add_times(out: &mut [f64], adjoint: &[f64], values: &[Vec<f64>], factors: &[usize]) {
+    match *factors {
+        [factor] => {
+            for ((o, a), v) in out.iter_mut().zip(adjoint).zip(&values[factor]) {
+                *o += a * v;
+            }
+        }
+        _ => {
+            for (i, (o, a)) in out.iter_mut().zip(adjoint).enumerate() {
+                *o += a * factors
+                    .iter()
+                    .map(|&other| values[other][i])
+                    .product::<f64>();
+            }
+        }
+    }
+}
+
+/// Derivative of `function` at `argument`, where it has the value `value`.
+fn slope(function: Function, argument: f64, value: f64) -> f64 {
+    match function {
+        Function::Sin => argument.cos(),
+        Function::Cos => -argument.sin(),
+        Function::Tan => 1.0 + value * value,
+        Function::Tanh => 1.0 - value * value,
+        Function::Exp => value,
+        Function::Log => 1.0 / argument,
+        Function::Sqrt => 0.5 / value,
+        Function::Abs => {
+            if argument == 0.0 {
+                0.0
+            } else {
+                argument.signum()
+            }
+        }
+        Function::Sign => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::random::Random;
+    use nalgebra::DVector;
+
+    fn library() -> Library {
+        let terms = [
+            "1",
+            "z1",
+            "dz2",
+            "z1*dz1*u2",
+            "sin(z1 + 2*z2)",
+            "cos(dz1)*z2",
+            "exp(-z1^2)",
+            "tanh(u1)/(2 + z2)",
+            "sqrt(2 + z1)",
+            "abs(z2)",
+            "log(3 + dz2)",
+            "tan(0.3*z1)",
+            "(2 + z1)^z2",
+        ];
+        Library::from_terms(2, &terms.map(String::from)).expect("terms parse")
+    }
+
+    #[test]
+    fn affine_terms_are_those_of_degree_one_at_most() {
+        let terms = [
+            "2",
+            "z1",
+            "3*dz2 - z1 + 1",
+            "u1/4",
+            "z1*u1",
+            "z1^2",
+            "sin(z1)",
+            "exp(dz1)",
+        ];
+        let library = Library::from_terms(2, &terms.map(String::from)).expect("terms parse");
+        let affine = Features::new(&library).affine_terms();
+        assert_eq!(affine, [true, true, true, true, false, false, false, false]);
+    }
+
+    #[test]
+    fn batch_values_equal_the_library_at_every_sample() {
+        let library = library();
+        let variables = Random::new(4).matrix(7, 6, 0.9);
+        let theta = Features::new(&library).evaluate(&variables, &mut FeatureValues::default());
+        for sample in 0..7 {
+            let block =
+                |i: usize| DVector::from(variables.row(sample).columns(2 * i, 2).transpose());
+            let expected = library
+                .evaluate(&block(0), &block(1), &block(2))
+                .expect("dimensions fit");
+            for term in 0..library.len() {
+                assert!(
+                    (theta[(sample, term)] - expected[term]).abs() < 1e-14,
+                    "{}",
+                    library.terms()[term].text()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn backward_pass_agrees_with_finite_differences_for_every_function() {
+        let features = Features::new(&library());
+        let variables = Random::new(8).matrix(3, 6, 0.9);
+        let weights = Random::new(9).matrix(3, features.library_dim(), 1.0);
+        let mut values = FeatureValues::default();
+        let loss = |at: &DMatrix<f64>| {
+            features
+                .evaluate(at, &mut FeatureValues::default())
+                .dot(&weights)
+        };
+        features.evaluate(&variables, &mut values);
+        let mut gradient = DMatrix::zeros(3, 6);
+        features.backward(&weights, &mut values, &mut gradient);
+        for index in 0..variables.len() {
+            let (mut above, mut below) = (variables.clone(), variables.clone());
+            above[index] += 1e-6;
+            below[index] -= 1e-6;
+            let difference = (loss(&above) - loss(&below)) / 2e-6;
+            assert!(
+                (difference - gradient[index]).abs() < 1e-7 * difference.abs().max(1.0),
+                "{index}"
+            );
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! What the encoder's rows are made of: rows that are held, and directions that the other rows combine.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::dataset::{Dataset, Jump, Rates};
+use super::error::TrainError;
+use super::metrics::{BODY_X, BODY_Z};
+use super::options::Coordinates;
+use crate::robot::{FeetRule, GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
+
+/// Pitch of the body among the 18 coordinates.
+const PITCH: usize = 16;
+/// Time over which accelerations in flight are averaged, in s.
+const WINDOW_S: f64 = 0.05;
+/// Samples left out at both ends of a flight, where feet still slip or already touch.
+const TRIM: usize = 4;
+/// Fewest averaged accelerations in flight that tell the centre of mass.
+const LEAST_WINDOWS: usize = 50;
+/// Ridge, relative to the mean square of all joints' accelerations: joints that move together share what they do, and
+/// one that hardly moves, whose part would be made of noise, has hardly any.
+const RIDGE: f64 = 1e-2;
+
+/// Rows of an encoder `W_e` before they are chosen, in scaled units.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Rows that every encoder has, as columns, `18 x h`.
+    pub held: DMatrix<f64>,
+    /// Orthonormal directions that the other rows combine, `18 x k`.
+    pub free: DMatrix<f64>,
+}
+
+impl Frame {
+    /// No row held, and the coordinates `active` to combine.
+    pub fn plain(active: &[usize]) -> Self {
+        Self {
+            held: DMatrix::zeros(STATE_DIM, 0),
+            free: DMatrix::identity(STATE_DIM, STATE_DIM).select_columns(active),
+        }
+    }
+
+    /// The frame of the options.
+    ///
+    /// With [`Coordinates::Named`] and two latent coordinates or more, the first two rows are the centre of mass
+    /// forwards and upwards (see `centre_of_mass`) and the others combine the sums of `active` coordinates left and
+    /// right that a mirror leaves alone: such an encoder knows nothing of `y`, roll and yaw, nor of left and right.
+    ///
+    /// # Errors
+    /// As [`Dataset::for_each`].
+    pub fn new(
+        training: &Dataset,
+        active: &[usize],
+        latent_dim: usize,
+        coordinates: Coordinates,
+        robot: &Robot,
+    ) -> Result<Self, TrainError> {
+        if coordinates == Coordinates::Free {
+            return Ok(Self::plain(active));
+        }
+        let body: &[usize] = if latent_dim < 2 {
+            &[BODY_X, BODY_Z]
+        } else {
+            &[]
+        };
+        let single = body.iter().chain(&[PITCH]).filter(|i| active.contains(i));
+        let mut free: Vec<DVector<f64>> = single.map(|&i| unit(i)).collect();
+        free.extend(mirrored_joints(active, robot));
+        Ok(Self {
+            held: match latent_dim {
+                0 | 1 => DMatrix::zeros(STATE_DIM, 0),
+                _ => centre_of_mass(training, robot)?,
+            },
+            free: match free.is_empty() {
+                true => DMatrix::zeros(STATE_DIM, 0),
+                false => DMatrix::from_columns(&free),
+            },
+        })
+    }
+
+    /// Largest number of latent coordinates.
+    pub fn dim(&self) -> usize {
+        self.held.ncols() + self.free.ncols()
+    }
+
+    /// The held rows and the `latent_dim - h` directions of the free space nearest to the space that the columns of
+    /// `basis` span.
+    pub fn nearest(&self, basis: &DMatrix<f64>, latent_dim: usize) -> DMatrix<f64> {
+        let inside = self.free.tr_mul(basis).svd(true, false);
+        let left = inside.u.expect("invariant: asked for");
+        let count = latent_dim - self.held.ncols();
+        let mut order: Vec<usize> = (0..left.ncols()).collect();
+        order.sort_by(|&a, &b| inside.singular_values[b].total_cmp(&inside.singular_values[a]));
+        &self.free * left.select_columns(&order[..count])
+    }
+}
+
+/// Directions of left and right joints that a mirror leaves alone, of the pairs with a joint among `active`:
+/// abductions mostly turn the other way on the other side.
+fn mirrored_joints(active: &[usize], robot: &Robot) -> Vec<DVector<f64>> {
+    let pairs = [
+        (Leg::FrontRight, Leg::FrontLeft),
+        (Leg::RearRight, Leg::RearLeft),
+    ];
+    let joints_of_leg = JOINT_DIM / Leg::ALL.len();
+    let mut directions = Vec::new();
+    for (right, left) in pairs {
+        for joint in 0..joints_of_leg {
+            let [a, b] = [right, left].map(|leg| joints_of_leg * leg.index() + joint);
+            if active.contains(&a) || active.contains(&b) {
+                let sign = robot.mirror_sign(b);
+                directions.push((unit(a) + unit(b) * sign) * std::f64::consts::FRAC_1_SQRT_2);
+            }
+        }
+    }
+    directions
+}
+
+/// Rows of the centre of mass forwards and upwards, as columns, `18 x 2`: `x + c_x^T q` and `z + c_z^T q` over the
+/// joints `q`, of the body alone where the recordings have no flight.
+///
+/// Nothing pushes the robot in flight, so its centre of mass falls freely: `ddx + c_x^T ddq = 0` and
+/// `ddz + c_z^T ddq = -g`. The regression of the body's accelerations on those of the joints (mirrored, ridge) over
+/// all flights therefore tells the part `c` that the legs have in the centre of mass, to first order in `q`.
+fn centre_of_mass(training: &Dataset, robot: &Robot) -> Result<DMatrix<f64>, TrainError> {
+    let all: Vec<usize> = (0..JOINT_DIM).collect();
+    let joints = DMatrix::from_columns(&mirrored_joints(&all, robot));
+    let mut body = DMatrix::from_columns(&[unit(BODY_X), unit(BODY_Z)]);
+    let mut accelerations = Vec::new();
+    training
+        .for_each(|jump, rates| flight_accelerations(training, jump, rates, &mut accelerations))?;
+    if accelerations.len() < LEAST_WINDOWS {
+        return Ok(body);
+    }
+    let samples = DMatrix::from_columns(&accelerations);
+    let (of_joints, n) = (joints.tr_mul(&samples), samples.ncols() as f64);
+    let mean_square = of_joints.norm_squared() / of_joints.len() as f64;
+    if mean_square <= 0.0 {
+        return Ok(body);
+    }
+    let gram = &of_joints * of_joints.transpose() / n
+        + DMatrix::identity(joints.ncols(), joints.ncols()) * (RIDGE * mean_square);
+    let factor = gram
+        .cholesky()
+        .expect("invariant: a Gram matrix plus a ridge");
+    let falling = GRAVITY_M_S2 * training.scaling.state[BODY_Z];
+    for (column, (row, fall)) in [(BODY_X, 0.0), (BODY_Z, falling)].into_iter().enumerate() {
+        let target = samples.row(row).transpose().add_scalar(fall);
+        let part = factor.solve(&(&of_joints * target / n));
+        let moved = body.column(column) - &joints * part;
+        body.set_column(column, &moved);
+    }
+    Ok(body)
+}
+
+/// Appends the accelerations over every window in the flights of a jump, scaled units.
+fn flight_accelerations(
+    training: &Dataset,
+    jump: &Jump,
+    rates: &Rates,
+    all: &mut Vec<DVector<f64>>,
+) {
+    for (phase, range) in &jump.spans {
+        if training.phases.patterns[*phase].feet != FeetRule::None || range.len() <= 2 * TRIM {
+            continue;
+        }
+        let inside = range.start + TRIM..range.end - TRIM;
+        let mut last = inside.start;
+        for first in inside.clone() {
+            while last < inside.end && jump.time_s[last] - jump.time_s[first] < WINDOW_S {
+                last += 1;
+            }
+            if last == inside.end {
+                break;
+            }
+            let duration = jump.time_s[last] - jump.time_s[first];
+            all.push((rates.dx.column(last) - rates.dx.column(first)) / duration);
+        }
+    }
+}
+
+fn unit(index: usize) -> DVector<f64> {
+    DVector::from_fn(STATE_DIM, |i, _| if i == index { 1.0 } else { 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::recording::Recording;
+    use crate::robot::{InputRule, Robot};
+    use crate::train::TrainOptions;
+
+    fn robot() -> &'static Robot {
+        Robot::by_name("go1").expect("a known robot")
+    }
+
+    fn go1(name: &str) -> Dataset {
+        let path = format!("examples/recordings/go1/{name}.csv.gz");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../..")
+            .join(path);
+        let jump = crate::recording::read(&path).expect("a shipped recording");
+        let options = TrainOptions::new("test", 4);
+        let rule = InputRule::published(robot());
+        let scaling = options.scaling.factors();
+        let jumps: [Recording; 1] = [jump];
+        Dataset::new(&jumps[..], &rule, &options.phases, &scaling, 11).expect("a jump")
+    }
+
+    /// Mean and standard deviation of the acceleration along a row over the windows in flight, m/s^2.
+    fn in_flight(dataset: &Dataset, row: DVector<f64>) -> (f64, f64) {
+        let mut all = Vec::new();
+        (dataset.for_each(|jump, rates| flight_accelerations(dataset, jump, rates, &mut all)))
+            .expect("held in memory");
+        let scale = dataset.scaling.state[BODY_Z];
+        let values: Vec<f64> = all.iter().map(|ddx| row.dot(ddx) / scale).collect();
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let square = values
+            .iter()
+            .map(|value| (value - mean).powi(2))
+            .sum::<f64>();
+        (mean, (square / n).sqrt())
+    }
+
+    #[test]
+    fn centre_of_mass_learned_from_one_jump_falls_freely_in_another_where_the_body_does_not() {
+        let rows = centre_of_mass(&go1("train_01"), robot()).expect("held in memory");
+        let other = go1("test_02");
+        let (mean, spread) = in_flight(&other, rows.column(1).into_owned());
+        assert!(
+            (mean + GRAVITY_M_S2).abs() < 0.1 && spread < 0.3,
+            "{mean} {spread}"
+        );
+        let (mean, spread) = in_flight(&other, rows.column(0).into_owned());
+        assert!(mean.abs() < 0.1 && spread < 0.3, "{mean} {spread}");
+        let (_, of_body) = in_flight(&other, unit(BODY_Z));
+        assert!(of_body > 2.0 * spread, "{of_body}");
+        // No leg is so heavy that a radian of a joint moves the whole robot by more than 2 cm.
+        assert!(rows.rows(0, JOINT_DIM).amax() < 0.02, "{rows}");
+    }
+
+    #[test]
+    fn named_rows_say_nothing_of_sideways_motion_and_are_the_same_mirrored() {
+        let dataset = go1("train_01");
+        let active: Vec<usize> = (0..STATE_DIM).collect();
+        let frame =
+            Frame::new(&dataset, &active, 6, Coordinates::Named, robot()).expect("in memory");
+        let (y, roll, yaw) = (13, 15, 17);
+        for rows in [&frame.held, &frame.free] {
+            for sideways in [y, roll, yaw] {
+                assert_eq!(rows.row(sideways).amax(), 0.0);
+            }
+            for (right, left) in [(0, 3), (6, 9)] {
+                assert!((rows.row(right) + rows.row(left)).amax() < 1e-15);
+            }
+            for (right, left) in [(1, 4), (2, 5), (7, 10), (8, 11)] {
+                assert!((rows.row(right) - rows.row(left)).amax() < 1e-15);
+            }
+        }
+        assert_eq!((frame.held.ncols(), frame.free.ncols()), (2, 7));
+    }
+
+    #[test]
+    fn nearest_directions_of_a_space_inside_the_frame_span_it() {
+        let frame = Frame::plain(&[1, 2, 5]);
+        let basis = DMatrix::from_columns(&[(unit(1) + unit(5)) / 2f64.sqrt()]);
+        let nearest = frame.nearest(&basis, 1);
+        assert!((nearest.dot(&basis).abs() - 1.0).abs() < 1e-12);
+    }
+}

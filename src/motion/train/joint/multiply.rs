@@ -1,0 +1,169 @@
+//! Products of batch matrices with small ones, with the vector units of the machine.
+//!
+//! A batch is a hundred rows and a product a microsecond: too short for general kernels, which pack their operands
+//! first. All matrices are column-major and their columns contiguous, so that every loop here runs down columns.
+
+use nalgebra::DMatrix;
+
+use crate::train::vectors::{self, Loop};
+
+const LANES: usize = 16;
+
+/// Consecutive columns of a matrix.
+#[derive(Clone, Copy)]
+pub struct Columns<'a> {
+    values: &'a [f64],
+    rows: usize,
+}
+
+impl<'a> Columns<'a> {
+    /// All columns.
+    pub fn all(matrix: &'a DMatrix<f64>) -> Self {
+        Self {
+            values: matrix.as_slice(),
+            rows: matrix.nrows(),
+        }
+    }
+
+    /// `count` columns from `start` on.
+    pub fn some(matrix: &'a DMatrix<f64>, start: usize, count: usize) -> Self {
+        let rows = matrix.nrows();
+        Self {
+            values: &matrix.as_slice()[rows * start..rows * (start + count)],
+            rows,
+        }
+    }
+
+    fn count(self) -> usize {
+        self.values.len() / self.rows.max(1)
+    }
+}
+
+/// Columns `start..` of `out`, as many as `b` has, become `a b`.
+pub fn product_into(out: &mut DMatrix<f64>, start: usize, a: Columns<'_>, b: &DMatrix<f64>) {
+    let rows = a.rows;
+    let out = &mut out.as_mut_slice()[rows * start..rows * (start + b.ncols())];
+    out.fill(0.0);
+    let scale = 1.0;
+    vectors::run(AddProduct { out, scale, a, b });
+}
+
+/// `out += scale a b`.
+pub fn add_product(out: &mut DMatrix<f64>, scale: f64, a: &DMatrix<f64>, b: &DMatrix<f64>) {
+    let (out, a) = (out.as_mut_slice(), Columns::all(a));
+    vectors::run(AddProduct { out, scale, a, b });
+}
+
+/// `out += scale a^T b`.
+pub fn add_transposed(out: &mut DMatrix<f64>, scale: f64, a: Columns<'_>, b: Columns<'_>) {
+    let out = out.as_mut_slice();
+    vectors::run(AddTransposed { out, scale, a, b });
+}
+
+struct AddProduct<'a> {
+    out: &'a mut [f64],
+    scale: f64,
+    a: Columns<'a>,
+    b: &'a DMatrix<f64>,
+}
+
+impl Loop for AddProduct<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { out, scale, a, b } = self;
+        assert_eq!((a.count(), out.len()), (b.nrows(), a.rows * b.ncols()));
+        let each = b.as_slice().chunks_exact(b.nrows());
+        for (out, factors) in out.chunks_exact_mut(a.rows).zip(each) {
+            let mut pairs = factors.chunks_exact(2);
+            let mut columns = a.values.chunks_exact(2 * a.rows);
+            for (factor, columns) in pairs.by_ref().zip(columns.by_ref()) {
+                let (first, second) = columns.split_at(a.rows);
+                let (p, q) = (scale * factor[0], scale * factor[1]);
+                for ((o, x), y) in out.iter_mut().zip(first).zip(second) {
+                    *o += p * x + q * y;
+                }
+            }
+            for factor in pairs.remainder() {
+                let p = scale * factor;
+                for (o, x) in out.iter_mut().zip(columns.remainder()) {
+                    *o += p * x;
+                }
+            }
+        }
+    }
+}
+
+struct AddTransposed<'a> {
+    out: &'a mut [f64],
+    scale: f64,
+    a: Columns<'a>,
+    b: Columns<'a>,
+}
+
+impl Loop for AddTransposed<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { out, scale, a, b } = self;
+        assert_eq!((out.len(), a.rows), (a.count() * b.count(), b.rows));
+        let mut entries = out.iter_mut();
+        for right in b.values.chunks_exact(b.rows) {
+            for (left, entry) in a.values.chunks_exact(a.rows).zip(entries.by_ref()) {
+                *entry += scale * dot(left, right);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn dot(left: &[f64], right: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (a, b) = (left.chunks_exact(LANES), right.chunks_exact(LANES));
+    let rest: f64 = a
+        .remainder()
+        .iter()
+        .zip(b.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (a, b) in a.zip(b) {
+        for ((sum, x), y) in sums.iter_mut().zip(a).zip(b) {
+            *sum += x * y;
+        }
+    }
+    rest + sums.iter().sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::random::Random;
+
+    #[test]
+    fn products_equal_those_of_nalgebra() {
+        let mut random = Random::new(5);
+        for inner in [6, 7] {
+            let (a, b) = (random.matrix(37, inner, 1.0), random.matrix(inner, 4, 1.0));
+            let plain = &a * &b;
+            let mut sum = plain.clone();
+            add_product(&mut sum, -2.0, &a, &b);
+            assert!((sum + &plain).amax() < 1e-13);
+            let mut gram = DMatrix::from_element(inner, 2, 1.0);
+            add_transposed(
+                &mut gram,
+                3.0,
+                Columns::all(&a),
+                Columns::some(&plain, 1, 2),
+            );
+            let expected = a.transpose() * plain.columns(1, 2) * 3.0;
+            assert!((gram.add_scalar(-1.0) - expected).amax() < 1e-12);
+            let mut wide = DMatrix::from_element(37, 9, 5.0);
+            product_into(&mut wide, 3, Columns::all(&a), &b);
+            assert!((wide.columns(3, 4) - &plain).amax() < 1e-13);
+            assert!(
+                wide.columns(0, 3)
+                    .iter()
+                    .chain(wide.columns(7, 2).iter())
+                    .all(|v| *v == 5.0)
+            );
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Landmarks, prior and deviations of the shipped recordings.
+
+use std::path::Path;
+
+use nalgebra::DMatrix;
+
+use super::*;
+use crate::model::{AffineMap, FEATURE_DIM};
+use crate::robot::{InputRule, Robot, STATE_DIM};
+use crate::train::TrainOptions;
+
+fn training() -> Dataset {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/recordings/go1");
+    let jumps: Vec<_> = (1..=8)
+        .map(|k| crate::recording::read(&folder.join(format!("train_{k:02}.csv.gz"))))
+        .collect::<Result<_, _>>()
+        .expect("shipped recordings");
+    let options = TrainOptions::new("test", 4);
+    let rule = InputRule::published(Robot::by_name("go1").unwrap());
+    let scaling = options.scaling.factors();
+    Dataset::new(&jumps[..], &rule, &options.phases, &scaling, 11).expect("jumps")
+}
+
+/// An encoder of the body's x and z and the front right thigh and knee.
+fn encoder() -> StateMap {
+    let rows = [BODY_X, BODY_Z, 1, 2];
+    let weights = DMatrix::from_fn(4, STATE_DIM, |i, j| f64::from(rows[i] == j));
+    AffineMap::new("encoder", weights, DVector::zeros(4))
+        .unwrap()
+        .into()
+}
+
+#[test]
+fn jumps_are_cut_into_crouch_thrust_flight_and_landing() {
+    let training = training();
+    let prior = learn_jumps(&training, &encoder())
+        .unwrap()
+        .expect("jumps of one kind")
+        .prior;
+    let names: Vec<&str> = prior.parts.iter().map(|part| part.name.as_str()).collect();
+    assert_eq!(names, ["crouch", "thrust", "flight", "landing"]);
+    assert_eq!(prior.parts[2].feet, [false; 4]);
+    assert_eq!(prior.jumps.len(), 8);
+    for part in &prior.parts {
+        let [least, most] = part.duration_range_s;
+        assert!(least <= part.duration_s[0] && part.duration_s[0] <= most);
+    }
+    // Where the flight begins the body rises, where it ends it falls.
+    let flight = &prior.parts[2];
+    let rate = |node: usize| JumpPart::at(&flight.dz, node, &[1.0, 0.0, 0.0, 0.0])[1];
+    assert!(rate(0) > 0.05 && rate(flight.nodes() - 1) < -0.05);
+}
+
+#[test]
+fn prior_at_the_goal_of_a_jump_is_nearer_to_it_than_the_mean_jump() {
+    let training = training();
+    let prior = learn_jumps(&training, &encoder())
+        .unwrap()
+        .expect("jumps of one kind")
+        .prior;
+    let latent = Latent::of(&training, &encoder()).unwrap();
+    let last = prior.parts.last().unwrap();
+    let error = |features: &dyn Fn(usize) -> [f64; FEATURE_DIM]| -> f64 {
+        let ends = (0..8).map(|jump| {
+            let z = &latent[jump].z;
+            let end = JumpPart::at(&last.z, last.nodes() - 1, &features(jump));
+            (end[0] - z[(0, z.ncols() - 1)]).powi(2)
+        });
+        ends.sum()
+    };
+    let at_goal = error(&|jump| prior.features(prior.jumps[jump]));
+    let at_mean = error(&|_| [1.0, 0.0, 0.0, 0.0]);
+    assert!(at_goal < 0.2 * at_mean, "{at_goal} {at_mean}");
+}
+
+#[test]
+fn deviations_know_nothing_of_where_the_robot_stands() {
+    let prior = learn_jumps(&training(), &encoder())
+        .unwrap()
+        .expect("jumps of one kind")
+        .prior;
+    for part in &prior.parts {
+        let xi = part.xi.as_ref().unwrap();
+        assert!(xi.row(0).amax() < 1e-9 * xi.amax(), "{}", part.name);
+        assert!(xi.rows(4, 8).amax() > 0.0);
+    }
+}
+
+#[test]
+fn too_few_jumps_have_no_prior() {
+    let mut training = training();
+    training.jumps.truncate(LEAST_JUMPS - 1);
+    assert_eq!(learn_jumps(&training, &encoder()).unwrap(), None);
+}
+
+#[test]
+fn score_of_deviations_falls_when_inputs_belong_to_other_jumps() {
+    let score = |training: &Dataset| -> f64 {
+        let learned = learn_jumps(training, &encoder()).unwrap();
+        let scores = learned.expect("jumps of one kind").scores;
+        let thrust = scores.iter().find(|score| score.part == "thrust");
+        thrust.expect("a thrust").ddz_r2
+    };
+    let mut training = training();
+    let right = score(&training);
+    let inputs: Vec<DMatrix<f64>> = training.jumps.iter().map(|jump| jump.u.clone()).collect();
+    for (k, jump) in training.jumps.iter_mut().enumerate() {
+        let other = &inputs[(k + 3) % inputs.len()];
+        let last = other.ncols() - 1;
+        jump.u = DMatrix::from_fn(STATE_DIM, jump.u.ncols(), |i, sample| {
+            other[(i, sample.min(last))]
+        });
+    }
+    let wrong = score(&training);
+    assert!(right > 0.3 && wrong < right - 0.1, "{right} {wrong}");
+}

@@ -1,0 +1,62 @@
+//! Learning: recordings in, a reduced-order model with its figures out.
+//!
+//! Enters: recordings of jumps, a robot, [`TrainOptions`]. Leaves: a [`Trained`] model, whose provenance says how to
+//! repeat it, and a [`TrainReport`]. Read [`closed_form()`] first: it walks from the dataset over the encoder's row
+//! space ([`subspace`], [`varimax`]) and the decoder ([`latent`]) to the dynamics ([`weak_form`], [`sparse`], [`select`]),
+//! judged by [`rollout`]s.
+
+pub mod closed_form;
+pub mod dataset;
+pub mod features;
+pub mod frame;
+mod growth;
+pub mod joint;
+pub mod jumps;
+pub mod knowledge;
+pub mod latent;
+pub mod metrics;
+pub mod progress;
+pub mod rollout;
+pub mod select;
+pub mod sparse;
+pub mod subspace;
+pub mod varimax;
+pub mod weak_form;
+
+mod assemble;
+mod data_sets;
+mod dynamics_fit;
+mod error;
+mod judge;
+mod map_options;
+mod options;
+#[cfg(test)]
+mod oscillator;
+mod overlap;
+mod prune;
+mod random;
+mod refine;
+mod report;
+mod seeds;
+mod smooth;
+mod split;
+mod stepper;
+mod task;
+mod thin;
+mod vectors;
+
+pub use assemble::{Origin, SourceFile, sha256};
+pub use closed_form::closed_form;
+pub use data_sets::Recordings;
+pub use dataset::{MIN_SAMPLES, ScaleOptions};
+pub use error::TrainError;
+pub use joint::{Integrator, Unroll, joint};
+pub use map_options::MapOptions;
+pub use metrics::{SetMetrics, assess};
+pub use options::{
+    Coordinates, EncoderOptions, JointOptions, LibraryChoice, Method, RegressionOptions,
+    TrainOptions, Transfer,
+};
+pub use progress::{Progress, Watch};
+pub use report::{PartScore, PhaseTerms, SeedReport, TrainReport, Trained};
+pub use split::Split;
