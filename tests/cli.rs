@@ -1385,11 +1385,11 @@ fn training_that_is_interrupted_says_so_in_text_exit_code_and_provenance() {
             .spawn()
             .expect("the binary runs");
         std::thread::sleep(std::time::Duration::from_secs(seconds));
-        let signal = Command::new("kill")
-            .args(["-INT", &training.id().to_string()])
+        let signal = Command::new("sh") // which has `kill` where no package brought a program of that name
+            .args(["-c", &format!("kill -INT {}", training.id())])
             .status();
         assert!(
-            signal.expect("kill runs").success(),
+            signal.expect("a shell runs").success(),
             "the training still runs"
         );
         let output = training.wait_with_output().expect("it ends");

@@ -254,10 +254,10 @@ fn an_interrupted_training_says_so_and_its_model_too() {
         .spawn()
         .expect("starts");
     std::thread::sleep(std::time::Duration::from_secs(3));
-    let stopped = Command::new("kill")
-        .args(["-INT", &training.id().to_string()])
+    let stopped = Command::new("sh") // which has `kill` where no package brought a program of that name
+        .args(["-c", &format!("kill -INT {}", training.id())])
         .status();
-    assert!(stopped.expect("kill").success());
+    assert!(stopped.expect("a shell").success());
     let output = training.wait_with_output().expect("ends");
     let note = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(130), "{note}");

@@ -112,6 +112,9 @@ fn analysers_find_nothing() {
 
 #[test]
 fn headers_are_clean_in_cpp() {
+    if !has("c++") {
+        return;
+    }
     let emitted = Emitted::new(&shipped("go1-d6"), Precision::Single);
     let name = &emitted.name;
     let caller = format!(
