@@ -6,15 +6,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The sources of romc's crates, in each of which a room is a folder.
-const CRATES: [&str; 3] = ["src/algebra", "src/motion", "src"];
+const CRATES: [&str; 3] = ["src", "src/algebra", "src/motion"];
 
-/// A row of the table: which rooms a room may import.
+/// A row of the table: the crate of a room, and which rooms it may import.
 struct Row {
+    place: &'static str,
     room: String,
     may_import: BTreeSet<String>,
 }
 
-/// Rows of the table whose header has the columns `room` and `may import`.
+/// Rows of the table whose header has the columns `crate`, `room` and `may import`.
 fn table(text: &str) -> Vec<Row> {
     let cells = |line: &str| -> Vec<String> {
         (line
@@ -27,9 +28,9 @@ fn table(text: &str) -> Vec<Row> {
     let header = lines.find_map(|line| {
         let cells = cells(line);
         let column = |name: &str| cells.iter().position(|cell| cell == name);
-        Some((column("room")?, column("may import")?))
+        Some((column("crate")?, column("room")?, column("may import")?))
     });
-    let (room, may_import) = header.expect("a table with the columns `room` and `may import`");
+    let (own, room, may_import) = header.expect("a table with these columns");
     let mut rows: Vec<Row> = Vec::new();
     for line in lines.skip(1) {
         let cells = cells(line);
@@ -49,8 +50,18 @@ fn table(text: &str) -> Vec<Row> {
             "nothing" => BTreeSet::new(),
             cell => names(cell).into_iter().collect(),
         };
+        let place = match cells[own].as_str() {
+            "romc" => CRATES[0],
+            "`algebra`" => CRATES[1],
+            "`motion`" => CRATES[2],
+            other => panic!("`{other}` is no crate"),
+        };
         let room = names(&cells[room]).remove(0);
-        rows.push(Row { room, may_import });
+        rows.push(Row {
+            place,
+            room,
+            may_import,
+        });
     }
     rows
 }
@@ -181,16 +192,16 @@ fn rooms_import_only_what_the_table_of_architecture_allows() {
     let mut faults = Vec::new();
     let mut imports: BTreeMap<&str, BTreeSet<String>> = BTreeMap::new();
     for row in &rows {
-        let places = CRATES.map(|place| root.join(place).join(&row.room));
-        let Some(folder) = places.iter().find(|folder| folder.is_dir()) else {
+        let folder = root.join(row.place).join(&row.room);
+        if !folder.is_dir() {
             faults.push(format!(
-                "the table has `{}`, src has no such folder",
-                row.room
+                "the table has `{}`, {} has no such folder",
+                row.room, row.place
             ));
             continue;
-        };
+        }
         let used = imports.entry(&row.room).or_default();
-        visit(folder, 1, &mut |path, code, depth| {
+        visit(&folder, 1, &mut |path, code, depth| {
             let path = path.strip_prefix(root).expect("below the root").display();
             for room in imported_rooms(code) {
                 if room != row.room && !row.may_import.contains(&room) {
@@ -277,14 +288,15 @@ mod tests {
 #[test]
 fn table_reads_its_columns_by_name() {
     let text = "\
-| room | holds | may import |
-|---|---|---|
-| `model` | x | nothing |
-| `lower` | programs | `model`, `ir`'s types |
-| `cli` | all | all |
+| room | holds | crate | may import |
+|---|---|---|---|
+| `model` | x | `algebra` | nothing |
+| `lower` | programs | `algebra` | `model`, `ir`'s types |
+| `cli` | all | romc | all |
 ";
     let rows = table(text);
     let names = |row: &Row| row.may_import.iter().cloned().collect::<Vec<_>>();
+    assert_eq!((rows[0].place, rows[2].place), ("src/algebra", "src"));
     assert_eq!(rows[0].may_import.len(), 0);
     assert_eq!(names(&rows[1]), ["ir", "model"]);
     assert_eq!(names(&rows[2]), ["Error", "lower", "model"]);

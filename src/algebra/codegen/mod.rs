@@ -4,6 +4,7 @@
 //! `interface` lists the functions, `translate` turns programs into the statements of `code`, `printer`
 //! prints them with what a `dialect` spells, templates place them. Nothing mathematical is decided here.
 
+#[doc(hidden)] // for `deploy`, in the crate above
 pub mod c;
 mod code;
 mod dialect;
@@ -11,15 +12,19 @@ mod error;
 mod fours;
 mod functions;
 mod ident;
+#[doc(hidden)] // for `deploy`, in the crate above
 pub mod interface;
 mod lanes;
+#[doc(hidden)] // for `deploy`, in the crate above
 pub mod line_wrapping;
 mod literal;
 mod map_equations;
 mod precision;
 mod printer;
 mod requirements;
+#[doc(hidden)] // for `deploy`, in the crate above
 pub mod rust;
+#[doc(hidden)] // for `deploy`, in the crate above
 pub mod script;
 mod sin_cos;
 mod sines;
