@@ -1360,51 +1360,82 @@ fn sines_of_the_paper_become_linear_over_given_ranges() {
     }
 }
 
+/// Ends the training that it holds, also where a test fails before it does.
+#[cfg(unix)]
+struct Training(std::process::Child);
+
+#[cfg(unix)]
+impl Drop for Training {
+    fn drop(&mut self) {
+        // A training that has ended is no fault here.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// What a training prints, and its exit code, when Ctrl-C ends it before its last epoch.
+///
 /// The handler is there once recordings are read, which takes as long as the machine is slow: a signal
 /// before ends the process, and the next attempt waits longer.
 #[cfg(unix)]
-#[test]
-fn training_that_is_interrupted_says_so_in_text_exit_code_and_provenance() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let model = folder.path().join("cut-short.json");
+fn interrupted_training(model: &Path, extra: &[&str]) -> (Option<i32>, String, String) {
+    use std::io::Read as _;
+    use std::process::Stdio;
     for seconds in [4, 10, 25, 60] {
-        let training = Command::new(env!("CARGO_BIN_EXE_romc"))
-            .args([
-                "train",
-                "examples/recordings/go1/train_01.csv.gz",
-                "--latent-dim",
-                "2",
-            ])
-            .args([
-                "--method", "joint", "--epochs", "1000000", "--force", "--output",
-            ])
-            .arg(&model)
-            .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .stdout(std::process::Stdio::piped())
-            .stderr(std::process::Stdio::piped())
-            .spawn()
-            .expect("the binary runs");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_romc"));
+        command.args([
+            "train",
+            "examples/recordings/go1/train_01.csv.gz",
+            "--latent-dim",
+            "2",
+        ]);
+        command.args(["--method", "joint", "--epochs", "1000000", "--force"]);
+        command.args(extra).arg("--output").arg(model);
+        command.current_dir(env!("CARGO_MANIFEST_DIR"));
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut training = Training(command.spawn().expect("the binary runs"));
         std::thread::sleep(std::time::Duration::from_secs(seconds));
         let signal = Command::new("sh") // which has `kill` where no package brought a program of that name
-            .args(["-c", &format!("kill -INT {}", training.id())])
+            .args(["-c", &format!("kill -INT {}", training.0.id())])
             .status();
         assert!(
             signal.expect("a shell runs").success(),
             "the training still runs"
         );
-        let output = training.wait_with_output().expect("it ends");
-        if output.status.code().is_none() {
-            continue;
+        let (mut said, mut wrong) = (String::new(), String::new());
+        let stdout = training.0.stdout.as_mut().expect("it is piped");
+        stdout.read_to_string(&mut said).expect("UTF-8");
+        let stderr = training.0.stderr.as_mut().expect("it is piped");
+        stderr.read_to_string(&mut wrong).expect("UTF-8");
+        let code = training.0.wait().expect("it ends").code();
+        if code.is_some() {
+            return (code, said, wrong);
         }
-        let (said, wrong) = (text(&output.stdout), text(&output.stderr));
-        assert_eq!(output.status.code(), Some(130), "{said}{wrong}");
-        assert!(said.contains("interrupted by Ctrl-C"), "{said}");
-        let value: Value =
-            serde_json::from_slice(&fs::read(&model).expect("a model")).expect("JSON");
-        assert_eq!(value["provenance"]["interrupted"], true);
-        return;
     }
     panic!("no training lived to be interrupted");
+}
+
+#[cfg(unix)]
+#[test]
+fn training_that_is_interrupted_says_so_in_text_json_exit_code_and_provenance() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let model = folder.path().join("cut-short.json");
+    let provenance = || {
+        let value: Value =
+            serde_json::from_slice(&fs::read(&model).expect("a model")).expect("JSON");
+        value["provenance"]["interrupted"].clone()
+    };
+    let (code, said, wrong) = interrupted_training(&model, &[]);
+    assert_eq!(code, Some(130), "{said}{wrong}");
+    assert!(said.contains("interrupted by Ctrl-C"), "{said}");
+    assert_eq!(provenance(), true);
+
+    let (code, said, wrong) = interrupted_training(&model, &["--seeds", "2", "--json"]);
+    assert_eq!(code, Some(130), "{said}{wrong}");
+    assert!(wrong.contains("note: interrupted"), "{wrong}");
+    let said: Value = serde_json::from_str(&said).expect("one JSON object");
+    assert_eq!(said["interrupted"], true);
+    assert_eq!(provenance(), true);
 }
 
 #[test]

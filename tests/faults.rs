@@ -230,44 +230,6 @@ fn settings_that_the_closed_form_would_ignore_are_refused_beside_it() {
     assert!(!Path::new(&model).exists());
 }
 
-#[cfg(unix)]
-#[test]
-fn an_interrupted_training_says_so_and_its_model_too() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let model = folder.path().join("m.json");
-    let mut training = Command::new(env!("CARGO_BIN_EXE_romc"));
-    training.args([
-        "train",
-        JUMP,
-        "--latent-dim",
-        "2",
-        "--epochs",
-        "300000",
-        "--seeds",
-        "2",
-    ]);
-    training.args(["--json", "--output"]).arg(&model);
-    let training = training.current_dir(env!("CARGO_MANIFEST_DIR"));
-    let training = training.stdout(std::process::Stdio::piped());
-    let training = training
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .expect("starts");
-    std::thread::sleep(std::time::Duration::from_secs(3));
-    let stopped = Command::new("sh") // which has `kill` where no package brought a program of that name
-        .args(["-c", &format!("kill -INT {}", training.id())])
-        .status();
-    assert!(stopped.expect("a shell").success());
-    let output = training.wait_with_output().expect("ends");
-    let note = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(130), "{note}");
-    assert!(note.contains("note: interrupted"), "{note}");
-    let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    assert_eq!(told["interrupted"], true);
-    let model: Value = serde_json::from_slice(&fs::read(model).expect("written")).expect("JSON");
-    assert_eq!(model["provenance"]["interrupted"], true);
-}
-
 #[test]
 fn the_derivative_of_a_power_of_a_product_has_a_value_where_the_product_is_zero() {
     for power in [
