@@ -58,17 +58,13 @@ impl ExprPool {
     ) -> Interval {
         let mut reduced = domain.to_vec();
         for ((_, range), slope) in reduced.iter_mut().zip(slopes) {
-            let to_low_end = match side {
-                Side::Low => slope.lo() >= 0.0,
-                Side::High => slope.hi() <= 0.0,
+            let away = match side {
+                Side::Low => *slope,
+                Side::High => -*slope,
             };
-            let to_high_end = match side {
-                Side::Low => slope.hi() <= 0.0,
-                Side::High => slope.lo() >= 0.0,
-            };
-            if to_low_end {
+            if away.lo() >= 0.0 {
                 *range = Interval::point(range.lo());
-            } else if to_high_end {
+            } else if away.hi() <= 0.0 {
                 *range = Interval::point(range.hi());
             }
         }

@@ -3,6 +3,7 @@
 use super::node::{ExprId, Node, SymbolId};
 use super::number::Number;
 use super::pool::ExprPool;
+use super::rounding::power_by;
 
 impl ExprPool {
     /// The value of `expr` where symbols have the values that `value_of` gives.
@@ -66,16 +67,8 @@ impl ExprPool {
 
 /// `base ^ exponent` by squaring.
 fn power(base: f64, exponent: i64) -> f64 {
-    let mut remaining = exponent.unsigned_abs();
-    let (mut result, mut square) = (1.0, base);
-    while remaining > 0 {
-        if remaining % 2 == 1 {
-            result *= square;
-        }
-        square *= square;
-        remaining /= 2;
-    }
-    if exponent < 0 { 1.0 / result } else { result }
+    let power = power_by(base, exponent.unsigned_abs(), |a, b| a * b);
+    if exponent < 0 { 1.0 / power } else { power }
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
 //! Canonical constructors of powers and functions.
 
+use num_integer::Integer;
+
 use super::node::{ExprId, Function, Node, Parity};
-use super::number::{Number, gcd_short};
+use super::number::Number;
 use super::order::Exponent;
 use super::pool::{ExprPool, Sign};
 
@@ -148,7 +150,7 @@ impl ExprPool {
             let exponent = exponent
                 .as_integer()
                 .filter(|_| self.as_number(base).is_none())?;
-            common = gcd_short(common, exponent.unsigned_abs());
+            common = exponent.unsigned_abs().gcd(&common);
             powers.push((base, exponent));
         }
         let common = i64::try_from(common).ok().filter(|&common| common > 1)?;

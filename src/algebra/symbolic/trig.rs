@@ -12,6 +12,8 @@
 
 use std::collections::BTreeMap;
 
+use num_integer::Integer;
+
 use super::node::{ExprId, Function, Node};
 use super::number::Number;
 use super::order::Exponent;
@@ -319,16 +321,9 @@ fn note_unit(units: &mut Units, coefficient: Number, rest: ExprId) {
     let common = || {
         let a = known_numerator.checked_mul(denominator)?;
         let b = numerator.checked_mul(known_denominator)?;
-        Number::rational(gcd(a, b), known_denominator.checked_mul(denominator)?)
+        Number::rational(a.gcd(&b), known_denominator.checked_mul(denominator)?)
     };
     *unit = common().unwrap_or(*unit);
-}
-
-fn gcd(mut a: i64, mut b: i64) -> i64 {
-    while b != 0 {
-        (a, b) = (b, a % b);
-    }
-    a
 }
 
 #[cfg(test)]

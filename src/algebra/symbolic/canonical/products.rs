@@ -4,6 +4,7 @@ use super::atoms::Atom;
 use super::coefficient::Coefficient;
 use super::forms::CanonicalForms;
 use super::polynomial::{CanonicalForm, Monomial};
+use crate::symbolic::number::power;
 
 /// Largest power of a sum that is multiplied out, and of a single term.
 const MAX_SUM_POWER: u32 = 40;
@@ -137,17 +138,7 @@ impl CanonicalForms<'_> {
         if count > limit {
             return None;
         }
-        let (mut power, mut square, mut rest) = (one, base, count);
-        loop {
-            if rest % 2 == 1 {
-                power = self.product(&power, &square)?;
-            }
-            rest /= 2;
-            if rest == 0 {
-                return Some(power);
-            }
-            square = self.product(&square, &square)?;
-        }
+        power(one, base, count.into(), |a, b| self.product(a, b))
     }
 
     pub(super) fn reciprocal(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
