@@ -9,7 +9,7 @@ use super::program::{
 use super::validate::{IrError, validate};
 
 /// What makes two scalar statements the same computation.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Key {
     Constant(u64),
     Unary(Unary, ValueId),
@@ -22,16 +22,6 @@ enum Key {
 pub struct ProgramBuilder {
     program: Program,
     known: HashMap<Key, ValueId>,
-}
-
-impl std::fmt::Debug for Key {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Constant(bits) => write!(f, "{}", f64::from_bits(*bits)),
-            Self::Unary(op, a) => write!(f, "{op:?}({a:?})"),
-            Self::Binary(op, a, b) => write!(f, "{op:?}({a:?}, {b:?})"),
-        }
-    }
 }
 
 impl ProgramBuilder {
@@ -81,6 +71,26 @@ impl ProgramBuilder {
             Binary::Sub | Binary::Div => (a, b),
         };
         self.numbered(Key::Binary(op, low, high), Statement::Binary(op, a, b))
+    }
+
+    /// `a + b`.
+    pub fn add(&mut self, a: ValueId, b: ValueId) -> ValueId {
+        self.binary(Binary::Add, a, b)
+    }
+
+    /// `a - b`.
+    pub fn sub(&mut self, a: ValueId, b: ValueId) -> ValueId {
+        self.binary(Binary::Sub, a, b)
+    }
+
+    /// `a * b`.
+    pub fn mul(&mut self, a: ValueId, b: ValueId) -> ValueId {
+        self.binary(Binary::Mul, a, b)
+    }
+
+    /// `a / b`.
+    pub fn div(&mut self, a: ValueId, b: ValueId) -> ValueId {
+        self.binary(Binary::Div, a, b)
     }
 
     /// Sines and cosines of all arguments.
@@ -208,15 +218,6 @@ impl ProgramBuilder {
                 first == second && at + 1 == next && next != arguments.len()
             }
             _ => first == second && at + 1 == next,
-        }
-    }
-
-    /// The value of a constant, `None` for anything computed.
-    pub fn constant_of(&self, value: ValueId) -> Option<f64> {
-        let (statement, _) = self.program.definition(value);
-        match self.program.statements[statement] {
-            Statement::Constant(constant) => Some(constant),
-            _ => None,
         }
     }
 

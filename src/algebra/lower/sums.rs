@@ -54,7 +54,7 @@ fn partial_sums(
         sums = sums
             .chunks(2)
             .map(|pair| match pair {
-                [Some(a), Some(b)] => Some(builder.binary(Binary::Add, *a, *b)),
+                [Some(a), Some(b)] => Some(builder.add(*a, *b)),
                 [one] | [one, None] => *one,
                 [None, other] => *other,
                 _ => None,
@@ -90,6 +90,6 @@ pub(super) fn scaled(builder: &mut ProgramBuilder, coefficient: f64, value: Valu
         builder.unary(Unary::Neg, value)
     } else {
         let coefficient = builder.constant(coefficient);
-        builder.binary(Binary::Mul, coefficient, value)
+        builder.mul(coefficient, value)
     }
 }
