@@ -51,7 +51,7 @@ pub fn dynamics(
     let (mut builder, ddz) = if options.uses_tables(&equations) {
         let mut lowering = start(system, &pool, "dynamics");
         lowering.prepare(&expressions(&equations));
-        let ddz = dense::accelerations(&mut lowering, &equations);
+        let ddz = dense::matrix_vector(&mut lowering, &equations);
         (lowering.builder, ddz)
     } else {
         let demand = Demand::new(&mut pool, &equations);
