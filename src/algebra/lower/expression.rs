@@ -194,10 +194,7 @@ impl<'a> ExpressionLowering<'a> {
     }
 
     fn power(&mut self, base: ExprId, exponent: ExprId) -> ValueId {
-        let integer = self
-            .pool
-            .as_number(exponent)
-            .and_then(|number| number.as_integer());
+        let integer = self.pool.as_integer(exponent);
         match integer.map(|exponent| (exponent, u32::try_from(exponent.unsigned_abs()))) {
             Some((exponent, Ok(magnitude))) => {
                 let base = self.value(base);
@@ -279,7 +276,7 @@ fn reciprocal_power(pool: &ExprPool, factor: ExprId) -> Option<(ExprId, u32)> {
     let Node::Power(base, exponent) = pool.node(factor) else {
         return None;
     };
-    let exponent = pool.as_number(*exponent)?.as_integer()?;
+    let exponent = pool.as_integer(*exponent)?;
     let magnitude = u32::try_from(exponent.checked_neg()?).ok()?;
     Some((*base, magnitude))
 }

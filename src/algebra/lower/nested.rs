@@ -173,7 +173,7 @@ impl Demand {
 fn base_of(pool: &ExprPool, factor: ExprId) -> Option<(ExprId, i64)> {
     match pool.node(factor) {
         Node::Power(base, exponent) => {
-            let exponent = pool.as_number(*exponent)?.as_integer()?;
+            let exponent = pool.as_integer(*exponent)?;
             (exponent > 0).then_some((*base, exponent))
         }
         _ => Some((factor, 1)),

@@ -2,7 +2,6 @@
 
 use super::interval::Interval;
 use super::node::{ExprId, Function, Node, SymbolId};
-use super::number::Number;
 use super::pool::ExprPool;
 
 impl ExprPool {
@@ -91,12 +90,10 @@ impl ExprPool {
         nodes.iter().all(|node| match *self.node(*node) {
             Node::Number(_) | Node::Sum(_) | Node::Product(_) => true,
             Node::Symbol(_) => range(*node).magnitude().is_finite() && !range(*node).is_empty(),
-            Node::Power(base, exponent) => {
-                match self.as_number(exponent).and_then(Number::as_integer) {
-                    Some(integer) => integer > 0 || !range(base).contains(0.0),
-                    None => range(base).lo() > 0.0,
-                }
-            }
+            Node::Power(base, exponent) => match self.as_integer(exponent) {
+                Some(integer) => integer > 0 || !range(base).contains(0.0),
+                None => range(base).lo() > 0.0,
+            },
             Node::Apply(function, argument) => match function {
                 Function::Sin | Function::Cos | Function::Tanh | Function::Exp | Function::Abs => {
                     true

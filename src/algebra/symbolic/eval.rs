@@ -1,7 +1,6 @@
 //! Numeric values.
 
 use super::node::{ExprId, Node, SymbolId};
-use super::number::Number;
 use super::pool::ExprPool;
 use super::rounding::power_by;
 
@@ -30,12 +29,10 @@ impl ExprPool {
                 .map(|factor| child(*factor))
                 .reduce(|a, b| a * b)
                 .expect("products have two factors or more"),
-            Node::Power(base, exponent) => {
-                match pool.as_number(*exponent).and_then(Number::as_integer) {
-                    Some(integer) => power(child(*base), integer),
-                    None => child(*base).powf(child(*exponent)),
-                }
-            }
+            Node::Power(base, exponent) => match pool.as_integer(*exponent) {
+                Some(integer) => power(child(*base), integer),
+                None => child(*base).powf(child(*exponent)),
+            },
             Node::Apply(function, argument) => function.evaluate(child(*argument)),
         })
     }

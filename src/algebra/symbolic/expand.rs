@@ -67,7 +67,7 @@ impl ExprPool {
         match *self.node(factor) {
             Node::Sum(_) => Some((factor, 1)),
             Node::Power(base, exponent) if matches!(self.node(base), Node::Sum(_)) => {
-                let exponent = self.as_number(exponent)?.as_integer()?;
+                let exponent = self.as_integer(exponent)?;
                 Some((base, usize::try_from(exponent).ok()?))
             }
             _ => None,

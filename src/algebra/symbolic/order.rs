@@ -95,13 +95,12 @@ impl ExprPool {
                 return Step::Compare(base_a, base_b);
             }
             match (exponent_a, exponent_b) {
-                (Exponent::Number(m), Exponent::Number(n)) if m == n => {}
+                (m, n) if m == n => {}
                 (Exponent::Number(m), Exponent::Number(n)) => return Step::Decided(n.cmp(&m)),
                 (Exponent::Number(_), Exponent::Expr(_)) => return Step::Decided(Ordering::Less),
                 (Exponent::Expr(_), Exponent::Number(_)) => {
                     return Step::Decided(Ordering::Greater);
                 }
-                (Exponent::Expr(m), Exponent::Expr(n)) if m == n => {}
                 (Exponent::Expr(m), Exponent::Expr(n)) => return Step::Compare(m, n),
             }
         }
@@ -168,11 +167,10 @@ impl ExprPool {
                 .map(|factor| self.grade(*factor))
                 .fold(0, combine_grades),
             Node::Power(base, exponent) => {
-                let degree = self
-                    .as_number(*exponent)
-                    .and_then(Number::as_integer)
-                    .and_then(|n| u32::try_from(n).ok())
-                    .map(|degree| degree.min(NOT_POLYNOMIAL - 1));
+                let degree = self.as_integer(*exponent).map(u32::try_from);
+                let degree = degree
+                    .and_then(Result::ok)
+                    .map(|n| n.min(NOT_POLYNOMIAL - 1));
                 match (degree, self.as_symbol(*base)) {
                     (Some(degree), Some(_)) => degree,
                     (Some(degree), None) => NOT_POLYNOMIAL | degree,

@@ -118,10 +118,7 @@ impl ExprPool {
         let all = (0..self.nodes.len() as u32).map(ExprId);
         let is_restriction = |expr: &ExprId| match self.node(*expr) {
             Node::Apply(Function::Log | Function::Sqrt, _) => true,
-            Node::Power(_, exponent) => {
-                let number = self.as_number(*exponent);
-                number.is_none_or(|number| number.as_integer().is_none())
-            }
+            Node::Power(_, exponent) => self.as_integer(*exponent).is_none(),
             _ => false,
         };
         all.filter(is_restriction).collect()
@@ -193,6 +190,11 @@ impl ExprPool {
         }
     }
 
+    /// The value of a constant whole number.
+    pub fn as_integer(&self, expr: ExprId) -> Option<i64> {
+        self.as_number(expr)?.as_integer()
+    }
+
     /// The variable that `expr` is.
     pub fn as_symbol(&self, expr: ExprId) -> Option<SymbolId> {
         match self.node(expr) {
@@ -240,13 +242,7 @@ impl ExprPool {
 
     /// The operands of the top level, left to right.
     pub fn children(&self, expr: ExprId) -> impl Iterator<Item = ExprId> + '_ {
-        let (pair, list): ([Option<ExprId>; 2], &[ExprId]) = match self.node(expr) {
-            Node::Number(_) | Node::Symbol(_) => ([None, None], &[]),
-            Node::Sum(operands) | Node::Product(operands) => ([None, None], operands),
-            Node::Power(base, exponent) => ([Some(*base), Some(*exponent)], &[]),
-            Node::Apply(_, argument) => ([Some(*argument), None], &[]),
-        };
-        pair.into_iter().flatten().chain(list.iter().copied())
+        self.node(expr).operands()
     }
 
     /// Every expression that `roots` are made of, each once, operands before what uses them.
@@ -385,15 +381,10 @@ impl ExprPool {
     }
 
     fn symbols_in(&self, node: &Node) -> u64 {
-        let of = |expr: &ExprId| self.facts[expr.index()].symbols;
+        let of = |expr: ExprId| self.facts[expr.index()].symbols;
         match node {
-            Node::Number(_) => 0,
             Node::Symbol(symbol) => symbol_bit(*symbol),
-            Node::Sum(operands) | Node::Product(operands) => {
-                operands.iter().fold(0, |mask, operand| mask | of(operand))
-            }
-            Node::Power(base, exponent) => of(base) | of(exponent),
-            Node::Apply(_, argument) => of(argument),
+            _ => node.operands().fold(0, |mask, operand| mask | of(operand)),
         }
     }
 }

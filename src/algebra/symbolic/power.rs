@@ -45,10 +45,9 @@ impl ExprPool {
             (Exponent::Number(m), _) if !m.is_one() => {
                 if let Some(combined) = self.folded(m.checked_mul(exponent)) {
                     // (x^2)^(1/2) = |x|: only even integers lose the sign of the base.
-                    let inner = if m.is_even() && !is_integer {
-                        self.apply(Function::Abs, inner)
-                    } else {
-                        inner
+                    let inner = match m.is_even() && !is_integer {
+                        true => self.apply(Function::Abs, inner),
+                        false => inner,
                     };
                     return self.pow_number(inner, combined);
                 }
@@ -64,11 +63,7 @@ impl ExprPool {
             (_, Node::Sum(_)) if is_integer && self.starts_negative(base) => {
                 let positive = self.neg(base);
                 let power = self.pow_number(positive, exponent);
-                return if exponent.is_even() {
-                    power
-                } else {
-                    self.neg(power)
-                };
+                return self.negated_if(!exponent.is_even(), power);
             }
             (_, &Node::Apply(Function::Abs, argument)) if exponent.is_even() => {
                 return self.pow_number(argument, exponent);
@@ -95,10 +90,10 @@ impl ExprPool {
     /// Integer powers go to every factor; of others only a number with an exact root leaves.
     fn pow_of_product(&mut self, factors: &[ExprId], exponent: Number) -> ExprId {
         if exponent.as_integer().is_some() {
-            let powers: Vec<ExprId> = factors
+            let powers = factors
                 .iter()
-                .map(|factor| self.pow_number(*factor, exponent))
-                .collect();
+                .map(|factor| self.pow_number(*factor, exponent));
+            let powers: Vec<ExprId> = powers.collect();
             return self.product(&powers);
         }
         if let Some((mut roots, common)) = self.common_power(factors)
@@ -113,15 +108,14 @@ impl ExprPool {
             let root = self.product(&roots);
             return self.pow_number(root, combined);
         }
-        let (coefficient, rest) = match self.as_number(factors[0]) {
-            Some(number) if self.as_number(factors[1]).is_none() => {
-                (number, self.product(&factors[1..]))
-            }
-            _ => {
-                let base = self.intern(Node::Product(factors.into()));
-                return self.raw_power(base, exponent);
-            }
+        let whole = |pool: &mut ExprPool| {
+            let base = pool.intern(Node::Product(factors.into()));
+            pool.raw_power(base, exponent)
         };
+        let [Some(coefficient), None] = [factors[0], factors[1]].map(|f| self.as_number(f)) else {
+            return whole(self);
+        };
+        let rest = self.product(&factors[1..]);
         match self.folded(exact_power(coefficient, exponent)) {
             Some(outside) => {
                 let rest = self.pow_number(rest, exponent);
@@ -132,10 +126,7 @@ impl ExprPool {
                 let rest = self.pow_number(rest, exponent);
                 self.product(&[outside, rest])
             }
-            None => {
-                let base = self.intern(Node::Product(factors.into()));
-                self.raw_power(base, exponent)
-            }
+            None => whole(self),
         }
     }
 
@@ -176,11 +167,7 @@ impl ExprPool {
             // Only a positive base is left under a power: (-x)^n = +-(x^n).
             let magnitude = self.constant(base.abs());
             let power = self.raw_power(magnitude, exponent);
-            return if base.is_negative() && !exponent.is_even() {
-                self.neg(power)
-            } else {
-                power
-            };
+            return self.negated_if(base.is_negative() && !exponent.is_even(), power);
         }
         if let Some(value) = self.folded(exact_power(base, exponent)) {
             return self.constant(value);
@@ -231,10 +218,7 @@ impl ExprPool {
         if function.parity() != Parity::Neither && self.starts_negative(argument) {
             let positive = self.neg(argument);
             let value = self.apply(function, positive);
-            return match function.parity() {
-                Parity::Odd => self.neg(value),
-                Parity::Even | Parity::Neither => value,
-            };
+            return self.negated_if(function.parity() == Parity::Odd, value);
         }
         self.intern(Node::Apply(function, argument))
     }

@@ -87,23 +87,42 @@ impl ExprPool {
     fn is_atom(&self, expr: ExprId) -> bool {
         match *self.node(expr) {
             Node::Apply(..) => true,
-            Node::Power(_, exponent) => self
-                .as_number(exponent)
-                .and_then(Number::as_integer)
-                .is_none(),
+            Node::Power(_, exponent) => self.as_integer(exponent).is_none(),
             Node::Number(_) | Node::Symbol(_) | Node::Sum(_) | Node::Product(_) => false,
+        }
+    }
+
+    /// A factor as an integer power.
+    pub(super) fn integer_power(&self, factor: ExprId) -> Option<(ExprId, i64)> {
+        match self.base_and_exponent(factor) {
+            (base, Exponent::Number(number)) => Some((base, number.as_integer()?)),
+            (_, Exponent::Expr(_)) => None,
         }
     }
 
     /// A factor as an integer power of a function call: `sin(x)^2` is `(Sin, x, 2)`.
     pub(super) fn function_power(&self, factor: ExprId) -> Option<(Function, ExprId, i64)> {
-        let (base, exponent) = self.base_and_exponent(factor);
-        match (self.node(base), exponent) {
-            (Node::Apply(function, argument), Exponent::Number(number)) => {
-                Some((*function, *argument, number.as_integer()?))
-            }
+        let (base, power) = self.integer_power(factor)?;
+        match self.node(base) {
+            Node::Apply(function, argument) => Some((*function, *argument, power)),
             _ => None,
         }
+    }
+
+    /// What `pick` takes of the factors of a product, and its other factors.
+    pub(super) fn partition_factors<T>(
+        &mut self,
+        expr: ExprId,
+        mut pick: impl FnMut(&mut ExprPool, ExprId) -> Option<T>,
+    ) -> (Vec<T>, Vec<ExprId>) {
+        let (mut picked, mut others) = (Vec::new(), Vec::new());
+        for factor in self.factors_of(expr).to_vec() {
+            match pick(self, factor) {
+                Some(found) => picked.push(found),
+                None => others.push(factor),
+            }
+        }
+        (picked, others)
     }
 
     /// `function(argument)^exponent`.

@@ -58,20 +58,14 @@ impl ExprPool {
 
     /// One node rewritten towards fewer function calls.
     pub(super) fn compact_rules(&mut self, expr: ExprId) -> ExprId {
-        match self.node(expr) {
-            Node::Product(_) => {
-                let expr = self.merge_tangents(expr);
-                let expr = self.merge_double_angles(expr);
-                let expr = self.merge_hyperbolic_tangent(expr);
-                let expr = self.merge_abs(expr);
-                self.abs_to_sign(expr)
-            }
-            Node::Number(_)
-            | Node::Symbol(_)
-            | Node::Sum(_)
-            | Node::Power(..)
-            | Node::Apply(..) => expr,
+        if !matches!(self.node(expr), Node::Product(_)) {
+            return expr;
         }
+        let expr = self.merge_tangents(expr);
+        let expr = self.merge_double_angles(expr);
+        let expr = self.merge_hyperbolic_tangent(expr);
+        let expr = self.merge_factors(Function::Abs, expr);
+        self.abs_to_sign(expr)
     }
 
     /// `exp(n*log(a) + b) = a^n*exp(b)`.
@@ -117,17 +111,7 @@ impl ExprPool {
             let log = self.apply(Function::Log, base);
             return Some(self.scale(exponent, log));
         }
-        let factors = self.factors_of(argument).to_vec();
-        let mut outside = Vec::new();
-        let mut inside = Vec::new();
-        for factor in factors {
-            match self.function_power(factor) {
-                Some((Function::Exp, exponent, power)) => {
-                    outside.push(self.scale(Number::integer(power), exponent));
-                }
-                _ => inside.push(factor),
-            }
-        }
+        let (mut outside, inside) = self.split_exponentials(argument);
         if outside.is_empty() {
             return None;
         }
@@ -138,15 +122,13 @@ impl ExprPool {
 
     /// `1/(a^2 + a*b) = 1/(a*(a + b))`, also with the least negative powers in front.
     fn split_divisor(&mut self, expr: ExprId) -> ExprId {
-        let (base, Exponent::Number(exponent)) = self.base_and_exponent(expr) else {
+        let Some((base, power @ ..0)) = self.integer_power(expr) else {
             return expr;
         };
-        if !exponent.is_negative() || exponent.as_integer().is_none() {
-            return expr;
-        }
         let Node::Sum(terms) = self.node(base) else {
             return expr;
         };
+        let exponent = Number::integer(power);
         let terms = terms.to_vec();
         let mut shared: Vec<(ExprId, Number)> = Vec::new();
         let powers: Vec<Vec<(ExprId, Number)>> = (terms.iter())
@@ -210,20 +192,19 @@ impl ExprPool {
         powers
     }
 
-    fn merge_exponentials(&mut self, expr: ExprId) -> ExprId {
-        let mut exponents = Vec::new();
-        let mut others = Vec::new();
-        let mut n_merged = 0;
-        for factor in self.factors_of(expr).to_vec() {
-            match self.function_power(factor) {
-                Some((Function::Exp, argument, power)) => {
-                    n_merged += if power == 1 { 1 } else { 2 };
-                    exponents.push(self.scale(Number::integer(power), argument));
-                }
-                _ => others.push(factor),
+    /// The exponents of the exponentials among the factors of a product, and its other factors.
+    fn split_exponentials(&mut self, expr: ExprId) -> (Vec<ExprId>, Vec<ExprId>) {
+        self.partition_factors(expr, |pool, factor| match pool.function_power(factor) {
+            Some((Function::Exp, argument, power)) => {
+                Some(pool.scale(Number::integer(power), argument))
             }
-        }
-        if n_merged < 2 {
+            _ => None,
+        })
+    }
+
+    fn merge_exponentials(&mut self, expr: ExprId) -> ExprId {
+        let (exponents, mut others) = self.split_exponentials(expr);
+        if exponents.is_empty() {
             return expr;
         }
         let exponent = self.sum(&exponents);
@@ -281,8 +262,7 @@ impl ExprPool {
                 continue;
             };
             let Some((below, unit)) = factors.iter().enumerate().find_map(|(below, factor)| {
-                let (base, Exponent::Number(Number::MINUS_ONE)) = self.base_and_exponent(*factor)
-                else {
+                let (base, -1) = self.integer_power(*factor)? else {
                     return None;
                 };
                 let [(unit, c), (other, d)] = self.two_exponentials(base)?;
@@ -364,17 +344,15 @@ impl ExprPool {
 
     /// A term with exactly one logarithm, as cofactor and argument.
     pub(super) fn as_log_term(&mut self, rest: ExprId) -> Option<(ExprId, ExprId)> {
-        let mut cofactors = Vec::new();
-        let mut found = None;
-        for factor in self.factors_of(rest).to_vec() {
-            match *self.node(factor) {
-                Node::Apply(Function::Log, argument) if found.is_none() => found = Some(argument),
-                Node::Apply(Function::Log, _) => return None,
-                _ => cofactors.push(factor),
-            }
+        let (logs, cofactors) =
+            self.partition_factors(rest, |pool, factor| match *pool.node(factor) {
+                Node::Apply(Function::Log, argument) => Some(argument),
+                _ => None,
+            });
+        match logs[..] {
+            [argument] => Some((self.product(&cofactors), argument)),
+            _ => None,
         }
-        let argument = found?;
-        Some((self.product(&cofactors), argument))
     }
 }
 

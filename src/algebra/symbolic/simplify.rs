@@ -24,7 +24,6 @@ use super::cost::Costs;
 use super::expand::MAX_PRODUCTS;
 use super::intern::BuildIdHasher;
 use super::node::{ExprId, Function, Node};
-use super::number::Number;
 use super::order::Exponent;
 use super::pool::ExprPool;
 
@@ -113,10 +112,9 @@ impl ExprPool {
         match self.node(expr) {
             Node::Sum(_) => self.shorter_sum(expr, budget),
             Node::Product(factors) => {
-                let is_divisor = |factor: &ExprId| {
-                    let (base, exponent) = self.base_and_exponent(*factor);
-                    let is_sum = matches!(self.node(base), Node::Sum(_));
-                    is_sum && exponent == Exponent::Number(Number::MINUS_ONE)
+                let is_divisor = |factor: &ExprId| match self.integer_power(*factor) {
+                    Some((base, -1)) => matches!(self.node(base), Node::Sum(_)),
+                    _ => false,
                 };
                 let (divisors, mut rest): (Vec<ExprId>, Vec<ExprId>) =
                     factors.iter().partition(|factor| is_divisor(factor));

@@ -16,7 +16,6 @@ use num_integer::Integer;
 
 use super::node::{ExprId, Function, Node};
 use super::number::Number;
-use super::order::Exponent;
 use super::pool::ExprPool;
 
 /// Largest multiple of an angle, and most angles in one argument, that are expanded.
@@ -51,14 +50,13 @@ impl ExprPool {
         self.note_units(expr, &mut units);
         self.note_units(other, &mut units);
         self.rewrite_region(expr, |pool, node| match *pool.node(node) {
-            Node::Apply(Function::Sin, argument) => match pool.sine_and_cosine(argument, &units) {
-                Some((sine, _)) => sine,
-                None => node,
-            },
-            Node::Apply(Function::Cos, argument) => match pool.sine_and_cosine(argument, &units) {
-                Some((_, cosine)) => cosine,
-                None => node,
-            },
+            Node::Apply(function @ (Function::Sin | Function::Cos), argument) => {
+                match (pool.sine_and_cosine(argument, &units), function) {
+                    (Some((sine, _)), Function::Sin) => sine,
+                    (Some((_, cosine)), _) => cosine,
+                    (None, _) => node,
+                }
+            }
             _ => node,
         })
     }
@@ -99,11 +97,7 @@ impl ExprPool {
         for (unit, rest, multiple) in multiples {
             let angle = self.scale(unit, rest);
             let unit_sine = self.apply(Function::Sin, angle);
-            let unit_sine = if multiple < 0 {
-                self.neg(unit_sine)
-            } else {
-                unit_sine
-            };
+            let unit_sine = self.negated_if(multiple < 0, unit_sine);
             let unit_cosine = self.apply(Function::Cos, angle);
             for _ in 0..multiple.abs() {
                 // sin(a + b) = sin a cos b + cos a sin b; cos(a + b) = cos a cos b - sin a sin b.
@@ -209,7 +203,7 @@ impl ExprPool {
     /// `1/(a + b*sin(x)) = (a - b*sin(x))/(a^2 - b^2*(1 - cos(x)^2))`, for the first angle of a sum with
     /// sines to the first power.
     pub(super) fn without_sine_below(&mut self, expr: ExprId) -> ExprId {
-        let (base, Exponent::Number(Number::MINUS_ONE)) = self.base_and_exponent(expr) else {
+        let Some((base, -1)) = self.integer_power(expr) else {
             return expr;
         };
         if !matches!(self.node(base), Node::Sum(_)) {
@@ -238,8 +232,7 @@ impl ExprPool {
     }
 
     fn combine_angles_of_term(&mut self, rest: ExprId) -> ExprId {
-        let mut others = Vec::new();
-        let (mut above, mut below) = (Vec::new(), Vec::new());
+        let (mut others, mut above, mut below) = (Vec::new(), Vec::new(), Vec::new());
         for factor in self.factors_of(rest).to_vec() {
             match self.function_power(factor) {
                 Some((function @ (Function::Sin | Function::Cos), argument, exponent))
