@@ -233,12 +233,8 @@ mod tests {
             "1.25*w*x*z - 2.5*w*w*w + 0.125*w*y*y - 6*y*z + w",
         ];
         texts.map(|text| {
-            let expr = pool.parse(text, &|_| true).expect("valid expression");
-            let terms = pool.terms_of(expr);
-            let summands = terms
-                .into_iter()
-                .map(|(number, expr)| (number.to_f64(), expr));
-            Combination::collect(pool, summands)
+            let expr = pool.parsed(text);
+            Combination::collect(pool, [(1.0, expr)])
         })
     }
 
@@ -305,10 +301,8 @@ mod tests {
     #[test]
     fn product_that_many_sums_share_stays_flat() {
         let mut pool = ExprPool::new();
-        let expr = pool.parse("2*x*y", &|_| true).expect("valid expression");
-        let terms = pool.terms_of(expr);
-        let summands = terms.iter().map(|(number, expr)| (number.to_f64(), *expr));
-        let sum = Combination::collect(&pool, summands);
+        let expr = pool.parsed("2*x*y");
+        let sum = Combination::collect(&pool, [(1.0, expr)]);
         let sums = vec![sum; 5];
         let demand = Demand::new(&mut pool, &sums);
         for sum in &sums {

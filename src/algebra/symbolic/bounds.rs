@@ -126,7 +126,7 @@ mod tests {
 
     fn bound(text: &str, lo: f64, hi: f64) -> Interval {
         let mut pool = ExprPool::new();
-        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let expr = pool.parsed(text);
         let domain: Vec<(SymbolId, Interval)> = pool
             .symbols_of(expr)
             .into_iter()

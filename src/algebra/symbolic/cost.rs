@@ -177,7 +177,7 @@ mod tests {
 
     fn cost(text: &str) -> u64 {
         let mut pool = ExprPool::new();
-        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let expr = pool.parsed(text);
         pool.cost(expr)
     }
 

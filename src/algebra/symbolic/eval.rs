@@ -75,7 +75,7 @@ mod tests {
 
     fn at_two(text: &str) -> f64 {
         let mut pool = ExprPool::new();
-        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let expr = pool.parsed(text);
         pool.evaluate(expr, &|_| 2.0)
     }
 

@@ -81,7 +81,7 @@ mod tests {
 
     fn bounds(text: &str, range: Interval) -> Interval {
         let mut pool = ExprPool::new();
-        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let expr = pool.parsed(text);
         pool.evaluate_interval(expr, &|_| range)
     }
 

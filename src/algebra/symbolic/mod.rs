@@ -63,6 +63,8 @@ mod shorten;
 mod simplify;
 mod substitute;
 mod tangents;
+#[cfg(test)]
+mod testing;
 mod trig;
 
 pub use canonical::{CanonicalForm, CanonicalForms, Coefficient, Literal, Rational};

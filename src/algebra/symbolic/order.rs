@@ -194,10 +194,7 @@ mod tests {
     /// The texts of the terms of a sum, in canonical order.
     fn sorted(terms: &[&str]) -> Vec<String> {
         let mut pool = ExprPool::new();
-        let ids: Vec<ExprId> = terms
-            .iter()
-            .map(|text| pool.parse(text, &|_| true).expect("test term parses"))
-            .collect();
+        let ids: Vec<ExprId> = terms.iter().map(|text| pool.parsed(text)).collect();
         let sum = pool.sum(&ids);
         let terms = pool.terms_of(sum);
         terms

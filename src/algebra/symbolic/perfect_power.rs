@@ -140,7 +140,7 @@ mod tests {
             ("x^2 + 1", "none"),
         ] {
             let mut pool = ExprPool::new();
-            let expr = pool.parse(text, &|_| true).expect("test text parses");
+            let expr = pool.parsed(text);
             let found = (pool.as_power(expr)).map(|power| pool.display(power).to_string());
             assert_eq!(found.as_deref().unwrap_or("none"), expected, "{text}");
         }

@@ -144,23 +144,17 @@ mod tests {
     #[test]
     fn rewrite_region_stops_at_functions_and_roots() {
         let mut pool = ExprPool::new();
-        let expr = pool
-            .parse("x + (x + y)^2*sin(x) + x^0.3", &|_| true)
-            .expect("test text parses");
+        let expr = pool.parsed("x + (x + y)^2*sin(x) + x^0.3");
         let (x, z) = (pool.symbol("x"), pool.symbol("z"));
         let result = pool.rewrite_region(expr, |_, node| if node == x { z } else { node });
-        let expected = pool
-            .parse("z + (z + y)^2*sin(x) + x^0.3", &|_| true)
-            .expect("test text parses");
+        let expected = pool.parsed("z + (z + y)^2*sin(x) + x^0.3");
         assert_eq!(result, expected);
     }
 
     #[test]
     fn map_regions_finishes_every_region_once_from_the_inside() {
         let mut pool = ExprPool::new();
-        let expr = pool
-            .parse("sin(x + y)*cos(x + y) + exp(sin(x + y))", &|_| true)
-            .expect("test text parses");
+        let expr = pool.parsed("sin(x + y)*cos(x + y) + exp(sin(x + y))");
         let mut seen = Vec::new();
         let result = pool.map_regions(expr, |pool, region| {
             seen.push(pool.display(region).to_string());

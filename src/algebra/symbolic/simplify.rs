@@ -242,7 +242,7 @@ mod tests {
             "exp(exp(exp(exp(exp(x)))))^1000",
         ] {
             let mut pool = ExprPool::new();
-            let expr = pool.parse(text, &|_| true).expect("test text parses");
+            let expr = pool.parsed(text);
             let result = pool.simplify(expr);
             assert!(pool.cost(result) <= pool.cost(expr), "{text}");
         }
@@ -262,7 +262,7 @@ mod tests {
             for depth in 1..last {
                 text = format!("{above}/({text} + {beside})");
                 let mut pool = ExprPool::new();
-                let expr = pool.parse(&text, &|_| true).expect("test text parses");
+                let expr = pool.parsed(&text);
                 let result = pool.simplify(expr);
                 let n_symbols = pool.symbols_of(result).len();
                 assert_eq!(n_symbols, 1, "{above}, {beside} at depth {depth}");
@@ -283,7 +283,7 @@ mod tests {
             ),
         ] {
             let mut pool = ExprPool::new();
-            let expr = pool.parse(text, &|_| true).expect("test text parses");
+            let expr = pool.parsed(text);
             let result = pool.simplify(expr);
             assert_eq!(pool.display(result).to_string(), expected, "{text}");
         }

@@ -7,7 +7,7 @@ use crate::symbolic::{ExprId, ExprPool};
 fn shortest(sum: &[(f64, &str)]) -> String {
     let mut pool = ExprPool::new();
     let summands: Vec<(f64, ExprId)> = (sum.iter())
-        .map(|(c, text)| (*c, pool.parse(text, &|_| true).expect("test text parses")))
+        .map(|(c, text)| (*c, pool.parsed(text)))
         .collect();
     let mut left: Vec<Option<Summands>> = summands
         .iter()
@@ -117,12 +117,9 @@ fn shorten_of_a_long_plain_sum_makes_no_expression() {
     let mut pool = ExprPool::new();
     let summands: Vec<(f64, ExprId)> = (0..20_000)
         .map(|i| {
-            (
-                0.1,
-                pool.parse(&format!("x{}*x{}*sin(y{i})", i % 97, i % 89), &|_| true),
-            )
+            let text = format!("x{}*x{}*sin(y{i})", i % 97, i % 89);
+            (0.1, pool.parsed(&text))
         })
-        .map(|(c, expr)| (c, expr.expect("test text parses")))
         .collect();
     let before = pool.len();
     assert_eq!(Shortener::new(&mut pool).shorten(&summands), []);
