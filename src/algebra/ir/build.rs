@@ -105,13 +105,7 @@ impl ProgramBuilder {
 
     /// A constant table for the array statements.
     pub fn table(&mut self, table: Table) -> TableId {
-        let tables = &mut self.program.tables;
-        let position = tables.iter().position(|known| *known == table);
-        let position = position.unwrap_or_else(|| {
-            tables.push(table);
-            tables.len() - 1
-        });
-        TableId(position as u32)
+        TableId(place_of(&mut self.program.tables, table) as u32)
     }
 
     /// Matrix-vector accumulation, see [`Statement::Accumulate`].
@@ -165,12 +159,7 @@ impl ProgramBuilder {
 
     /// Evaluates another program; returns the values of each of its outputs.
     pub fn call(&mut self, callee: &Program, arguments: &[ValueId]) -> Vec<Vec<ValueId>> {
-        let callees = &mut self.program.callees;
-        let position = callees.iter().position(|known| known == callee);
-        let position = position.unwrap_or_else(|| {
-            callees.push(callee.clone());
-            callees.len() - 1
-        });
+        let position = place_of(&mut self.program.callees, callee.clone());
         let n = callee.outputs.iter().map(|slot| slot.len).sum();
         let statement = Statement::Call {
             callee: position,
@@ -251,4 +240,13 @@ impl ProgramBuilder {
         let first = self.push(statement, n_values).0;
         (first..first + n_values as u32).map(ValueId).collect()
     }
+}
+
+/// The position of an element equal to `wanted`, which is added if there is none.
+fn place_of<T: PartialEq>(list: &mut Vec<T>, wanted: T) -> usize {
+    let known = list.iter().position(|known| *known == wanted);
+    known.unwrap_or_else(|| {
+        list.push(wanted);
+        list.len() - 1
+    })
 }

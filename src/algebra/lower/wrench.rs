@@ -19,6 +19,7 @@
 //! `d / max(d^2, least^2)`, see
 //! [`LegGeometry::least_levers`](crate::robot::LegGeometry::least_levers).
 
+use super::chain::JointAngles;
 use super::error::LowerError;
 use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
 use crate::model::ReducedModel;
@@ -115,19 +116,11 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
         .map(|leg| {
             let k = leg.index();
             let at = |group: usize| (sines[FOOT_DIM * group + k], cosines[FOOT_DIM * group + k]);
+            let angles = [at(0), at(1), at(2)];
             let torques = std::array::from_fn(|i| net[LEG_JOINT_DIM * k + i]);
             let wrench = match robot.geometry(leg) {
-                LegGeometry::Planar(planar) => {
-                    let angles = LegAngles {
-                        abduction: at(0),
-                        thigh: at(1),
-                        calf: at(2),
-                    };
-                    steps.leg_wrench(planar, angles, torques, feet[k])
-                }
-                LegGeometry::Chain(chain) => {
-                    steps.chain_wrench(chain, [at(0), at(1), at(2)], torques, feet[k])
-                }
+                LegGeometry::Planar(planar) => steps.leg_wrench(planar, angles, torques, feet[k]),
+                LegGeometry::Chain(chain) => steps.chain_wrench(chain, angles, torques, feet[k]),
             };
             match frame {
                 WrenchFrame::Body => wrench,
@@ -153,14 +146,6 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     let u: Vec<ValueId> = net.into_iter().chain(wrench).collect();
     builder.output("u", &u);
     Ok(builder.finish()?)
-}
-
-/// Sine and cosine of each angle of a leg.
-struct LegAngles {
-    abduction: (ValueId, ValueId),
-    thigh: (ValueId, ValueId),
-    /// Flexion plus knee.
-    calf: (ValueId, ValueId),
 }
 
 /// The builder, with longer operations by name.
@@ -270,20 +255,20 @@ impl Steps<'_> {
         self.0.add(left, right)
     }
 
-    /// Force and moment of one leg about its hip, in axes parallel to the body's.
+    /// Force and moment of one leg about its hip, in axes parallel to the body's; the third angle is that
+    /// of the calf, flexion plus knee.
     fn leg_wrench(
         &mut self,
         geometry: &PlanarLeg,
-        angles: LegAngles,
+        [abduction, of_thigh, (calf_sin, calf_cos)]: JointAngles,
         torques: [ValueId; LEG_JOINT_DIM],
         foot: ValueId,
     ) -> [ValueId; BODY_DIM] {
         let (thigh, calf, forward) = (geometry.thigh_m, geometry.calf_m, geometry.foot_forward_m);
-        let (calf_sin, calf_cos) = angles.calf;
         let calf_forward = self.combined((-calf, calf_sin), (forward, calf_cos));
         let calf_up = self.combined((-calf, calf_cos), (-forward, calf_sin));
-        let thigh_forward = self.combined((-thigh, angles.thigh.0), (0.0, angles.thigh.0));
-        let thigh_up = self.combined((-thigh, angles.thigh.1), (0.0, angles.thigh.1));
+        let thigh_forward = self.combined((-thigh, of_thigh.0), (0.0, of_thigh.0));
+        let thigh_up = self.combined((-thigh, of_thigh.1), (0.0, of_thigh.1));
         let fwd = self.0.add(thigh_forward, calf_forward);
         let up = self.0.add(thigh_up, calf_up);
         // The same as up c_fwd - fwd c_up, without what cancels.
@@ -304,8 +289,8 @@ impl Steps<'_> {
         let m_e = self.minor((hip, f_x), (fwd, f_n));
         let m_n = self.cross_sum((fwd, f_e), (up, f_x));
 
-        let [f_y, f_z] = self.turned(angles.abduction, f_e, f_n);
-        let [m_y, m_z] = self.turned(angles.abduction, m_e, m_n);
+        let [f_y, f_z] = self.turned(abduction, f_e, f_n);
+        let [m_y, m_z] = self.turned(abduction, m_e, m_n);
         [f_x, f_y, f_z, m_x, m_y, m_z]
     }
 

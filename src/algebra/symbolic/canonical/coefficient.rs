@@ -230,7 +230,7 @@ impl Coefficient {
             (true, false) => (&self.re * &other.re, &self.re * &other.im),
             (false, true) => (&self.re * &other.re, &self.im * &other.re),
             (false, false) => (
-                &(&self.re * &other.re) - &(&self.im * &other.im),
+                &(&self.re * &other.re) + &-(&self.im * &other.im),
                 &(&self.re * &other.im) + &(&self.im * &other.re),
             ),
         };

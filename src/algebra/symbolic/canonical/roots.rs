@@ -162,9 +162,9 @@ impl CanonicalForms<'_> {
         base: &CanonicalForm,
         exponent: &Rational,
     ) -> Option<CanonicalForm> {
-        let whole = exponent.floor().to_i32()?;
-        let rest = exponent - &Rational::from(exponent.floor());
-        let power = self.power(base, whole)?;
+        let whole = exponent.floor();
+        let power = self.power(base, whole.to_i32()?)?;
+        let rest = exponent + &Rational::from(-whole);
         if rest.is_zero() {
             return Some(power);
         }
