@@ -394,16 +394,4 @@ impl Program {
         let statement = self.first.partition_point(|&first| first <= value.0) - 1;
         (statement, (value.0 - self.first[statement]) as usize)
     }
-
-    /// Whether the program calls the target's mathematics library or the
-    /// sine-and-cosine kernel, itself or through a callee.
-    pub fn is_transcendental(&self) -> bool {
-        self.statements.iter().any(|statement| match statement {
-            Statement::SinCos { .. } => true,
-            Statement::Unary(op, _) => {
-                matches!(op, Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log)
-            }
-            _ => false,
-        }) || self.callees.iter().any(Program::is_transcendental)
-    }
 }

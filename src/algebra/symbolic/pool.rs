@@ -158,11 +158,6 @@ impl ExprPool {
         self.symbol_expr(id)
     }
 
-    /// The variable of that name if the pool has it.
-    pub fn find_symbol(&self, name: &str) -> Option<SymbolId> {
-        self.symbol_ids.get(name).copied()
-    }
-
     /// A variable as an expression.
     pub fn symbol_expr(&self, symbol: SymbolId) -> ExprId {
         self.symbols[symbol.index()].expr
@@ -403,10 +398,9 @@ mod tests {
         let first = pool.symbol("z1");
         assert_eq!(pool.symbol("z1"), first);
         assert_ne!(pool.symbol("z2"), first);
-        let id = pool.find_symbol("z1").expect("z1 was made");
+        let id = pool.symbol_id("z1");
         assert_eq!(pool.symbol_name(id), "z1");
         assert_eq!(pool.as_symbol(first), Some(id));
-        assert_eq!(pool.find_symbol("z3"), None);
     }
 
     #[test]

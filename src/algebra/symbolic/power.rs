@@ -224,7 +224,6 @@ impl ExprPool {
     }
 
     fn special_value(&mut self, function: Function, argument: ExprId) -> Option<ExprId> {
-        let number = self.as_number(argument);
         let is_zero = argument == ExprId::ZERO;
         match (function, self.node(argument)) {
             (Function::Sin | Function::Tan | Function::Tanh, _) if is_zero => Some(ExprId::ZERO),
@@ -244,22 +243,17 @@ impl ExprPool {
                 let magnitude = self.apply(Function::Abs, rest);
                 Some(self.scale(coefficient.abs(), magnitude))
             }
-            (Function::Sign, _) => match number {
-                Some(number) if number.is_zero() => Some(ExprId::ZERO),
-                Some(number) if number.is_negative() => Some(self.integer(-1)),
-                Some(_) => Some(ExprId::ONE),
-                None => match self.node(argument) {
-                    _ if self.sign(argument) == Sign::Positive => Some(ExprId::ONE),
-                    Node::Apply(Function::Sign, _) => Some(argument),
-                    _ => {
-                        let (coefficient, rest) = self.split(argument);
-                        if coefficient.is_one() || coefficient.is_negative() {
-                            return None;
-                        }
-                        Some(self.apply(Function::Sign, rest))
-                    }
-                },
-            },
+            (Function::Sign, _) if is_zero => Some(ExprId::ZERO),
+            (Function::Sign, _) if self.sign(argument) == Sign::Positive => Some(ExprId::ONE),
+            (Function::Sign, Node::Number(_)) => Some(self.integer(-1)),
+            (Function::Sign, Node::Apply(Function::Sign, _)) => Some(argument),
+            (Function::Sign, _) => {
+                let (coefficient, rest) = self.split(argument);
+                if coefficient.is_one() || coefficient.is_negative() {
+                    return None;
+                }
+                Some(self.apply(Function::Sign, rest))
+            }
             _ => None,
         }
     }
