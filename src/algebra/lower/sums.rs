@@ -21,8 +21,7 @@ pub(super) fn linear_combination(
     constant: f64,
     terms: &[Term],
 ) -> ValueId {
-    let early: Vec<Term> = terms.iter().copied().filter(|term| !term.late).collect();
-    let late: Vec<Term> = terms.iter().copied().filter(|term| term.late).collect();
+    let (late, early): (Vec<Term>, Vec<Term>) = terms.iter().partition(|term| term.late);
     let start = (constant != 0.0).then(|| builder.constant(constant));
     let sum = partial_sums(builder, start, &early);
     let sum = if late.len() <= 3 {
