@@ -33,9 +33,6 @@ struct PhaseView<'a> {
 }
 
 /// Describes a model.
-///
-/// # Errors
-/// [`Error::Artifact`] if the digest cannot be computed.
 pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     let dominant = dominant_coordinates(model);
     let equations = Equations::of(model);
@@ -84,11 +81,9 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     } else {
         text.push_str("latent-only: no encoder, so it says nothing about a robot's coordinates\n");
     }
+    let file = path.display().to_string();
     let invariance = Invariance::of(model).unwrap_or_else(|error| {
-        note(&format!(
-            "{}: invariance is not told: {error}",
-            path.display()
-        ));
+        note(&format!("{file}: invariance is not told: {error}"));
         None
     });
     if let Some(invariance) = &invariance {
@@ -99,7 +94,7 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
         text,
         json: json!({
             "kind": "model",
-            "file": path.display().to_string(),
+            "file": file,
             "name": model.name(),
             "description": model.description(),
             "digest": artifact::digest(model).to_string(),

@@ -4,7 +4,6 @@
 //! answer and picks the exit code (0 done, 1 the run failed, 2 wrong usage). Human text and JSON go
 //! to stdout; progress, warnings and errors go to stderr. Start with [`args`].
 
-mod actuators;
 pub mod args;
 mod check;
 mod compile;
@@ -13,7 +12,6 @@ mod demo;
 mod destination;
 mod identify;
 mod import;
-mod import_check;
 mod inspect;
 mod inspect_model;
 mod inspect_recording;
@@ -29,8 +27,6 @@ mod simulate;
 mod study;
 mod train;
 mod train_settings;
-mod trajectory;
-mod whole_jumps;
 
 use std::borrow::Cow;
 use std::ffi::OsString;

@@ -41,9 +41,6 @@ pub struct RecordedSets {
 impl RecordedSets {
     /// The recordings that the arguments name, divided by their shares if they have any, to be conditioned as the
     /// settings say.
-    ///
-    /// # Errors
-    /// [`Error::Recording`] for a file, [`Error::Train`] for fewer jumps than sets.
     pub fn new(
         arguments: &TrainArguments,
         settings: &TrainSettings,
@@ -61,9 +58,10 @@ impl RecordedSets {
         };
         let jumps = jumps_of(&arguments.recordings, &reader)?;
         let sets = split.of(jumps.len(), seed)?;
-        let sets = sets.map(|set| -> Vec<Place> {
-            let places = set.into_iter().map(|jump| jumps[jump].clone());
-            places.collect()
+        let sets = sets.map(|set| {
+            set.into_iter()
+                .map(|j| jumps[j].clone())
+                .collect::<Vec<Place>>()
         });
         let files = sets.each_ref().map(|set| chosen_segments(set));
         Ok(Self {
@@ -109,18 +107,11 @@ impl RecordedSets {
 
     /// Which jumps came into which set, file and first row of each, if they were divided.
     pub fn json(&self) -> Option<Value> {
-        let places = |set: &[Place]| -> Vec<Value> {
-            let jumps = set.iter();
-            jumps
-                .map(|(path, _, row)| json!({ "file": path.display().to_string(), "row": row }))
-                .collect()
-        };
-        let [training, validation, test] = self.divided.as_ref()?;
-        Some(json!({
-            "training": places(training),
-            "validation": places(validation),
-            "test": places(test),
-        }))
+        let place =
+            |(path, _, row): &Place| json!({ "file": path.display().to_string(), "row": row });
+        let sets = SETS.into_iter().zip(self.divided.as_ref()?);
+        let sets = sets.map(|(name, set)| (name.to_owned(), set.iter().map(place).collect()));
+        Some(Value::Object(sets.collect()))
     }
 
     /// The sets that the jumps of a file came into, if they were divided.
@@ -220,20 +211,19 @@ impl RecordedSets {
             left_out,
             ..
         } = self.notes();
-        let mismatches = mismatches.iter().map(|(file, mismatch)| {
-            let mut value = mismatch_json(mismatch);
+        let of_file = |file: &Path, mut value: Value| {
             value["file"] = json!(file.display().to_string());
             value
-        });
-        let mismatches: Vec<Value> = mismatches.collect();
-        let findings = findings.iter().map(|(file, finding)| {
-            let mut value = finding_json(finding);
-            value["file"] = json!(file.display().to_string());
-            value
-        });
+        };
+        let findings = findings
+            .iter()
+            .map(|(file, found)| of_file(file, finding_json(found)));
+        let mismatches = mismatches
+            .iter()
+            .map(|(file, found)| of_file(file, mismatch_json(found)));
         json!({
             "implausible": findings.collect::<Vec<_>>(),
-            "mismatches": mismatches,
+            "mismatches": mismatches.collect::<Vec<_>>(),
             "left_out": left_out,
         })
     }
@@ -254,9 +244,6 @@ fn report_singular(findings: &[(PathBuf, Finding)]) {
 }
 
 /// All recordings of a set of files, in memory.
-///
-/// # Errors
-/// [`Error::Recording`] for the first that cannot be read, or of which too little remains.
 pub fn read_all(files: &RecordingFiles) -> Result<Vec<Recording>, Error> {
     let mut all = Vec::new();
     files.for_each(|recording| {
@@ -267,9 +254,6 @@ pub fn read_all(files: &RecordingFiles) -> Result<Vec<Recording>, Error> {
 }
 
 /// The reader of a training: clocks are repaired unless told otherwise, or to train as published.
-///
-/// # Errors
-/// [`Error::Recording`] for the map of columns.
 pub fn reader_for(arguments: &ReadingArguments, settings: &TrainSettings) -> Result<Reader, Error> {
     let clocks = match settings.paper {
         true => Clocks::Recorded,

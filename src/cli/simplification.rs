@@ -1,13 +1,12 @@
 //! Simplification for the commands that offer it: the domain from files, the effect on rollouts.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
 use super::args::{ReadingArguments, SimplifyArguments};
-use super::output::{names, read_recordings, spinner};
+use super::output::{names, read_recordings, read_text, spinner};
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::EmittedFile;
@@ -35,9 +34,6 @@ pub struct Basis {
 
 impl Basis {
     /// The domain that `files` give: one TOML file of ranges, or recordings.
-    ///
-    /// # Errors
-    /// [`Error::Simplify`] for files that give no domain, and whatever reading refuses.
     pub fn read(
         model: &ReducedModel,
         files: &[PathBuf],
@@ -57,18 +53,12 @@ impl Basis {
             }
             .into()),
             Some(_) if margin.is_some() => Err(SimplifyError::Margin.into()),
-            Some(path) => {
-                let text = fs::read_to_string(path).map_err(|source| Error::Read {
-                    path: path.clone(),
-                    source,
-                })?;
-                Ok(Self {
-                    domain: Domain::from_toml(model, path, &text)?,
-                    samples: None,
-                    recordings: Vec::new(),
-                    latent: Vec::new(),
-                })
-            }
+            Some(path) => Ok(Self {
+                domain: Domain::from_toml(model, path, &read_text(path)?)?,
+                samples: None,
+                recordings: Vec::new(),
+                latent: Vec::new(),
+            }),
         }
     }
 
@@ -127,9 +117,6 @@ pub struct Outcome {
 }
 
 /// Simplifies a model as typed; nothing if no domain was given.
-///
-/// # Errors
-/// Whatever reading, simplifying or simulating refuses.
 pub fn run(
     equations: &Equations<'_>,
     arguments: &SimplifyArguments,
@@ -193,9 +180,6 @@ impl Outcome {
 
     /// The certificate as a file beside the emitted ones, its summary, and the same as JSON;
     /// `equations` are those of the model as they are printed, `rounding` is how.
-    ///
-    /// # Errors
-    /// [`Error::Simplify`] if printing cannot be evaluated.
     pub fn files_and_summary(
         &self,
         equations: &Equations<'_>,
@@ -312,9 +296,6 @@ pub struct Ladder {
 
 /// Simplifies a model within several tolerances over the recordings of an assessment, and lists the
 /// changes within `chosen`.
-///
-/// # Errors
-/// Whatever simplifying or simulating refuses.
 pub fn ladder(
     model: &ReducedModel,
     assessment: &Assessment<'_>,
@@ -335,10 +316,8 @@ pub fn ladder(
     let equations = &Equations::of(model);
     let none = simplify(equations, &domain, Some(&samples), Tolerance::Absolute(0.0))?;
     let mut steps = vec![("none".to_owned(), none.certificate, [x, z])];
-    let body = assessment
-        .names
-        .iter()
-        .filter(|name| name.starts_with("body."));
+    let names = assessment.names.iter();
+    let body = names.filter(|name| name.starts_with("body."));
     let places = ["body.x", "body.z"].map(|name| body.clone().position(|known| known == name));
     for share in LADDER {
         let tolerance = Tolerance::ShareOfRms(share);

@@ -1,7 +1,10 @@
-//! Parsers of numbers by their ranges.
+//! Parsers of numbers by their ranges, and of names.
+
+use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 
 use super::train::Finite;
 use crate::limits::Range;
+use crate::robot::{Robot, WrenchFrame};
 
 /// A whole number in a range.
 pub(super) fn count(range: &'static Range) -> impl Fn(&str) -> Result<usize, String> + Clone {
@@ -16,6 +19,33 @@ pub(super) fn real(range: &'static Range) -> impl Fn(&str) -> Result<f64, String
 /// As [`real`], as settings hold it.
 pub(super) fn finite(range: &'static Range) -> impl Fn(&str) -> Result<Finite, String> + Clone {
     |text| range.parse::<f64>(text)?.try_into()
+}
+
+/// Takes any text and offers the names of romc's own robots to shells.
+#[derive(Clone, Debug)]
+pub struct RobotParser;
+
+impl TypedValueParser for RobotParser {
+    type Value = String;
+
+    fn parse_ref(
+        &self,
+        command: &clap::Command,
+        argument: Option<&clap::Arg>,
+        value: &std::ffi::OsStr,
+    ) -> Result<String, clap::Error> {
+        StringValueParser::new().parse_ref(command, argument, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        let names = Robot::known_names();
+        Some(Box::new(names.into_iter().map(PossibleValue::new)))
+    }
+}
+
+/// Reads `body` or `world`.
+pub fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
+    WrenchFrame::by_name(text).ok_or_else(|| format!("found `{text}`, expected `world` or `body`"))
 }
 
 #[cfg(test)]
