@@ -157,7 +157,7 @@ pub fn page_of(
     };
     let verdict = verdict(content)?;
     Ok(Made {
-        page: page(content, verdict.clone(), &figures, &options)?,
+        page: page(content, &verdict, &figures, &options)?,
         verdict,
         files: figures.iter().flat_map(figure_files).collect(),
         n_figures: figures.iter().count(),

@@ -130,18 +130,24 @@ pub(super) fn jumps<'a>(content: &Content<'a>) -> Vec<Jump<'a>> {
         model, assessment, ..
     } = *content;
     let runs = assessment.runs.iter().enumerate();
-    let is_one_of_several = |run: &SegmentRun<'_>| {
-        let same = assessment
+    let jump = |(index, run): (usize, &'a SegmentRun<'a>)| {
+        let path = &run.segment.path;
+        let mut place = Place::of_recording(index, path);
+        if assessment
             .runs
             .iter()
-            .filter(|other| other.segment.path == run.segment.path);
-        same.count() > 1
-    };
-    let jump = |(index, run): (usize, &'a SegmentRun<'a>)| Jump {
-        model,
-        assessment,
-        run,
-        place: Place::of_segment(index, run, is_one_of_several(run)),
+            .filter(|other| other.segment.path == *path)
+            .count()
+            > 1
+        {
+            place.words += &format!(", from row {}", run.segment.first_row);
+        }
+        Jump {
+            model,
+            assessment,
+            run,
+            place,
+        }
     };
     runs.map(jump).collect()
 }
@@ -160,25 +166,22 @@ fn encoder(
     let d = model.latent_dim();
     let at = |row: usize, column: usize| weights[(column, row)] / factors[row];
     let values = (0..rows * d).map(|k| at(k / d, k % d)).collect();
-    let what = if model.is_linear() {
-        "Magnitudes of the encoder's weights"
-    } else {
-        "Magnitudes of the encoder's Jacobian at the first sample"
+    let what = match model.is_linear() {
+        true => "Magnitudes of the encoder's weights",
+        false => "Magnitudes of the encoder's Jacobian at the first sample",
     };
+    let caption = format!("{what}: how much of each coordinate a latent one takes (scaled units).");
+    let columns = (1..=d).map(|index| format!("z{}", subscript(index)));
+    let map = Panel::Heat(HeatMap {
+        title: "|weight|".to_owned(),
+        rows: assessment.names.clone(),
+        columns: columns.collect(),
+        values,
+    });
     Ok(Figure {
-        id: "encoder".to_owned(),
-        caption: format!("{what}: how much of each coordinate a latent one takes (scaled units)."),
         x_label: String::new(),
         panel_size: (120.0 + 40.0 * d.min(18) as f64, 330.0),
         columns: 1,
-        panels: vec![Panel::Heat(HeatMap {
-            title: "|weight|".to_owned(),
-            rows: assessment.names.clone(),
-            columns: (1..=d)
-                .map(|index| format!("z{}", subscript(index)))
-                .collect(),
-            values,
-        })],
-        legend: Vec::new(),
+        ..Figure::over_time("encoder", caption, vec![map], &[])
     })
 }

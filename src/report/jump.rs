@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::figures::{
-    Figure, Film, LinePlot, Motion, Panel, Role, Series, film, film_strip, floor_m, subscript,
+    Figure, Film, Motion, Panel, Role, Series, film, film_strip, floor_m, subscript,
 };
 use super::place::Place;
 use crate::evaluate::{Assessment, FitSums, SegmentRun};
@@ -93,13 +93,11 @@ impl Jump<'_> {
         rollout: &Rollout,
         value: impl Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>, ModelError>,
     ) -> Result<Samples, ModelError> {
-        let states = rollout
-            .states(self.run.latent.len())
-            .into_iter()
-            .enumerate();
-        states
-            .map(|(sample, state)| state.map(|(z, dz)| value(sample, &z, &dz)).transpose())
-            .collect()
+        let states = rollout.states(self.run.latent.len()).into_iter();
+        let value = |(sample, state): (usize, Option<(DVector<f64>, DVector<f64>)>)| {
+            state.map(|(z, dz)| value(sample, &z, &dz)).transpose()
+        };
+        states.enumerate().map(value).collect()
     }
 
     /// Coordinates of the robot along a rollout.
@@ -108,20 +106,12 @@ impl Jump<'_> {
     }
 
     fn series(&self, role: Role, value: impl Fn(usize) -> Option<f64>) -> Series {
-        let times = self.run.latent.time_s.iter().enumerate();
-        Series {
-            role,
-            points: times.map(|(k, &time)| (time, value(k))).collect(),
-        }
+        Series::over(role, &self.run.latent.time_s, value)
     }
 
     /// Lines over the samples; flight is shaded.
-    fn panel(&self, title: String, series: Vec<Series>) -> Panel {
-        Panel::Lines(LinePlot {
-            title,
-            series,
-            shaded: self.flights(),
-        })
+    fn panel(&self, title: impl Into<String>, series: Vec<Series>) -> Panel {
+        Panel::shaded(title, series, self.flights())
     }
 
     /// Times without a foot down.
@@ -234,17 +224,10 @@ impl Jump<'_> {
                 self.series(Role::Recorded, |k| Some(run.segment.x[(row, k)])),
                 self.series(Role::Full, |k| full[k].as_ref().map(|x| x[row])),
             ];
-            lines.extend(
-                roles
-                    .into_iter()
-                    .zip(&run.baselines)
-                    .map(|(role, rollout)| {
-                        let position =
-                            |k: usize| rollout.position_m[k].map(|position| position[axis]);
-                        self.series(role, position)
-                    }),
-            );
-            self.panel(title.to_owned(), lines)
+            for (role, rollout) in roles.into_iter().zip(&run.baselines) {
+                lines.push(self.series(role, |k| rollout.position_m[k].map(|at| at[axis])));
+            }
+            self.panel(title, lines)
         };
         let mut legend = vec![
             (Role::Recorded, "recorded"),
@@ -260,15 +243,11 @@ impl Jump<'_> {
             panel(JOINT_DIM, 0, "body.x, m"),
             panel(JOINT_DIM + 2, 1, "body.z, m"),
         ];
+        let id = format!("aslip_{}", self.place.suffix);
         Ok(Figure {
             panel_size: (360.0, 180.0),
             columns: 2,
-            ..Figure::over_time(
-                format!("aslip_{}", self.place.suffix),
-                caption,
-                panels,
-                &legend,
-            )
+            ..Figure::over_time(id, caption, panels, &legend)
         })
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::evaluate::SegmentRun;
+use super::tables::file_name;
 
 /// Which jump a figure shows.
 pub(super) struct Place {
@@ -13,31 +13,13 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// A whole recording, as the controller follows it.
+    /// A recording.
     pub fn of_recording(index: usize, path: &Path) -> Self {
+        let name = file_name(path);
+        let stem = name.trim_end_matches(".gz").trim_end_matches(".csv");
         Self {
             suffix: (index + 1).to_string(),
-            words: stem(path),
+            words: stem.to_owned(),
         }
     }
-
-    /// One segment of a recording, perhaps of several.
-    pub fn of_segment(index: usize, run: &SegmentRun<'_>, is_one_of_several: bool) -> Self {
-        let (path, row) = (&run.segment.path, run.segment.first_row);
-        let mut words = stem(path);
-        if is_one_of_several {
-            words.push_str(&format!(", from row {row}"));
-        }
-        Self {
-            suffix: (index + 1).to_string(),
-            words,
-        }
-    }
-}
-
-/// Name of a recording without folder and endings.
-fn stem(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let name = name.trim_end_matches(".gz").trim_end_matches(".csv");
-    name.to_owned()
 }
