@@ -53,14 +53,14 @@ impl Role {
         }
     }
 
-    /// Lengths of dashes and gaps, so that lines differ in grey print too; empty for a full line.
-    pub fn dashes(self) -> &'static [f64] {
+    /// Lengths of dashes and gaps, as SVG and PDF list them, so that lines differ in grey print too; empty for a full line.
+    pub fn dashes(self) -> &'static str {
         match self {
-            Self::Recorded => &[],
-            Self::Full => &[6.0, 2.5],
-            Self::Restarted => &[2.0, 1.6],
-            Self::Baseline => &[8.0, 2.0, 2.0, 2.0],
-            Self::SecondBaseline | Self::Limit => &[1.0, 2.0],
+            Self::Recorded => "",
+            Self::Full => "6 2.5",
+            Self::Restarted => "2 1.6",
+            Self::Baseline => "8 2 2 2",
+            Self::SecondBaseline | Self::Limit => "1 2",
         }
     }
 }
