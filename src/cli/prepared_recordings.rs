@@ -27,12 +27,8 @@ const SETS: [&str; 3] = ["training", "validation", "test"];
 
 /// The recordings of a training; their files are read when the samples are needed.
 pub struct RecordedSets {
-    /// Jumps that the model is fitted to.
-    pub training: Arc<RecordingFiles>,
-    /// Jumps that choose between candidates.
-    pub validation: Arc<RecordingFiles>,
-    /// Jumps used only for the final metrics.
-    pub test: Arc<RecordingFiles>,
+    /// Jumps that the model is fitted to, those that choose between candidates, and those used only for the final metrics.
+    pub sets: [Arc<RecordingFiles>; 3],
     /// The jumps of each set, if they were divided.
     pub divided: Option<[Vec<Place>; 3]>,
     options: ConditionOptions,
@@ -49,20 +45,14 @@ impl RecordedSets {
     ) -> Result<Self, Error> {
         let reader = reader_for(&arguments.reading, settings)?;
         let Some(split) = arguments.split else {
-            let paths = [
-                &arguments.recordings[..],
-                &arguments.validation,
-                &arguments.test,
-            ];
+            let (training, validation) = (&arguments.recordings, &arguments.validation);
+            let paths = [training.as_slice(), validation, &arguments.test];
             return Ok(Self::whole(paths, settings, robot, reader));
         };
         let jumps = jumps_of(&arguments.recordings, &reader)?;
         let sets = split.of(jumps.len(), seed)?;
-        let sets = sets.map(|set| {
-            set.into_iter()
-                .map(|j| jumps[j].clone())
-                .collect::<Vec<Place>>()
-        });
+        let sets = sets
+            .map(|set| -> Vec<Place> { set.into_iter().map(|jump| jumps[jump].clone()).collect() });
         let files = sets.each_ref().map(|set| chosen_segments(set));
         Ok(Self {
             divided: Some(sets),
@@ -92,14 +82,12 @@ impl RecordedSets {
         reader: Reader,
     ) -> Self {
         let options = train_settings::conditioning(settings);
-        let [training, validation, test] = files.map(|files| {
+        let sets = files.map(|files| {
             let files = RecordingFiles::new(files, robot, options.clone());
             Arc::new(files.read_by(reader.clone()))
         });
         Self {
-            training,
-            validation,
-            test,
+            sets,
             divided: None,
             options,
         }
@@ -124,10 +112,12 @@ impl RecordedSets {
 
     /// The files of each set, those with jumps in several in the first.
     pub fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
-        let sets = [&self.training, &self.validation, &self.test];
         let mut seen: Vec<&Path> = Vec::new();
         let mut of_set = |set: usize| {
-            let files = sets[set].files().iter().map(|file| file.path.as_path());
+            let files = self.sets[set]
+                .files()
+                .iter()
+                .map(|file| file.path.as_path());
             let new = files.filter(|path| self.divided.is_none() || !seen.contains(path));
             let new: Vec<&Path> = new.collect();
             seen.extend(&new);
@@ -152,7 +142,7 @@ impl RecordedSets {
     /// The notes of all sets together, as far as files were read.
     fn notes(&self) -> Notes {
         let mut all = Notes::default();
-        for set in [&self.training, &self.validation, &self.test] {
+        for set in &self.sets {
             let notes = set.notes();
             all.findings.extend(notes.findings);
             all.mismatches.extend(notes.mismatches);
@@ -163,7 +153,7 @@ impl RecordedSets {
 
     /// Reports on stderr which files have implausible samples, and what became of them.
     pub fn report_findings(&self) {
-        report_reading(&self.training.notes().reading);
+        report_reading(&self.sets[0].notes().reading);
         let Notes {
             findings,
             mismatches,
@@ -176,20 +166,17 @@ impl RecordedSets {
         let (findings, singular): (Vec<_>, Vec<_>) =
             (findings.into_iter()).partition(|(_, finding)| finding.kind.can_be_left_out());
         report_singular(&singular);
-        let mut files: Vec<&Path> = Vec::new();
-        for (file, _) in &findings {
-            if !files.contains(&file.as_path()) {
-                files.push(file);
+        let mut files: Vec<(&Path, usize, &Finding)> = Vec::new();
+        for (file, finding) in &findings {
+            match files.iter_mut().find(|(known, ..)| known == file) {
+                Some((_, runs, _)) => *runs += 1,
+                None => files.push((file, 1, finding)),
             }
         }
-        for file in files {
-            let of_file = findings.iter().filter(|(path, _)| path == file);
-            let runs: Vec<&Finding> = of_file.map(|(_, finding)| finding).collect();
+        for (file, runs, first) in files {
+            let file = file.display();
             note(&format!(
-                "{}: {} implausible runs of samples, such as {}",
-                file.display(),
-                runs.len(),
-                runs[0]
+                "{file}: {runs} implausible runs of samples, such as {first}"
             ));
         }
         match self.options.implausible {

@@ -67,11 +67,12 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
         robot,
         reader_for(&arguments.reading, &settings)?,
     );
-    let training = read_all(&recorded.training)?;
-    let validation = read_all(&recorded.validation)?;
+    let [of_training, of_validation, _] = &recorded.sets;
+    let training = read_all(of_training)?;
+    let validation = read_all(of_validation)?;
     recorded.report_findings();
     let mut base = train_settings::options(&settings, 1, String::new())?;
-    train_settings::identified(&mut base, &settings, &recorded.training, robot)?;
+    train_settings::identified(&mut base, &settings, of_training, robot)?;
     settings.wrench_frame = Some(base.wrench_frame);
     settings.actuators = Some(train_settings::actuators(&settings).to_owned());
     let plan = plan(arguments, &settings, &training, &validation);

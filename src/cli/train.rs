@@ -43,10 +43,11 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let name = named(arguments.name.as_deref(), &arguments.output);
     let mut options = train_settings::options(&settings, latent_dim, name)?;
     let recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
-    train_settings::identified(&mut options, &settings, &recorded.training, robot)?;
+    let [training, validation, test] = &recorded.sets;
+    train_settings::identified(&mut options, &settings, training, robot)?;
     // a fault of the test recordings ends the command before the training
-    read_all(&recorded.test)?;
-    let sets = Recordings::new(&recorded.training, &recorded.validation);
+    read_all(test)?;
+    let sets = Recordings::new(training, validation);
     let files = arguments.recordings.iter().chain(&arguments.validation);
     let command = command_line(arguments, &settings, method, &options);
     let mut origin = Origin::of_files(command, files);
@@ -82,9 +83,9 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
         );
     }
     artifact::write_with(&arguments.output, &trained.model, overwrite)?;
-    let tested = match recorded.test.is_empty() {
+    let tested = match test.is_empty() {
         true => None,
-        false => Some(train::assess(&trained.model, &recorded.test)?),
+        false => Some(train::assess(&trained.model, test)?),
     };
     let mut answer = answer(arguments, &trained, tested.as_ref());
     let notes = notes(&trained.report, tested.as_ref(), &recorded)?;
@@ -113,12 +114,13 @@ fn notes(
     tested: Option<&SetMetrics>,
     recorded: &RecordedSets,
 ) -> Result<Vec<String>, Error> {
+    let [training, validation, test] = &recorded.sets;
     let judged = match &report.validation {
-        Some(validation) => ("validation", Some(validation), &recorded.validation),
-        None => ("training", Some(&report.training), &recorded.training),
+        Some(metrics) => ("validation", Some(metrics), validation),
+        None => ("training", Some(&report.training), training),
     };
     let mut notes = Vec::new();
-    for (set, metrics, files) in [judged, ("test", tested, &recorded.test)] {
+    for (set, metrics, files) in [judged, ("test", tested, test)] {
         if let Some(metrics) = metrics {
             notes.extend(whole_jump_note(metrics, (set, files))?);
         }
