@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use super::complexity::study_figures;
 use super::control::{latent_inputs, torques};
 use super::figures::{Figure, Film, HeatMap, Panel, subscript};
-use super::jump::Jump;
-use super::place::Place;
+use super::jump::{Jump, Place};
 use super::tables::NamedRun;
 use crate::evaluate::{Assessment, SegmentRun};
 use crate::model::{ModelError, ReducedModel};
@@ -83,9 +82,7 @@ impl AllFigures {
 /// [`ModelError`] for a model without encoder or decoder.
 pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
     let mut figures = AllFigures::default();
-    let Content {
-        model, assessment, ..
-    } = *content;
+    let (model, assessment) = (content.model, content.assessment);
     if let Some(run) = assessment.runs.first() {
         figures.encoder.push(encoder(model, assessment, run)?);
     }
@@ -126,20 +123,13 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
 
 /// Every jump of an assessment, named.
 pub(super) fn jumps<'a>(content: &Content<'a>) -> Vec<Jump<'a>> {
-    let Content {
-        model, assessment, ..
-    } = *content;
+    let (model, assessment) = (content.model, content.assessment);
     let runs = assessment.runs.iter().enumerate();
     let jump = |(index, run): (usize, &'a SegmentRun<'a>)| {
         let path = &run.segment.path;
         let mut place = Place::of_recording(index, path);
-        if assessment
-            .runs
-            .iter()
-            .filter(|other| other.segment.path == *path)
-            .count()
-            > 1
-        {
+        let same = assessment.runs.iter().map(|run| &run.segment.path);
+        if same.filter(|other| *other == path).count() > 1 {
             place.words += &format!(", from row {}", run.segment.first_row);
         }
         Jump {

@@ -2,7 +2,7 @@
 //! latent tracking, solve times.
 
 use super::figures::{Figure, Panel, Role, Series};
-use super::place::Place;
+use super::jump::Place;
 use super::tables::NamedRun;
 use crate::evaluate::{Run, StepRow};
 use crate::model::ReducedModel;

@@ -1,11 +1,13 @@
 //! The figures of one jump: recorded beside predicted, pendulums, robots as sticks.
 
+use std::path::Path;
+
 use nalgebra::DVector;
 
 use super::figures::{
     Figure, Film, Motion, Panel, Role, Series, film, film_strip, floor_m, subscript,
 };
-use super::place::Place;
+use super::tables::file_name;
 use crate::evaluate::{Assessment, FitSums, SegmentRun};
 use crate::model::{ModelError, ReducedModel};
 use crate::recording::Segment;
@@ -20,14 +22,34 @@ pub(super) fn heading_rad(segment: &Segment) -> f64 {
     segment.x[(STATE_DIM - 1, 0)]
 }
 
-/// Whether each coordinate of the robot enters a latent one at the state `x` (18).
+/// Whether each coordinate of the robot enters a latent one at the beginning of a run.
 ///
 /// # Errors
 /// [`ModelError`] for a model without encoder.
-pub fn modelled(model: &ReducedModel, x: DVector<f64>) -> Result<Vec<bool>, ModelError> {
-    let weights = model.encoder_jacobian(&x)?;
+pub fn modelled(model: &ReducedModel, run: &SegmentRun<'_>) -> Result<Vec<bool>, ModelError> {
+    let weights = model.encoder_jacobian(&run.segment.x.column(0).into_owned())?;
     let columns = weights.column_iter();
     Ok(columns.map(|column| column.amax() != 0.0).collect())
+}
+
+/// Which jump a figure shows.
+pub(super) struct Place {
+    /// Number from 1, which ends the figure's name.
+    pub suffix: String,
+    /// Name of the recording, with the row where the jump begins if there may be several.
+    pub words: String,
+}
+
+impl Place {
+    /// A recording.
+    pub fn of_recording(index: usize, path: &Path) -> Self {
+        let name = file_name(path);
+        let stem = name.trim_end_matches(".gz").trim_end_matches(".csv");
+        Self {
+            suffix: (index + 1).to_string(),
+            words: stem.to_owned(),
+        }
+    }
 }
 
 /// A value of every sample; none where a rollout did not arrive.
@@ -71,7 +93,7 @@ impl Jump<'_> {
     /// encode stay as recorded.
     fn motions(&self) -> Result<[Motion; 2], ModelError> {
         let recorded = &self.run.segment.x;
-        let modelled = modelled(self.model, recorded.column(0).into_owned())?;
+        let modelled = modelled(self.model, self.run)?;
         let mut states = self.decoded(&self.run.full)?;
         for (sample, state) in states.iter_mut().enumerate() {
             let Some(state) = state else { continue };
@@ -166,7 +188,7 @@ impl Jump<'_> {
         let (names, units) = (&self.assessment.names, &self.assessment.units);
         let full = self.decoded(&self.run.full)?;
         let restarted = self.decoded(&self.run.restarted)?;
-        let modelled = modelled(self.model, self.run.segment.x.column(0).into_owned())?;
+        let modelled = modelled(self.model, self.run)?;
         let panel = |row: usize| {
             let recorded = |k| self.run.segment.x[(row, k)];
             let title = format!("{}, {}", names[row], units[row]);

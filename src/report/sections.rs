@@ -59,9 +59,7 @@ impl<'a> Section<'a> {
 
 /// The numbers at the top of the page, each with its name.
 pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
-    let Content {
-        model, assessment, ..
-    } = content;
+    let (model, assessment) = (content.model, content.assessment);
     let every = assessment.restart_every_s;
     let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
     let errors = |sums: &CoordinateSums| {
@@ -95,9 +93,7 @@ pub(super) fn sections<'a>(
     figures: &'a AllFigures,
     options: &PageOptions,
 ) -> Vec<Section<'a>> {
-    let Content {
-        model, assessment, ..
-    } = *content;
+    let (model, assessment) = (content.model, content.assessment);
     let every = assessment.restart_every_s;
     let by_phase = format!(
         "All {} coordinates: root mean square errors over whole jumps and restarted every {every} s; on the right those of \

@@ -35,7 +35,7 @@ pub fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Ta
     let every = format!("restarted every {} s", assessment.restart_every_s);
     let mut table = coordinates(assessment);
     let first = assessment.runs.first();
-    let modelled = first.and_then(|run| modelled(model, run.segment.x.column(0).into_owned()).ok());
+    let modelled = first.and_then(|run| modelled(model, run).ok());
     let is_modelled = |row: usize| modelled.as_ref().is_none_or(|modelled| modelled[row]);
     for (title, coefficient, sums) in [
         ("full rms", "full R^2", &assessment.full),

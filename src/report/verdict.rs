@@ -106,14 +106,12 @@ fn headline(whole: Grade, short: Grade, is_doubtful: bool) -> &'static str {
 
 /// What the model is.
 fn subject(content: &Content<'_>) -> Result<String, ModelError> {
-    let Content {
-        model, assessment, ..
-    } = *content;
+    let (model, assessment) = (content.model, content.assessment);
     let robot = model.robot().map_or("a robot", |robot| robot.name());
     let n = assessment.names.len();
     let phases: Vec<&str> = model.phases().iter().map(|p| p.name.as_str()).collect();
     let modelled = match assessment.runs.first() {
-        Some(run) => modelled(model, run.segment.x.column(0).into_owned())?,
+        Some(run) => modelled(model, run)?,
         None => vec![true; n],
     };
     let names = assessment.names.iter().zip(modelled);
