@@ -111,9 +111,8 @@ pub fn note_mismatches(recording: &Recording, robot: &Robot) {
 /// counts twice says less than two.
 pub fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
     let mut first: BTreeMap<String, (&str, &Path)> = BTreeMap::new();
-    let all = sets
-        .iter()
-        .flat_map(|(set, paths)| paths.iter().map(move |path| (*set, *path)));
+    let sets = sets.iter();
+    let all = sets.flat_map(|(set, paths)| paths.iter().map(move |path| (*set, *path)));
     for (set, path) in all.filter(|(_, path)| path.is_file()) {
         let Ok(bytes) = std::fs::read(path) else {
             continue; // reading it as a recording says why
@@ -126,11 +125,8 @@ pub fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
                     true => "and counts twice".to_owned(),
                     false => format!("which is in the {other} set: its {set} figures say too much"),
                 };
-                note(&format!(
-                    "{}: the same recording as {}, {what}",
-                    path.display(),
-                    earlier.display()
-                ));
+                let (path, earlier) = (path.display(), earlier.display());
+                note(&format!("{path}: the same recording as {earlier}, {what}"));
             }
         }
     }

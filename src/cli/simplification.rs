@@ -14,7 +14,7 @@ use crate::model::ReducedModel;
 use crate::recording::Recording;
 use crate::sim::LatentSegment;
 use crate::simplify::{
-    Certificate, Domain, MARGIN, PrintedEquation, RolloutBasis, RolloutEffect, Samples, Simplified,
+    Certificate, Domain, MARGIN, PrintedEquation, RolloutBasis, RolloutEffect, Samples,
     SimplifyError, Tolerance, bound_words, certificate_json, change_table, equation_table,
     lost_words, markdown, printed, rollout_table, rollouts_json, simplify,
 };
@@ -42,11 +42,10 @@ impl Basis {
     ) -> Result<Self, Error> {
         let is_table = |path: &&PathBuf| path.extension().is_some_and(|end| end == "toml");
         match files.iter().find(is_table) {
-            None => Self::of(
-                model,
-                read_recordings(files, reading)?,
-                margin.unwrap_or(MARGIN),
-            ),
+            None => {
+                let recordings = read_recordings(files, reading)?;
+                Self::of(model, recordings, margin.unwrap_or(MARGIN))
+            }
             Some(path) if files.len() > 1 => Err(SimplifyError::DomainFile {
                 path: path.clone(),
                 message: "one .toml file of ranges, or recordings, but not both".to_owned(),
@@ -126,25 +125,18 @@ pub fn run(
         return Ok(None);
     }
     let progress = spinner("simplifying");
-    let basis = Basis::read(
-        model,
-        &arguments.domain,
-        arguments.margin,
-        &arguments.reading,
-    )?;
+    let (files, reading) = (&arguments.domain, &arguments.reading);
+    let basis = Basis::read(model, files, arguments.margin, reading)?;
     let tolerance = arguments.tolerance.unwrap_or(Tolerance::Absolute(0.0));
-    let Simplified {
-        model: simplified,
-        certificate,
-    } = simplify(equations, &basis.domain, basis.samples.as_ref(), tolerance)?;
+    let simplified = simplify(equations, &basis.domain, basis.samples.as_ref(), tolerance)?;
     progress.set_message("rolling out");
-    let rollouts = basis.rollouts(model, &simplified)?;
+    let rollouts = basis.rollouts(model, &simplified.model)?;
     progress.finish_and_clear();
     let margin = (basis.samples.as_ref()).map(|_| arguments.margin.unwrap_or(MARGIN));
     let mut outcome = Outcome {
-        model: simplified,
+        model: simplified.model,
         original: model.clone(),
-        certificate,
+        certificate: simplified.certificate,
         rollouts,
         basis,
         domain_files: names(&arguments.domain),
@@ -191,12 +183,8 @@ impl Outcome {
             _ => printed(equations, &basis.domain, basis.samples.as_ref(), rounding)?,
         };
         let name = format!("{}-simplification.md", self.model.identifier());
-        let page = markdown(
-            [&self.original, &self.model],
-            &self.certificate,
-            self.rollouts.as_ref(),
-            &printed,
-        );
+        let (models, rollouts) = ([&self.original, &self.model], self.rollouts.as_ref());
+        let page = markdown(models, &self.certificate, rollouts, &printed);
         let mut value = certificate_json(&self.certificate);
         value["file"] = json!(name);
         value["domain_files"] = json!(self.domain_files);
