@@ -43,7 +43,7 @@ pub enum Error {
     #[error(transparent)]
     Artifact(#[from] ArtifactError),
     #[error(transparent)]
-    Import(Box<ImportError>),
+    Import(#[from] ImportError),
     #[error(transparent)]
     Identify(#[from] IdentifyError),
     #[error(transparent)]
@@ -142,29 +142,7 @@ impl Error {
             | Self::Ending { .. }
             | Self::IsRead { .. }
             | Self::OneSegment(_) => true,
-            Self::Recording(_)
-            | Self::Identify(_)
-            | Self::Model(_)
-            | Self::Artifact(_)
-            | Self::Emit(_)
-            | Self::Typeset(_)
-            | Self::Codegen(_)
-            | Self::Folder(_)
-            | Self::Lower(_)
-            | Self::Sim(_)
-            | Self::Study(_)
-            | Self::Evaluate(_)
-            | Self::Physical(_)
-            | Self::Mpc(_)
-            | Self::Plan(_)
-            | Self::Distrusted(_)
-            | Self::Config { .. }
-            | Self::Mismatch { .. }
-            | Self::Exists(_)
-            | Self::IsFolder(_)
-            | Self::NoFolder { .. }
-            | Self::Read { .. }
-            | Self::Write { .. } => false,
+            _ => false,
         }
     }
 }
@@ -174,11 +152,5 @@ fn other_name(path: &Path, input: &Path) -> String {
     match path == input {
         true => String::new(),
         false => format!(" as {}", input.display()),
-    }
-}
-
-impl From<ImportError> for Error {
-    fn from(error: ImportError) -> Self {
-        Self::Import(Box::new(error))
     }
 }
