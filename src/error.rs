@@ -142,7 +142,29 @@ impl Error {
             | Self::Ending { .. }
             | Self::IsRead { .. }
             | Self::OneSegment(_) => true,
-            _ => false,
+            Self::Recording(_)
+            | Self::Identify(_)
+            | Self::Model(_)
+            | Self::Artifact(_)
+            | Self::Emit(_)
+            | Self::Typeset(_)
+            | Self::Codegen(_)
+            | Self::Folder(_)
+            | Self::Lower(_)
+            | Self::Sim(_)
+            | Self::Study(_)
+            | Self::Evaluate(_)
+            | Self::Physical(_)
+            | Self::Mpc(_)
+            | Self::Plan(_)
+            | Self::Distrusted(_)
+            | Self::Config { .. }
+            | Self::Mismatch { .. }
+            | Self::Exists(_)
+            | Self::IsFolder(_)
+            | Self::NoFolder { .. }
+            | Self::Read { .. }
+            | Self::Write { .. } => false,
         }
     }
 }

@@ -18,7 +18,7 @@ use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::lower::LowerOptions;
 use crate::mpc::ControlModel;
-use crate::mpc::interface::{CODES, Settings, status_text};
+use crate::mpc::interface::{Settings, TEXTS};
 use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
 use control_model::ControlModelText;
 use lock::Lock;
@@ -203,8 +203,9 @@ fn project(
 
 /// Every code of the interface with its text.
 pub(super) fn texts() -> impl Iterator<Item = (i32, String)> {
-    let text = |code| status_text(code).to_string_lossy().into_owned();
-    CODES.into_iter().map(move |code| (code, text(code)))
+    TEXTS
+        .iter()
+        .map(|(code, text)| (*code, text.to_string_lossy().into_owned()))
 }
 
 /// The name of a code: the words of its text before the colon.

@@ -60,11 +60,22 @@ impl Status {
 
     /// Whether the command comes from this step's own plan.
     pub fn has_plan(self) -> bool {
-        use Status::{ContactEarly, ContactLate, ContactUnknown, Softened, Solved};
-        matches!(
-            self,
-            Solved | Softened | ContactEarly | ContactLate | ContactUnknown
-        )
+        match self {
+            Status::Solved
+            | Status::Softened
+            | Status::ContactEarly
+            | Status::ContactLate
+            | Status::ContactUnknown => true,
+            Status::Inaccurate
+            | Status::Infeasible
+            | Status::IterationCap
+            | Status::NumericalFailure
+            | Status::MeasurementJump
+            | Status::LiftFailed
+            | Status::NotFinite
+            | Status::WrongDimension
+            | Status::NoReference => false,
+        }
     }
 
     /// The status as a number.

@@ -92,7 +92,11 @@ impl ConeLift {
                     rules.within_limit(solution[joint] * limit[joint], joint, losses)
                 }))
             }
-            failed => Err(LiftFailure::Solver(failed)),
+            outcome @ (Outcome::Inaccurate
+            | Outcome::Infeasible
+            | Outcome::Unbounded
+            | Outcome::IterationCap
+            | Outcome::NumericalFailure) => Err(LiftFailure::Solver(outcome)),
         }
     }
 }
