@@ -5,6 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, Rotation3, Vector2, Vector3};
 
 use super::metrics::FitSums;
+use crate::recording::segment::{between, stretches};
 use crate::recording::{RecordingError, Segment};
 use crate::robot::{InputRule, JOINT_DIM, Leg, Robot, WrenchFrame};
 use crate::sim::{IntegrationOptions, OdeSystem, Restart, SimError, integrate, restart_windows};
@@ -96,11 +97,9 @@ impl Aslip {
             segment.dx[(z, start)],
         ];
         position_m[start] = Some(Vector2::new(state[0], state[1]));
-        let mut first = start;
-        while first < window.end {
-            let down = stances[first].is_some();
-            let same = (first..window.end).take_while(|&k| stances[k].is_some() == down);
-            let end = first + same.count();
+        let down = |sample: usize| stances[sample].is_some();
+        for span in stretches(window.clone(), |a, b| down(a) == down(b)) {
+            let Range { start: first, end } = span;
             let times = &segment.time_s[first..(end + 1).min(window.end)];
             let mut span = PendulumSpan {
                 pendulum: self,
@@ -116,7 +115,6 @@ impl Aslip {
                 return;
             }
             state.copy_from_slice(states.column(states.ncols() - 1).as_slice());
-            first = end;
         }
     }
 }
@@ -131,16 +129,9 @@ struct PendulumSpan<'a> {
 impl PendulumSpan<'_> {
     /// The stance with the force interpolated between samples, held after the last.
     fn stance_at(&self, time_s: f64) -> Option<Stance> {
-        let n = self.stances.len();
-        let after = self.times[..n].partition_point(|&t| t <= time_s);
-        let (left, right) = (after.saturating_sub(1), after.min(n - 1));
+        let times = &self.times[..self.stances.len()];
+        let (left, right, share) = between(times, time_s);
         let (from, to) = (self.stances[left]?, self.stances[right]?);
-        let step = self.times[right] - self.times[left];
-        let share = if step > 0.0 {
-            (time_s - self.times[left]) / step
-        } else {
-            0.0
-        };
         Some(Stance {
             foot_m: from.foot_m,
             force_n: from.force_n.lerp(&to.force_n, share),
@@ -268,33 +259,17 @@ fn mean_foot(robot: &Robot, segment: &Segment, sample: usize) -> Vector2<f64> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
-
     use super::*;
-    use crate::robot::STATE_DIM;
 
     /// A body at rest at `height`, legs bent, without torques; `feet` for all samples.
     fn at_rest(height: f64, feet: [bool; 4], count: usize) -> Segment {
-        let mut x = DMatrix::zeros(STATE_DIM, count);
-        for (row, mut values) in x.row_iter_mut().enumerate() {
-            values.fill(match row {
-                BODY_Z => height,
-                row if row < JOINT_DIM => [0.0, 0.8, -1.6][row % 3],
-                _ => 0.0,
-            });
+        let mut segment = Segment::still("rest", (0..count).map(|k| 0.002 * k as f64).collect());
+        segment.x.row_mut(BODY_Z).fill(height);
+        for joint in 0..JOINT_DIM {
+            segment.x.row_mut(joint).fill([0.0, 0.8, -1.6][joint % 3]);
         }
-        Segment {
-            path: PathBuf::from("rest"),
-            first_row: 2,
-            row_stride: 1.0,
-            time_s: (0..count).map(|k| 0.002 * k as f64).collect(),
-            dx: DMatrix::zeros(STATE_DIM, count),
-            ddx: DMatrix::zeros(STATE_DIM, count),
-            x,
-            torque_nm: DMatrix::zeros(JOINT_DIM, count),
-            feet: vec![feet; count],
-            body_wrench: None,
-        }
+        segment.feet.fill(feet);
+        segment
     }
 
     fn rms_z(segment: &Segment) -> f64 {

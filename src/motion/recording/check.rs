@@ -11,7 +11,8 @@ use nalgebra::DMatrix;
 
 use super::columns::Column;
 use super::error::{RecordingError, RecordingFault};
-use super::segment::{Recording, Segment};
+use super::preprocess::median;
+use super::segment::{Recording, Segment, stretches};
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::kinematics::{LEAST_HEIGHT, LEAST_SPAN};
 use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
@@ -172,14 +173,11 @@ pub fn without(
             let end = finding.samples.end.min(keep.len());
             keep[finding.samples.start.min(end)..end].fill(false);
         }
-        let mut start = 0;
-        while start < keep.len() {
-            let kept = keep[start..].iter().take_while(|k| **k).count();
-            if kept >= 2 {
-                segments.push(segment.slice(start..start + kept));
-            }
-            start += kept + 1;
-        }
+        let kept = stretches(0..keep.len(), |a, b| keep[a] == keep[b]);
+        let kept = kept
+            .into_iter()
+            .filter(|range| keep[range.start] && range.len() >= 2);
+        segments.extend(kept.map(|range| segment.slice(range)));
     }
     if segments.is_empty() {
         let row = recording.segments.first().map_or(1, |s| s.first_row);
@@ -321,14 +319,10 @@ impl Scan<'_> {
             // In flight nothing pushes the body forwards or sideways: a velocity that does not change is right there.
             let glides = |j: usize| BODY_XY.contains(&i) && segment.feet[j] == [false; 4];
             let at_extreme = |j: usize| segment.dx[(i, j)].abs() == extreme && !glides(j);
-            let mut start = 0;
             let mut clipped = vec![false; n];
-            while start < n {
-                let run = (start..n).take_while(|j| at_extreme(*j)).count();
-                if run >= CLIPPED_SAMPLES {
-                    clipped[start..start + run].fill(true);
-                }
-                start += run + 1;
+            for run in stretches(0..n, |a, b| at_extreme(a) == at_extreme(b)) {
+                let is_long = run.len() >= CLIPPED_SAMPLES;
+                clipped[run.clone()].fill(is_long && at_extreme(run.start));
             }
             self.column(Implausible::Clipped, Column::Velocity(i), |j| {
                 clipped[j].then_some((segment.dx[(i, j)], extreme))
@@ -338,11 +332,8 @@ impl Scan<'_> {
 
     fn time_steps(&mut self) {
         let segment = self.segment;
-        let mut steps: Vec<f64> = segment.time_s.windows(2).map(|w| w[1] - w[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        let Some(median) = steps.get(steps.len() / 2).copied() else {
-            return;
-        };
+        let steps = segment.time_s.windows(2).map(|pair| pair[1] - pair[0]);
+        let median = median(steps);
         self.column(Implausible::TimeStep, Column::Time, |j| {
             let step = segment.time_s[j] - segment.time_s[j.checked_sub(1)?];
             ((step - median).abs() > STEP_SHARE * median).then_some((step, median))
@@ -375,7 +366,7 @@ fn row(matrix: &DMatrix<f64>, index: usize) -> Vec<f64> {
 }
 
 /// The value below which a share of the values lies; 0 if there are none.
-fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
+pub(super) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);
     let place = (sorted.len().saturating_sub(1) as f64 * share) as usize;

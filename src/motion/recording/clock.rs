@@ -5,8 +5,6 @@
 //! moved by velocity times elapsed time, in every coordinate. A clock is wrong for all of them alike: where they
 //! disagree, a coordinate is wrong, not the clock.
 
-use nalgebra::DMatrix;
-
 use super::error::RecordingError;
 use super::preprocess::{differences, median, resampled};
 use super::segment::Segment;
@@ -217,18 +215,10 @@ impl Interval {
 
 /// Some samples of a segment, at other times.
 fn chosen(segment: &Segment, samples: &[usize], time_s: Vec<f64>) -> Segment {
-    let columns = |m: &DMatrix<f64>| m.select_columns(samples);
+    let feet = samples.iter().map(|sample| segment.feet[*sample]);
     let rows = segment.row(segment.len() - 1) - segment.row(0);
     Segment {
-        path: segment.path.clone(),
-        first_row: segment.first_row,
         row_stride: rows as f64 / samples.len().saturating_sub(1).max(1) as f64,
-        time_s,
-        x: columns(&segment.x),
-        dx: columns(&segment.dx),
-        ddx: columns(&segment.ddx),
-        torque_nm: columns(&segment.torque_nm),
-        feet: samples.iter().map(|sample| segment.feet[*sample]).collect(),
-        body_wrench: segment.body_wrench.as_ref().map(columns),
+        ..segment.remade(time_s, feet.collect(), |m| m.select_columns(samples))
     }
 }

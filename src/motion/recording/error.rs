@@ -209,6 +209,14 @@ impl RecordingFault {
         RecordingFault::Io { action, source }
     }
 
+    /// A file that cannot be opened or read; there may be none.
+    pub(super) fn unreadable(action: &'static str, source: io::Error) -> Self {
+        match source.kind() {
+            io::ErrorKind::NotFound => RecordingFault::Missing,
+            _ => RecordingFault::io(action, source),
+        }
+    }
+
     /// A line that is not separated as expected.
     pub(super) fn delimiter(line: &str, expected: &'static str) -> Self {
         let found = shortened(line);

@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use super::error::{RecordingError, RecordingFault};
-use super::segment::Segment;
+use super::segment::{Segment, stretches};
 use crate::robot::{ContactFlags, FeetRule};
 
 /// Fewest samples of a span: fewer are chatter of contact and join the span before them.
@@ -123,7 +123,9 @@ impl PhaseRule {
             };
         };
         assign_transitional(&mut phases, feet, first_known);
-        let runs = runs_of(phases.into_iter().flatten());
+        let phases: Vec<usize> = phases.into_iter().flatten().collect();
+        let runs = stretches(0..phases.len(), |a, b| phases[a] == phases[b]).into_iter();
+        let runs = runs.map(|range| (phases[range.start], range));
         let runs = merge_short(runs, self.min_samples);
         Ok(with_stance(runs, feet))
     }
@@ -164,18 +166,7 @@ fn assign_transitional(phases: &mut [Option<usize>], feet: &[ContactFlags], firs
 
 type Run = (usize, Range<usize>);
 
-fn runs_of(phases: impl Iterator<Item = usize>) -> Vec<Run> {
-    let mut runs: Vec<Run> = Vec::new();
-    for (sample, phase) in phases.enumerate() {
-        match runs.last_mut() {
-            Some((last, range)) if *last == phase => range.end = sample + 1,
-            _ => runs.push((phase, sample..sample + 1)),
-        }
-    }
-    runs
-}
-
-fn merge_short(runs: Vec<Run>, min_samples: usize) -> Vec<Run> {
+fn merge_short(runs: impl Iterator<Item = Run>, min_samples: usize) -> Vec<Run> {
     let mut out: Vec<Run> = Vec::new();
     for (phase, range) in runs {
         match out.last_mut() {

@@ -96,21 +96,12 @@ pub fn resampled(segment: &Segment, rows: usize) -> Result<Segment, RecordingErr
         return Err(fault.at(&segment.path, segment.row(0)));
     }
     let places = places(&segment.time_s, rows);
-    let along = |m: &DMatrix<f64>| interpolate(m, &places);
+    let nearest = |p: &Place| segment.feet[if p.share < 0.5 { p.left } else { p.left + 1 }];
+    let time_s = places.iter().map(|place| place.time_s).collect();
+    let feet = places.iter().map(nearest).collect();
     Ok(Segment {
-        path: segment.path.clone(),
-        first_row: segment.first_row,
         row_stride: segment.row_stride * (n - 1) as f64 / (rows - 1) as f64,
-        time_s: places.iter().map(|place| place.time_s).collect(),
-        x: along(&segment.x),
-        dx: along(&segment.dx),
-        ddx: along(&segment.ddx),
-        torque_nm: along(&segment.torque_nm),
-        feet: places
-            .iter()
-            .map(|p| segment.feet[if p.share < 0.5 { p.left } else { p.left + 1 }])
-            .collect(),
-        body_wrench: segment.body_wrench.as_ref().map(along),
+        ..segment.remade(time_s, feet, |m| interpolate(m, &places))
     })
 }
 

@@ -87,8 +87,7 @@ pub fn write_inputs_with(
         write_table(&mut packed, recording, inputs, options)?;
         packed.finish().map(|_| ())
     });
-    let action = "write";
-    written.map_err(|source| RecordingFault::Io { action, source }.of(path))
+    written.map_err(|source| RecordingFault::io("write", source).of(path))
 }
 
 /// Writes a segment as an MCAP file: joint states, odometry, contact, and if given the inputs (18 x samples).
@@ -129,18 +128,16 @@ fn write_table(
     options: &WriteOptions,
 ) -> io::Result<()> {
     let with_force = recording.segments.iter().all(|s| s.body_wrench.is_some());
-    let columns: Vec<Column> = Column::all()
-        .into_iter()
-        .filter(|column| match column {
-            Column::Acceleration(_) => options.accelerations,
-            Column::Force(_) => with_force,
-            Column::Time
-            | Column::Position(_)
-            | Column::Velocity(_)
-            | Column::Torque(_)
-            | Column::Foot(_) => true,
-        })
-        .collect();
+    let is_written = |column: &Column| match column {
+        Column::Acceleration(_) => options.accelerations,
+        Column::Force(_) => with_force,
+        Column::Time
+        | Column::Position(_)
+        | Column::Velocity(_)
+        | Column::Torque(_)
+        | Column::Foot(_) => true,
+    };
+    let columns: Vec<Column> = Column::all().into_iter().filter(is_written).collect();
     let separator = match options.notation {
         Notation::Semicolon => ";",
         Notation::Comma => ",",
@@ -150,34 +147,27 @@ fn write_table(
         names.extend(Robot::input_names().map(|name| format!("Input {name}")));
     }
     writeln!(destination, "{}", names.join(separator))?;
-    let (mut line, mut number) = (String::new(), String::new());
+    let mut line = String::new();
     for (index, segment) in recording.segments.iter().enumerate() {
-        let inputs = inputs.map(|inputs| &inputs[index]);
         for sample in 0..segment.len() {
             line.clear();
-            for (place, column) in columns.iter().enumerate() {
-                if place > 0 {
+            for column in &columns {
+                push_cell(&mut line, segment, *column, sample);
+                line.push_str(separator);
+            }
+            if let Some(inputs) = inputs {
+                for value in inputs[index].column(sample).iter() {
+                    push_number(&mut line, *value);
                     line.push_str(separator);
                 }
-                number.clear();
-                push_cell(&mut number, segment, *column, sample);
-                match options.notation {
-                    Notation::Semicolon => line.push_str(&number.replace('.', ",")),
-                    Notation::Comma => line.push_str(&number),
-                }
             }
-            for row in 0..inputs.map_or(0, |inputs| inputs.nrows()) {
-                let value = inputs.map_or(0.0, |inputs| inputs[(row, sample)]);
-                line.push_str(separator);
-                number.clear();
-                write!(number, "{value:?}").expect("a String takes any text");
-                match options.notation {
-                    Notation::Semicolon => line.push_str(&number.replace('.', ",")),
-                    Notation::Comma => line.push_str(&number),
-                }
-            }
+            line.pop();
             line.push('\n');
-            destination.write_all(line.as_bytes())?;
+            let bytes = match options.notation {
+                Notation::Semicolon => &line.replace('.', ","),
+                Notation::Comma => &line,
+            };
+            destination.write_all(bytes.as_bytes())?;
         }
     }
     Ok(())
@@ -196,6 +186,10 @@ fn push_cell(out: &mut String, segment: &Segment, column: Column, sample: usize)
             return;
         }
     };
+    push_number(out, value);
+}
+
+fn push_number(out: &mut String, value: f64) {
     // Debug has an exponent where Display would print hundreds of zeros.
     write!(out, "{value:?}").expect("a String takes any text");
 }

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use super::integrate::{IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
 use super::latent::LatentSegment;
 use crate::lower::CompiledModel;
+use crate::recording::segment::stretches;
 
 /// When a rollout starts again from the recorded latent state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -142,7 +143,8 @@ fn roll_window(
     states.column_mut(0).copy_from_slice(&state);
     let mut reached = 1;
     let mut window_end = (None, false);
-    for span in spans(&recorded.phase, &samples) {
+    let phase = &recorded.phase;
+    for span in stretches(samples.clone(), |a, b| phase[a] == phase[b]) {
         // the last step of a span ends on the first sample of the next
         let times = &recorded.time_s[span.start..(span.end + 1).min(samples.end)];
         dynamics.phase = recorded.phase[span.start];
@@ -199,18 +201,6 @@ impl OdeSystem for PhaseDynamics<'_> {
         jacobian.view_mut((0, d), (d, d)).fill_with_identity();
         (jacobian.rows_mut(d, d)).copy_from(&self.partials.columns(0, 2 * d));
     }
-}
-
-/// Runs of samples with one phase.
-fn spans(phase: &[usize], samples: &Range<usize>) -> Vec<Range<usize>> {
-    let mut out: Vec<Range<usize>> = Vec::new();
-    for sample in samples.clone() {
-        match out.last_mut() {
-            Some(span) if phase[span.start] == phase[sample] => span.end = sample + 1,
-            _ => out.push(sample..sample + 1),
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -242,10 +242,8 @@ impl ColumnMap {
     /// [`RecordingFault::MapSyntax`] with line, key and what was expected; [`RecordingFault::Map`] for
     /// a key that does not apply to its table.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
-        let text = std::fs::read_to_string(path).map_err(|source| match source.kind() {
-            std::io::ErrorKind::NotFound => RecordingFault::Missing.of(path),
-            _ => RecordingFault::io("read", source).of(path),
-        })?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| RecordingFault::unreadable("read", source).of(path))?;
         Self::parse(&path.display().to_string(), &text)
     }
 

@@ -22,10 +22,8 @@ const LARGEST_CHUNK: u64 = 1 << 30;
 /// # Errors
 /// [`RecordingFault::Mcap`] for a damaged file, [`RecordingFault::NoTopic`] if nothing can be read.
 pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, RecordingError> {
-    let bytes = std::fs::read(path).map_err(|source| match source.kind() {
-        std::io::ErrorKind::NotFound => RecordingFault::Missing.of(path),
-        _ => RecordingFault::io("read", source).of(path),
-    })?;
+    let bytes = std::fs::read(path)
+        .map_err(|source| RecordingFault::unreadable("read", source).of(path))?;
     let fault = |error: mcap::McapError| RecordingFault::Mcap(error.to_string()).of(path);
     let mut topics = Topics::new(path);
     for record in LinearReader::new(&bytes).map_err(fault)? {

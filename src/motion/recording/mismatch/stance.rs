@@ -6,6 +6,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use crate::recording::preprocess::median;
+use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
@@ -255,15 +256,13 @@ fn stances(segment: &Segment) -> Vec<(Leg, Range<usize>)> {
     let samples_in = |time_s: f64| (time_s / step_s).round() as usize;
     let mut out = Vec::new();
     for leg in Leg::ALL {
-        let down = |sample: &usize| segment.feet[*sample][leg.index()];
-        let mut start = 0;
-        while start < segment.len() {
-            let count = (start..segment.len()).take_while(down).count();
-            if count >= samples_in(LEAST_STANCE_S).max(2) {
+        let down = |sample: usize| segment.feet[sample][leg.index()];
+        for stretch in stretches(0..segment.len(), |a, b| down(a) == down(b)) {
+            let count = stretch.len();
+            if down(stretch.start) && count >= samples_in(LEAST_STANCE_S).max(2) {
                 let edge = samples_in(EDGE_S).min(count / 8);
-                out.push((leg, start + edge..start + count - edge));
+                out.push((leg, stretch.start + edge..stretch.end - edge));
             }
-            start += count + 1;
         }
     }
     out

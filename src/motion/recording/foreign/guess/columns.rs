@@ -4,6 +4,7 @@ use super::super::elements::Quantity;
 use super::super::log::{Channel, Log};
 use super::super::units::Dimension;
 use super::names::{Reading, is_time, read, unit};
+use crate::recording::preprocess::median;
 use crate::robot::JOINT_DIM;
 
 /// The columns of one quantity.
@@ -171,10 +172,7 @@ fn mean_step(channel: &Channel) -> Option<f64> {
         .iter()
         .filter(|step| step.is_nan() || **step <= 0.0)
         .count();
-    let mut sorted: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
-    if sorted.is_empty() || back * 50 > steps.len() {
-        return None;
-    }
-    sorted.sort_by(f64::total_cmp);
-    Some(sorted[sorted.len() / 2])
+    let forward: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
+    let counts = !forward.is_empty() && back * 50 <= steps.len();
+    counts.then(|| median(forward.into_iter()))
 }

@@ -3,7 +3,9 @@
 use nalgebra::{DMatrix, Matrix3};
 
 use super::super::attitude::{RateAxes, angle_rates};
+use crate::recording::check::quantile;
 use crate::recording::preprocess::differences;
+use crate::recording::segment::stretches;
 use crate::robot::input_rule::rotation;
 
 /// Share of a derivative that a velocity must leave unexplained at most to be evidence.
@@ -22,15 +24,10 @@ pub(super) struct Scale {
 /// Slopes without the samples at which time jumps.
 pub(super) fn slopes(times_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(rows.nrows(), rows.ncols());
-    let mut start = 0;
-    for end in 1..=times_s.len() {
-        if end < times_s.len() && times_s[end] > times_s[end - 1] {
-            continue;
-        }
-        let own = rows.columns(start, end - start).into_owned();
-        let of = differences(&times_s[start..end], &own);
-        out.columns_mut(start, end - start).copy_from(&of);
-        start = end;
+    for range in stretches(0..times_s.len(), |before, at| times_s[at] > times_s[before]) {
+        let own = rows.columns(range.start, range.len()).into_owned();
+        let of = differences(&times_s[range.clone()], &own);
+        out.columns_mut(range.start, range.len()).copy_from(&of);
     }
     out
 }
@@ -140,8 +137,5 @@ pub(super) fn real_is_last(quaternions: &DMatrix<f64>) -> bool {
 
 /// The largest value, the 99th percentile of absolute values, so that single spikes do not count.
 pub(super) fn reach(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.map(f64::abs).collect();
-    sorted.sort_by(f64::total_cmp);
-    let place = (0.99 * (sorted.len() as f64 - 1.0)).max(0.0) as usize;
-    sorted.get(place).copied().unwrap_or_default()
+    quantile(values.map(f64::abs), 0.99)
 }
