@@ -62,35 +62,24 @@ pub(super) fn angle_rates(
         if c_p.abs() < UPRIGHT {
             return Err(i);
         }
+        // Columns of the matrices one below the other.
         let map = match axes {
             RateAxes::Body => {
                 let (s_r, c_r) = roll.sin_cos();
                 let tangent = s_p / c_p;
-                Matrix3::new(
-                    1.0,
-                    s_r * tangent,
-                    c_r * tangent, //
-                    0.0,
-                    c_r,
-                    -s_r, //
-                    0.0,
-                    s_r / c_p,
-                    c_r / c_p,
-                )
+                Matrix3::from([
+                    [1.0, 0.0, 0.0],
+                    [s_r * tangent, c_r, s_r / c_p],
+                    [c_r * tangent, -s_r, c_r / c_p],
+                ])
             }
             RateAxes::World => {
                 let (s_y, c_y) = yaw.sin_cos();
-                Matrix3::new(
-                    c_y / c_p,
-                    s_y / c_p,
-                    0.0, //
-                    -s_y,
-                    c_y,
-                    0.0, //
-                    c_y * s_p / c_p,
-                    s_y * s_p / c_p,
-                    1.0,
-                )
+                Matrix3::from([
+                    [c_y / c_p, -s_y, c_y * s_p / c_p],
+                    [s_y / c_p, c_y, s_y * s_p / c_p],
+                    [0.0, 0.0, 1.0],
+                ])
             }
         };
         out.set_column(i, &(map * omega));
@@ -170,12 +159,8 @@ mod tests {
         let mut angles = DMatrix::from_row_slice(1, 5, &[3.0, 3.1, -3.1, -3.0, 3.1]);
         assert!(unwrap(&mut angles));
         let expected = [3.0, 3.1, TAU - 3.1, TAU - 3.0, 3.1];
-        assert!(
-            angles
-                .iter()
-                .zip(expected)
-                .all(|(a, b)| (a - b).abs() < 1e-14)
-        );
+        let errors = angles.iter().zip(expected).map(|(a, b)| (a - b).abs());
+        assert!(errors.fold(0.0, f64::max) < 1e-14);
         assert!(!unwrap(&mut angles));
     }
 }
