@@ -14,7 +14,7 @@ use super::parameters::{
     ARMATURE, CALF, CALF_SECOND, DELAY, DRY, GRAVITY, INVERSE_MASS, LEG_SIDE, PARAMETER_DIM, THIGH,
     THIGH_SECOND, VISCOUS, priors,
 };
-use super::windows::{Group, Windows};
+use super::windows::{Group, Row, Windows};
 use crate::recording::check::check;
 use crate::recording::clock::{Timed, timed};
 use crate::recording::{Recording, Segment};
@@ -75,7 +75,7 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
         ));
     }
     notes.extend(round.notes());
-    let mut found = state.result(robot, &segments, &round.windows, notes)?;
+    let mut found = state.result(robot, &segments, &round.windows, notes);
     found.notes.extend(found.contradiction());
     found.notes.extend(found.doubts(robot.mass_kg()));
     Ok(found)
@@ -100,35 +100,29 @@ impl Round {
             windows: Windows::default(),
             clipped_torques: 0,
         };
-        for Prepared {
-            segment,
-            motion,
-            lost,
-        } in segments
-        {
+        for prepared in segments {
+            let (segment, motion) = (&prepared.segment, &prepared.motion);
             let equations =
                 SampleEquations::of(segment, motion, robot, state.gravity_m_s2, state.delay_s);
             round.clipped_torques += equations.clipped_torques;
-            round.windows.add(segment, &equations, lost)?;
+            round.windows.add(segment, &equations, &prepared.lost)?;
         }
         Ok(round)
     }
 
     fn require_enough(&self, recordings: usize) -> Result<(), IdentifyError> {
-        let found = self.windows.contact_samples;
-        if found < LEAST_CONTACT_SAMPLES {
-            let expected = LEAST_CONTACT_SAMPLES;
+        let (found, expected) = (self.windows.contact_samples, LEAST_CONTACT_SAMPLES);
+        if found < expected {
             return Err(IdentifyError::Contact {
                 recordings,
                 found,
                 expected,
             });
         }
-        let is_moving = |group: Group, moving: bool| moving && group == Group::Contact(0);
-        let rows = self.windows.rows.iter();
-        let found = rows.filter(|row| is_moving(row.group, row.moving)).count();
-        if found < LEAST_WINDOWS {
-            let expected = LEAST_WINDOWS;
+        let is_moving = |row: &&Row| row.moving && row.group == Group::Contact(0);
+        let found = self.windows.rows.iter().filter(is_moving).count();
+        let expected = LEAST_WINDOWS;
+        if found < expected {
             return Err(IdentifyError::Still {
                 recordings,
                 found,
@@ -220,7 +214,7 @@ impl State {
         segments: &[Prepared],
         windows: &Windows,
         notes: Vec<String>,
-    ) -> Result<Identification, IdentifyError> {
+    ) -> Identification {
         let priors = priors(robot.geometry(Leg::FrontLeft), self.mass_kg, &self.losses);
         let estimate = self.iteration.estimate.unwrap_or_default();
         // When within a step a torque acts is not recorded: uniform over it.
@@ -251,7 +245,7 @@ impl State {
         let joints = |first: usize| -> [f64; JOINT_DIM] {
             std::array::from_fn(|joint| value(first + joint % 3))
         };
-        Ok(Identification {
+        Identification {
             robot: robot.name().to_owned(),
             gravity_m_s2: self.gravity_m_s2,
             mass_kg: self.mass_kg,
@@ -272,22 +266,23 @@ impl State {
                 legs: legs(&per_mass),
             },
             r2: fit_of(windows, &estimate),
-            force_alone: self.force_alone(windows)?,
+            force_alone: alone(windows),
             samples: Samples {
                 contact: windows.contact_samples,
                 flight: windows.flight_samples,
             },
             notes,
-        })
+        }
     }
+}
 
-    fn force_alone(&self, windows: &Windows) -> Result<ForceAlone, IdentifyError> {
-        let estimate = force_alone(&windows.rows).unwrap_or_default();
-        Ok(ForceAlone {
-            gravity_m_s2: estimate[GRAVITY],
-            mass_kg: 1.0 / estimate[INVERSE_MASS],
-            r2: fit_of(windows, &estimate),
-        })
+/// The regression on the feet's forces alone.
+fn alone(windows: &Windows) -> ForceAlone {
+    let estimate = force_alone(&windows.rows).unwrap_or_default();
+    ForceAlone {
+        gravity_m_s2: estimate[GRAVITY],
+        mass_kg: 1.0 / estimate[INVERSE_MASS],
+        r2: fit_of(windows, &estimate),
     }
 }
 

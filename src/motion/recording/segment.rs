@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use nalgebra::DMatrix;
 
 use super::error::{RecordingError, RecordingFault};
-use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, STATE_DIM};
+use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
 /// Time over which accelerations of joints are averaged before the inertia of the motors counts, in
 /// s: 11 samples at 500 Hz.
@@ -249,12 +249,16 @@ impl Segment {
     /// # Errors
     /// As [`Segment::wrench`].
     pub fn input_within_limits(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
-        let limits = rule.robot().torque_limit_nm();
+        self.input_of(rule, &self.torque_within_limits(rule.robot()))
+    }
+
+    /// The recorded torques, N m; those beyond a limit of the robot count as the limit.
+    pub fn torque_within_limits(&self, robot: &Robot) -> DMatrix<f64> {
         let mut torque_nm = self.torque_nm.clone();
-        for (mut row, limit) in torque_nm.row_iter_mut().zip(limits) {
+        for (mut row, limit) in torque_nm.row_iter_mut().zip(robot.torque_limit_nm()) {
             row.apply(|torque| *torque = torque.clamp(-limit, *limit));
         }
-        self.input_of(rule, &torque_nm)
+        torque_nm
     }
 
     /// The input of these torques of the motors; the file's wrench is that of the recorded ones.
@@ -304,7 +308,7 @@ impl Segment {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::robot::{Actuators, Robot, RobotError, WrenchFrame};
+    use crate::robot::{Actuators, RobotError, WrenchFrame};
 
     /// A segment whose entries all differ, of a robot that stands.
     pub fn sample_segment(n: usize) -> Segment {

@@ -11,7 +11,7 @@ use super::elements::{QUATERNION, Quantity};
 use super::interpolate::{Between, at_times};
 use super::log::Log;
 use super::map::{ColumnMap, Frame, Origin};
-use super::signal::{Signal, Taker};
+use super::signal::{Signal, Source};
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::preprocess::differences;
 use crate::recording::segment::Recording;
@@ -44,16 +44,15 @@ pub(in crate::recording) fn assemble(
     logs: &[Log],
     map: &ColumnMap,
 ) -> Result<Assembled, RecordingError> {
-    let mut taker = Taker {
-        logs,
-        map,
-        epoch_s: 0,
+    let find = |quantity| Source::find(logs, map, quantity);
+    let epoch_s = match find(Quantity::JointPosition)? {
+        Some(source) => source.epoch_s()?,
+        None => None,
     };
-    let epoch_s = taker.epoch_of(Quantity::JointPosition)?;
-    taker.epoch_s = epoch_s.unwrap_or(0);
     let mut signals = Signals::default();
     for quantity in Quantity::ALL {
-        if let Some(signal) = taker.take(quantity)? {
+        if let Some(source) = find(quantity)? {
+            let signal = source.take(epoch_s.unwrap_or(0))?;
             signals.all.insert(quantity, signal);
         }
     }

@@ -282,9 +282,26 @@ impl ColumnMap {
         out
     }
 
+    /// The fault of a key in the table of a quantity.
+    pub(super) fn fault_in(
+        &self,
+        quantity: Quantity,
+        key: &str,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> RecordingError {
+        self.fault(&format!("{}.{key}", quantity.key()), found, expected)
+    }
+
     /// The fault of a key.
-    pub(super) fn fault(&self, key: &str, found: String, expected: String) -> RecordingError {
+    pub(super) fn fault(
+        &self,
+        key: &str,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> RecordingError {
         let place = crate::files::Place::Entry(format!("`{key}`").into());
+        let (found, expected) = (found.into(), expected.into());
         RecordingError::new(&self.file, place, RecordingFault::Map { found, expected })
     }
 }
