@@ -216,11 +216,7 @@ pub(super) fn stances(
             continue;
         }
         let foot = *foot_m.get_or_insert_with(|| mean_foot(rule.robot(), segment, sample));
-        let force = Vector3::new(
-            wrench[(0, sample)],
-            wrench[(1, sample)],
-            wrench[(2, sample)],
-        );
+        let force = wrench.fixed_view::<3, 1>(0, sample).into_owned();
         let force = match rule.wrench_frame() {
             WrenchFrame::Body => orientation(segment, sample) * force,
             WrenchFrame::World => force,

@@ -166,10 +166,9 @@ impl Windows {
     ) {
         let feet = segment.feet[averaged.span.start];
         let in_contact = feet.contains(&true);
-        let count = if in_contact {
-            &mut self.contact_samples
-        } else {
-            &mut self.flight_samples
+        let (group, count): (fn(usize) -> Group, _) = match in_contact {
+            true => (Group::Contact, &mut self.contact_samples),
+            false => (Group::Flight, &mut self.flight_samples),
         };
         *count += averaged.span.len();
         let mean_speed = |is_meant: fn(usize) -> bool| {
@@ -195,11 +194,7 @@ impl Windows {
                 self.rows.push(Row {
                     coefficients: std::array::from_fn(|i| means[(row + i, centre)]),
                     left: means[(row + PARAMETER_DIM, centre)],
-                    group: if in_contact {
-                        Group::Contact(axis)
-                    } else {
-                        Group::Flight(axis)
-                    },
+                    group: group(axis),
                     block: block(centre),
                     moving: !in_contact || moving,
                 });

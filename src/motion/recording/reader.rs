@@ -171,11 +171,9 @@ impl ReadingNotes {
         };
         let mut clocks = Vec::new();
         if let Some((least, most)) = self.ratios {
-            let least = format!("{least:.2}");
-            let most = format!("{most:.2}");
-            let ratio = match least == most {
-                true => most,
-                false => format!("{least} to {most}"),
+            let ratio = match [least, most].map(|ratio| format!("{ratio:.2}")) {
+                [least, most] if least == most => most,
+                [least, most] => format!("{least} to {most}"),
             };
             clocks.push(format!(
                 "times are rebuilt from the motion, which takes {ratio} s in a recorded second{}",
@@ -193,10 +191,8 @@ impl ReadingNotes {
         }
         let mut lines = Vec::new();
         if !clocks.is_empty() {
-            lines.push(format!(
-                "{} (--clock recorded: as recorded)",
-                clocks.join("; ")
-            ));
+            let clocks = clocks.join("; ");
+            lines.push(format!("{clocks} (--clock recorded: as recorded)"));
         }
         let others = self.others.iter();
         lines.extend(others.map(|(note, count)| format!("{note}{}", of(*count))));
@@ -212,13 +208,8 @@ mod tests {
     use crate::recording::{WriteOptions, write_with};
 
     fn reading(elapsed_ratio: Option<f64>, note: &str) -> Reading {
-        let segment = sample_segment(3);
         Reading {
-            recording: Recording {
-                path: segment.path.clone(),
-                segments: vec![segment],
-                ignored_columns: Vec::new(),
-            },
+            recording: Recording::from(sample_segment(3)),
             notes: vec![note.to_owned()],
             mended: vec![Mended {
                 elapsed_ratio,
@@ -252,10 +243,7 @@ mod tests {
                 ..WriteOptions::default()
             };
             write_with(&path, &recording, &options).unwrap();
-            let notes = Reader::new(None, Clocks::Recorded)
-                .read(&path)
-                .unwrap()
-                .notes;
+            let notes = Reader::default().read(&path).unwrap().notes;
             let expected = [DERIVED_DDX];
             assert_eq!(notes, expected[usize::from(accelerations)..]);
         }
