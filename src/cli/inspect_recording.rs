@@ -199,7 +199,7 @@ fn in_segment(finding: &Finding) -> Value {
 /// A mismatch without its recording.
 pub(super) fn mismatch_json(mismatch: &Mismatch) -> Value {
     json!({
-        "what": mismatch.kind.word(),
+        "what": mismatch.kind,
         "value": mismatch.value,
         "bound": mismatch.bound,
         "words": mismatch.words,

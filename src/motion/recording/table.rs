@@ -6,7 +6,7 @@ use super::columns::{Column, Layout};
 use super::error::{RecordingError, RecordingFault, shortened};
 use super::instant::Instant;
 use super::lines::{cells, count};
-use super::number::{DecimalMark, NumberReader};
+use super::number::NumberReader;
 use super::segment::Segment;
 use super::segments::{Sample, SegmentBuilder};
 
@@ -27,15 +27,11 @@ pub(super) struct Table<'a> {
 
 impl<'a> Table<'a> {
     pub fn new(path: &'a Path, delimiter: char, layout: &'a Layout) -> Self {
-        let mark = match delimiter {
-            ',' => DecimalMark::Point,
-            _ => DecimalMark::Unknown,
-        };
         Table {
             path,
             delimiter,
             layout,
-            numbers: NumberReader::new(mark),
+            numbers: NumberReader::new(delimiter),
             rows: 0,
             start: None,
             segments: SegmentBuilder::new(path, layout.has_acceleration, layout.has_force),

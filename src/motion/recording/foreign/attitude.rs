@@ -89,6 +89,8 @@ pub(super) fn angle_rates(
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::UnitQuaternion;
+
     use super::*;
     use crate::robot::input_rule::rotation;
 
@@ -99,29 +101,13 @@ mod tests {
         [3.0, 0.4, 0.0],
     ];
 
-    /// Half-angle products in the order z, y, x.
-    fn quaternion([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
-        let of = |axis: usize, angle: f64| {
-            let mut q = [(angle / 2.0).cos(), 0.0, 0.0, 0.0];
-            q[axis] = (angle / 2.0).sin();
-            q
-        };
-        let times = |a: [f64; 4], b: [f64; 4]| {
-            [
-                a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-                a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-                a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-                a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-            ]
-        };
-        times(times(of(3, yaw), of(2, pitch)), of(1, roll))
-    }
-
     #[test]
     fn angles_of_quaternions_of_either_sign_and_any_length_are_those_of_the_rotation() {
         for angles in ATTITUDES {
             for scale in [1.0, -1.0, 0.4] {
-                let q = quaternion(angles).map(|part| scale * part);
+                let [roll, pitch, yaw] = angles;
+                let q = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+                let q = [q.w, q.i, q.j, q.k].map(|part| scale * part);
                 let found = angles_of_quaternions(&DMatrix::from_column_slice(4, 1, &q));
                 let error = (&found - DMatrix::from_column_slice(3, 1, &angles)).amax();
                 assert!(error < 1e-14, "{angles:?} {found}");

@@ -7,7 +7,7 @@ use super::map::{ColumnMap, Delimiter, TextFormat};
 use crate::recording::error::{RecordingError, RecordingFault, shortened};
 use crate::recording::instant::Instant;
 use crate::recording::lines::{self, Lines};
-use crate::recording::number::{DecimalMark, NumberReader};
+use crate::recording::number::NumberReader;
 use crate::recording::table::MAX_ROWS;
 
 /// Numbers from which a column is kept as times: beyond, one number does not hold a microsecond.
@@ -102,19 +102,15 @@ impl Sheet {
         // NumPy and MATLAB write headers as comments.
         let header = line.trim_start().trim_start_matches(['#', '%']);
         let delimiter = format.delimiter.unwrap_or_else(|| delimiter_of(header));
-        let mark = match delimiter {
-            Delimiter::Comma => DecimalMark::Point,
-            Delimiter::Tab | Delimiter::Blank | Delimiter::Semicolon => DecimalMark::Unknown,
-        };
-        let mut numbers = NumberReader::new(mark);
-        let cells = cells(header, delimiter);
+        let numbers = || NumberReader::new(character(delimiter));
+        let (cells, mut reader) = (cells(header, delimiter), numbers());
         let is_value = |cell: &String| {
-            cell.is_empty() || numbers.parse(cell).is_some() || Instant::from_iso(cell).is_some()
+            cell.is_empty() || reader.parse(cell).is_some() || Instant::from_iso(cell).is_some()
         };
         let is_named = format.header.unwrap_or_else(|| !cells.iter().all(is_value));
         let mut sheet = Self {
             delimiter,
-            numbers: NumberReader::new(mark),
+            numbers: numbers(),
             columns: vec![Channel::default(); cells.len()],
             is_named,
             first_row: if is_named { row + 1 } else { row },
@@ -213,14 +209,22 @@ fn delimiter_of(line: &str) -> Delimiter {
     }
 }
 
-fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
-    let separator = match delimiter {
-        Delimiter::Blank => return line.split_whitespace().map(str::to_owned).collect(),
+fn character(delimiter: Delimiter) -> char {
+    match delimiter {
+        Delimiter::Blank => ' ',
         Delimiter::Tab => '\t',
         Delimiter::Comma => ',',
         Delimiter::Semicolon => ';',
-    };
-    lines::cells(line, separator).map(str::to_owned).collect()
+    }
+}
+
+fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
+    match delimiter {
+        Delimiter::Blank => line.split_whitespace().map(str::to_owned).collect(),
+        _ => lines::cells(line, character(delimiter))
+            .map(str::to_owned)
+            .collect(),
+    }
 }
 
 #[cfg(test)]
