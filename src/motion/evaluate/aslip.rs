@@ -5,10 +5,13 @@ use std::ops::Range;
 use nalgebra::{DMatrix, Rotation3, Vector2, Vector3};
 
 use super::metrics::FitSums;
-use crate::recording::segment::{between, stretches};
+use crate::recording::segment::between;
 use crate::recording::{RecordingError, Segment};
 use crate::robot::{InputRule, JOINT_DIM, Leg, Robot, WrenchFrame};
-use crate::sim::{IntegrationOptions, OdeSystem, Restart, SimError, integrate, restart_windows};
+use crate::sim::{
+    IntegrationOptions, OdeSystem, Restart, SimError, integrate, integrate_stretches,
+    restart_windows,
+};
 
 /// Constants of the pendulum.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,31 +93,29 @@ impl Aslip {
     ) {
         let (x, z) = (BODY_X, BODY_Z);
         let start = window.start;
-        let mut state = [
+        let initial = [
             segment.x[(x, start)],
             segment.x[(z, start)],
             segment.dx[(x, start)],
             segment.dx[(z, start)],
         ];
-        position_m[start] = Some(Vector2::new(state[0], state[1]));
         let down = |sample: usize| stances[sample].is_some();
-        for span in stretches(window.clone(), |a, b| down(a) == down(b)) {
-            let Range { start: first, end } = span;
-            let times = &segment.time_s[first..(end + 1).min(window.end)];
-            let mut span = PendulumSpan {
-                pendulum: self,
-                stances: &stances[first..end],
-                times,
-            };
-            let states = integrate(&mut span, &state, times, &IntegrationOptions::default()).states;
-            for column in 1..states.ncols() {
-                let reached = Vector2::new(states[(0, column)], states[(1, column)]);
-                position_m[first + column] = Some(reached);
-            }
-            if states.ncols() < times.len() {
-                return;
-            }
-            state.copy_from_slice(states.column(states.ncols() - 1).as_slice());
+        let found = integrate_stretches(
+            &initial,
+            &segment.time_s,
+            window,
+            |a, b| down(a) == down(b),
+            |stretch, state, times| {
+                let mut span = PendulumSpan {
+                    pendulum: self,
+                    stances: &stances[stretch],
+                    times,
+                };
+                integrate(&mut span, state, times, &IntegrationOptions::default())
+            },
+        );
+        for (state, position) in found.states.column_iter().zip(&mut position_m[start..]) {
+            *position = Some(Vector2::new(state[0], state[1]));
         }
     }
 }

@@ -314,11 +314,10 @@ fn implausible(recording: &Recording, robot: &Robot) -> Option<String> {
 /// What was mended in the segments of a recording.
 fn mended(path: &Path, segments: &[Timed]) -> Option<String> {
     let mut faults = Vec::new();
-    let rebuilt: Vec<f64> = (segments.iter())
-        .filter(|timed| timed.rebuilt)
-        .map(|timed| timed.elapsed_ratio)
-        .collect();
-    if let Some(longest) = rebuilt.iter().copied().reduce(f64::max) {
+    let rebuilt = segments
+        .iter()
+        .filter_map(|timed| timed.mended.elapsed_ratio);
+    if let Some(longest) = rebuilt.reduce(f64::max) {
         faults.push(format!(
             "{longest:.2} s of motion pass in a recorded second (displacements against velocities; \
              samples lost?), times were rebuilt"
@@ -329,7 +328,7 @@ fn mended(path: &Path, segments: &[Timed]) -> Option<String> {
     if lost > 0 {
         faults.push(format!("{lost} samples between distant ones are left out"));
     }
-    if segments.iter().any(|timed| timed.rates_replaced) {
+    if segments.iter().any(|timed| timed.mended.rates_replaced) {
         faults.push("angular rates disagree with the angles and were replaced".to_owned());
     }
     (!faults.is_empty()).then(|| format!("{}: {}", path.display(), faults.join("; ")))

@@ -184,11 +184,7 @@ pub fn without(
         let (found, expected) = (0, 2);
         return Err(RecordingFault::TooShort { found, expected }.at(&recording.path, row));
     }
-    let out = Recording {
-        path: recording.path.clone(),
-        segments,
-        ignored_columns: recording.ignored_columns.clone(),
-    };
+    let out = recording.with_segments(segments);
     let dropped = recording.sample_count() - out.sample_count();
     Ok((out, dropped))
 }
@@ -285,23 +281,23 @@ impl Scan<'_> {
     fn consistency(&mut self) {
         let segment = self.segment;
         for i in 0..STATE_DIM {
-            let (x, dx, ddx) = (
-                row(&segment.x, i),
-                row(&segment.dx, i),
-                row(&segment.ddx, i),
+            let [x, dx, ddx] = [&segment.x, &segment.dx, &segment.ddx].map(|m| row(m, i));
+            let velocity = (Implausible::Velocity, Column::Velocity(i), VELOCITY_FLOOR);
+            let acceleration = (
+                Implausible::Acceleration,
+                Column::Acceleration(i),
+                ACCELERATION_FLOOR,
             );
-            let slack = VELOCITY_FLOOR[group(i)]
-                + CONSISTENCY_SHARE * quantile(dx.iter().map(|v| v.abs()), 0.95)
-                + noise(&segment.time_s, &x);
-            self.column(Implausible::Velocity, Column::Velocity(i), |j| {
-                disagrees(&segment.time_s, &x, &dx, j, slack)
-            });
-            let slack = ACCELERATION_FLOOR[group(i)]
-                + CONSISTENCY_SHARE * quantile(ddx.iter().map(|v| v.abs()), 0.95)
-                + noise(&segment.time_s, &dx);
-            self.column(Implausible::Acceleration, Column::Acceleration(i), |j| {
-                disagrees(&segment.time_s, &dx, &ddx, j, slack)
-            });
+            for ((kind, column, floor), values, rates) in
+                [(velocity, &x, &dx), (acceleration, &dx, &ddx)]
+            {
+                let slack = floor[group(i)]
+                    + CONSISTENCY_SHARE * quantile(rates.iter().map(|v| v.abs()), 0.95)
+                    + noise(&segment.time_s, values);
+                self.column(kind, column, |j| {
+                    disagrees(&segment.time_s, values, rates, j, slack)
+                });
+            }
         }
     }
 

@@ -236,11 +236,7 @@ impl RecordingFiles {
     /// The recordings of one file, and its reading without samples. Checks that only report are made once.
     fn read(&self, file: &RecordingFile) -> Result<Ready, RecordingError> {
         let mut reading = self.reader.read(&file.path)?;
-        let empty = Recording {
-            path: file.path.clone(),
-            segments: Vec::new(),
-            ignored_columns: Vec::new(),
-        };
+        let empty = reading.recording.with_segments(Vec::new());
         let recording = std::mem::replace(&mut reading.recording, empty);
         let options = self.options_for(&mut reading, &recording)?;
         let keeps = self.options.implausible == ImplausibleSamples::Keep;

@@ -168,18 +168,6 @@ mod tests {
     }
 
     #[test]
-    fn next_row_strips_mark_and_line_ends() {
-        let text = b"\xef\xbb\xbfa\r\nb\n\nc";
-        let mut lines = Lines::of(Path::new("t"), &text[..]).unwrap();
-        let mut rows = Vec::new();
-        while let Some((row, text)) = lines.next_row().unwrap() {
-            rows.push((row, text.to_owned()));
-        }
-        let expected = [(1, "a"), (2, "b"), (3, ""), (4, "c")];
-        assert!(rows.iter().map(|(r, t)| (*r, t.as_str())).eq(expected));
-    }
-
-    #[test]
     fn next_row_longest_line_is_read_and_one_byte_more_is_not() {
         let read = |ones: usize| {
             let text = [vec![b'1'; ones], b"\n".to_vec()].concat();

@@ -55,7 +55,8 @@ mod segments;
 mod table;
 
 pub use self::csv::{read, read_from_bytes};
-pub use self::write::{WriteOptions, write, write_inputs_with, write_mcap, write_with};
+pub use self::write::{WriteOptions, write, write_mcap, write_with};
+pub use clock::Mended;
 pub use condition::{
     Accelerations, ConditionOptions, Conditioned, ImplausibleSamples, SmoothedRows, condition,
 };
@@ -63,5 +64,5 @@ pub use error::{RecordingError, RecordingFault};
 pub use files::{RecordingFile, RecordingFiles, Source};
 pub use foreign::map::ColumnMap;
 pub use phases::{PhaseRule, PhaseSpan, Stance};
-pub use reader::{Clocks, Mended, Reader, Reading, ReadingNotes};
+pub use reader::{Clocks, Reader, Reading, ReadingNotes};
 pub use segment::{Recording, Segment};

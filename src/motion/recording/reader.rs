@@ -6,7 +6,7 @@ use std::sync::Arc;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-use super::clock::{Timed, timed};
+use super::clock::{Mended, timed};
 use super::csv;
 use super::error::{RecordingError, RecordingFault};
 use super::foreign::guess::guess_of;
@@ -45,17 +45,6 @@ pub struct Reading {
     pub mended: Vec<Mended>,
 }
 
-/// What was mended in a segment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mended {
-    /// Time that passed by the motion over time that passed by the stamps, where times were rebuilt.
-    pub elapsed_ratio: Option<f64>,
-    /// Whether steps were uneven and the segment is resampled.
-    pub resampled: bool,
-    /// Whether angular rates are differences of the angles.
-    pub rates_replaced: bool,
-}
-
 impl Reader {
     /// A reader by a map of columns, or romc's own names, that treats clocks as told.
     pub fn new(map: Option<ColumnMap>, clocks: Clocks) -> Self {
@@ -92,7 +81,7 @@ impl Reader {
         if self.clocks == Clocks::Repaired {
             for segment in &mut recording.segments {
                 let timed = timed(segment)?;
-                mended.push(Mended::of(&timed));
+                mended.push(timed.mended);
                 *segment = timed.segment;
             }
         }
@@ -120,16 +109,6 @@ fn by_guess(path: &Path) -> Result<Assembled, RecordingError> {
     let note = "topics are taken by their names (`romc inspect --guess` prints the map)";
     assembled.notes.push(note.to_owned());
     Ok(assembled)
-}
-
-impl Mended {
-    fn of(timed: &Timed) -> Self {
-        Self {
-            elapsed_ratio: timed.rebuilt.then_some(timed.elapsed_ratio),
-            resampled: timed.resampled,
-            rates_replaced: timed.rates_replaced,
-        }
-    }
 }
 
 /// What was done to several recordings besides reading.
@@ -242,7 +221,7 @@ mod tests {
                 accelerations,
                 ..WriteOptions::default()
             };
-            write_with(&path, &recording, &options).unwrap();
+            write_with(&path, &recording, None, &options).unwrap();
             let notes = Reader::default().read(&path).unwrap().notes;
             let expected = [DERIVED_DDX];
             assert_eq!(notes, expected[usize::from(accelerations)..]);

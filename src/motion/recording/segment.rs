@@ -24,6 +24,15 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// These segments as a recording of the same file.
+    pub fn with_segments(&self, segments: Vec<Segment>) -> Self {
+        Self {
+            path: self.path.clone(),
+            segments,
+            ignored_columns: self.ignored_columns.clone(),
+        }
+    }
+
     /// Number of samples in all segments.
     pub fn sample_count(&self) -> usize {
         self.segments.iter().map(Segment::len).sum()

@@ -52,27 +52,15 @@ impl Default for WriteOptions {
 /// # Errors
 /// [`RecordingFault::Io`]. An existing file is replaced.
 pub fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
-    write_with(path, recording, &WriteOptions::default())
+    write_with(path, recording, None, &WriteOptions::default())
 }
 
-/// [`write()`] with a choice of notation and columns.
+/// [`write()`] with a choice of notation and columns, and, if given, the inputs of each segment (18 x samples), as columns
+/// `Input fr.hx` and so on, which reading ignores.
 ///
 /// # Errors
 /// As [`write()`].
 pub fn write_with(
-    path: &Path,
-    recording: &Recording,
-    options: &WriteOptions,
-) -> Result<(), RecordingError> {
-    write_inputs_with(path, recording, None, options)
-}
-
-/// [`write_with`] and, if given, the inputs of each segment (18 x samples), as columns `Input fr.hx` and so on, which
-/// reading ignores.
-///
-/// # Errors
-/// As [`write()`].
-pub fn write_inputs_with(
     path: &Path,
     recording: &Recording,
     inputs: Option<&[DMatrix<f64>]>,
@@ -81,10 +69,10 @@ pub fn write_inputs_with(
     let is_gzip = (path.extension()).is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     let written = write_whole(path, |mut file| {
         if !is_gzip {
-            return write_table(&mut file, recording, inputs, options);
+            return write_to(&mut file, recording, inputs, options);
         }
         let mut packed = GzEncoder::new(file, Compression::best());
-        write_table(&mut packed, recording, inputs, options)?;
+        write_to(&mut packed, recording, inputs, options)?;
         packed.finish().map(|_| ())
     });
     written.map_err(|source| RecordingFault::io("write", source).of(path))
@@ -106,22 +94,13 @@ pub fn write_mcap(
     written.map_err(|source| RecordingFault::io("write", source).of(path))
 }
 
-/// Writes a recording as text.
+/// Writes a recording as text, its inputs as [`write_with`].
 ///
 /// The wrench is written if every segment carries one.
 ///
 /// # Errors
 /// Those of the destination.
 pub fn write_to(
-    destination: &mut impl Write,
-    recording: &Recording,
-    options: &WriteOptions,
-) -> io::Result<()> {
-    write_table(destination, recording, None, options)
-}
-
-/// [`write_to`] with inputs behind the other columns.
-fn write_table(
     destination: &mut impl Write,
     recording: &Recording,
     inputs: Option<&[DMatrix<f64>]>,
@@ -222,7 +201,7 @@ mod tests {
 
     fn text(recording: &Recording, options: &WriteOptions) -> Vec<u8> {
         let mut out = Vec::new();
-        write_to(&mut out, recording, options).unwrap();
+        write_to(&mut out, recording, None, options).unwrap();
         out
     }
 
@@ -256,20 +235,6 @@ mod tests {
         }
         let bytes = text(&recording, &WriteOptions::default());
         assert_eq!(read_from_bytes("sample.csv", &bytes).unwrap(), recording);
-    }
-
-    #[test]
-    fn write_without_accelerations_reads_back_as_differences() {
-        let mut recording = awkward();
-        recording.segments.remove(0);
-        let options = WriteOptions {
-            accelerations: false,
-            ..WriteOptions::default()
-        };
-        let bytes = text(&recording, &options);
-        let back = read_from_bytes("sample.csv", &bytes).unwrap();
-        // The velocities of the sample rise by 0.001 in 2 ms.
-        assert!(back.segments[0].ddx.iter().all(|a| (a - 0.5).abs() < 1e-9));
     }
 
     #[test]

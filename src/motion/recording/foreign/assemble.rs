@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::DMatrix;
 
-use super::attitude::{RateAxes, angle_rates, angles_of_quaternions, unwrap};
+use super::attitude::{angle_rates, angles_of_quaternions, in_world, unwrap};
 use super::elements::{QUATERNION, Quantity};
 use super::interpolate::{Between, at_times};
 use super::log::Log;
@@ -17,7 +17,6 @@ use crate::recording::preprocess::differences;
 use crate::recording::segment::Recording;
 use crate::recording::segments::{DERIVED_DDX, EPOCH_S, Sample, SegmentBuilder, begins_segment};
 use crate::robot::FOOT_DIM;
-use crate::robot::input_rule::rotation;
 
 /// Largest distance between samples of a topic that is interpolated, in s.
 const MAX_GAP_S: f64 = 0.05;
@@ -304,19 +303,11 @@ impl Rows<'_> {
         if frame(Quantity::BodyVelocity) == Some(Frame::Body)
             && let Some(signal) = self.signals.all.get_mut(&Quantity::BodyVelocity)
         {
-            for i in 0..signal.values.ncols() {
-                let turn: Matrix3<f64> = rotation([angles[(0, i)], angles[(1, i)], angles[(2, i)]]);
-                let velocity = turn * signal.values.fixed_view::<3, 1>(0, i);
-                signal.values.set_column(i, &velocity);
-            }
+            signal.values = in_world(&angles, &signal.values);
         }
-        let axes = match frame(Quantity::AngularVelocity) {
-            Some(Frame::Body) => RateAxes::Body,
-            Some(Frame::World) => RateAxes::World,
-            Some(Frame::Angles) | None => return Ok(()),
-        };
+        let frame = frame(Quantity::AngularVelocity).unwrap_or(Frame::Angles);
         if let Some(signal) = self.signals.all.get_mut(&Quantity::AngularVelocity) {
-            let turned = angle_rates(&angles, &signal.values, axes);
+            let turned = angle_rates(&angles, &signal.values, frame);
             signal.values = turned.map_err(|sample| {
                 let row = self.first_row + sample;
                 RecordingFault::Upright.at(self.path, row)

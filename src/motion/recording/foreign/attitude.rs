@@ -3,6 +3,9 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::f64::consts::{PI, TAU};
 
+use super::map::Frame;
+use crate::robot::input_rule::rotation;
+
 /// Cosine of the pitch below which roll and yaw cannot be told apart.
 const UPRIGHT: f64 = 1e-6;
 
@@ -39,21 +42,28 @@ pub(super) fn unwrap(angles: &mut DMatrix<f64>) -> bool {
     any
 }
 
-/// Axes that an angular velocity is given in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum RateAxes {
-    Body,
-    World,
+/// Velocities in the world of velocities along the body's own axes, at these angles.
+pub(super) fn in_world(angles: &DMatrix<f64>, velocities: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = velocities.clone();
+    for (i, mut velocity) in out.column_iter_mut().enumerate() {
+        let turn: Matrix3<f64> = rotation([angles[(0, i)], angles[(1, i)], angles[(2, i)]]);
+        velocity.copy_from(&(turn * velocities.fixed_view::<3, 1>(0, i)));
+    }
+    out
 }
 
-/// Rates of roll, pitch and yaw from an angular velocity about the body's or the world's axes.
+/// Rates of roll, pitch and yaw from an angular velocity about the body's or the world's axes, or from themselves.
 ///
-/// `None` for the first sample at which the trunk points straight up or down.
+/// # Errors
+/// The first sample at which the trunk points straight up or down.
 pub(super) fn angle_rates(
     angles: &DMatrix<f64>,
     angular: &DMatrix<f64>,
-    axes: RateAxes,
+    frame: Frame,
 ) -> Result<DMatrix<f64>, usize> {
+    if frame == Frame::Angles {
+        return Ok(angular.clone());
+    }
     let mut out = DMatrix::zeros(3, angular.ncols());
     for i in 0..angular.ncols() {
         let [roll, pitch, yaw] = [angles[(0, i)], angles[(1, i)], angles[(2, i)]];
@@ -63,8 +73,8 @@ pub(super) fn angle_rates(
             return Err(i);
         }
         // Columns of the matrices one below the other.
-        let map = match axes {
-            RateAxes::Body => {
+        let map = match frame {
+            Frame::Body => {
                 let (s_r, c_r) = roll.sin_cos();
                 let tangent = s_p / c_p;
                 Matrix3::from([
@@ -73,7 +83,7 @@ pub(super) fn angle_rates(
                     [c_r * tangent, -s_r, c_r / c_p],
                 ])
             }
-            RateAxes::World => {
+            Frame::World | Frame::Angles => {
                 let (s_y, c_y) = yaw.sin_cos();
                 Matrix3::from([
                     [c_y / c_p, -s_y, c_y * s_p / c_p],
@@ -92,7 +102,6 @@ mod tests {
     use nalgebra::UnitQuaternion;
 
     use super::*;
-    use crate::robot::input_rule::rotation;
 
     const ATTITUDES: [[f64; 3]; 4] = [
         [0.1, -0.2, 0.3],
@@ -122,20 +131,20 @@ mod tests {
             let turned = |h: f64| rotation(std::array::from_fn(|i| angles[i] + h * rates[i]));
             let (h, r) = (1e-6, rotation(angles));
             let derivative = (turned(h) - turned(-h)) / (2.0 * h);
-            for (axes, spin) in [
-                (RateAxes::Body, r.transpose() * derivative),
-                (RateAxes::World, derivative * r.transpose()),
+            for (frame, spin) in [
+                (Frame::Body, r.transpose() * derivative),
+                (Frame::World, derivative * r.transpose()),
             ] {
                 let omega = [spin[(2, 1)], spin[(0, 2)], spin[(1, 0)]];
                 let column = |values: &[f64; 3]| DMatrix::from_column_slice(3, 1, values);
-                let found = angle_rates(&column(&angles), &column(&omega), axes).unwrap();
+                let found = angle_rates(&column(&angles), &column(&omega), frame).unwrap();
                 let error = (&found - column(&rates)).amax();
-                assert!(error < 1e-8, "{axes:?} {angles:?}: {found}");
+                assert!(error < 1e-8, "{frame:?} {angles:?}: {found}");
             }
         }
         let upright = DMatrix::from_column_slice(3, 1, &[0.0, PI / 2.0, 0.0]);
         assert_eq!(
-            angle_rates(&upright, &DMatrix::zeros(3, 1), RateAxes::Body),
+            angle_rates(&upright, &DMatrix::zeros(3, 1), Frame::Body),
             Err(0)
         );
     }

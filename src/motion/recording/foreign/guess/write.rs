@@ -9,9 +9,10 @@ use nalgebra::DMatrix;
 use super::super::attitude::angles_of_quaternions;
 use super::super::elements::Quantity;
 use super::super::log::Log;
+use super::super::map::Frame;
 use super::super::units::Dimension;
 use super::columns::{Clock, Group};
-use super::evidence::{Axes, Scale, angular, linear, reach, real_is_last, scale, slopes};
+use super::evidence::{Scale, angular, linear, reach, real_is_last, scale, slopes};
 use super::first_map::{raw, times_s};
 use super::names::unit;
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot};
@@ -390,7 +391,7 @@ fn rest_force(values: &DMatrix<f64>) -> f64 {
 }
 
 /// Unit, sign and axes of a velocity of the trunk.
-fn velocity_lines(found: Option<(Scale, Axes)>, of: &str) -> Vec<String> {
+fn velocity_lines(found: Option<(Scale, Frame)>, of: &str) -> Vec<String> {
     let Some((scale, axes)) = found else {
         return vec![format!(
             "# frame = \"body\"   # unknown: it does not follow {of}"
@@ -404,9 +405,9 @@ fn velocity_lines(found: Option<(Scale, Axes)>, of: &str) -> Vec<String> {
         lines.push("sign = -1".to_owned());
     }
     match axes {
-        Axes::Body => lines.push("frame = \"body\"".to_owned()),
-        Axes::World if of == "the angles" => lines.push("frame = \"world\"".to_owned()),
-        Axes::World | Axes::Angles => {}
+        Frame::Body => lines.push("frame = \"body\"".to_owned()),
+        Frame::World if of == "the angles" => lines.push("frame = \"world\"".to_owned()),
+        Frame::World | Frame::Angles => {}
     }
     lines
 }
