@@ -112,15 +112,15 @@ impl PhaseRule {
     pub fn spans(&self, segment: &Segment) -> Result<Vec<PhaseSpan>, RecordingError> {
         let feet = &segment.feet;
         let mut phases: Vec<Option<usize>> = feet.iter().map(|f| self.phase_of(*f)).collect();
-        let Some(first_known) = phases.iter().position(Option::is_some) else {
+        if phases.iter().all(Option::is_none) {
             let Some(&feet) = feet.first() else {
                 return Ok(Vec::new());
             };
             let phases = self.names();
             let fault = RecordingFault::NoPhase { feet, phases };
             return Err(fault.at(&segment.path, segment.row(0)));
-        };
-        assign_transitional(&mut phases, feet, first_known);
+        }
+        assign_transitional(&mut phases, feet);
         let phases: Vec<usize> = phases.into_iter().flatten().collect();
         let runs = stretches(0..phases.len(), |a, b| phases[a] == phases[b]).into_iter();
         let runs = runs.map(|range| (phases[range.start], range));
@@ -140,25 +140,25 @@ fn feet_down(feet: ContactFlags) -> usize {
     feet.iter().filter(|down| **down).count()
 }
 
-fn assign_transitional(phases: &mut [Option<usize>], feet: &[ContactFlags], first_known: usize) {
-    let known = phases[first_known];
-    phases[..first_known].fill(known);
-    let mut at = first_known;
-    while at < phases.len() {
-        if phases[at].is_some() {
-            at += 1;
+/// Gives runs of samples without phase that of a neighbour, of which at least one has a phase.
+fn assign_transitional(phases: &mut [Option<usize>], feet: &[ContactFlags]) {
+    let runs = stretches(0..phases.len(), |a, b| {
+        phases[a].is_some() == phases[b].is_some()
+    });
+    for run in runs {
+        if phases[run.start].is_some() {
             continue;
         }
-        let before = phases[at - 1];
-        let end = phases[at..].iter().position(Option::is_some);
-        let Some(end) = end.map(|offset| at + offset) else {
-            phases[at..].fill(before);
-            return;
+        let before = run.start.checked_sub(1);
+        let after = (run.end < phases.len()).then_some(run.end);
+        let down = |sample: Option<usize>| sample.map(|sample| feet_down(feet[sample]));
+        let joined = if down(after) > down(before) {
+            after
+        } else {
+            before
         };
-        let joins_next = feet_down(feet[end]) > feet_down(feet[at - 1]);
-        let phase = if joins_next { phases[end] } else { before };
-        phases[at..end].fill(phase);
-        at = end;
+        let phase = joined.and_then(|sample| phases[sample]);
+        phases[run].fill(phase);
     }
 }
 

@@ -178,9 +178,7 @@ mod tests {
     use super::*;
     use crate::recording::read_from_bytes;
     use crate::recording::segment::tests::sample_segment;
-    use nalgebra::DMatrix;
     use std::fs;
-    use std::path::PathBuf;
 
     fn awkward() -> Recording {
         let mut first = sample_segment(7);
@@ -192,11 +190,9 @@ mod tests {
         first.feet[5] = [true, false, true, false];
         let mut second = sample_segment(3);
         second.first_row = 9;
-        Recording {
-            path: PathBuf::from("sample.csv"),
-            segments: vec![first, second],
-            ignored_columns: Vec::new(),
-        }
+        let mut recording = Recording::from(first);
+        recording.segments.push(second);
+        recording
     }
 
     fn text(recording: &Recording, options: &WriteOptions) -> Vec<u8> {

@@ -93,11 +93,10 @@ const PLACES: [Reading; 6] = [
 /// The reading of the body's place under which feet on the ground stay best where they are, and their root mean square
 /// then, m.
 pub(super) fn best_other_place(recording: &Recording, robot: &Robot) -> Option<(f64, Reading)> {
-    let judged = PLACES.into_iter().filter_map(|reading| {
+    best(PLACES.into_iter().map(|reading| {
         let slip = Slip::read(recording, robot, &reading);
-        Some((slip.rms_m()?, reading))
-    });
-    (judged.filter(|(rms_m, _)| rms_m.is_finite())).min_by(|one, other| one.0.total_cmp(&other.0))
+        (slip.rms_m(), reading)
+    }))
 }
 
 /// The reading under which feet on the ground stay best in place against each other, and their root mean square then,
@@ -116,8 +115,14 @@ pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option
     let of_signs =
         (SIGNS.into_iter()).map(|reading| (Slip::read(recording, robot, &reading), reading));
     let readings = of_orders.chain(of_signs);
-    let judged = readings.filter_map(|(slip, reading)| Some((slip.relative_rms_m()?, reading)));
-    (judged.filter(|(rms_m, _)| rms_m.is_finite())).min_by(|one, other| one.0.total_cmp(&other.0))
+    best(readings.map(|(slip, reading)| (slip.relative_rms_m(), reading)))
+}
+
+/// The reading with the least of these figures.
+fn best(judged: impl Iterator<Item = (Option<f64>, Reading)>) -> Option<(f64, Reading)> {
+    let known = judged.filter_map(|(rms_m, reading)| Some((rms_m?, reading)));
+    let finite = known.filter(|(rms_m, _)| rms_m.is_finite());
+    finite.min_by(|one, other| one.0.total_cmp(&other.0))
 }
 
 /// All orders of the legs.
