@@ -69,9 +69,8 @@ impl SampleEquations {
     ) -> Self {
         let n = segment.len();
         let recorded = segment.torque_within_limits(robot);
-        let is_clipped = |(within, recorded): &(&f64, &f64)| recorded.abs() > within.abs();
         let pairs = recorded.iter().zip(segment.torque_nm.iter());
-        let clipped_torques = pairs.filter(is_clipped).count();
+        let clipped_torques = pairs.filter(|(kept, all)| all.abs() > kept.abs()).count();
         let torque = delayed(&segment.time_s, &recorded, delay_s);
         let torque_rate = differences(&segment.time_s, &torque);
         let mut equations = Self {

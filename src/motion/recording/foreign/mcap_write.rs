@@ -70,10 +70,8 @@ pub fn write_mcap(
         topic(body, BODY_TOPIC)?,
         topic(joint, FEET_TOPIC)?,
     ];
-    let inputs = match inputs {
-        Some(inputs) => Some((topic(joint, INPUT_TOPIC)?, inputs)),
-        None => None,
-    };
+    let with_topic = |inputs| Ok::<_, mcap::McapError>((topic(joint, INPUT_TOPIC)?, inputs));
+    let inputs = inputs.map(with_topic).transpose()?;
     let names = JOINT_NAMES.map(str::to_owned);
     let feet = Leg::ALL.map(|leg| leg.to_string());
     let input_names = Robot::input_names();

@@ -136,12 +136,7 @@ pub(super) fn clock(logs: &[Log], groups: &[Group]) -> Option<Clock> {
     const UNITS: [&str; 4] = ["s", "ms", "us", "ns"];
     let factor = |unit: &str| Dimension::Time.factor(unit).unwrap_or(1.0);
     let told = unit(&channel.name, &["ms", "us", "ns", "s"]);
-    let told = told.filter(|unit| is_possible(channel, factor(unit)));
-    let unit = told.or_else(|| {
-        UNITS
-            .into_iter()
-            .find(|unit| is_possible(channel, factor(unit)))
-    })?;
+    let unit = (told.into_iter().chain(UNITS)).find(|unit| is_possible(channel, factor(unit)))?;
     Some(Clock {
         name: channel.name.clone(),
         unit,
@@ -157,13 +152,10 @@ fn is_possible(channel: &Channel, factor: f64) -> bool {
 /// Typical distance of samples in a column that counts upwards, else nothing.
 fn mean_step(channel: &Channel) -> Option<f64> {
     let steps: Vec<f64> = match &channel.instants {
-        Some(instants) => instants
-            .windows(2)
+        Some(instants) => (instants.windows(2))
             .map(|pair| pair[1].since(pair[0]))
             .collect(),
-        None => channel
-            .values
-            .windows(2)
+        None => (channel.values.windows(2))
             .map(|pair| pair[1] - pair[0])
             .collect(),
     };

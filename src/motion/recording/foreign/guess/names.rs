@@ -113,25 +113,21 @@ pub(super) fn read(name: &str) -> Option<Reading> {
             is_bare_hip: joint == Some(0) && has("hip") && !has("x roll aa"),
         })
     };
-    let kind = if has(TORQUE) {
-        Quantity::JointTorque
-    } else if has(ACCELERATION) {
-        Quantity::JointAcceleration
-    } else if has(VELOCITY) {
-        Quantity::JointVelocity
-    } else {
-        Quantity::JointPosition
-    };
+    let kinds = [
+        (TORQUE, Quantity::JointTorque),
+        (ACCELERATION, Quantity::JointAcceleration),
+        (VELOCITY, Quantity::JointVelocity),
+    ];
+    let kind = kinds.into_iter().find(|(known, _)| has(known));
+    let kind = kind.map_or(Quantity::JointPosition, |(_, kind)| kind);
     if let (Some(number), [list, _]) = (number, &words[..])
-        && let Some((quantity, element, is_quaternion)) = generalised(list, number)
+        && let Some((quantity, element, is_quaternion)) = in_list(list, number)
     {
-        let is_counted = matches!(quantity, Quantity::JointPosition | Quantity::JointVelocity);
+        let is_counted = matches!(
+            quantity,
+            Quantity::JointPosition | Quantity::JointVelocity | Quantity::Feet
+        );
         return reading(quantity, element, is_quaternion, is_counted);
-    }
-    if let ([list, _], Some(number @ 0..4)) = (&words[..], number)
-        && list == "c"
-    {
-        return reading(Quantity::Feet, number, false, true);
     }
     if has(FEET) || (has("force forces") && axis.is_none()) {
         let element = leg.or(number.filter(|n| *n < 4));
@@ -170,8 +166,8 @@ fn after(words: &[String], known: &str) -> Option<usize> {
     pair[1].parse().ok()
 }
 
-/// An element of MuJoCo's lists of a floating robot: place, quaternion, joints.
-fn generalised(list: &str, number: usize) -> Option<(Quantity, usize, bool)> {
+/// An element of MuJoCo's lists of a floating robot: place, quaternion, joints; or of a list `c` of contacts.
+fn in_list(list: &str, number: usize) -> Option<(Quantity, usize, bool)> {
     Some(match (list, number) {
         ("qpos", 0..3) => (Quantity::BodyPosition, number, false),
         ("qpos", 3..7) => (Quantity::Orientation, number - 3, true),
@@ -179,6 +175,7 @@ fn generalised(list: &str, number: usize) -> Option<(Quantity, usize, bool)> {
         ("qvel", 0..3) => (Quantity::BodyVelocity, number, false),
         ("qvel", 3..6) => (Quantity::AngularVelocity, number - 3, false),
         ("qvel", 6..18) => (Quantity::JointVelocity, number - 6, false),
+        ("c", 0..4) => (Quantity::Feet, number, false),
         _ => return None,
     })
 }
