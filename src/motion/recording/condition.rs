@@ -188,17 +188,12 @@ mod tests {
         let out = condition(recording.clone(), go1(), &ConditionOptions::default()).expect("sound");
         assert_eq!(out.recording, recording);
         assert_eq!(out.left_out, 0);
-        let places: Vec<_> = out
-            .findings
-            .iter()
+        let places: Vec<_> = (out.findings.iter())
             .map(|f| (f.first_row, f.value))
             .collect();
         assert_eq!(places, [(62, 900.0), (72, 900.0)]);
-        assert!(
-            out.findings[0].column.contains("fl.hy"),
-            "{:?}",
-            out.findings[0].column
-        );
+        let column = &out.findings[0].column;
+        assert!(column.contains("fl.hy"), "{column}");
     }
 
     #[test]
@@ -232,9 +227,11 @@ mod tests {
             ..ConditionOptions::default()
         };
         let before = recording();
-        let out = condition(before.clone(), go1(), &smooth)
-            .expect("sound")
-            .recording;
+        let made = |options| {
+            let made = condition(before.clone(), go1(), options);
+            made.expect("sound").recording
+        };
+        let out = made(&smooth);
         let ddx = |recording: &Recording| recording.segments[0].ddx.clone();
         assert!(ddx(&out).norm() < 0.3 * ddx(&before).norm());
         assert_eq!(out.segments[0].torque_nm, before.segments[0].torque_nm);
@@ -243,9 +240,7 @@ mod tests {
             accelerations: Accelerations::Differences,
             ..ConditionOptions::default()
         };
-        let out = condition(before.clone(), go1(), &differences)
-            .expect("sound")
-            .recording;
+        let out = made(&differences);
         assert_eq!(ddx(&out).amax(), 0.0);
     }
 

@@ -64,14 +64,11 @@ pub(super) fn groups(logs: &[Log]) -> Vec<Group> {
                 true => 4,
                 false => quantity.elements().len(),
             };
-            let of = |element| {
-                members
-                    .iter()
-                    .find(|(_, reading)| reading.element == element)
+            let column = |element| {
+                let mut found = members.iter().filter(|(_, own)| own.element == element);
+                found.next().map(|(column, _)| *column)
             };
-            let columns: Option<Vec<usize>> = (0..count)
-                .map(|element| of(element).map(|found| found.0))
-                .collect();
+            let columns: Option<Vec<usize>> = (0..count).map(column).collect();
             let group = Group {
                 quantity,
                 log: *log,
