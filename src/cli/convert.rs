@@ -10,7 +10,7 @@ use super::args::ConvertArguments;
 use super::destination::{Format, Inputs};
 use super::output::{names, read_with, reader};
 use crate::files::Overwrite;
-use crate::recording::{Clocks, Recording, Segment, WriteOptions, write_inputs_with, write_mcap};
+use crate::recording::{Clocks, Recording, Segment, WriteOptions, write_mcap, write_with};
 use crate::{Error, artifact};
 
 /// Reads, chains and writes.
@@ -85,7 +85,7 @@ pub fn write_recording(
         segments,
         ignored_columns: Vec::new(),
     };
-    Ok(write_inputs_with(
+    Ok(write_with(
         path,
         &recording,
         inputs,

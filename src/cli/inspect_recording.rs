@@ -187,7 +187,7 @@ fn findings_text(findings: &[Finding]) -> String {
 /// A mismatch without its recording.
 pub(super) fn mismatch_json(mismatch: &Mismatch) -> Value {
     json!({
-        "what": mismatch.kind.word(),
+        "what": mismatch.kind,
         "value": mismatch.value,
         "bound": mismatch.bound,
         "words": mismatch.words,

@@ -4,8 +4,6 @@
 //! passes through the nodes of the program. Torques are the lifted input with what the joints take
 //! of the very motion that is written, so that who reads the recording finds the planned input.
 
-use std::path::PathBuf;
-
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 
 use super::costs::moved_foot;
@@ -52,40 +50,25 @@ pub fn motion(
     let total = ends[ends.len() - 1];
     let steps = (total / sample_time_s).round().max(1.0) as usize;
     let count = steps + 1;
-    let mut motion = empty(count);
+    let times = (0..count).map(|sample| total * (sample as f64 / steps as f64));
+    let mut motion = Segment::still(SOURCE, times.collect());
     let mut input = DMatrix::zeros(STATE_DIM, count);
     for sample in 0..count {
-        let time = total * (sample as f64 / steps as f64);
+        let time = motion.time_s[sample];
         let part = ends.partition_point(|end| *end <= time).min(ends.len() - 1);
         let start = if part == 0 { 0.0 } else { ends[part - 1] };
         let at = at(task, y, part, (time - start, ends[part] - start));
-        motion.time_s.push(time);
         let x = &task.seed.decode * at.z + &task.seed.decode_bias;
         motion.x.set_column(sample, &x);
         motion.dx.set_column(sample, &(&task.seed.decode * at.dz));
         motion.ddx.set_column(sample, &(&task.seed.decode * at.ddz));
         input.set_column(sample, &(&task.seed.lift * at.u_lat));
-        motion.feet.push(task.seed.parts[part].part.feet);
+        motion.feet[sample] = task.seed.parts[part].part.feet;
     }
     let torque_nm = input.rows(0, JOINT_DIM) + motion.losses(&task.seed.rule);
     motion.torque_nm = torque_nm;
     let margins = margins(task, y, (&motion, &input));
     Ok((motion, margins))
-}
-
-fn empty(count: usize) -> Segment {
-    Segment {
-        path: PathBuf::from(SOURCE),
-        first_row: 2,
-        row_stride: 1.0,
-        time_s: Vec::with_capacity(count),
-        x: DMatrix::zeros(STATE_DIM, count),
-        dx: DMatrix::zeros(STATE_DIM, count),
-        ddx: DMatrix::zeros(STATE_DIM, count),
-        torque_nm: DMatrix::zeros(JOINT_DIM, count),
-        feet: Vec::with_capacity(count),
-        body_wrench: None,
-    }
 }
 
 struct At {

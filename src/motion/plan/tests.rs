@@ -90,7 +90,7 @@ fn plan_read_as_a_recording_has_the_planned_torques_inside_their_limits() {
     };
     let mut bytes = Vec::new();
     let options = crate::recording::WriteOptions::default();
-    crate::recording::write::write_to(&mut bytes, &recording, &options).unwrap();
+    crate::recording::write::write_to(&mut bytes, &recording, None, &options).unwrap();
     let read = crate::recording::read_from_bytes("plan.csv", &bytes).unwrap();
     assert_eq!(read.segments[0].torque_nm, plan.motion.torque_nm);
     let limits = Robot::by_name("go1").unwrap().torque_limit_nm();

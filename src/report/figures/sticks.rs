@@ -257,20 +257,13 @@ mod tests {
 
     #[test]
     fn plan_starts_where_the_jump_does_and_ends_by_itself() {
-        let segment = |n: usize, step_s: f64, from_m: f64| Segment {
-            path: "plan.csv".into(),
-            first_row: 2,
-            row_stride: 1.0,
-            time_s: (0..n).map(|k| 5.0 * from_m + step_s * k as f64).collect(),
-            x: nalgebra::DMatrix::from_fn(STATE_DIM, n, |row, k| match row {
-                JOINT_DIM => from_m + step_s * k as f64,
-                _ => 0.0,
-            }),
-            dx: nalgebra::DMatrix::zeros(STATE_DIM, n),
-            ddx: nalgebra::DMatrix::zeros(STATE_DIM, n),
-            torque_nm: nalgebra::DMatrix::zeros(JOINT_DIM, n),
-            feet: vec![[true; FOOT_DIM]; n],
-            body_wrench: None,
+        let segment = |n: usize, step_s: f64, from_m: f64| {
+            let times = (0..n).map(|k| 5.0 * from_m + step_s * k as f64);
+            let mut segment = Segment::still("plan.csv", times.collect());
+            for k in 0..n {
+                segment.x[(JOINT_DIM, k)] = from_m + step_s * k as f64;
+            }
+            segment
         };
         let (plan, jump) = (segment(101, 0.01, 3.0), segment(601, 0.002, 1.0));
         let planned = Motion::planned(&plan, &jump);
