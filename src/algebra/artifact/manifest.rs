@@ -82,6 +82,24 @@ pub(super) struct Manifest {
     pub provenance: Map<String, Value>,
 }
 
+impl Manifest {
+    /// A key that it has and the first schema does not know.
+    pub(super) fn later_key(&self) -> Option<&'static str> {
+        let mut statistics = self.input_statistics.0.iter();
+        let has_given_state = statistics.any(|(_, entry)| entry.given_state.is_some());
+        let later = [
+            ("actuators", self.actuators.is_some()),
+            ("wrench_frame", self.wrench_frame.is_some()),
+            ("landmarks", self.landmarks.is_some()),
+            ("prior", self.prior.is_some()),
+            ("input_statistics.given_state", has_given_state),
+            ("robot", matches!(self.robot, Some(RobotValue::Entry(_)))),
+        ];
+        let found = later.into_iter().find(|(_, there)| *there);
+        found.map(|(key, _)| key)
+    }
+}
+
 /// A robot of romc's own by its name, or any by its description.
 #[derive(Serialize)]
 #[serde(untagged)]
@@ -203,12 +221,6 @@ pub(super) struct GivenStateEntry {
     pub mean: Rows,
     pub covariance: Rows,
     pub acceleration_error: Rows,
-}
-
-/// Whether the statistics of a phase say something of inputs given states, which the first schema does not know.
-pub(super) fn has_given_state(statistics: &Pairs<StatisticsEntry>) -> bool {
-    let mut entries = statistics.0.iter();
-    entries.any(|(_, entry)| entry.given_state.is_some())
 }
 
 /// A list of terms, or the shorthand.

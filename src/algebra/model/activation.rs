@@ -86,14 +86,8 @@ impl Activation {
     /// `phi'(a)`.
     pub fn slope(self, a: f64) -> f64 {
         match self {
-            Self::Linear => 1.0,
-            Self::Elu if a > 0.0 => 1.0,
-            Self::Elu => a.exp(),
-            Self::Tanh => 1.0 - a.tanh() * a.tanh(),
-            Self::Sigmoid => sigmoid(a) * (1.0 - sigmoid(a)),
-            Self::Relu => f64::from(u8::from(a > 0.0)),
-            Self::Gelu | Self::GeluTanh | Self::Silu => self.jet(a)[1],
-            Self::Softplus => sigmoid(a),
+            Self::Elu if a <= 0.0 => a.exp(),
+            _ => self.jet(a)[1],
         }
     }
 
@@ -119,7 +113,7 @@ impl Activation {
                 let third = slope * (1.0 - 6.0 * slope);
                 [s, slope, slope * (1.0 - 2.0 * s), third]
             }
-            Self::Relu => [self.value(a), self.slope(a), 0.0, 0.0],
+            Self::Relu => [a.max(0.0), f64::from(u8::from(a > 0.0)), 0.0, 0.0],
             Self::Gelu => {
                 let (cumulative, density) = (normal_cumulative(a), normal_density(a));
                 // Far out the density is zero, and the powers of a before it need not be finite.
@@ -152,16 +146,8 @@ impl Activation {
     /// `phi''(a)`; of elu at zero, where it jumps, that of the negative side.
     pub fn curvature(self, a: f64) -> f64 {
         match self {
-            Self::Linear => 0.0,
-            Self::Elu if a > 0.0 => 0.0,
-            Self::Elu => a.exp(),
-            Self::Tanh => -2.0 * a.tanh() * (1.0 - a.tanh() * a.tanh()),
-            Self::Sigmoid => {
-                let s = sigmoid(a);
-                s * (1.0 - s) * (1.0 - 2.0 * s)
-            }
-            Self::Relu => 0.0,
-            Self::Gelu | Self::GeluTanh | Self::Silu | Self::Softplus => self.jet(a)[2],
+            Self::Elu if a <= 0.0 => a.exp(),
+            _ => self.jet(a)[2],
         }
     }
 }

@@ -201,23 +201,13 @@ impl Library {
     ///
     /// `None` if its index is not below `latent_dim`.
     pub fn symbol(&self, variable: LatentVariable) -> Option<SymbolId> {
-        let (block, index) = match variable {
-            LatentVariable::Z(index) => (0, index),
-            LatentVariable::Dz(index) => (1, index),
-            LatentVariable::U(index) => (2, index),
-        };
-        (index < self.latent_dim).then(|| self.symbols[block * self.latent_dim + index])
+        Some(self.symbols[variable.place(self.latent_dim)?])
     }
 
     /// The variable that a symbol of the library's pool stands for.
     pub fn variable(&self, symbol: SymbolId) -> Option<LatentVariable> {
         let position = self.symbols.binary_search(&symbol).ok()?;
-        let index = position % self.latent_dim;
-        Some(match position / self.latent_dim {
-            0 => LatentVariable::Z(index),
-            1 => LatentVariable::Dz(index),
-            _ => LatentVariable::U(index),
-        })
+        LatentVariable::all(self.latent_dim).nth(position)
     }
 
     /// Theta at one point: the value of each term, in order.
