@@ -17,9 +17,8 @@ use super::npz;
 use super::options::{Format, ImportOptions};
 use super::report::ImportReport;
 use super::safetensors;
-use crate::files::{Located, Place};
+use crate::files::{Located, Place, hex};
 use crate::model::{CoordinateNames, ReducedModel, StateMap};
-use crate::robot::Robot;
 
 /// Largest file that is read.
 const MAX_FILE_BYTES: u64 = 256 << 20;
@@ -146,19 +145,14 @@ fn of_equations(
     sections: &Sections,
     options: &ImportOptions,
 ) -> Result<(Parts, ImportNotes), ImportError> {
-    let found = latent::latent(file, sections, options)?;
+    let (library, phases, notes) = latent::latent(file, sections, options)?;
     let parts = Parts {
-        library: found.library,
-        phases: found.phases,
+        library,
+        phases,
         encoder: None,
         decoder: None,
         scaling: options.scaling.clone(),
         statistics: Vec::new(),
-    };
-    let notes = ImportNotes {
-        equations: found.equations,
-        notes: found.notes,
-        ..ImportNotes::default()
     };
     Ok((parts, notes))
 }
@@ -166,20 +160,17 @@ fn of_equations(
 /// The origin as the model file keeps it: no folders, no time.
 fn provenance(source: &Source<'_>, notes: &ImportNotes) -> Map<String, Value> {
     let name = Path::new(source.file).file_name();
-    let name = name.map_or_else(
-        || source.file.to_owned(),
-        |name| name.to_string_lossy().into_owned(),
-    );
-    let digest: String = source
-        .digest
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
+    let name = name.map_or(source.file.into(), |name| name.to_string_lossy());
+    let entries = [
+        ("imported_from", json!(name)),
+        ("format", json!(source.format)),
+        ("sha256", json!(hex(&source.digest))),
+        ("romc", json!(env!("CARGO_PKG_VERSION"))),
+    ];
+    let mut entries: Map<_, _> = entries
+        .map(|(key, value)| (key.to_owned(), value))
+        .into_iter()
         .collect();
-    let mut entries = Map::new();
-    entries.insert("imported_from".to_owned(), json!(name));
-    entries.insert("format".to_owned(), json!(source.format));
-    entries.insert("sha256".to_owned(), json!(digest));
-    entries.insert("romc".to_owned(), json!(env!("CARGO_PKG_VERSION")));
     if !notes.used.is_empty() {
         let tensors = notes.used.iter().map(|used| {
             let value = json!({ "tensor": used.tensor, "layout": used.layout });
@@ -216,38 +207,24 @@ fn build(
     let mut builder = ReducedModel::builder(options.name.clone(), parts.library)
         .description(options.description.clone())
         .phases(parts.phases)
-        .provenance(provenance);
+        .provenance(provenance)
+        .scaling(parts.scaling)
+        .all_input_statistics(parts.statistics)
+        .robot(options.robot)
+        .actuators(options.actuators.clone())
+        .sample_time_s(options.sample_time_s);
     if let Some(encoder) = parts.encoder {
         builder = builder.encoder(encoder);
     }
     if let Some(decoder) = parts.decoder {
         builder = builder.decoder(decoder);
     }
-    if let Some(scaling) = parts.scaling {
-        builder = builder.scaling(scaling);
-    }
-    for (phase, statistics) in parts.statistics {
-        builder = builder.input_statistics(phase, statistics);
-    }
-    if let Some(robot) = options.robot {
-        builder = builder
-            .robot(robot)
-            .wrench_frame(options.wrench_frame)
-            .actuators(options.actuators.clone());
+    if options.robot.is_some() {
+        builder = builder.wrench_frame(options.wrench_frame);
         if map.is_some() {
-            builder = builder
-                .state(CoordinateNames {
-                    names: Robot::state_names().to_vec(),
-                    units: Robot::state_units().to_vec(),
-                })
-                .input(CoordinateNames {
-                    names: Robot::input_names().to_vec(),
-                    units: Robot::input_units().to_vec(),
-                });
+            let [state, input] = CoordinateNames::of_robot();
+            builder = builder.state(state).input(input);
         }
-    }
-    if let Some(sample_time_s) = options.sample_time_s {
-        builder = builder.sample_time_s(sample_time_s);
     }
     (builder.build()).map_err(|source| ImportFault::model(file, source))
 }
