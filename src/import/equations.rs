@@ -21,33 +21,37 @@ use crate::symbolic::{ExprId, ExprPool, ParseErrorKind};
 /// Largest text.
 pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
 
-/// One section.
+/// The equations of one phase.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Section {
-    /// `None` for a text without sections.
-    pub(super) phase: Option<String>,
-    pub(super) line: usize,
-    pub(super) equations: Vec<Equation>,
+pub struct Section {
+    /// The phase, if the file names it.
+    pub phase: Option<String>,
+    /// Line of its start, from 1.
+    pub line: usize,
+    /// In the order of their left sides.
+    pub equations: Vec<Equation>,
 }
 
 /// The right side of one equation and where it came from.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Equation {
+pub struct Equation {
     /// Latent coordinate, from 0.
-    pub(super) output: usize,
+    pub output: usize,
     /// Line of the left side, from 1.
-    pub(super) line: usize,
+    pub line: usize,
     pub(super) pieces: Vec<Piece>,
 }
 
 /// A piece of a right side: line and column of its first character, and its text.
 pub(super) type Piece = ((usize, usize), String);
 
-/// A text in sections, every one with the same left sides.
+/// The equations of a text or LaTeX file in sections, every one with the same left sides.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Sections {
-    pub(super) latent_dim: usize,
-    pub(super) sections: Vec<Section>,
+pub struct Sections {
+    /// Number of latent coordinates.
+    pub latent_dim: usize,
+    /// In the file's order.
+    pub sections: Vec<Section>,
 }
 
 /// Cuts a text into sections and equations, and checks that they are complete.
@@ -244,8 +248,8 @@ impl Equation {
         })
     }
 
-    /// The right side in the grammar of candidate terms.
-    pub(super) fn text(&self) -> String {
+    /// The right side in the grammar of candidate terms, numbers as they are written.
+    pub fn text(&self) -> String {
         let texts: Vec<&str> = self.pieces.iter().map(|(_, text)| text.as_str()).collect();
         texts.join("\n")
     }

@@ -11,7 +11,7 @@ use super::assemble::{self, ImportNotes, Parts};
 use super::equations::{self, Sections};
 use super::error::{ImportError, ImportFault};
 use super::latent;
-use super::latex;
+use super::latex::{self, SymbolNames};
 use super::memory::{self, Tensor};
 use super::npz;
 use super::options::{Format, ImportOptions};
@@ -19,6 +19,7 @@ use super::report::ImportReport;
 use super::safetensors;
 use crate::files::{Located, Place, hex};
 use crate::model::{CoordinateNames, ReducedModel, StateMap};
+use crate::symbolic::ExprPool;
 
 /// Largest file that is read.
 const MAX_FILE_BYTES: u64 = 256 << 20;
@@ -60,23 +61,20 @@ pub fn import_from_bytes(
     bytes: &[u8],
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
-    let max = match format {
-        Format::Equations | Format::Latex => equations::MAX_TEXT_BYTES,
-        Format::Safetensors | Format::Npz => MAX_FILE_BYTES,
-    };
-    if bytes.len() as u64 > max {
-        return Err(ImportFault::too_large(file, max, "bytes"));
-    }
     let (parts, notes) = match format {
-        Format::Safetensors => assemble::parts(&safetensors::open(file, bytes)?, options)?,
-        Format::Npz => assemble::parts(&npz::open(file, bytes)?, options)?,
-        Format::Equations => of_equations(file, &equations::read(file, bytes)?, options)?,
-        Format::Latex => {
-            let usual = ["contact", "flight"].map(str::to_owned).into_iter();
-            let known: Vec<String> = (options.phases.iter().map(|rule| rule.name.clone()))
-                .chain(usual)
-                .collect();
-            let sections = latex::read(file, bytes, &options.symbols, &known)?;
+        Format::Safetensors | Format::Npz => {
+            check_size(file, bytes, MAX_FILE_BYTES)?;
+            let tensors = match format {
+                Format::Npz => npz::open(file, bytes)?,
+                _ => safetensors::open(file, bytes)?,
+            };
+            assemble::parts(&tensors, options)?
+        }
+        Format::Equations | Format::Latex => {
+            let usual = ["contact", "flight"].map(str::to_owned);
+            let given = options.phases.iter().map(|rule| rule.name.clone());
+            let known: Vec<String> = given.chain(usual).collect();
+            let sections = sections(file, format, bytes, &options.symbols, &known)?;
             of_equations(file, &sections, options)?
         }
     };
@@ -104,6 +102,48 @@ pub fn import_tensors(
         digest: memory::digest(tensors),
     };
     finish(&source, parts, notes, options)
+}
+
+fn check_size(file: &str, bytes: &[u8], max: u64) -> Result<(), ImportError> {
+    match bytes.len() as u64 > max {
+        true => Err(ImportFault::too_large(file, max, "bytes")),
+        false => Ok(()),
+    }
+}
+
+/// The equations of a file in memory, their right sides not looked at.
+fn sections(
+    file: &str,
+    format: Format,
+    bytes: &[u8],
+    symbols: &SymbolNames,
+    known: &[String],
+) -> Result<Sections, ImportError> {
+    check_size(file, bytes, equations::MAX_TEXT_BYTES)?;
+    match format {
+        Format::Latex => latex::read(file, bytes, symbols, known),
+        Format::Equations | Format::Safetensors | Format::Npz => equations::read(file, bytes),
+    }
+}
+
+/// Reads the equations of a file in memory. `symbols` are LaTeX's names of variables, `known`
+/// names of phases that its labels may end in.
+///
+/// # Errors
+/// [`ImportError`] with the place of what cannot be read.
+pub fn read_equations(
+    file: &str,
+    format: Format,
+    bytes: &[u8],
+    symbols: &SymbolNames,
+    known: &[String],
+) -> Result<Sections, ImportError> {
+    let read = sections(file, format, bytes, symbols, known)?;
+    for equation in read.sections.iter().flat_map(|section| &section.equations) {
+        // Each in a pool of its own: only faults are wanted.
+        equation.parse(file, read.latent_dim, &mut ExprPool::new())?;
+    }
+    Ok(read)
 }
 
 /// Where a model comes from.
