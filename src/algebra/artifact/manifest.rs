@@ -52,31 +52,19 @@ pub(super) struct Manifest {
     pub input_statistics: Pairs<StatisticsEntry>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<RobotValue>,
-    #[serde(
-        default,
-        deserialize_with = "present",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "present")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub actuators: Option<Actuators>,
-    #[serde(
-        default,
-        deserialize_with = "present",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "present")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub wrench_frame: Option<WrenchFrame>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample_time_s: Option<f64>,
-    #[serde(
-        default,
-        deserialize_with = "present",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "present")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub landmarks: Option<LandmarksEntry>,
-    #[serde(
-        default,
-        deserialize_with = "present",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "present")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorEntry>,
     #[serde(default, skip_serializing_if = "Map::is_empty")]
     pub provenance: Map<String, Value>,
@@ -177,22 +165,14 @@ impl TryFrom<MapFields> for MapEntry {
     type Error = &'static str;
 
     fn try_from(fields: MapFields) -> Result<Self, &'static str> {
-        match fields {
-            MapFields {
-                weights: None,
-                bias: None,
-                layers: Some(layers),
-            } => Ok(Self::Layers { layers }),
-            MapFields {
-                layers: Some(_), ..
-            } => Err("found `layers` beside `weights` or `bias`, expected one of the two"),
-            MapFields { weights: None, .. } => Err("missing field `weights`"),
-            MapFields { bias: None, .. } => Err("missing field `bias`"),
-            MapFields {
-                weights: Some(weights),
-                bias: Some(bias),
-                layers: None,
-            } => Ok(Self::Affine { weights, bias }),
+        match (fields.weights, fields.bias, fields.layers) {
+            (None, None, Some(layers)) => Ok(Self::Layers { layers }),
+            (_, _, Some(_)) => {
+                Err("found `layers` beside `weights` or `bias`, expected one of the two")
+            }
+            (Some(weights), Some(bias), None) => Ok(Self::Affine { weights, bias }),
+            (None, _, None) => Err("missing field `weights`"),
+            (_, None, None) => Err("missing field `bias`"),
         }
     }
 }

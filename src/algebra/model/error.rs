@@ -126,7 +126,7 @@ pub enum ModelError {
 
 impl ModelError {
     /// `found` at a place, where `expected` should be.
-    pub(super) fn invalid(
+    pub(crate) fn invalid(
         place: impl Into<String>,
         found: impl ToString,
         expected: impl Into<String>,

@@ -31,7 +31,7 @@ impl ExprPool {
                 .expect("products have two factors or more"),
             Node::Power(base, exponent) => {
                 match pool.as_number(*exponent).and_then(Number::as_integer) {
-                    Some(integer) => power(child(*base), integer),
+                    Some(integer) => integer_power(child(*base), integer),
                     None => child(*base).powf(child(*exponent)),
                 }
             }
@@ -65,7 +65,8 @@ impl ExprPool {
 }
 
 /// `base ^ exponent` by squaring.
-fn power(base: f64, exponent: i64) -> f64 {
+#[inline]
+pub fn integer_power(base: f64, exponent: i64) -> f64 {
     let mut remaining = exponent.unsigned_abs();
     let (mut result, mut square) = (1.0, base);
     while remaining > 0 {
