@@ -30,7 +30,7 @@ impl ExprPool {
                 .reduce(|a, b| a * b)
                 .expect("products have two factors or more"),
             Node::Power(base, exponent) => match pool.as_integer(*exponent) {
-                Some(integer) => power(child(*base), integer),
+                Some(integer) => integer_power(child(*base), integer),
                 None => child(*base).powf(child(*exponent)),
             },
             Node::Apply(function, argument) => function.evaluate(child(*argument)),
@@ -63,7 +63,8 @@ impl ExprPool {
 }
 
 /// `base ^ exponent` by squaring.
-fn power(base: f64, exponent: i64) -> f64 {
+#[inline]
+pub fn integer_power(base: f64, exponent: i64) -> f64 {
     let power = power_by(base, exponent.unsigned_abs(), |a, b| a * b);
     if exponent < 0 { 1.0 / power } else { power }
 }

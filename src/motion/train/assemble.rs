@@ -13,6 +13,7 @@ use super::latent::Latent;
 use super::metrics::PLACE;
 use super::options::{EncoderOptions, TrainOptions};
 use super::report::TrainReport;
+use crate::files::hex;
 use crate::model::{
     CoordinateNames, InputGivenState, InputStatistics, JumpPrior, Library, Phase, ReducedModel,
     ScaleFactors, Scaling, StateMap,
@@ -76,11 +77,7 @@ impl Origin {
 
 /// SHA-256 of a file's bytes, with the name of the algorithm in front, as provenances have it.
 pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes)
-        .iter()
-        .fold(String::from("sha256:"), |text, byte| {
-            text + &format!("{byte:02x}")
-        })
+    format!("sha256:{}", hex(&Sha256::digest(bytes)))
 }
 
 /// Puts the parts together.
@@ -93,13 +90,14 @@ pub(super) fn assemble(
     origin: &Origin,
     report: &TrainReport,
 ) -> Result<ReducedModel, TrainError> {
+    let [state, input] = CoordinateNames::of_robot();
     let builder = ReducedModel::builder(options.name.clone(), parts.library.clone())
         .description(description(options, robot))
         .robot(robot)
         .actuators(options.actuators.clone())
         .wrench_frame(options.wrench_frame)
-        .state(signals(Robot::state_names(), Robot::state_units()))
-        .input(signals(Robot::input_names(), Robot::input_units()))
+        .state(state)
+        .input(input)
         .scaling(Scaling {
             state: ScaleFactors::Uniform(options.scaling.state),
             input: ScaleFactors::PerCoordinate(options.scaling.factors().input),
@@ -162,13 +160,6 @@ fn description(options: &TrainOptions, robot: &Robot) -> String {
         options.latent_dim,
         robot.name()
     )
-}
-
-fn signals<const N: usize>(names: [String; N], units: [String; N]) -> CoordinateNames {
-    CoordinateNames {
-        names: names.into(),
-        units: units.into(),
-    }
 }
 
 fn median_step_s(dataset: &Dataset) -> f64 {
