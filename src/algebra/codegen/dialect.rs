@@ -1,9 +1,10 @@
 //! What targets spell differently.
 
-use super::code::{Argument, ConstTable, Function, Index, Infix, MathFunction, Parameter};
+use super::code::{ConstTable, Index, MathFunction, Span};
 use super::fours::{FourBlock, Fours};
 use super::literal::Literal;
 use super::printer::subscript;
+use crate::ir::Binary;
 
 /// Spelling of lanes: neighbours of an array that are computed side by side.
 pub trait LaneDialect {
@@ -35,8 +36,8 @@ pub trait FourDialect {
 /// Spelling of a target language. The printer owns precedence and parentheses, the
 /// dialect everything that differs between languages.
 pub trait Dialect {
-    /// Words that no variable may be called.
-    fn reserved(&self) -> &'static [&'static str];
+    /// Words that no variable may be called, with blanks between them.
+    fn reserved(&self) -> &'static str;
 
     /// What ends a statement.
     fn terminator(&self) -> &'static str {
@@ -59,12 +60,12 @@ pub trait Dialect {
     }
 
     /// An operator between numbers, with the spaces around it.
-    fn operator(&self, op: Infix) -> &'static str {
+    fn operator(&self, op: Binary) -> &'static str {
         match op {
-            Infix::Add => " + ",
-            Infix::Sub => " - ",
-            Infix::Mul => "*",
-            Infix::Div => "/",
+            Binary::Add => " + ",
+            Binary::Sub => " - ",
+            Binary::Mul => "*",
+            Binary::Div => "/",
         }
     }
 
@@ -90,7 +91,9 @@ pub trait Dialect {
     }
 
     /// A number in the target's precision.
-    fn literal(&self, literal: Literal) -> String;
+    fn literal(&self, literal: Literal) -> String {
+        literal.to_string()
+    }
 
     /// A function applied to a printed argument.
     fn apply(&self, function: MathFunction, argument: &str) -> String;
@@ -108,31 +111,26 @@ pub trait Dialect {
     fn for_loop(&self, variable: &str, count: usize) -> String;
 
     /// Beginning of the names of constant tables.
-    fn table_base(&self, prefix: &str) -> String;
-
-    /// A mention of a parameter that nothing reads.
-    fn discard(&self, parameter: &str) -> String;
+    fn table_base(&self, _prefix: &str) -> String {
+        "TABLE".to_owned()
+    }
 
     /// Function `f(a, b, c) = a*b + c` for loops, in a language whose compilers never fuse the two
     /// operations by themselves.
-    fn multiply_add(&self) -> Option<&'static str>;
+    fn multiply_add(&self) -> Option<&'static str> {
+        None
+    }
 
     /// A call of the sine-and-cosine kernel, or of a generated function (`callee`).
-    fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String;
+    fn call(&self, callee: Option<&str>, read: &[Span], written: &[Span]) -> String;
 
     /// The kernel's core on one printed argument of a lane: defines sine and cosine, and
-    /// notes an argument beyond its limit.
-    fn sin_cos_lane(&self, argument: &str, names: &[String; 2], is_used: [bool; 2]) -> Vec<String>;
+    /// notes an argument beyond its limit. Blocks of lanes are for compilers: scripts run many
+    /// points as columns.
+    fn sin_cos_lane(&self, _: &str, _: &[String; 2], _is_used: [bool; 2]) -> Vec<String> {
+        Vec::new()
+    }
 
     /// Definition of a constant table.
     fn table(&self, table: &ConstTable) -> String;
-
-    /// A parameter.
-    fn parameter(&self, parameter: &Parameter) -> String;
-
-    /// The function's name and parameters, without body.
-    fn signature(&self, function: &Function) -> String;
-
-    /// Documentation from its lines.
-    fn docs(&self, lines: &[String]) -> String;
 }

@@ -1,8 +1,10 @@
 //! The one place that owns precedence, parentheses, indentation and line width.
 
-use super::code::{Argument, ConstTable, Expr, Function, Index, Infix, Stmt};
+use super::code::{ConstTable, Expr, Function, Index, Stmt};
 use super::dialect::{Dialect, LaneDialect};
 use super::fours::Fours;
+use super::ident::Ident;
+use crate::ir::Binary;
 
 /// Longest line before an expression is broken, in characters.
 const WIDTH: usize = 100;
@@ -36,13 +38,17 @@ impl<'a> Printer<'a> {
         }
     }
 
-    /// A function with its documentation; ends without a newline.
-    pub fn function(&self, function: &Function) -> String {
-        let mut text = self.dialect.docs(&function.docs);
-        text.push_str(&self.dialect.signature(function));
-        text.push_str(" {\n");
+    /// A function behind its head, with a mention of each parameter that nothing reads; ends without
+    /// a newline.
+    pub fn function(
+        &self,
+        head: &str,
+        mention: impl Fn(&Ident) -> String,
+        function: &Function,
+    ) -> String {
+        let mut text = format!("{head} {{\n");
         for parameter in &function.unused {
-            self.line(&self.dialect.discard(&parameter.to_string()), 1, &mut text);
+            self.line(&mention(parameter), 1, &mut text);
         }
         self.block(&function.body, 1, &mut text);
         text.push('}');
@@ -103,28 +109,16 @@ impl<'a> Printer<'a> {
                 }
                 Stmt::Assign(target, value) => self.assign(target, " = ", value, depth, text),
                 Stmt::AddAssign(target, value) => match (self.multiply_add, value) {
-                    (Some(_), Expr::Infix(Infix::Mul, ..)) => {
-                        let sum = Expr::infix(Infix::Add, target.clone(), value.clone());
+                    (Some(_), Expr::Infix(Binary::Mul, ..)) => {
+                        let sum = Expr::infix(Binary::Add, target.clone(), value.clone());
                         self.assign(target, " = ", &sum, depth, text);
                     }
                     (_, value) if !self.dialect.adds_in_place() => {
-                        let sum = Expr::infix(Infix::Add, target.clone(), value.clone());
+                        let sum = Expr::infix(Binary::Add, target.clone(), value.clone());
                         self.assign(target, " = ", &sum, depth, text);
                     }
                     (_, value) => self.assign(target, " += ", value, depth, text),
                 },
-                Stmt::SinCos {
-                    arguments,
-                    sines,
-                    cosines,
-                } => {
-                    let arguments = [
-                        Argument::Read(arguments.clone()),
-                        Argument::Write(sines.clone()),
-                        Argument::Write(cosines.clone()),
-                    ];
-                    self.line(&self.dialect.call(None, &arguments), depth, text);
-                }
                 Stmt::SinCosLane {
                     argument,
                     sine,
@@ -160,8 +154,13 @@ impl<'a> Printer<'a> {
                         self.line(close, depth, text);
                     }
                 }
-                Stmt::Call(callee, arguments) => {
-                    let call = self.dialect.call(Some(&callee.to_string()), arguments);
+                Stmt::Call {
+                    callee,
+                    read,
+                    written,
+                } => {
+                    let callee = callee.as_ref().map(Ident::to_string);
+                    let call = self.dialect.call(callee.as_deref(), read, written);
                     self.line(&call, depth, text);
                 }
             }
@@ -247,8 +246,8 @@ impl<'a> Printer<'a> {
                 // Sums and products group to the left; a right operand of the same kind keeps
                 // its parentheses, because floating-point sums do not associate.
                 let (own, right) = match op {
-                    Infix::Add | Infix::Sub => (Precedence::Sum, Precedence::Product),
-                    Infix::Mul | Infix::Div => (Precedence::Product, Precedence::Atom),
+                    Binary::Add | Binary::Sub => (Precedence::Sum, Precedence::Product),
+                    Binary::Mul | Binary::Div => (Precedence::Product, Precedence::Atom),
                 };
                 let right = if starts_with_minus(b) {
                     Precedence::Atom
@@ -272,20 +271,22 @@ impl<'a> Printer<'a> {
 
     /// `a*b + c` and its like by the dialect's function, if it has one; the same two roundings, unless
     /// the target can fuse them.
-    fn multiply_added(&self, op: Infix, a: &Expr, b: &Expr) -> Option<String> {
+    fn multiply_added(&self, op: Binary, a: &Expr, b: &Expr) -> Option<String> {
         let name = self.multiply_add?;
         let (first, second, rest) = match (op, product(a), product(b)) {
-            (Infix::Add, _, Some((x, y))) => (self.expression(x), y, self.expression(a)),
-            (Infix::Add, Some((x, y)), None) => (self.expression(x), y, self.expression(b)),
-            (Infix::Sub, _, Some((x, y))) => {
+            (Binary::Add, _, Some((x, y))) => (self.expression(x), y, self.expression(a)),
+            (Binary::Add, Some((x, y)), None) => (self.expression(x), y, self.expression(b)),
+            (Binary::Sub, _, Some((x, y))) => {
                 let negated = format!("-{}", self.operand(x, Precedence::Atom));
                 (negated, y, self.expression(a))
             }
-            (Infix::Sub, Some((x, y)), None) => {
+            (Binary::Sub, Some((x, y)), None) => {
                 let negated = format!("-{}", self.operand(b, Precedence::Atom));
                 (self.expression(x), y, negated)
             }
-            (Infix::Add | Infix::Sub, None, None) | (Infix::Mul | Infix::Div, ..) => return None,
+            (Binary::Add | Binary::Sub, None, None) | (Binary::Mul | Binary::Div, ..) => {
+                return None;
+            }
         };
         Some(format!(
             "{name}({first}, {}, {rest})",
@@ -314,14 +315,14 @@ fn precedence(expr: &Expr) -> Precedence {
         | Expr::LaneTotal(_)
         | Expr::Apply(..) => Precedence::Atom,
         Expr::Negate(_) => Precedence::Sign,
-        Expr::Infix(Infix::Add | Infix::Sub, ..) => Precedence::Sum,
-        Expr::Infix(Infix::Mul | Infix::Div, ..) => Precedence::Product,
+        Expr::Infix(Binary::Add | Binary::Sub, ..) => Precedence::Sum,
+        Expr::Infix(Binary::Mul | Binary::Div, ..) => Precedence::Product,
     }
 }
 
 fn product(expr: &Expr) -> Option<(&Expr, &Expr)> {
     match expr {
-        Expr::Infix(Infix::Mul, a, b) => Some((a, b)),
+        Expr::Infix(Binary::Mul, a, b) => Some((a, b)),
         _ => None,
     }
 }
@@ -331,8 +332,8 @@ fn starts_with_minus(expr: &Expr) -> bool {
     match expr {
         Expr::Literal(literal) => literal.is_negative(),
         Expr::Negate(_) => true,
-        Expr::Infix(Infix::Mul | Infix::Div, a, _) => starts_with_minus(a),
-        Expr::Infix(Infix::Add | Infix::Sub, ..)
+        Expr::Infix(Binary::Mul | Binary::Div, a, _) => starts_with_minus(a),
+        Expr::Infix(Binary::Add | Binary::Sub, ..)
         | Expr::Name(_)
         | Expr::Element(..)
         | Expr::Entry(..)

@@ -2,11 +2,11 @@
 //!
 //! No mathematics happens here: the tree of operations of the program is kept as it is.
 
-use super::code::{Expr, Index, Infix, MathFunction, Parameter, Role, Stmt};
+use super::code::{Expr, Index, MathFunction, Parameter, Role, Stmt};
 use super::ident::{Ident, Namer};
 use super::literal::Literal;
 use super::tables::Tables;
-use crate::ir::{Binary, Program, Statement, Unary, ValueId};
+use crate::ir::{Program, Statement, Unary, ValueId};
 
 /// Deepest nesting of operations in one expression.
 const DEEPEST: usize = 48;
@@ -151,7 +151,7 @@ impl Translator<'_> {
             }
             Statement::Binary(op, a, b) => {
                 let ((a, left), (b, right)) = (self.read(*a), self.read(*b));
-                let expr = Expr::infix(infix(*op), a, b);
+                let expr = Expr::infix(*op, a, b);
                 self.define(first, expr, left.max(right) + 1);
             }
             Statement::SinCos { arguments } => self.sin_cos(first, arguments),
@@ -257,15 +257,6 @@ impl Translator<'_> {
             assigned.push(Stmt::Assign(target, value));
         }
         self.body.extend(assigned);
-    }
-}
-
-fn infix(op: Binary) -> Infix {
-    match op {
-        Binary::Add => Infix::Add,
-        Binary::Sub => Infix::Sub,
-        Binary::Mul => Infix::Mul,
-        Binary::Div => Infix::Div,
     }
 }
 

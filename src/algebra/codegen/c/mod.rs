@@ -128,7 +128,7 @@ pub fn emit(
         functions.sines_point_by_point();
     }
     let printer = Printer::new(&dialect);
-    let print = |function: &Function| printer.function(function);
+    let print = |function: &Function| dialect.definition(function, &printer);
     let phases: Vec<PhaseText> = entries
         .phases
         .iter()

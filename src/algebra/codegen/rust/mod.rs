@@ -90,7 +90,7 @@ pub fn emit(
         functions.sines_point_by_point();
     }
     let printer = Printer::new(&dialect);
-    let print = |function: &Function| printer.function(function);
+    let print = |function: &Function| dialect.definition(function, &printer);
     let uses_kernel = functions.all().any(|function| calls_kernel(&function.body));
     let lib = Lib {
         banner: format!("// {provenance}"),

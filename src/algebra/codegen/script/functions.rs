@@ -31,6 +31,11 @@ impl FunctionText {
         list(&self.inputs, |input| input.name.clone())
     }
 
+    /// The names of its results.
+    pub fn results(&self) -> String {
+        list(&self.outputs, |output| output.name.clone())
+    }
+
     /// The parameters that are arrays, with their lengths.
     pub fn arrays(&self) -> Vec<(&str, usize)> {
         let arrays = self.inputs.iter().filter(|input| !input.is_scalar);

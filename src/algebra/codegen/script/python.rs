@@ -3,7 +3,7 @@
 use askama::Template;
 
 use super::functions::{FunctionText, ModelText, Script, list};
-use crate::codegen::code::{Argument, ConstTable, Function, MathFunction, Parameter, Span};
+use crate::codegen::code::{ConstTable, MathFunction, Span};
 use crate::codegen::dialect::Dialect;
 use crate::codegen::error::CodegenError;
 use crate::codegen::functions::ModelFunctions;
@@ -30,120 +30,27 @@ struct PythonDialect {
 }
 
 /// Keywords of Python and the names that generated modules use themselves.
-const RESERVED: [&str; 49] = [
-    "False", "None", "True", "and", "as", "assert", "async", "await", "break", "class", "continue",
-    "def", "del", "elif", "else", "except", "finally", "for", "from", "global", "if", "import",
-    "in", "is", "lambda", "nonlocal", "not", "or", "pass", "raise", "return", "try", "while",
-    "with", "yield", "match", "case", "type", "np", "casadi", "range", "list", "shape", "zip",
-    "len", "float", "print", "_rows", "_sin_cos",
-];
+const RESERVED: &str = "
+    False None True and as assert async await break class continue def del elif else except finally
+    for from global if import in is lambda nonlocal not or pass raise return try while with yield
+    match case type np casadi range list shape zip len float print _rows _sin_cos
+";
 
 /// Modules that a file of the same name would hide from NumPy, CasADi and the file itself.
-const MODULES: [&str; 95] = [
-    "numpy",
-    "abc",
-    "argparse",
-    "array",
-    "ast",
-    "atexit",
-    "base64",
-    "bisect",
-    "builtins",
-    "bz2",
-    "calendar",
-    "cmath",
-    "code",
-    "codecs",
-    "collections",
-    "concurrent",
-    "contextlib",
-    "contextvars",
-    "copy",
-    "copyreg",
-    "csv",
-    "ctypes",
-    "dataclasses",
-    "datetime",
-    "decimal",
-    "dis",
-    "email",
-    "encodings",
-    "enum",
-    "errno",
-    "fnmatch",
-    "fractions",
-    "functools",
-    "gc",
-    "genericpath",
-    "getpass",
-    "glob",
-    "gzip",
-    "hashlib",
-    "heapq",
-    "hmac",
-    "html",
-    "http",
-    "importlib",
-    "inspect",
-    "io",
-    "itertools",
-    "json",
-    "keyword",
-    "linecache",
-    "locale",
-    "logging",
-    "lzma",
-    "marshal",
-    "math",
-    "mmap",
-    "multiprocessing",
-    "numbers",
-    "opcode",
-    "operator",
-    "os",
-    "pathlib",
-    "pickle",
-    "pkgutil",
-    "platform",
-    "posixpath",
-    "pprint",
-    "queue",
-    "random",
-    "re",
-    "secrets",
-    "select",
-    "selectors",
-    "shutil",
-    "signal",
-    "site",
-    "socket",
-    "stat",
-    "statistics",
-    "string",
-    "struct",
-    "subprocess",
-    "sys",
-    "sysconfig",
-    "tempfile",
-    "textwrap",
-    "threading",
-    "time",
-    "token",
-    "tokenize",
-    "traceback",
-    "types",
-    "typing",
-    "unittest",
-    "urllib",
-];
+const MODULES: &str = "
+    numpy abc argparse array ast atexit base64 bisect builtins bz2 calendar cmath code codecs
+    collections concurrent contextlib contextvars copy copyreg csv ctypes dataclasses datetime
+    decimal dis email encodings enum errno fnmatch fractions functools gc genericpath getpass glob
+    gzip hashlib heapq hmac html http importlib inspect io itertools json keyword linecache locale
+    logging lzma marshal math mmap multiprocessing numbers opcode operator os pathlib pickle pkgutil
+    platform posixpath pprint queue random re secrets select selectors shutil signal site socket
+    stat statistics string struct subprocess sys sysconfig tempfile textwrap threading time token
+    tokenize traceback types typing unittest urllib
+";
 
 impl Dialect for PythonDialect {
-    fn reserved(&self) -> &'static [&'static str] {
-        &RESERVED
-    }
-
-    fn literal(&self, literal: Literal) -> String {
-        literal.to_string()
+    fn reserved(&self) -> &'static str {
+        RESERVED
     }
 
     fn terminator(&self) -> &'static str {
@@ -164,14 +71,8 @@ impl Dialect for PythonDialect {
             Library::Casadi => "casadi",
         };
         let name = match (function, self.library) {
-            (MathFunction::Sqrt, _) => "sqrt",
-            (MathFunction::Abs, Library::NumPy) => "abs",
             (MathFunction::Abs, Library::Casadi) => "fabs",
-            (MathFunction::Sign, _) => "sign",
-            (MathFunction::Tan, _) => "tan",
-            (MathFunction::Tanh, _) => "tanh",
-            (MathFunction::Exp, _) => "exp",
-            (MathFunction::Log, _) => "log",
+            (named, _) => named.name(),
         };
         format!("{library}.{name}({argument})")
     }
@@ -192,38 +93,17 @@ impl Dialect for PythonDialect {
         format!("for {variable} in range({count})")
     }
 
-    fn table_base(&self, _prefix: &str) -> String {
-        "TABLE".to_owned()
-    }
-
-    fn discard(&self, _parameter: &str) -> String {
-        String::new()
-    }
-
-    fn multiply_add(&self) -> Option<&'static str> {
-        None
-    }
-
-    fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String {
+    fn call(&self, callee: Option<&str>, read: &[Span], written: &[Span]) -> String {
         let callee = match (callee, self.library) {
             (None, _) => "_sin_cos".to_owned(),
             (Some(callee), Library::NumPy) => callee.to_owned(),
             (Some(callee), Library::Casadi) => private(callee),
         };
-        let (mut read, mut written) = (Vec::new(), Vec::new());
-        for argument in arguments {
-            match argument {
-                Argument::Read(span) if span.is_whole() => read.push(span.array.to_string()),
-                Argument::Read(span) => read.push(slice(span)),
-                Argument::Write(span) => written.push(slice(span)),
-            }
-        }
-        format!("{} = {callee}({})", written.join(", "), read.join(", "))
-    }
-
-    fn sin_cos_lane(&self, _: &str, _: &[String; 2], _: [bool; 2]) -> Vec<String> {
-        // Blocks of lanes are for compilers: scripts run many points as columns.
-        Vec::new()
+        let read = list(read, |span| match span.is_whole() {
+            true => span.array.to_string(),
+            false => slice(span),
+        });
+        format!("{} = {callee}({read})", list(written, slice))
     }
 
     fn table(&self, table: &ConstTable) -> String {
@@ -233,19 +113,6 @@ impl Dialect for PythonDialect {
             format!("    [{}],\n", lines.join(",\n     "))
         });
         format!("{} = [\n{}]", table.name, rows.collect::<String>())
-    }
-
-    fn parameter(&self, parameter: &Parameter) -> String {
-        parameter.name.to_string()
-    }
-
-    fn signature(&self, function: &Function) -> String {
-        format!("def {}", function.name)
-    }
-
-    fn docs(&self, _lines: &[String]) -> String {
-        // The template places documentation.
-        String::new()
     }
 }
 
@@ -266,14 +133,11 @@ struct NumPyModule {
     config = "../../templates/askama.toml"
 )]
 struct NumPyFunction<'a> {
-    name: &'a str,
-    parameters: String,
+    f: &'a FunctionText,
     docs: Vec<String>,
     /// Names of the arrays, and each with its length.
     arrays: String,
     lengths: String,
-    created: Vec<(&'a str, usize)>,
-    body: &'a str,
     results: String,
 }
 
@@ -292,13 +156,9 @@ struct CasadiModule<'a> {
     config = "../../templates/askama.toml"
 )]
 struct CasadiFunction<'a> {
+    f: &'a FunctionText,
     name: String,
-    parameters: String,
     docs: Vec<String>,
-    copied: Vec<&'a str>,
-    created: Vec<(&'a str, usize)>,
-    body: &'a str,
-    results: String,
 }
 
 /// The module of a model on NumPy; `provenance` is the text of the first line.
@@ -353,23 +213,17 @@ pub fn emit_casadi(
 }
 
 fn stem(entries: &ModelInterface) -> String {
-    let mut namer = Namer::new(&RESERVED);
-    for module in MODULES {
-        namer.mint(module);
-    }
+    let mut namer = Namer::new(&format!("{RESERVED} {MODULES}"));
     namer.mint(&entries.identifier).to_string()
 }
 
 fn numpy_function(function: &FunctionText) -> Result<String, CodegenError> {
     let arrays = function.arrays();
     let template = NumPyFunction {
-        name: &function.name,
-        parameters: function.parameters(),
+        f: function,
         docs: escaped(&function.docs),
         arrays: list(&arrays, |(name, _)| (*name).to_owned()),
         lengths: list(&arrays, |(name, len)| format!("({name}, {len})")),
-        created: function.created(),
-        body: &function.body,
         results: list(&function.outputs, |output| {
             format!("_rows({}, shape)", output.name)
         }),
@@ -385,13 +239,9 @@ fn casadi_function(
 ) -> Result<(String, String), CodegenError> {
     let copied = function.copied();
     let template = CasadiFunction {
+        f: function,
         name: private(&function.name),
-        parameters: function.parameters(),
         docs: escaped(&function.docs),
-        copied: copied.clone(),
-        created: function.created(),
-        body: &function.body,
-        results: list(&function.outputs, |output| output.name.clone()),
     };
     let name = &function.name;
     let inputs = list(&function.inputs, |input| {
