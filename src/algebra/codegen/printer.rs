@@ -77,48 +77,33 @@ impl<'a> Printer<'a> {
 
     fn block(&self, statements: &[Stmt], depth: usize, text: &mut String) {
         for statement in statements {
-            match statement {
+            let line = match statement {
                 Stmt::For(variable, count, body) => {
                     let head = self.dialect.for_loop(&variable.to_string(), *count);
-                    let (open, close) = self.dialect.loop_ends();
-                    self.line(&format!("{head}{open}"), depth, text);
-                    self.in_loop().block(body, depth + 1, text);
-                    if let Some(close) = close {
-                        self.line(close, depth, text);
-                    }
+                    self.in_loop().looped(&head, body, depth, text);
+                    continue;
                 }
-                Stmt::Let(name, value) => {
-                    let value = self.expression(value);
-                    self.line(
-                        &self.dialect.let_scalar(&name.to_string(), &value),
-                        depth,
-                        text,
-                    );
+                Stmt::ForLanes(variable, body) => {
+                    let lanes = self.lane_dialect();
+                    let inside = Self {
+                        lanes: Some(lanes),
+                        ..*self
+                    };
+                    inside.looped(&lanes.for_lanes(&variable.to_string()), body, depth, text);
+                    continue;
                 }
-                Stmt::LetArray(name, elements) => {
-                    let elements: Vec<String> =
-                        elements.iter().map(|e| self.expression(e)).collect();
-                    self.line(
-                        &self.dialect.let_array(&name.to_string(), &elements),
-                        depth,
-                        text,
-                    );
+                Stmt::Row(row) => {
+                    let statements = match self.dialect.lanes() {
+                        Some(_) => row.in_lanes(),
+                        None => row.in_columns(),
+                    };
+                    self.block(&statements, depth, text);
+                    continue;
                 }
-                Stmt::Declare(name, len) => {
-                    self.line(&self.dialect.declare(&name.to_string(), *len), depth, text);
+                Stmt::Fours(fours) => {
+                    self.fours(fours, depth, text);
+                    continue;
                 }
-                Stmt::Assign(target, value) => self.assign(target, " = ", value, depth, text),
-                Stmt::AddAssign(target, value) => match (self.multiply_add, value) {
-                    (Some(_), Expr::Infix(Binary::Mul, ..)) => {
-                        let sum = Expr::infix(Binary::Add, target.clone(), value.clone());
-                        self.assign(target, " = ", &sum, depth, text);
-                    }
-                    (_, value) if !self.dialect.adds_in_place() => {
-                        let sum = Expr::infix(Binary::Add, target.clone(), value.clone());
-                        self.assign(target, " = ", &sum, depth, text);
-                    }
-                    (_, value) => self.assign(target, " += ", value, depth, text),
-                },
                 Stmt::SinCosLane {
                     argument,
                     sine,
@@ -130,40 +115,50 @@ impl<'a> Printer<'a> {
                     for line in self.dialect.sin_cos_lane(&argument, &names, *is_used) {
                         self.line(&line, depth, text);
                     }
+                    continue;
                 }
-                Stmt::Row(row) => match self.dialect.lanes() {
-                    Some(_) => self.block(&row.in_lanes(), depth, text),
-                    None => self.block(&row.in_columns(), depth, text),
-                },
-                Stmt::Fours(fours) => self.fours(fours, depth, text),
-                Stmt::DeclareLanes(sums) => {
-                    let declare = self.lane_dialect().declare(&sums.to_string());
-                    self.line(&declare, depth, text);
+                Stmt::Let(name, value) => {
+                    let value = self.expression(value);
+                    self.dialect.let_scalar(&name.to_string(), &value)
                 }
-                Stmt::ForLanes(variable, body) => {
-                    let lanes = self.lane_dialect();
-                    let head = lanes.for_lanes(&variable.to_string());
-                    let (open, close) = self.dialect.loop_ends();
-                    self.line(&format!("{head}{open}"), depth, text);
-                    let inside = Self {
-                        lanes: Some(lanes),
-                        ..*self
-                    };
-                    inside.block(body, depth + 1, text);
-                    if let Some(close) = close {
-                        self.line(close, depth, text);
+                Stmt::LetArray(name, elements) => {
+                    let elements: Vec<_> = elements.iter().map(|e| self.expression(e)).collect();
+                    self.dialect.let_array(&name.to_string(), &elements)
+                }
+                Stmt::Declare(name, len) => self.dialect.declare(&name.to_string(), *len),
+                Stmt::Assign(target, value) => self.assign(target, " = ", value),
+                Stmt::AddAssign(target, value) => {
+                    let is_product = matches!(value, Expr::Infix(Binary::Mul, ..));
+                    let is_fused = self.multiply_add.is_some() && is_product;
+                    match is_fused || !self.dialect.adds_in_place() {
+                        true => {
+                            let sum = Expr::infix(Binary::Add, target.clone(), value.clone());
+                            self.assign(target, " = ", &sum)
+                        }
+                        false => self.assign(target, " += ", value),
                     }
                 }
+                Stmt::DeclareLanes(sums) => self.lane_dialect().declare(&sums.to_string()),
                 Stmt::Call {
                     callee,
                     read,
                     written,
                 } => {
                     let callee = callee.as_ref().map(Ident::to_string);
-                    let call = self.dialect.call(callee.as_deref(), read, written);
-                    self.line(&call, depth, text);
+                    self.dialect.call(callee.as_deref(), read, written)
                 }
-            }
+            };
+            self.line(&line, depth, text);
+        }
+    }
+
+    /// A loop whose body this printer prints.
+    fn looped(&self, head: &str, body: &[Stmt], depth: usize, text: &mut String) {
+        let (open, close) = self.dialect.loop_ends();
+        self.line(&format!("{head}{open}"), depth, text);
+        self.block(body, depth + 1, text);
+        if let Some(close) = close {
+            self.line(close, depth, text);
         }
     }
 
@@ -183,7 +178,7 @@ impl<'a> Printer<'a> {
         self.dialect.lanes().expect("a dialect with lanes")
     }
 
-    fn assign(&self, target: &Expr, op: &str, value: &Expr, depth: usize, text: &mut String) {
+    fn assign(&self, target: &Expr, op: &str, value: &Expr) -> String {
         let value = self.expression(value);
         let outside = Self {
             lanes: None,
@@ -193,8 +188,7 @@ impl<'a> Printer<'a> {
             (Expr::Element(..), Some(lanes)) => lanes.write(&outside.expression(target)),
             _ => self.expression(target),
         };
-        let line = format!("{target}{op}{value}{}", self.dialect.terminator());
-        self.line(&line, depth, text);
+        format!("{target}{op}{value}{}", self.dialect.terminator())
     }
 
     /// Adds a line, broken at spaces if it is too wide.

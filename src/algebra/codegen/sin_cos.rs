@@ -19,14 +19,18 @@ pub struct KernelText {
     pub sin: Vec<String>,
     /// Coefficients of the cosine.
     pub cos: Vec<String>,
+    /// From bit 1 of a number to its sign.
+    pub to_sign: usize,
 }
 
 impl KernelText {
     /// The constants in a precision, each spelled by `spell`.
     pub fn new(precision: Precision, spell: &dyn Fn(Literal) -> String) -> Self {
+        let to_sign = precision.bits() - 2;
         match precision {
             Precision::Double => Self::spelled(
                 spell,
+                to_sign,
                 [sin_cos::LIMIT, sin_cos::TWO_OVER_PI, sin_cos::ROUND],
                 [&sin_cos::PI_2, &sin_cos::SIN, &sin_cos::COS],
             ),
@@ -34,6 +38,7 @@ impl KernelText {
                 let wide = |values: [f32; 3]| values.map(f64::from);
                 Self::spelled(
                     spell,
+                    to_sign,
                     wide([
                         sin_cos_f32::LIMIT,
                         sin_cos_f32::TWO_OVER_PI,
@@ -49,7 +54,12 @@ impl KernelText {
         }
     }
 
-    fn spelled(spell: &dyn Fn(Literal) -> String, single: [f64; 3], lists: [&[f64]; 3]) -> Self {
+    fn spelled(
+        spell: &dyn Fn(Literal) -> String,
+        to_sign: usize,
+        single: [f64; 3],
+        lists: [&[f64]; 3],
+    ) -> Self {
         let text =
             |value: f64| spell(Literal::new(value).expect("the kernel's constants are finite"));
         let signed = |&value: &f64| match value < 0.0 {
@@ -65,6 +75,7 @@ impl KernelText {
             pi_2,
             sin,
             cos,
+            to_sign,
         }
     }
 }

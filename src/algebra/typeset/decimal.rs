@@ -1,5 +1,7 @@
 //! Numbers as they are printed: how many digits, and what that costs.
 
+use std::fmt;
+
 /// How coefficients are rounded for print.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rounding {
@@ -105,7 +107,7 @@ impl Decimal {
             return Self::plain(value, "0".to_owned());
         }
         let text = format!("{:.*e}", digits - 1, value.abs());
-        let exponent = exponent_of(&text);
+        let (_, exponent) = parts(&text);
         if exponent < -4 || exponent > 6.max(digits as i32) {
             return Self::scientific(value, text);
         }
@@ -132,11 +134,10 @@ impl Decimal {
 
     /// From Rust's `1.25e-7` form.
     fn scientific(value: f64, text: String) -> Self {
-        let exponent = exponent_of(&text);
-        let digits = text.split('e').next().unwrap_or("0").to_owned();
+        let (digits, exponent) = parts(&text);
         Self {
             negative: value < 0.0,
-            digits,
+            digits: digits.to_owned(),
             exponent: (exponent != 0).then_some(exponent),
         }
     }
@@ -153,10 +154,7 @@ impl Decimal {
 
     /// Whether it prints as nothing but zeros.
     pub fn is_zero(&self) -> bool {
-        !self
-            .digits
-            .bytes()
-            .any(|byte| (b'1'..=b'9').contains(&byte))
+        !self.digits.contains(|digit| ('1'..='9').contains(&digit))
     }
 
     /// Whether it prints as one.
@@ -188,12 +186,20 @@ impl Decimal {
     }
 }
 
-fn exponent_of(scientific: &str) -> i32 {
-    scientific
-        .split('e')
-        .nth(1)
-        .and_then(|text| text.parse().ok())
-        .unwrap_or(0)
+/// Digits and exponent of Rust's `1.25e-7` form.
+fn parts(scientific: &str) -> (&str, i32) {
+    let parts = scientific.split_once('e');
+    let (digits, exponent) = parts.expect("a float's scientific form has an exponent");
+    (digits, exponent.parse().expect("which is an integer"))
+}
+
+impl fmt::Display for Decimal {
+    /// Plain text: `-1.25e-7`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sign = if self.negative { "-" } else { "" };
+        write!(f, "{sign}{}", self.digits)?;
+        self.exponent.map_or(Ok(()), |power| write!(f, "e{power}"))
+    }
 }
 
 #[cfg(test)]
@@ -201,12 +207,7 @@ mod tests {
     use super::*;
 
     fn text(value: f64, rounding: Rounding) -> String {
-        let decimal = Decimal::rounded(value, rounding);
-        let sign = if decimal.is_negative() { "-" } else { "" };
-        match decimal.exponent() {
-            Some(exponent) => format!("{sign}{}e{exponent}", decimal.digits()),
-            None => format!("{sign}{}", decimal.digits()),
-        }
+        Decimal::rounded(value, rounding).to_string()
     }
 
     #[test]

@@ -92,7 +92,7 @@ struct Layout<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum FactorKey {
     Number,
-    Variable(Option<Variable>),
+    Variable(Variable),
     Group,
     Function,
 }
@@ -174,7 +174,7 @@ impl Layout<'_> {
     }
 
     fn small_power(&self, exponent: ExprId) -> Option<usize> {
-        let integer = self.number(exponent)?.as_integer()?;
+        let integer = self.pool.as_number(exponent)?.as_integer()?;
         usize::try_from(integer).ok().filter(|power| *power <= 64)
     }
 
@@ -221,7 +221,7 @@ impl Layout<'_> {
         exponent: ExprId,
         parts: &mut Quotient,
     ) -> Result<(), UnknownSymbol> {
-        match self.number(exponent) {
+        match self.pool.as_number(exponent) {
             Some(number) if number.is_negative() => {
                 let factor = self.numeric_power(base, number.abs())?;
                 parts.bottom.push(factor);
@@ -326,7 +326,7 @@ impl Layout<'_> {
                     name: name.to_owned(),
                 })?;
                 let symbol = Math::Symbol(self.symbols.symbol(variable.quantity, variable.index));
-                (FactorKey::Variable(Some(variable)), symbol)
+                (FactorKey::Variable(variable), symbol)
             }
             Node::Apply(function, argument) => {
                 (FactorKey::Function, self.apply(*function, *argument)?)
@@ -355,13 +355,6 @@ impl Layout<'_> {
             Function::Abs => Math::Absolute(argument),
             named => Math::Function(named, None, argument),
         })
-    }
-
-    fn number(&self, expr: ExprId) -> Option<Number> {
-        match self.pool.node(expr) {
-            Node::Number(number) => Some(*number),
-            _other => None,
-        }
     }
 }
 

@@ -33,11 +33,7 @@ impl Spelling for Plain {
     }
 
     fn number(number: &Decimal) -> String {
-        let sign = if number.is_negative() { "-" } else { "" };
-        let power = number
-            .exponent()
-            .map_or(String::new(), |power| format!("e{power}"));
-        format!("{sign}{}{power}", number.digits())
+        number.to_string()
     }
 
     fn term(_: &Math, text: &str) -> String {

@@ -11,7 +11,7 @@ mod sources;
 use askama::Template;
 
 use crate::codegen::interface::ModelInterface;
-use crate::codegen::line_wrapping::tidy;
+use crate::codegen::line_wrapping::{tidy, wrapped};
 use crate::codegen::{Precision, SineCosine, Units, rust};
 use crate::deploy::{EmitError, PlannedJump};
 use crate::equations::Equations;
@@ -131,16 +131,7 @@ pub(super) fn input_in_words(rule: &InputRule, name: &str) -> String {
     let text = format!(
         "Of u, {torques}; {wrench}. {name}_generalised_input() of the model makes it{of_torques}."
     );
-    let mut lines = vec![String::new()];
-    for word in text.split(' ') {
-        let last = lines.last_mut().expect("never empty");
-        match last.len() + word.len() {
-            ..100 if last.is_empty() => last.push_str(word),
-            ..100 => *last += &format!(" {word}"),
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines.join("\n * ")
+    wrapped(&text, 100, "").join("\n * ")
 }
 
 /// What is the same for all models but for names.

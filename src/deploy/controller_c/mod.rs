@@ -19,7 +19,7 @@ use crate::codegen::line_wrapping::tidy;
 use crate::codegen::{Precision, Units, c};
 use crate::deploy::EmitError;
 use crate::deploy::controller::{constant, input_in_words, texts};
-use crate::deploy::emit::EmitOptions;
+use crate::deploy::emit::{EmitOptions, compiled};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::mpc::interface::Settings;
@@ -101,11 +101,7 @@ pub fn emit(
         ..MpcSettings::default()
     };
     let rows = StageRows::new(&plant, &unit_rate);
-    let mut entries = ModelInterface::new(equations, &options.lower, Units::Si)?;
-    options.precision.check(&entries)?;
-    if options.precision == Precision::Single {
-        entries.state_bounds();
-    }
+    let entries = compiled(equations, options, Units::Si)?;
     let own = |phase: &&PhaseInterface| phase.identifier.eq_ignore_ascii_case("controller");
     if let Some(phase) = entries.phases.iter().find(own) {
         return Err(EmitError::PhaseName {

@@ -7,6 +7,7 @@ use crate::codegen::error::CodegenError;
 use crate::codegen::functions::ModelFunctions;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::comment_lines;
+use crate::codegen::phase_text::PhaseText;
 use crate::codegen::printer::Printer;
 
 /// A function of a script.
@@ -75,22 +76,6 @@ impl ArrayText {
     }
 }
 
-/// A phase in the templates; `F` is what they print of a function.
-pub struct PhaseText<F> {
-    /// Name of the phase as an identifier.
-    pub identifier: String,
-    /// The same in upper case.
-    pub upper: String,
-    /// Number of structural nonzeros of the Jacobian.
-    pub nnz: usize,
-    /// Rows of the nonzeros.
-    pub rows: String,
-    /// Columns of the nonzeros.
-    pub cols: String,
-    /// Accelerations, then with Jacobian, then a step.
-    pub functions: Vec<F>,
-}
-
 /// Joins what is printed of each element.
 pub fn list<T>(elements: &[T], print: impl Fn(&T) -> String) -> String {
     elements.iter().map(print).collect::<Vec<_>>().join(", ")
@@ -142,14 +127,8 @@ impl<F> Script<'_, F> {
         };
         let phase = |(phase, of_phase): (&PhaseInterface, &[Function; 3])| {
             let texts = of_phase.iter().map(|function| print(function, Some(phase)));
-            Ok(PhaseText {
-                identifier: phase.identifier.clone(),
-                upper: phase.identifier.to_ascii_uppercase(),
-                nnz: phase.pattern.len(),
-                rows: (self.numbers)(&phase.pattern.rows),
-                cols: (self.numbers)(&phase.pattern.cols),
-                functions: texts.collect::<Result<_, CodegenError>>()?,
-            })
+            let texts = texts.collect::<Result<_, CodegenError>>()?;
+            Ok(PhaseText::new(phase, texts, self.numbers))
         };
         let maps = functions.maps.iter().map(|map| print(map, None));
         let phases = entries.phases.iter().zip(&functions.phases).map(phase);

@@ -1,5 +1,7 @@
 //! The files of the LaTeX backend.
 
+use std::fmt;
+
 use askama::Template;
 
 use crate::equations::Equations;
@@ -58,7 +60,7 @@ pub fn emit(
     };
     let tables = table::references(&blocks);
     let coefficients = Table {
-        header: header.short(packages) + &label_list(blocks.iter().flat_map(TableBlock::labels)),
+        header: header.short(packages) + &label_list(blocks.iter().flat_map(|block| &block.labels)),
         blocks,
     };
     let nomenclature = Nomenclature {
@@ -214,7 +216,7 @@ impl System {
 }
 
 /// Comment lines that list labels, each line after a line end.
-fn label_list(labels: impl IntoIterator<Item = String>) -> String {
+fn label_list(labels: impl IntoIterator<Item = impl fmt::Display>) -> String {
     let lines = labels.into_iter().map(|label| format!("\n%   {label}"));
     format!("\n% Labels:{}", lines.collect::<String>())
 }

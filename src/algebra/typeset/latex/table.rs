@@ -22,7 +22,7 @@ pub(super) struct TableBlock {
     pub columns: String,
     /// Caption, escaped.
     pub caption: String,
-    /// Labels: its own, and for the first that of the whole.
+    /// What `\ref` can name: its own label, and for the first that of the whole.
     pub labels: Vec<String>,
     /// Row of phase names over the columns.
     pub phases: String,
@@ -34,13 +34,6 @@ pub(super) struct TableBlock {
     pub rows: Vec<String>,
     /// Whether it must break across pages.
     pub long: bool,
-}
-
-impl TableBlock {
-    /// What `\ref` can name.
-    pub fn labels(&self) -> Vec<String> {
-        self.labels.clone()
-    }
 }
 
 /// Cuts the table into blocks that fit into a column of text. Phases share a block when
@@ -229,11 +222,7 @@ impl Layout<'_> {
 
     fn cell(&self, number: &Decimal, width: &ColumnWidth) -> String {
         match self.numbers {
-            NumberStyle::Siunitx => {
-                let sign = if number.is_negative() { "-" } else { "" };
-                let power = number.exponent().map_or(String::new(), |e| format!("e{e}"));
-                format!("{sign}{}{power}", number.digits())
-            }
+            NumberStyle::Siunitx => number.to_string(),
             NumberStyle::Plain => {
                 let text = TexNumber {
                     number,
