@@ -131,6 +131,17 @@ pub trait Dialect {
         Vec::new()
     }
 
+    /// The rows of a constant table: entries between `open` and `close`, with `between` after every
+    /// eight of them.
+    fn rows(&self, table: &ConstTable, [open, between, close]: [&str; 3]) -> String {
+        let row = |row: &[Literal]| {
+            let entries: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
+            let lines: Vec<String> = entries.chunks(8).map(|line| line.join(", ")).collect();
+            format!("{open}{}{close}\n", lines.join(between))
+        };
+        table.entries.chunks(table.cols).map(row).collect()
+    }
+
     /// Definition of a constant table.
     fn table(&self, table: &ConstTable) -> String;
 }

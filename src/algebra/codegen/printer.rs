@@ -1,6 +1,6 @@
 //! The one place that owns precedence, parentheses, indentation and line width.
 
-use super::code::{ConstTable, Expr, Function, Index, Stmt};
+use super::code::{Expr, Function, Index, Stmt};
 use super::dialect::{Dialect, LaneDialect};
 use super::fours::Fours;
 use super::ident::Ident;
@@ -68,11 +68,6 @@ impl<'a> Printer<'a> {
         let mut text = String::new();
         self.in_loop().block(statements, depth, &mut text);
         text
-    }
-
-    /// A constant table.
-    pub fn table(&self, table: &ConstTable) -> String {
-        self.dialect.table(table)
     }
 
     fn block(&self, statements: &[Stmt], depth: usize, text: &mut String) {

@@ -173,7 +173,7 @@ impl Translator<'_> {
         }
         let row = Row {
             slope_at: slopes.index(&r, &i),
-            slopes: slopes.array,
+            slopes: slopes.home.array,
             column: i,
             names,
             runs,

@@ -206,28 +206,30 @@ impl fmt::Display for Decimal {
 mod tests {
     use super::*;
 
-    fn text(value: f64, rounding: Rounding) -> String {
-        Decimal::rounded(value, rounding).to_string()
-    }
-
     #[test]
-    fn fixed_decimals_keep_trailing_zeros_and_may_vanish() {
-        assert_eq!(text(-1.0, Rounding::Decimals(2)), "-1.00");
-        assert_eq!(text(51.05, Rounding::Decimals(2)), "51.05");
-        assert_eq!(text(0.004, Rounding::Decimals(2)), "0.00");
+    fn numbers_are_rounded_by_decimals_by_significant_digits_or_as_each_needs() {
+        let adaptive = Rounding::default();
+        for (value, rounding, text) in [
+            (-1.0, Rounding::Decimals(2), "-1.00"),
+            (51.05, Rounding::Decimals(2), "51.05"),
+            (0.004, Rounding::Decimals(2), "0.00"),
+            (0.36, adaptive, "0.36"),
+            (-1.0, adaptive, "-1.00"),
+            (0.05, adaptive, "0.05"),
+            (0.0537, adaptive, "0.054"),
+            (0.00612, adaptive, "0.006"),
+            (3.14e-9, adaptive, "3.1e-9"),
+            (123456789.0, adaptive, "1.2e8"),
+            (0.36, Rounding::Significant(3), "0.360"),
+            (51.05, Rounding::Significant(3), "51.0"),
+            (51234.0, Rounding::Significant(3), "51200"),
+            (9.996, Rounding::Significant(3), "10.0"),
+            (-1.25e-7, Rounding::Significant(2), "-1.2e-7"),
+        ] {
+            let rounded = Decimal::rounded(value, rounding).to_string();
+            assert_eq!(rounded, text, "{value} by {rounding:?}");
+        }
         assert!(Decimal::rounded(-0.004, Rounding::Decimals(2)).is_zero());
-    }
-
-    #[test]
-    fn adaptive_rounding_adds_decimals_only_where_two_mislead() {
-        let rounding = Rounding::default();
-        assert_eq!(text(0.36, rounding), "0.36");
-        assert_eq!(text(-1.0, rounding), "-1.00");
-        assert_eq!(text(0.05, rounding), "0.05");
-        assert_eq!(text(0.0537, rounding), "0.054");
-        assert_eq!(text(0.00612, rounding), "0.006");
-        assert_eq!(text(3.14e-9, rounding), "3.1e-9");
-        assert_eq!(text(123456789.0, rounding), "1.2e8");
     }
 
     #[test]
@@ -239,15 +241,6 @@ mod tests {
             assert!((printed - value).abs() <= 0.05 * value, "{value} {printed}");
             value *= 1.713;
         }
-    }
-
-    #[test]
-    fn significant_digits_count_from_the_first_nonzero() {
-        assert_eq!(text(0.36, Rounding::Significant(3)), "0.360");
-        assert_eq!(text(51.05, Rounding::Significant(3)), "51.0");
-        assert_eq!(text(51234.0, Rounding::Significant(3)), "51200");
-        assert_eq!(text(9.996, Rounding::Significant(3)), "10.0");
-        assert_eq!(text(-1.25e-7, Rounding::Significant(2)), "-1.2e-7");
     }
 
     #[test]

@@ -138,11 +138,8 @@ impl<'a> Source<'a> {
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: SolverNumbers::new(precision, mpc.qp.accepted_residual),
             legs: Legs::of(robot, numbers),
-            torque_mean: numbers.matrix(
-                phases
-                    .iter()
-                    .map(|phase| phase.torque_mean.iter().copied().collect::<Vec<_>>()),
-            ),
+            torque_mean: numbers
+                .matrix(phases.iter().map(|phase| phase.torque_mean.iter().copied())),
             torque_deviation: nested(deviations.iter().map(|rows| numbers.matrix(*rows))),
             weight_n,
             fallback: mpc.fallback,
@@ -161,11 +158,8 @@ impl<'a> Source<'a> {
                 (parts.phase_of_feet.iter()).map(|phase| phase.map_or(-1, |phase| phase as i64)),
             ),
             is_grounded: integers(phases.iter().map(|phase| i64::from(phase.is_grounded))),
-            input_mean: numbers.matrix(
-                phases
-                    .iter()
-                    .map(|phase| phase.latent_mean.iter().copied().collect::<Vec<_>>()),
-            ),
+            input_mean: numbers
+                .matrix(phases.iter().map(|phase| phase.latent_mean.iter().copied())),
             input_root: nested(
                 phases
                     .iter()

@@ -111,25 +111,17 @@ impl Dialect for CDialect {
     }
 
     fn table(&self, table: &ConstTable) -> String {
-        let rows: Vec<String> = table
-            .entries
-            .chunks(table.cols)
-            .map(|row| {
-                let row: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
-                format!("    {}", braced(&row, "\n     "))
-            })
-            .collect();
+        let rows = self.rows(table, ["    {", ",\n     ", "},"]);
         let aligned = match table.is_in_lanes {
             true => format!(" {}_ALIGNED", self.upper()),
             false => String::new(),
         };
         format!(
-            "static const {}{aligned} {}[{}][{}] = {{\n{},\n}};",
+            "static const {}{aligned} {}[{}][{}] = {{\n{rows}}};",
             self.real(),
             table.name,
             table.rows,
             table.cols,
-            rows.join(",\n")
         )
     }
 }

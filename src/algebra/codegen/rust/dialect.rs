@@ -3,7 +3,7 @@
 use crate::codegen::code::{ConstTable, Function, MathFunction, Parameter, Role, Span};
 use crate::codegen::dialect::{Dialect, FourDialect};
 use crate::codegen::fours::{FourBlock, Fours};
-use crate::codegen::line_wrapping::{braced, comment_lines};
+use crate::codegen::line_wrapping::comment_lines;
 use crate::codegen::literal::Literal;
 use crate::codegen::precision::Precision;
 use crate::codegen::printer::Printer;
@@ -122,22 +122,13 @@ impl Dialect for RustDialect {
     }
 
     fn table(&self, table: &ConstTable) -> String {
-        let rows: Vec<String> = table
-            .entries
-            .chunks(table.cols)
-            .map(|row| {
-                let row: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
-                let row = braced(&row, "\n     ");
-                format!("    [{}]", row.trim_matches(['{', '}']))
-            })
-            .collect();
+        let rows = self.rows(table, ["    [", ",\n     ", "],"]);
         let (name, real, cols, n) = (&table.name, self.real(), table.cols, table.rows);
-        let rows = rows.join(",\n");
         match table.is_in_lanes {
             true => {
-                format!("static {name}: &[[{real}; {cols}]; {n}] = &Aligned([\n{rows},\n]).0;")
+                format!("static {name}: &[[{real}; {cols}]; {n}] = &Aligned([\n{rows}]).0;")
             }
-            false => format!("static {name}: [[{real}; {cols}]; {n}] = [\n{rows},\n];"),
+            false => format!("static {name}: [[{real}; {cols}]; {n}] = [\n{rows}];"),
         }
     }
 }

@@ -2,16 +2,14 @@
 
 use askama::Template;
 
-use super::functions::{FunctionText, ModelText, Script, list};
+use super::functions::{FunctionText, ModelText, list, names};
 use crate::codegen::code::{ConstTable, Index, MathFunction, Span};
 use crate::codegen::dialect::Dialect;
 use crate::codegen::error::CodegenError;
-use crate::codegen::functions::ModelFunctions;
 use crate::codegen::ident::Namer;
 use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
-use crate::codegen::literal::Literal;
-use crate::codegen::printer::{Printer, subscript};
+use crate::codegen::printer::subscript;
 use crate::files::EmittedFile;
 use crate::ir::Binary;
 
@@ -97,16 +95,11 @@ impl Dialect for MatlabDialect {
     }
 
     fn table(&self, table: &ConstTable) -> String {
-        let rows = table.entries.chunks(table.cols).map(|row| {
-            let row: Vec<String> = row.iter().map(Literal::to_string).collect();
-            let lines: Vec<String> = row.chunks(8).map(|line| line.join(", ")).collect();
-            format!("        {}\n", lines.join(", ...\n        "))
-        });
-        format!(
-            "function t = {}_entries()\n    t = [\n{}    ];\nend",
-            table.name,
-            rows.collect::<String>()
-        )
+        let (name, rows) = (
+            &table.name,
+            self.rows(table, ["        ", ", ...\n        ", ""]),
+        );
+        format!("function t = {name}_entries()\n    t = [\n{rows}    ];\nend")
     }
 }
 
@@ -142,7 +135,7 @@ struct MatlabFile<'a> {
     config = "../../templates/askama.toml"
 )]
 struct MatlabFunction<'a> {
-    f: &'a FunctionText,
+    f: &'a FunctionText<'a>,
 }
 
 /// The file of a model; `provenance` is the text of the first line.
@@ -150,18 +143,11 @@ struct MatlabFunction<'a> {
 /// # Errors
 /// [`CodegenError::Template`] if a template fails.
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
-    let dialect = MatlabDialect;
-    let functions = ModelFunctions::new(entries, &dialect, "");
-    let script = Script {
-        printer: Printer::new(&dialect),
-        print: &|function, _| matlab_function(function),
-        numbers: column,
-    };
     let stem = Namer::new(RESERVED).mint(&entries.identifier).to_string();
     let file = MatlabFile {
         banner: format!("% {provenance}"),
         file: &stem,
-        m: script.model(entries, &functions)?,
+        m: ModelText::new(entries, &MatlabDialect, &|f, _| matlab_function(f), column)?,
     };
     Ok(vec![EmittedFile::new(
         format!("{stem}.m"),

@@ -2,16 +2,13 @@
 
 use askama::Template;
 
-use super::functions::{FunctionText, ModelText, Script, list};
-use crate::codegen::code::{ConstTable, MathFunction, Span};
+use super::functions::{FunctionText, ModelText, list, names};
+use crate::codegen::code::{ConstTable, MathFunction, Role, Span};
 use crate::codegen::dialect::Dialect;
 use crate::codegen::error::CodegenError;
-use crate::codegen::functions::ModelFunctions;
 use crate::codegen::ident::Namer;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::tidy;
-use crate::codegen::literal::Literal;
-use crate::codegen::printer::Printer;
 use crate::files::EmittedFile;
 
 /// On which numbers the functions work.
@@ -107,12 +104,8 @@ impl Dialect for PythonDialect {
     }
 
     fn table(&self, table: &ConstTable) -> String {
-        let rows = table.entries.chunks(table.cols).map(|row| {
-            let row: Vec<String> = row.iter().map(Literal::to_string).collect();
-            let lines: Vec<String> = row.chunks(8).map(|line| line.join(", ")).collect();
-            format!("    [{}],\n", lines.join(",\n     "))
-        });
-        format!("{} = [\n{}]", table.name, rows.collect::<String>())
+        let rows = self.rows(table, ["    [", ",\n     ", "],"]);
+        format!("{} = [\n{rows}]", table.name)
     }
 }
 
@@ -133,12 +126,8 @@ struct NumPyModule {
     config = "../../templates/askama.toml"
 )]
 struct NumPyFunction<'a> {
-    f: &'a FunctionText,
+    f: &'a FunctionText<'a>,
     docs: Vec<String>,
-    /// Names of the arrays, and each with its length.
-    arrays: String,
-    lengths: String,
-    results: String,
 }
 
 #[derive(Template)]
@@ -156,8 +145,7 @@ struct CasadiModule<'a> {
     config = "../../templates/askama.toml"
 )]
 struct CasadiFunction<'a> {
-    f: &'a FunctionText,
-    name: String,
+    f: &'a FunctionText<'a>,
     docs: Vec<String>,
 }
 
@@ -166,18 +154,15 @@ struct CasadiFunction<'a> {
 /// # Errors
 /// [`CodegenError::Template`] if a template fails.
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
-    let dialect = PythonDialect {
-        library: Library::NumPy,
-    };
-    let functions = ModelFunctions::new(entries, &dialect, "");
-    let script = Script {
-        printer: Printer::new(&dialect),
-        print: &|function, _| numpy_function(function),
-        numbers: tuple,
-    };
+    let library = Library::NumPy;
     let module = NumPyModule {
         banner: format!("# {provenance}"),
-        m: script.model(entries, &functions)?,
+        m: ModelText::new(
+            entries,
+            &PythonDialect { library },
+            &|f, _| numpy_function(f),
+            tuple,
+        )?,
     };
     let path = format!("{}.py", stem(entries));
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
@@ -191,22 +176,19 @@ pub fn emit_casadi(
     entries: &ModelInterface,
     provenance: &str,
 ) -> Result<Vec<EmittedFile>, CodegenError> {
-    let dialect = PythonDialect {
-        library: Library::Casadi,
-    };
-    // Expressions are private functions; the functions made of them have the plain names.
-    let functions = ModelFunctions::new(entries, &dialect, "");
     let model = entries.identifier.as_str();
-    let script = Script {
-        printer: Printer::new(&dialect),
-        print: &|function, phase| casadi_function(model, function, phase),
-        numbers: tuple,
-    };
+    let library = Library::Casadi;
     let module_name = format!("{}_casadi", stem(entries));
     let module = CasadiModule {
         banner: format!("# {provenance}"),
         module: &module_name,
-        m: script.model(entries, &functions)?,
+        // Expressions are private functions; the functions made of them have the plain names.
+        m: ModelText::new(
+            entries,
+            &PythonDialect { library },
+            &|f, phase| casadi_function(model, f, phase),
+            tuple,
+        )?,
     };
     let path = format!("{module_name}.py");
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
@@ -217,41 +199,24 @@ fn stem(entries: &ModelInterface) -> String {
     namer.mint(&entries.identifier).to_string()
 }
 
-fn numpy_function(function: &FunctionText) -> Result<String, CodegenError> {
-    let arrays = function.arrays();
-    let template = NumPyFunction {
-        f: function,
-        docs: escaped(&function.docs),
-        arrays: list(&arrays, |(name, _)| (*name).to_owned()),
-        lengths: list(&arrays, |(name, len)| format!("({name}, {len})")),
-        results: list(&function.outputs, |output| {
-            format!("_rows({}, shape)", output.name)
-        }),
-    };
-    Ok(template.render()?)
+fn numpy_function(f: &FunctionText) -> Result<String, CodegenError> {
+    let docs = escaped(&f.docs);
+    Ok(NumPyFunction { f, docs }.render()?)
 }
 
 /// The expressions of a function, and the definition of the CasADi function made of them.
 fn casadi_function(
     model: &str,
-    function: &FunctionText,
+    f: &FunctionText,
     phase: Option<&PhaseInterface>,
 ) -> Result<(String, String), CodegenError> {
-    let copied = function.copied();
-    let template = CasadiFunction {
-        f: function,
-        name: private(&function.name),
-        docs: escaped(&function.docs),
-    };
-    let name = &function.name;
-    let inputs = list(&function.inputs, |input| {
+    let (name, docs) = (&f.name, escaped(&f.docs));
+    let inputs = list(&f.inputs(), |input| {
         format!("(\"{}\", {})", input.name, input.len)
     });
-    let outputs = list(&function.outputs, |output| {
-        match copied.contains(&output.name.as_str()) {
-            true => format!("\"{}_next\"", output.name),
-            false => format!("\"{}\"", output.name),
-        }
+    let outputs = list(&f.outputs(), |output| match output.role {
+        Role::InOut => format!("\"{}_next\"", output.name),
+        _ => format!("\"{}\"", output.name),
     });
     let pattern = match phase {
         Some(phase) if phase.jacobian.name == *name => {
@@ -260,11 +225,11 @@ fn casadi_function(
         }
         Some(_) | None => String::new(),
     };
+    let expressions = private(name);
     let definition = format!(
-        "{name} = _function(\n    \"{model}_{name}\", {}, [{inputs}], [{outputs}]{pattern})",
-        private(name)
+        "{name} = _function(\n    \"{model}_{name}\", {expressions}, [{inputs}], [{outputs}]{pattern})"
     );
-    Ok((template.render()?, definition))
+    Ok((CasadiFunction { f, docs }.render()?, definition))
 }
 
 /// Name of the expressions of a function.
