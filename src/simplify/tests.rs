@@ -1,5 +1,7 @@
 //! Random models and boxes: no point of a box may be off by more than its certificate says.
 
+use std::collections::BTreeMap;
+
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 use nalgebra::{DMatrix, DVector};
@@ -46,6 +48,15 @@ fn made_of(model: &ReducedModel, domain: &Domain, tolerance: f64) -> Simplified 
 fn boxed(model: &ReducedModel, ranges: [(f64, f64); 3]) -> Domain {
     let ranges = ranges.map(|(lo, hi)| Interval::new(lo, hi)).to_vec();
     Domain::new(model, vec![Some(ranges)]).expect("a box")
+}
+
+/// The terms of an equation and their coefficients.
+fn terms_of(model: &ReducedModel, phase: usize, output: usize) -> Vec<(String, f64)> {
+    let active = model.active_terms(phase, output).expect("in range");
+    let active = active.into_iter();
+    active
+        .map(|(xi, term)| (term.text().to_owned(), xi))
+        .collect()
 }
 
 struct Random(ChaCha8Rng);
@@ -193,16 +204,11 @@ fn changes_of_the_certificate_replayed_give_the_simplified_coefficients() {
             simplify(&Equations::as_learned(&model), &domain, None, tolerance).expect("certified");
         for (phase, certificate) in made.certificate.phases.iter().enumerate() {
             for equation in &certificate.equations {
-                let coefficients =
-                    |model: &ReducedModel| -> std::collections::BTreeMap<String, f64> {
-                        let active = model
-                            .active_terms(phase, equation.output)
-                            .expect("in range");
-                        active
-                            .into_iter()
-                            .map(|(xi, term)| (term.text().to_owned(), xi))
-                            .collect()
-                    };
+                let coefficients = |model: &ReducedModel| -> BTreeMap<String, f64> {
+                    terms_of(model, phase, equation.output)
+                        .into_iter()
+                        .collect()
+                };
                 let mut replayed = coefficients(&model);
                 for change in &equation.changes {
                     let effects = change.effects.iter().map(|e| (&e.term, e.before, e.after));
@@ -262,11 +268,7 @@ fn simplified(terms: &[(&str, f64)], ranges: [(f64, f64); 3], tolerance: f64) ->
 }
 
 fn left(made: &Simplified) -> Vec<(String, f64)> {
-    let active = made.model.active_terms(0, 0).expect("in range");
-    active
-        .into_iter()
-        .map(|(xi, term)| (term.text().to_owned(), xi))
-        .collect()
+    terms_of(&made.model, 0, 0)
 }
 
 const UNIT: (f64, f64) = (-1.0, 1.0);
@@ -358,16 +360,9 @@ fn bound_of_dropped_independent_terms_is_reached_at_a_corner() {
         ["Phase contact no longer depends on z1, dz1"]
     );
     // 0.3 * 2 + 0.2 * 3
-    assert!(
-        (equation.bound.hi() - 1.2).abs() < 1e-12,
-        "{}",
-        equation.bound
-    );
-    assert!(
-        (equation.bound.lo() + 0.5).abs() < 1e-12,
-        "{}",
-        equation.bound
-    );
+    let bound = equation.bound;
+    assert!((bound.hi() - 1.2).abs() < 1e-12, "{bound}");
+    assert!((bound.lo() + 0.5).abs() < 1e-12, "{bound}");
 }
 
 #[test]

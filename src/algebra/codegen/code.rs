@@ -4,7 +4,7 @@ use super::fours::Fours;
 use super::ident::Ident;
 use super::lanes::Row;
 use super::literal::Literal;
-use crate::ir::Binary;
+use crate::ir::{Binary, Table};
 
 /// A subscript `offset + sum_i stride_i * name_i`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -246,12 +246,8 @@ pub struct Parameter {
 pub struct ConstTable {
     /// Its name.
     pub name: Ident,
-    /// Number of rows.
-    pub rows: usize,
-    /// Number of columns.
-    pub cols: usize,
-    /// Entries, row-major.
-    pub entries: Vec<Literal>,
+    /// Its entries.
+    pub values: Table,
     /// Whether rows are read in lanes.
     pub is_in_lanes: bool,
 }

@@ -27,12 +27,6 @@ pub trait LaneDialect {
     fn total(&self, sums: &str) -> String;
 }
 
-/// Spelling of sums of vectors of four numbers.
-pub trait FourDialect {
-    /// Lines that compute the sums of a block, each with its depth of indentation.
-    fn block(&self, fours: &Fours, block: &FourBlock) -> Vec<(usize, String)>;
-}
-
 /// Spelling of a target language. The printer owns precedence and parentheses, the
 /// dialect everything that differs between languages.
 pub trait Dialect {
@@ -85,8 +79,9 @@ pub trait Dialect {
         None
     }
 
-    /// How four numbers run side by side; other languages take one after the other.
-    fn fours(&self) -> Option<&dyn FourDialect> {
+    /// Lines that compute the sums of a block of vectors of four numbers side by side, each with its depth
+    /// of indentation; other languages take one number after the other.
+    fn fours(&self, _: &Fours, _: &FourBlock) -> Option<Vec<(usize, String)>> {
         None
     }
 
@@ -99,7 +94,9 @@ pub trait Dialect {
     fn apply(&self, function: MathFunction, argument: &str) -> String;
 
     /// Definition of a scalar.
-    fn let_scalar(&self, name: &str, value: &str) -> String;
+    fn let_scalar(&self, name: &str, value: &str) -> String {
+        format!("{name} = {value}{}", self.terminator())
+    }
 
     /// Definition of an array by its printed elements.
     fn let_array(&self, name: &str, elements: &[String]) -> String;
@@ -134,12 +131,18 @@ pub trait Dialect {
     /// The rows of a constant table: entries between `open` and `close`, with `between` after every
     /// eight of them.
     fn rows(&self, table: &ConstTable, [open, between, close]: [&str; 3]) -> String {
-        let row = |row: &[Literal]| {
-            let entries: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
+        let entry = |&value: &f64| {
+            let literal = Literal::new(value).expect("tables of programs are finite");
+            self.literal(literal)
+        };
+        let row = |row: &[f64]| {
+            let entries: Vec<String> = row.iter().map(entry).collect();
             let lines: Vec<String> = entries.chunks(8).map(|line| line.join(", ")).collect();
             format!("{open}{}{close}\n", lines.join(between))
         };
-        table.entries.chunks(table.cols).map(row).collect()
+        (0..table.values.rows())
+            .map(|r| row(table.values.row(r)))
+            .collect()
     }
 
     /// Definition of a constant table.

@@ -158,11 +158,11 @@ impl<'a> Printer<'a> {
     }
 
     fn fours(&self, fours: &Fours, depth: usize, text: &mut String) {
-        let Some(dialect) = self.dialect.fours() else {
-            return self.block(&fours.one_by_one(), depth, text);
-        };
         for block in &fours.blocks {
-            for (inner, line) in dialect.block(fours, block) {
+            let Some(lines) = self.dialect.fours(fours, block) else {
+                return self.block(&fours.one_by_one(), depth, text);
+            };
+            for (inner, line) in lines {
                 self.line(&line, depth + inner, text);
             }
         }

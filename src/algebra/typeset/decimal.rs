@@ -64,11 +64,7 @@ impl Decimal {
 
     /// An integer with all its digits.
     pub fn integer(value: i64) -> Self {
-        Self {
-            negative: value < 0,
-            digits: value.unsigned_abs().to_string(),
-            exponent: None,
-        }
+        Self::plain(value as f64, value.unsigned_abs().to_string())
     }
 
     /// `value` rounded for print; the exact binary value is rounded, ties to even.
@@ -136,9 +132,8 @@ impl Decimal {
     fn scientific(value: f64, text: String) -> Self {
         let (digits, exponent) = parts(&text);
         Self {
-            negative: value < 0.0,
-            digits: digits.to_owned(),
             exponent: (exponent != 0).then_some(exponent),
+            ..Self::plain(value, digits.to_owned())
         }
     }
 

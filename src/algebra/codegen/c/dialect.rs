@@ -1,7 +1,7 @@
 //! How C99 spells statements.
 
 use crate::codegen::code::{ConstTable, Function, MathFunction, Parameter, Role, Span};
-use crate::codegen::dialect::{Dialect, FourDialect, LaneDialect};
+use crate::codegen::dialect::{Dialect, LaneDialect};
 use crate::codegen::fours::{FourBlock, Fours};
 use crate::codegen::line_wrapping::{braced, comment_lines};
 use crate::codegen::literal::Literal;
@@ -102,32 +102,7 @@ impl Dialect for CDialect {
         Some(self)
     }
 
-    fn fours(&self) -> Option<&dyn FourDialect> {
-        Some(self)
-    }
-
-    fn table_base(&self, prefix: &str) -> String {
-        format!("{prefix}table")
-    }
-
-    fn table(&self, table: &ConstTable) -> String {
-        let rows = self.rows(table, ["    {", ",\n     ", "},"]);
-        let aligned = match table.is_in_lanes {
-            true => format!(" {}_ALIGNED", self.upper()),
-            false => String::new(),
-        };
-        format!(
-            "static const {}{aligned} {}[{}][{}] = {{\n{rows}}};",
-            self.real(),
-            table.name,
-            table.rows,
-            table.cols,
-        )
-    }
-}
-
-impl FourDialect for CDialect {
-    fn block(&self, fours: &Fours, block: &FourBlock) -> Vec<(usize, String)> {
+    fn fours(&self, fours: &Fours, block: &FourBlock) -> Option<Vec<(usize, String)>> {
         let (upper, y, weights) = (self.upper(), &fours.array, &fours.weights);
         let vector = |vector: Quad| match vector {
             Quad::Row(row) => format!("{}[{row}]", fours.table.1),
@@ -159,7 +134,26 @@ impl FourDialect for CDialect {
             lines.push((1, format!("{upper}_STORE_FOUR(&{y}[{at}], {});", name(sum))));
         }
         lines.push((0, "}".to_owned()));
-        lines
+        Some(lines)
+    }
+
+    fn table_base(&self, prefix: &str) -> String {
+        format!("{prefix}table")
+    }
+
+    fn table(&self, table: &ConstTable) -> String {
+        let rows = self.rows(table, ["    {", ",\n     ", "},"]);
+        let aligned = match table.is_in_lanes {
+            true => format!(" {}_ALIGNED", self.upper()),
+            false => String::new(),
+        };
+        format!(
+            "static const {}{aligned} {}[{}][{}] = {{\n{rows}}};",
+            self.real(),
+            table.name,
+            table.values.rows(),
+            table.values.cols(),
+        )
     }
 }
 

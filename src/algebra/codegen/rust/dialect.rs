@@ -1,7 +1,7 @@
 //! How Rust spells statements.
 
 use crate::codegen::code::{ConstTable, Function, MathFunction, Parameter, Role, Span};
-use crate::codegen::dialect::{Dialect, FourDialect};
+use crate::codegen::dialect::Dialect;
 use crate::codegen::fours::{FourBlock, Fours};
 use crate::codegen::line_wrapping::comment_lines;
 use crate::codegen::literal::Literal;
@@ -117,24 +117,7 @@ impl Dialect for RustDialect {
         ]
     }
 
-    fn fours(&self) -> Option<&dyn FourDialect> {
-        Some(self)
-    }
-
-    fn table(&self, table: &ConstTable) -> String {
-        let rows = self.rows(table, ["    [", ",\n     ", "],"]);
-        let (name, real, cols, n) = (&table.name, self.real(), table.cols, table.rows);
-        match table.is_in_lanes {
-            true => {
-                format!("static {name}: &[[{real}; {cols}]; {n}] = &Aligned([\n{rows}]).0;")
-            }
-            false => format!("static {name}: [[{real}; {cols}]; {n}] = [\n{rows}];"),
-        }
-    }
-}
-
-impl FourDialect for RustDialect {
-    fn block(&self, fours: &Fours, block: &FourBlock) -> Vec<(usize, String)> {
+    fn fours(&self, fours: &Fours, block: &FourBlock) -> Option<Vec<(usize, String)>> {
         let (real, y, n_sums) = (self.real(), &fours.array, QUAD * fours.sums.len());
         let (weights, n_weights) = (&fours.weights.array, fours.weights.of);
         let vector = |vector: Quad| match vector {
@@ -181,7 +164,19 @@ impl FourDialect for RustDialect {
             lines.push((1, format!("part(&mut {y}, {by}{weights});")));
             lines.push((0, "}".to_owned()));
         }
-        lines
+        Some(lines)
+    }
+
+    fn table(&self, table: &ConstTable) -> String {
+        let rows = self.rows(table, ["    [", ",\n     ", "],"]);
+        let (name, real) = (&table.name, self.real());
+        let (n, cols) = (table.values.rows(), table.values.cols());
+        match table.is_in_lanes {
+            true => {
+                format!("static {name}: &[[{real}; {cols}]; {n}] = &Aligned([\n{rows}]).0;")
+            }
+            false => format!("static {name}: [[{real}; {cols}]; {n}] = [\n{rows}];"),
+        }
     }
 }
 

@@ -63,10 +63,6 @@ impl Dialect for MatlabDialect {
         format!("{}({argument})", function.name())
     }
 
-    fn let_scalar(&self, name: &str, value: &str) -> String {
-        format!("{name} = {value};")
-    }
-
     fn let_array(&self, name: &str, elements: &[String]) -> String {
         format!("{name} = rows_of(n, {});", elements.join(", "))
     }

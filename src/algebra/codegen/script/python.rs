@@ -11,19 +11,13 @@ use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::tidy;
 use crate::files::EmittedFile;
 
-/// On which numbers the functions work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Python with the elementary functions of the library on whose numbers the functions work.
+#[derive(Clone, Copy, Debug)]
 enum Library {
     /// Arrays of NumPy.
     NumPy,
     /// Symbolic scalars of CasADi.
     Casadi,
-}
-
-/// Python with the elementary functions of a library.
-#[derive(Clone, Copy, Debug)]
-struct PythonDialect {
-    library: Library,
 }
 
 /// Keywords of Python and the names that generated modules use themselves.
@@ -45,7 +39,7 @@ const MODULES: &str = "
     tokenize traceback types typing unittest urllib
 ";
 
-impl Dialect for PythonDialect {
+impl Dialect for Library {
     fn reserved(&self) -> &'static str {
         RESERVED
     }
@@ -63,19 +57,15 @@ impl Dialect for PythonDialect {
     }
 
     fn apply(&self, function: MathFunction, argument: &str) -> String {
-        let library = match self.library {
+        let library = match self {
             Library::NumPy => "np",
             Library::Casadi => "casadi",
         };
-        let name = match (function, self.library) {
+        let name = match (function, self) {
             (MathFunction::Abs, Library::Casadi) => "fabs",
             (named, _) => named.name(),
         };
         format!("{library}.{name}({argument})")
-    }
-
-    fn let_scalar(&self, name: &str, value: &str) -> String {
-        format!("{name} = {value}")
     }
 
     fn let_array(&self, name: &str, elements: &[String]) -> String {
@@ -91,7 +81,7 @@ impl Dialect for PythonDialect {
     }
 
     fn call(&self, callee: Option<&str>, read: &[Span], written: &[Span]) -> String {
-        let callee = match (callee, self.library) {
+        let callee = match (callee, self) {
             (None, _) => "_sin_cos".to_owned(),
             (Some(callee), Library::NumPy) => callee.to_owned(),
             (Some(callee), Library::Casadi) => private(callee),
@@ -154,15 +144,9 @@ struct CasadiFunction<'a> {
 /// # Errors
 /// [`CodegenError::Template`] if a template fails.
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
-    let library = Library::NumPy;
     let module = NumPyModule {
         banner: format!("# {provenance}"),
-        m: ModelText::new(
-            entries,
-            &PythonDialect { library },
-            &|f, _| numpy_function(f),
-            tuple,
-        )?,
+        m: ModelText::new(entries, &Library::NumPy, &|f, _| numpy_function(f), tuple)?,
     };
     let path = format!("{}.py", stem(entries));
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
@@ -177,7 +161,6 @@ pub fn emit_casadi(
     provenance: &str,
 ) -> Result<Vec<EmittedFile>, CodegenError> {
     let model = entries.identifier.as_str();
-    let library = Library::Casadi;
     let module_name = format!("{}_casadi", stem(entries));
     let module = CasadiModule {
         banner: format!("# {provenance}"),
@@ -185,7 +168,7 @@ pub fn emit_casadi(
         // Expressions are private functions; the functions made of them have the plain names.
         m: ModelText::new(
             entries,
-            &PythonDialect { library },
+            &Library::Casadi,
             &|f, phase| casadi_function(model, f, phase),
             tuple,
         )?,
