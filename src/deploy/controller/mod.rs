@@ -17,6 +17,7 @@ use crate::deploy::{EmitError, PlannedJump};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::lower::LowerOptions;
+use crate::model::ReducedModel;
 use crate::mpc::ControlModel;
 use crate::mpc::interface::{Settings, TEXTS};
 use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
@@ -73,13 +74,7 @@ pub fn emit(
     provenance: &str,
     plan: Option<&PlannedJump>,
 ) -> Result<Vec<EmittedFile>, EmitError> {
-    let model = equations.model();
-    if !model.is_linear() {
-        return Err(EmitError::Nonlinear {
-            model: model.name().to_owned(),
-        });
-    }
-    let plant = ControlModel::new(model)?;
+    let plant = plant(equations.model())?;
     let entries = &ModelInterface::new(equations, options, Units::Si)?;
     let name = entries.identifier.as_str();
     let folder = format!("{name}-controller");
@@ -103,6 +98,19 @@ pub fn emit(
         files.extend(plan.files(&format!("{folder}/examples"), name, provenance));
     }
     Ok(files)
+}
+
+/// What a controller knows of a model.
+///
+/// # Errors
+/// [`EmitError::Nonlinear`] and [`EmitError::Control`].
+pub(super) fn plant(model: &ReducedModel) -> Result<ControlModel, EmitError> {
+    match model.is_linear() {
+        true => Ok(ControlModel::new(model)?),
+        false => Err(EmitError::Nonlinear {
+            model: model.name().to_owned(),
+        }),
+    }
 }
 
 /// How the controller's inputs come from torques, for the header's first comment.
