@@ -230,12 +230,12 @@ pub enum Role {
     Scalar,
 }
 
-/// A parameter of a generated function.
+/// A parameter of a generated function, in a language or, with a text for a name, in any.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Parameter {
+pub struct Parameter<N = Ident> {
     /// Its name.
-    pub name: Ident,
-    /// Number of elements.
+    pub name: N,
+    /// Number of elements; an output may have none.
     pub len: usize,
     /// What it is for.
     pub role: Role,

@@ -1,6 +1,6 @@
 //! What is generated for a model: programs, with names, roles and documentation.
 
-use super::code::Role;
+use super::code::{Parameter, Role};
 use super::map_equations::{in_matrices, points, titles, without_factors};
 use super::precision::{Precision, stated_bounds};
 use super::units::Units;
@@ -22,20 +22,9 @@ pub struct FunctionSpec {
     /// The program.
     pub program: Program,
     /// Parameters in order.
-    pub parameters: Vec<EntryParameter>,
+    pub parameters: Vec<Parameter<String>>,
     /// Lines of documentation.
     pub docs: Vec<String>,
-}
-
-/// A parameter of an entry.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct EntryParameter {
-    /// Name of the slot.
-    pub name: String,
-    /// Number of elements; an output may have none.
-    pub len: usize,
-    /// What it is for.
-    pub role: Role,
 }
 
 /// The functions of one phase.
@@ -331,7 +320,7 @@ fn phase_entries(
     )];
     let mut jacobian = entry(format!("{identifier}_dynamics_jacobian"), program, docs);
     if pattern.is_empty() {
-        jacobian.parameters.push(EntryParameter {
+        jacobian.parameters.push(Parameter {
             name: "jacobian".to_owned(),
             len: 0,
             role: Role::Output,
@@ -357,7 +346,7 @@ fn phase_entries(
 fn entry(name: String, program: Program, mut docs: Vec<String>) -> FunctionSpec {
     docs.push(shapes(&program));
     let is_in = |slots: &[Slot], name: &str| slots.iter().any(|slot| slot.name == name);
-    let parameter = |slot: &Slot, role| EntryParameter {
+    let parameter = |slot: &Slot, role| Parameter {
         name: slot.name.clone(),
         len: slot.len,
         role,

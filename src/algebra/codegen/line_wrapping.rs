@@ -35,24 +35,9 @@ pub fn wrapped(paragraph: &str, width: usize, indent: &str) -> Vec<String> {
 
 /// The text without trailing spaces or several blank lines in a row, ending with one newline.
 pub fn tidy(text: &str) -> String {
-    let mut result = String::with_capacity(text.len());
-    let mut blank = true;
-    for line in text.lines().map(str::trim_end) {
-        if line.is_empty() {
-            if !blank {
-                result.push('\n');
-            }
-            blank = true;
-        } else {
-            result.push_str(line);
-            result.push('\n');
-            blank = false;
-        }
-    }
-    while result.ends_with("\n\n") {
-        result.pop();
-    }
-    result
+    let mut lines: Vec<&str> = text.lines().map(str::trim_end).collect();
+    lines.dedup_by(|next, line| next.is_empty() && line.is_empty());
+    lines.join("\n").trim_matches('\n').to_owned() + "\n"
 }
 
 #[cfg(test)]

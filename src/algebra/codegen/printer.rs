@@ -334,22 +334,15 @@ fn starts_with_minus(expr: &Expr) -> bool {
 
 /// A subscript such as `4*i + 3`.
 pub fn subscript(index: &Index) -> String {
-    let mut text = String::new();
-    for (stride, name) in index.terms.iter().filter(|(stride, _)| *stride != 0) {
-        if !text.is_empty() {
-            text.push_str(" + ");
-        }
-        if *stride == 1 {
-            text.push_str(&name.to_string());
-        } else {
-            text.push_str(&format!("{stride}*{name}"));
-        }
+    let terms = index.terms.iter().filter(|(stride, _)| *stride != 0);
+    let terms = terms.map(|(stride, name)| match stride {
+        1 => name.to_string(),
+        _ => format!("{stride}*{name}"),
+    });
+    let offset = (index.offset != 0).then(|| index.offset.to_string());
+    let parts: Vec<String> = terms.chain(offset).collect();
+    match parts.as_slice() {
+        [] => "0".to_owned(),
+        parts => parts.join(" + "),
     }
-    if text.is_empty() {
-        return index.offset.to_string();
-    }
-    if index.offset != 0 {
-        text.push_str(&format!(" + {}", index.offset));
-    }
-    text
 }

@@ -175,6 +175,12 @@ impl Decimal {
         &self.digits
     }
 
+    /// How many digits stand before and after the point.
+    pub(super) fn places(&self) -> (usize, usize) {
+        let (before, after) = self.digits.split_once('.').unwrap_or((&self.digits, ""));
+        (before.len(), after.len())
+    }
+
     /// The power of ten that the digits are multiplied with, if one is printed.
     pub fn exponent(&self) -> Option<i32> {
         self.exponent

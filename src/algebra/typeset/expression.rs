@@ -184,10 +184,7 @@ impl Layout<'_> {
             match self.pool.node(*factor) {
                 Node::Number(number) => self.take_number(*number, &mut parts),
                 Node::Power(base, exponent) => self.take_power(*base, *exponent, &mut parts)?,
-                _other => {
-                    let factor = self.factor(*factor)?;
-                    parts.top.push(factor);
-                }
+                _other => parts.top.push(self.factor(*factor)?),
             }
         }
         if parts.negative {
@@ -222,13 +219,12 @@ impl Layout<'_> {
         parts: &mut Quotient,
     ) -> Result<(), UnknownSymbol> {
         match self.pool.as_number(exponent) {
-            Some(number) if number.is_negative() => {
-                let factor = self.numeric_power(base, number.abs())?;
-                parts.bottom.push(factor);
-            }
             Some(number) => {
-                let factor = self.numeric_power(base, number)?;
-                parts.top.push(factor);
+                let factor = self.numeric_power(base, number.abs())?;
+                match number.is_negative() {
+                    true => parts.bottom.push(factor),
+                    false => parts.top.push(factor),
+                }
             }
             None => {
                 let exponent = self.signed(exponent)?.into_math();

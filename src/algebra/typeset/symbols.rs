@@ -95,11 +95,6 @@ impl SymbolTable {
         Ok(table)
     }
 
-    /// Whether no variable has a new name.
-    pub fn is_empty(&self) -> bool {
-        self.names.is_empty()
-    }
-
     /// How a variable is written, its index counted from one.
     pub fn symbol(&self, quantity: Quantity, index: usize) -> Symbol {
         let (base, letter, dots) = match quantity {

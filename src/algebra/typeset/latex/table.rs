@@ -228,7 +228,7 @@ impl Layout<'_> {
                     number,
                     numbers: self.numbers,
                 };
-                let missing = width.decimals - places(number.digits()).1;
+                let missing = width.decimals - number.places().1;
                 // Points stand below each other when the missing digits take their space.
                 let point = if missing > 0 && !number.digits().contains('.') {
                     "."
@@ -259,7 +259,7 @@ impl ColumnWidth {
     fn of<'a>(numbers: impl Iterator<Item = &'a Option<Decimal>>) -> Self {
         let mut width = Self::default();
         for number in numbers.flatten() {
-            let (integers, decimals) = places(number.digits());
+            let (integers, decimals) = number.places();
             width.negative |= number.is_negative();
             width.integers = width.integers.max(integers);
             width.decimals = width.decimals.max(decimals);
@@ -293,13 +293,5 @@ impl ColumnWidth {
             format.push_str(&format!("e{sign}{}", self.exponent));
         }
         format
-    }
-}
-
-/// How many digits stand before and after the point.
-fn places(digits: &str) -> (usize, usize) {
-    match digits.split_once('.') {
-        Some((before, after)) => (before.len(), after.len()),
-        None => (digits.len(), 0),
     }
 }
