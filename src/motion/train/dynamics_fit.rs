@@ -98,7 +98,12 @@ impl Task<'_> {
         };
         let judged_latent = validated.as_ref().unwrap_or(&latent);
         let options = &self.options.regression;
-        let judge = Judge::new(judged, judged_latent, options.rollout_weight);
+        let judge = Judge::new(
+            &self.features,
+            judged,
+            judged_latent,
+            options.rollout_weight,
+        );
         let target = Target {
             dataset: training,
             latent: &latent,

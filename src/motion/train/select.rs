@@ -14,7 +14,6 @@ use super::options::RegressionOptions;
 use super::progress::Watch;
 use super::prune::Refined;
 use super::refine::{Coefficients, Refiner};
-use super::rollout::Candidate;
 use super::sparse::{Pruning, Regression, active_terms};
 use super::weak_form::{check_terms, windowed_samples};
 
@@ -71,17 +70,16 @@ pub fn select(
     options: &RegressionOptions,
     watch: &mut Watch<'_>,
 ) -> Result<Selected, TrainError> {
-    let features = target.features;
-    let regressions = regressions(target, &options.windows)?;
-    let growth = &Growth::of_jumps(
-        options.growth_per_s,
-        target.dataset,
-        target.latent,
+    let Target {
+        dataset,
+        latent,
         features,
-    );
+        knowledge,
+    } = target;
+    let regressions = regressions(target, &options.windows)?;
+    let growth = &Growth::of_jumps(options.growth_per_s, dataset, latent, features);
     let attempt = Attempt {
         regressions: &regressions,
-        features,
         growth,
         judge,
         options,
@@ -89,23 +87,15 @@ pub fn select(
     let mut tried = attempt.all(watch);
     let candidates = tried.len();
     let reference = best_of(&tried)?.xi.clone();
-    let reference = Candidate {
-        features,
-        xi: &reference,
-    };
-    let training =
-        Judge::new(target.dataset, target.latent, options.rollout_weight).relative_to(reference);
-    let relative = judge.relative_to(reference);
+    let training = Judge::new(features, dataset, latent, options.rollout_weight);
+    let training = training.relative_to(&reference);
+    let relative = judge.relative_to(&reference);
     for fitted in tried.iter_mut().filter(|fitted| fitted.is_stable()) {
-        fitted.choice.score = relative.score(Candidate {
-            features,
-            xi: &fitted.xi,
-        });
+        fitted.choice.score = relative.score(&fitted.xi);
     }
     let limit = (1.0 + options.slack) * best_of(&tried)?.choice.score;
     let refiner = Refiner {
-        features,
-        knowledge: target.knowledge,
+        knowledge,
         growth,
         training: &training,
         judge: &relative,
@@ -122,11 +112,12 @@ pub fn select(
             regressions: &regressions[window],
             ridge: choice.ridge,
             growth,
-            score: relative.score(Candidate { features, xi: &xi }),
+            judge: &relative,
+            score: relative.score(&xi),
             xi,
         };
         if options.sweeps > 0 {
-            pruned.sweep(features, &relative, limit, watch);
+            pruned.sweep(limit, watch);
         }
         let start = Coefficients {
             xi: pruned.xi,
@@ -146,7 +137,7 @@ pub fn select(
         .filter(|fitted| fitted.choice.score <= limit);
     let sparsest = within.min_by_key(|fitted| fitted.choice.active);
     let Fitted { xi, mut choice, .. } = sparsest.ok_or(TrainError::NoStableModel { candidates })?;
-    choice.score = judge.score(Candidate { features, xi: &xi });
+    choice.score = judge.score(&xi);
     Ok(Selected {
         xi,
         choice,
@@ -222,7 +213,6 @@ impl Fitted {
 /// What candidates are fitted from and judged by.
 struct Attempt<'a> {
     regressions: &'a [Vec<Regression>],
-    features: &'a Features,
     growth: &'a Growth,
     judge: &'a Judge<'a>,
     options: &'a RegressionOptions,
@@ -232,7 +222,7 @@ impl Attempt<'_> {
     /// Every combination of the options; where the library has terms that are not affine, also those without them, and
     /// the best of these grown by such terms: rollouts of full libraries diverge more often than not.
     fn all(&self, watch: &mut Watch<'_>) -> Vec<Fitted> {
-        let affine = self.features.affine_terms();
+        let affine = self.judge.features.affine_terms();
         let has_nonlinear = affine.contains(&false);
         // The affine terms are still to come where full libraries diverge.
         let enough = |tried: &[Fitted]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
@@ -254,7 +244,7 @@ impl Attempt<'_> {
         enough: impl Fn(&[Fitted]) -> bool,
         watch: &mut Watch<'_>,
     ) -> Vec<Fitted> {
-        let (options, features) = (self.options, self.features);
+        let options = self.options;
         let mut tried = Vec::new();
         watch.stage(
             "fitting the dynamics",
@@ -271,10 +261,10 @@ impl Attempt<'_> {
                     .collect();
                 for (number, &pruning) in options.prunings.iter().enumerate() {
                     let mut xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
-                    let mut score = self.judge.score(Candidate { features, xi: &xi });
+                    let mut score = self.judge.score(&xi);
                     if score.is_infinite() {
                         hold(self.growth, phases, ridge, &mut xi);
-                        score = self.judge.score(Candidate { features, xi: &xi });
+                        score = self.judge.score(&xi);
                     }
                     let active = xi.iter().map(active_terms).sum();
                     watch.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
@@ -299,20 +289,16 @@ impl Attempt<'_> {
             regressions: &self.regressions[best.window],
             ridge: best.choice.ridge,
             growth: self.growth,
+            judge: self.judge,
             xi: best.xi.clone(),
             score: best.choice.score,
         };
-        refined.grow(self.features, self.judge, watch);
-        let choice = Choice {
-            score: refined.score,
-            active: refined.xi.iter().map(active_terms).sum(),
-            ..best.choice.clone()
-        };
-        Some(Fitted {
+        refined.grow(watch);
+        let end = Coefficients {
             xi: refined.xi,
-            choice,
-            window: best.window,
-        })
+            score: refined.score,
+        };
+        Some(Fitted::of(end, &best.choice, best.window))
     }
 }
 

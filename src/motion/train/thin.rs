@@ -73,7 +73,8 @@ impl Refiner<'_> {
 
     /// The places that may go, those first whose loss is least.
     fn order(&self, about: &About) -> Vec<usize> {
-        let (features, d) = (self.features, self.features.latent_dim());
+        let features = self.judge.features;
+        let d = features.latent_dim();
         let inputs: Vec<_> = (2 * d..3 * d)
             .filter_map(|i| features.variable_term(i))
             .collect();
@@ -170,13 +171,12 @@ mod tests {
     /// What is left of the known system with a few terms too many, the limit as a share of its score.
     fn left_of_too_many(limit: f64) -> Vec<DMatrix<f64>> {
         let (dataset, latent) = oscillator::jumps(3);
-        let judge = Judge::new(&dataset, &latent, 0.2);
         let (features, truth) = oscillator::known();
+        let judge = Judge::new(&features, &dataset, &latent, 0.2);
         let mut knowledge = [Knowledge::nothing(7, 2), Knowledge::nothing(7, 2)];
         knowledge[0].kept[(3, 0)] = true;
         let growth = Growth::of_jumps(None, &dataset, &latent, &features);
         let refiner = Refiner {
-            features: &features,
             knowledge: &knowledge,
             growth: &growth,
             training: &judge,
