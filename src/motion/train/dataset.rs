@@ -441,7 +441,7 @@ fn mean(blocks: impl Iterator<Item = DMatrix<f64>>, n: usize) -> DVector<f64> {
 }
 
 /// Every row times its factor.
-fn scaled(mut rows: DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
+pub fn scaled(mut rows: DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
     rows.row_iter_mut()
         .zip(factors.iter())
         .for_each(|(mut row, factor)| row *= *factor);

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Sender, channel};
 
 use nalgebra::{DMatrix, DVector};
 
-use super::batch::{Batch, BatchOptions, batches};
+use super::batch::{Batch, batches};
 use super::fold::{self, LatentBasis};
 use super::linear::{LinearMaps, mask_rows};
 use super::loss::{JointLoss, LossWeights, Losses, Maps};
@@ -45,15 +45,8 @@ pub fn joint(
     watch: &mut Watch<'_>,
 ) -> Result<Trained, TrainError> {
     let task = Task::new(recordings.clone(), robot, options)?;
-    let scaling = options.scaling.factors();
-    let rule = options.input_rule(robot);
-    let batch_options = BatchOptions {
-        phases: &options.phases,
-        scaling: &scaling,
-        rows: options.joint.batch_rows,
-        smoothing: options.regression.smoothing,
-    };
-    let training = batches(&recordings.training, &rule, &batch_options)?;
+    let cut = |set| batches(set, &task.sets.training, options.joint.batch_rows);
+    let training = cut(&recordings.training)?;
     let trainer = Trainer {
         task: &task,
         batches: &training,
@@ -61,7 +54,7 @@ pub fn joint(
     };
     let runs = trainer.run_seeds(watch);
 
-    let validation = batches(&recordings.validation, &rule, &batch_options)?;
+    let validation = cut(&recordings.validation)?;
     let judged = if validation.is_empty() {
         &training
     } else {
@@ -229,11 +222,8 @@ impl Trainer<'_> {
 
     /// Coordinates that the encoder may use.
     fn mask(&self) -> Vec<bool> {
-        self.frame
-            .factors
-            .iter()
-            .map(|factor| *factor != 0.0)
-            .collect()
+        let factors = self.frame.factors.iter();
+        factors.map(|factor| *factor != 0.0).collect()
     }
 
     /// Where a seed starts: random maps, and for linear ones `b_e = 0` as published or `-W_e mean(x)`.
