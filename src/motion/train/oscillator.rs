@@ -26,14 +26,19 @@ pub(super) fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] 
     }
 }
 
-/// Library of the terms 1, z1, z2, dz1, dz2, u1, u2, and the known system's coefficients.
-pub(super) fn known() -> (Features, Vec<DMatrix<f64>>) {
+/// A standard library with inputs.
+pub(super) fn standard_library(latent_dim: usize, degree: u32, trigonometric: bool) -> Library {
     let standard = StandardLibrary {
-        degree: 1,
-        trigonometric: false,
+        degree,
+        trigonometric,
         inputs: true,
     };
-    let features = Features::new(&Library::standard(2, standard).expect("small library"));
+    Library::standard(latent_dim, standard).expect("small library")
+}
+
+/// Library of the terms 1, z1, z2, dz1, dz2, u1, u2, and the known system's coefficients.
+pub(super) fn known() -> (Features, Vec<DMatrix<f64>>) {
+    let features = Features::new(&standard_library(2, 1, false));
     let mut contact = DMatrix::zeros(7, 2);
     let mut flight = contact.clone();
     (contact[(1, 0)], contact[(3, 0)], contact[(5, 0)]) = (-40.0, -3.0, 5.0);

@@ -122,7 +122,8 @@ fn renamed_terms(library: &Library, partner: &[usize]) -> Vec<Option<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{AffineMap, StandardLibrary};
+    use crate::model::AffineMap;
+    use crate::train::oscillator::standard_library;
     use nalgebra::DVector;
 
     fn fitted(weights: DMatrix<f64>, active: &[(usize, usize)], terms: usize) -> Fitted {
@@ -146,46 +147,21 @@ mod tests {
 
     #[test]
     fn exchanged_coordinates_overlap_fully_and_other_terms_do_not() {
-        let standard = StandardLibrary {
-            degree: 2,
-            trigonometric: false,
-            inputs: true,
+        let library = standard_library(2, 2, false);
+        let with = |weights: &DMatrix<f64>, active: [(&str, usize); 3]| {
+            let row = |text| library.terms().iter().position(|term| term.text() == text);
+            let active = active.map(|(text, column)| (row(text).expect(text), column));
+            fitted(weights.clone(), &active, library.len())
         };
-        let library = Library::standard(2, standard).expect("small library");
-        let index = |text: &str| {
-            library
-                .terms()
-                .iter()
-                .position(|term| term.text() == text)
-                .expect(text)
-        };
-        let n = library.len();
         let straight = DMatrix::from_row_slice(2, 3, &[1.0, 0.1, 0.0, 0.0, 1.0, 0.0]);
         let exchanged = DMatrix::from_row_slice(2, 3, &[0.0, -1.0, 0.0, 1.0, 0.2, 0.0]);
         let covariance = DMatrix::identity(3, 3);
-        let first = fitted(
-            straight.clone(),
-            &[(index("z1"), 0), (index("u2"), 1), (index("dz1^2"), 1)],
-            n,
-        );
-        let same = fitted(
-            exchanged,
-            &[(index("z2"), 1), (index("u1"), 0), (index("dz2^2"), 0)],
-            n,
-        );
-        assert_eq!(
-            support_overlap(&library, &[&first, &same], &covariance),
-            Some(1.0)
-        );
-        let half = fitted(
-            straight,
-            &[(index("z1"), 0), (index("u2"), 0), (index("dz1^2"), 1)],
-            n,
-        );
-        assert_eq!(
-            support_overlap(&library, &[&first, &half], &covariance),
-            Some(0.5)
-        );
-        assert_eq!(support_overlap(&library, &[&first], &covariance), None);
+        let first = with(&straight, [("z1", 0), ("u2", 1), ("dz1^2", 1)]);
+        let same = with(&exchanged, [("z2", 1), ("u1", 0), ("dz2^2", 0)]);
+        let half = with(&straight, [("z1", 0), ("u2", 0), ("dz1^2", 1)]);
+        let overlap = |runs: &[&Fitted]| support_overlap(&library, runs, &covariance);
+        assert_eq!(overlap(&[&first, &same]), Some(1.0));
+        assert_eq!(overlap(&[&first, &half]), Some(0.5));
+        assert_eq!(overlap(&[&first]), None);
     }
 }

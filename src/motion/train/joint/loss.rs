@@ -284,10 +284,11 @@ mod tests {
     use nalgebra::DVector;
 
     use super::*;
-    use crate::model::{Activation, Library, StandardLibrary};
+    use crate::model::Activation;
     use crate::train::joint::linear::LinearMaps;
     use crate::train::joint::nonlinear::NonlinearMaps;
     use crate::train::joint::parameters::Frame;
+    use crate::train::oscillator::standard_library;
     use crate::train::random::Random;
 
     const WEIGHTS: LossWeights = LossWeights {
@@ -300,8 +301,7 @@ mod tests {
 
     /// Library, batch of phase 1 of 2, and moved random parameters with layers of `widths`.
     fn setup(widths: (&[usize], &[usize]), phi: Activation) -> (Features, Batch, Parameters) {
-        let library = Library::standard(3, StandardLibrary::default()).expect("small library");
-        let features = Features::new(&library);
+        let features = Features::new(&standard_library(3, 1, true));
         let mut random = Random::new(11);
         let blocks = std::array::from_fn(|_| random.matrix(30, 7, 0.8));
         let shape = (features.library_dim(), 2, 0.1);
