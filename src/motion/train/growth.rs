@@ -278,17 +278,17 @@ fn dot(a: &[DMatrix<f64>], b: &[DMatrix<f64>]) -> f64 {
 /// Mean of `z`, `dz`, `u_lat` over the samples of a phase, 0 if there are none.
 fn mean_of(phase: usize, dataset: &Dataset, latent: &[Latent]) -> Vec<f64> {
     let d = latent.first().map_or(0, |first| first.z.nrows());
-    let (mut mean, mut samples) = (vec![0.0; 3 * d], 0usize);
-    for (jump, latent) in dataset.jumps.iter().zip(latent) {
-        for sample in (0..jump.len()).filter(|&sample| jump.phase[sample] == phase) {
+    let mut mean = vec![0.0; 3 * d];
+    for (jump, range) in dataset.spans(Some(phase)) {
+        let of = [&latent[jump].z, &latent[jump].dz, &latent[jump].u_lat];
+        for sample in range {
             for (i, total) in mean.iter_mut().enumerate() {
-                *total += [&latent.z, &latent.dz, &latent.u_lat][i / d][(i % d, sample)];
+                *total += of[i / d][(i % d, sample)];
             }
-            samples += 1;
         }
     }
-    mean.iter_mut()
-        .for_each(|total| *total /= samples.max(1) as f64);
+    let samples = dataset.samples(Some(phase)).max(1) as f64;
+    mean.iter_mut().for_each(|total| *total /= samples);
     mean
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::dataset::{Dataset, Rates, Scaling};
+use super::dataset::{Dataset, Rates, Scaling, mean};
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
 use super::latent::{Latent, lift_samples, map_samples};
@@ -75,11 +75,7 @@ pub fn assess<'a>(
         SMOOTHING,
     )?;
     let features = Features::new(model.library());
-    let xi: Vec<_> = model
-        .phases()
-        .iter()
-        .map(|phase| phase.xi.clone())
-        .collect();
+    let xi: Vec<_> = (model.phases().iter().map(|phase| phase.xi.clone())).collect();
     let assessed = Assessed {
         candidate: Candidate {
             features: &features,
@@ -160,13 +156,11 @@ fn ddz_r2(candidate: Candidate<'_>, dataset: &Dataset, latent: &[Latent], phase:
         Latent::regression_blocks(dataset, latent, phase)
             .map(|(variables, target)| (variables, target.transpose()))
     };
-    let mut mean = DVector::zeros(candidate.features.latent_dim());
-    let share = 1.0 / dataset.samples(Some(phase)) as f64;
-    for (_, target) in blocks() {
-        let columns = target.column_iter();
-        columns.for_each(|column| mean.axpy(share, &column, 1.0));
-    }
-    let mut sums = Determination::about(mean);
+    let (d, n) = (
+        candidate.features.latent_dim(),
+        dataset.samples(Some(phase)),
+    );
+    let mut sums = Determination::about(mean(d, n, blocks().map(|(_, target)| target)));
     let mut values = FeatureValues::default();
     for (variables, target) in blocks() {
         let theta = candidate.features.evaluate(&variables, &mut values);
@@ -183,11 +177,8 @@ fn torque_r2(encoder: &StateMap, dataset: &Dataset, latent: &[Latent]) -> Result
     let mut mean = DVector::zeros(JOINT_DIM);
     dataset.for_each(|jump, rates| {
         for sample in jump.torque_samples() {
-            mean.axpy(
-                1.0 / n as f64,
-                &recorded_torque(&jump.u, rates, sample),
-                1.0,
-            );
+            let torque = recorded_torque(&jump.u, rates, sample);
+            mean.axpy(1.0 / n as f64, &torque, 1.0);
         }
     })?;
     let mut sums = Determination::about(mean);

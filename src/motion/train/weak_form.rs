@@ -83,17 +83,13 @@ pub fn windowed_samples(
         return (theta, targets);
     }
     let (mut theta_rows, mut target_rows) = (Vec::new(), Vec::new());
-    for (jump, samples) in dataset.jumps.iter().zip(latent) {
-        for (_, range) in jump
-            .spans
-            .iter()
-            .filter(|(index, range)| *index == phase && range.len() > 4)
-        {
-            let span = Span::new(samples, &jump.time_s, range.clone(), features);
-            let window = window.min(range.len() - 1);
-            for start in (0..range.len() - window).step_by(STRIDE) {
-                span.equations(start, start + window, &mut theta_rows, &mut target_rows);
-            }
+    let spans = dataset.spans(Some(phase));
+    for (jump, range) in spans.filter(|(_, range)| range.len() > 4) {
+        let time_s = &dataset.jumps[jump].time_s;
+        let span = Span::new(&latent[jump], time_s, range.clone(), features);
+        let window = window.min(range.len() - 1);
+        for start in (0..range.len() - window).step_by(STRIDE) {
+            span.equations(start, start + window, &mut theta_rows, &mut target_rows);
         }
     }
     let n = theta_rows.len() / p.max(1);
@@ -123,10 +119,8 @@ impl Span {
         let mut variables = DMatrix::zeros(n, 3 * features.latent_dim());
         latent.copy_variables(range.clone(), &mut variables.rows_mut(0, n));
         let theta = features.evaluate(&variables, &mut FeatureValues::default());
-        let (mut once, mut twice) = (
-            DMatrix::zeros(n, theta.ncols()),
-            DMatrix::zeros(n, theta.ncols()),
-        );
+        let mut once = DMatrix::zeros(n, theta.ncols());
+        let mut twice = once.clone();
         for i in 1..n {
             let h = time_s[start + i] - time_s[start + i - 1];
             for j in 0..theta.ncols() {

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::batch::Batch;
-use super::multiply::{Columns, add_product, add_transposed};
+use super::multiply::{Columns, add_transposed, product};
 use super::network::Network;
 use super::parameters::Parameters;
 use super::schedule::Schedule;
@@ -209,8 +209,7 @@ impl<'a> JointLoss<'a> {
         let xi = &parameters.xi[batch.phase];
         let variables = self.maps.encode(at);
         let theta = self.features.evaluate(&variables, &mut self.values);
-        let mut predicted = DMatrix::zeros(n, d);
-        add_product(&mut predicted, 1.0, &theta, xi);
+        let predicted = product(&theta, xi);
         let mut residual = self.maps.residual(at, &predicted);
         let ddz = residual.norm_squared() / (n * d) as f64;
         residual *= 2.0 * weights.ddz / (n * d) as f64;
@@ -242,8 +241,7 @@ impl<'a> JointLoss<'a> {
         let xi = &at.parameters.xi[at.batch.phase];
         let onto_xi = &mut self.gradient.xi[at.batch.phase];
         add_transposed(onto_xi, 1.0, Columns::all(theta), Columns::all(adjoint));
-        let mut onto_theta = DMatrix::zeros(theta.nrows(), theta.ncols());
-        add_product(&mut onto_theta, 1.0, adjoint, &xi.transpose());
+        let onto_theta = product(adjoint, &xi.transpose());
         let mut onto_variables = DMatrix::zeros(variables.nrows(), variables.ncols());
         self.features
             .backward(&onto_theta, &mut self.values, &mut onto_variables);
@@ -435,13 +433,8 @@ mod tests {
         assert!((a - b).abs() < 1e-9 * b && (losses.lift - reference.lift).abs() < 1e-9);
         let (mut found, mut expected) = (found.gradient().clone(), expected.gradient().clone());
         for (found, expected) in all(&mut found).into_iter().zip(all(&mut expected)) {
-            let close = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9 * b.abs().max(1.0);
-            assert!(
-                found
-                    .iter()
-                    .zip(expected.iter())
-                    .all(|(a, b)| close((a, b)))
-            );
+            let mut each = found.iter().zip(expected.iter());
+            assert!(each.all(|(a, b)| (a - b).abs() < 1e-9 * b.abs().max(1.0)));
         }
     }
 }

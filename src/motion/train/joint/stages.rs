@@ -226,13 +226,12 @@ mod tests {
         for kind in KINDS {
             let (features, batches, mut fast) = setup(kind);
             let all: Vec<&Batch> = batches.iter().collect();
-            let [ddz, ddx, l1, lift, bptt] = [0.0; 5];
             let only_decoder = LossWeights {
-                ddz,
-                ddx,
-                l1,
-                lift,
-                bptt,
+                ddz: 0.0,
+                ddx: 0.0,
+                l1: 0.0,
+                lift: 0.0,
+                bptt: 0.0,
             };
             let mut loss = loss(&features, &mut fast, only_decoder);
             let mut slow = fast.clone();
