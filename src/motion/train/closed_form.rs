@@ -60,12 +60,11 @@ fn fit(
     let search = SubspaceOptions {
         lift_weight: options.encoder.lift_weight,
         coordinate_weights: options.encoder.coordinate_weights(),
-        iterations: 2000,
         restarts: options.encoder.restarts,
         seed,
     };
-    let subspace = find_subspace(&task.moments, &task.frame, options.latent_dim, &search)?;
-    let encoder = task.encoder_over(&subspace.basis)?.into();
+    let basis = find_subspace(&task.moments, &task.frame, options.latent_dim, &search);
+    let encoder = task.encoder_over(&basis)?.into();
     let decoder = least_squares_decoder(&task.sets.training, &encoder)?.into();
     let fitted = task.fit_dynamics((encoder, decoder), watch)?;
     let report = task.seed_report(&fitted, (seed, fitted.score()), None)?;

@@ -16,7 +16,7 @@ use super::progress::Watch;
 use super::report::Trained;
 use super::sparse::Pruning;
 use crate::limits::table;
-use crate::model::{Library, StandardLibrary, check_name};
+use crate::model::{Library, ModelError, StandardLibrary, check_name};
 use crate::recording::PhaseRule;
 use crate::recording::phases::CHATTER_SAMPLES;
 use crate::robot::{Actuators, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame};
@@ -136,28 +136,22 @@ pub struct EncoderOptions {
     /// Whether the latent basis is rotated by varimax.
     pub rotate: bool,
     /// What the encoder's rows are made of.
-    #[serde(default = "Coordinates::free")]
+    #[serde(default)]
     pub coordinates: Coordinates,
     /// Random starting points of the search.
     pub restarts: usize,
 }
 
 /// What the rows of a linear encoder are made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
     /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right;
     /// the dynamics obey what is known of them.
     Named,
     /// Any rows over all coordinates that move or are actuated.
+    #[default] // what a training did before it had the choice
     Free,
-}
-
-impl Coordinates {
-    /// What a training did before it had the choice.
-    fn free() -> Self {
-        Self::Free
-    }
 }
 
 /// Settings of the regression for Xi.
@@ -268,10 +262,8 @@ impl TrainOptions {
             LibraryChoice::Standard(standard) => Library::standard(self.latent_dim, *standard),
             LibraryChoice::Terms(terms) => Library::from_terms(self.latent_dim, terms),
         };
-        let library = library.map_err(crate::model::ModelError::from)?;
-        library
-            .check_distinct()
-            .map_err(crate::model::ModelError::from)?;
+        let library = library.map_err(ModelError::from)?;
+        library.check_distinct().map_err(ModelError::from)?;
         Ok(library)
     }
 
@@ -282,30 +274,24 @@ impl TrainOptions {
     /// model can have.
     pub fn check(&self) -> Result<(), TrainError> {
         check_name(&self.name)?;
-        let EncoderOptions {
-            lift_weight,
-            body_weight,
-            least_std,
-            least_input_share,
-            ..
-        } = self.encoder;
-        table::LIFT_WEIGHT.check(lift_weight)?;
-        table::BODY_WEIGHT.check(body_weight)?;
-        table::MASK_STD.check(least_std)?;
-        table::MASK_INPUT_SHARE.check(least_input_share)?;
+        let (encoder, regression) = (&self.encoder, &self.regression);
+        table::LIFT_WEIGHT.check(encoder.lift_weight)?;
+        table::BODY_WEIGHT.check(encoder.body_weight)?;
+        table::MASK_STD.check(encoder.least_std)?;
+        table::MASK_INPUT_SHARE.check(encoder.least_input_share)?;
         table::SEEDS.check_count(self.n_seeds.max(1))?;
-        table::MOVING_AVERAGE.check_count(self.regression.smoothing)?;
+        table::MOVING_AVERAGE.check_count(regression.smoothing)?;
         self.joint.maps.check(self.latent_dim)?;
         self.joint.check_predictions()?;
-        table::SLACK.check(self.regression.slack)?;
-        if let Some(rate) = self.regression.growth_per_s {
+        table::SLACK.check(regression.slack)?;
+        if let Some(rate) = regression.growth_per_s {
             table::GROWTH.check(rate)?;
         }
-        at_least_zero("rollout-weight", self.regression.rollout_weight)?;
-        for ridge in &self.regression.ridges {
-            above_zero("ridge", *ridge)?;
+        at_least_zero("rollout-weight", regression.rollout_weight)?;
+        for ridge in &regression.ridges {
+            in_range("ridge", *ridge, *ridge > 0.0, "a finite number above 0")?;
         }
-        for pruning in &self.regression.prunings {
+        for pruning in &regression.prunings {
             let (Pruning::Threshold(value) | Pruning::Elimination(value)) = pruning;
             at_least_zero("threshold", *value)?;
         }
@@ -317,21 +303,12 @@ impl TrainOptions {
                 expected: "finite numbers of at least 0",
             });
         }
-        let RegressionOptions {
-            windows,
-            ridges,
-            prunings,
-            ..
-        } = &self.regression;
-        if windows.is_empty() || ridges.is_empty() || prunings.is_empty() {
+        let (windows, ridges) = (regression.windows.len(), regression.ridges.len());
+        let prunings = regression.prunings.len();
+        if [windows, ridges, prunings].contains(&0) {
             return Err(TrainError::Option {
                 option: "windows, ridges and prunings",
-                found: format!(
-                    "{}, {} and {} values",
-                    windows.len(),
-                    ridges.len(),
-                    prunings.len()
-                ),
+                found: format!("{windows}, {ridges} and {prunings} values"),
                 expected: "at least one each",
             });
         }
@@ -343,15 +320,10 @@ impl JointOptions {
     /// Complains about a window of predictions out of range; one that no batch has room for would count for nothing.
     fn check_predictions(&self) -> Result<(), TrainError> {
         table::BPTT_WEIGHT.check(self.weights.bptt)?;
-        let Unroll {
-            window,
-            stride,
-            decay,
-            ..
-        } = self.unroll;
+        let (window, stride) = (self.unroll.window, self.unroll.stride);
         table::BPTT_WINDOW.check_count(window)?;
         table::BPTT_STRIDE.check_count(stride)?;
-        table::BPTT_DECAY.check(decay)?;
+        table::BPTT_DECAY.check(self.unroll.decay)?;
         let reach = window.checked_mul(stride);
         if self.weights.bptt > 0.0 && reach.is_none_or(|reach| reach >= self.batch_rows) {
             return Err(TrainError::Option {
@@ -440,23 +412,18 @@ fn at_least_zero(option: &'static str, value: f64) -> Result<(), TrainError> {
     in_range(option, value, value >= 0.0, "a finite number of at least 0")
 }
 
-fn above_zero(option: &'static str, value: f64) -> Result<(), TrainError> {
-    in_range(option, value, value > 0.0, "a finite number above 0")
-}
-
 fn in_range(
     option: &'static str,
     value: f64,
     inside: bool,
     expected: &'static str,
 ) -> Result<(), TrainError> {
-    if inside && value.is_finite() {
-        Ok(())
-    } else {
-        Err(TrainError::Option {
-            option,
-            found: value.to_string(),
-            expected,
-        })
-    }
+    let refused = || TrainError::Option {
+        option,
+        found: value.to_string(),
+        expected,
+    };
+    (inside && value.is_finite())
+        .then_some(())
+        .ok_or_else(refused)
 }

@@ -1,6 +1,7 @@
 //! One training as every method sees it, checked before any map is learned.
 
 use super::data_sets::{DataSets, Recordings};
+use super::dataset::Dataset;
 use super::error::TrainError;
 use super::features::Features;
 use super::frame::Frame;
@@ -8,6 +9,7 @@ use super::knowledge::Knowledge;
 use super::options::TrainOptions;
 use super::subspace::Moments;
 use crate::model::Library;
+use crate::recording::Source;
 use crate::robot::Robot;
 
 /// Data, library and options that all seeds share.
@@ -27,7 +29,7 @@ pub(super) struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    /// Reads the data sets and checks them against the options.
+    /// Checks the options, reads the data sets and cuts them into phases, and checks them against the options.
     ///
     /// # Errors
     /// [`TrainError`]: options out of range, too few samples, too many latent coordinates.
@@ -36,21 +38,24 @@ impl<'a> Task<'a> {
         robot: &'static Robot,
         options: &'a TrainOptions,
     ) -> Result<Self, TrainError> {
-        let sets = DataSets::new(recordings, robot, options)?;
+        options.check()?;
+        let (scaling, smoothing) = (options.scaling.factors(), options.regression.smoothing);
+        let rule = options.input_rule(robot);
+        let read = |set: Source<'_>| Dataset::new(set, &rule, &options.phases, &scaling, smoothing);
+        let training = read(recordings.training)?;
+        training.check_for_training()?;
+        let sets = DataSets {
+            training,
+            validation: read(recordings.validation)?,
+        };
         let moments = sets.training.moments();
         let least_std = options.encoder.least_std * options.scaling.state;
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
-        let coordinates = options.coordinates();
-        let frame = Frame::new(
-            &sets.training,
-            &active,
-            options.latent_dim,
-            coordinates,
-            robot,
-        )?;
-        if options.latent_dim == 0 || options.latent_dim > frame.dim() {
+        let (coordinates, requested) = (options.coordinates(), options.latent_dim);
+        let frame = Frame::new(&sets.training, &active, requested, coordinates, robot)?;
+        if requested == 0 || requested > frame.dim() {
             return Err(TrainError::LatentDim {
-                requested: options.latent_dim,
+                requested,
                 active: frame.dim(),
             });
         }
