@@ -76,11 +76,9 @@ impl Origin {
 
 /// SHA-256 of a file's bytes, with the name of the algorithm in front, as provenances have it.
 pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes)
-        .iter()
-        .fold(String::from("sha256:"), |text, byte| {
-            text + &format!("{byte:02x}")
-        })
+    let digits = Sha256::digest(bytes);
+    let digits: String = digits.iter().map(|byte| format!("{byte:02x}")).collect();
+    format!("sha256:{digits}")
 }
 
 /// Puts the parts together.
@@ -93,8 +91,9 @@ pub(super) fn assemble(
     origin: &Origin,
     report: &TrainReport,
 ) -> Result<ReducedModel, TrainError> {
+    let (d, name) = (options.latent_dim, robot.name());
     let builder = ReducedModel::builder(options.name.clone(), parts.library.clone())
-        .description(description(options, robot))
+        .description(format!("{d} latent coordinates of {name} jumps"))
         .robot(robot)
         .actuators(options.actuators.clone())
         .wrench_frame(options.wrench_frame)
@@ -156,14 +155,6 @@ fn inputs_given_states(
     Ok(given.collect())
 }
 
-fn description(options: &TrainOptions, robot: &Robot) -> String {
-    format!(
-        "{} latent coordinates of {} jumps",
-        options.latent_dim,
-        robot.name()
-    )
-}
-
 fn signals<const N: usize>(names: [String; N], units: [String; N]) -> CoordinateNames {
     CoordinateNames {
         names: names.into(),
@@ -172,11 +163,8 @@ fn signals<const N: usize>(names: [String; N], units: [String; N]) -> Coordinate
 }
 
 fn median_step_s(dataset: &Dataset) -> f64 {
-    let mut steps: Vec<f64> = dataset
-        .jumps
-        .iter()
-        .flat_map(|jump| jump.time_s.windows(2).map(|pair| pair[1] - pair[0]))
-        .collect();
+    let pairs = dataset.jumps.iter().flat_map(|jump| jump.time_s.windows(2));
+    let mut steps: Vec<f64> = pairs.map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
     // Recorded times carry rounding; a microsecond is below every sampling.
     steps
@@ -190,14 +178,12 @@ fn provenance(
     origin: &Origin,
     report: &TrainReport,
 ) -> Result<Map<String, Value>, TrainError> {
-    let recordings: Vec<Value> = origin
-        .recordings
-        .iter()
-        .map(|file| match file.sets.is_empty() {
-            true => json!({ "path": file.path, "digest": file.digest }),
-            false => json!({ "path": file.path, "digest": file.digest, "sets": file.sets }),
-        })
-        .collect();
+    let recordings = origin.recordings.iter();
+    let recordings = recordings.map(|file| match file.sets.is_empty() {
+        true => json!({ "path": file.path, "digest": file.digest }),
+        false => json!({ "path": file.path, "digest": file.digest, "sets": file.sets }),
+    });
+    let recordings: Vec<Value> = recordings.collect();
     let mut map = Map::new();
     map.insert("command".into(), json!(origin.command));
     map.insert("romc_version".into(), json!(env!("CARGO_PKG_VERSION")));
@@ -208,7 +194,7 @@ fn provenance(
         ..options.encoder.clone()
     };
     map.insert("encoder_options".into(), json!(encoder));
-    map.insert("recordings".into(), Value::Array(recordings));
+    map.insert("recordings".into(), json!(recordings));
     map.insert("report".into(), json!(report));
     Ok(map)
 }

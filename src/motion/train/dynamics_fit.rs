@@ -97,17 +97,12 @@ impl Task<'_> {
             false => Some(Latent::of(judged, &encoder)?),
         };
         let judged_latent = validated.as_ref().unwrap_or(&latent);
-        let options = &self.options.regression;
-        let judge = Judge::new(
-            &self.features,
-            judged,
-            judged_latent,
-            options.rollout_weight,
-        );
+        let (options, features) = (&self.options.regression, &self.features);
+        let judge = Judge::new(features, judged, judged_latent, options.rollout_weight);
         let target = Target {
             dataset: training,
             latent: &latent,
-            features: &self.features,
+            features,
             knowledge: &self.knowledge,
         };
         let selected = select(target, &judge, options, watch)?;
@@ -123,7 +118,7 @@ impl Task<'_> {
             choice: Some((selected.choice, selected.candidates)),
             training: None,
         };
-        let measured = measure_encoded(fitted.assessed(&self.features), training, &latent)?;
+        let measured = measure_encoded(fitted.assessed(features), training, &latent)?;
         fitted.training = Some(measured);
         Ok(fitted)
     }

@@ -296,10 +296,8 @@ fn mean_of(phase: usize, dataset: &Dataset, latent: &[Latent]) -> Vec<f64> {
 /// no finite one.
 fn slopes_at(mean: &[f64], features: &Features) -> DMatrix<f64> {
     let d = features.latent_dim();
-    let step = DIFFERENCE
-        * mean
-            .iter()
-            .fold(1.0, |most: f64, value| most.max(value.abs()));
+    let largest = mean.iter().fold(1.0, |most: f64, v| most.max(v.abs()));
+    let step = DIFFERENCE * largest;
     let variables = DMatrix::from_fn(4 * d, 3 * d, |row, i| match (row / 2 == i, row % 2) {
         (true, 0) => mean[i] + step,
         (true, _) => mean[i] - step,
@@ -323,10 +321,8 @@ fn usual_sequence(dataset: &Dataset) -> Vec<(usize, f64)> {
             *total_s += jump.time_s[span.end - 1] - jump.time_s[span.start];
         }
     }
-    let usual = orders
-        .into_iter()
-        .rev()
-        .max_by_key(|(_, (jumps, _))| *jumps);
+    let all = orders.into_iter().rev();
+    let usual = all.max_by_key(|(_, (jumps, _))| *jumps);
     let (order, (jumps, total_s)) = usual.unwrap_or_default();
     let mean_s = total_s.iter().map(|total_s| total_s / jumps as f64);
     order.into_iter().zip(mean_s).collect()
@@ -341,10 +337,8 @@ mod tests {
     fn growth() -> (Growth, Vec<DMatrix<f64>>) {
         let (dataset, latent) = oscillator::jumps(3);
         let (features, truth) = oscillator::known();
-        (
-            Growth::of_jumps(Some(1.0), &dataset, &latent, &features),
-            truth,
-        )
+        let growth = Growth::of_jumps(Some(1.0), &dataset, &latent, &features);
+        (growth, truth)
     }
 
     /// Changes weigh the same in all coefficients.
@@ -412,9 +406,7 @@ mod tests {
         let (growth, mut xi) = growth();
         xi[0][(3, 0)] = 50.0;
         let inputs = xi[0].rows(5, 2).into_owned();
-        growth.hold(&mut xi, |gradient| {
-            gradient.iter().map(|g| g * 0.0).collect()
-        });
+        growth.hold(&mut xi, |all| all.iter().map(|g| g * 0.0).collect());
         assert!(growth.admits(&xi) && xi[0].rows(5, 2) == inputs);
         let unbounded = Growth {
             bound_per_s: None,

@@ -1,14 +1,17 @@
-//! A known system for tests: two latents, a driven oscillator in contact, a falling body in flight.
+//! Data for tests: a known system of two latents, a driven oscillator in contact and a falling body in flight; shipped
+//! jumps.
 
+use std::fmt::Display;
 use std::path::PathBuf;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, Vector2};
 
 use super::dataset::{Dataset, Jump, Rates, ScaleOptions};
 use super::features::Features;
 use super::latent::Latent;
+use super::options::TrainOptions;
 use crate::model::{Library, StandardLibrary};
-use crate::recording::PhaseRule;
+use crate::recording::{PhaseRule, shipped};
 use crate::robot::{InputRule, Robot, STATE_DIM, WrenchFrame};
 
 /// Samples between contact and flight.
@@ -16,7 +19,7 @@ const LIFT_OFF: usize = 120;
 const STEP_S: f64 = 0.002;
 
 /// `ddz` of the known system.
-pub(super) fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] {
+fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] {
     match phase {
         0 => [
             -40.0 * z[0] - 3.0 * dz[0] + 5.0 * u[0],
@@ -24,6 +27,16 @@ pub(super) fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] 
         ],
         _ => [-0.5 * dz[0], -0.981],
     }
+}
+
+/// Shipped jumps of the Go1, such as `train_01`.
+pub(super) fn go1(names: impl IntoIterator<Item = impl Display>) -> Dataset {
+    let names = names.into_iter().map(|name| format!("go1/{name}"));
+    let jumps: Vec<_> = names.map(|name| shipped(&name)).collect();
+    let options = TrainOptions::new("test", 4);
+    let rule = InputRule::published(Robot::by_name("go1").expect("known"));
+    let scaling = options.scaling.factors();
+    Dataset::new(&jumps[..], &rule, &options.phases, &scaling, 11).expect("jumps")
 }
 
 /// A standard library with inputs.
@@ -73,30 +86,22 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
             implausible: Vec::new(),
         }
     });
-    let scaling = ScaleOptions::uniform(1.0).factors();
-    (
-        Dataset {
-            jumps: jumps.collect(),
-            phases: PhaseRule::two_phase(),
-            rule: InputRule::new(
-                Robot::by_name("go1").expect("known"),
-                None,
-                WrenchFrame::World,
-            ),
-            scaling,
-            smoothing: 1,
-            files: None,
-        },
-        latent,
-    )
+    let robot = Robot::by_name("go1").expect("known");
+    let dataset = Dataset {
+        jumps: jumps.collect(),
+        phases: PhaseRule::two_phase(),
+        rule: InputRule::new(robot, None, WrenchFrame::World),
+        scaling: ScaleOptions::uniform(1.0).factors(),
+        smoothing: 1,
+        files: None,
+    };
+    (dataset, latent)
 }
 
 fn simulate(seed: usize) -> Latent {
     let n = 200;
-    let (mut z, mut dz) = (
-        [0.1 + 0.02 * seed as f64, -0.05],
-        [0.3, 0.2 - 0.1 * seed as f64],
-    );
+    let number = seed as f64;
+    let (mut z, mut dz) = ([0.1 + 0.02 * number, -0.05], [0.3, 0.2 - 0.1 * number]);
     let blank = DMatrix::zeros(2, n);
     let mut samples = Latent {
         z: blank.clone(),
@@ -109,15 +114,15 @@ fn simulate(seed: usize) -> Latent {
         let phase = usize::from(i >= LIFT_OFF);
         let input = |time: f64| [(9.0 * time + seed as f64).sin(), (5.0 * time).cos()];
         let start = i as f64 * STEP_S;
-        samples.z.set_column(i, &DVector::from_row_slice(&z));
-        samples.dz.set_column(i, &DVector::from_row_slice(&dz));
-        samples.ddz.set_column(
-            i,
-            &DVector::from_row_slice(&truth(phase, &z, &dz, &input(start))),
-        );
-        samples
-            .u_lat
-            .set_column(i, &DVector::from_row_slice(&input(start)));
+        let u = input(start);
+        for (rows, column) in [
+            (&mut samples.z, z),
+            (&mut samples.dz, dz),
+            (&mut samples.ddz, truth(phase, &z, &dz, &u)),
+            (&mut samples.u_lat, u),
+        ] {
+            rows.set_column(i, &Vector2::from(column));
+        }
         for k in 0..fine {
             let h = STEP_S / fine as f64;
             let acceleration = truth(phase, &z, &dz, &input(start + k as f64 * h));

@@ -44,12 +44,8 @@ fn match_latents(
         .map(|k| (k / d, k % d))
         .map(|(i, j)| {
             let scale = energy(first, i) * energy(second, j);
-            let strength = if scale > 0.0 {
-                shared[(i, j)].abs() / scale
-            } else {
-                0.0
-            };
-            (strength, i, j)
+            let strength = shared[(i, j)].abs() / scale;
+            (if scale > 0.0 { strength } else { 0.0 }, i, j)
         })
         .collect();
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
@@ -59,10 +55,8 @@ fn match_latents(
             (partner[i], taken[j]) = (Some(j), true);
         }
     }
-    partner
-        .into_iter()
-        .map(|j| j.expect("as many coordinates on both sides"))
-        .collect()
+    let partner: Option<Vec<usize>> = partner.into_iter().collect();
+    partner.expect("as many coordinates on both sides")
 }
 
 fn overlap(library: &Library, first: &Fitted, second: &Fitted, partner: &[usize]) -> f64 {
@@ -81,22 +75,18 @@ fn overlap(library: &Library, first: &Fitted, second: &Fitted, partner: &[usize]
         either += found + b.iter().filter(|xi| **xi != 0.0).count();
     }
     let either = either - both;
-    if either == 0 {
-        1.0
-    } else {
-        both as f64 / either as f64
+    match either {
+        0 => 1.0,
+        _ => both as f64 / either as f64,
     }
 }
 
 /// For every term the one that it becomes when latent coordinate `i` is called `partner[i]`, if the library has it.
 fn renamed_terms(library: &Library, partner: &[usize]) -> Vec<Option<usize>> {
     let mut pool = library.pool().clone();
-    let known: BTreeMap<_, _> = library
-        .terms()
-        .iter()
-        .enumerate()
-        .map(|(index, term)| (term.expr(), index))
-        .collect();
+    let terms = library.terms().iter();
+    let indexed = terms.clone().enumerate();
+    let known: BTreeMap<_, _> = indexed.map(|(index, term)| (term.expr(), index)).collect();
     let replacements: Vec<_> = LatentVariable::all(library.latent_dim())
         .filter_map(|variable| {
             let renamed = match variable {
@@ -108,15 +98,8 @@ fn renamed_terms(library: &Library, partner: &[usize]) -> Vec<Option<usize>> {
             Some((library.symbol(variable)?, renamed))
         })
         .collect();
-    library
-        .terms()
-        .iter()
-        .map(|term| {
-            known
-                .get(&pool.substitute(term.expr(), &replacements))
-                .copied()
-        })
-        .collect()
+    let renamed = terms.map(|term| pool.substitute(term.expr(), &replacements));
+    renamed.map(|term| known.get(&term).copied()).collect()
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 
 use nalgebra::DMatrix;
 
-use super::dataset::Dataset;
+use super::dataset::{Dataset, Jump};
 use super::features::Features;
 use super::latent::Latent;
 use super::stepper::{Row, Stepper};
@@ -57,16 +57,13 @@ pub fn restarted(dataset: &Dataset, duration_s: f64) -> Vec<Window> {
 
 /// One window a jump, from its first to its last sample.
 pub fn whole(dataset: &Dataset) -> Vec<Window> {
-    dataset
-        .jumps
-        .iter()
-        .enumerate()
-        .map(|(jump, samples)| Window {
-            jump,
-            start: 0,
-            steps: samples.len() - 1,
-        })
-        .collect()
+    let jumps = dataset.jumps.iter().enumerate();
+    let of = |(jump, samples): (usize, &Jump)| Window {
+        jump,
+        start: 0,
+        steps: samples.len() - 1,
+    };
+    jumps.map(of).collect()
 }
 
 /// Latent positions predicted in every window, `latent_dim x steps` (samples `start + 1 ..= start + steps`).
@@ -157,22 +154,19 @@ mod tests {
     use super::*;
     use crate::train::oscillator;
 
+    fn of<'a>(features: &'a Features, xi: &'a [DMatrix<f64>]) -> Candidate<'a> {
+        Candidate { features, xi }
+    }
+
     #[test]
     fn predictions_of_the_true_dynamics_follow_the_samples_through_both_phases() {
         let (dataset, latent) = oscillator::jumps(2);
         let (features, xi) = oscillator::known();
-        let candidate = Candidate {
-            features: &features,
-            xi: &xi,
-        };
         for windows in [whole(&dataset), restarted(&dataset, 0.1)] {
-            for (window, prediction) in windows
-                .iter()
-                .zip(predict(candidate, &dataset, &latent, &windows))
-            {
-                let truth = latent[window.jump]
-                    .z
-                    .columns(window.start + 1, window.steps);
+            let predictions = predict(of(&features, &xi), &dataset, &latent, &windows);
+            for (window, prediction) in windows.iter().zip(predictions) {
+                let z = &latent[window.jump].z;
+                let truth = z.columns(window.start + 1, window.steps);
                 assert!((prediction - truth).amax() < 2e-4, "{window:?}");
             }
         }
@@ -182,32 +176,17 @@ mod tests {
     fn restarted_windows_cover_every_sample_once() {
         let (dataset, _) = oscillator::jumps(1);
         let windows = restarted(&dataset, 0.1);
-        assert_eq!(
-            windows
-                .iter()
-                .map(|window| window.steps)
-                .collect::<Vec<_>>(),
-            [50, 50, 50, 49]
-        );
-        assert_eq!(
-            windows
-                .iter()
-                .map(|window| window.start)
-                .collect::<Vec<_>>(),
-            [0, 50, 100, 150]
-        );
+        let places = windows.iter().map(|window| (window.start, window.steps));
+        assert!(places.eq([(0, 50), (50, 50), (100, 50), (150, 49)]));
     }
 
     #[test]
     fn windows_of_several_lengths_are_predicted_as_each_by_itself() {
         let (dataset, latent) = oscillator::jumps(2);
         let (features, xi) = oscillator::known();
-        let candidate = Candidate {
-            features: &features,
-            xi: &xi,
-        };
-        let of = |(jump, start, steps)| Window { jump, start, steps };
-        let windows = [(0, 110, 20), (1, 0, 199), (0, 0, 1), (1, 130, 60)].map(of);
+        let candidate = of(&features, &xi);
+        let window = |(jump, start, steps)| Window { jump, start, steps };
+        let windows = [(0, 110, 20), (1, 0, 199), (0, 0, 1), (1, 130, 60)].map(window);
         let together = predict(candidate, &dataset, &latent, &windows);
         for (window, prediction) in windows.iter().zip(&together) {
             let alone = predict(candidate, &dataset, &latent, &[*window]);
@@ -221,9 +200,7 @@ mod tests {
         let (dataset, latent) = oscillator::jumps(1);
         let (features, xi) = oscillator::known();
         let predicted = |xi: &[DMatrix<f64>], window| {
-            let features = &features;
-            let candidate = Candidate { features, xi };
-            predict(candidate, &dataset, &latent, &[window]).remove(0)
+            predict(of(&features, xi), &dataset, &latent, &[window]).remove(0)
         };
         let changes = [((1, 0, 1), 0.3), ((0, 1, 0), -2.0), ((0, 2, 1), 0.5)];
         let changes = changes.map(|(place, by)| Change { place, by });
@@ -233,10 +210,7 @@ mod tests {
                 start,
                 steps: if phases[1] { 199 - start } else { 50 },
             };
-            let candidate = Candidate {
-                features: &features,
-                xi: &xi,
-            };
+            let candidate = of(&features, &xi);
             let found = predict_changed(candidate, &changes, &dataset, &latent, window);
             let unchanged = predicted(&xi, window);
             for (Change { place, by }, found) in changes.iter().zip(&found) {
@@ -254,15 +228,7 @@ mod tests {
         let (dataset, latent) = oscillator::jumps(1);
         let (features, mut xi) = oscillator::known();
         xi[0][(1, 0)] = 1e7;
-        let prediction = &predict(
-            Candidate {
-                features: &features,
-                xi: &xi,
-            },
-            &dataset,
-            &latent,
-            &whole(&dataset),
-        )[0];
-        assert!(!prediction.iter().all(|value| value.is_finite()));
+        let predictions = predict(of(&features, &xi), &dataset, &latent, &whole(&dataset));
+        assert!(!predictions[0].iter().all(|value| value.is_finite()));
     }
 }

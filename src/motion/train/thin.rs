@@ -31,11 +31,8 @@ impl Refiner<'_> {
             let places = self.free_places(&thinned.xi);
             let scales = relative(&thinned, &places);
             let model = self.model(&thinned.xi, &places, &scales, weights);
-            let Some(mut about) =
-                model.and_then(|model| About::new(&thinned, places, scales, &model))
-            else {
-                break;
-            };
+            let about = model.and_then(|model| About::new(&thinned, places, scales, &model));
+            let Some(mut about) = about else { break };
             let before = about.places.len();
             let Some(fewer) = self.drop_about(&mut about, &thinned, limit) else {
                 break;
@@ -147,10 +144,9 @@ impl About {
         for (i, &(phase, term, column)) in self.places.iter().enumerate() {
             let change = self.lowest[i] * self.scales[i];
             let coefficient = &mut xi[phase][(term, column)];
-            *coefficient = if self.gone[i] {
-                0.0
-            } else {
-                *coefficient + change
+            *coefficient = match self.gone[i] {
+                true => 0.0,
+                false => *coefficient + change,
             };
         }
         xi

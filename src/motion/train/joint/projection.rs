@@ -23,9 +23,7 @@ impl InputProjection {
         let gram = encoder.tr_mul(encoder) + DMatrix::identity(d, d) * DAMPING;
         let inverse_gram = match gram.clone().cholesky() {
             Some(factor) => factor.inverse(),
-            None => gram
-                .pseudo_inverse(1e-12)
-                .expect("the tolerance is positive"),
+            None => gram.pseudo_inverse(1e-12).expect("a positive tolerance"),
         };
         Self {
             weights: encoder * &inverse_gram,
