@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use super::dataset::Dataset;
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
-use super::latent::Latent;
+use super::latent::{EncodedSet, Latent};
 use super::metrics::PLACE;
 use super::options::{EncoderOptions, TrainOptions};
 use super::report::TrainReport;
@@ -143,7 +143,7 @@ fn inputs_given_states(
     let given = phases.map(|(phase, xi)| {
         let blocks = || {
             let mut values = FeatureValues::default();
-            let blocks = Latent::regression_blocks(dataset, &latent, phase);
+            let blocks = EncodedSet::new(dataset, &latent).regression_blocks(phase);
             let features = &features;
             blocks.map(move |(variables, ddz)| {
                 let left = ddz - features.evaluate(&variables, &mut values) * xi;

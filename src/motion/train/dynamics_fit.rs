@@ -7,7 +7,7 @@ use super::error::TrainError;
 use super::features::Features;
 use super::joint::Losses;
 use super::judge::Judge;
-use super::latent::{Latent, input_projection, lift_samples, mean_jacobian};
+use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jacobian};
 use super::metrics::{Assessed, BODY_X, BODY_Z, SetMetrics, measure, measure_encoded};
 use super::progress::Watch;
 use super::report::{PhaseTerms, SeedReport, TrainReport};
@@ -98,10 +98,9 @@ impl Task<'_> {
         };
         let judged_latent = validated.as_ref().unwrap_or(&latent);
         let (options, features) = (&self.options.regression, &self.features);
-        let judge = Judge::new(features, judged, judged_latent, options.rollout_weight);
+        let judge = Judge::new(features, EncodedSet::new(judged, judged_latent));
         let target = Target {
-            dataset: training,
-            latent: &latent,
+            set: EncodedSet::new(training, &latent),
             features,
             knowledge: &self.knowledge,
         };
@@ -118,7 +117,7 @@ impl Task<'_> {
             choice: Some((selected.choice, selected.candidates)),
             training: None,
         };
-        let measured = measure_encoded(fitted.assessed(features), training, &latent)?;
+        let measured = measure_encoded(fitted.assessed(features), target.set)?;
         fitted.training = Some(measured);
         Ok(fitted)
     }

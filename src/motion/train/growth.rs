@@ -11,7 +11,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::dataset::Dataset;
 use super::features::{FeatureValues, Features};
-use super::latent::Latent;
+use super::latent::EncodedSet;
 use crate::evaluate::{eigenvalues, state_matrix};
 
 /// Steps of least change before coefficients are scaled down instead.
@@ -43,19 +43,14 @@ struct Mode {
 
 impl Growth {
     /// Of these jumps: the mean state of each phase, and the most frequent order of phases with its mean durations.
-    pub fn of_jumps(
-        bound_per_s: Option<f64>,
-        dataset: &Dataset,
-        latent: &[Latent],
-        features: &Features,
-    ) -> Self {
-        let phases = 0..dataset.phases.patterns.len();
+    pub fn of_jumps(bound_per_s: Option<f64>, set: EncodedSet<'_>, features: &Features) -> Self {
+        let phases = 0..set.dataset.phases.patterns.len();
         Self {
             bound_per_s,
             slopes: phases
-                .map(|phase| slopes_at(&mean_of(phase, dataset, latent), features))
+                .map(|phase| slopes_at(&mean_of(phase, set), features))
                 .collect(),
-            sequence: usual_sequence(dataset),
+            sequence: usual_sequence(set.dataset),
         }
     }
 
@@ -276,18 +271,19 @@ fn dot(a: &[DMatrix<f64>], b: &[DMatrix<f64>]) -> f64 {
 }
 
 /// Mean of `z`, `dz`, `u_lat` over the samples of a phase, 0 if there are none.
-fn mean_of(phase: usize, dataset: &Dataset, latent: &[Latent]) -> Vec<f64> {
-    let d = latent.first().map_or(0, |first| first.z.nrows());
+fn mean_of(phase: usize, set: EncodedSet<'_>) -> Vec<f64> {
+    let d = set.latent_dim();
     let mut mean = vec![0.0; 3 * d];
-    for (jump, range) in dataset.spans(Some(phase)) {
-        let of = [&latent[jump].z, &latent[jump].dz, &latent[jump].u_lat];
+    for (jump, range) in set.dataset.spans(Some(phase)) {
+        let latent = &set.latent[jump];
+        let of = [&latent.z, &latent.dz, &latent.u_lat];
         for sample in range {
             for (i, total) in mean.iter_mut().enumerate() {
                 *total += of[i / d][(i % d, sample)];
             }
         }
     }
-    let samples = dataset.samples(Some(phase)).max(1) as f64;
+    let samples = set.dataset.samples(Some(phase)).max(1) as f64;
     mean.iter_mut().for_each(|total| *total /= samples);
     mean
 }
@@ -337,8 +333,8 @@ mod tests {
     fn growth() -> (Growth, Vec<DMatrix<f64>>) {
         let (dataset, latent) = oscillator::jumps(3);
         let (features, truth) = oscillator::known();
-        let growth = Growth::of_jumps(Some(1.0), &dataset, &latent, &features);
-        (growth, truth)
+        let set = EncodedSet::new(&dataset, &latent);
+        (Growth::of_jumps(Some(1.0), set, &features), truth)
     }
 
     /// Changes weigh the same in all coefficients.

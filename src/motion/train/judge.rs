@@ -6,9 +6,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::dataset::Dataset;
 use super::features::Features;
-use super::latent::Latent;
+use super::latent::{EncodedSet, Latent};
 use super::rollout::{Candidate, Change, Window, predict, predict_changed, restarted, whole};
 
+/// Weight of whole-jump rollouts against predictions of 0.1 s in a score.
+const ROLLOUT_WEIGHT: f64 = 0.2;
 /// Samples between errors that coefficients are refined by.
 const THINNED: usize = 5;
 /// Samples of a part, of which there are several only for more recordings than fit into little memory.
@@ -24,50 +26,35 @@ const LONG: usize = 1;
 pub struct Judge<'a> {
     /// The library.
     pub features: &'a Features,
-    dataset: &'a Dataset,
-    latent: &'a [Latent],
+    set: EncodedSet<'a>,
     windows: [Vec<Window>; 2],     // short and long
     parts: Vec<[Range<usize>; 2]>, // those of consecutive jumps
     scales: [Vec<f64>; 2],         // what errors are multiplied by, a coordinate
-    rollout_weight: f64,
 }
 
 impl<'a> Judge<'a> {
     /// Judges on these jumps.
-    pub fn new(
-        features: &'a Features,
-        dataset: &'a Dataset,
-        latent: &'a [Latent],
-        rollout_weight: f64,
-    ) -> Self {
-        Self::in_parts(features, (dataset, latent), rollout_weight, PART)
+    pub fn new(features: &'a Features, set: EncodedSet<'a>) -> Self {
+        Self::in_parts(features, set, PART)
     }
 
-    fn in_parts(
-        features: &'a Features,
-        (dataset, latent): (&'a Dataset, &'a [Latent]),
-        rollout_weight: f64,
-        samples: usize,
-    ) -> Self {
-        let d = latent.first().map_or(0, |first| first.z.nrows());
-        let inverse_std: Vec<f64> = (0..d)
-            .map(|row| 1.0 / row_std(latent, row).max(f64::MIN_POSITIVE))
+    fn in_parts(features: &'a Features, set: EncodedSet<'a>, samples: usize) -> Self {
+        let inverse_std: Vec<f64> = (0..set.latent_dim())
+            .map(|row| 1.0 / row_std(set.latent, row).max(f64::MIN_POSITIVE))
             .collect();
-        let windows = [restarted(dataset, 0.1), whole(dataset)];
+        let windows = [restarted(set.dataset, 0.1), whole(set.dataset)];
         let of_jumps = |windows: &Vec<Window>, jumps: &Range<usize>| {
             let before = |jump| windows.partition_point(|window| window.jump < jump);
             before(jumps.start)..before(jumps.end)
         };
-        let parts = parts_of(dataset, samples)
+        let parts = parts_of(set.dataset, samples)
             .map(|jumps| windows.each_ref().map(|windows| of_jumps(windows, &jumps)));
         Self {
             features,
             parts: parts.collect(),
-            dataset,
-            latent,
+            set,
             windows,
             scales: [inverse_std.clone(), inverse_std],
-            rollout_weight,
         }
     }
 
@@ -97,10 +84,10 @@ impl<'a> Judge<'a> {
     /// The same, or a number above `limit` if the score is: whole jumps are left out if 0.1 s are enough to know.
     pub fn score_within(&self, xi: &[DMatrix<f64>], limit: f64) -> f64 {
         let short = self.error(xi, SHORT);
-        if short > limit || self.rollout_weight == 0.0 {
+        if short > limit {
             return short;
         }
-        short + self.rollout_weight * self.error(xi, LONG)
+        short + ROLLOUT_WEIGHT * self.error(xi, LONG)
     }
 
     /// Parts that [`Self::errors`] can be asked for, one by one so that few predictions are held at a time.
@@ -128,12 +115,11 @@ impl<'a> Judge<'a> {
         changes: &[Change],
         part: usize,
     ) -> Option<Vec<[DVector<f64>; 2]>> {
-        let (candidate, dataset) = (self.candidate(xi), self.dataset);
+        let candidate = self.candidate(xi);
         let of_kind = |kind: usize| {
             let mut errors = vec![Vec::new(); changes.len()];
             for window in self.windows_of(part, kind) {
-                let predictions =
-                    predict_changed(candidate, changes, dataset, self.latent, *window);
+                let predictions = predict_changed(candidate, changes, self.set, *window);
                 for (errors, prediction) in errors.iter_mut().zip(&predictions) {
                     self.add_errors(kind, window, prediction, errors);
                 }
@@ -158,7 +144,7 @@ impl<'a> Judge<'a> {
         kind: usize,
     ) -> impl Iterator<Item = (&Window, DMatrix<f64>)> {
         let windows = self.windows_of(part, kind);
-        let predictions = predict(self.candidate(xi), self.dataset, self.latent, windows);
+        let predictions = predict(self.candidate(xi), self.set, windows);
         windows.iter().zip(predictions)
     }
 
@@ -174,7 +160,7 @@ impl<'a> Judge<'a> {
         prediction: &DMatrix<f64>,
         errors: &mut Vec<f64>,
     ) {
-        let z = &self.latent[window.jump].z;
+        let z = &self.set.latent[window.jump].z;
         for step in (THINNED - 1..window.steps).step_by(THINNED) {
             for (row, scale) in self.scales[kind].iter().enumerate() {
                 let truth = z[(row, window.start + 1 + step)];
@@ -201,19 +187,16 @@ impl<'a> Judge<'a> {
         let (mut squares, mut count) = (vec![0.0; self.scales[kind].len()], 0);
         for part in self.parts() {
             for (window, prediction) in self.predictions(xi, part, kind) {
-                let truth = self.latent[window.jump]
-                    .z
-                    .columns(window.start + 1, window.steps);
+                let z = &self.set.latent[window.jump].z;
+                let truth = z.columns(window.start + 1, window.steps);
                 for (row, square) in squares.iter_mut().enumerate() {
                     *square += (prediction.row(row) - truth.row(row)).norm_squared();
                 }
                 count += window.steps;
             }
         }
-        squares
-            .iter()
-            .map(|square| square / count.max(1) as f64)
-            .collect()
+        let means = squares.iter().map(|square| square / count.max(1) as f64);
+        means.collect()
     }
 }
 
@@ -258,7 +241,7 @@ mod tests {
         let (dataset, latent) = oscillator::jumps(3);
         let (features, truth) = oscillator::known();
         let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();
-        let plain = Judge::new(&features, &dataset, &latent, 0.2);
+        let plain = Judge::new(&features, EncodedSet::new(&dataset, &latent));
         let judge = plain.relative_to(&off);
         assert!((judge.score(&off) - 1.2).abs() < 1e-12);
         assert!(judge.score(&truth) < 0.05);
@@ -276,7 +259,7 @@ mod tests {
     fn score_within_a_limit_is_the_score_or_above_the_limit() {
         let (dataset, latent) = oscillator::jumps(3);
         let (features, truth) = oscillator::known();
-        let judge = Judge::new(&features, &dataset, &latent, 0.2);
+        let judge = Judge::new(&features, EncodedSet::new(&dataset, &latent));
         let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();
         let (score, short) = (judge.score(&off), judge.error(&off, SHORT));
         assert_eq!(judge.score_within(&off, score), score);
@@ -297,12 +280,13 @@ mod tests {
             let changed = judge.errors_changed(&off, &[change], part)?;
             Some([judge.errors(&off, part)?, changed[0].clone()])
         };
-        let together = Judge::new(&features, &dataset, &latent, 0.2);
+        let set = EncodedSet::new(&dataset, &latent);
+        let together = Judge::new(&features, set);
         assert_eq!(together.parts(), 0..1);
         let all = errors(&together, 0).expect("no rollout diverges");
         assert_ne!(all[0], all[1]);
         for (samples, n_parts) in [(2 * dataset.jumps[0].len(), 3), (1, 5)] {
-            let judge = Judge::in_parts(&features, (&dataset, &latent), 0.2, samples);
+            let judge = Judge::in_parts(&features, set, samples);
             assert_eq!(judge.parts(), 0..n_parts);
             let parts = judge.parts().map(|part| errors(&judge, part));
             let parts: Option<Vec<_>> = parts.collect();

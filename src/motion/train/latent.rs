@@ -75,15 +75,48 @@ impl Latent {
         latent
     }
 
+    /// Writes `[z, dz, u_lat]` of some samples into the rows of `variables`.
+    pub fn copy_variables(&self, range: Range<usize>, variables: &mut DMatrixViewMut<'_, f64>) {
+        let d = self.z.nrows();
+        for (block, source) in [&self.z, &self.dz, &self.u_lat].into_iter().enumerate() {
+            variables
+                .columns_mut(block * d, d)
+                .tr_copy_from(&source.columns_range(range.clone()));
+        }
+    }
+}
+
+/// A dataset with its latent samples, one of each jump.
+#[derive(Clone, Copy, Debug)]
+pub struct EncodedSet<'a> {
+    /// The jumps.
+    pub dataset: &'a Dataset,
+    /// Their latent samples.
+    pub latent: &'a [Latent],
+}
+
+impl<'a> EncodedSet<'a> {
+    /// These latent samples of a dataset.
+    pub fn new(dataset: &'a Dataset, latent: &'a [Latent]) -> Self {
+        Self { dataset, latent }
+    }
+
+    /// Number of latent coordinates, 0 without a jump.
+    pub fn latent_dim(self) -> usize {
+        self.latent.first().map_or(0, |first| first.z.nrows())
+    }
+
     /// Blocks of the samples of one phase: `[z, dz, u_lat]`, `n x 3 latent_dim`, and `ddz^T`, `n x latent_dim`.
-    pub fn regression_blocks<'a>(
-        dataset: &'a Dataset,
-        latent: &'a [Latent],
+    pub fn regression_blocks(
+        self,
         phase: usize,
-    ) -> impl Iterator<Item = (DMatrix<f64>, DMatrix<f64>)> + 'a {
-        let d = latent.first().map_or(0, |first| first.z.nrows());
+    ) -> impl Iterator<Item = (DMatrix<f64>, DMatrix<f64>)> {
+        let Self { dataset, latent } = self;
+        let d = self.latent_dim();
         let spans = dataset.spans(Some(phase));
-        let mut spans = spans.map(|(jump, range)| (&latent[jump], range)).peekable();
+        let mut spans = spans
+            .map(move |(jump, range)| (&latent[jump], range))
+            .peekable();
         block_widths(dataset.samples(Some(phase))).map(move |width| {
             let (mut variables, mut target) =
                 (DMatrix::zeros(width, 3 * d), DMatrix::zeros(width, d));
@@ -106,21 +139,11 @@ impl Latent {
     }
 
     /// Jump and sample of a row of [`Self::regression_blocks`], if there are so many.
-    pub fn place_of_row(dataset: &Dataset, phase: usize, row: usize) -> Option<(&Jump, usize)> {
-        let spans = dataset.spans(Some(phase));
+    pub fn place_of_row(self, phase: usize, row: usize) -> Option<(&'a Jump, usize)> {
+        let spans = self.dataset.spans(Some(phase));
         let mut places = spans.flat_map(|(jump, range)| range.map(move |sample| (jump, sample)));
         let (jump, sample) = places.nth(row)?;
-        Some((&dataset.jumps[jump], sample))
-    }
-
-    /// Writes `[z, dz, u_lat]` of some samples into the rows of `variables`.
-    pub fn copy_variables(&self, range: Range<usize>, variables: &mut DMatrixViewMut<'_, f64>) {
-        let d = self.z.nrows();
-        for (block, source) in [&self.z, &self.dz, &self.u_lat].into_iter().enumerate() {
-            variables
-                .columns_mut(block * d, d)
-                .tr_copy_from(&source.columns_range(range.clone()));
-        }
+        Some((&self.dataset.jumps[jump], sample))
     }
 }
 

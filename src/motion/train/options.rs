@@ -14,7 +14,6 @@ use super::map_options::MapOptions;
 use super::metrics::{BODY_X, BODY_Z};
 use super::progress::Watch;
 use super::report::Trained;
-use super::sparse::Pruning;
 use crate::limits::table;
 use crate::model::{Library, ModelError, StandardLibrary, check_name};
 use crate::recording::PhaseRule;
@@ -155,27 +154,15 @@ pub enum Coordinates {
 }
 
 /// Settings of the regression for Xi.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RegressionOptions {
     /// Window of the moving average over accelerations, in samples.
     pub smoothing: usize,
-    /// Windows (samples) over which the dynamics are integrated before regression; 0 means the accelerations.
-    pub windows: Vec<usize>,
-    /// Ridges on the normalised columns.
-    pub ridges: Vec<f64>,
-    /// Prunings.
-    pub prunings: Vec<Pruning>,
     /// Of all candidates within this share of the best validation score, the one with fewest terms is taken.
     pub slack: f64,
-    /// How many candidates are pruned further, a term at a time, while their score stays within the slack.
-    pub sweeps: usize,
-    /// Weight of whole-jump rollouts against predictions of 0.1 s in the validation score.
-    pub rollout_weight: f64,
     /// Steps by which rollouts of the training jumps refine the coefficients chosen; 0 leaves the regression's.
-    #[serde(default)]
     pub refinements: usize,
     /// Largest rate in 1/s at which deviations may grow, in every phase and through their sequence; none for no bound.
-    #[serde(default)]
     pub growth_per_s: Option<f64>,
 }
 
@@ -287,29 +274,12 @@ impl TrainOptions {
         if let Some(rate) = regression.growth_per_s {
             table::GROWTH.check(rate)?;
         }
-        at_least_zero("rollout-weight", regression.rollout_weight)?;
-        for ridge in &regression.ridges {
-            in_range("ridge", *ridge, *ridge > 0.0, "a finite number above 0")?;
-        }
-        for pruning in &regression.prunings {
-            let (Pruning::Threshold(value) | Pruning::Elimination(value)) = pruning;
-            at_least_zero("threshold", *value)?;
-        }
         self.scaling.check()?;
         if let Some((array, joint, found)) = self.actuators.as_ref().and_then(Actuators::unusable) {
             return Err(TrainError::Option {
                 option: "actuators",
                 found: format!("{array} {found} at {}", JOINT_NAMES[joint]),
                 expected: "finite numbers of at least 0",
-            });
-        }
-        let (windows, ridges) = (regression.windows.len(), regression.ridges.len());
-        let prunings = regression.prunings.len();
-        if [windows, ridges, prunings].contains(&0) {
-            return Err(TrainError::Option {
-                option: "windows, ridges and prunings",
-                found: format!("{windows}, {ridges} and {prunings} values"),
-                expected: "at least one each",
             });
         }
         Ok(())
@@ -392,38 +362,11 @@ impl Default for EncoderOptions {
 
 impl Default for RegressionOptions {
     fn default() -> Self {
-        let eliminations = [1e-3, 3e-3, 1e-2, 2e-2, 3e-2, 5e-2].map(Pruning::Elimination);
-        let thresholds = [0.0, 0.03, 0.1, 0.2].map(Pruning::Threshold);
         Self {
             smoothing: 11,
-            windows: vec![0, 25, 50],
-            ridges: vec![1e-4, 1e-3, 1e-2],
-            prunings: eliminations.into_iter().chain(thresholds).collect(),
             slack: 0.1,
-            sweeps: 3,
-            rollout_weight: 0.2,
             refinements: 10,
             growth_per_s: Some(3.0),
         }
     }
-}
-
-fn at_least_zero(option: &'static str, value: f64) -> Result<(), TrainError> {
-    in_range(option, value, value >= 0.0, "a finite number of at least 0")
-}
-
-fn in_range(
-    option: &'static str,
-    value: f64,
-    inside: bool,
-    expected: &'static str,
-) -> Result<(), TrainError> {
-    let refused = || TrainError::Option {
-        option,
-        found: value.to_string(),
-        expected,
-    };
-    (inside && value.is_finite())
-        .then_some(())
-        .ok_or_else(refused)
 }

@@ -295,14 +295,16 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
+    use crate::train::latent::EncodedSet;
     use crate::train::oscillator;
     use crate::train::progress::{Progress, Watch};
 
     fn refined(start: Vec<DMatrix<f64>>, knowledge: &[Knowledge]) -> (f64, Coefficients) {
         let (dataset, latent) = oscillator::jumps(3);
         let (features, _) = oscillator::known();
-        let judge = Judge::new(&features, &dataset, &latent, 0.2);
-        let growth = Growth::of_jumps(Some(1.0), &dataset, &latent, &features);
+        let set = EncodedSet::new(&dataset, &latent);
+        let judge = Judge::new(&features, set);
+        let growth = Growth::of_jumps(Some(1.0), set, &features);
         let refiner = Refiner {
             knowledge,
             growth: &growth,

@@ -161,6 +161,7 @@ mod tests {
     use crate::train::growth::Growth;
     use crate::train::judge::Judge;
     use crate::train::knowledge::Knowledge;
+    use crate::train::latent::EncodedSet;
     use crate::train::oscillator;
     use crate::train::progress::Progress;
 
@@ -168,10 +169,11 @@ mod tests {
     fn left_of_too_many(limit: f64) -> Vec<DMatrix<f64>> {
         let (dataset, latent) = oscillator::jumps(3);
         let (features, truth) = oscillator::known();
-        let judge = Judge::new(&features, &dataset, &latent, 0.2);
+        let set = EncodedSet::new(&dataset, &latent);
+        let judge = Judge::new(&features, set);
         let mut knowledge = [Knowledge::nothing(7, 2), Knowledge::nothing(7, 2)];
         knowledge[0].kept[(3, 0)] = true;
-        let growth = Growth::of_jumps(None, &dataset, &latent, &features);
+        let growth = Growth::of_jumps(None, set, &features);
         let refiner = Refiner {
             knowledge: &knowledge,
             growth: &growth,

@@ -2,10 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::dataset::Dataset;
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
-use super::latent::Latent;
+use super::latent::{EncodedSet, Latent};
 
 /// Samples between the starts of two windows.
 const STRIDE: usize = 5;
@@ -16,17 +15,13 @@ const LARGEST: f64 = 1e150;
 ///
 /// # Errors
 /// [`TrainError::TermValue`].
-pub fn check_terms(
-    dataset: &Dataset,
-    latent: &[Latent],
-    features: &Features,
-) -> Result<(), TrainError> {
+pub fn check_terms(set: EncodedSet<'_>, features: &Features) -> Result<(), TrainError> {
     let bad = |value: &f64| value.is_nan() || value.abs() > LARGEST;
     let mut values = FeatureValues::default();
-    for (phase, pattern) in dataset.phases.patterns.iter().enumerate() {
+    for (phase, pattern) in set.dataset.phases.patterns.iter().enumerate() {
         let mut first: Option<(usize, usize, f64)> = None; // term, row, value
         let mut above = 0;
-        for (variables, _) in Latent::regression_blocks(dataset, latent, phase) {
+        for (variables, _) in set.regression_blocks(phase) {
             let theta = features.evaluate(&variables, &mut values);
             let terms = first.map_or(theta.ncols(), |(term, _, _)| term);
             let found = (0..terms).find_map(|term| {
@@ -40,7 +35,7 @@ pub fn check_terms(
         let Some((term, row, found)) = first else {
             continue;
         };
-        let (jump, sample) = Latent::place_of_row(dataset, phase, row)
+        let (jump, sample) = (set.place_of_row(phase, row))
             .expect("invariant: a row of the regression is a sample of the phase");
         return Err(TrainError::TermValue {
             path: jump.path.clone(),
@@ -62,18 +57,17 @@ pub fn check_terms(
 /// (the integral form of Schaeffer and McCalla 2017, here of second order). They need no accelerations and weigh
 /// coefficients by what they do to a prediction. A `window` of 0 gives the smoothed accelerations themselves.
 pub fn windowed_samples(
-    dataset: &Dataset,
-    latent: &[Latent],
+    set: EncodedSet<'_>,
     features: &Features,
     phase: usize,
     window: usize,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
     let (p, d) = (features.library_dim(), features.latent_dim());
     if window == 0 {
-        let n = dataset.samples(Some(phase));
+        let n = set.dataset.samples(Some(phase));
         let (mut theta, mut targets) = (DMatrix::zeros(n, p), DMatrix::zeros(n, d));
         let (mut at, mut values) = (0, FeatureValues::default());
-        for (variables, target) in Latent::regression_blocks(dataset, latent, phase) {
+        for (variables, target) in set.regression_blocks(phase) {
             let count = variables.nrows();
             let block = features.evaluate(&variables, &mut values);
             theta.rows_mut(at, count).copy_from(&block);
@@ -83,10 +77,10 @@ pub fn windowed_samples(
         return (theta, targets);
     }
     let (mut theta_rows, mut target_rows) = (Vec::new(), Vec::new());
-    let spans = dataset.spans(Some(phase));
+    let spans = set.dataset.spans(Some(phase));
     for (jump, range) in spans.filter(|(_, range)| range.len() > 4) {
-        let time_s = &dataset.jumps[jump].time_s;
-        let span = Span::new(&latent[jump], time_s, range.clone(), features);
+        let time_s = &set.dataset.jumps[jump].time_s;
+        let span = Span::new(&set.latent[jump], time_s, range.clone(), features);
         let window = window.min(range.len() - 1);
         for start in (0..range.len() - window).step_by(STRIDE) {
             span.equations(start, start + window, &mut theta_rows, &mut target_rows);
@@ -175,7 +169,8 @@ mod tests {
         let (dataset, latent) = oscillator::jumps(4);
         let (features, truth) = oscillator::known();
         for window in [0, 20, 60] {
-            let (theta, target) = windowed_samples(&dataset, &latent, &features, 0, window);
+            let set = EncodedSet::new(&dataset, &latent);
+            let (theta, target) = windowed_samples(set, &features, 0, window);
             let xi = Regression::new(&theta, &target, Knowledge::nothing(7, 2))
                 .fit(1e-9, Pruning::Threshold(1e-3));
             let active = xi

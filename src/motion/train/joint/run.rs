@@ -20,7 +20,9 @@ use crate::train::data_sets::Recordings;
 use crate::train::dataset::Quantity;
 use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
-use crate::train::latent::{Latent, fit_affine, least_squares_decoder, map_samples, mean_jacobian};
+use crate::train::latent::{
+    EncodedSet, Latent, fit_affine, least_squares_decoder, map_samples, mean_jacobian,
+};
 use crate::train::options::{TrainOptions, Transfer};
 use crate::train::progress::Watch;
 use crate::train::random::Random;
@@ -263,10 +265,8 @@ impl Trainer<'_> {
     fn published_score(&self, parameters: &Parameters, judged: &[Batch]) -> f64 {
         let weights = self.task.options.joint.weights;
         let mut loss = self.loss(weights, parameters);
-        let total: f64 = judged
-            .iter()
-            .map(|batch| loss.evaluate(parameters, batch).total(&weights))
-            .sum();
+        let mut of = |batch| loss.evaluate(parameters, batch).total(&weights);
+        let total: f64 = judged.iter().map(&mut of).sum();
         total / judged.len().max(1) as f64
     }
 
@@ -360,7 +360,7 @@ impl Trainer<'_> {
             let plain = LatentBasis::unchanged(self.task.options.latent_dim);
             let encoder = self.state_maps(&self.start(seed), &plain)?.0;
             let latent = Latent::of(training, &encoder)?;
-            check_terms(training, &latent, &self.task.features)
+            check_terms(EncodedSet::new(training, &latent), &self.task.features)
         };
         terms_at_start().err().unwrap_or(error)
     }
