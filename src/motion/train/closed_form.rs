@@ -46,7 +46,7 @@ pub fn closed_form(
         }
         seeds.add(seed, fit(&task, seed, watch), watch)?;
     }
-    seeds.into_model(task, robot, "closed-form", origin)
+    seeds.into_model(task, "closed-form", origin)
 }
 
 /// The numbers of one seed, and its score.

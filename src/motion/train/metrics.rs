@@ -1,7 +1,7 @@
 //! How good a model is on a set of jumps.
 
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::dataset::{Dataset, Rates, Scaling, mean};
 use super::error::TrainError;
@@ -25,7 +25,7 @@ const SHORT_S: f64 = 0.1;
 const SMOOTHING: usize = 11;
 
 /// Figures of one model on one set of jumps.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SetMetrics {
     /// Mean square of `x - decode(encode(x))` over samples and coordinates, scaled units.
     pub decoder_mse: f64,

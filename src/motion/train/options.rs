@@ -9,6 +9,7 @@ use super::closed_form::closed_form;
 use super::data_sets::Recordings;
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
+use super::joint::batch::BATCH_ROWS;
 use super::joint::{LossWeights, Schedule, Unroll, joint};
 use super::map_options::MapOptions;
 use super::metrics::{BODY_X, BODY_Z};
@@ -90,14 +91,12 @@ pub struct TrainOptions {
 }
 
 /// Settings of the joint training.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct JointOptions {
     /// Epochs, thresholding, step length.
     pub schedule: Schedule,
     /// Weights of the accelerations and of sparsity in the loss.
     pub weights: LossWeights,
-    /// Samples of a batch; each phase of a jump is resampled to a multiple.
-    pub batch_rows: usize,
     /// Value that all coefficients start at.
     pub xi_start: f64,
     /// Seeds trained at the same time; the result does not depend on it.
@@ -111,8 +110,7 @@ pub struct JointOptions {
 }
 
 /// What follows the joint step on contact data.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transfer {
     /// The published steps by Adam: decoder on whole jumps, then Xi of every phase.
     Published,
@@ -121,7 +119,7 @@ pub enum Transfer {
 }
 
 /// Settings of the encoder.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EncoderOptions {
     /// Weight of the input energy which the latent input cannot carry, against the reconstruction error in scaled
     /// units (the lift loss); 0 leaves the lift to chance.
@@ -135,21 +133,19 @@ pub struct EncoderOptions {
     /// Whether the latent basis is rotated by varimax.
     pub rotate: bool,
     /// What the encoder's rows are made of.
-    #[serde(default)]
     pub coordinates: Coordinates,
     /// Random starting points of the search.
     pub restarts: usize,
 }
 
 /// What the rows of a linear encoder are made of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
     /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right;
     /// the dynamics obey what is known of them.
     Named,
     /// Any rows over all coordinates that move or are actuated.
-    #[default] // what a training did before it had the choice
     Free,
 }
 
@@ -295,10 +291,10 @@ impl JointOptions {
         table::BPTT_STRIDE.check_count(stride)?;
         table::BPTT_DECAY.check(self.unroll.decay)?;
         let reach = window.checked_mul(stride);
-        if self.weights.bptt > 0.0 && reach.is_none_or(|reach| reach >= self.batch_rows) {
+        if self.weights.bptt > 0.0 && reach.is_none_or(|reach| reach >= BATCH_ROWS) {
             return Err(TrainError::Option {
                 option: "bptt-window times bptt-stride",
-                found: format!("{window} x {stride} with batches of {}", self.batch_rows),
+                found: format!("{window} x {stride} with batches of {BATCH_ROWS}"),
                 expected: "fewer samples than a batch has",
             });
         }
@@ -335,7 +331,6 @@ impl Default for JointOptions {
         Self {
             schedule: Schedule::default(),
             weights: LossWeights::default(),
-            batch_rows: 100,
             xi_start: 0.0,
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             unroll: Unroll::default(),

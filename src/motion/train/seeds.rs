@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::assemble::{Origin, Parts, assemble};
+use super::assemble::{Origin, provenance};
 use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::jumps::learn_jumps;
@@ -11,7 +11,6 @@ use super::progress::Watch;
 use super::report::{SeedReport, Trained};
 use super::task::Task;
 use crate::model::{Library, ModelError};
-use crate::robot::Robot;
 
 /// Outcomes of the seeds so far.
 #[derive(Default)]
@@ -51,7 +50,6 @@ impl Seeds {
     pub fn into_model(
         self,
         task: Task<'_>,
-        robot: &'static Robot,
         method: &str,
         origin: &Origin,
     ) -> Result<Trained, TrainError> {
@@ -61,19 +59,12 @@ impl Seeds {
         if reports.len() > 1 || reports[0].losses.is_some() {
             (report.seeds, report.support_overlap) = (reports, overlap);
         }
-        let (options, training) = (task.options, &task.sets.training);
-        let jumps = learn_jumps(training, &best.encoder)?.map(|learned| {
+        let jumps = learn_jumps(&task.sets.training, &best.encoder)?.map(|learned| {
             report.deviations = learned.scores;
             learned.prior
         });
-        let parts = Parts {
-            library: task.library,
-            encoder: best.encoder,
-            decoder: best.decoder,
-            xi: best.xi,
-            jumps,
-        };
-        let model = assemble(parts, training, robot, options, method, origin, &report)?;
+        let provenance = provenance(task.options, method, origin, &report);
+        let model = task.assemble(best, jumps, provenance)?;
         Ok(Trained { model, report })
     }
 

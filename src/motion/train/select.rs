@@ -1,7 +1,7 @@
 //! Choosing Xi: many candidates, judged by what their rollouts predict on jumps that were not fitted.
 
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::error::TrainError;
 use super::features::Features;
@@ -36,7 +36,7 @@ const PRUNINGS: [Pruning; 10] = [
 const SWEEPS: usize = 3;
 
 /// How a candidate was fitted, and how it did.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
     /// Window of the regression in samples, 0 for accelerations.
     pub window: usize,

@@ -1,7 +1,7 @@
 //! Sparse regression of the latent accelerations: which terms of the library stay, with which coefficients.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::knowledge::Knowledge;
 
@@ -23,7 +23,7 @@ pub struct Regression {
 }
 
 /// When a term of the library is dropped.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pruning {
     /// Sequential thresholding: drop every term whose contribution `|xi| rms(term) / rms(ddz)` is below this, solve

@@ -26,6 +26,7 @@ pub(super) struct Task<'a> {
     /// What is known of the dynamics in its coordinates, one a phase.
     pub knowledge: Vec<Knowledge>,
     pub options: &'a TrainOptions,
+    pub robot: &'static Robot,
 }
 
 impl<'a> Task<'a> {
@@ -70,6 +71,7 @@ impl<'a> Task<'a> {
             active,
             frame,
             options,
+            robot,
         })
     }
 }

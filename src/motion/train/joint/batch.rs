@@ -8,6 +8,9 @@ use crate::train::dataset::{Dataset, scaled};
 use crate::train::error::TrainError;
 use crate::train::smooth::moving_average;
 
+/// Samples of a batch; every phase of a jump is resampled to a multiple (section IV-C4).
+pub const BATCH_ROWS: usize = 100;
+
 /// Consecutive samples of one phase, rows are samples, scaled units.
 #[derive(Clone, Debug)]
 pub struct Batch {
@@ -62,25 +65,19 @@ impl Batch {
 
 /// Batches of all phases of all recordings, in their order, with the phases, inputs, units and smoothing of `dataset`.
 ///
-/// A batch has so many `rows`; every phase of a jump is resampled to a multiple (section IV-C4).
-///
 /// # Errors
 /// [`TrainError::Recording`] for what cannot be resampled or turned into inputs.
-pub fn batches(
-    recordings: &Source<'_>,
-    dataset: &Dataset,
-    rows: usize,
-) -> Result<Vec<Batch>, TrainError> {
+pub fn batches(recordings: &Source<'_>, dataset: &Dataset) -> Result<Vec<Batch>, TrainError> {
     let mut out = Vec::new();
     let state = |columns| scaled(columns, &dataset.scaling.state).transpose();
     recordings.for_each(|recording| {
-        for part in prepare(recording, &dataset.phases, rows)? {
+        for part in prepare(recording, &dataset.phases, BATCH_ROWS)? {
             let samples = &part.samples;
             let u = scaled(samples.input(&dataset.rule)?, &dataset.scaling.input).transpose();
             let (x, dx) = (state(samples.x.clone()), state(samples.dx.clone()));
             let ddx = state(moving_average(&samples.ddx, dataset.smoothing));
-            for start in (0..samples.len()).step_by(rows) {
-                let cut = |all: &DMatrix<f64>| all.rows(start, rows).into_owned();
+            for start in (0..samples.len()).step_by(BATCH_ROWS) {
+                let cut = |all: &DMatrix<f64>| all.rows(start, BATCH_ROWS).into_owned();
                 let blocks = [cut(&x), cut(&dx), cut(&ddx), cut(&u)];
                 out.push(Batch::new(part.span.phase, blocks, samples.mean_step_s()));
             }

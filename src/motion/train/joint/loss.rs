@@ -1,7 +1,7 @@
 //! The losses (16) to (20) with the lift loss and the window (41), and their exact gradient.
 
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::batch::Batch;
 use super::multiply::{Columns, add_transposed, product};
@@ -12,7 +12,7 @@ use super::unroll::{Adjoints, Unroll, Window};
 use crate::train::features::{FeatureValues, Features};
 
 /// Weights of the terms of the loss (equation 20).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LossWeights {
     /// Of the latent accelerations (17).
     pub ddz: f64,
@@ -23,7 +23,6 @@ pub struct LossWeights {
     /// Of the share of the input's energy that the latent input cannot carry.
     pub lift: f64,
     /// Of predictions over a window (41).
-    #[serde(default)]
     pub bptt: f64,
 }
 
@@ -41,7 +40,7 @@ impl Default for LossWeights {
 }
 
 /// Values of the terms, unweighted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Losses {
     /// Mean square of `x - x_dec` (16), with coordinate weights if there are any.
     pub decoder: f64,
@@ -54,7 +53,6 @@ pub struct Losses {
     /// `||u - W_e^T u_lat||^2 / ||u||^2`.
     pub lift: f64,
     /// Mean square of `z - z_pred` over a window (41); 0 unless it has a weight.
-    #[serde(default)]
     pub bptt: f64,
 }
 

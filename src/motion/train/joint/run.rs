@@ -47,7 +47,7 @@ pub fn joint(
     watch: &mut Watch<'_>,
 ) -> Result<Trained, TrainError> {
     let task = Task::new(recordings.clone(), robot, options)?;
-    let cut = |set| batches(set, &task.sets.training, options.joint.batch_rows);
+    let cut = |set| batches(set, &task.sets.training);
     let training = cut(&recordings.training)?;
     let trainer = Trainer {
         task: &task,
@@ -69,7 +69,7 @@ pub fn joint(
         let outcome = outcome.map_err(|error| trainer.explained(error, seed));
         seeds.add(seed, outcome, watch)?;
     }
-    seeds.into_model(task, robot, "joint", origin)
+    seeds.into_model(task, "joint", origin)
 }
 
 /// Units in which the maps see the states: for linear maps and as published those of the samples, else centred and in

@@ -23,7 +23,7 @@ pub enum Integrator {
 }
 
 /// Shape of the window.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unroll {
     /// Steps predicted from every sample.
     pub window: usize,
