@@ -138,17 +138,17 @@ fn plan(
     training: &[Recording],
     validation: &[Recording],
 ) -> Plan {
-    let all: Vec<Recording> = training.iter().chain(validation).cloned().collect();
+    let files = training
+        .iter()
+        .chain(validation)
+        .map(|recording| &recording.path);
+    let recordings = Origin::of_files("", files).recordings.into_iter();
     Plan {
         latent_dims: arguments.latent_dims.0.clone(),
         seeds: arguments.seeds,
         method: train_settings::method(settings),
         settings: train_settings::as_flags(settings),
-        recordings: Origin::new("", &all)
-            .recordings
-            .into_iter()
-            .map(|file| file.digest)
-            .collect(),
+        recordings: recordings.map(|file| file.digest).collect(),
         training: training.len(),
         romc: env!("CARGO_PKG_VERSION").to_owned(),
     }

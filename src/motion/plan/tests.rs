@@ -45,12 +45,15 @@ fn plan_inside_the_recorded_range_reaches_its_goal_within_its_bounds() {
         let plan = planned(distance, apex).expect("a plan");
         let [reached, rise] = plan.reached_m;
         assert!((reached - distance).abs() < 2e-3, "{reached} {distance}");
-        assert!((rise - apex).abs() < 4e-3, "{rise} {apex}");
+        assert!((rise - apex).abs() < 1e-3, "{rise} {apex}");
         assert_eq!(plan.verdict, Verdict::Trusted, "{plan:?}");
         assert!(plan.margins.torque_share <= 1.0);
         assert!(plan.margins.beyond_joint_limit_rad <= 2e-3);
         assert!(plan.input_deviation < 1.5, "{}", plan.input_deviation);
     }
+    // The body is highest there however legs swing in flight.
+    let [_, rise] = planned(0.3, 0.16).expect("a plan").reached_m;
+    assert!((rise - 0.16).abs() < 1e-3, "{rise}");
 }
 
 #[test]
@@ -216,16 +219,4 @@ fn jumps_recorded_up_to_touch_down_are_planned_up_to_it() {
     assert!(plan.motion.dx[(seed::BODY_Z, last)] < -0.3, "still falling");
     assert!((plan.reached_m[0] - distance.mean).abs() < 3e-3);
     assert!((plan.reached_m[1] - apex.mean).abs() < 3e-3);
-}
-
-#[test]
-fn apex_is_where_the_body_is_highest_however_legs_swing_in_flight() {
-    for (distance, apex) in [(0.25, 0.115), (0.38, 0.13), (0.3, 0.16)] {
-        let plan = planned(distance, apex).expect("a plan");
-        assert!(
-            (plan.reached_m[1] - apex).abs() < 1e-3,
-            "{:?}",
-            plan.reached_m
-        );
-    }
 }

@@ -3,13 +3,19 @@
 
 use std::fmt::Display;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::{DMatrix, Vector2};
 
 use super::dataset::{Dataset, Jump, Rates, ScaleOptions};
 use super::features::Features;
-use super::latent::Latent;
+use super::growth::Growth;
+use super::judge::Judge;
+use super::knowledge::Knowledge;
+use super::latent::{EncodedSet, Latent};
 use super::options::TrainOptions;
+use super::progress::{Progress, Watch};
+use super::refine::Refiner;
 use crate::model::{Library, StandardLibrary};
 use crate::recording::{PhaseRule, shipped};
 use crate::robot::{InputRule, Robot, STATE_DIM, WrenchFrame};
@@ -96,6 +102,25 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
         files: None,
     };
     (dataset, latent)
+}
+
+/// What `work` makes of a refiner by three jumps of the known system, watched by nobody.
+pub(super) fn with_refiner<T>(
+    bound_per_s: Option<f64>,
+    knowledge: &[Knowledge],
+    work: impl FnOnce(&Refiner<'_>, &mut Watch<'_>) -> T,
+) -> T {
+    let ((dataset, latent), (features, _)) = (jumps(3), known());
+    let set = EncodedSet::new(&dataset, &latent);
+    let judge = Judge::new(&features, set);
+    let refiner = Refiner {
+        knowledge,
+        growth: &Growth::of_jumps(bound_per_s, set, &features),
+        training: &judge,
+        judge: &judge,
+    };
+    let (mut nothing, cancel) = (|_: Progress| {}, AtomicBool::new(false));
+    work(&refiner, &mut Watch::new(&mut nothing, &cancel))
 }
 
 fn simulate(seed: usize) -> Latent {

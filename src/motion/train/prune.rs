@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::growth::Growth;
 use super::judge::Judge;
 use super::progress::Watch;
+use super::refine::Coefficients;
 use super::sparse::Regression;
 
 /// Share of the score that a term must bring to be added.
@@ -23,14 +24,12 @@ pub(super) struct Refined<'a> {
     pub regressions: &'a [Regression],
     /// Ridge of every fit.
     pub ridge: f64,
-    /// `library_dim x latent_dim` for each phase.
-    pub xi: Vec<DMatrix<f64>>,
     /// What they keep to.
     pub growth: &'a Growth,
     /// What scores them.
     pub judge: &'a Judge<'a>,
-    /// Score of `xi`.
-    pub score: f64,
+    /// The coefficients.
+    pub now: Coefficients,
 }
 
 impl Refined<'_> {
@@ -45,7 +44,7 @@ impl Refined<'_> {
                 return;
             }
             self.attempt(place, false, limit);
-            watch.done(attempt + 1, format!("score {:.4}", self.score));
+            watch.done(attempt + 1, format!("score {:.4}", self.now.score));
         }
     }
 
@@ -54,18 +53,18 @@ impl Refined<'_> {
     pub fn grow(&mut self, watch: &mut Watch<'_>) {
         watch.stage("adding terms that predictions gain by", ROUNDS * ATTEMPTS);
         for round in 0..ROUNDS {
-            let before = self.score;
+            let before = self.now.score;
             let mut order = self.places(Regression::gains);
             order.sort_by(|a, b| b.0.total_cmp(&a.0));
             for (attempt, place) in order.into_iter().take(ATTEMPTS).enumerate() {
                 if watch.cancelled() {
                     return;
                 }
-                self.attempt(place, true, (1.0 - LEAST_GAIN) * self.score);
+                self.attempt(place, true, (1.0 - LEAST_GAIN) * self.now.score);
                 let done = round * ATTEMPTS + attempt + 1;
-                watch.done(done, format!("score {:.4}", self.score));
+                watch.done(done, format!("score {:.4}", self.now.score));
             }
-            if self.score == before {
+            if self.now.score == before {
                 return;
             }
         }
@@ -73,16 +72,16 @@ impl Refined<'_> {
 
     /// Fits the equation of a term with or without it, and keeps that if the score is at most `limit`.
     fn attempt(&mut self, (_, phase, row, column): Place, active: bool, limit: f64) {
-        let mut support = self.xi[phase].map(|value| value != 0.0);
+        let mut support = self.now.xi[phase].map(|value| value != 0.0);
         support[(row, column)] = active;
         let fitted = self.regressions[phase].fit_column(column, &support, self.ridge);
-        let before = self.xi[phase].column(column).into_owned();
-        self.xi[phase].set_column(column, &fitted);
-        let score = self.judge.score_within(&self.xi, limit);
-        if score <= limit && self.growth.admits(&self.xi) {
-            self.score = score;
+        let before = self.now.xi[phase].column(column).into_owned();
+        self.now.xi[phase].set_column(column, &fitted);
+        let score = self.judge.score_within(&self.now.xi, limit);
+        if score <= limit && self.growth.admits(&self.now.xi) {
+            self.now.score = score;
         } else {
-            self.xi[phase].set_column(column, &before);
+            self.now.xi[phase].set_column(column, &before);
         }
     }
 
@@ -93,7 +92,7 @@ impl Refined<'_> {
     ) -> Vec<Place> {
         let mut places = Vec::new();
         for (phase, regression) in self.regressions.iter().enumerate() {
-            let support = self.xi[phase].map(|value| value != 0.0);
+            let support = self.now.xi[phase].map(|value| value != 0.0);
             for column in 0..support.ncols() {
                 let found = shares(regression, column, &support, self.ridge).into_iter();
                 places.extend(found.map(|(row, share)| (share, phase, row, column)));

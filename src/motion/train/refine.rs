@@ -292,34 +292,14 @@ pub(super) fn relative(coefficients: &Coefficients, places: &[Place]) -> Vec<f64
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::AtomicBool;
-
     use super::*;
-    use crate::train::latent::EncodedSet;
     use crate::train::oscillator;
-    use crate::train::progress::{Progress, Watch};
 
-    fn refined(start: Vec<DMatrix<f64>>, knowledge: &[Knowledge]) -> (f64, Coefficients) {
-        let (dataset, latent) = oscillator::jumps(3);
-        let (features, _) = oscillator::known();
-        let set = EncodedSet::new(&dataset, &latent);
-        let judge = Judge::new(&features, set);
-        let growth = Growth::of_jumps(Some(1.0), set, &features);
-        let refiner = Refiner {
-            knowledge,
-            growth: &growth,
-            training: &judge,
-            judge: &judge,
-        };
-        let before = refiner.score(&start);
-        let start = Coefficients {
-            xi: start,
-            score: before,
-        };
-        let mut nothing = |_: Progress| {};
-        let cancel = AtomicBool::new(false);
-        let mut watch = Watch::new(&mut nothing, &cancel);
-        (before, refiner.refine(start, 20, &mut watch))
+    fn refined(xi: Vec<DMatrix<f64>>, knowledge: &[Knowledge]) -> (f64, Coefficients) {
+        oscillator::with_refiner(Some(1.0), knowledge, |refiner, watch| {
+            let score = refiner.score(&xi);
+            (score, refiner.refine(Coefficients { xi, score }, 20, watch))
+        })
     }
 
     #[test]

@@ -121,21 +121,20 @@ pub fn select(
             ridge: choice.ridge,
             growth,
             judge: &relative,
-            score: relative.score(&xi),
-            xi,
+            now: Coefficients {
+                score: relative.score(&xi),
+                xi,
+            },
         };
         pruned.sweep(limit, watch);
-        let start = Coefficients {
-            xi: pruned.xi,
-            score: pruned.score,
-        };
-        let end = refiner.refine(start, options.refinements, watch);
+        let end = refiner.refine(pruned.now, options.refinements, watch);
         refined.push(Fitted::of(end, &choice, window));
     }
     let best = best_of(&refined)?;
     let limit = (1.0 + options.slack) * best.choice.score;
     if options.refinements > 0 {
-        let thinned = best.thinned(&refiner, limit, watch);
+        let thinned = refiner.thin(best.coefficients(), limit, watch);
+        let thinned = Fitted::of(thinned, &best.choice, best.window);
         refined.push(thinned);
     }
     let all = refined.into_iter();
@@ -197,13 +196,11 @@ impl Fitted {
         self.choice.score.is_finite()
     }
 
-    /// Without the terms that rollouts do not miss.
-    fn thinned(&self, refiner: &Refiner<'_>, limit: f64, watch: &mut Watch<'_>) -> Self {
-        let start = Coefficients {
+    fn coefficients(&self) -> Coefficients {
+        Coefficients {
             xi: self.xi.clone(),
             score: self.choice.score,
-        };
-        Self::of(refiner.thin(start, limit, watch), &self.choice, self.window)
+        }
     }
 }
 
@@ -282,15 +279,10 @@ impl Attempt<'_> {
             ridge: best.choice.ridge,
             growth: self.growth,
             judge: self.judge,
-            xi: best.xi.clone(),
-            score: best.choice.score,
+            now: best.coefficients(),
         };
         refined.grow(watch);
-        let end = Coefficients {
-            xi: refined.xi,
-            score: refined.score,
-        };
-        Some(Fitted::of(end, &best.choice, best.window))
+        Some(Fitted::of(refined.now, &best.choice, best.window))
     }
 }
 

@@ -155,40 +155,23 @@ impl About {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::AtomicBool;
-
     use super::*;
-    use crate::train::growth::Growth;
-    use crate::train::judge::Judge;
     use crate::train::knowledge::Knowledge;
-    use crate::train::latent::EncodedSet;
     use crate::train::oscillator;
-    use crate::train::progress::Progress;
 
     /// What is left of the known system with a few terms too many, the limit as a share of its score.
     fn left_of_too_many(limit: f64) -> Vec<DMatrix<f64>> {
-        let (dataset, latent) = oscillator::jumps(3);
-        let (features, truth) = oscillator::known();
-        let set = EncodedSet::new(&dataset, &latent);
-        let judge = Judge::new(&features, set);
+        let (_, mut xi) = oscillator::known();
         let mut knowledge = [Knowledge::nothing(7, 2), Knowledge::nothing(7, 2)];
         knowledge[0].kept[(3, 0)] = true;
-        let growth = Growth::of_jumps(None, set, &features);
-        let refiner = Refiner {
-            knowledge: &knowledge,
-            growth: &growth,
-            training: &judge,
-            judge: &judge,
-        };
-        let mut xi = truth;
         (xi[0][(2, 0)], xi[0][(4, 0)], xi[0][(4, 1)]) = (0.3, 0.02, -0.05);
         (xi[0][(5, 1)], xi[1][(1, 0)]) = (0.01, 0.02);
-        let score = refiner.score(&xi);
-        let (mut nothing, cancel) = (|_: Progress| {}, AtomicBool::new(false));
-        let mut watch = Watch::new(&mut nothing, &cancel);
-        let thinned = refiner.thin(Coefficients { xi, score }, limit * score, &mut watch);
-        assert!(thinned.score <= limit * score);
-        thinned.xi
+        oscillator::with_refiner(None, &knowledge, |refiner, watch| {
+            let score = refiner.score(&xi);
+            let thinned = refiner.thin(Coefficients { xi, score }, limit * score, watch);
+            assert!(thinned.score <= limit * score);
+            thinned.xi
+        })
     }
 
     #[test]

@@ -400,23 +400,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn values_alone_have_the_gradient_of_the_whole_stack() {
-        let mut random = Random::new(6);
-        for network in networks() {
-            let (x, adjoint) = (random.matrix(N, 5, 1.0), random.matrix(N, 2, 1.0));
-            let mut tape = Tape::default();
-            network.forward(x.clone(), N, &mut tape);
-            let mut alone = network.zeros_like();
-            network.backward(&tape, adjoint.clone(), &[], &mut alone);
-            let stack = x.insert_rows(N, 2 * N, 0.0);
-            network.forward(stack, N, &mut tape);
-            let mut whole = network.zeros_like();
-            network.backward(&tape, adjoint.insert_rows(N, 2 * N, 0.0), &[], &mut whole);
-            for (a, b) in alone.blocks().zip(whole.blocks()) {
-                assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-13));
-            }
-        }
-    }
 }
