@@ -81,7 +81,7 @@ impl Task<'_> {
         jumps: Option<JumpPrior>,
         provenance: Map<String, Value>,
     ) -> Result<ReducedModel, TrainError> {
-        let (options, robot, training) = (self.options, self.robot, &self.sets.training);
+        let (options, robot, training) = (self.options, self.robot, &self.training);
         let (d, name) = (options.latent_dim, robot.name());
         let given_state = self.inputs_given_states(&fitted)?;
         let mut builder = ReducedModel::builder(options.name.clone(), self.library.clone())
@@ -127,7 +127,7 @@ impl Task<'_> {
         };
         // Where the robot is, and which way it looks, is in `z` but says nothing of its inputs.
         let shifts = encoder.weights().select_columns(&PLACE);
-        let training = &self.sets.training;
+        let training = &self.training;
         let latent = Latent::of(training, &fitted.encoder)?;
         let phases = fitted.xi.iter().enumerate();
         let given = phases.map(|(phase, xi)| {

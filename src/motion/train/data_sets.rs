@@ -1,6 +1,5 @@
 //! Training and validation jumps of one training.
 
-use super::dataset::Dataset;
 use crate::recording::Source;
 
 /// Recordings to learn from and to choose by.
@@ -18,23 +17,6 @@ impl<'a> Recordings<'a> {
         Self {
             training: training.into(),
             validation: validation.into(),
-        }
-    }
-}
-
-/// The recordings cut into phases, scaled.
-pub(super) struct DataSets {
-    pub training: Dataset,
-    pub validation: Dataset,
-}
-
-impl DataSets {
-    /// The jumps that candidates are judged by.
-    pub fn judged(&self) -> &Dataset {
-        if self.validation.jumps.is_empty() {
-            &self.training
-        } else {
-            &self.validation
         }
     }
 }

@@ -59,7 +59,7 @@ impl Seeds {
         if reports.len() > 1 || reports[0].losses.is_some() {
             (report.seeds, report.support_overlap) = (reports, overlap);
         }
-        let jumps = learn_jumps(&task.sets.training, &best.encoder)?.map(|learned| {
+        let jumps = learn_jumps(&task.training, &best.encoder)?.map(|learned| {
             report.deviations = learned.scores;
             learned.prior
         });

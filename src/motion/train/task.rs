@@ -1,6 +1,6 @@
 //! One training as every method sees it, checked before any map is learned.
 
-use super::data_sets::{DataSets, Recordings};
+use super::data_sets::Recordings;
 use super::dataset::Dataset;
 use super::error::TrainError;
 use super::features::Features;
@@ -14,7 +14,10 @@ use crate::robot::Robot;
 
 /// Data, library and options that all seeds share.
 pub(super) struct Task<'a> {
-    pub sets: DataSets,
+    /// The training recordings cut into phases, scaled.
+    pub training: Dataset,
+    /// The same of the validation recordings; may have no jump.
+    pub validation: Dataset,
     /// Of the training samples.
     pub moments: Moments,
     pub library: Library,
@@ -45,15 +48,12 @@ impl<'a> Task<'a> {
         let read = |set: Source<'_>| Dataset::new(set, &rule, &options.phases, &scaling, smoothing);
         let training = read(recordings.training)?;
         training.check_for_training()?;
-        let sets = DataSets {
-            training,
-            validation: read(recordings.validation)?,
-        };
-        let moments = sets.training.moments();
+        let validation = read(recordings.validation)?;
+        let moments = training.moments();
         let least_std = options.encoder.least_std * options.scaling.state;
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
         let (coordinates, requested) = (options.coordinates(), options.latent_dim);
-        let frame = Frame::new(&sets.training, &active, requested, coordinates, robot)?;
+        let frame = Frame::new(&training, &active, requested, coordinates, robot)?;
         if requested == 0 || requested > frame.dim() {
             return Err(TrainError::LatentDim {
                 requested,
@@ -63,8 +63,9 @@ impl<'a> Task<'a> {
         let library = options.library()?;
         let features = Features::new(&library);
         Ok(Self {
-            knowledge: Knowledge::of_phases(&sets.training, &features, &frame),
-            sets,
+            knowledge: Knowledge::of_phases(&training, &features, &frame),
+            training,
+            validation,
             moments,
             features,
             library,
@@ -73,5 +74,12 @@ impl<'a> Task<'a> {
             options,
             robot,
         })
+    }
+    /// The jumps that candidates are judged by.
+    pub fn judged(&self) -> &Dataset {
+        match self.validation.jumps.is_empty() {
+            true => &self.training,
+            false => &self.validation,
+        }
     }
 }

@@ -137,22 +137,18 @@ impl Span {
     fn equations(&self, from: usize, to: usize, theta: &mut Vec<f64>, target: &mut Vec<f64>) {
         let duration = self.time_s[to] - self.time_s[from];
         let scale = 2.0 / (duration * duration);
-        for j in 0..self.once.ncols() {
-            theta.push((self.once[(to, j)] - self.once[(from, j)]) / duration);
+        let (once, twice, z, dz) = (&self.once, &self.twice, &self.z, &self.dz);
+        for j in 0..once.ncols() {
+            theta.push((once[(to, j)] - once[(from, j)]) / duration);
         }
-        for k in 0..self.z.nrows() {
-            target.push((self.dz[(k, to)] - self.dz[(k, from)]) / duration);
+        for k in 0..z.nrows() {
+            target.push((dz[(k, to)] - dz[(k, from)]) / duration);
         }
-        for j in 0..self.once.ncols() {
-            theta.push(
-                (self.twice[(to, j)] - self.twice[(from, j)] - duration * self.once[(from, j)])
-                    * scale,
-            );
+        for j in 0..once.ncols() {
+            theta.push((twice[(to, j)] - twice[(from, j)] - duration * once[(from, j)]) * scale);
         }
-        for k in 0..self.z.nrows() {
-            target.push(
-                (self.z[(k, to)] - self.z[(k, from)] - duration * self.dz[(k, from)]) * scale,
-            );
+        for k in 0..z.nrows() {
+            target.push((z[(k, to)] - z[(k, from)] - duration * dz[(k, from)]) * scale);
         }
     }
 }

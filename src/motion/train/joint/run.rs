@@ -47,7 +47,7 @@ pub fn joint(
     watch: &mut Watch<'_>,
 ) -> Result<Trained, TrainError> {
     let task = Task::new(recordings.clone(), robot, options)?;
-    let cut = |set| batches(set, &task.sets.training);
+    let cut = |set| batches(set, &task.training);
     let training = cut(&recordings.training)?;
     let trainer = Trainer {
         task: &task,
@@ -81,7 +81,7 @@ fn frame(task: &Task<'_>) -> Frame {
     if options.joint.maps.is_linear() || options.joint.transfer == Transfer::Published {
         return plain;
     }
-    let x = task.sets.training.gather(Quantity::X, None);
+    let x = task.training.gather(Quantity::X, None);
     let least = options.encoder.least_std * options.scaling.state;
     let spread: DVector<f64> = x
         .column_variance()
@@ -218,7 +218,7 @@ impl Trainer<'_> {
     /// Where a seed starts: random maps, and for linear ones `b_e = 0` as published or `-W_e mean(x)`.
     fn start(&self, seed: u64) -> Parameters {
         let options = &self.task.options.joint;
-        let (maps, training) = (&options.maps, &self.task.sets.training);
+        let (maps, training) = (&options.maps, &self.task.training);
         let d = self.task.options.latent_dim;
         let encoder = [&[STATE_DIM], &maps.encoder_layers[..], &[d]].concat();
         let decoder = [&[d], &maps.decoder_layers[..], &[STATE_DIM]].concat();
@@ -274,7 +274,7 @@ impl Trainer<'_> {
     fn published(&self, parameters: Parameters) -> Result<Fitted, TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
         let (encoder, decoder) = self.state_maps(&parameters, &plain)?;
-        let x = self.task.sets.training.gather(Quantity::X, None);
+        let x = self.task.training.gather(Quantity::X, None);
         Ok(Fitted {
             weights: mean_jacobian(&encoder, &x),
             encoder,
@@ -310,14 +310,14 @@ impl Trainer<'_> {
         let (task, d) = (self.task, self.task.options.latent_dim);
         let basis = task.frame.nearest(&learned, d);
         let encoder = task.encoder_over(&basis)?.into();
-        let decoder = least_squares_decoder(&task.sets.training, &encoder)?.into();
+        let decoder = least_squares_decoder(&task.training, &encoder)?.into();
         Ok((encoder, decoder))
     }
 
     /// The learned networks in the canonical latent basis, the decoder's last layer by least squares.
     fn nonlinear_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
-        let x = self.task.sets.training.gather(Quantity::X, None);
+        let x = self.task.training.gather(Quantity::X, None);
         let basis = self.basis(&self.state_maps(parameters, &plain)?.0, &x);
         let (encoder, decoder) = self.state_maps(parameters, &basis)?;
         let decoder = with_fitted_last_layer(&decoder, &x, &map_samples(&encoder, &x))?;
@@ -355,7 +355,7 @@ impl Trainer<'_> {
         if !matches!(error, TrainError::Model(ModelError::NonFinite { .. })) {
             return error;
         }
-        let training = &self.task.sets.training;
+        let training = &self.task.training;
         let terms_at_start = || {
             let plain = LatentBasis::unchanged(self.task.options.latent_dim);
             let encoder = self.state_maps(&self.start(seed), &plain)?.0;
