@@ -20,6 +20,7 @@ use super::weak_form::{check_terms, windowed_samples};
 const WINDOWS: [usize; 3] = [0, 25, 50];
 /// Ridges on the normalised columns.
 const RIDGES: [f64; 3] = [1e-4, 1e-3, 1e-2];
+/// Eliminations share the walk that drops terms one by one.
 const PRUNINGS: [Pruning; 10] = [
     Pruning::Elimination(1e-3),
     Pruning::Elimination(3e-3),

@@ -75,6 +75,7 @@ impl<'a> Task<'a> {
             robot,
         })
     }
+
     /// The jumps that candidates are judged by.
     pub fn judged(&self) -> &Dataset {
         match self.validation.jumps.is_empty() {
