@@ -119,8 +119,11 @@ fn plan(
     training: &[Recording],
     validation: &[Recording],
 ) -> Plan {
-    let all: Vec<Recording> = training.iter().chain(validation).cloned().collect();
-    let recordings = Origin::new("", &all).recordings.into_iter();
+    let files = training
+        .iter()
+        .chain(validation)
+        .map(|recording| &recording.path);
+    let recordings = Origin::of_files("", files).recordings.into_iter();
     Plan {
         latent_dims: arguments.latent_dims.0.clone(),
         seeds: arguments.seeds,

@@ -86,7 +86,7 @@ pub(super) fn power_down(x: f64, exponent: u64) -> f64 {
     power_by(x, exponent, |a, b| (-mul_up(-a, b)).max(0.0))
 }
 
-/// A power by squaring, all factors non-negative and `product` monotone.
+/// A power by squaring; a bound if `product` is monotone and all factors are non-negative.
 pub(super) fn power_by(x: f64, exponent: u64, product: impl Fn(f64, f64) -> f64) -> f64 {
     let power = power(1.0, x, exponent, |a, b| Some(product(*a, *b)));
     power.expect("no product fails")

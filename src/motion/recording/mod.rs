@@ -63,3 +63,10 @@ pub use foreign::map::ColumnMap;
 pub use phases::{PhaseRule, PhaseSpan, Stance};
 pub use reader::{Clocks, Reader, Reading, ReadingNotes};
 pub use segment::{Recording, Segment};
+
+/// A recording below `examples/recordings`, such as `go1/test_01`.
+#[cfg(test)]
+pub(crate) fn shipped(name: &str) -> Recording {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/recordings");
+    read(format!("{folder}/{name}.csv.gz").as_ref()).expect("a shipped recording")
+}
