@@ -50,8 +50,8 @@ pub fn run(
     std::thread::scope(|scope| {
         let started = (0..threads.min(todo.len())).map(|_| scope.spawn(worker));
         let workers: Vec<_> = started.collect();
-        let joined = workers.into_iter().map(|worker| worker.join());
-        joined.map(|kept| kept.expect("no thread panics")).collect()
+        let mut workers = workers.into_iter();
+        workers.try_for_each(|worker| worker.join().expect("no thread panics"))
     })
 }
 

@@ -147,7 +147,11 @@ impl Interval {
             true => -power_down(-x, exponent),
             false => power_up(x, exponent),
         };
-        let base = if exponent % 2 == 0 { self.abs() } else { self };
+        let base = if exponent.is_multiple_of(2) {
+            self.abs()
+        } else {
+            self
+        };
         Interval::between(down(base.lo), up(base.hi))
     }
 

@@ -269,7 +269,7 @@ fn one_step(
     let limits = controller.plant().robot().torque_limit_nm();
     tally.limit_violations += usize::from(exceeds(&command.torque_nm, limits, 1.0));
     if command.status.has_plan() {
-        let planned = controller.planned_deviations().into_iter();
+        let planned = controller.planned_deviations();
         planned.for_each(|deviation| tally.tracking.add(deviation * deviation));
     }
     let stance = stance(controller, segment, sample);
