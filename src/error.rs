@@ -43,7 +43,7 @@ pub enum Error {
     #[error(transparent)]
     Artifact(#[from] ArtifactError),
     #[error(transparent)]
-    Import(Box<ImportError>),
+    Import(#[from] ImportError),
     #[error(transparent)]
     Identify(#[from] IdentifyError),
     #[error(transparent)]
@@ -174,11 +174,5 @@ fn other_name(path: &Path, input: &Path) -> String {
     match path == input {
         true => String::new(),
         false => format!(" as {}", input.display()),
-    }
-}
-
-impl From<ImportError> for Error {
-    fn from(error: ImportError) -> Self {
-        Self::Import(Box::new(error))
     }
 }

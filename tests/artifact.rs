@@ -895,6 +895,8 @@ fn library_terms_that_do_not_parse_are_refused_with_index_and_text() {
         "z1; z2",
         "x; system(\"x\")",
         "\\input{x}",
+        "sinh(z1)",
+        "",
     ] {
         match model_refusal("three-phases", |value| value["library"][3] = json!(text)) {
             ModelError::Library(LibraryError::Parse { index, text: t, .. }) => {

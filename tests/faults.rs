@@ -196,7 +196,7 @@ fn a_step_that_no_recording_holds_is_refused() {
     let recording = romc::recording::read(&jump).expect("a sound recording");
     let mut text = Vec::new();
     let options = romc::recording::write::WriteOptions::default();
-    romc::recording::write::write_to(&mut text, &recording, &options).expect("memory");
+    romc::recording::write::write_to(&mut text, &recording, None, &options).expect("memory");
     let text = String::from_utf8(text).expect("UTF-8");
     for (rows, step) in [(101, "0.5"), (3, "0.01")] {
         let short: Vec<&str> = text.lines().take(rows).collect();
@@ -380,7 +380,7 @@ fn a_bomb_of_blank_lines_is_refused_early() {
     let recording = romc::recording::read(&jump).expect("a sound recording");
     let options = romc::recording::write::WriteOptions::default();
     let mut text = Vec::new();
-    romc::recording::write::write_to(&mut text, &recording, &options).expect("memory");
+    romc::recording::write::write_to(&mut text, &recording, None, &options).expect("memory");
     let rows = text.iter().filter(|byte| **byte == b'\n').count();
     for (start, place) in [(&text[..], rows + 10_001), (&b"\n"[..], 10_001)] {
         let file = fs::File::create(&path).expect("a file");

@@ -297,7 +297,7 @@ fn through_the_format(
     options: &WriteOptions,
 ) -> Result<romc::recording::Recording, RecordingError> {
     let mut text = Vec::new();
-    write_to(&mut text, recording, options).expect("memory takes all bytes");
+    write_to(&mut text, recording, None, options).expect("memory takes all bytes");
     read_from_bytes(name, &text).map_err(|mut error| {
         // Arrays count from 0 and have no header.
         match &mut error.place {

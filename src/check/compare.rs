@@ -5,9 +5,9 @@ use std::collections::HashMap;
 use serde::Serialize;
 
 use super::CheckOptions;
-use super::point::{Gap, Search, Sides, search};
+use super::point::{Gap, Sides, search};
 use super::side::{Floats, RightSide, Side, SidePhase, literal};
-use crate::symbolic::{CanonicalForms, Coefficient, ExprId, ExprPool, Node, Number};
+use crate::symbolic::{CanonicalForm, CanonicalForms, Coefficient, ExprId, ExprPool, Node, Number};
 
 /// Most terms that a difference names.
 const MAX_TERMS: usize = 5;
@@ -93,10 +93,8 @@ impl Comparison {
 
     /// The verdicts of all equations.
     pub fn verdicts(&self) -> impl Iterator<Item = &Verdict> {
-        self.phases
-            .iter()
-            .flat_map(|phase| &phase.equations)
-            .map(|equation| &equation.verdict)
+        let equations = self.phases.iter().flat_map(|phase| &phase.equations);
+        equations.map(|equation| &equation.verdict)
     }
 }
 
@@ -139,10 +137,8 @@ fn paired<'p>(left: &'p [SidePhase], right: &'p [SidePhase]) -> Vec<[Option<&'p 
         left.iter().map(|phase| [Some(phase), None]).collect();
     for [phase, partner] in &mut pairs {
         let name = phase.and_then(|phase| phase.name.as_ref());
-        let found = right
-            .iter()
-            .position(|other| name.is_some() && other.name.as_ref() == name);
-        if let Some(place) = found {
+        let is_same = |other: &SidePhase| name.is_some() && other.name.as_ref() == name;
+        if let Some(place) = right.iter().position(is_same) {
             (*partner, taken[place]) = (Some(&right[place]), true);
         }
     }
@@ -191,9 +187,9 @@ fn decide_with(
     let whole = [0, 1].map(|side| files[side].build(ddz[side], floats, &mut pool));
     let restrictions = pool.restrictions();
     let table = Table::of(&mut pool, whole);
-    let rest = [0, 1].map(|side| table.sum(&mut pool, side, |_| true));
-    let unexplained =
-        [0, 1].map(|side| table.sum(&mut pool, side, |row| !row.difference().may_be_zero()));
+    let (rows, strange) = (table.differing().collect::<Vec<_>>(), table.unexplained());
+    let rest = [0, 1].map(|side| sum(&mut pool, side, &rows));
+    let unexplained = [0, 1].map(|side| sum(&mut pool, side, &strange));
     // The exact side first: rounded arguments of the other are compared with its own.
     let order = if files[0].is_rounded && !files[1].is_rounded {
         [1, 0]
@@ -206,34 +202,25 @@ fn decide_with(
         let sides = Sides::new(&pool, whole, rest, &restrictions);
         search(&sides, phase, &options.domain, &groups, proof.is_some())
     };
-    let rows: Vec<&Row> = table.differing().collect();
     let mut found = searched(rest, &rows);
     let mut beside_rounding = false;
     if proof.is_none() && found.gap.is_none() {
         // Rounding of some terms can hide the difference of others at every single point.
-        let rows: Vec<&Row> = (table.differing())
-            .filter(|row| !row.difference().may_be_zero())
-            .collect();
-        found.gap = searched(unexplained, &rows).gap;
+        found.gap = searched(unexplained, &strange).gap;
         beside_rounding = found.gap.is_some();
     }
-    let Search {
-        gap,
-        largest,
-        one_sided,
-        has_common_point,
-    } = found;
     let terms = || table.largest(&pool);
-    let verdict = match (proof, gap) {
-        (Some(verdict), None) if has_common_point || one_sided.is_none() => verdict,
+    let has_points = found.has_common_point || found.one_sided.is_none();
+    let verdict = match (proof, found.gap) {
+        (Some(verdict), None) if has_points => verdict,
         (_, Some(gap)) => Verdict::Different(Difference {
             gap,
             terms: terms(),
             beside_rounding,
         }),
-        (_, None) => Verdict::Undecided(largest, terms()),
+        (_, None) => Verdict::Undecided(found.largest, terms()),
     };
-    (verdict, one_sided)
+    (verdict, found.one_sided)
 }
 
 /// A proof that what is left of both sides is equal wherever the restrictions have values.
@@ -250,14 +237,11 @@ fn proof(
     let mut forms = CanonicalForms::new(pool, restrictions, &literal);
     let [first, second] = order.map(|side| forms.of(rest[side]));
     let difference = first.minus(&second);
-    let verdict = |form: &crate::symbolic::CanonicalForm, rounding: f64| {
-        let largest = form
-            .coefficients()
-            .map(Coefficient::magnitude)
-            .fold(rounding, f64::max);
+    let verdict = |form: &CanonicalForm, rounding: f64| {
+        let sizes = form.coefficients().map(Coefficient::magnitude);
         match (form.is_zero() && rounding == 0.0, form.may_be_zero()) {
             (true, _) => Some(Verdict::Equal),
-            (_, true) => Some(Verdict::EqualAsPrinted(largest)),
+            (_, true) => Some(Verdict::EqualAsPrinted(sizes.fold(rounding, f64::max))),
             _ => None,
         }
     };
@@ -267,6 +251,14 @@ fn proof(
         found = verdict(&cleared, forms.rounding());
     }
     found.filter(|_| !forms.is_contradictory())
+}
+
+/// The sum of one side's terms in these rows.
+fn sum(pool: &mut ExprPool, side: usize, rows: &[&Row]) -> ExprId {
+    let terms: Vec<ExprId> = (rows.iter())
+        .flat_map(|row| row.terms[side].clone())
+        .collect();
+    pool.sum(&terms)
 }
 
 /// Terms of both sides by what they are without their numbers.
@@ -294,17 +286,13 @@ impl Table {
         for (side, expr) in whole.into_iter().enumerate() {
             let mut open = vec![(ExprId::ONE, Coefficient::from(Number::ONE), expr)];
             while let Some((factor, scale, expr)) = open.pop() {
-                let (coefficient, rest) = without_numbers(pool, expr);
-                let numbers: Vec<ExprId> = numbers_of(pool, expr);
+                let (coefficient, numbers, rest) = parted(pool, expr);
+                let rest = pool.product(&rest);
                 let factor = pool.product(&[&[factor], numbers.as_slice()].concat());
                 let coefficient = scale.times(&coefficient);
                 if let Node::Sum(terms) = pool.node(rest) {
-                    let terms = terms.to_vec();
-                    open.extend(
-                        terms
-                            .into_iter()
-                            .map(|term| (factor, coefficient.clone(), term)),
-                    );
+                    let terms = terms.iter();
+                    open.extend(terms.map(|&term| (factor, coefficient.clone(), term)));
                     continue;
                 }
                 let place = *places.entry(rest).or_insert_with(|| {
@@ -333,25 +321,17 @@ impl Table {
         })
     }
 
-    /// The sum of one side's terms in the rows that differ and are `wanted`.
-    fn sum(&self, pool: &mut ExprPool, side: usize, wanted: impl Fn(&Row) -> bool) -> ExprId {
-        let rows = self.differing().filter(|row| wanted(row));
-        let terms: Vec<ExprId> = rows.flat_map(|row| row.terms[side].clone()).collect();
-        pool.sum(&terms)
+    /// Those of them that rounding does not explain.
+    fn unexplained(&self) -> Vec<&Row> {
+        let rows = self.differing();
+        rows.filter(|row| !row.difference().may_be_zero()).collect()
     }
 
     /// The rows that rounding does not explain, largest difference first.
     fn largest(&self, pool: &ExprPool) -> Vec<TermDifference> {
-        let mut rows: Vec<&Row> = self
-            .rows
-            .iter()
-            .filter(|row| !row.difference().may_be_zero())
-            .collect();
-        rows.sort_by(|a, b| {
-            b.difference()
-                .magnitude()
-                .total_cmp(&a.difference().magnitude())
-        });
+        let mut rows = self.unexplained();
+        let size = |row: &Row| row.difference().magnitude();
+        rows.sort_by(|a, b| size(b).total_cmp(&size(a)));
         rows.truncate(MAX_TERMS);
         let term = |row: &&Row| {
             let [left, right] =
@@ -367,26 +347,20 @@ impl Table {
     }
 }
 
-/// The factors of a term that are numbers or stand for decimals.
-fn numbers_of(pool: &ExprPool, expr: ExprId) -> Vec<ExprId> {
-    let factors = pool.factors_of(expr).iter().copied();
-    factors
-        .filter(|factor| value_of(pool, *factor).is_some())
-        .collect()
-}
-
-/// The product of a term's numbers, and the term without them.
-fn without_numbers(pool: &mut ExprPool, expr: ExprId) -> (Coefficient, ExprId) {
-    let factors = pool.factors_of(expr).to_vec();
+/// A term taken apart: the product of its numbers, these numbers, and its other factors.
+fn parted(pool: &ExprPool, expr: ExprId) -> (Coefficient, Vec<ExprId>, Vec<ExprId>) {
     let mut coefficient = Coefficient::from(Number::ONE);
-    let mut rest = Vec::with_capacity(factors.len());
-    for factor in factors {
+    let (mut numbers, mut rest) = (Vec::new(), Vec::new());
+    for &factor in pool.factors_of(expr) {
         match value_of(pool, factor) {
-            Some(value) => coefficient = coefficient.times(&value),
+            Some(value) => {
+                coefficient = coefficient.times(&value);
+                numbers.push(factor);
+            }
             None => rest.push(factor),
         }
     }
-    (coefficient, pool.product(&rest))
+    (coefficient, numbers, rest)
 }
 
 fn value_of(pool: &ExprPool, factor: ExprId) -> Option<Coefficient> {

@@ -32,6 +32,12 @@ pub struct Gap {
     pub right: f64,
 }
 
+impl Gap {
+    fn size(&self) -> f64 {
+        (self.left - self.right).abs()
+    }
+}
+
 /// What the search found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Search {
@@ -96,10 +102,8 @@ pub(super) fn search(
         .collect::<BTreeSet<_>>()
         .into_iter()
         .collect();
-    let ranges: Vec<Option<[f64; 2]>> = variables
-        .iter()
-        .map(|symbol| domain.range(phase, pool.symbol_name(*symbol)))
-        .collect();
+    let range = |symbol: &SymbolId| domain.range(phase, pool.symbol_name(*symbol));
+    let ranges: Vec<Option<[f64; 2]>> = variables.iter().map(range).collect();
     let has_domain = ranges.iter().any(Option::is_some);
     let groups: Vec<BTreeSet<SymbolId>> =
         groups.iter().map(|expr| pool.symbols_of(*expr)).collect();
@@ -107,10 +111,9 @@ pub(super) fn search(
     let mut search = Search::default();
     let mut best = 0.0;
     for attempt in 0..if is_proven { POINTS_OF_EQUALS } else { POINTS } {
-        let scale = if has_domain {
-            1.0
-        } else {
-            SCALES[attempt % SCALES.len()]
+        let scale = match has_domain {
+            true => 1.0,
+            false => SCALES[attempt % SCALES.len()],
         };
         let group = (attempt % 3 == 2)
             .then(|| groups.get(attempt / 3 % groups.len().max(1)))
@@ -122,15 +125,13 @@ pub(super) fn search(
                     Some([lo, hi]) => lo + share * (hi - lo),
                     None => scale * (2.0 * share - 1.0),
                 };
-                let is_off = group.is_some_and(|group| !group.contains(symbol));
-                (
-                    *symbol,
-                    if is_off {
+                let value = match group {
+                    Some(group) if !group.contains(symbol) => {
                         range.map_or(0.0, |[lo, hi]| 0.0_f64.clamp(lo, hi))
-                    } else {
-                        short(value)
-                    },
-                )
+                    }
+                    _ => short(value),
+                };
+                (*symbol, value)
             })
             .collect();
         let gap = sides.at(&values);
@@ -145,19 +146,15 @@ pub(super) fn search(
             }
             _ => continue,
         }
-        let size = (gap.left - gap.right).abs() / (1.0 + gap.left.abs().max(gap.right.abs()));
+        let size = gap.size() / (1.0 + gap.left.abs().max(gap.right.abs()));
         if sides.are_apart(&values) {
             if search.gap.is_none() || size > best {
                 (best, search.gap) = (size, Some(gap));
             }
-        } else if search.gap.is_none() {
-            let largest = search
-                .largest
-                .as_ref()
-                .map_or(0.0, |gap| (gap.left - gap.right).abs());
-            if (gap.left - gap.right).abs() > largest {
-                search.largest = Some(gap);
-            }
+        } else if search.gap.is_none()
+            && gap.size() > search.largest.as_ref().map_or(0.0, Gap::size)
+        {
+            search.largest = Some(gap);
         }
         if search.gap.is_some() && attempt >= ENOUGH {
             break;

@@ -9,7 +9,7 @@ use crate::artifact;
 use crate::equations::Equations;
 use crate::import::{Format, read_equations};
 use crate::model::{LatentVariable, ReducedModel};
-use crate::symbolic::{ExprId, ExprPool, Literal, Number, SymbolId};
+use crate::symbolic::{ExprId, ExprPool, Literal, Number, ParseError, SymbolId};
 
 /// Marks of symbols that stand for decimals: exact ones, and ones rounded in their last digit.
 const EXACT: char = '#';
@@ -79,25 +79,19 @@ impl Side {
         options: &CheckOptions,
         known: &[String],
     ) -> Result<Self, CheckError> {
-        let ending = Path::new(file)
-            .extension()
-            .map(|ending| ending.to_string_lossy().to_lowercase());
+        let ending = Path::new(file).extension();
+        let ending = ending.map(|ending| ending.to_string_lossy().to_lowercase());
         if ending.as_deref() == Some("json") {
-            return Ok(Self::of_model(
-                file,
-                &artifact::read_from_bytes(file, bytes)?,
-            ));
+            let model = artifact::read_from_bytes(file, bytes)?;
+            return Ok(Self::of_model(file, &model));
         }
-        let format = match Format::of_path(Path::new(file)) {
-            Ok(format @ (Format::Equations | Format::Latex)) => format,
-            Ok(_) | Err(_) => {
-                return Err(CheckError::Kind {
-                    file: file.to_owned(),
-                    found: ending.map_or("no ending".to_owned(), |ending| {
-                        format!("the ending `.{ending}`")
-                    }),
-                });
-            }
+        let Ok(format @ (Format::Equations | Format::Latex)) = Format::of_path(Path::new(file))
+        else {
+            let found = ending.map(|ending| format!("the ending `.{ending}`"));
+            return Err(CheckError::Kind {
+                file: file.to_owned(),
+                found: found.unwrap_or("no ending".to_owned()),
+            });
         };
         let usual = ["contact", "flight"].map(str::to_owned);
         let known: Vec<String> = known.iter().cloned().chain(usual).collect();
@@ -106,11 +100,11 @@ impl Side {
             file: file.to_owned(),
             latent_dim: read.latent_dim,
             is_rounded: format == Format::Latex && !options.exact,
-            phases: (read.systems.into_iter())
-                .map(|system| SidePhase {
-                    name: system.phase,
-                    ddz: (system.right_sides.into_iter())
-                        .map(|(line, text)| RightSide::Text(line, text))
+            phases: (read.sections.into_iter())
+                .map(|section| SidePhase {
+                    name: section.phase,
+                    ddz: (section.equations.iter())
+                        .map(|equation| RightSide::Text(equation.line, equation.text()))
                         .collect(),
                 })
                 .collect(),
@@ -122,18 +116,16 @@ impl Side {
     /// The equations of a model as it was learned.
     pub fn of_model(file: &str, model: &ReducedModel) -> Self {
         let equations = Equations::as_learned(model);
-        let phases = equations.phases().iter().map(|phase| SidePhase {
-            name: Some(phase.name.clone()),
-            ddz: (0..model.latent_dim())
-                .map(|output| {
-                    let summands = phase.summands(&equations, output);
-                    RightSide::Summands(
-                        summands
-                            .map(|(c, term)| (c, term.text().to_owned()))
-                            .collect(),
-                    )
-                })
-                .collect(),
+        let phases = equations.phases().iter().map(|phase| {
+            let ddz = (0..model.latent_dim()).map(|output| {
+                let summands = phase.summands(&equations, output);
+                let texts = summands.map(|(c, term)| (c, term.text().to_owned()));
+                RightSide::Summands(texts.collect())
+            });
+            SidePhase {
+                name: Some(phase.name.clone()),
+                ddz: ddz.collect(),
+            }
         });
         Self {
             file: file.to_owned(),
@@ -145,34 +137,27 @@ impl Side {
 
     /// Names of the phases that have one.
     pub fn phase_names(&self) -> Vec<String> {
-        self.phases
-            .iter()
-            .filter_map(|phase| phase.name.clone())
-            .collect()
+        let names = self.phases.iter().map(|phase| phase.name.clone());
+        names.flatten().collect()
     }
 
     /// Builds every right side once, so that later ones are known to build.
     fn check(&self) -> Result<(), CheckError> {
         let mut pool = ExprPool::exact();
         for right_side in self.phases.iter().flat_map(|phase| &phase.ddz) {
-            let RightSide::Text(line, text) = right_side else {
-                continue;
-            };
-            self.parse(text, &mut pool)
-                .map_err(|source| CheckError::Expression {
+            if let RightSide::Text(line, text) = right_side {
+                let parsed = self.parse(text, &mut pool);
+                parsed.map_err(|source| CheckError::Expression {
                     file: self.file.clone(),
                     line: *line,
                     source,
                 })?;
+            }
         }
         Ok(())
     }
 
-    fn parse(
-        &self,
-        text: &str,
-        pool: &mut ExprPool,
-    ) -> Result<ExprId, crate::symbolic::ParseError> {
+    fn parse(&self, text: &str, pool: &mut ExprPool) -> Result<ExprId, ParseError> {
         let known = |name: &str| LatentVariable::from_name(name, self.latent_dim).is_some();
         pool.parse_with_literals(text, &known, &|number| self.literal_name(number))
     }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use super::args::CheckArguments;
+use super::output::extend;
 use super::{Answer, DONE, FAILED};
 use crate::Error;
 use crate::check::{
@@ -13,11 +14,9 @@ use crate::check::{
 };
 use crate::import::SymbolNames;
 use crate::typeset::significant;
+use crate::typeset::words::counted;
 
 /// Compares two files. The exit code is 0 if they are proven equal and 1 otherwise.
-///
-/// # Errors
-/// [`Error::Check`] for files that cannot be read.
 pub fn run(arguments: &CheckArguments) -> Result<(Answer, u8), Error> {
     let options = CheckOptions {
         exact: arguments.exact,
@@ -61,12 +60,8 @@ fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
     for phase in &comparison.phases {
         let _ = writeln!(text, "\nphase {}", phase.name);
         for equation in &phase.equations {
-            let _ = writeln!(
-                text,
-                "  {}: {}",
-                equation.output,
-                verdict_text(&equation.verdict)
-            );
+            let verdict = verdict_text(&equation.verdict);
+            let _ = writeln!(text, "  {}: {verdict}", equation.output);
             for (file, side) in dropping(&equation.verdict, [left, right]) {
                 let _ = writeln!(
                     text,
@@ -74,15 +69,11 @@ fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
                 );
             }
             if let Some(gap) = &equation.one_sided {
-                let (has, lacks) = if gap.left.is_nan() {
-                    ("B", "A")
-                } else {
-                    ("A", "B")
-                };
+                let is_of_second = gap.left.is_nan();
+                let (has, lacks, at) = (side(is_of_second), side(!is_of_second), place(gap));
                 let _ = writeln!(
                     text,
-                    "    note: {has} has a value at {}, {lacks} has none",
-                    place(gap)
+                    "    note: {has} has a value at {at}, {lacks} has none"
                 );
             }
         }
@@ -94,14 +85,17 @@ fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
         0 => String::new(),
         n => format!(", {n} of them up to the printed digits"),
     };
-    let equations = if all == 1 { "equation" } else { "equations" };
-    let summary = match comparison.says_the_same() {
-        true => format!("A and B say the same: {all} {equations} proven equal{rounded}"),
-        false => format!(
-            "A and B do not say the same: {equal} of {all} {equations} proven equal{rounded}"
+    let (say, of_all) = match comparison.says_the_same() {
+        true => ("say", counted(all, "equation")),
+        false => (
+            "do not say",
+            format!("{equal} of {}", counted(all, "equation")),
         ),
     };
-    let _ = writeln!(text, "\n{summary}");
+    let _ = writeln!(
+        text,
+        "\nA and B {say} the same: {of_all} proven equal{rounded}"
+    );
     text
 }
 
@@ -113,14 +107,21 @@ fn dropping<'s>(verdict: &Verdict, [left, right]: [&'s Side; 2]) -> Vec<(&'stati
         Verdict::Equal | Verdict::EqualAsPrinted(_) | Verdict::Missing(_) => &[],
     };
     let lacks = |of: fn(&TermDifference) -> f64| terms.iter().any(|term| of(term) == 0.0);
-    let mut files = Vec::new();
-    if left.is_rounded && lacks(|term| term.left) {
-        files.push(("A", left.file.as_str()));
-    }
-    if right.is_rounded && lacks(|term| term.right) {
-        files.push(("B", right.file.as_str()));
-    }
-    files
+    let files = [
+        ("A", left, lacks(|term| term.left)),
+        ("B", right, lacks(|term| term.right)),
+    ];
+    let dropping = files
+        .into_iter()
+        .filter(|(_, file, lacks)| file.is_rounded && *lacks);
+    dropping
+        .map(|(side, file, _)| (side, file.file.as_str()))
+        .collect()
+}
+
+/// The letter of a file.
+fn side(is_second: bool) -> &'static str {
+    if is_second { "B" } else { "A" }
 }
 
 fn verdict_text(verdict: &Verdict) -> String {
@@ -148,20 +149,14 @@ fn verdict_text(verdict: &Verdict) -> String {
                 terms_text(terms)
             )
         }
-        Verdict::Missing(in_second) => {
-            format!("missing in {}", if *in_second { "B" } else { "A" })
-        }
+        Verdict::Missing(in_second) => format!("missing in {}", side(*in_second)),
     }
 }
 
 fn gap_text(gap: &Gap) -> String {
-    format!(
-        " at {}\n    A = {}, B = {}, A - B = {}",
-        place(gap),
-        gap.left,
-        gap.right,
-        significant(gap.left - gap.right)
-    )
+    let Gap { left, right, .. } = gap;
+    let (at, difference) = (place(gap), significant(left - right));
+    format!(" at {at}\n    A = {left}, B = {right}, A - B = {difference}")
 }
 
 fn place(gap: &Gap) -> String {
@@ -176,41 +171,38 @@ fn place(gap: &Gap) -> String {
 
 fn terms_text(terms: &[TermDifference]) -> String {
     // A term that is not there has the coefficient 0.
-    let side = |coefficient: f64, file: &str| match coefficient {
+    let coefficient = |value: f64, file: &str| match value {
         0.0 => format!("not in {file}"),
-        _ => format!("{coefficient} in {file}"),
+        _ => format!("{value} in {file}"),
     };
     let lines = terms.iter().map(|term| {
-        let (left, right) = (side(term.left, "A"), side(term.right, "B"));
+        let (left, right) = (coefficient(term.left, "A"), coefficient(term.right, "B"));
         format!("\n    {}: {left}, {right}", term.term)
     });
     lines.collect()
 }
 
 fn equation_json(equation: &EquationComparison) -> Value {
-    let mut entry = json!({ "equation": equation.output });
-    match &equation.verdict {
-        Verdict::Equal => entry["verdict"] = json!("equal"),
+    let verdict = match &equation.verdict {
+        Verdict::Equal => json!({ "verdict": "equal" }),
         Verdict::EqualAsPrinted(rounding) => {
-            entry["verdict"] = json!("equal as printed");
-            entry["rounding"] = json!(rounding);
+            json!({ "verdict": "equal as printed", "rounding": rounding })
         }
-        Verdict::Different(difference) => {
-            entry["verdict"] = json!("different");
-            entry["point"] = gap_json(&difference.gap);
-            entry["terms"] = json!(difference.terms);
-            entry["beside_rounding"] = json!(difference.beside_rounding);
-        }
-        Verdict::Undecided(largest, terms) => {
-            entry["verdict"] = json!("not decided");
-            entry["point"] = largest.as_ref().map_or(Value::Null, gap_json);
-            entry["terms"] = json!(terms);
-        }
-        Verdict::Missing(in_second) => {
-            entry["verdict"] = json!("missing");
-            entry["missing_in"] = json!(if *in_second { "B" } else { "A" });
-        }
-    }
+        Verdict::Different(difference) => json!({
+            "verdict": "different",
+            "point": gap_json(&difference.gap),
+            "terms": difference.terms,
+            "beside_rounding": difference.beside_rounding,
+        }),
+        Verdict::Undecided(largest, terms) => json!({
+            "verdict": "not decided",
+            "point": largest.as_ref().map(gap_json),
+            "terms": terms,
+        }),
+        Verdict::Missing(second) => json!({ "verdict": "missing", "missing_in": side(*second) }),
+    };
+    let mut entry = json!({ "equation": equation.output });
+    extend(&mut entry, verdict);
     if let Some(gap) = &equation.one_sided {
         entry["one_sided"] = gap_json(gap);
     }

@@ -7,20 +7,17 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::{CodeArguments, CompileArguments, EquationArguments, UnitsChoice};
-use super::destination::{Format, Inputs, check_name, check_output, write_folder};
-use super::output::{names, note_mismatches, read_recordings};
+use super::destination::{Format, Inputs};
+use super::output::{names, note_mismatches, read_recordings, refused};
 use super::simplification::{self, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
-use crate::equations::{EquationForm, Equations, PhaseEquations};
+use crate::equations::{EquationForm, Equations};
 use crate::files::{EmittedFile, Overwrite, earlier_files};
 use crate::model::ReducedModel;
 use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
 use crate::{Error, artifact};
 
 /// Compiles a model into a folder.
-///
-/// # Errors
-/// Whatever reading, lowering or writing refuses.
 pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     let save_model = arguments.simplification.save_model.as_deref();
@@ -33,9 +30,9 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     // What would be the same file again may stay; it is compared once there is a model.
     match save_model {
         Some(path) if path.parent() == Some(&arguments.out_dir) => {
-            check_name(path, Format::Model, &inputs)?;
+            inputs.check_name(path, Format::Model)?;
         }
-        Some(_) | None => check_output(save_model, Format::Model, &inputs, Overwrite::Replace)?,
+        Some(_) | None => inputs.check_output(save_model, Format::Model, Overwrite::Replace)?,
     }
     let read = artifact::read(&arguments.model)?;
     let form = match arguments.equations.as_learned {
@@ -48,25 +45,17 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let approximate = simplified.as_ref().map(|_| Equations::in_form(model, form));
     let equations = approximate.as_ref().unwrap_or(&exact);
     let unless_given = (simplified.as_ref()).map_or(Rounding::default(), |s| s.rounding());
-    let plan = planned(arguments, model)?;
-    let mut files = emit(
-        equations,
-        (&arguments.emit, plan),
-        &arguments.code,
-        &arguments.equations,
-        unless_given,
-    )?;
-    let certificate = match &simplified {
-        None => None,
-        Some(outcome) => {
-            let rounding = rounding(&arguments.equations, unless_given);
-            Some(outcome.files_and_summary(equations, rounding)?)
-        }
-    };
+    let targets = (arguments.emit.as_slice(), planned(arguments, model)?);
+    let (code, print) = (&arguments.code, &arguments.equations);
+    let mut files = emit(equations, targets, code, print, unless_given)?;
+    let (mut summary, mut certificate) = (String::new(), Value::Null);
     if let Some(outcome) = &simplified {
+        let (file, words, value) =
+            outcome.files_and_summary(equations, rounding(print, unless_given))?;
         outcome.comment(&mut files);
+        files.push(file);
+        (summary, certificate) = (words, value);
     }
-    files.extend(certificate.iter().map(|(file, _, _)| file.clone()));
     if let Some(path) = save_model {
         artifact::check_place(path, model, overwrite)?;
     }
@@ -75,8 +64,6 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     if let Some(path) = save_model {
         artifact::write_with(path, model, overwrite)?;
     }
-    let (summary, certificate) =
-        certificate.map_or((String::new(), Value::Null), |(_, s, c)| (s, c));
     Ok(Answer {
         text: exact_words(&exact)
             + &summary
@@ -91,7 +78,9 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
             "exact": exact.steps(),
             "simplification": certificate,
             "saved_model": save_model.map(|path| path.display().to_string()),
-            "files": written.iter().map(|(path, bytes)| file_json(path, *bytes)).collect::<Vec<_>>(),
+            "files": written.iter().map(|(path, bytes)| {
+                json!({ "path": path.display().to_string(), "bytes": bytes })
+            }).collect::<Vec<_>>(),
             "earlier_files": names(&earlier),
         }),
     })
@@ -108,11 +97,14 @@ fn text(
         .column("file", "", |(path, _)| path.display().to_string())
         .column("bytes", "", |(_, bytes)| *bytes)
         .table();
+    let phases: Vec<String> = (equations.phases().iter())
+        .map(|phase| format!("{} active terms in {}", phase.active_count(), phase.name))
+        .collect();
     let mut text = format!(
         "model `{}`: {} latent coordinates, {}\n\n{table}",
         model.name(),
         model.latent_dim(),
-        phases_in_words(equations)
+        phases.join(", ")
     );
     if let Some(path) = &arguments.simplification.save_model {
         let _ = writeln!(text, "simplified model: {}", path.display());
@@ -137,10 +129,7 @@ fn rounding(equations: &EquationArguments, unless_given: Rounding) -> Rounding {
     }
 }
 
-/// The jump of `--plan` with its inputs by the rule of the model: the first segment of the recording.
-///
-/// # Errors
-/// [`Error::Config`] without a controller that would jump it, [`Error::Recording`], [`Error::Model`].
+/// The jump of `--plan` with its inputs by the rule of the model: the one segment of the recording.
 fn planned(
     arguments: &CompileArguments,
     model: &ReducedModel,
@@ -150,11 +139,9 @@ fn planned(
     };
     let jumps = |target| arguments.emit.contains(&target);
     if !jumps(Target::Controller) && !jumps(Target::ControllerC) {
-        return Err(Error::Config {
-            path: path.clone(),
-            message: "--plan without a target that jumps it; add --emit controller or controller-c"
-                .to_owned(),
-        });
+        let message =
+            "--plan without a target that jumps it; add --emit controller or controller-c";
+        return Err(refused(path, message));
     }
     let reading = &arguments.simplification.reading;
     let mut recording = read_recordings(std::slice::from_ref(path), reading)?.swap_remove(0);
@@ -162,10 +149,7 @@ fn planned(
     if recording.segments.len() > 1 {
         let found = recording.segments.len();
         let message = format!("--plan takes one jump: found {found} segments");
-        return Err(Error::Config {
-            path: path.clone(),
-            message,
-        });
+        return Err(refused(path, message));
     }
     let motion = recording.segments.swap_remove(0);
     Ok(Some(PlannedJump {
@@ -180,10 +164,6 @@ fn planned(
 
 /// The files of the targets, in memory, with the model's digest in their headers; `unless_given` is
 /// how coefficients are printed unless the arguments give it.
-///
-/// # Errors
-/// [`Error::Emit`] if the model cannot be lowered or typeset, [`Error::Rename`] for a new name that
-/// cannot be used.
 pub fn emit(
     model_equations: &Equations<'_>,
     (targets, plan): (&[Target], Option<PlannedJump>),
@@ -210,25 +190,22 @@ pub fn emit(
         },
         ..EmitOptions::default()
     };
-    Ok(match code.units {
-        UnitsChoice::Si | UnitsChoice::Scaled => deploy::emit(model_equations, targets, &options)?,
-        UnitsChoice::Physical => {
-            deploy::emit(&model_equations.in_physical_units()?, targets, &options)?
-        }
-    })
+    let physical = match code.units {
+        UnitsChoice::Si | UnitsChoice::Scaled => None,
+        UnitsChoice::Physical => Some(model_equations.in_physical_units()?),
+    };
+    let equations = physical.as_ref().unwrap_or(model_equations);
+    Ok(deploy::emit(equations, targets, &options)?)
 }
 
 /// Writes files into a folder; the path of each, with its size in bytes.
-///
-/// # Errors
-/// As [`write_folder`].
 pub fn write(
     folder: &Path,
     files: &[EmittedFile],
     inputs: &Inputs<'_>,
     overwrite: Overwrite,
 ) -> Result<Vec<(PathBuf, usize)>, Error> {
-    let paths = write_folder(folder, files, inputs, overwrite)?;
+    let paths = inputs.write_folder(folder, files, overwrite)?;
     let sizes = files.iter().map(|file| file.contents.len());
     Ok(paths.into_iter().zip(sizes).collect())
 }
@@ -244,17 +221,4 @@ fn earlier_in_words(earlier: &[PathBuf]) -> String {
             others.len()
         ),
     }
-}
-
-fn phases_in_words(equations: &Equations<'_>) -> String {
-    let phase =
-        |phase: &PhaseEquations| format!("{} active terms in {}", phase.active_count(), phase.name);
-    (equations.phases().iter())
-        .map(phase)
-        .collect::<Vec<_>>()
-        .join(", ")
-}
-
-fn file_json(path: &Path, bytes: usize) -> Value {
-    json!({ "path": path.display().to_string(), "bytes": bytes })
 }

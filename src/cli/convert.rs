@@ -7,29 +7,20 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::ConvertArguments;
-use super::destination::{Format, Inputs, check_output};
+use super::destination::{Format, Inputs};
 use super::output::{names, read_with, reader};
 use crate::files::Overwrite;
-use crate::recording::{Clocks, Recording, Segment, WriteOptions, write_inputs_with, write_mcap};
+use crate::recording::{Clocks, Recording, Segment, WriteOptions, write_mcap, write_with};
 use crate::{Error, artifact};
 
 /// Reads, chains and writes.
-///
-/// # Errors
-/// Whatever reading or writing refuses; [`Error::Exists`] for the output, [`Error::OneSegment`] for an MCAP file
-/// of several.
 pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    let inputs = Inputs::default()
+    Inputs::default()
         .and(&arguments.recordings)
         .and(&arguments.inputs_of)
-        .and(&arguments.reading.columns);
-    check_output(
-        Some(&arguments.output),
-        Format::Recording,
-        &inputs,
-        overwrite,
-    )?;
+        .and(&arguments.reading.columns)
+        .check_output(Some(&arguments.output), Format::Recording, overwrite)?;
     let rule = match &arguments.inputs_of {
         None => None,
         Some(path) => Some(artifact::read(path)?.input_rule()?),
@@ -37,17 +28,13 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     let reader = reader(&arguments.reading, Clocks::Recorded)?;
     let recordings = read_with(&reader, &arguments.recordings)?;
     let segments = chained(recordings);
-    let inputs = match &rule {
-        None => None,
-        Some(rule) => {
-            let inputs = segments.iter().map(|segment| segment.input(rule));
-            Some(inputs.collect::<Result<Vec<DMatrix<f64>>, _>>()?)
-        }
-    };
-    let (samples, count) = (
-        segments.iter().map(Segment::len).sum::<usize>(),
-        segments.len(),
-    );
+    let inputs = rule.as_ref().map(|rule| {
+        let inputs = segments.iter().map(|segment| segment.input(rule));
+        inputs.collect::<Result<Vec<DMatrix<f64>>, _>>()
+    });
+    let inputs = inputs.transpose()?;
+    let count = segments.len();
+    let samples: usize = segments.iter().map(Segment::len).sum();
     write_recording(&arguments.output, segments, inputs.as_deref())?;
     let output = arguments.output.display().to_string();
     Ok(Answer {
@@ -98,7 +85,7 @@ pub fn write_recording(
         segments,
         ignored_columns: Vec::new(),
     };
-    Ok(write_inputs_with(
+    Ok(write_with(
         path,
         &recording,
         inputs,

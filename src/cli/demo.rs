@@ -52,10 +52,6 @@ const RESTART_S: f64 = 0.1;
 const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
 /// Runs the whole path and reports its files and metrics. The exit code is 1 if the self-test or a run fails.
-///
-/// # Errors
-/// [`Error::Folder`] for a file in the folder that romc did not make; nothing else should fail on
-/// the shipped files.
 pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     let progress = spinner("reading the shipped model and recordings");
@@ -105,15 +101,15 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
         control_table(&control[0]),
         run_table(&control[0])
     );
-    for failure in failures(&control[0]) {
-        let _ = writeln!(text, "FAILED along {failure}");
-    }
     let failed: Vec<String> = control.iter().flat_map(|runs| failed_runs(runs)).collect();
-    for reason in &failed {
+    for reason in failures(&control[0]).iter().chain(&failed) {
         let _ = writeln!(text, "FAILED along {reason}");
     }
-    let is_sound = failed.is_empty() && !matches!(self_test, SelfTest::Failed(_));
-    let self_test = self_test.words();
+    let is_sound = failed.is_empty() && self_test.is_ok();
+    let self_test = match self_test {
+        Ok(words) => words.to_owned(),
+        Err(reason) => format!("FAILED: {reason}"),
+    };
     let _ = writeln!(text, "\nself-test of the emitted C: {self_test}\n");
     let _ = writeln!(text, "made in {}:", arguments.out_dir.display());
     for (path, bytes) in &made {
@@ -137,30 +133,10 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     Ok((answer, if is_sound { DONE } else { FAILED }))
 }
 
-/// Outcome of the emitted self-test.
-#[derive(Debug, Clone, PartialEq, Eq)]
-enum SelfTest {
-    Passed,
-    NoCompiler,
-    Failed(String),
-}
-
-impl SelfTest {
-    fn words(&self) -> String {
-        match self {
-            Self::Passed => "passed".to_owned(),
-            Self::NoCompiler => "not run: no C compiler `cc` was found".to_owned(),
-            Self::Failed(reason) => format!("FAILED: {reason}"),
-        }
-    }
-}
-
-/// Compiles the emitted C with the machine's compiler and runs its self-test.
-fn self_test(model: &ReducedModel, folder: &Path) -> SelfTest {
+/// Compiles the emitted C with the machine's compiler and runs its self-test: what became of it, or why it failed.
+fn self_test(model: &ReducedModel, folder: &Path) -> Result<&'static str, String> {
     let name = model.identifier().as_str();
-    let Ok(scratch) = tempfile::tempdir() else {
-        return SelfTest::Failed("no temporary folder".to_owned());
-    };
+    let scratch = tempfile::tempdir().map_err(|_| "no temporary folder")?;
     let binary = scratch.path().join("selftest");
     let compiled = Command::new("cc")
         .args(["-std=c99", "-O2", "-o"])
@@ -169,16 +145,18 @@ fn self_test(model: &ReducedModel, folder: &Path) -> SelfTest {
         .arg(folder.join(format!("{name}_selftest.c")))
         .arg("-lm")
         .output();
-    match compiled {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => SelfTest::NoCompiler,
-        Err(error) => SelfTest::Failed(error.to_string()),
-        Ok(output) if !output.status.success() => {
-            SelfTest::Failed(String::from_utf8_lossy(&output.stderr).into_owned())
+    let compiled = match compiled {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            return Ok("not run: no C compiler `cc` was found");
         }
-        Ok(_) => match Command::new(&binary).output() {
-            Ok(output) if output.status.success() => SelfTest::Passed,
-            Ok(output) => SelfTest::Failed(String::from_utf8_lossy(&output.stdout).into_owned()),
-            Err(error) => SelfTest::Failed(error.to_string()),
-        },
+        compiled => compiled.map_err(|error| error.to_string())?,
+    };
+    if !compiled.status.success() {
+        return Err(String::from_utf8_lossy(&compiled.stderr).into_owned());
+    }
+    match Command::new(&binary).output() {
+        Ok(output) if output.status.success() => Ok("passed"),
+        Ok(output) => Err(String::from_utf8_lossy(&output.stdout).into_owned()),
+        Err(error) => Err(error.to_string()),
     }
 }

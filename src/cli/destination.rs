@@ -2,8 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use super::Answer;
+use super::output::names;
 use crate::Error;
 use crate::files::{EmittedFile, Overwrite, write_files};
+use crate::report::figures::{Figure, figure_files};
 use crate::robot::Robot;
 
 /// What an output file holds, which the ending of its name says.
@@ -75,9 +78,6 @@ impl<'a> Inputs<'a> {
     }
 
     /// Refuses to write a file that is read, by whatever path: it, or the folder that it is in, is an input.
-    ///
-    /// # Errors
-    /// [`Error::IsRead`].
     fn check(&self, output: &Path) -> Result<(), Error> {
         let Ok(place) = output.canonicalize() else {
             return Ok(()); // what is not there is not read
@@ -94,59 +94,66 @@ impl<'a> Inputs<'a> {
             Some(_) | None => Ok(()),
         }
     }
-}
 
-/// Refuses an output by its name alone.
-///
-/// # Errors
-/// [`Error::IsFolder`] for a folder, [`Error::Ending`] for a name that says another format, [`Error::IsRead`] for one of
-/// the inputs.
-pub fn check_name(path: &Path, format: Format, inputs: &Inputs<'_>) -> Result<(), Error> {
-    if path.is_dir() || path.file_name().is_none() {
-        return Err(Error::IsFolder(path.to_owned()));
-    }
-    format.check(path)?;
-    inputs.check(path)
-}
-
-/// Refuses an output that could not be written, before long work begins.
-///
-/// # Errors
-/// Those of [`check_name`], [`Error::Exists`] if the file is there and may not be replaced, [`Error::NoFolder`] if its folder is not.
-pub fn check_output(
-    path: Option<&Path>,
-    format: Format,
-    inputs: &Inputs<'_>,
-    overwrite: Overwrite,
-) -> Result<(), Error> {
-    let Some(path) = path else { return Ok(()) };
-    check_name(path, format, inputs)?;
-    if !overwrite.allows(path) {
-        return Err(Error::Exists(path.to_owned()));
-    }
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
-            Err(Error::NoFolder {
-                path: path.to_owned(),
-                folder: folder.to_owned(),
-            })
+    /// Refuses an output by its name alone: a folder, a name that says another format, one of the inputs.
+    pub fn check_name(&self, path: &Path, format: Format) -> Result<(), Error> {
+        if path.is_dir() || path.file_name().is_none() {
+            return Err(Error::IsFolder(path.to_owned()));
         }
-        Some(_) | None => Ok(()),
+        format.check(path)?;
+        self.check(path)
     }
-}
 
-/// Writes files into a folder, none of them one of the inputs.
-///
-/// # Errors
-/// [`Error::IsRead`], [`Error::Folder`] for a file of that name that romc did not make.
-pub fn write_folder(
-    folder: &Path,
-    files: &[EmittedFile],
-    inputs: &Inputs<'_>,
-    overwrite: Overwrite,
-) -> Result<Vec<PathBuf>, Error> {
-    for file in files {
-        inputs.check(&folder.join(&file.path))?;
+    /// Refuses an output that could not be written, before long work begins: by its name, as it is there and may not be
+    /// replaced, or as its folder is not.
+    pub fn check_output(
+        &self,
+        path: Option<&Path>,
+        format: Format,
+        overwrite: Overwrite,
+    ) -> Result<(), Error> {
+        let Some(path) = path else { return Ok(()) };
+        self.check_name(path, format)?;
+        if !overwrite.allows(path) {
+            return Err(Error::Exists(path.to_owned()));
+        }
+        match path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+                Err(Error::NoFolder {
+                    path: path.to_owned(),
+                    folder: folder.to_owned(),
+                })
+            }
+            Some(_) | None => Ok(()),
+        }
     }
-    Ok(write_files(folder, files, overwrite)?)
+
+    /// Writes files into a folder, none of them one of these, nor one of that name that romc did not make.
+    pub fn write_folder(
+        &self,
+        folder: &Path,
+        files: &[EmittedFile],
+        overwrite: Overwrite,
+    ) -> Result<Vec<PathBuf>, Error> {
+        for file in files {
+            self.check(&folder.join(&file.path))?;
+        }
+        Ok(write_files(folder, files, overwrite)?)
+    }
+
+    /// Writes figures into a folder, if one is given, and says so in the answer.
+    pub fn write_figures(
+        &self,
+        folder: Option<&Path>,
+        figures: &[Figure],
+        overwrite: Overwrite,
+        answer: &mut Answer,
+    ) -> Result<(), Error> {
+        let Some(folder) = folder else { return Ok(()) };
+        let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
+        let written = self.write_folder(folder, &files, overwrite)?;
+        answer.text += &format!("{} figures: {}\n", figures.len(), folder.display());
+        answer.json["figures"] = names(&written).into();
+        Ok(())
+    }
 }

@@ -7,38 +7,27 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::IdentifyArguments;
-use super::destination::{Format, Inputs, check_output};
-use super::output::{note_repeated, read_with, reader, spinner, write_file};
+use super::destination::{Format, Inputs};
+use super::output::{names, note_repeated, read_with, reader, spinner, write_file};
 use super::robot;
 use crate::Error;
 use crate::files::Overwrite;
-use crate::identify::{Identification, PerKind, identify};
+use crate::identify::{Identification, Legs, identify};
 use crate::recording::Clocks;
 use crate::robot::Robot;
 use crate::typeset::{Table, significant};
 
 /// Identifies the robot and writes the file, if one is asked for.
-///
-/// # Errors
-/// [`Error::Robot`] for an unknown name, [`Error::Recording`] for a file that cannot be read,
-/// [`Error::Identify`] for recordings that do not say enough, [`Error::Exists`] for the output.
 pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    let inputs = Inputs::default()
+    Inputs::default()
         .and(&arguments.recordings)
         .and(&arguments.reading.columns)
-        .and_robot(Some(&arguments.robot));
-    check_output(
-        arguments.output.as_deref(),
-        Format::Toml,
-        &inputs,
-        overwrite,
-    )?;
+        .and_robot(Some(&arguments.robot))
+        .check_output(arguments.output.as_deref(), Format::Toml, overwrite)?;
     let robot = robot::chosen(&arguments.robot)?;
-    let recordings = read_with(
-        &reader(&arguments.reading, Clocks::Recorded)?,
-        &arguments.recordings,
-    )?;
+    let reader = reader(&arguments.reading, Clocks::Recorded)?;
+    let recordings = read_with(&reader, &arguments.recordings)?;
     let paths = arguments.recordings.iter().map(PathBuf::as_path);
     note_repeated(&[("recordings", paths.collect())]);
     let progress = spinner("identifying");
@@ -58,111 +47,61 @@ pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
 
 fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
     let error = &found.standard_error;
-    let mut body = Table::new(["quantity", "unit", "value", "standard error"]);
-    for (name, unit, value, error) in [
-        ("gravity", "m/s^2", found.gravity_m_s2, error.gravity_m_s2),
-        ("mass", "kg", found.mass_kg, error.mass_kg),
-        (
-            "torque to motion",
-            "ms",
-            1e3 * found.delay_s,
-            1e3 * error.delay_s,
-        ),
-    ] {
-        body.row([
-            name.to_owned(),
-            unit.to_owned(),
-            significant(value),
-            two_digits(error),
-        ]);
-    }
+    let delays = [found.delay_s, error.delay_s].map(|delay| 1e3 * delay);
+    let body = [
+        ("gravity", "m/s^2", [found.gravity_m_s2, error.gravity_m_s2]),
+        ("mass", "kg", [found.mass_kg, error.mass_kg]),
+        ("torque to motion", "ms", delays),
+    ];
+    let body = quantities("quantity", body);
     let mut joints = Table::new(["losses of a joint", "unit", "hx", "hy", "kn"]);
-    for (name, unit, values, errors) in [
+    let (viscous, dry) = (
+        [found.viscous(), error.viscous_nm_s_rad],
+        [found.dry(), error.dry_nm],
+    );
+    for (name, unit, [values, errors]) in [
+        ("viscous friction", "N m s/rad", viscous),
+        ("dry friction", "N m", dry),
         (
-            "viscous friction",
-            "N m s/rad",
-            found.viscous(),
-            error.viscous_nm_s_rad,
+            "armature",
+            "kg m^2",
+            [found.armature(), error.armature_kg_m2],
         ),
-        ("dry friction", "N m", found.dry(), error.dry_nm),
-        ("armature", "kg m^2", found.armature(), error.armature_kg_m2),
     ] {
-        let mut row = vec![name.to_owned(), unit.to_owned()];
         let pairs = values.to_array().into_iter().zip(errors.to_array());
-        row.extend(pairs.map(|(value, error)| with_error(value, error)));
-        joints.row(row);
+        let cells =
+            pairs.map(|(value, error)| format!("{} ± {}", significant(value), two_digits(error)));
+        joints.row([name, unit].map(str::to_owned).into_iter().chain(cells));
     }
-    let (of, legs) = (&found.legs, &error.legs);
-    let mut links = Table::new(["one leg", "unit", "value", "standard error"]);
-    for (name, unit, value, error) in [
-        (
-            "first moment beside the hip",
-            "kg m",
-            of.side_kg_m,
-            legs.side_kg_m,
-        ),
-        (
-            "first moment of the thigh",
-            "kg m",
-            of.thigh_kg_m,
-            legs.thigh_kg_m,
-        ),
-        (
-            "first moment of the calf",
-            "kg m",
-            of.calf_kg_m,
-            legs.calf_kg_m,
-        ),
-        (
-            "second moment of the thigh",
-            "kg m^2",
-            of.thigh_kg_m2,
-            legs.thigh_kg_m2,
-        ),
-        (
-            "second moment of the calf",
-            "kg m^2",
-            of.calf_kg_m2,
-            legs.calf_kg_m2,
-        ),
-    ] {
-        links.row([
-            name.to_owned(),
-            unit.to_owned(),
-            significant(value),
-            two_digits(error),
-        ]);
-    }
+    let moments: [(&str, &str, fn(&Legs) -> f64); 5] = [
+        ("first moment beside the hip", "kg m", |l| l.side_kg_m),
+        ("first moment of the thigh", "kg m", |l| l.thigh_kg_m),
+        ("first moment of the calf", "kg m", |l| l.calf_kg_m),
+        ("second moment of the thigh", "kg m^2", |l| l.thigh_kg_m2),
+        ("second moment of the calf", "kg m^2", |l| l.calf_kg_m2),
+    ];
+    let moments = moments.map(|(name, unit, of)| (name, unit, [of(&found.legs), of(&error.legs)]));
+    let links = quantities("one leg", moments);
     let alone = &found.force_alone;
-    let mut fits = Table::new([
-        "trunk's acceleration by",
-        "R^2 x",
-        "R^2 z",
-        "gravity",
-        "mass, kg",
-    ]);
-    for (name, r2, gravity, mass) in [
+    let fits = [
         (
             "the feet's forces alone",
             alone.r2,
-            alone.gravity_m_s2,
-            alone.mass_kg,
+            [alone.gravity_m_s2, alone.mass_kg],
         ),
         (
             "losses and legs too",
             found.r2,
-            found.gravity_m_s2,
-            found.mass_kg,
+            [found.gravity_m_s2, found.mass_kg],
         ),
-    ] {
-        fits.row([
-            name.to_owned(),
-            format!("{:.3}", r2.x),
-            format!("{:.3}", r2.z),
-            format!("{gravity:.2}"),
-            format!("{mass:.2}"),
-        ]);
-    }
+    ];
+    let fits = Table::of(fits)
+        .column("trunk's acceleration by", "", |(name, ..)| *name)
+        .column("R^2 x", "", |(_, r2, _)| format!("{:.3}", r2.x))
+        .column("R^2 z", "", |(_, r2, _)| format!("{:.3}", r2.z))
+        .column("gravity", "", |(.., [gravity, _])| format!("{gravity:.2}"))
+        .column("mass", "kg", |(.., [_, mass])| format!("{mass:.2}"))
+        .table();
     let mut text = format!(
         "{} from {recordings} recordings: {} samples with feet on the ground, {} in flight\n\n\
          {body}\n{joints}\n{links}\n{fits}",
@@ -176,8 +115,14 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
     text
 }
 
-fn with_error(value: f64, error: f64) -> String {
-    format!("{} ± {}", significant(value), two_digits(error))
+/// A table of values with their standard errors.
+fn quantities<const N: usize>(what: &str, rows: [(&str, &str, [f64; 2]); N]) -> Table {
+    Table::of(rows)
+        .column(what, "", |(name, ..)| *name)
+        .column("unit", "", |(_, unit, _)| *unit)
+        .column("value", "", |(.., [value, _])| *value)
+        .column("standard error", "", |(.., [_, error])| two_digits(*error))
+        .table()
 }
 
 fn two_digits(value: f64) -> String {
@@ -193,30 +138,19 @@ fn two_digits(value: f64) -> String {
 
 /// The keys that other programs rely on; see `docs/identify.md`.
 fn report(found: &Identification, arguments: &IdentifyArguments) -> Value {
-    let error = &found.standard_error;
-    let kinds = |values: PerKind| json!({"hx": values.hx, "hy": values.hy, "kn": values.kn});
     let alone = &found.force_alone;
     json!({
         "command": "identify",
         "robot": found.robot,
-        "recordings": arguments.recordings.iter().map(|path| path.display().to_string())
-            .collect::<Vec<_>>(),
+        "recordings": names(&arguments.recordings),
         "gravity_m_s2": found.gravity_m_s2,
         "mass_kg": found.mass_kg,
         "delay_s": found.delay_s,
-        "viscous_nm_s_rad": kinds(found.viscous()),
-        "dry_nm": kinds(found.dry()),
-        "armature_kg_m2": kinds(found.armature()),
+        "viscous_nm_s_rad": found.viscous(),
+        "dry_nm": found.dry(),
+        "armature_kg_m2": found.armature(),
         "legs": found.legs,
-        "standard_error": {
-            "gravity_m_s2": error.gravity_m_s2,
-            "mass_kg": error.mass_kg,
-            "delay_s": error.delay_s,
-            "viscous_nm_s_rad": kinds(error.viscous_nm_s_rad),
-            "dry_nm": kinds(error.dry_nm),
-            "armature_kg_m2": kinds(error.armature_kg_m2),
-            "legs": error.legs,
-        },
+        "standard_error": found.standard_error,
         "r2": { "force": alone.r2, "losses": found.r2 },
         "force_alone": { "gravity_m_s2": alone.gravity_m_s2, "mass_kg": alone.mass_kg },
         "samples": found.samples,

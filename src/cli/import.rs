@@ -2,13 +2,12 @@
 
 use std::fmt::Write as _;
 
-use serde_json::json;
+use serde_json::{Map, Value, json};
 
 use super::Answer;
 use super::args::{ImportArguments, LibraryArgument};
-use super::destination::{Format, Inputs, check_output};
-use super::import_check;
-use super::output::{read_recordings, stem};
+use super::destination::{Format, Inputs};
+use super::output::{named, read_recordings};
 use super::robot;
 use crate::evaluate::RoundTrip;
 use crate::files::Overwrite;
@@ -23,23 +22,20 @@ use crate::typeset::Table;
 use crate::{Error, artifact};
 
 /// Imports a model and writes it.
-///
-/// # Errors
-/// Whatever the importer refuses; [`Error::Exists`] for the model file.
 pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     let library = match &arguments.library {
         Some(LibraryArgument::File(path)) => Some(path),
         Some(LibraryArgument::Shorthand(_)) | None => None,
     };
-    let inputs = Inputs::default()
+    Inputs::default()
         .and([&arguments.file])
         .and(library)
         .and(&arguments.actuators)
         .and(&arguments.inputs_from)
         .and(&arguments.reading.columns)
-        .and_robot(arguments.robot.as_deref());
-    check_output(Some(&arguments.output), Format::Model, &inputs, overwrite)?;
+        .and_robot(arguments.robot.as_deref())
+        .check_output(Some(&arguments.output), Format::Model, overwrite)?;
     let imported = import(&arguments.file, &options(arguments)?)?;
     let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
@@ -62,14 +58,10 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         let _ = writeln!(text, "note: {axes}");
     }
     if let Some(check) = &check {
-        text.push_str(&import_check::describe(check));
+        text.push_str(&describe_check(check));
     }
-    let _ = writeln!(
-        text,
-        "{}: model `{}`",
-        arguments.output.display(),
-        model.name()
-    );
+    let (output, name) = (arguments.output.display().to_string(), model.name());
+    let _ = writeln!(text, "{output}: model `{name}`");
     let lacking = lacking(&model);
     if let Some(lacking) = lacking {
         let _ = writeln!(text, "\n{lacking}");
@@ -78,13 +70,13 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         text,
         json: json!({
             "command": "import",
-            "model": arguments.output.display().to_string(),
-            "name": model.name(),
+            "model": output,
+            "name": name,
             "digest": artifact::digest(&model).to_string(),
             "report": imported.report,
             "wrench_axes": axes,
             "lacking": lacking,
-            "check": check.as_ref().map(import_check::json),
+            "check": check.as_ref().map(check_json),
         }),
     })
 }
@@ -129,11 +121,9 @@ fn lacking(model: &ReducedModel) -> Option<&'static str> {
 fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
     let robot = arguments.robot.as_deref().map(robot::chosen).transpose()?;
     let actuators = arguments.actuators.as_deref();
+    let actuators = actuators.map(|path| read_actuators(path, robot));
     Ok(ImportOptions {
-        name: arguments
-            .name
-            .clone()
-            .unwrap_or_else(|| stem(&arguments.output)),
+        name: named(arguments.name.as_deref(), &arguments.output),
         description: arguments.description.clone(),
         format: arguments.format,
         mapping: arguments.map.clone(),
@@ -141,25 +131,19 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
         activation: arguments.activation,
         xi_layout: arguments.xi_layout,
         symbols: SymbolNames::parse(&arguments.symbols)?,
-        library: library(arguments)?,
+        library: match &arguments.library {
+            None => None,
+            Some(LibraryArgument::Shorthand(standard)) => Some(LibraryChoice::Standard(*standard)),
+            Some(LibraryArgument::File(path)) => Some(LibraryChoice::Terms(read_terms(path)?)),
+        },
         latent_dim: arguments.latent_dim,
         phases: arguments.phase.clone(),
         order: arguments.order.clone(),
         robot,
         wrench_frame: arguments.wrench_frame.unwrap_or_default(),
-        actuators: actuators
-            .map(|path| read_actuators(path, robot))
-            .transpose()?,
+        actuators: actuators.transpose()?,
         sample_time_s: arguments.sample_time,
         ..ImportOptions::of_factors(&arguments.scaling, &arguments.input_scaling)
-    })
-}
-
-fn library(arguments: &ImportArguments) -> Result<Option<LibraryChoice>, Error> {
-    Ok(match &arguments.library {
-        None => None,
-        Some(LibraryArgument::Shorthand(standard)) => Some(LibraryChoice::Standard(*standard)),
-        Some(LibraryArgument::File(path)) => Some(LibraryChoice::Terms(read_terms(path)?)),
     })
 }
 
@@ -212,4 +196,35 @@ fn shape(dims: &[usize]) -> String {
         true => "1".to_owned(),
         false => dims.join(" x "),
     }
+}
+
+/// What the recordings of `--inputs-from` say of the imported model, as text.
+fn describe_check(check: &RoundTrip) -> String {
+    let mut text = format!(
+        "\nOn the recordings: decode(encode(x)) misses {:.3} of the variance",
+        check.error
+    );
+    for (phase, r2) in &check.acceleration_r2 {
+        if let Some(r2) = r2 {
+            let _ = write!(text, "; R^2 of ddz in {phase} {r2:.3}");
+        }
+    }
+    text.push('\n');
+    if let Some(fault) = check.fault() {
+        let _ = writeln!(text, "warning: {fault}");
+    }
+    text.push('\n');
+    text
+}
+
+/// The same as JSON.
+fn check_json(check: &RoundTrip) -> Value {
+    let phases: Map<String, Value> = (check.acceleration_r2.iter())
+        .map(|(phase, r2)| (phase.clone(), json!(r2)))
+        .collect();
+    json!({
+        "reconstruction_error": check.error,
+        "acceleration_r2": phases,
+        "fault": check.fault(),
+    })
 }

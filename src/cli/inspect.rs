@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::Answer;
 use super::args::InspectArguments;
-use super::destination::{Format, Inputs, check_output};
+use super::destination::{Format, Inputs};
 use super::output::{note, reader, write_file};
 use super::{inspect_model, inspect_recording, robot};
 use crate::files::Overwrite;
@@ -16,20 +16,18 @@ use crate::robot::Robot;
 use crate::{Error, artifact};
 
 /// Inspects each file: those that end in `.json` as models, all others as recordings.
-///
-/// # Errors
-/// Whatever reading the file refuses.
 pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     let robot = robot::chosen(&arguments.robot)?;
     if arguments.guess {
         return guessed(arguments, robot);
     }
     let reader = reader(&arguments.reading, Clocks::Recorded)?;
-    let answers = (arguments.files.iter())
-        .map(|path| inspect(path, robot, &reader))
-        .collect::<Result<Vec<_>, _>>()?;
-    let texts: Vec<String> = answers.iter().map(|answer| answer.text.clone()).collect();
-    let files: Vec<Value> = answers.into_iter().map(|answer| answer.json).collect();
+    let (mut texts, mut files) = (Vec::new(), Vec::new());
+    for path in &arguments.files {
+        let Answer { text, json } = inspect(path, robot, &reader)?;
+        texts.push(text);
+        files.push(json);
+    }
     Ok(Answer {
         text: texts.join("\n"),
         json: json!({ "command": "inspect", "files": files }),
@@ -42,15 +40,10 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
         return Err(Error::OneLog(arguments.files.len()));
     };
     let overwrite = Overwrite::when_forced(arguments.force);
-    let inputs = Inputs::default()
+    Inputs::default()
         .and([log])
-        .and_robot(Some(&arguments.robot));
-    check_output(
-        arguments.output.as_deref(),
-        Format::Toml,
-        &inputs,
-        overwrite,
-    )?;
+        .and_robot(Some(&arguments.robot))
+        .check_output(arguments.output.as_deref(), Format::Toml, overwrite)?;
     let guess = guess(log, robot)?;
     let outcome = match &guess.outcome {
         Ok(samples) => format!("read by this map, the log has {samples} samples"),

@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use serde::Serialize;
 use serde_json::json;
 
 use super::Answer;
@@ -23,19 +22,7 @@ const PATTERN_WIDTH: usize = 120;
 /// Coordinates named for each latent.
 const DOMINANT: usize = 4;
 
-/// One phase of the equations.
-#[derive(Serialize)]
-struct PhaseView<'a> {
-    name: &'a str,
-    feet: String,
-    active_terms: usize,
-    coefficients: usize,
-}
-
 /// Describes a model.
-///
-/// # Errors
-/// [`Error::Artifact`] if the digest cannot be computed.
 pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     let dominant = dominant_coordinates(model);
     let equations = Equations::of(model);
@@ -50,20 +37,21 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
         let _ = writeln!(text, "  {}", model.description());
     }
     text.push_str(&input_rule(model));
-    let phases: Vec<PhaseView> = (equations.phases().iter())
-        .map(|phase| PhaseView {
-            name: &phase.name,
-            feet: phase.feet.to_string(),
-            active_terms: phase.active_count(),
-            coefficients: equations.terms().len() * equations.latent_dim(),
-        })
-        .collect();
-    let table = Table::of(&phases)
-        .column("phase", "", |phase| phase.name)
-        .column("feet", "", |phase| &phase.feet)
-        .column("active terms", "", |phase| phase.active_terms)
-        .column("of", "", |phase| phase.coefficients)
+    let coefficients = equations.terms().len() * equations.latent_dim();
+    let table = Table::of(equations.phases())
+        .column("phase", "", |phase| &phase.name)
+        .column("feet", "", |phase| phase.feet.to_string())
+        .column("active terms", "", |phase| phase.active_count())
+        .column("of", "", |_| coefficients)
         .table();
+    let phases = equations.phases().iter().map(|phase| {
+        json!({
+            "name": phase.name,
+            "feet": phase.feet.to_string(),
+            "active_terms": phase.active_count(),
+            "coefficients": coefficients,
+        })
+    });
     let _ = writeln!(text, "\n{table}");
     text.push_str(&exact_words(&equations));
     for phase in 0..equations.phases().len() {
@@ -84,11 +72,9 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     } else {
         text.push_str("latent-only: no encoder, so it says nothing about a robot's coordinates\n");
     }
+    let file = path.display().to_string();
     let invariance = Invariance::of(model).unwrap_or_else(|error| {
-        note(&format!(
-            "{}: invariance is not told: {error}",
-            path.display()
-        ));
+        note(&format!("{file}: invariance is not told: {error}"));
         None
     });
     if let Some(invariance) = &invariance {
@@ -99,14 +85,14 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
         text,
         json: json!({
             "kind": "model",
-            "file": path.display().to_string(),
+            "file": file,
             "name": model.name(),
             "description": model.description(),
             "digest": artifact::digest(model).to_string(),
             "latent_dim": model.latent_dim(),
             "library_dim": model.library().len(),
             "library": model.library().terms().iter().map(|term| term.text()).collect::<Vec<_>>(),
-            "phases": phases,
+            "phases": phases.collect::<Vec<_>>(),
             "exact": equations.steps(),
             "dominant_coordinates": dominant,
             "encoder": model.encoder_map().ok().map(StateMap::summary),
@@ -133,19 +119,13 @@ fn input_rule(model: &ReducedModel) -> String {
         return text + " torques of the motors\n";
     };
     text.push_str(" torques of the motors less what the joints take\n\n");
-    let mut table = Table::new([
-        "joint",
-        "viscous, N m s/rad",
-        "dry, N m",
-        "armature, kg m^2",
-    ]);
-    for (joint, name) in JOINT_NAMES.into_iter().enumerate() {
-        let values = actuators
-            .named()
-            .map(|(_, values)| significant(values[joint]));
-        table.row([name.to_owned()].into_iter().chain(values));
-    }
-    text + &format!("{table}")
+    let mut table = Table::default();
+    table
+        .column("joint", "", JOINT_NAMES)
+        .column("viscous", "N m s/rad", actuators.viscous)
+        .column("dry", "N m", actuators.dry)
+        .column("armature", "kg m^2", actuators.armature);
+    text + &table.to_string()
 }
 
 /// Rows are outputs, columns terms; a dot is an inactive one.
@@ -175,16 +155,14 @@ fn dominant_coordinates(model: &ReducedModel) -> Option<Vec<Vec<(String, f64)>>>
     let names = match model.state() {
         Some(state) => state.names.clone(),
         None if weights.ncols() == Robot::state_names().len() => Robot::state_names().to_vec(),
-        None => (1..=weights.ncols())
-            .map(|index| format!("x{index}"))
-            .collect(),
+        None => (1..=weights.ncols()).map(|i| format!("x{i}")).collect(),
     };
     let of_latent = |row: usize| {
-        let mut pairs: Vec<(String, f64)> = names
+        let pairs = names
             .iter()
             .cloned()
-            .zip(weights.row(row).iter().copied())
-            .collect();
+            .zip(weights.row(row).into_iter().copied());
+        let mut pairs: Vec<(String, f64)> = pairs.collect();
         pairs.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         pairs.truncate(DOMINANT);
         pairs

@@ -12,6 +12,7 @@ use crate::recording::check::{Finding, check};
 use crate::recording::mismatch::{Figures, Mismatch, mismatches};
 use crate::recording::{PhaseRule, PhaseSpan, Reading, ReadingNotes, Recording, Segment, Stance};
 use crate::robot::{JOINT_DIM, Robot};
+use crate::typeset::words::counted;
 use crate::typeset::{Cell, Table, significant};
 
 /// Characters of the time bar.
@@ -22,9 +23,6 @@ const CHATTER: usize = 10;
 const FINDINGS_SHOWN: usize = 12;
 
 /// Describes a recording.
-///
-/// # Errors
-/// [`Error::Recording`] if no phase rule covers the feet.
 pub fn describe(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
     let recording = &reading.recording;
     let mut notes = ReadingNotes::default();
@@ -33,15 +31,10 @@ pub fn describe(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
     let findings = check(recording, robot);
     let rule = PhaseRule::three_phase().with_min_samples(CHATTER);
     let mut text = format!(
-        "{}: {} samples in {} {}\n",
+        "{}: {} samples in {}\n",
         recording.path.display(),
         recording.sample_count(),
-        recording.segments.len(),
-        if recording.segments.len() == 1 {
-            "segment"
-        } else {
-            "segments"
-        }
+        counted(recording.segments.len(), "segment")
     );
     let mut segments = Vec::new();
     for (index, segment) in recording.segments.iter().enumerate() {
@@ -87,22 +80,24 @@ pub fn describe(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
             "ignored_columns": recording.ignored_columns,
             "figures": Figures::of(recording, robot),
             "mismatches": mismatches.iter().map(mismatch_json).collect::<Vec<_>>(),
-            "implausible": findings.iter().map(in_segment).collect::<Vec<_>>(),
+            "implausible": findings.iter().map(|finding| {
+                let mut value = finding_json(finding);
+                value["segment"] = json!(finding.segment);
+                value
+            }).collect::<Vec<_>>(),
         }),
     })
 }
 
 /// Feet on the ground over time, one character per slice of equal duration.
 fn time_bar(segment: &Segment) -> String {
-    (0..BAR_WIDTH)
-        .map(
-            |slot| match segment.feet[slot * segment.len() / BAR_WIDTH] {
-                [false, false, false, false] => ' ',
-                [false, false, _, _] => '=',
-                [_, _, _, _] => '#',
-            },
-        )
-        .collect()
+    let feet = (0..BAR_WIDTH).map(|slot| segment.feet[slot * segment.len() / BAR_WIDTH]);
+    let character = |feet: [bool; 4]| match feet {
+        [false, false, false, false] => ' ',
+        [false, false, _, _] => '=',
+        [_, _, _, _] => '#',
+    };
+    feet.map(character).collect()
 }
 
 fn segment_json(segment: &Segment, spans: &[PhaseSpan], rule: &PhaseRule) -> Value {
@@ -142,9 +137,8 @@ struct Range {
 
 fn ranges(recording: &Recording) -> Vec<Range> {
     let extremes = |row: usize, matrix: &dyn Fn(&Segment) -> &DMatrix<f64>| {
-        let values = recording
-            .segments
-            .iter()
+        let segments = recording.segments.iter();
+        let values = segments
             .flat_map(|segment| matrix(segment).row(row).iter().copied().collect::<Vec<_>>());
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
             (low.min(value), high.max(value))
@@ -190,16 +184,10 @@ fn findings_text(findings: &[Finding]) -> String {
     text
 }
 
-fn in_segment(finding: &Finding) -> Value {
-    let mut value = finding_json(finding);
-    value["segment"] = json!(finding.segment);
-    value
-}
-
 /// A mismatch without its recording.
 pub(super) fn mismatch_json(mismatch: &Mismatch) -> Value {
     json!({
-        "what": mismatch.kind.word(),
+        "what": mismatch.kind,
         "value": mismatch.value,
         "bound": mismatch.bound,
         "words": mismatch.words,

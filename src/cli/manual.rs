@@ -1,5 +1,7 @@
 //! `romc manual` and `romc completions`: the commands described for `man` and for shells.
 
+use std::path::Path;
+
 use clap::CommandFactory as _;
 use serde_json::json;
 
@@ -10,10 +12,6 @@ use crate::Error;
 use crate::files::{EmittedFile, Overwrite, write_files};
 
 /// Writes `romc.1` and `romc-COMMAND.1` for each command.
-///
-/// # Errors
-/// [`Error::Folder`] for files in the folder that romc did not make; [`Error::Write`] if a page
-/// cannot be made.
 pub fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
     let mut root = Arguments::command();
     root.build();
@@ -34,17 +32,11 @@ pub fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
     })
 }
 
-fn file(
-    folder: &std::path::Path,
-    name: &str,
-    command: clap::Command,
-) -> Result<EmittedFile, Error> {
+fn file(folder: &Path, name: &str, command: clap::Command) -> Result<EmittedFile, Error> {
     let path = format!("{name}.1");
     let mut page = Vec::new();
-    let title = name.to_uppercase();
-    let command = command.display_name(name.to_owned());
-    clap_mangen::Man::new(command)
-        .title(title)
+    clap_mangen::Man::new(command.display_name(name.to_owned()))
+        .title(name.to_uppercase())
         // a date would make every build's pages differ
         .date("")
         .render(&mut page)
@@ -52,10 +44,7 @@ fn file(
             path: folder.join(&path),
             source,
         })?;
-    Ok(EmittedFile::new(
-        path,
-        String::from_utf8_lossy(&page).into_owned(),
-    ))
+    Ok(EmittedFile::new(path, String::from_utf8_lossy(&page)))
 }
 
 /// The completions of one shell.

@@ -4,7 +4,6 @@
 //! answer and picks the exit code (0 done, 1 the run failed, 2 wrong usage). Human text and JSON go
 //! to stdout; progress, warnings and errors go to stderr. Start with [`args`].
 
-mod actuators;
 pub mod args;
 mod check;
 mod compile;
@@ -13,7 +12,6 @@ mod demo;
 mod destination;
 mod identify;
 mod import;
-mod import_check;
 mod inspect;
 mod inspect_model;
 mod inspect_recording;
@@ -29,8 +27,6 @@ mod simulate;
 mod study;
 mod train;
 mod train_settings;
-mod trajectory;
-mod whole_jumps;
 
 use std::borrow::Cow;
 use std::ffi::OsString;
@@ -75,18 +71,17 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             return u8::try_from(refusal.exit_code()).unwrap_or(WRONG_USAGE);
         }
     };
-    let printed = execute(arguments.command).map(|(answer, code)| match arguments.json {
-        true => (
-            format!("{}\n", printable_json(&answer.json.to_string())),
-            code,
-        ),
-        false => (printable(&answer.text).into_owned(), code),
-    });
-    match printed {
-        Ok((text, code)) => match print(&text) {
-            DONE => code,
-            failed => failed,
-        },
+    match execute(arguments.command) {
+        Ok((Answer { text, json }, code)) => {
+            let text = match arguments.json {
+                true => format!("{}\n", printable_json(&json.to_string())),
+                false => printable(&text).into_owned(),
+            };
+            match print(&text) {
+                DONE => code,
+                failed => failed,
+            }
+        }
         Err(error) => {
             print_error(&error);
             match error.is_usage() {
@@ -128,10 +123,8 @@ fn execute(command: Command) -> Result<(Answer, u8), Error> {
 /// Prints to stdout; a reader that has gone away (`| head`) is no failure.
 fn print(text: &str) -> u8 {
     let mut stdout = io::stdout().lock();
-    match stdout
-        .write_all(text.as_bytes())
-        .and_then(|()| stdout.flush())
-    {
+    let written = stdout.write_all(text.as_bytes());
+    match written.and_then(|()| stdout.flush()) {
         Ok(()) => DONE,
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => DONE,
         Err(error) => {

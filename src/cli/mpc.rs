@@ -5,36 +5,27 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use super::args::MpcArguments;
-use super::destination::{Format, Inputs, check_output, write_folder};
-use super::output::{names, note, progress_bar, read_recordings, write_file};
+use super::destination::{Format, Inputs};
+use super::output::{extend, note, progress_bar, read_recordings, show_progress, write_file};
 use super::{Answer, DONE, FAILED};
 use crate::evaluate::{ReferenceInput, STEP_SLACK, along_recording, control_metrics, remarks};
-use crate::files::{EmittedFile, Overwrite};
+use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::mpc::{Controller, Lift, MpcSettings};
 use crate::recording::{Recording, Segment};
-use crate::report::figures::figure_files;
 use crate::report::{NamedRun, control_figures, control_table, failed_runs, failures, run_table};
 use crate::robot::{JOINT_DIM, Robot};
 use crate::typeset::Table;
 use crate::{Error, artifact};
 
 /// Runs the controller along each recording. The exit code is 1 if along one of them most steps have no plan.
-///
-/// # Errors
-/// Whatever reading or the controller's set-up refuses; [`Error::Exists`] for the output file.
 pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.reading.columns);
-    check_output(
-        arguments.output.as_deref(),
-        Format::Table,
-        &inputs,
-        overwrite,
-    )?;
+    inputs.check_output(arguments.output.as_deref(), Format::Table, overwrite)?;
     let model = artifact::read(&arguments.model)?;
     let settings = MpcSettings {
         horizon: arguments.horizon,
@@ -47,34 +38,23 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
     let remarks = remarks(&model, &recordings)?;
-    let mut answer = answer(arguments, &runs, &remarks);
-    if let Some(folder) = &arguments.figures {
-        let figures = control_figures(&model, &settings, &runs);
-        let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
-        let written = write_folder(folder, &files, &inputs, overwrite)?;
-        let count = figures.len();
-        let _ = writeln!(answer.text, "{count} figures: {}", folder.display());
-        answer.json["figures"] = names(&written).into();
-    }
+    let failed = failed_runs(&runs);
+    let mut answer = answer(arguments, &runs, &failed, &remarks);
+    let figures = control_figures(&model, &settings, &runs);
+    inputs.write_figures(
+        arguments.figures.as_deref(),
+        &figures,
+        overwrite,
+        &mut answer,
+    )?;
     if let Some(path) = &arguments.output {
-        write_file(
-            path,
-            command_table(&model, &runs).csv().as_bytes(),
-            overwrite,
-        )?;
+        let table = command_table(&model, &runs);
+        write_file(path, table.csv().as_bytes(), overwrite)?;
     }
-    let code = if failed_runs(&runs).is_empty() {
-        DONE
-    } else {
-        FAILED
-    };
-    Ok((answer, code))
+    Ok((answer, if failed.is_empty() { DONE } else { FAILED }))
 }
 
 /// Runs a fresh controller along each recording.
-///
-/// # Errors
-/// Whatever reading or the controller's set-up refuses.
 pub fn run_all(
     model: &ReducedModel,
     recordings: &[Recording],
@@ -84,21 +64,12 @@ pub fn run_all(
     let mut controller = Controller::new(model, settings)?;
     let mut runs = Vec::with_capacity(recordings.len());
     for recording in recordings {
-        let bar = progress_bar(format!("controlling along {}", recording.path.display()));
+        let path = recording.path.display();
+        let bar = progress_bar(format!("controlling along {path}"));
         controller.reset();
-        let mut run = along_recording(
-            &mut controller,
-            recording,
-            reference_input,
-            |done, total| {
-                bar.set_length(total as u64);
-                bar.set_position(done as u64);
-            },
-        )?;
-        bar.set_message(format!(
-            "comparing with baselines along {}",
-            recording.path.display()
-        ));
+        let progress = |done, total| show_progress(&bar, done, total);
+        let mut run = along_recording(&mut controller, recording, reference_input, progress)?;
+        bar.set_message(format!("comparing with baselines along {path}"));
         run.metrics = Some(control_metrics(model, recording, settings)?);
         bar.finish_and_clear();
         runs.push((recording.path.clone(), run));
@@ -108,9 +79,6 @@ pub fn run_all(
 
 /// Runs with default settings: with the plain lift, then with the consistent one. Recordings of fewer samples than a
 /// default stage has are followed at the rate of the slowest, which a note says.
-///
-/// # Errors
-/// As [`run_all`].
 pub fn run_with_both_lifts(
     model: &ReducedModel,
     recordings: &[Recording],
@@ -139,7 +107,12 @@ pub fn run_with_both_lifts(
     Ok([with(Lift::Transpose)?, with(Lift::Consistent)?])
 }
 
-fn answer(arguments: &MpcArguments, runs: &[NamedRun], remarks: &[String]) -> Answer {
+fn answer(
+    arguments: &MpcArguments,
+    runs: &[NamedRun],
+    failed: &[String],
+    remarks: &[String],
+) -> Answer {
     let mut text = format!(
         "{}: latent MPC, {} stages of {} s\n\n{}\n{}\n",
         arguments.model.display(),
@@ -148,11 +121,7 @@ fn answer(arguments: &MpcArguments, runs: &[NamedRun], remarks: &[String]) -> An
         control_table(runs),
         run_table(runs)
     );
-    for failure in failures(runs) {
-        let _ = writeln!(text, "FAILED along {failure}");
-    }
-    let failed = failed_runs(runs);
-    for reason in &failed {
+    for reason in failures(runs).iter().chain(failed) {
         let _ = writeln!(text, "FAILED along {reason}");
     }
     for remark in remarks {
@@ -205,9 +174,7 @@ pub fn run_json((path, run): &NamedRun) -> Value {
             "inconsistency": summary.inconsistency,
         },
     });
-    if let (Value::Object(all), Value::Object(metrics)) = (&mut value, json!(run.metrics)) {
-        all.extend(metrics);
-    }
+    extend(&mut value, json!(run.metrics));
     value
 }
 
@@ -221,8 +188,9 @@ pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
         Some(input) => input.names.clone(),
         None => Robot::input_names().to_vec(),
     };
-    let torques = inputs.iter().take(JOINT_DIM);
-    let torques: Vec<String> = torques.map(|name| format!("{name} torque")).collect();
+    let torques: Vec<String> = (inputs.iter().take(JOINT_DIM))
+        .map(|name| format!("{name} torque"))
+        .collect();
     let first = "recording,segment,time,phase,status,solve_us,iterations".split(',');
     let columns = first
         .map(str::to_owned)

@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::de::DeserializeOwned;
+use serde_json::Value;
 
 use super::args::ReadingArguments;
 use crate::Error;
@@ -15,10 +17,7 @@ use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, misma
 use crate::robot::Robot;
 use crate::train::sha256;
 
-/// Writes a whole file.
-///
-/// # Errors
-/// [`Error::Exists`] if it is there and may not be replaced, [`Error::Write`] if the file system refuses.
+/// Writes a whole file, unless it is there and may not be replaced.
 pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<(), Error> {
     if !overwrite.allows(path) {
         return Err(Error::Exists(path.to_owned()));
@@ -29,10 +28,34 @@ pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<
     })
 }
 
+/// Reads a text.
+pub fn read_text(path: &Path) -> Result<String, Error> {
+    std::fs::read_to_string(path).map_err(|source| Error::Read {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// The settings of a TOML file, checked.
+pub fn read_settings<T: DeserializeOwned>(
+    path: &Path,
+    check: impl Fn(&T) -> Result<(), String>,
+) -> Result<T, Error> {
+    let settings = toml::from_str(&read_text(path)?)
+        .map_err(|error| refused(path, error.to_string().trim_end()))?;
+    check(&settings).map_err(|message| refused(path, message))?;
+    Ok(settings)
+}
+
+/// A file of settings that cannot be used.
+pub fn refused(path: &Path, message: impl Into<String>) -> Error {
+    Error::Config {
+        path: path.to_owned(),
+        message: message.into(),
+    }
+}
+
 /// The reader that the arguments ask for, with this treatment of clocks unless they name another.
-///
-/// # Errors
-/// [`Error::Recording`] for the map of columns.
 pub fn reader(arguments: &ReadingArguments, clocks: Clocks) -> Result<Reader, Error> {
     let map = arguments.columns.as_deref().map(ColumnMap::read);
     Ok(Reader::new(
@@ -42,9 +65,6 @@ pub fn reader(arguments: &ReadingArguments, clocks: Clocks) -> Result<Reader, Er
 }
 
 /// Reads recordings, showing which; what reading did besides goes to stderr.
-///
-/// # Errors
-/// [`Error::Recording`] for the map of columns, and the first that cannot be read.
 pub fn read_recordings(
     paths: &[PathBuf],
     arguments: &ReadingArguments,
@@ -53,9 +73,6 @@ pub fn read_recordings(
 }
 
 /// [`read_recordings`] by a reader.
-///
-/// # Errors
-/// [`Error::Recording`] for the first that cannot be read.
 pub fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
     let progress = spinner("reading recordings");
     let mut notes = ReadingNotes::default();
@@ -94,9 +111,8 @@ pub fn note_mismatches(recording: &Recording, robot: &Robot) {
 /// counts twice says less than two.
 pub fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
     let mut first: BTreeMap<String, (&str, &Path)> = BTreeMap::new();
-    let all = sets
-        .iter()
-        .flat_map(|(set, paths)| paths.iter().map(move |path| (*set, *path)));
+    let sets = sets.iter();
+    let all = sets.flat_map(|(set, paths)| paths.iter().map(move |path| (*set, *path)));
     for (set, path) in all.filter(|(_, path)| path.is_file()) {
         let Ok(bytes) = std::fs::read(path) else {
             continue; // reading it as a recording says why
@@ -109,11 +125,8 @@ pub fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
                     true => "and counts twice".to_owned(),
                     false => format!("which is in the {other} set: its {set} figures say too much"),
                 };
-                note(&format!(
-                    "{}: the same recording as {}, {what}",
-                    path.display(),
-                    earlier.display()
-                ));
+                let (path, earlier) = (path.display(), earlier.display());
+                note(&format!("{path}: the same recording as {earlier}, {what}"));
             }
         }
     }
@@ -155,18 +168,21 @@ pub fn report_reading(notes: &ReadingNotes) {
 
 /// Paths as JSON shows them.
 pub fn names(paths: &[PathBuf]) -> Vec<String> {
-    paths
-        .iter()
-        .map(|path| path.display().to_string())
-        .collect()
+    let names = paths.iter().map(|path| path.display().to_string());
+    names.collect()
 }
 
-/// Name of a file without folder and ending.
-pub fn stem(path: &Path) -> String {
-    path.file_stem()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned()
+/// Adds the entries of one object to another.
+pub fn extend(object: &mut Value, more: Value) {
+    if let (Value::Object(object), Value::Object(more)) = (object, more) {
+        object.extend(more);
+    }
+}
+
+/// The name of a model: as given, or that of its file without folder and ending.
+pub fn named(given: Option<&str>, output: &Path) -> String {
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+    given.map_or_else(|| stem.into_owned(), str::to_owned)
 }
 
 /// A spinner on stderr, shown only when stderr is a terminal.
@@ -186,4 +202,10 @@ pub fn progress_bar(message: impl Into<String>) -> ProgressBar {
     let bar = ProgressBar::new(0).with_style(style);
     bar.set_message(message.into());
     bar
+}
+
+/// Shows on a bar how many steps are done.
+pub fn show_progress(bar: &ProgressBar, done: usize, total: usize) {
+    bar.set_length(total as u64);
+    bar.set_position(done as u64);
 }

@@ -1,56 +1,48 @@
 //! `romc plan`: a jump that nobody recorded, as a recording.
 
 use std::fmt::Write as _;
-use std::fs;
-use std::path::Path;
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::Answer;
-use super::args::{PlanArguments, ReadingArguments};
+use super::args::PlanArguments;
 use super::convert::write_recording;
-use super::destination::{Format, Inputs, check_output, write_folder};
-use super::output::{names, note_mismatches, progress_bar, reader, spinner, warn};
-use super::train_settings::refused;
-use crate::files::{EmittedFile, Overwrite};
+use super::destination::{Format, Inputs};
+use super::output::{
+    extend, note_mismatches, progress_bar, read_settings, reader, show_progress, spinner, warn,
+};
+use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::plan::{self, Goal, Plan, PlanSettings, Reach, Verdict};
 use crate::recording::Clocks;
-use crate::report::figures::{Figure, figure_files};
 use crate::report::{plan_figures, plan_json, reach_figure};
 use crate::robot::Robot;
 use crate::typeset::{Cell, Table};
 use crate::{Error, artifact};
 
-/// Plans a jump and writes it, or maps what can be planned.
-///
-/// # Errors
-/// Whatever reading or planning refuses; [`Error::Distrusted`] for a plan that is not to be trusted,
-/// unless forced; [`Error::Exists`] for the output.
+/// Plans a jump and writes it unless it is not to be trusted and not forced, or maps what can be planned.
 pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    let inputs = inputs(arguments);
-    check_output(
-        arguments.output.as_deref(),
-        Format::Recording,
-        &inputs,
-        overwrite,
-    )?;
+    let inputs = Inputs::default()
+        .and([&arguments.model])
+        .and(&arguments.start)
+        .and(&arguments.settings)
+        .and(&arguments.reading.columns);
+    inputs.check_output(arguments.output.as_deref(), Format::Recording, overwrite)?;
     let model = artifact::read(&arguments.model)?;
-    let settings = settings(arguments.settings.as_deref())?;
-    if arguments.reach {
-        return map(arguments, &model, &settings);
-    }
-    let (Some(distance), Some(apex)) = (arguments.distance, arguments.apex) else {
-        unreachable!("clap asks for both without --reach");
+    let settings = match &arguments.settings {
+        None => PlanSettings::default(),
+        Some(path) => read_settings(path, PlanSettings::check)?,
     };
-    let goal = goal(
-        distance,
-        apex,
-        arguments.start.as_deref(),
-        &arguments.reading,
-        model.robot()?,
-    )?;
+    let figures = arguments.figures.as_deref();
+    if arguments.reach {
+        let reach = map(&model, &settings)?;
+        let mut answer = reach_answer(arguments, &reach);
+        let figure = reach_figure(&reach, model.jump_prior()?);
+        inputs.write_figures(figures, &[figure], overwrite, &mut answer)?;
+        return Ok(answer);
+    }
+    let goal = goal(arguments, model.robot()?)?;
     let bar = spinner("planning");
     let planned = plan::plan(&model, &goal, &settings);
     bar.finish_and_clear();
@@ -66,11 +58,8 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     }
     let mut answer = answer(arguments, &planned);
     // Figures first: a folder that is refused leaves no plan behind.
-    draw(
-        arguments,
-        &plan_figures(&planned, model.robot()?),
-        &mut answer,
-    )?;
+    let drawn = plan_figures(&planned, model.robot()?);
+    inputs.write_figures(figures, &drawn, overwrite, &mut answer)?;
     if let Some(path) = &arguments.output {
         write_recording(path, vec![planned.motion.clone()], None)?;
         let _ = writeln!(answer.text, "\nthe plan: {}", path.display());
@@ -78,70 +67,17 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     Ok(answer)
 }
 
-/// The files that planning reads.
-fn inputs(arguments: &PlanArguments) -> Inputs<'_> {
-    Inputs::default()
-        .and([&arguments.model])
-        .and(&arguments.start)
-        .and(&arguments.settings)
-        .and(&arguments.reading.columns)
-}
-
-/// Writes figures, if a folder for them is given.
-///
-/// # Errors
-/// [`Error::Folder`] for files there that romc did not make.
-fn draw(arguments: &PlanArguments, figures: &[Figure], answer: &mut Answer) -> Result<(), Error> {
-    let Some(folder) = &arguments.figures else {
-        return Ok(());
-    };
-    let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
-    let overwrite = Overwrite::when_forced(arguments.force);
-    let written = write_folder(folder, &files, &inputs(arguments), overwrite)?;
-    let _ = writeln!(
-        answer.text,
-        "{} figures: {}",
-        figures.len(),
-        folder.display()
-    );
-    answer.json["figures"] = names(&written).into();
-    Ok(())
-}
-
-/// The settings of a file, or the defaults.
-///
-/// # Errors
-/// [`Error::Read`], [`Error::Config`].
-fn settings(path: Option<&Path>) -> Result<PlanSettings, Error> {
-    let Some(path) = path else {
-        return Ok(PlanSettings::default());
-    };
-    let text = fs::read_to_string(path).map_err(|source| Error::Read {
-        path: path.to_owned(),
-        source,
-    })?;
-    let settings: PlanSettings =
-        toml::from_str(&text).map_err(|error| refused(path, error.to_string().trim_end()))?;
-    settings
-        .check()
-        .map_err(|message| refused(path, &message))?;
-    Ok(settings)
-}
-
 /// The goal of the arguments.
-///
-/// # Errors
-/// [`Error::Plan`] for numbers that no jump has, [`Error::Recording`] for the start.
-fn goal(
-    distance_m: f64,
-    apex_m: f64,
-    start: Option<&Path>,
-    reading: &ReadingArguments,
-    robot: &Robot,
-) -> Result<Goal, Error> {
+fn goal(arguments: &PlanArguments, robot: &Robot) -> Result<Goal, Error> {
+    let (Some(distance_m), Some(apex_m)) = (arguments.distance, arguments.apex) else {
+        unreachable!("clap asks for both without --reach");
+    };
     let goal = Goal::new(distance_m, apex_m)?;
-    let Some(path) = start else { return Ok(goal) };
-    let recording = reader(reading, Clocks::Recorded)?.read(path)?.recording;
+    let Some(path) = &arguments.start else {
+        return Ok(goal);
+    };
+    let reader = reader(&arguments.reading, Clocks::Recorded)?;
+    let recording = reader.read(path)?.recording;
     note_mismatches(&recording, robot);
     let first = &recording.segments[0];
     let column = |rows: &nalgebra::DMatrix<f64>| rows.column(0).into_owned();
@@ -150,23 +86,13 @@ fn goal(
 
 fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
     let mut table = Table::new(["", "unit", "planned", "expected error"]);
-    let quantities = ["distance", "apex"].into_iter().enumerate();
-    for (i, name) in quantities {
-        table.row([
-            name.into(),
-            "m".into(),
-            Cell::from(planned.reached_m[i]),
-            Cell::from(planned.error_m[i]),
-        ]);
+    for (i, name) in ["distance", "apex"].into_iter().enumerate() {
+        let values = [planned.reached_m[i], planned.error_m[i]].map(Cell::from);
+        table.row([name, "m"].map(Cell::from).into_iter().chain(values));
     }
     for part in &planned.parts {
         let name = format!("duration of {}", part.name);
-        table.row([
-            name.into(),
-            "s".into(),
-            Cell::from(part.duration_s),
-            "".into(),
-        ]);
+        table.row([name.into(), "s".into(), Cell::from(part.duration_s)]);
     }
     let margins = &planned.margins;
     let mut text = format!(
@@ -195,45 +121,23 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
     for reason in planned.verdict.reasons() {
         let _ = writeln!(text, "{}: {reason}", planned.verdict.word());
     }
-    Answer {
-        text,
-        json: json_of(arguments, planned),
-    }
-}
-
-/// The object of the documentation.
-fn json_of(arguments: &PlanArguments, planned: &Plan) -> Value {
-    let mut value = json!({
+    let mut json = json!({
         "command": "plan",
         "model": arguments.model.display().to_string(),
     });
-    if let (Value::Object(all), Value::Object(plan)) = (&mut value, plan_json(planned)) {
-        all.extend(plan);
-    }
-    value["output"] = json!(
-        arguments
-            .output
-            .as_ref()
-            .map(|path| path.display().to_string())
-    );
-    value
+    extend(&mut json, plan_json(planned));
+    let output = arguments.output.as_ref();
+    json["output"] = json!(output.map(|path| path.display().to_string()));
+    Answer { text, json }
 }
 
-fn map(
-    arguments: &PlanArguments,
-    model: &ReducedModel,
-    settings: &PlanSettings,
-) -> Result<Answer, Error> {
-    let bar = progress_bar("planning a grid of goals".to_owned());
+fn map(model: &ReducedModel, settings: &PlanSettings) -> Result<Reach, Error> {
+    let bar = progress_bar("planning a grid of goals");
     let reach = plan::reach(model, settings, |done, total| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
+        show_progress(&bar, done, total);
     })?;
     bar.finish_and_clear();
-    let mut answer = reach_answer(arguments, &reach);
-    let figure = reach_figure(&reach, model.jump_prior()?);
-    draw(arguments, &[figure], &mut answer)?;
-    Ok(answer)
+    Ok(reach)
 }
 
 fn reach_answer(arguments: &PlanArguments, reach: &Reach) -> Answer {

@@ -27,12 +27,8 @@ const SETS: [&str; 3] = ["training", "validation", "test"];
 
 /// The recordings of a training; their files are read when the samples are needed.
 pub struct RecordedSets {
-    /// Jumps that the model is fitted to.
-    pub training: Arc<RecordingFiles>,
-    /// Jumps that choose between candidates.
-    pub validation: Arc<RecordingFiles>,
-    /// Jumps used only for the final metrics.
-    pub test: Arc<RecordingFiles>,
+    /// Jumps that the model is fitted to, those that choose between candidates, and those used only for the final metrics.
+    pub sets: [Arc<RecordingFiles>; 3],
     /// The jumps of each set, if they were divided.
     pub divided: Option<[Vec<Place>; 3]>,
     options: ConditionOptions,
@@ -41,9 +37,6 @@ pub struct RecordedSets {
 impl RecordedSets {
     /// The recordings that the arguments name, divided by their shares if they have any, to be conditioned as the
     /// settings say.
-    ///
-    /// # Errors
-    /// [`Error::Recording`] for a file, [`Error::Train`] for fewer jumps than sets.
     pub fn new(
         arguments: &TrainArguments,
         settings: &TrainSettings,
@@ -52,19 +45,14 @@ impl RecordedSets {
     ) -> Result<Self, Error> {
         let reader = reader_for(&arguments.reading, settings)?;
         let Some(split) = arguments.split else {
-            let paths = [
-                &arguments.recordings[..],
-                &arguments.validation,
-                &arguments.test,
-            ];
+            let (training, validation) = (&arguments.recordings, &arguments.validation);
+            let paths = [training.as_slice(), validation, &arguments.test];
             return Ok(Self::whole(paths, settings, robot, reader));
         };
         let jumps = jumps_of(&arguments.recordings, &reader)?;
         let sets = split.of(jumps.len(), seed)?;
-        let sets = sets.map(|set| -> Vec<Place> {
-            let places = set.into_iter().map(|jump| jumps[jump].clone());
-            places.collect()
-        });
+        let sets = sets
+            .map(|set| -> Vec<Place> { set.into_iter().map(|jump| jumps[jump].clone()).collect() });
         let files = sets.each_ref().map(|set| chosen_segments(set));
         Ok(Self {
             divided: Some(sets),
@@ -94,14 +82,12 @@ impl RecordedSets {
         reader: Reader,
     ) -> Self {
         let options = train_settings::conditioning(settings);
-        let [training, validation, test] = files.map(|files| {
+        let sets = files.map(|files| {
             let files = RecordingFiles::new(files, robot, options.clone());
             Arc::new(files.read_by(reader.clone()))
         });
         Self {
-            training,
-            validation,
-            test,
+            sets,
             divided: None,
             options,
         }
@@ -109,18 +95,11 @@ impl RecordedSets {
 
     /// Which jumps came into which set, file and first row of each, if they were divided.
     pub fn json(&self) -> Option<Value> {
-        let places = |set: &[Place]| -> Vec<Value> {
-            let jumps = set.iter();
-            jumps
-                .map(|(path, _, row)| json!({ "file": path.display().to_string(), "row": row }))
-                .collect()
-        };
-        let [training, validation, test] = self.divided.as_ref()?;
-        Some(json!({
-            "training": places(training),
-            "validation": places(validation),
-            "test": places(test),
-        }))
+        let place =
+            |(path, _, row): &Place| json!({ "file": path.display().to_string(), "row": row });
+        let sets = SETS.into_iter().zip(self.divided.as_ref()?);
+        let sets = sets.map(|(name, set)| (name.to_owned(), set.iter().map(place).collect()));
+        Some(Value::Object(sets.collect()))
     }
 
     /// The sets that the jumps of a file came into, if they were divided.
@@ -133,10 +112,12 @@ impl RecordedSets {
 
     /// The files of each set, those with jumps in several in the first.
     pub fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
-        let sets = [&self.training, &self.validation, &self.test];
         let mut seen: Vec<&Path> = Vec::new();
         let mut of_set = |set: usize| {
-            let files = sets[set].files().iter().map(|file| file.path.as_path());
+            let files = self.sets[set]
+                .files()
+                .iter()
+                .map(|file| file.path.as_path());
             let new = files.filter(|path| self.divided.is_none() || !seen.contains(path));
             let new: Vec<&Path> = new.collect();
             seen.extend(&new);
@@ -161,7 +142,7 @@ impl RecordedSets {
     /// The notes of all sets together, as far as files were read.
     fn notes(&self) -> Notes {
         let mut all = Notes::default();
-        for set in [&self.training, &self.validation, &self.test] {
+        for set in &self.sets {
             let notes = set.notes();
             all.findings.extend(notes.findings);
             all.mismatches.extend(notes.mismatches);
@@ -172,7 +153,7 @@ impl RecordedSets {
 
     /// Reports on stderr which files have implausible samples, and what became of them.
     pub fn report_findings(&self) {
-        report_reading(&self.training.notes().reading);
+        report_reading(&self.sets[0].notes().reading);
         let Notes {
             findings,
             mismatches,
@@ -185,20 +166,17 @@ impl RecordedSets {
         let (findings, singular): (Vec<_>, Vec<_>) =
             (findings.into_iter()).partition(|(_, finding)| finding.kind.can_be_left_out());
         report_singular(&singular);
-        let mut files: Vec<&Path> = Vec::new();
-        for (file, _) in &findings {
-            if !files.contains(&file.as_path()) {
-                files.push(file);
+        let mut files: Vec<(&Path, usize, &Finding)> = Vec::new();
+        for (file, finding) in &findings {
+            match files.iter_mut().find(|(known, ..)| known == file) {
+                Some((_, runs, _)) => *runs += 1,
+                None => files.push((file, 1, finding)),
             }
         }
-        for file in files {
-            let of_file = findings.iter().filter(|(path, _)| path == file);
-            let runs: Vec<&Finding> = of_file.map(|(_, finding)| finding).collect();
+        for (file, runs, first) in files {
+            let file = file.display();
             note(&format!(
-                "{}: {} implausible runs of samples, such as {}",
-                file.display(),
-                runs.len(),
-                runs[0]
+                "{file}: {runs} implausible runs of samples, such as {first}"
             ));
         }
         match self.options.implausible {
@@ -220,20 +198,19 @@ impl RecordedSets {
             left_out,
             ..
         } = self.notes();
-        let mismatches = mismatches.iter().map(|(file, mismatch)| {
-            let mut value = mismatch_json(mismatch);
+        let of_file = |file: &Path, mut value: Value| {
             value["file"] = json!(file.display().to_string());
             value
-        });
-        let mismatches: Vec<Value> = mismatches.collect();
-        let findings = findings.iter().map(|(file, finding)| {
-            let mut value = finding_json(finding);
-            value["file"] = json!(file.display().to_string());
-            value
-        });
+        };
+        let findings = findings
+            .iter()
+            .map(|(file, found)| of_file(file, finding_json(found)));
+        let mismatches = mismatches
+            .iter()
+            .map(|(file, found)| of_file(file, mismatch_json(found)));
         json!({
             "implausible": findings.collect::<Vec<_>>(),
-            "mismatches": mismatches,
+            "mismatches": mismatches.collect::<Vec<_>>(),
             "left_out": left_out,
         })
     }
@@ -254,9 +231,6 @@ fn report_singular(findings: &[(PathBuf, Finding)]) {
 }
 
 /// All recordings of a set of files, in memory.
-///
-/// # Errors
-/// [`Error::Recording`] for the first that cannot be read, or of which too little remains.
 pub fn read_all(files: &RecordingFiles) -> Result<Vec<Recording>, Error> {
     let mut all = Vec::new();
     files.for_each(|recording| {
@@ -267,9 +241,6 @@ pub fn read_all(files: &RecordingFiles) -> Result<Vec<Recording>, Error> {
 }
 
 /// The reader of a training: clocks are repaired unless told otherwise, or to train as published.
-///
-/// # Errors
-/// [`Error::Recording`] for the map of columns.
 pub fn reader_for(arguments: &ReadingArguments, settings: &TrainSettings) -> Result<Reader, Error> {
     let clocks = match settings.paper {
         true => Clocks::Recorded,

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::ReportArguments;
-use super::destination::{Format, Inputs, check_output, write_folder};
+use super::destination::{Format, Inputs};
 use super::mpc::run_with_both_lifts;
 use super::output::{names, note_mismatches, read_recordings, spinner, write_file};
 use super::simplification;
@@ -25,9 +25,6 @@ use crate::train::sha256;
 use crate::{Error, artifact};
 
 /// Writes the page, and the figures if a folder for them is given.
-///
-/// # Errors
-/// Whatever reading, simulating, controlling or writing refuses.
 pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     let inputs = Inputs::default()
@@ -35,7 +32,7 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         .and(&arguments.recordings)
         .and(&arguments.plan)
         .and(&arguments.reading.columns);
-    check_output(Some(&arguments.output), Format::Page, &inputs, overwrite)?;
+    inputs.check_output(Some(&arguments.output), Format::Page, overwrite)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let study = match &arguments.study {
@@ -50,15 +47,11 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
             Some(read.swap_remove(0))
         }
     };
-    let made = make(
-        &model,
-        &recordings,
-        (study.as_ref(), plan.as_ref()),
-        arguments,
-    )?;
+    let beside = (study.as_ref(), plan.as_ref());
+    let made = make(&model, &recordings, beside, arguments)?;
     // The figures come first: files that romc did not make are refused with nothing written.
     let written = match &arguments.figures {
-        Some(folder) => write_folder(folder, &made.files, &inputs, overwrite)?,
+        Some(folder) => inputs.write_folder(folder, &made.files, overwrite)?,
         None => Vec::new(),
     };
     write_file(&arguments.output, made.page.as_bytes(), overwrite)?;
@@ -74,11 +67,10 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         let _ = writeln!(text, "note: {remark}");
     }
     if let Some(folder) = &arguments.figures {
+        let (folder, files) = (folder.display(), written.len());
         let _ = writeln!(
             text,
-            "{}: {} files, each figure as .svg, .pdf and .csv",
-            folder.display(),
-            written.len()
+            "{folder}: {files} files, each figure as .svg, .pdf and .csv"
         );
     }
     Ok(Answer {
@@ -111,9 +103,6 @@ pub struct Made {
 }
 
 /// Assesses the model, runs the controller and draws everything.
-///
-/// # Errors
-/// Whatever simulating, controlling or typesetting refuses.
 fn make(
     model: &ReducedModel,
     recordings: &[Recording],
@@ -142,20 +131,13 @@ fn make(
         plan: plan.and_then(|recording| recording.segments.first()),
         digests: &digests,
     };
-    let made = page_of(
-        &content,
-        arguments.tolerance,
-        commands(arguments, can_control),
-    );
+    let commands = commands(arguments, can_control);
+    let made = page_of(&content, arguments.tolerance, commands);
     progress.finish_and_clear();
     made
 }
 
 /// Draws the assessment and the controller's runs.
-///
-/// # Errors
-/// [`Error::Model`] for a model without encoder or decoder, [`Error::Typeset`] for one that cannot be
-/// typeset.
 pub fn page_of(
     content: &Content<'_>,
     tolerance: Tolerance,
@@ -175,7 +157,7 @@ pub fn page_of(
     };
     let verdict = verdict(content)?;
     Ok(Made {
-        page: page(content, verdict.clone(), &figures, &options)?,
+        page: page(content, &verdict, &figures, &options)?,
         verdict,
         files: figures.iter().flat_map(figure_files).collect(),
         n_figures: figures.iter().count(),
@@ -187,19 +169,17 @@ const LADDER_CAPTION: &str = "Size of the equations within each tolerance: activ
 
 /// The commands that reproduce the page.
 fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
-    let paths = |paths: &[PathBuf]| {
-        let quoted = paths.iter().map(|path| quoted(path));
-        quoted.collect::<Vec<_>>().join(" ")
-    };
-    let (model, recordings) = (quoted(&arguments.model), paths(&arguments.recordings));
+    let recordings: Vec<String> = arguments.recordings.iter().map(|p| quoted(p)).collect();
+    let (model, recordings) = (quoted(&arguments.model), recordings.join(" "));
     let every = arguments.restart_every;
-    let study = arguments
-        .study
-        .as_deref()
-        .map(|folder| format!(" --study {}", quoted(folder)));
-    let study = study.unwrap_or_default();
-    let plan = arguments.plan.as_deref();
-    let plan = plan.map_or(String::new(), |path| format!(" --plan {}", quoted(path)));
+    let flag = |name: &str, path: &Option<PathBuf>| -> String {
+        let flag = |path: &PathBuf| format!(" --{name} {}", quoted(path));
+        path.iter().map(flag).collect()
+    };
+    let (study, plan) = (
+        flag("study", &arguments.study),
+        flag("plan", &arguments.plan),
+    );
     let tolerance = arguments.tolerance;
     let mut commands = vec![
         format!(

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::Answer;
 use super::args::RobotArguments;
-use super::destination::{Format, Inputs, check_output};
+use super::destination::{Format, Inputs};
 use super::output::{note, write_file};
 use crate::Error;
 use crate::files::Overwrite;
@@ -16,46 +16,25 @@ use crate::robot_file::{self, RobotEntry};
 use crate::typeset::Table;
 
 /// The robot of `--robot`; of a file, how its joints were matched goes to stderr.
-///
-/// # Errors
-/// [`Error::RobotFile`].
 pub fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
     let robot = robot_file::find(name_or_file)?;
     if Robot::by_name(name_or_file).is_err() {
-        note(&format!(
-            "{name_or_file}: robot {}, {}",
-            robot.name(),
-            matched(robot)
-        ));
+        let joints = Leg::ALL.into_iter().zip(robot.joint_names().chunks(3));
+        let matched: Vec<String> = joints
+            .map(|(leg, joints)| format!("{leg} = {}", joints.join(" ")))
+            .collect();
+        let (name, matched) = (robot.name(), matched.join(", "));
+        note(&format!("{name_or_file}: robot {name}, {matched}"));
     }
     Ok(robot)
 }
 
-/// Which of the robot's joints each leg has.
-fn matched(robot: &Robot) -> String {
-    let legs = Leg::ALL.map(|leg| {
-        let first = 3 * leg.index();
-        format!(
-            "{leg} = {}",
-            robot.joint_names()[first..first + 3].join(" ")
-        )
-    });
-    legs.join(", ")
-}
-
 /// Shows a robot, and writes its TOML.
-///
-/// # Errors
-/// [`Error::RobotFile`], [`Error::Exists`] for the file to write.
 pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    let inputs = Inputs::default().and_robot(Some(&arguments.robot));
-    check_output(
-        arguments.output.as_deref(),
-        Format::Toml,
-        &inputs,
-        overwrite,
-    )?;
+    Inputs::default()
+        .and_robot(Some(&arguments.robot))
+        .check_output(arguments.output.as_deref(), Format::Toml, overwrite)?;
     let robot = match arguments.feet.as_slice() {
         [] => robot_file::find(&arguments.robot)?,
         feet => robot_file::read(Path::new(&arguments.robot), feet)?,

@@ -1,13 +1,12 @@
 //! Simplification for the commands that offer it: the domain from files, the effect on rollouts.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
 use super::args::{ReadingArguments, SimplifyArguments};
-use super::output::{names, read_recordings, spinner};
+use super::output::{names, read_recordings, read_text, spinner};
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::EmittedFile;
@@ -15,7 +14,7 @@ use crate::model::ReducedModel;
 use crate::recording::Recording;
 use crate::sim::LatentSegment;
 use crate::simplify::{
-    Certificate, Domain, MARGIN, PrintedEquation, RolloutBasis, RolloutEffect, Samples, Simplified,
+    Certificate, Domain, MARGIN, PrintedEquation, RolloutBasis, RolloutEffect, Samples,
     SimplifyError, Tolerance, bound_words, certificate_json, change_table, equation_table,
     lost_words, markdown, printed, rollout_table, rollouts_json, simplify,
 };
@@ -35,9 +34,6 @@ pub struct Basis {
 
 impl Basis {
     /// The domain that `files` give: one TOML file of ranges, or recordings.
-    ///
-    /// # Errors
-    /// [`Error::Simplify`] for files that give no domain, and whatever reading refuses.
     pub fn read(
         model: &ReducedModel,
         files: &[PathBuf],
@@ -46,29 +42,22 @@ impl Basis {
     ) -> Result<Self, Error> {
         let is_table = |path: &&PathBuf| path.extension().is_some_and(|end| end == "toml");
         match files.iter().find(is_table) {
-            None => Self::of(
-                model,
-                read_recordings(files, reading)?,
-                margin.unwrap_or(MARGIN),
-            ),
+            None => {
+                let recordings = read_recordings(files, reading)?;
+                Self::of(model, recordings, margin.unwrap_or(MARGIN))
+            }
             Some(path) if files.len() > 1 => Err(SimplifyError::DomainFile {
                 path: path.clone(),
                 message: "one .toml file of ranges, or recordings, but not both".to_owned(),
             }
             .into()),
             Some(_) if margin.is_some() => Err(SimplifyError::Margin.into()),
-            Some(path) => {
-                let text = fs::read_to_string(path).map_err(|source| Error::Read {
-                    path: path.clone(),
-                    source,
-                })?;
-                Ok(Self {
-                    domain: Domain::from_toml(model, path, &text)?,
-                    samples: None,
-                    recordings: Vec::new(),
-                    latent: Vec::new(),
-                })
-            }
+            Some(path) => Ok(Self {
+                domain: Domain::from_toml(model, path, &read_text(path)?)?,
+                samples: None,
+                recordings: Vec::new(),
+                latent: Vec::new(),
+            }),
         }
     }
 
@@ -127,9 +116,6 @@ pub struct Outcome {
 }
 
 /// Simplifies a model as typed; nothing if no domain was given.
-///
-/// # Errors
-/// Whatever reading, simplifying or simulating refuses.
 pub fn run(
     equations: &Equations<'_>,
     arguments: &SimplifyArguments,
@@ -139,25 +125,18 @@ pub fn run(
         return Ok(None);
     }
     let progress = spinner("simplifying");
-    let basis = Basis::read(
-        model,
-        &arguments.domain,
-        arguments.margin,
-        &arguments.reading,
-    )?;
+    let (files, reading) = (&arguments.domain, &arguments.reading);
+    let basis = Basis::read(model, files, arguments.margin, reading)?;
     let tolerance = arguments.tolerance.unwrap_or(Tolerance::Absolute(0.0));
-    let Simplified {
-        model: simplified,
-        certificate,
-    } = simplify(equations, &basis.domain, basis.samples.as_ref(), tolerance)?;
+    let simplified = simplify(equations, &basis.domain, basis.samples.as_ref(), tolerance)?;
     progress.set_message("rolling out");
-    let rollouts = basis.rollouts(model, &simplified)?;
+    let rollouts = basis.rollouts(model, &simplified.model)?;
     progress.finish_and_clear();
     let margin = (basis.samples.as_ref()).map(|_| arguments.margin.unwrap_or(MARGIN));
     let mut outcome = Outcome {
-        model: simplified,
+        model: simplified.model,
         original: model.clone(),
-        certificate,
+        certificate: simplified.certificate,
         rollouts,
         basis,
         domain_files: names(&arguments.domain),
@@ -193,9 +172,6 @@ impl Outcome {
 
     /// The certificate as a file beside the emitted ones, its summary, and the same as JSON;
     /// `equations` are those of the model as they are printed, `rounding` is how.
-    ///
-    /// # Errors
-    /// [`Error::Simplify`] if printing cannot be evaluated.
     pub fn files_and_summary(
         &self,
         equations: &Equations<'_>,
@@ -207,12 +183,8 @@ impl Outcome {
             _ => printed(equations, &basis.domain, basis.samples.as_ref(), rounding)?,
         };
         let name = format!("{}-simplification.md", self.model.identifier());
-        let page = markdown(
-            [&self.original, &self.model],
-            &self.certificate,
-            self.rollouts.as_ref(),
-            &printed,
-        );
+        let (models, rollouts) = ([&self.original, &self.model], self.rollouts.as_ref());
+        let page = markdown(models, &self.certificate, rollouts, &printed);
         let mut value = certificate_json(&self.certificate);
         value["file"] = json!(name);
         value["domain_files"] = json!(self.domain_files);
@@ -312,9 +284,6 @@ pub struct Ladder {
 
 /// Simplifies a model within several tolerances over the recordings of an assessment, and lists the
 /// changes within `chosen`.
-///
-/// # Errors
-/// Whatever simplifying or simulating refuses.
 pub fn ladder(
     model: &ReducedModel,
     assessment: &Assessment<'_>,
@@ -335,10 +304,8 @@ pub fn ladder(
     let equations = &Equations::of(model);
     let none = simplify(equations, &domain, Some(&samples), Tolerance::Absolute(0.0))?;
     let mut steps = vec![("none".to_owned(), none.certificate, [x, z])];
-    let body = assessment
-        .names
-        .iter()
-        .filter(|name| name.starts_with("body."));
+    let names = assessment.names.iter();
+    let body = names.filter(|name| name.starts_with("body."));
     let places = ["body.x", "body.z"].map(|name| body.clone().position(|known| known == name));
     for share in LADDER {
         let tolerance = Tolerance::ShareOfRms(share);

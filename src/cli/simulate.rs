@@ -2,39 +2,32 @@
 
 use std::fmt::Write as _;
 
+use nalgebra::DVector;
 use serde_json::json;
 
 use super::Answer;
 use super::args::SimulateArguments;
-use super::destination::{Format, Inputs, check_output};
+use super::destination::{Format, Inputs};
 use super::output::{read_recordings, spinner, write_file};
-use super::trajectory::trajectory_table;
-use crate::evaluate::Assessment;
+use crate::evaluate::{Assessment, SegmentRun};
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::report::{
     assessment_json, baseline_table, coordinate_table, dynamics_table, phase_table,
 };
-use crate::typeset::significant;
+use crate::robot::Robot;
 use crate::typeset::words::counted;
+use crate::typeset::{Table, significant};
 use crate::{Error, artifact};
 
 /// Rolls the model out over every segment of every recording.
-///
-/// # Errors
-/// Whatever reading, encoding or integrating refuses; [`Error::Exists`] for the output file.
 pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    let inputs = Inputs::default()
+    Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
-        .and(&arguments.reading.columns);
-    check_output(
-        arguments.output.as_deref(),
-        Format::Table,
-        &inputs,
-        overwrite,
-    )?;
+        .and(&arguments.reading.columns)
+        .check_output(arguments.output.as_deref(), Format::Table, overwrite)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let progress = spinner("simulating");
@@ -111,4 +104,74 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
         let _ = writeln!(text, "\nnote: {remark}");
     }
     text
+}
+
+/// One row per sample: time, phase, recorded and predicted latent state and coordinates.
+///
+/// Columns: `segment, time, phase`, then `z_i, z_i_full, z_i_restarted` for each latent coordinate, the same
+/// three of its velocity `dz_i`, the latent input `u_lat_i`, then the three of every robot coordinate
+/// in SI units. A prediction that diverged leaves its cell empty.
+fn trajectory_table(model: &ReducedModel, runs: &[SegmentRun<'_>]) -> Result<Table, Error> {
+    let mut table = Table::new(columns(model));
+    for (index, run) in runs.iter().enumerate() {
+        let [full, restarted] =
+            [&run.full, &run.restarted].map(|rollout| rollout.states(run.latent.len()));
+        for (sample, predictions) in full.iter().zip(&restarted).enumerate() {
+            let (segment, latent) = (run.segment, &run.latent);
+            let phase = &model.phases()[latent.phase[sample]].name;
+            let mut row = vec![
+                index.to_string(),
+                segment.time_s[sample].to_string(),
+                phase.clone(),
+            ];
+            let states = [predictions.0.as_ref(), predictions.1.as_ref()];
+            let z = states.map(|state| state.map(|(z, _)| z));
+            add(&mut row, latent.z.column(sample).iter(), z);
+            let dz = states.map(|state| state.map(|(_, dz)| dz));
+            add(&mut row, latent.dz.column(sample).iter(), dz);
+            row.extend(latent.u_lat.column(sample).iter().map(f64::to_string));
+            let [full, restarted] = z.map(|z| z.map(|z| model.decode(z)).transpose());
+            let decoded = [full?, restarted?];
+            let decoded = decoded.each_ref().map(Option::as_ref);
+            add(&mut row, segment.x.column(sample).iter(), decoded);
+            table.row(row);
+        }
+    }
+    Ok(table)
+}
+
+fn columns(model: &ReducedModel) -> Vec<String> {
+    const KINDS: [&str; 3] = ["", "_full", "_restarted"];
+    let latent = |symbol: &str| -> Vec<String> {
+        let indices = 1..=model.latent_dim();
+        indices.map(|index| format!("{symbol}_{index}")).collect()
+    };
+    let thrice = |names: Vec<String>| {
+        let of = |name: String| KINDS.map(|kind| format!("{name}{kind}"));
+        names.into_iter().flat_map(of)
+    };
+    let names = model.state().map(|state| state.names.clone());
+    let names = names.unwrap_or_else(|| Robot::state_names().to_vec());
+    let first = ["segment", "time", "phase"].map(str::to_owned).into_iter();
+    first
+        .chain(thrice(latent("z")))
+        .chain(thrice(latent("dz")))
+        .chain(latent("u_lat"))
+        .chain(thrice(names))
+        .collect()
+}
+
+/// Adds each recorded value with its two predictions to a row.
+fn add<'a>(
+    row: &mut Vec<String>,
+    recorded: impl Iterator<Item = &'a f64>,
+    predicted: [Option<&DVector<f64>>; 2],
+) {
+    for (index, value) in recorded.enumerate() {
+        row.push(value.to_string());
+        let cell = |values: Option<&DVector<f64>>| {
+            values.map_or(String::new(), |values| values[index].to_string())
+        };
+        row.extend(predicted.map(cell));
+    }
 }

@@ -5,10 +5,9 @@ use std::path::Path;
 use serde_json::json;
 
 use super::Answer;
-use super::actuators;
 use super::args::{StudyArguments, TrainSettings};
-use super::destination::{Inputs, write_folder};
-use super::output::spinner;
+use super::destination::Inputs;
+use super::output::{refused, spinner};
 use super::prepared_recordings::{RecordedSets, read_all, reader_for};
 use super::train_settings;
 use crate::Error;
@@ -24,33 +23,27 @@ use crate::typeset::{Cell, Table, significant};
 const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
 
 /// Trains what is missing, or joins parts, and writes the tables of the study.
-///
-/// # Errors
-/// Whatever reading refuses; [`Error::Study`] for folders of another study, [`Error::Folder`] for one with
-/// files of these names that romc did not make.
 pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     check_folder(&arguments.out_dir, TABLES, overwrite)?;
-    let store = if arguments.merge.is_empty() {
-        trained(arguments)?
-    } else {
-        merged(arguments)?
+    let store = match arguments.merge.is_empty() {
+        true => trained(arguments)?,
+        false => merged(arguments)?,
     };
     let cells = store.cells()?;
     let summary = Summary::of(&cells, arguments.lambda);
     let tables = [cell_table(&cells, arguments.lambda), summary.table()];
     let tables = TABLES.iter().zip(tables);
-    let mut files: Vec<EmittedFile> = tables
-        .map(|(name, table)| EmittedFile::new(*name, table.csv()))
-        .collect();
+    let tables = tables.map(|(name, table)| EmittedFile::new(*name, table.csv()));
+    let mut files: Vec<EmittedFile> = tables.collect();
     files.extend(study_figures(&summary).iter().flat_map(figure_files));
-    let inputs = Inputs::default()
+    Inputs::default()
         .and(&arguments.recordings)
         .and(&arguments.validation)
         .and(&arguments.config)
         .and(&arguments.reading.columns)
-        .and_robot(arguments.robot.as_deref());
-    write_folder(&arguments.out_dir, &files, &inputs, overwrite)?;
+        .and_robot(arguments.robot.as_deref())
+        .write_folder(&arguments.out_dir, &files, overwrite)?;
     Ok(answer(&arguments.out_dir, &store, &summary))
 }
 
@@ -74,13 +67,12 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
         robot,
         reader_for(&arguments.reading, &settings)?,
     );
-    let training = read_all(&recorded.training)?;
-    let validation = read_all(&recorded.validation)?;
+    let [of_training, of_validation, _] = &recorded.sets;
+    let training = read_all(of_training)?;
+    let validation = read_all(of_validation)?;
     recorded.report_findings();
     let mut base = train_settings::options(&settings, 1, String::new())?;
-    if train_settings::actuators(&settings) == actuators::IDENTIFIED {
-        base.actuators = actuators::identified(&recorded.training, robot)?;
-    }
+    train_settings::identified(&mut base, &settings, of_training, robot)?;
     settings.wrench_frame = Some(base.wrench_frame);
     settings.actuators = Some(train_settings::actuators(&settings).to_owned());
     let plan = plan(arguments, &settings, &training, &validation);
@@ -97,33 +89,22 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
         bar.set_message(format!("{} of {total} models trained", total - left));
     };
     let shard = arguments.shard.unwrap_or(Shard::WHOLE);
-    study::run(
-        &store,
-        shard,
-        [&training, &validation],
-        robot,
-        &options,
-        &finished,
-    )?;
+    let sets = [&training[..], &validation];
+    study::run(&store, shard, sets, robot, &options, &finished)?;
     bar.finish_and_clear();
     Ok(store)
 }
 
 /// The settings of the file with those of the command line over them.
 fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
-    let mut settings = match &arguments.config {
-        None => TrainSettings::default(),
-        Some(path) => {
-            let settings = train_settings::read(path)?;
-            let given = train_settings::given(&settings);
-            let mut fixed = ["latent-dim", "seed", "seeds"].into_iter();
-            if let Some(name) = fixed.find(|name| given.contains_key(*name)) {
-                let message = format!("`{name}` is not a setting of a study, which runs over them");
-                return Err(train_settings::refused(path, &message));
-            }
-            settings
+    let mut settings = TrainSettings::default();
+    if let Some(path) = &arguments.config {
+        settings = train_settings::read(path)?;
+        if let Some(name) = train_settings::first(&settings, &["latent-dim", "seed", "seeds"]) {
+            let message = format!("`{name}` is not a setting of a study, which runs over them");
+            return Err(refused(path, message));
         }
-    };
+    }
     settings.paper |= arguments.paper;
     settings.method = arguments.method.or(settings.method);
     settings.robot = arguments.robot.clone().or(settings.robot);
@@ -138,17 +119,17 @@ fn plan(
     training: &[Recording],
     validation: &[Recording],
 ) -> Plan {
-    let all: Vec<Recording> = training.iter().chain(validation).cloned().collect();
+    let files = training
+        .iter()
+        .chain(validation)
+        .map(|recording| &recording.path);
+    let recordings = Origin::of_files("", files).recordings.into_iter();
     Plan {
         latent_dims: arguments.latent_dims.0.clone(),
         seeds: arguments.seeds,
         method: train_settings::method(settings),
         settings: train_settings::as_flags(settings),
-        recordings: Origin::new("", &all)
-            .recordings
-            .into_iter()
-            .map(|file| file.digest)
-            .collect(),
+        recordings: recordings.map(|file| file.digest).collect(),
         training: training.len(),
         romc: env!("CARGO_PKG_VERSION").to_owned(),
     }
@@ -181,8 +162,7 @@ fn answer(folder: &Path, store: &Store, summary: &Summary) -> Answer {
             summary.lambda
         );
     }
-    let names = missing.iter();
-    let names: Vec<String> = names
+    let names: Vec<String> = (missing.iter())
         .map(|id| format!("d = {} seed {}", id.latent_dim, id.seed))
         .collect();
     if !names.is_empty() {

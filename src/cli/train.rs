@@ -7,50 +7,47 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde_json::json;
 
 use super::Answer;
-use super::actuators;
 use super::args::{TrainArguments, TrainSettings};
-use super::destination::{Format, Inputs, check_output};
-use super::output::{names, note, note_repeated, spinner, stem};
+use super::destination::{Format, Inputs};
+use super::output::{named, names, note, note_repeated, spinner};
 use super::prepared_recordings::{RecordedSets, read_all};
 use super::train_settings;
-use super::whole_jumps::whole_jump_note;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
+use crate::recording::Source;
+use crate::robot::JOINT_DIM;
 use crate::train::{
     Method, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained, Watch,
 };
-use crate::typeset::{Cell, Table};
+use crate::typeset::{Cell, Table, significant};
 use crate::{Error, artifact, train};
 
 /// Learns a model and writes it.
-///
-/// # Errors
-/// Whatever reading or training refuses; [`Error::Exists`] for the model file.
 pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
     let settings = train_settings::effective(arguments)?;
-    let inputs = Inputs::default()
+    Inputs::default()
         .and(&arguments.recordings)
         .and(&arguments.validation)
         .and(&arguments.test)
         .and(&arguments.config)
         .and(&arguments.reading.columns)
         .and_robot(settings.robot.as_deref())
-        .and(&settings.actuators);
-    check_output(Some(&arguments.output), Format::Model, &inputs, overwrite)?;
+        .and(&settings.actuators)
+        .check_output(Some(&arguments.output), Format::Model, overwrite)?;
     let latent_dim = settings
         .latent_dim
         .expect("checked by clap, or with the file");
     let method = train_settings::method(&settings);
     let robot = train_settings::robot(&settings)?;
-    let mut options = train_settings::options(&settings, latent_dim, model_name(arguments))?;
+    let name = named(arguments.name.as_deref(), &arguments.output);
+    let mut options = train_settings::options(&settings, latent_dim, name)?;
     let recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
-    if train_settings::actuators(&settings) == actuators::IDENTIFIED {
-        options.actuators = actuators::identified(&recorded.training, robot)?;
-    }
+    let [training, validation, test] = &recorded.sets;
+    train_settings::identified(&mut options, &settings, training, robot)?;
     // a fault of the test recordings ends the command before the training
-    read_all(&recorded.test)?;
-    let sets = Recordings::new(&recorded.training, &recorded.validation);
+    read_all(test)?;
+    let sets = Recordings::new(training, validation);
     let files = arguments.recordings.iter().chain(&arguments.validation);
     let command = command_line(arguments, &settings, method, &options);
     let mut origin = Origin::of_files(command, files);
@@ -86,9 +83,9 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
         );
     }
     artifact::write_with(&arguments.output, &trained.model, overwrite)?;
-    let tested = match recorded.test.is_empty() {
+    let tested = match test.is_empty() {
         true => None,
-        false => Some(train::assess(&trained.model, &recorded.test)?),
+        false => Some(train::assess(&trained.model, test)?),
     };
     let mut answer = answer(arguments, &trained, tested.as_ref());
     let notes = notes(&trained.report, tested.as_ref(), &recorded)?;
@@ -112,20 +109,18 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
 }
 
 /// Where whole jumps are worse than standing still: of the validation, or else of the training, and of the test.
-///
-/// # Errors
-/// As [`whole_jump_note`].
 fn notes(
     report: &TrainReport,
     tested: Option<&SetMetrics>,
     recorded: &RecordedSets,
 ) -> Result<Vec<String>, Error> {
+    let [training, validation, test] = &recorded.sets;
     let judged = match &report.validation {
-        Some(validation) => ("validation", Some(validation), &recorded.validation),
-        None => ("training", Some(&report.training), &recorded.training),
+        Some(metrics) => ("validation", Some(metrics), validation),
+        None => ("training", Some(&report.training), training),
     };
     let mut notes = Vec::new();
-    for (set, metrics, files) in [judged, ("test", tested, &recorded.test)] {
+    for (set, metrics, files) in [judged, ("test", tested, test)] {
         if let Some(metrics) = metrics {
             notes.extend(whole_jump_note(metrics, (set, files))?);
         }
@@ -155,13 +150,6 @@ fn stop_on_interrupt() -> &'static AtomicBool {
         }
     });
     &INTERRUPTED
-}
-
-fn model_name(arguments: &TrainArguments) -> String {
-    arguments
-        .name
-        .clone()
-        .unwrap_or_else(|| stem(&arguments.output))
 }
 
 /// The command that repeats this training, as the provenance keeps it.
@@ -228,9 +216,7 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
     let mut table = Table::new(["metric", "unit"].into_iter().chain(sets_of));
     let mut row = |name: &str, unit: &str, value: &dyn Fn(&SetMetrics) -> Option<f64>| {
         let cell = |set: &SetMetrics| value(set).map_or("diverged".into(), Cell::from);
-        let cells = sets
-            .iter()
-            .map(|(_, set)| set.map(cell).unwrap_or_default());
+        let cells = (sets.iter()).map(|(_, set)| set.map(cell).unwrap_or_default());
         table.row([name.into(), unit.into()].into_iter().chain(cells));
     };
     type Metric = (&'static str, &'static str, fn(&SetMetrics) -> Option<f64>);
@@ -286,4 +272,74 @@ fn seed_table(report: &TrainReport) -> String {
         .column("latents follow", "", |seed| seed.dominant.join(", "))
         .table();
     format!("\n{table}")
+}
+
+/// Rows of the body's position forwards and upwards.
+const BODY: [usize; 2] = [JOINT_DIM, JOINT_DIM + 2];
+
+/// A note if rollouts of whole jumps end up further off than a body would be that stays where each jump starts: root mean
+/// squares over all samples of the body's error forwards and upwards, and of its way from the start.
+fn whole_jump_note<'a>(
+    metrics: &SetMetrics,
+    (set, recordings): (&str, impl Into<Source<'a>>),
+) -> Result<Option<String>, Error> {
+    let (mut squares, mut samples) = (0.0, 0);
+    recordings.into().for_each(|recording| {
+        for segment in &recording.segments {
+            for row in BODY {
+                let start = segment.x[(row, 0)];
+                squares += (segment.x.row(row).iter())
+                    .map(|value| (value - start).powi(2))
+                    .sum::<f64>();
+            }
+            samples += segment.len();
+        }
+        Ok::<_, Error>(())
+    })?;
+    let moved_m = (squares / f64::from(u32::try_from(samples.max(1)).unwrap_or(u32::MAX))).sqrt();
+    let off = match (metrics.rollout_x_m, metrics.rollout_z_m) {
+        (Some(x), Some(z)) if x.hypot(z) <= moved_m => return Ok(None),
+        (Some(x), Some(z)) => format!("are {} m off", significant(x.hypot(z))),
+        (None, _) | (_, None) => "diverge".to_owned(),
+    };
+    Ok(Some(format!(
+        "rollouts of the whole {set} jumps {off}, where a body that stays at its start is {} m off: rely on predictions \
+         of 0.1 s only, try another number of latent coordinates, or record more jumps",
+        significant(moved_m)
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::recording;
+
+    #[test]
+    fn whole_jump_note_appears_where_standing_still_is_better() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/recordings/go1");
+        // moves by 0.140 m forwards and 0.065 m upwards, root mean squares
+        let jumps = [recording::read(&folder.join("test_01.csv.gz")).expect("shipped")];
+        let note = |x: Option<f64>, z: f64| {
+            let metrics = SetMetrics {
+                decoder_mse: 0.0,
+                ddz_r2: Vec::new(),
+                torque_r2: 1.0,
+                prediction_x_m: 0.0,
+                prediction_z_m: 0.0,
+                rollout_x_m: x,
+                rollout_z_m: Some(z),
+            };
+            whole_jump_note(&metrics, ("validation", &jumps)).expect("in memory")
+        };
+        assert_eq!(note(Some(0.13), 0.06), None);
+        let found = note(Some(0.15), 0.07).expect("a note");
+        assert!(
+            found.contains("validation jumps are 0.1655 m off"),
+            "{found}"
+        );
+        assert!(note(Some(3.0), 4.0).expect("a note").contains("5.000 m"));
+        assert!(note(None, 0.0).expect("a note").contains("diverge"));
+    }
 }

@@ -1,30 +1,34 @@
 //! The settings of `romc train`: from flags and a file to options, and back to flags for the provenance.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use super::actuators;
 use super::args::{PhaseSet, TrainArguments, TrainSettings, Widths};
+use super::output::{note, read_settings, refused};
 use super::robot::chosen;
 use crate::Error;
+use crate::identify::identify;
 use crate::limits::of_training;
 use crate::limits::table::LAYER_WIDTH;
 use crate::model::{Activation, StandardLibrary};
-use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule};
-use crate::robot::Robot;
+use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule, RecordingFiles};
+use crate::robot::{Actuators, Robot};
 use crate::robot_file::read_actuators;
 use crate::train::{
     Coordinates, LibraryChoice, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError,
     TrainOptions,
 };
 
-/// The options that the settings describe.
-///
-/// # Errors
-/// [`Error::Read`] and [`Error::Config`] for the file of the actuators.
+/// The word for actuators that stands for no file.
+const NONE: &str = "none";
+/// The word that stands for what the training recordings tell.
+const IDENTIFIED: &str = "identify";
+/// Files of recordings that tell it, at most.
+const IDENTIFIED_FROM: usize = 20;
+
+/// The options that the settings describe; actuators that recordings tell are still to be [`identified`].
 pub(super) fn options(
     settings: &TrainSettings,
     latent_dim: usize,
@@ -72,16 +76,39 @@ pub(super) fn options(
         options.phases = PhaseRule::three_phase().with_min_samples(options.phases.min_samples);
     }
     options.actuators = match actuators(settings) {
-        actuators::NONE | actuators::IDENTIFIED => None,
+        NONE | IDENTIFIED => None,
         path => Some(read_actuators(Path::new(path), Some(robot(settings)?))?),
     };
     Ok(options)
 }
 
+/// Sets the actuators that the first training recordings tell, if the settings want those; where they tell none, a note
+/// on stderr says so.
+pub(super) fn identified(
+    options: &mut TrainOptions,
+    settings: &TrainSettings,
+    recordings: &RecordingFiles,
+    robot: &Robot,
+) -> Result<(), Error> {
+    if actuators(settings) != IDENTIFIED {
+        return Ok(());
+    }
+    let found = identify(&recordings.first(IDENTIFIED_FROM)?, robot);
+    let found: Result<Actuators, String> = match found {
+        Ok(found) => found.contradiction().map_or(Ok(found.actuators), Err),
+        Err(reason) => Err(reason.to_string()),
+    };
+    options.actuators = found
+        .inspect_err(|reason| {
+            note(&format!(
+                "torques are those of the motors, as the recordings do not tell the joints' losses: {reason}"
+            ));
+        })
+        .ok();
+    Ok(())
+}
+
 /// The robot of a training.
-///
-/// # Errors
-/// [`Error::Robot`] for an unknown name.
 pub(super) fn robot(settings: &TrainSettings) -> Result<&'static Robot, Error> {
     chosen(settings.robot.as_deref().unwrap_or("go1"))
 }
@@ -121,11 +148,11 @@ pub(super) fn method(settings: &TrainSettings) -> Method {
     settings.method.unwrap_or(default)
 }
 
-/// Where the joints' losses come from: a file, or one of the words of [`actuators`].
+/// Where the joints' losses come from: a file, [`NONE`] or [`IDENTIFIED`].
 pub(super) fn actuators(settings: &TrainSettings) -> &str {
     let default = match settings.paper {
-        true => actuators::NONE,
-        false => actuators::IDENTIFIED,
+        true => NONE,
+        false => IDENTIFIED,
     };
     settings.actuators.as_deref().unwrap_or(default)
 }
@@ -136,39 +163,32 @@ fn of_the_joint_method(settings: &TrainSettings) -> Option<&'static str> {
         Some(_) => "encoder-layers",
         None => "decoder-layers",
     };
-    let given = [
-        ("paper", settings.paper),
-        ("epochs", settings.epochs.is_some()),
-        (layers, !maps(settings).is_linear()),
-        ("bptt-weight", settings.bptt_weight.is_some()),
-    ];
-    first(&given).or_else(|| of_the_window(settings))
+    let layers = (!maps(settings).is_linear()).then_some(layers);
+    first(settings, &["paper", "epochs"])
+        .or(layers)
+        .or_else(|| first(settings, &["bptt-weight"]))
+        .or_else(|| first(settings, &WINDOW))
 }
 
-/// The first setting of the window of predictions beside its weight.
-fn of_the_window(settings: &TrainSettings) -> Option<&'static str> {
-    first(&[
-        ("bptt-window", settings.bptt_window.is_some()),
-        ("bptt-stride", settings.bptt_stride.is_some()),
-        ("bptt-decay", settings.bptt_decay.is_some()),
-        ("bptt-integrator", settings.bptt_integrator.is_some()),
-    ])
-}
+/// The settings of the window of predictions beside its weight.
+const WINDOW: [&str; 4] = [
+    "bptt-window",
+    "bptt-stride",
+    "bptt-decay",
+    "bptt-integrator",
+];
 
-/// The first of some settings that is given.
-fn first(settings: &[(&'static str, bool)]) -> Option<&'static str> {
-    let given = settings.iter().find(|(_, is_given)| *is_given);
-    given.map(|(name, _)| *name)
+/// The first of these settings that is given.
+pub(super) fn first(settings: &TrainSettings, names: &[&'static str]) -> Option<&'static str> {
+    let given = given(settings);
+    names.iter().copied().find(|name| given.contains_key(*name))
 }
 
 fn library(settings: &TrainSettings, default: LibraryChoice) -> LibraryChoice {
     match (&settings.terms, default) {
-        (Some(terms), _) => LibraryChoice::Terms(
-            terms
-                .split(';')
-                .map(|term| term.trim().to_owned())
-                .collect(),
-        ),
+        (Some(terms), _) => {
+            LibraryChoice::Terms(terms.split(';').map(|t| t.trim().to_owned()).collect())
+        }
         (None, LibraryChoice::Standard(standard)) => LibraryChoice::Standard(StandardLibrary {
             degree: settings.degree.unwrap_or(standard.degree),
             trigonometric: settings.trigonometric || standard.trigonometric,
@@ -185,7 +205,7 @@ fn set<T>(option: &mut T, given: Option<impl Into<T>>) {
 }
 
 /// The settings that were given, by the names of their flags.
-pub(super) fn given(settings: &TrainSettings) -> Map<String, Value> {
+fn given(settings: &TrainSettings) -> Map<String, Value> {
     let Ok(Value::Object(mut given)) = serde_json::to_value(settings) else {
         unreachable!("settings are a struct of numbers, texts and switches");
     };
@@ -218,9 +238,6 @@ pub(super) fn as_flags(settings: &TrainSettings) -> String {
 }
 
 /// The settings of the command line over those of its file, if it names one.
-///
-/// # Errors
-/// [`Error::Read`] and [`Error::Config`] for the file, [`Error::Train`] for settings that need others.
 pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Error> {
     let mut settings = arguments.settings.clone();
     if let Some(path) = &arguments.config {
@@ -236,8 +253,8 @@ pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Err
     Ok(settings)
 }
 
-/// Refuses settings that the method does not use, an activation without hidden layers, rows to filter without a filter, and named coordinates where a
-/// method learns others.
+/// Refuses settings that the method does not use, an activation without hidden layers, rows to filter without a filter,
+/// and named coordinates where a method learns others.
 pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
     let refused = |option, found, expected| {
         Err(Error::Train(TrainError::Option {
@@ -254,7 +271,7 @@ pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
         );
     }
     let weight = settings.bptt_weight.map_or(0.0, f64::from);
-    if let (Some(name), true) = (of_the_window(settings), weight == 0.0) {
+    if let (Some(name), true) = (first(settings, &WINDOW), weight == 0.0) {
         return refused(
             name,
             "set for a loss without weight".to_owned(),
@@ -294,39 +311,16 @@ pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
 }
 
 /// The settings of a file.
-///
-/// # Errors
-/// [`Error::Read`] and [`Error::Config`].
 pub(super) fn read(path: &Path) -> Result<TrainSettings, Error> {
-    let text = fs::read_to_string(path).map_err(|source| Error::Read {
-        path: path.to_owned(),
-        source,
-    })?;
-    let settings =
-        toml::from_str(&text).map_err(|error| refused(path, error.to_string().trim_end()))?;
-    check(&settings).map_err(|message| refused(path, &message))?;
-    Ok(settings)
-}
-
-/// A file of settings that cannot be used.
-pub(super) fn refused(path: &Path, message: &str) -> Error {
-    Error::Config {
-        path: path.to_owned(),
-        message: message.to_owned(),
-    }
+    read_settings(path, check)
 }
 
 /// The checks of clap, for settings that came from a file.
 fn check(settings: &TrainSettings) -> Result<(), String> {
-    let given = given(settings);
-    for (name, value) in &given {
-        let numbers = match value {
-            Value::Array(widths) => widths.as_slice(),
-            single => std::slice::from_ref(single),
-        };
-        let range = match value {
-            Value::Array(_) => Some(&LAYER_WIDTH),
-            _ => of_training(name),
+    for (name, value) in &given(settings) {
+        let (numbers, range) = match value {
+            Value::Array(widths) => (widths.as_slice(), Some(&LAYER_WIDTH)),
+            single => (std::slice::from_ref(single), of_training(name)),
         };
         for number in numbers.iter().filter_map(Value::as_f64) {
             if let Some(Err(refusal)) = range.map(|range| range.check(number)) {
@@ -337,21 +331,13 @@ fn check(settings: &TrainSettings) -> Result<(), String> {
             }
         }
     }
-    if given.contains_key("terms")
-        && ["degree", "trigonometric"]
-            .iter()
-            .any(|name| given.contains_key(*name))
-    {
-        return Err(
+    let fault =
+        if settings.terms.is_some() && first(settings, &["degree", "trigonometric"]).is_some() {
             "`terms` stands beside `degree` or `trigonometric`, expected one or the other"
-                .to_owned(),
-        );
-    }
-    if settings.activation == Some(Activation::Linear) {
-        return Err(
+        } else if settings.activation == Some(Activation::Linear) {
             "`activation` is linear, expected elu, tanh, sigmoid, relu, gelu, silu or softplus"
-                .to_owned(),
-        );
-    }
-    Ok(())
+        } else {
+            return Ok(());
+        };
+    Err(fault.to_owned())
 }

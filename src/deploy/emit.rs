@@ -10,7 +10,7 @@ use crate::codegen::script::{matlab, python};
 use crate::codegen::{Precision, SineCosine, Units, c, interface::ModelInterface, rust};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
-use crate::lower::{LowerError, LowerOptions};
+use crate::lower::LowerOptions;
 use crate::model::ReducedModel;
 use crate::typeset::{PrintOptions, latex, markdown, mathml};
 
@@ -86,12 +86,11 @@ pub fn emit(
 ) -> Result<Vec<EmittedFile>, EmitError> {
     let provenance = provenance(equations.model(), options.print.digest.as_deref());
     let (precision, sines) = (options.precision, options.sines);
-    let mut entries = EntriesOnDemand {
-        equations,
-        options,
-        compiled: None,
-        scripts: None,
-    };
+    let (lower, units) = (&options.lower, options.units);
+    let for_compilers = || compiled(equations, options, units);
+    // Languages that compute in double precision alone.
+    let for_scripts = || Ok(ModelInterface::new(equations, lower, units)?);
+    let (mut in_precision, mut scripts) = (None, None);
     let control = equations.in_scaled_units();
     let mut files = Vec::new();
     for (position, target) in targets.iter().enumerate() {
@@ -99,16 +98,22 @@ pub fn emit(
             continue;
         }
         files.extend(match target {
-            Target::C => c::emit(entries.compiled()?, &provenance, precision, sines)?,
-            Target::Rust => rust::emit(entries.compiled()?, &provenance, precision, sines)?,
-            Target::Python => python::emit(entries.scripts()?, &provenance)?,
-            Target::Casadi => python::emit_casadi(entries.scripts()?, &provenance)?,
-            Target::Matlab => matlab::emit(entries.scripts()?, &provenance)?,
+            Target::C => {
+                let entries = made(&mut in_precision, for_compilers)?;
+                c::emit(entries, &provenance, precision, sines)?
+            }
+            Target::Rust => {
+                let entries = made(&mut in_precision, for_compilers)?;
+                rust::emit(entries, &provenance, precision, sines)?
+            }
+            Target::Python => python::emit(made(&mut scripts, for_scripts)?, &provenance)?,
+            Target::Casadi => python::emit_casadi(made(&mut scripts, for_scripts)?, &provenance)?,
+            Target::Matlab => matlab::emit(made(&mut scripts, for_scripts)?, &provenance)?,
             Target::Latex => latex::emit(equations, &options.print)?,
             Target::Markdown => markdown::emit(equations, &options.print)?,
             Target::Mathml => mathml::emit(equations, &options.print)?,
             Target::Controller => {
-                controller::emit(control, &options.lower, &provenance, options.plan.as_ref())?
+                controller::emit(control, lower, &provenance, options.plan.as_ref())?
             }
             Target::ControllerC => controller_c::emit(control, options, &provenance)?,
         });
@@ -116,43 +121,27 @@ pub fn emit(
     Ok(files)
 }
 
-/// What code is generated from, made when the first target asks.
-struct EntriesOnDemand<'a> {
-    equations: &'a Equations<'a>,
-    options: &'a EmitOptions,
-    compiled: Option<ModelInterface>,
-    scripts: Option<ModelInterface>,
+/// What C and Rust are generated from, with the error of single precision in the documentation.
+pub(super) fn compiled(
+    equations: &Equations<'_>,
+    options: &EmitOptions,
+    units: Units,
+) -> Result<ModelInterface, EmitError> {
+    let mut entries = ModelInterface::new(equations, &options.lower, units)?;
+    options.precision.check(&entries)?;
+    if options.precision == Precision::Single {
+        entries.state_bounds();
+    }
+    Ok(entries)
 }
 
-impl EntriesOnDemand<'_> {
-    /// For C and Rust, with the error of single precision in the documentation.
-    fn compiled(&mut self) -> Result<&ModelInterface, EmitError> {
-        let entries = match self.compiled.take() {
-            Some(entries) => entries,
-            None => {
-                let mut entries = self.in_double()?;
-                self.options.precision.check(&entries)?;
-                if self.options.precision == Precision::Single {
-                    entries.state_bounds();
-                }
-                entries
-            }
-        };
-        Ok(self.compiled.insert(entries))
-    }
-
-    /// For languages that compute in double precision alone.
-    fn scripts(&mut self) -> Result<&ModelInterface, EmitError> {
-        let entries = match self.scripts.take() {
-            Some(entries) => entries,
-            None => self.in_double()?,
-        };
-        Ok(self.scripts.insert(entries))
-    }
-
-    fn in_double(&self) -> Result<ModelInterface, LowerError> {
-        ModelInterface::new(self.equations, &self.options.lower, self.options.units)
-    }
+/// What code is generated from, made when the first target asks.
+fn made(
+    place: &mut Option<ModelInterface>,
+    make: impl FnOnce() -> Result<ModelInterface, EmitError>,
+) -> Result<&ModelInterface, EmitError> {
+    let entries = place.take().map_or_else(make, Ok)?;
+    Ok(place.insert(entries))
 }
 
 /// The first line of generated code, without comment signs.

@@ -61,17 +61,15 @@ impl PlannedJump {
     fn source(&self, name: &str, provenance: &str) -> String {
         let upper = name.to_ascii_uppercase();
         let mut text = format!("/* {provenance} */\n#include \"{name}_plan.h\"\n");
-        let _ = write!(
-            text,
-            "\nconst double {name}_plan_time_s[{upper}_PLAN_COUNT] = {{\n"
-        );
+        let open = |text: &mut String, kind: &str, of: &str, width: &str| {
+            let array = format!("{name}_plan_{of}[{upper}_PLAN_COUNT]{width}");
+            let _ = write!(text, "\nconst {kind} {array} = {{\n");
+        };
+        open(&mut text, "double", "time_s", "");
         push_lines(&mut text, self.time_s.iter().copied());
         text.push_str("};\n");
         for (rows, of) in [(&self.x, "x"), (&self.dx, "dx"), (&self.u, "u")] {
-            let _ = write!(
-                text,
-                "\nconst double {name}_plan_{of}[{upper}_PLAN_COUNT][{STATE_DIM}] = {{\n"
-            );
+            open(&mut text, "double", of, &format!("[{STATE_DIM}]"));
             for column in rows.column_iter() {
                 text.push_str("    {\n");
                 push_lines(&mut text, column.iter().copied());
@@ -79,10 +77,7 @@ impl PlannedJump {
             }
             text.push_str("};\n");
         }
-        let _ = write!(
-            text,
-            "\nconst uint8_t {name}_plan_feet[{upper}_PLAN_COUNT][4] = {{\n"
-        );
+        open(&mut text, "uint8_t", "feet", "[4]");
         for feet in &self.feet {
             let [a, b, c, d] = feet.map(u8::from);
             let _ = writeln!(text, "    {{ {a}, {b}, {c}, {d} }},");

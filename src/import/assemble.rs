@@ -8,12 +8,12 @@ use nalgebra::{DMatrix, DVector};
 use super::assign::{Assigned, Assignment, assign};
 use super::error::{ImportError, ImportFault, shape_text};
 use super::library;
-use super::options::{ImportOptions, LibraryChoice, XiLayout};
+use super::options::{ImportOptions, LibraryChoice, PhaseRule, XiLayout};
 use super::report::{Layout, Note, ReadEquation, UnusedTensor, UsedTensor};
 use super::role::Role;
 use super::tensors::{Array, Element, TensorFile};
 use crate::files::Place;
-use crate::model::{InputStatistics, Library, Phase, Scaling, StateMap};
+use crate::model::{InputStatistics, Library, ModelError, Phase, Scaling, StateMap};
 use crate::robot::STATE_DIM;
 
 /// The parts of a model that a file has.
@@ -104,7 +104,12 @@ impl<'a> Assembly<'a, '_> {
         found: impl Into<Box<str>>,
         expected: impl Into<Box<str>>,
     ) -> ImportError {
-        ImportFault::at(self.tensors.file(), assigned.place(&[]), found, expected)
+        self.tensors.refused(assigned.place(&[]), found, expected)
+    }
+
+    /// Parts that do not make a model.
+    fn unusable(&self, source: impl Into<ModelError>) -> ImportError {
+        ImportFault::model(self.tensors.file(), source)
     }
 
     fn wrong_shape(&self, assigned: &Assigned<'_>, expected: String) -> ImportError {
@@ -178,19 +183,13 @@ impl<'a> Assembly<'a, '_> {
         let mut phases = Vec::new();
         for rule in &self.assignment.phases {
             let xi = self.xi(&rule.name, choice)?;
-            self.notes
-                .notes
-                .extend(options.usual_feet(&rule.name, &rule.feet));
-            phases.push(Phase {
-                name: rule.name.clone(),
-                feet: rule.feet.clone(),
-                xi,
-            });
+            let PhaseRule { name, feet } = rule.clone();
+            self.notes.notes.extend(options.usual_feet(&name, &feet));
+            phases.push(Phase { name, feet, xi });
         }
         let latent_dim = phases[0].xi.ncols();
-        let library = library::build(choice, latent_dim)
-            .map_err(|source| ImportFault::model(self.tensors.file(), source))?;
-        Ok((library, phases))
+        let library = library::build(choice, latent_dim);
+        Ok((library.map_err(|source| self.unusable(source))?, phases))
     }
 
     /// Coefficients of a phase in the file's order of terms, `library_dim x latent_dim`.
@@ -211,7 +210,7 @@ impl<'a> Assembly<'a, '_> {
                 _ => assigned.place(&[row, column]),
             };
             let found = mask[position].to_string();
-            return Err(ImportFault::at(self.tensors.file(), place, found, "0 or 1"));
+            return Err(self.tensors.refused(place, found, "0 or 1"));
         }
         self.note_used(assigned, layout);
         let off = |(value, flag): &(&f64, &f64)| **flag == 0.0 && **value != 0.0;
@@ -229,21 +228,21 @@ impl<'a> Assembly<'a, '_> {
         choice: &LibraryChoice,
     ) -> Result<(DMatrix<f64>, Layout), ImportError> {
         let (by_terms, by_latent) = (Layout::TermsByLatent, Layout::LatentByTerms);
-        let ways = match (&assigned.info.shape[..], self.options.xi_layout) {
-            (&[length], _) => vec![(Layout::Plain, (length, 1))],
-            (&[rows, columns], Some(XiLayout::TermsByLatent)) => vec![(by_terms, (rows, columns))],
-            (&[rows, columns], Some(XiLayout::LatentByTerms)) => vec![(by_latent, (columns, rows))],
-            (&[rows, columns], None) => {
-                vec![(by_terms, (rows, columns)), (by_latent, (columns, rows))]
-            }
+        let mut ways = match assigned.info.shape[..] {
+            [length] => vec![(Layout::Plain, (length, 1))],
+            [rows, columns] => vec![(by_terms, (rows, columns)), (by_latent, (columns, rows))],
             _ => Vec::new(),
         };
-        let fits = |(_, (terms, latent)): &(Layout, (usize, usize))| {
-            *latent > 0
-                && self.known.latent.is_none_or(|known| known == *latent)
-                && library::dim(choice, *latent) == Some(*terms)
-        };
-        let fitting: Vec<_> = ways.into_iter().filter(fits).collect();
+        ways.retain(|(way, _)| match self.options.xi_layout {
+            Some(XiLayout::TermsByLatent) => *way != by_latent,
+            Some(XiLayout::LatentByTerms) => *way != by_terms,
+            None => true,
+        });
+        ways.retain(|&(_, (terms, latent))| {
+            latent > 0
+                && self.known.latent.is_none_or(|known| known == latent)
+                && library::dim(choice, latent) == Some(terms)
+        });
         let option = "--xi-layout terms-by-latent (one row per term) or --xi-layout latent-by-terms \
                       (one row per latent coordinate)";
         let expected = || match assigned.info.shape.len() {
@@ -251,7 +250,7 @@ impl<'a> Assembly<'a, '_> {
                 .to_owned(),
             _ => self.expected_xi(choice),
         };
-        let (layout, (terms, latent)) = self.only_way(assigned, &fitting, expected, option)?;
+        let (layout, (terms, latent)) = self.only_way(assigned, &ways, expected, option)?;
         let array = self.read(assigned)?;
         let matrix = match layout {
             Layout::LatentByTerms => array.matrix((latent, terms)).transpose(),
@@ -291,7 +290,7 @@ impl<'a> Assembly<'a, '_> {
             expected += &suggestions.join(" or ");
         }
         let found = format!("no candidate terms for {}", first.info.describe());
-        ImportFault::at(self.tensors.file(), Place::Whole, found, expected)
+        self.tensors.refused(Place::Whole, found, expected)
     }
 
     /// Both tensors of a pair, or none.
@@ -322,14 +321,12 @@ impl<'a> Assembly<'a, '_> {
             if covariance.info.shape != [dim, dim] {
                 return Err(self.wrong_shape(covariance, format!("{dim} x {dim}")));
             }
-            let matrix = self.read(covariance)?.matrix((dim, dim));
-            self.note_used(covariance, Layout::Plain);
-            let covariance = matrix;
             let statistics = InputStatistics {
                 mean,
-                covariance,
+                covariance: self.read(covariance)?.matrix((dim, dim)),
                 given_state: None,
             };
+            self.note_used(covariance, Layout::Plain);
             all.push((rule.name.clone(), statistics));
         }
         Ok(all)

@@ -83,12 +83,7 @@ fn named<'f>(
             let (a, b) = (earlier.info.describe(), info.describe());
             let found = format!("{a}, {b} for {role}");
             let expected = format!("one: name it with --map {role}=TENSOR");
-            return Err(ImportFault::at(
-                tensors.file(),
-                Place::Whole,
-                found,
-                expected,
-            ));
+            return Err(tensors.refused(Place::Whole, found, expected));
         }
         let chosen = Chosen::Named;
         named.push(Assigned { role, info, chosen });
@@ -119,12 +114,7 @@ fn mapped<'f>(
         let Some(info) = tensors.infos().iter().find(|info| info.name == *tensor) else {
             let found = format!("no tensor `{tensor}` for {role}");
             let expected = format!("one of {}", tensors.listing());
-            return Err(ImportFault::at(
-                tensors.file(),
-                Place::Whole,
-                found,
-                expected,
-            ));
+            return Err(tensors.refused(Place::Whole, found, expected));
         };
         let (role, chosen) = (role.clone(), Chosen::Mapped);
         used.push(Assigned { role, info, chosen });
@@ -163,12 +153,8 @@ fn check_mapped_phases(options: &ImportOptions, phases: &[PhaseRule]) -> Result<
     let is_strange = |role: &&Role| {
         (role.phase()).is_some_and(|phase| phases.iter().all(|rule| rule.name != phase))
     };
-    match options
-        .mapping
-        .iter()
-        .map(|mapping| &mapping.role)
-        .find(is_strange)
-    {
+    let mut roles = options.mapping.iter().map(|mapping| &mapping.role);
+    match roles.find(is_strange) {
         None => Ok(()),
         Some(role) => {
             let names: Vec<&str> = phases.iter().map(|rule| rule.name.as_str()).collect();

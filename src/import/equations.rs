@@ -21,31 +21,37 @@ use crate::symbolic::{ExprId, ExprPool, ParseErrorKind};
 /// Largest text.
 pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
 
-/// One section.
+/// The equations of one phase.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Section {
-    /// `None` for a text without sections.
-    pub(super) phase: Option<String>,
-    pub(super) line: usize,
-    pub(super) equations: Vec<Equation>,
+pub struct Section {
+    /// The phase, if the file names it.
+    pub phase: Option<String>,
+    /// Line of its start, from 1.
+    pub line: usize,
+    /// In the order of their left sides.
+    pub equations: Vec<Equation>,
 }
 
 /// The right side of one equation and where it came from.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Equation {
+pub struct Equation {
     /// Latent coordinate, from 0.
-    pub(super) output: usize,
+    pub output: usize,
     /// Line of the left side, from 1.
-    pub(super) line: usize,
-    /// Pieces of the right side: line, column of the first character, text.
-    pieces: Vec<(usize, usize, String)>,
+    pub line: usize,
+    pub(super) pieces: Vec<Piece>,
 }
 
-/// A text in sections, every one with the same left sides.
+/// A piece of a right side: line and column of its first character, and its text.
+pub(super) type Piece = ((usize, usize), String);
+
+/// The equations of a text or LaTeX file in sections, every one with the same left sides.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Sections {
-    pub(super) latent_dim: usize,
-    pub(super) sections: Vec<Section>,
+pub struct Sections {
+    /// Number of latent coordinates.
+    pub latent_dim: usize,
+    /// In the file's order.
+    pub sections: Vec<Section>,
 }
 
 /// Cuts a text into sections and equations, and checks that they are complete.
@@ -68,8 +74,8 @@ pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Result<&'b str, Import
         let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
         let line = before.matches('\n').count() + 1;
         let last = before.rsplit('\n').next().unwrap_or("");
-        let (column, found) = (last.chars().count() + 1, "bytes that are no text");
-        refused(file, line, column, found, "equations in UTF-8")
+        let place = (line, last.chars().count() + 1);
+        refused(file, place, "bytes that are no text", "equations in UTF-8")
     })?;
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }
@@ -77,8 +83,7 @@ pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Result<&'b str, Import
 /// A fault at a line and column.
 pub(super) fn refused(
     file: &str,
-    line: usize,
-    column: usize,
+    (line, column): (usize, usize),
     found: impl Into<Box<str>>,
     expected: impl Into<Box<str>>,
 ) -> ImportError {
@@ -103,29 +108,30 @@ impl Reader<'_> {
         if content.is_empty() {
             return Ok(());
         }
+        let place = (number, column);
         if content.starts_with('[') {
-            return self.header(number, column, content);
+            return self.header(place, content);
         }
         if let Some((left, right)) = content.split_once('=') {
-            let start = column + left.chars().count() + 1;
-            return self.equation((number, column), left.trim(), start, right);
+            let start = (number, column + left.chars().count() + 1);
+            return self.equation(place, left.trim(), (start, right.to_owned()));
         }
         let open = self.sections.last_mut();
         match open.and_then(|section| section.equations.last_mut()) {
             Some(equation) => {
-                equation.pieces.push((number, column, content.to_owned()));
+                equation.pieces.push((place, content.to_owned()));
                 Ok(())
             }
             None => {
                 let expected = "a phase such as `[contact]` or an equation such as \
                                 `ddz1 = 0.5*z1 + u1`";
-                Err(refused(self.file, number, column, quote(content), expected))
+                Err(refused(self.file, place, quote(content), expected))
             }
         }
     }
 
-    fn header(&mut self, number: usize, column: usize, content: &str) -> Result<(), ImportError> {
-        let refused = |found, expected: &str| refused(self.file, number, column, found, expected);
+    fn header(&mut self, place: (usize, usize), content: &str) -> Result<(), ImportError> {
+        let refused = |found, expected: &str| refused(self.file, place, found, expected);
         let name = (content.strip_prefix('[')).and_then(|rest| rest.strip_suffix(']'));
         let Some(name) = name.map(str::trim).filter(|name| !name.is_empty()) else {
             let expected = "the name of a phase in brackets, such as `[contact]`";
@@ -144,7 +150,7 @@ impl Reader<'_> {
         }
         self.sections.push(Section {
             phase: Some(name.to_owned()),
-            line: number,
+            line: place.0,
             equations: Vec::new(),
         });
         Ok(())
@@ -152,12 +158,11 @@ impl Reader<'_> {
 
     fn equation(
         &mut self,
-        (line, column): (usize, usize),
+        place: (usize, usize),
         left: &str,
-        start: usize,
-        right: &str,
+        right: Piece,
     ) -> Result<(), ImportError> {
-        let refused = |found, expected: &str| refused(self.file, line, column, found, expected);
+        let refused = |found, expected: &str| refused(self.file, place, found, expected);
         let variable = (left.strip_prefix('d'))
             .and_then(|name| LatentVariable::from_name(name, MAX_LATENT_DIM));
         let Some(LatentVariable::Dz(output)) = variable else {
@@ -167,7 +172,7 @@ impl Reader<'_> {
         if self.sections.is_empty() {
             self.sections.push(Section {
                 phase: None,
-                line,
+                line: place.0,
                 equations: Vec::new(),
             });
         }
@@ -178,8 +183,11 @@ impl Reader<'_> {
             let found = format!("`{left}` again, as in line {}", earlier.line);
             return Err(refused(found, "each left side once per phase"));
         }
-        let pieces = vec![(line, start, right.to_owned())];
-        section.equations.push(Equation::new(output, line, pieces));
+        section.equations.push(Equation {
+            output,
+            line: place.0,
+            pieces: vec![right],
+        });
         Ok(())
     }
 }
@@ -193,13 +201,8 @@ pub(super) fn complete(
 ) -> Result<Sections, ImportError> {
     let outputs = sections.iter().flat_map(|section| &section.equations);
     let Some(last) = outputs.map(|equation| equation.output).max() else {
-        return Err(refused(
-            file,
-            lines.max(1),
-            1,
-            "the end of the text",
-            expected,
-        ));
+        let place = (lines.max(1), 1);
+        return Err(refused(file, place, "the end of the text", expected));
     };
     let latent_dim = last + 1;
     for section in &mut sections {
@@ -212,7 +215,7 @@ pub(super) fn complete(
             };
             let found = format!("{phase} without ddz{}", output + 1);
             let expected = format!("ddz1 to ddz{latent_dim} (`ddz{} = 0` if none)", output + 1);
-            return Err(refused(file, section.line, 1, found, expected));
+            return Err(refused(file, (section.line, 1), found, expected));
         }
     }
     Ok(Sections {
@@ -222,15 +225,6 @@ pub(super) fn complete(
 }
 
 impl Equation {
-    /// An equation from pieces of its right side: line, column and text.
-    pub(super) fn new(output: usize, line: usize, pieces: Vec<(usize, usize, String)>) -> Self {
-        Self {
-            output,
-            line,
-            pieces,
-        }
-    }
-
     /// Builds the right side in a pool.
     pub(super) fn parse(
         &self,
@@ -240,29 +234,23 @@ impl Equation {
     ) -> Result<ExprId, ImportError> {
         let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
         pool.parse(&self.text(), &known).map_err(|error| {
-            let (line, column) = self.place(error.position);
+            let place = self.place(error.position);
             match (error.kind, latent_dim) {
                 (ParseErrorKind::UnknownName(name), 1) => {
-                    refused(file, line, column, quote(&name), "z1, dz1 or u1")
+                    refused(file, place, quote(&name), "z1, dz1 or u1")
                 }
                 (ParseErrorKind::UnknownName(name), d) => {
                     let expected = format!("z1 to z{d}, dz1 to dz{d} or u1 to u{d}");
-                    refused(file, line, column, quote(&name), expected)
+                    refused(file, place, quote(&name), expected)
                 }
-                (kind, _) => Located::new(
-                    file,
-                    Place::Character(line, column),
-                    ImportFault::Syntax(kind),
-                ),
+                (kind, _) => Located::new(file, Place::Character(place.0, place.1), kind),
             }
         })
     }
 
-    /// The right side in the grammar of candidate terms.
-    pub(super) fn text(&self) -> String {
-        let texts: Vec<&str> = (self.pieces.iter())
-            .map(|(_, _, text)| text.as_str())
-            .collect();
+    /// The right side in the grammar of candidate terms, numbers as they are written.
+    pub fn text(&self) -> String {
+        let texts: Vec<&str> = self.pieces.iter().map(|(_, text)| text.as_str()).collect();
         texts.join("\n")
     }
 
@@ -270,7 +258,7 @@ impl Equation {
     fn place(&self, position: usize) -> (usize, usize) {
         let mut rest = position.saturating_sub(1);
         let mut place = (self.line, 1);
-        for (line, column, text) in &self.pieces {
+        for ((line, column), text) in &self.pieces {
             let length = text.chars().count();
             place = (*line, column + rest.min(length));
             if rest <= length {

@@ -4,32 +4,24 @@ use std::collections::HashMap;
 
 use nalgebra::DMatrix;
 
+use super::assemble::ImportNotes;
 use super::equations::{Equation, Section, Sections, refused};
 use super::error::{ImportError, ImportFault};
 use super::library;
 use super::options::{ImportOptions, PhaseRule, no_feet};
-use super::report::{Note, ReadEquation};
+use super::report::ReadEquation;
 use super::terms::{self, Coefficients};
 use crate::model::{Library, Phase};
 use crate::symbolic::{ExprId, ExprPool};
 
-/// The model parts that the equations of a file make.
-#[derive(Debug)]
-pub(super) struct Latent {
-    pub(super) library: Library,
-    pub(super) phases: Vec<Phase>,
-    pub(super) equations: Vec<ReadEquation>,
-    pub(super) notes: Vec<Note>,
-}
-
-/// Makes library and phases out of equations.
+/// Makes library and phases out of equations, with the notes of both.
 ///
 /// Without a library in the options, the library is the union of the terms found.
 pub(super) fn latent(
     file: &str,
     sections: &Sections,
     options: &ImportOptions,
-) -> Result<Latent, ImportError> {
+) -> Result<(Library, Vec<Phase>, ImportNotes), ImportError> {
     let latent_dim = sections.latent_dim;
     check_options(latent_dim, options)?;
     let ordered = phases_in_order(file, sections, options)?;
@@ -45,58 +37,44 @@ pub(super) fn latent(
     };
     let mut separated: Vec<Vec<Coefficients>> = Vec::new();
     for (_, section) in &ordered {
-        let columns = section
-            .equations
-            .iter()
-            .map(|equation| separation.equation(equation));
+        let columns = (section.equations.iter()).map(|equation| separation.equation(equation));
         separated.push(columns.collect::<Result<_, _>>()?);
     }
     let (library, rows) = match given {
         Some(library) => (library, separation.given),
         None => union(file, latent_dim, &separation.pool, &separated)?,
     };
-    let mut found = Latent {
-        library,
-        phases: Vec::new(),
-        equations: Vec::new(),
-        notes: Vec::new(),
-    };
+    let (mut phases, mut notes) = (Vec::new(), ImportNotes::default());
     for ((rule, section), columns) in ordered.into_iter().zip(&separated) {
-        found
-            .notes
-            .extend(options.usual_feet(&rule.name, &rule.feet));
-        found.add(rule, section, columns, &rows);
-    }
-    Ok(found)
-}
-
-impl Latent {
-    fn add(
-        &mut self,
-        rule: PhaseRule,
-        section: &Section,
-        columns: &[Coefficients],
-        rows: &HashMap<ExprId, Row>,
-    ) {
-        let mut xi = DMatrix::zeros(self.library.len(), self.library.latent_dim());
-        for (column, coefficients) in columns.iter().enumerate() {
-            for (term, coefficient) in coefficients {
-                let row = &rows[term];
-                xi[(row.index, column)] = match row.factor {
-                    1.0 => coefficient.to_f64(),
-                    factor => coefficient.to_f64() / factor,
-                };
-            }
-            self.equations.push(ReadEquation {
-                phase: rule.name.clone(),
-                output: format!("ddz{}", column + 1),
-                line: section.equations[column].line,
+        let PhaseRule { name, feet } = rule;
+        notes.notes.extend(options.usual_feet(&name, &feet));
+        for (equation, coefficients) in section.equations.iter().zip(columns) {
+            notes.equations.push(ReadEquation {
+                phase: name.clone(),
+                output: format!("ddz{}", equation.output + 1),
+                line: equation.line,
                 terms: coefficients.len(),
             });
         }
-        let PhaseRule { name, feet } = rule;
-        self.phases.push(Phase { name, feet, xi });
+        let xi = xi(&library, columns, &rows);
+        phases.push(Phase { name, feet, xi });
     }
+    Ok((library, phases, notes))
+}
+
+/// The coefficients of a phase's equations in the rows of their terms.
+fn xi(library: &Library, columns: &[Coefficients], rows: &HashMap<ExprId, Row>) -> DMatrix<f64> {
+    let mut xi = DMatrix::zeros(library.len(), library.latent_dim());
+    for (column, coefficients) in columns.iter().enumerate() {
+        for (term, coefficient) in coefficients {
+            let row = &rows[term];
+            xi[(row.index, column)] = match row.factor {
+                1.0 => coefficient.to_f64(),
+                factor => coefficient.to_f64() / factor,
+            };
+        }
+    }
+    xi
 }
 
 /// A row of Xi, and the number in front of its term in the library (`2` for `2*z1`).
@@ -110,12 +88,11 @@ struct Row {
 fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), ImportError> {
     match options.latent_dim {
         Some(expected) if expected != latent_dim => {
-            let found = format!("{latent_dim}, as the equations have");
-            return Err(ImportFault::option(
-                "--latent-dim",
+            let (found, expected) = (
                 expected.to_string(),
-                found,
-            ));
+                format!("{latent_dim}, as the equations have"),
+            );
+            return Err(ImportFault::option("--latent-dim", found, expected));
         }
         _ => {}
     }
@@ -126,11 +103,10 @@ fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), Impor
     ];
     match given.iter().find(|(_, is_given)| *is_given) {
         None => Ok(()),
-        Some((option, _)) => Err(ImportFault::option(
-            option,
-            "a file of equations",
-            "a file of tensors",
-        )),
+        Some((option, _)) => {
+            let (found, expected) = ("a file of equations", "a file of tensors");
+            Err(ImportFault::option(option, found, expected))
+        }
     }
 }
 
@@ -150,7 +126,7 @@ fn phases_in_order<'s>(
                 let found = "equations of no phase";
                 let expected = "a phase such as `[contact]` before them (LaTeX: `% Phase contact`, \
                                 or a label that ends in its name), or one --phase NAME=FEET for each";
-                return Err(refused(file, section.line, 1, found, expected));
+                return Err(refused(file, (section.line, 1), found, expected));
             }
         };
         let feet = options
@@ -190,12 +166,12 @@ struct Separation<'f> {
 
 impl Separation<'_> {
     fn equation(&mut self, equation: &Equation) -> Result<Coefficients, ImportError> {
-        let (line, output) = (equation.line, equation.output + 1);
+        let (place, output) = ((equation.line, 1), equation.output + 1);
         let expr = equation.parse(self.file, self.latent_dim, &mut self.pool)?;
         let is_term = |expr| self.given.contains_key(&expr);
         let coefficients = terms::coefficients(&self.pool, expr, &is_term).ok_or_else(|| {
             let found = format!("a coefficient of ddz{output} beyond the range of numbers");
-            refused(self.file, line, 1, found, "finite coefficients")
+            refused(self.file, place, found, "finite coefficients")
         })?;
         let mut strange: Vec<ExprId> = (coefficients.keys().copied())
             .filter(|&term| !self.given.is_empty() && !is_term(term))
@@ -207,13 +183,8 @@ impl Separation<'_> {
                 let term = self.pool.display(term).to_string();
                 let short: String = term.chars().take(80).collect();
                 let found = format!("the term `{short}` in ddz{output}");
-                Err(refused(
-                    self.file,
-                    line,
-                    1,
-                    found,
-                    "the terms of --library only",
-                ))
+                let expected = "the terms of --library only";
+                Err(refused(self.file, place, found, expected))
             }
         }
     }

@@ -41,10 +41,10 @@ mod report;
 mod role;
 mod run;
 mod safetensors;
-mod systems;
 mod tensors;
 mod terms;
 
+pub use equations::{Equation, Section, Sections};
 pub use error::{ImportError, ImportFault};
 pub use latex::{NameError, SymbolNames};
 pub use library::read_terms;
@@ -54,5 +54,4 @@ pub use options::{
 };
 pub use report::{Chosen, ImportReport, Layout, Note, ReadEquation, UnusedTensor, UsedTensor};
 pub use role::{Mapping, Part, Role};
-pub use run::{Imported, import, import_from_bytes, import_tensors};
-pub use systems::{ReadEquations, ReadSystem, read_equations};
+pub use run::{Imported, import, import_from_bytes, import_tensors, read_equations};

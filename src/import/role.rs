@@ -59,6 +59,23 @@ const EXPECTED: &str = "encoder.weight, encoder.bias, decoder.weight, decoder.bi
                         input_covariance.PHASE, scaling.state, scaling.input, mean.state, std.state \
                         or std.input";
 
+/// First words of the parts of a phase; its name follows.
+const OF_PHASES: [(&str, fn(String) -> Role); 5] = [
+    ("xi", Role::Xi),
+    ("sindy_coefficients", Role::Xi),
+    ("mask", Role::Mask),
+    ("input_mean", Role::InputMean),
+    ("input_covariance", Role::InputCovariance),
+];
+/// Parts of which a model has one.
+const SINGLE: [Role; 5] = [
+    Role::StateScaling,
+    Role::InputScaling,
+    Role::StateMean,
+    Role::StateStd,
+    Role::InputStd,
+];
+
 impl fmt::Display for Role {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -96,29 +113,20 @@ fn after<'t>(head: &str, text: &'t str) -> Option<&'t str> {
 }
 
 fn read_role(text: &str) -> Option<Role> {
-    let phase = |head: &str| after(head, text).map(str::to_owned);
-    let of_phase = (phase("xi").map(Role::Xi))
-        .or_else(|| phase("sindy_coefficients").map(Role::Xi))
-        .or_else(|| phase("mask").map(Role::Mask))
-        .or_else(|| phase("input_mean").map(Role::InputMean))
-        .or_else(|| phase("input_covariance").map(Role::InputCovariance));
-    if of_phase.is_some() {
-        return of_phase;
-    }
-    match text {
-        "xi" | "Xi" | "sindy_coefficients" => return Some(Role::Xi(ONLY_PHASE.to_owned())),
-        _ => {}
-    }
-    for (head, state, input) in [
-        ("scaling", Role::StateScaling, Some(Role::InputScaling)),
-        ("std", Role::StateStd, Some(Role::InputStd)),
-        ("mean", Role::StateMean, None),
-    ] {
-        match after(head, text) {
-            Some("state") => return Some(state),
-            Some("input") if input.is_some() => return input,
-            _ => {}
+    for (head, of_phase) in OF_PHASES {
+        if let Some(phase) = after(head, text) {
+            return Some(of_phase(phase.to_owned()));
         }
+    }
+    if matches!(text, "xi" | "Xi" | "sindy_coefficients") {
+        return Some(Role::Xi(ONLY_PHASE.to_owned()));
+    }
+    let is_named = |role: &Role| {
+        let name = role.to_string();
+        text == name || text == name.replace('.', "_")
+    };
+    if let Some(single) = SINGLE.into_iter().find(is_named) {
+        return Some(single);
     }
     let (part, tail) = [Part::Encoder, Part::Decoder]
         .into_iter()
@@ -151,13 +159,7 @@ impl Role {
             | Role::Mask(phase)
             | Role::InputMean(phase)
             | Role::InputCovariance(phase) => Some(phase),
-            Role::Weights(..)
-            | Role::Bias(..)
-            | Role::StateScaling
-            | Role::InputScaling
-            | Role::StateMean
-            | Role::StateStd
-            | Role::InputStd => None,
+            _ => None,
         }
     }
 }
@@ -180,11 +182,10 @@ impl FromStr for Mapping {
                 role: role.trim().parse()?,
                 tensor: tensor.to_owned(),
             }),
-            _ => Err(ImportFault::option(
-                "--map",
-                format!("{text:?}"),
-                "PART=TENSOR, such as encoder.weight=net.enc.0.weight",
-            )),
+            _ => {
+                let expected = "PART=TENSOR, such as encoder.weight=net.enc.0.weight";
+                Err(ImportFault::option("--map", format!("{text:?}"), expected))
+            }
         }
     }
 }

@@ -11,15 +11,15 @@ use super::assemble::{self, ImportNotes, Parts};
 use super::equations::{self, Sections};
 use super::error::{ImportError, ImportFault};
 use super::latent;
-use super::latex;
+use super::latex::{self, SymbolNames};
 use super::memory::{self, Tensor};
 use super::npz;
 use super::options::{Format, ImportOptions};
 use super::report::ImportReport;
 use super::safetensors;
-use crate::files::{Located, Place};
+use crate::files::{Located, Place, hex};
 use crate::model::{CoordinateNames, ReducedModel, StateMap};
-use crate::robot::Robot;
+use crate::symbolic::ExprPool;
 
 /// Largest file that is read.
 const MAX_FILE_BYTES: u64 = 256 << 20;
@@ -61,23 +61,20 @@ pub fn import_from_bytes(
     bytes: &[u8],
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
-    let max = match format {
-        Format::Equations | Format::Latex => equations::MAX_TEXT_BYTES,
-        Format::Safetensors | Format::Npz => MAX_FILE_BYTES,
-    };
-    if bytes.len() as u64 > max {
-        return Err(ImportFault::too_large(file, max, "bytes"));
-    }
     let (parts, notes) = match format {
-        Format::Safetensors => assemble::parts(&safetensors::open(file, bytes)?, options)?,
-        Format::Npz => assemble::parts(&npz::open(file, bytes)?, options)?,
-        Format::Equations => of_equations(file, &equations::read(file, bytes)?, options)?,
-        Format::Latex => {
-            let usual = ["contact", "flight"].map(str::to_owned).into_iter();
-            let known: Vec<String> = (options.phases.iter().map(|rule| rule.name.clone()))
-                .chain(usual)
-                .collect();
-            let sections = latex::read(file, bytes, &options.symbols, &known)?;
+        Format::Safetensors | Format::Npz => {
+            check_size(file, bytes, MAX_FILE_BYTES)?;
+            let tensors = match format {
+                Format::Npz => npz::open(file, bytes)?,
+                _ => safetensors::open(file, bytes)?,
+            };
+            assemble::parts(&tensors, options)?
+        }
+        Format::Equations | Format::Latex => {
+            let usual = ["contact", "flight"].map(str::to_owned);
+            let given = options.phases.iter().map(|rule| rule.name.clone());
+            let known: Vec<String> = given.chain(usual).collect();
+            let sections = sections(file, format, bytes, &options.symbols, &known)?;
             of_equations(file, &sections, options)?
         }
     };
@@ -105,6 +102,48 @@ pub fn import_tensors(
         digest: memory::digest(tensors),
     };
     finish(&source, parts, notes, options)
+}
+
+fn check_size(file: &str, bytes: &[u8], max: u64) -> Result<(), ImportError> {
+    match bytes.len() as u64 > max {
+        true => Err(ImportFault::too_large(file, max, "bytes")),
+        false => Ok(()),
+    }
+}
+
+/// The equations of a file in memory, their right sides not looked at.
+fn sections(
+    file: &str,
+    format: Format,
+    bytes: &[u8],
+    symbols: &SymbolNames,
+    known: &[String],
+) -> Result<Sections, ImportError> {
+    check_size(file, bytes, equations::MAX_TEXT_BYTES)?;
+    match format {
+        Format::Latex => latex::read(file, bytes, symbols, known),
+        Format::Equations | Format::Safetensors | Format::Npz => equations::read(file, bytes),
+    }
+}
+
+/// Reads the equations of a file in memory. `symbols` are LaTeX's names of variables, `known`
+/// names of phases that its labels may end in.
+///
+/// # Errors
+/// [`ImportError`] with the place of what cannot be read.
+pub fn read_equations(
+    file: &str,
+    format: Format,
+    bytes: &[u8],
+    symbols: &SymbolNames,
+    known: &[String],
+) -> Result<Sections, ImportError> {
+    let read = sections(file, format, bytes, symbols, known)?;
+    for equation in read.sections.iter().flat_map(|section| &section.equations) {
+        // Each in a pool of its own: only faults are wanted.
+        equation.parse(file, read.latent_dim, &mut ExprPool::new())?;
+    }
+    Ok(read)
 }
 
 /// Where a model comes from.
@@ -146,19 +185,14 @@ fn of_equations(
     sections: &Sections,
     options: &ImportOptions,
 ) -> Result<(Parts, ImportNotes), ImportError> {
-    let found = latent::latent(file, sections, options)?;
+    let (library, phases, notes) = latent::latent(file, sections, options)?;
     let parts = Parts {
-        library: found.library,
-        phases: found.phases,
+        library,
+        phases,
         encoder: None,
         decoder: None,
         scaling: options.scaling.clone(),
         statistics: Vec::new(),
-    };
-    let notes = ImportNotes {
-        equations: found.equations,
-        notes: found.notes,
-        ..ImportNotes::default()
     };
     Ok((parts, notes))
 }
@@ -166,20 +200,17 @@ fn of_equations(
 /// The origin as the model file keeps it: no folders, no time.
 fn provenance(source: &Source<'_>, notes: &ImportNotes) -> Map<String, Value> {
     let name = Path::new(source.file).file_name();
-    let name = name.map_or_else(
-        || source.file.to_owned(),
-        |name| name.to_string_lossy().into_owned(),
-    );
-    let digest: String = source
-        .digest
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
+    let name = name.map_or(source.file.into(), |name| name.to_string_lossy());
+    let entries = [
+        ("imported_from", json!(name)),
+        ("format", json!(source.format)),
+        ("sha256", json!(hex(&source.digest))),
+        ("romc", json!(env!("CARGO_PKG_VERSION"))),
+    ];
+    let mut entries: Map<_, _> = entries
+        .map(|(key, value)| (key.to_owned(), value))
+        .into_iter()
         .collect();
-    let mut entries = Map::new();
-    entries.insert("imported_from".to_owned(), json!(name));
-    entries.insert("format".to_owned(), json!(source.format));
-    entries.insert("sha256".to_owned(), json!(digest));
-    entries.insert("romc".to_owned(), json!(env!("CARGO_PKG_VERSION")));
     if !notes.used.is_empty() {
         let tensors = notes.used.iter().map(|used| {
             let value = json!({ "tensor": used.tensor, "layout": used.layout });
@@ -216,38 +247,24 @@ fn build(
     let mut builder = ReducedModel::builder(options.name.clone(), parts.library)
         .description(options.description.clone())
         .phases(parts.phases)
-        .provenance(provenance);
+        .provenance(provenance)
+        .scaling(parts.scaling)
+        .all_input_statistics(parts.statistics)
+        .robot(options.robot)
+        .actuators(options.actuators.clone())
+        .sample_time_s(options.sample_time_s);
     if let Some(encoder) = parts.encoder {
         builder = builder.encoder(encoder);
     }
     if let Some(decoder) = parts.decoder {
         builder = builder.decoder(decoder);
     }
-    if let Some(scaling) = parts.scaling {
-        builder = builder.scaling(scaling);
-    }
-    for (phase, statistics) in parts.statistics {
-        builder = builder.input_statistics(phase, statistics);
-    }
-    if let Some(robot) = options.robot {
-        builder = builder
-            .robot(robot)
-            .wrench_frame(options.wrench_frame)
-            .actuators(options.actuators.clone());
+    if options.robot.is_some() {
+        builder = builder.wrench_frame(options.wrench_frame);
         if map.is_some() {
-            builder = builder
-                .state(CoordinateNames {
-                    names: Robot::state_names().to_vec(),
-                    units: Robot::state_units().to_vec(),
-                })
-                .input(CoordinateNames {
-                    names: Robot::input_names().to_vec(),
-                    units: Robot::input_units().to_vec(),
-                });
+            let [state, input] = CoordinateNames::of_robot();
+            builder = builder.state(state).input(input);
         }
-    }
-    if let Some(sample_time_s) = options.sample_time_s {
-        builder = builder.sample_time_s(sample_time_s);
     }
     (builder.build()).map_err(|source| ImportFault::model(file, source))
 }

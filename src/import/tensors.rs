@@ -146,11 +146,21 @@ impl<'b> TensorFile<'b> {
         texts.join(", ")
     }
 
+    /// `found` at a place of the file, where `expected` should be.
+    pub(super) fn refused(
+        &self,
+        place: Place,
+        found: impl Into<Box<str>>,
+        expected: impl Into<Box<str>>,
+    ) -> ImportError {
+        ImportFault::at(&self.file, place, found, expected)
+    }
+
     /// A file without a tensor for a use.
     pub(super) fn missing(&self, role: &dyn std::fmt::Display) -> ImportError {
         let found = format!("no tensor for {role} among {}", self.listing());
         let expected = format!("a tensor of that name, or --map {role}=TENSOR");
-        ImportFault::at(&self.file, Place::Whole, found, expected)
+        self.refused(Place::Whole, found, expected)
     }
 
     /// The numbers of a tensor for one use, which `place` names in errors; all are finite.
@@ -161,7 +171,7 @@ impl<'b> TensorFile<'b> {
     ) -> Result<Array, ImportError> {
         let Some(size) = info.element.size() else {
             let found = format!("numbers of type {}", info.element.name());
-            return Err(ImportFault::at(&self.file, place(&[]), found, "f32 or f64"));
+            return Err(self.refused(place(&[]), found, "f32 or f64"));
         };
         let count = (info.shape.iter()).try_fold(1usize, |count, &dim| count.checked_mul(dim));
         let Some(count) = count.filter(|&count| count <= MAX_ELEMENTS) else {
@@ -178,12 +188,11 @@ impl<'b> TensorFile<'b> {
         };
         match array.values.iter().position(|value| !value.is_finite()) {
             None => Ok(array),
-            Some(position) => Err(ImportFault::at(
-                &self.file,
-                place(&array.index_of(position)),
-                array.values[position].to_string(),
-                "a finite number",
-            )),
+            Some(position) => {
+                let found = array.values[position].to_string();
+                let place = place(&array.index_of(position));
+                Err(self.refused(place, found, "a finite number"))
+            }
         }
     }
 }

@@ -98,11 +98,8 @@ fn variable(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<LatentVa
 
 /// Index into (z, dz).
 fn state_index(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<usize> {
-    match variable(pool, latent_dim, expr)? {
-        LatentVariable::Z(index) => Some(index),
-        LatentVariable::Dz(index) => Some(latent_dim + index),
-        LatentVariable::U(_) => None,
-    }
+    let place = variable(pool, latent_dim, expr)?.place(latent_dim)?;
+    (place < 2 * latent_dim).then_some(place)
 }
 
 /// Indices into (z, dz), rising, each as often as its power.

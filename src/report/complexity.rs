@@ -3,7 +3,6 @@
 use super::figures::{Figure, Panel, Role, Series};
 use crate::study::{DimensionSummary, Spread, Summary};
 
-const PANEL: (f64, f64) = (360.0, 210.0);
 const LEGEND: [(Role, &str); 2] = [
     (Role::Recorded, "mean over seeds"),
     (Role::SecondBaseline, "standard deviation"),
@@ -12,43 +11,32 @@ const LEGEND: [(Role, &str); 2] = [
 /// Figures 10 (decoder error and active coefficients) and 11 (combined loss) of a study; bars are one standard deviation
 /// over the seeds to either side.
 pub fn study_figures(summary: &Summary) -> Vec<Figure> {
-    let figure = |id: &str, caption: String, panels: Vec<Panel>| Figure {
+    let figure = |id: &str, caption: &str, panels: Vec<Panel>| Figure {
         x_label: "latent coordinates".to_owned(),
-        panel_size: PANEL,
+        panel_size: (360.0, 210.0),
         columns: 2,
-        ..Figure::over_time(id.to_owned(), caption, panels, &LEGEND)
+        ..Figure::over_time(id, caption, panels, &LEGEND)
     };
-    let rows = &summary.dimensions;
-    let over_dimensions = vec![
-        panel("log10 of decoder mean square, scaled units", rows, |row| {
+    type Row = (&'static str, fn(&DimensionSummary) -> Bar);
+    let over_dimensions: [Row; 4] = [
+        ("log10 of decoder mean square, scaled units", |row| {
             logarithm(row.decoder_mse)
         }),
-        panel("active coefficients in contact", rows, |row| {
-            range(row.active)
-        }),
-        panel("x after 0.1 s, mm", rows, |row| {
-            millimetres(row.prediction_x_m)
-        }),
-        panel("z after 0.1 s, mm", rows, |row| {
-            millimetres(row.prediction_z_m)
-        }),
+        ("active coefficients in contact", |row| range(row.active)),
+        ("x after 0.1 s, mm", |row| millimetres(row.prediction_x_m)),
+        ("z after 0.1 s, mm", |row| millimetres(row.prediction_z_m)),
     ];
+    let rows = &summary.dimensions;
+    let over_dimensions = over_dimensions.map(|(title, bar)| panel(title, rows, bar));
     let combined = panel("combined loss", rows, |row| range(row.combined_loss));
+    let accuracy = "Accuracy against complexity over the latent dimension (figure 10 of the paper)";
+    let loss = format!(
+        "Combined loss 2 E_dec + 2 lambda log |Xi| with lambda = {} (figure 11 of the paper)",
+        summary.lambda
+    );
     vec![
-        figure(
-            "complexity",
-            "Accuracy against complexity over the latent dimension (figure 10 of the paper)"
-                .to_owned(),
-            over_dimensions,
-        ),
-        figure(
-            "combined-loss",
-            format!(
-                "Combined loss 2 E_dec + 2 lambda log |Xi| with lambda = {} (figure 11 of the paper)",
-                summary.lambda
-            ),
-            vec![combined],
-        ),
+        figure("complexity", accuracy, over_dimensions.into()),
+        figure("combined-loss", &loss, vec![combined]),
     ]
 }
 
@@ -104,21 +92,15 @@ mod tests {
             dimensions: vec![row(1, spread(10.0, 2.0)), row(2, spread(20.0, 3.0))],
         };
         let figures = study_figures(&summary);
-        let Panel::Lines(active) = &figures[0].panels[1] else {
-            panic!("a line plot");
+        let [Panel::Lines(decoder), Panel::Lines(active), ..] = &figures[0].panels[..] else {
+            panic!("line plots");
         };
-        let bars = &active.series[0].points;
+        let [bars, means] = [0, 1].map(|line| active.series[line].points.as_slice());
         assert_eq!(
             bars[..3],
             [(1.0, Some(8.0)), (1.0, Some(12.0)), (1.0, None)]
         );
-        assert_eq!(
-            active.series[1].points,
-            [(1.0, Some(10.0)), (2.0, Some(20.0))]
-        );
-        let Panel::Lines(decoder) = &figures[0].panels[0] else {
-            panic!("a line plot");
-        };
+        assert_eq!(means, [(1.0, Some(10.0)), (2.0, Some(20.0))]);
         assert_eq!(decoder.series[0].points[0], (1.0, Some(-5.0)));
     }
 }

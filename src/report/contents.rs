@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use super::complexity::study_figures;
 use super::control::{latent_inputs, torques};
 use super::figures::{Figure, Film, HeatMap, Panel, subscript};
-use super::jump::Jump;
-use super::place::Place;
+use super::jump::{Jump, Place};
 use super::tables::NamedRun;
 use crate::evaluate::{Assessment, SegmentRun};
 use crate::model::{ModelError, ReducedModel};
@@ -83,9 +82,7 @@ impl AllFigures {
 /// [`ModelError`] for a model without encoder or decoder.
 pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
     let mut figures = AllFigures::default();
-    let Content {
-        model, assessment, ..
-    } = *content;
+    let (model, assessment) = (content.model, content.assessment);
     if let Some(run) = assessment.runs.first() {
         figures.encoder.push(encoder(model, assessment, run)?);
     }
@@ -126,22 +123,21 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
 
 /// Every jump of an assessment, named.
 pub(super) fn jumps<'a>(content: &Content<'a>) -> Vec<Jump<'a>> {
-    let Content {
-        model, assessment, ..
-    } = *content;
+    let (model, assessment) = (content.model, content.assessment);
     let runs = assessment.runs.iter().enumerate();
-    let is_one_of_several = |run: &SegmentRun<'_>| {
-        let same = assessment
-            .runs
-            .iter()
-            .filter(|other| other.segment.path == run.segment.path);
-        same.count() > 1
-    };
-    let jump = |(index, run): (usize, &'a SegmentRun<'a>)| Jump {
-        model,
-        assessment,
-        run,
-        place: Place::of_segment(index, run, is_one_of_several(run)),
+    let jump = |(index, run): (usize, &'a SegmentRun<'a>)| {
+        let path = &run.segment.path;
+        let mut place = Place::of_recording(index, path);
+        let same = assessment.runs.iter().map(|run| &run.segment.path);
+        if same.filter(|other| *other == path).count() > 1 {
+            place.words += &format!(", from row {}", run.segment.first_row);
+        }
+        Jump {
+            model,
+            assessment,
+            run,
+            place,
+        }
     };
     runs.map(jump).collect()
 }
@@ -160,25 +156,22 @@ fn encoder(
     let d = model.latent_dim();
     let at = |row: usize, column: usize| weights[(column, row)] / factors[row];
     let values = (0..rows * d).map(|k| at(k / d, k % d)).collect();
-    let what = if model.is_linear() {
-        "Magnitudes of the encoder's weights"
-    } else {
-        "Magnitudes of the encoder's Jacobian at the first sample"
+    let what = match model.is_linear() {
+        true => "Magnitudes of the encoder's weights",
+        false => "Magnitudes of the encoder's Jacobian at the first sample",
     };
+    let caption = format!("{what}: how much of each coordinate a latent one takes (scaled units).");
+    let columns = (1..=d).map(|index| format!("z{}", subscript(index)));
+    let map = Panel::Heat(HeatMap {
+        title: "|weight|".to_owned(),
+        rows: assessment.names.clone(),
+        columns: columns.collect(),
+        values,
+    });
     Ok(Figure {
-        id: "encoder".to_owned(),
-        caption: format!("{what}: how much of each coordinate a latent one takes (scaled units)."),
         x_label: String::new(),
         panel_size: (120.0 + 40.0 * d.min(18) as f64, 330.0),
         columns: 1,
-        panels: vec![Panel::Heat(HeatMap {
-            title: "|weight|".to_owned(),
-            rows: assessment.names.clone(),
-            columns: (1..=d)
-                .map(|index| format!("z{}", subscript(index)))
-                .collect(),
-            values,
-        })],
-        legend: Vec::new(),
+        ..Figure::over_time("encoder", caption, vec![map], &[])
     })
 }

@@ -2,7 +2,7 @@
 //! latent tracking, solve times.
 
 use super::figures::{Figure, Panel, Role, Series};
-use super::place::Place;
+use super::jump::Place;
 use super::tables::NamedRun;
 use crate::evaluate::{Run, StepRow};
 use crate::model::ReducedModel;
@@ -37,30 +37,23 @@ pub fn without_statistics(model: &ReducedModel) -> Option<&str> {
 
 /// A line over the steps of a run.
 fn line(run: &Run, role: Role, value: impl Fn(&StepRow) -> Option<f64>) -> Series {
-    Series {
-        role,
-        points: run
-            .rows
-            .iter()
-            .map(|row| (row.time_s, value(row)))
-            .collect(),
-    }
+    let points = run.rows.iter().map(|row| (row.time_s, value(row)));
+    let points = points.collect();
+    Series { role, points }
 }
 
 /// Commanded torques beside the recorded ones, between the limits.
 pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &Place) -> Figure {
     let limits = model.robot().ok().map(Robot::torque_limit_nm);
     let panel = |joint: usize| {
-        let limit = |sign: f64| {
-            let limit = limits.map(|limits| sign * limits[joint]);
-            line(run, Role::Limit, |_| limit)
-        };
-        let recorded = |row: &StepRow| Some(row.recorded_torque_nm[joint]);
+        let limit = |sign: f64| limits.map(|limits| sign * limits[joint]);
         let lines = vec![
-            line(run, Role::Recorded, recorded),
+            line(run, Role::Recorded, |row| {
+                Some(row.recorded_torque_nm[joint])
+            }),
             line(run, Role::Full, |row| Some(row.torque_nm[joint])),
-            limit(1.0),
-            limit(-1.0),
+            line(run, Role::Limit, |_| limit(1.0)),
+            line(run, Role::Limit, |_| limit(-1.0)),
         ];
         Panel::lines(format!("{}, N m", Robot::state_names()[joint]), lines)
     };
@@ -113,9 +106,10 @@ fn latent_tracking(
             let end = row.z_planned.as_ref().map(|z| z[latent]);
             (row.time_s + horizon_s, end)
         });
+        let points = planned.collect();
         let planned = Series {
             role: Role::Full,
-            points: planned.collect(),
+            points,
         };
         let reference = line(run, Role::Recorded, |row| Some(row.z_reference[latent]));
         Panel::lines(format!("z{}", latent + 1), vec![reference, planned])

@@ -40,10 +40,8 @@ pub fn assessment_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Val
 
 /// A value of each phase under its name.
 fn by_phase(model: &ReducedModel, value: impl Fn(usize) -> Value) -> Map<String, Value> {
-    let phases = model.phases().iter().enumerate();
-    phases
-        .map(|(index, phase)| (phase.name.clone(), value(index)))
-        .collect()
+    let names = model.phases().iter().map(|phase| phase.name.clone());
+    names.zip((0..).map(value)).collect()
 }
 
 fn linearised_json(phase: &LinearisedPhase) -> Value {
@@ -73,12 +71,12 @@ fn rollouts_json(
     sums: &CoordinateSums,
 ) -> Value {
     let named = |fits: Vec<Option<Fit>>| -> Map<String, Value> {
-        let names = assessment.names.iter().zip(&assessment.units).zip(fits);
-        let entry = |((name, unit), fit): ((&String, &String), Option<Fit>)| {
+        let names = assessment.names.iter().cloned();
+        let fits = assessment.units.iter().zip(fits).map(|(unit, fit)| {
             let (rms, r2) = (fit.map(|fit| fit.rms), fit.and_then(|fit| fit.r2));
-            (name.clone(), json!({ "unit": unit, "rms": rms, "r2": r2 }))
-        };
-        names.map(entry).collect()
+            json!({ "unit": unit, "rms": rms, "r2": r2 })
+        });
+        names.zip(fits).collect()
     };
     json!({
         "rollouts": sums.windows,

@@ -1,11 +1,13 @@
 //! The figures of one jump: recorded beside predicted, pendulums, robots as sticks.
 
+use std::path::Path;
+
 use nalgebra::DVector;
 
 use super::figures::{
-    Figure, Film, LinePlot, Motion, Panel, Role, Series, film, film_strip, floor_m, subscript,
+    Figure, Film, Motion, Panel, Role, Series, film, film_strip, floor_m, subscript,
 };
-use super::place::Place;
+use super::tables::file_name;
 use crate::evaluate::{Assessment, FitSums, SegmentRun};
 use crate::model::{ModelError, ReducedModel};
 use crate::recording::Segment;
@@ -20,14 +22,34 @@ pub(super) fn heading_rad(segment: &Segment) -> f64 {
     segment.x[(STATE_DIM - 1, 0)]
 }
 
-/// Whether each coordinate of the robot enters a latent one at the state `x` (18).
+/// Whether each coordinate of the robot enters a latent one at the beginning of a run.
 ///
 /// # Errors
 /// [`ModelError`] for a model without encoder.
-pub fn modelled(model: &ReducedModel, x: DVector<f64>) -> Result<Vec<bool>, ModelError> {
-    let weights = model.encoder_jacobian(&x)?;
+pub fn modelled(model: &ReducedModel, run: &SegmentRun<'_>) -> Result<Vec<bool>, ModelError> {
+    let weights = model.encoder_jacobian(&run.segment.x.column(0).into_owned())?;
     let columns = weights.column_iter();
     Ok(columns.map(|column| column.amax() != 0.0).collect())
+}
+
+/// Which jump a figure shows.
+pub(super) struct Place {
+    /// Number from 1, which ends the figure's name.
+    pub suffix: String,
+    /// Name of the recording, with the row where the jump begins if there may be several.
+    pub words: String,
+}
+
+impl Place {
+    /// A recording.
+    pub fn of_recording(index: usize, path: &Path) -> Self {
+        let name = file_name(path);
+        let stem = name.trim_end_matches(".gz").trim_end_matches(".csv");
+        Self {
+            suffix: (index + 1).to_string(),
+            words: stem.to_owned(),
+        }
+    }
 }
 
 /// A value of every sample; none where a rollout did not arrive.
@@ -71,7 +93,7 @@ impl Jump<'_> {
     /// encode stay as recorded.
     fn motions(&self) -> Result<[Motion; 2], ModelError> {
         let recorded = &self.run.segment.x;
-        let modelled = modelled(self.model, recorded.column(0).into_owned())?;
+        let modelled = modelled(self.model, self.run)?;
         let mut states = self.decoded(&self.run.full)?;
         for (sample, state) in states.iter_mut().enumerate() {
             let Some(state) = state else { continue };
@@ -93,13 +115,11 @@ impl Jump<'_> {
         rollout: &Rollout,
         value: impl Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>, ModelError>,
     ) -> Result<Samples, ModelError> {
-        let states = rollout
-            .states(self.run.latent.len())
-            .into_iter()
-            .enumerate();
-        states
-            .map(|(sample, state)| state.map(|(z, dz)| value(sample, &z, &dz)).transpose())
-            .collect()
+        let states = rollout.states(self.run.latent.len()).into_iter();
+        let value = |(sample, state): (usize, Option<(DVector<f64>, DVector<f64>)>)| {
+            state.map(|(z, dz)| value(sample, &z, &dz)).transpose()
+        };
+        states.enumerate().map(value).collect()
     }
 
     /// Coordinates of the robot along a rollout.
@@ -108,20 +128,12 @@ impl Jump<'_> {
     }
 
     fn series(&self, role: Role, value: impl Fn(usize) -> Option<f64>) -> Series {
-        let times = self.run.latent.time_s.iter().enumerate();
-        Series {
-            role,
-            points: times.map(|(k, &time)| (time, value(k))).collect(),
-        }
+        Series::over(role, &self.run.latent.time_s, value)
     }
 
     /// Lines over the samples; flight is shaded.
-    fn panel(&self, title: String, series: Vec<Series>) -> Panel {
-        Panel::Lines(LinePlot {
-            title,
-            series,
-            shaded: self.flights(),
-        })
+    fn panel(&self, title: impl Into<String>, series: Vec<Series>) -> Panel {
+        Panel::shaded(title, series, self.flights())
     }
 
     /// Times without a foot down.
@@ -176,7 +188,7 @@ impl Jump<'_> {
         let (names, units) = (&self.assessment.names, &self.assessment.units);
         let full = self.decoded(&self.run.full)?;
         let restarted = self.decoded(&self.run.restarted)?;
-        let modelled = modelled(self.model, self.run.segment.x.column(0).into_owned())?;
+        let modelled = modelled(self.model, self.run)?;
         let panel = |row: usize| {
             let recorded = |k| self.run.segment.x[(row, k)];
             let title = format!("{}, {}", names[row], units[row]);
@@ -234,17 +246,10 @@ impl Jump<'_> {
                 self.series(Role::Recorded, |k| Some(run.segment.x[(row, k)])),
                 self.series(Role::Full, |k| full[k].as_ref().map(|x| x[row])),
             ];
-            lines.extend(
-                roles
-                    .into_iter()
-                    .zip(&run.baselines)
-                    .map(|(role, rollout)| {
-                        let position =
-                            |k: usize| rollout.position_m[k].map(|position| position[axis]);
-                        self.series(role, position)
-                    }),
-            );
-            self.panel(title.to_owned(), lines)
+            for (role, rollout) in roles.into_iter().zip(&run.baselines) {
+                lines.push(self.series(role, |k| rollout.position_m[k].map(|at| at[axis])));
+            }
+            self.panel(title, lines)
         };
         let mut legend = vec![
             (Role::Recorded, "recorded"),
@@ -260,15 +265,11 @@ impl Jump<'_> {
             panel(JOINT_DIM, 0, "body.x, m"),
             panel(JOINT_DIM + 2, 1, "body.z, m"),
         ];
+        let id = format!("aslip_{}", self.place.suffix);
         Ok(Figure {
             panel_size: (360.0, 180.0),
             columns: 2,
-            ..Figure::over_time(
-                format!("aslip_{}", self.place.suffix),
-                caption,
-                panels,
-                &legend,
-            )
+            ..Figure::over_time(id, caption, panels, &legend)
         })
     }
 

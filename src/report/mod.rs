@@ -11,7 +11,6 @@ pub mod figures;
 mod json;
 mod jump;
 mod page;
-mod place;
 mod plan;
 mod provenance;
 mod sections;

@@ -3,16 +3,18 @@
 use askama::Template;
 
 use super::contents::{AllFigures, Content, JumpFigures};
-use super::figures::{Figure, Film, Role, panel_svg};
-use super::provenance::origin;
+use super::figures::{Figure, panel_svg};
+use super::provenance::{Origin, origin};
 use super::sections::{Section, sections, tiles};
 use super::verdict::Verdict;
 use crate::artifact;
-use crate::equations::Equations;
+use crate::equations::{Equations, PhaseEquations};
+use crate::model::ReducedModel;
 use crate::typeset::latex::tex_cases;
 use crate::typeset::mathml::{Html, HtmlProse, HtmlText, system};
+use crate::typeset::words::{feet, rounding};
 use crate::typeset::{
-    Rounding, SymbolTable, Table, Typeset, TypesetError, rendered, rounded, words,
+    EquationSystem, Rounding, SymbolTable, Table, Typeset, TypesetError, rendered, rounded,
 };
 
 /// Longest line of an equation, in em.
@@ -35,165 +37,90 @@ pub struct PageOptions {
 /// [`TypesetError`] if a candidate term has a variable without a symbol.
 pub fn page(
     content: &Content<'_>,
-    verdict: Verdict,
+    verdict: &Verdict,
     figures: &AllFigures,
     options: &PageOptions,
 ) -> Result<String, TypesetError> {
     let model = content.model;
     let equations = &Equations::of(model);
     let typeset = Typeset::new(equations, &SymbolTable::default(), Rounding::default())?;
-    let origin = origin(model.provenance());
-    let all = |texts: &[String]| texts.iter().map(|text| prose(text)).collect();
     let page = Page {
-        name: html(model.name()),
-        description: html(model.description()),
+        model,
         version: env!("CARGO_PKG_VERSION"),
         digest: artifact::digest(model).to_string(),
-        headline: prose(&verdict.headline),
-        sentences: all(&verdict.sentences),
-        recordings: verdict.recordings,
-        tiles: (tiles(content).iter())
-            .map(|(name, value)| (prose(name), prose(value)))
-            .collect(),
-        remarks: all(&content.assessment.remarks),
-        phases: phases(equations, &typeset),
-        rounding: words::rounding::<Html>(Rounding::default(), &typeset.rounding),
-        jumps: figures.jumps.iter().map(jump_view).collect(),
+        verdict,
+        tiles: tiles(content),
+        remarks: &content.assessment.remarks,
+        phases: typeset.systems.iter().zip(equations.phases()).collect(),
+        rounding: rounding::<Html>(Rounding::default(), &typeset.rounding),
+        jumps: &figures.jumps,
         rest: content.assessment.runs.len() - figures.jumps.len(),
         sections: sections(content, figures, options),
-        facts: (origin.facts.iter())
-            .map(|(key, value)| (html(key), html(value)))
-            .collect(),
-        lists: origin.lists,
-        commands: (options.commands.iter())
-            .map(|command| html(command))
-            .collect(),
+        origin: origin(model.provenance()),
+        commands: &options.commands,
     };
     Ok(rendered(&page)?)
+}
+
+/// What the template shows; it escapes texts by [`html`], and sentences of the report itself by [`prose`].
+#[derive(Template)]
+#[template(path = "report/page.askama", config = "templates/askama.toml")]
+struct Page<'a> {
+    model: &'a ReducedModel,
+    version: &'static str,
+    digest: String,
+    verdict: &'a Verdict,
+    tiles: Vec<(String, String)>,
+    remarks: &'a [String],
+    phases: Vec<(&'a EquationSystem, &'a PhaseEquations)>,
+    rounding: String,
+    jumps: &'a [JumpFigures],
+    /// Jumps without figures.
+    rest: usize,
+    sections: Vec<Section<'a>>,
+    origin: Origin,
+    commands: &'a [String],
 }
 
 fn html(text: &str) -> String {
     HtmlText(text).to_string()
 }
 
-/// Sentences of the report itself, with their symbols as mathematics.
-pub(super) fn prose(text: &str) -> String {
+/// Symbols in the text become mathematics.
+fn prose(text: &str) -> String {
     HtmlProse(text).to_string()
 }
 
-fn legend(entries: &[(Role, String)]) -> Vec<(&'static str, String)> {
-    let entries = entries.iter();
-    entries
-        .map(|(role, words)| (role.class(), prose(words)))
-        .collect()
-}
-
-fn jump_view(jump: &JumpFigures) -> JumpView {
+/// How far off the model is over a jump.
+fn errors(jump: &JumpFigures) -> String {
     let [x, z] = jump.body_rms_m.map(|rms| match rms {
         Some(rms) => format!("{} mm", rounded(1e3 * rms, 2)),
         None => "nothing predicted".to_owned(),
     });
-    JumpView {
-        title: html(&jump.title),
-        errors: format!("body x off by {x}, body z by {z} over the whole jump"),
-        film: jump.film.clone(),
-        film_legend: (jump.film.as_ref()).map_or_else(Vec::new, |film| legend(&film.legend)),
-        strip: jump.strip.as_ref().map(figure_view),
-        body: figure_view(&jump.body),
-        folded: (jump.folded.iter())
-            .map(|(title, figure)| (*title, figure_view(figure)))
-            .collect(),
+    format!("body x off by {x}, body z by {z} over the whole jump")
+}
+
+/// With which feet a phase holds.
+fn holds(phase: &PhaseEquations) -> String {
+    html(&feet(&phase.feet))
+}
+
+fn math(equations: &EquationSystem) -> String {
+    system(equations, WIDTH_EM)
+}
+
+/// LaTeX whose line ends stay.
+fn latex(equations: &EquationSystem) -> String {
+    let latex = tex_cases(equations, WIDTH_EM);
+    let lines = latex.lines().map(|line| format!("{}\n", HtmlText(line)));
+    lines.collect()
+}
+
+/// How a figure's panels are laid out.
+fn layout(figure: &Figure) -> &'static str {
+    match (figure.panels.len(), figure.columns) {
+        (1, _) => "one",
+        (_, 2) => "two",
+        _ => "many",
     }
-}
-
-fn phases(latent: &Equations<'_>, typeset: &Typeset) -> Vec<PhaseView> {
-    (typeset.systems.iter().zip(latent.phases()))
-        .enumerate()
-        .map(|(index, (equations, phase))| PhaseView {
-            index,
-            name: html(&phase.name),
-            feet: html(&words::feet(&phase.feet)),
-            terms: phase.active_count(),
-            math: system(equations, WIDTH_EM),
-            latex: HtmlLines(&tex_cases(equations, WIDTH_EM)).to_string(),
-        })
-        .collect()
-}
-
-/// Text whose line ends stay.
-struct HtmlLines<'a>(&'a str);
-
-impl std::fmt::Display for HtmlLines<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        (self.0.lines()).try_for_each(|line| writeln!(f, "{}", HtmlText(line)))
-    }
-}
-
-pub(super) fn figure_view(figure: &Figure) -> FigureView {
-    FigureView {
-        id: html(&figure.id),
-        caption: prose(&figure.caption),
-        kind: match (figure.panels.len(), figure.columns) {
-            (1, _) => "one",
-            (_, 2) => "two",
-            _ => "many",
-        },
-        legend: legend(&figure.legend),
-        panels: (figure.panels.iter())
-            .map(|panel| panel_svg(figure, panel))
-            .collect(),
-    }
-}
-
-#[derive(Template)]
-#[template(path = "report/page.askama", config = "templates/askama.toml")]
-struct Page {
-    name: String,
-    description: String,
-    version: &'static str,
-    digest: String,
-    headline: String,
-    sentences: Vec<String>,
-    recordings: Table,
-    tiles: Vec<(String, String)>,
-    remarks: Vec<String>,
-    phases: Vec<PhaseView>,
-    rounding: String,
-    jumps: Vec<JumpView>,
-    /// Jumps without figures.
-    rest: usize,
-    sections: Vec<Section>,
-    facts: Vec<(String, String)>,
-    lists: Vec<Table>,
-    commands: Vec<String>,
-}
-
-/// One phase in the template.
-struct PhaseView {
-    index: usize,
-    name: String,
-    feet: String,
-    terms: usize,
-    math: String,
-    latex: String,
-}
-
-/// One jump in the template.
-struct JumpView {
-    title: String,
-    errors: String,
-    film: Option<Film>,
-    film_legend: Vec<(&'static str, String)>,
-    strip: Option<FigureView>,
-    body: FigureView,
-    folded: Vec<(&'static str, FigureView)>,
-}
-
-/// A figure in the template.
-pub(super) struct FigureView {
-    id: String,
-    caption: String,
-    kind: &'static str,
-    legend: Vec<(&'static str, String)>,
-    panels: Vec<String>,
 }

@@ -1,7 +1,7 @@
 //! Figures of a planned jump: posture over time, path of the body, torques within their limits,
 //! phases; and of all the jumps that can be planned.
 
-use super::figures::{Figure, LinePlot, Motion, Panel, Role, Series, film_strip, floor_m};
+use super::figures::{Figure, Motion, Panel, Role, Series, film_strip, floor_m};
 use crate::model::JumpPrior;
 use crate::plan::{Plan, Reach};
 use crate::robot::{JOINT_DIM, Robot};
@@ -17,15 +17,12 @@ const CROSS_M: f64 = 0.004;
 /// The figures of a plan for a robot.
 pub fn plan_figures(plan: &Plan, robot: &Robot) -> Vec<Figure> {
     let motion = &plan.motion;
-    let goal = format!(
-        "a planned jump of {} m, {} m high",
-        plan.goal_m[0], plan.goal_m[1]
-    );
-    let states = motion.x.column_iter().map(|x| Some(x.into_owned()));
+    let [distance_m, apex_m] = plan.goal_m;
+    let goal = format!("a planned jump of {distance_m} m, {apex_m} m high");
     let planned = Motion {
         role: Role::Full,
         words: "planned".to_owned(),
-        states: states.collect(),
+        ..Motion::recorded(motion)
     };
     let names = ("plan_posture".to_owned(), format!("Posture in {goal}."));
     let seen_from = (0.0, floor_m(robot, motion));
@@ -39,13 +36,7 @@ pub fn plan_figures(plan: &Plan, robot: &Robot) -> Vec<Figure> {
 }
 
 fn over_time(plan: &Plan, role: Role, value: impl Fn(usize) -> f64) -> Series {
-    let times = plan.motion.time_s.iter().enumerate();
-    Series {
-        role,
-        points: times
-            .map(|(sample, time)| (*time, Some(value(sample))))
-            .collect(),
-    }
+    Series::over(role, &plan.motion.time_s, |sample| Some(value(sample)))
 }
 
 /// Times without a foot on the ground.
@@ -66,29 +57,25 @@ fn flights(plan: &Plan) -> Vec<(f64, f64)> {
 }
 
 fn panel(plan: &Plan, title: String, series: Vec<Series>) -> Panel {
-    Panel::Lines(LinePlot {
-        title,
-        series,
-        shaded: flights(plan),
-    })
+    Panel::shaded(title, series, flights(plan))
 }
 
 /// Height over distance of the body.
 fn path(plan: &Plan, goal: &str) -> Figure {
     let x = &plan.motion.x;
     let points = (0..plan.motion.len()).map(|k| (x[(BODY_X, k)], Some(x[(BODY_Z, k)])));
+    let points = points.collect();
     let body = Series {
         role: Role::Full,
-        points: points.collect(),
+        points,
     };
+    let panels = vec![Panel::lines("body z, m", vec![body])];
+    let caption = format!("Path of the body in {goal}.");
     Figure {
-        id: "plan_path".to_owned(),
-        caption: format!("Path of the body in {goal}."),
         x_label: "body x, m".to_owned(),
         panel_size: (360.0, 220.0),
         columns: 1,
-        panels: vec![Panel::lines("body z, m", vec![body])],
-        legend: vec![(Role::Full, "planned".to_owned())],
+        ..Figure::over_time("plan_path", caption, panels, &[(Role::Full, "planned")])
     }
 }
 
@@ -100,13 +87,10 @@ fn phases(plan: &Plan, goal: &str) -> Figure {
         let position = over_time(plan, Role::Full, |k| motion.x[(row, k)]);
         let rate = over_time(plan, Role::Full, |k| motion.dx[(row, k)]);
         let unit = &Robot::state_units()[row];
+        let of_rate = format!("rate of {}, {unit}/s", names[row]);
         [
             panel(plan, format!("{}, {unit}", names[row]), vec![position]),
-            panel(
-                plan,
-                format!("rate of {}, {unit}/s", names[row]),
-                vec![rate],
-            ),
+            panel(plan, of_rate, vec![rate]),
         ]
     });
     let mut start = 0.0;
@@ -115,14 +99,11 @@ fn phases(plan: &Plan, goal: &str) -> Figure {
         format!("{} to {start:.3} s", part.name)
     });
     let parts = parts.collect::<Vec<_>>().join(", ");
+    let caption = format!("The body in {goal}: {parts}; the flight is shaded.");
+    let legend = [(Role::Full, "planned")];
     Figure {
         columns: 2,
-        ..Figure::over_time(
-            "plan_phases".to_owned(),
-            format!("The body in {goal}: {parts}; the flight is shaded."),
-            panels.collect(),
-            &[(Role::Full, "planned")],
-        )
+        ..Figure::over_time("plan_phases", caption, panels.collect(), &legend)
     }
 }
 
@@ -140,7 +121,7 @@ fn torques(plan: &Plan, robot: &Robot, goal: &str) -> Figure {
         panel(plan, format!("{}, N m", names[joint]), lines)
     });
     Figure::over_time(
-        "plan_torques".to_owned(),
+        "plan_torques",
         format!("Torques of the motors in {goal}, within their limits; the flight is shaded."),
         panels.collect(),
         &[(Role::Full, "planned"), (Role::Limit, "limit")],
@@ -160,27 +141,24 @@ pub fn reach_figure(reach: &Reach, prior: &JumpPrior) -> Figure {
             (distance, None),
         ]
     });
+    let (role, points) = (Role::Recorded, crosses.collect());
     let series = vec![
-        Series {
-            role: Role::Recorded,
-            points: crosses.collect(),
-        },
+        Series { role, points },
         border(reach, Role::Full, &["trusted"]),
         border(reach, Role::Restarted, &["trusted", "extrapolates"]),
     ];
+    let caption = "Jumps that can be planned: those to be trusted, and those with a warning.";
+    let panels = vec![Panel::lines("apex above the start, m", series)];
+    let legend = [
+        (Role::Recorded, "recorded"),
+        (Role::Full, "trusted"),
+        (Role::Restarted, "with a warning"),
+    ];
     Figure {
-        id: "plan_reach".to_owned(),
-        caption: "Jumps that can be planned: those to be trusted, and those with a warning."
-            .to_owned(),
         x_label: "distance, m".to_owned(),
         panel_size: (420.0, 280.0),
         columns: 1,
-        panels: vec![Panel::lines("apex above the start, m", series)],
-        legend: vec![
-            (Role::Recorded, "recorded".to_owned()),
-            (Role::Full, "trusted".to_owned()),
-            (Role::Restarted, "with a warning".to_owned()),
-        ],
+        ..Figure::over_time("plan_reach", caption, panels, &legend)
     }
 }
 
@@ -195,10 +173,8 @@ fn border(reach: &Reach, role: Role, words: &[&str]) -> Series {
             Some([first.goal_m[0], last.goal_m[0], *apex])
         })
         .collect();
-    let left = stretches
-        .iter()
-        .rev()
-        .map(|[least, _, apex]| (*least, Some(*apex)));
+    let upwards = stretches.iter().rev();
+    let left = upwards.map(|[least, _, apex]| (*least, Some(*apex)));
     let right = stretches.iter().map(|[_, most, apex]| (*most, Some(*apex)));
     let mut points: Vec<_> = right.chain(left).collect();
     points.extend(points.first().copied());

@@ -69,10 +69,7 @@ fn list(place: &str, items: &[Value]) -> Table {
         .unwrap_or_default();
     let mut table = Table::new(keys.iter().map(|key| spaced(key)));
     for item in items {
-        table.row(
-            keys.iter()
-                .map(|key| item.get(key.as_str()).map_or(String::new(), text)),
-        );
+        table.row((keys.iter()).map(|key| item.get(key.as_str()).map_or(String::new(), text)));
     }
     table.captioned(format!("{}: {}", spaced(place), items.len()))
 }
@@ -127,16 +124,10 @@ mod tests {
             "encoded": ["fr.hx", "fr.hy"],
         });
         let origin = origin(value.as_object().unwrap());
-        let facts: Vec<(&str, &str)> = origin
-            .facts
-            .iter()
-            .map(|(key, value)| (key.as_str(), value.as_str()))
-            .collect();
         let encoded = ("encoded", "fr.hx, fr.hy");
-        assert_eq!(
-            facts,
-            [("command", "romc train a.csv"), ("seed", "3"), encoded]
-        );
+        let facts = [("command", "romc train a.csv"), ("seed", "3"), encoded];
+        let facts = facts.map(|(key, value)| (key.to_owned(), value.to_owned()));
+        assert_eq!(origin.facts, facts);
         let [options, recordings] = origin.lists.as_slice() else {
             panic!("{:?}", origin.lists);
         };

@@ -3,49 +3,48 @@
 use super::contents::{AllFigures, Content};
 use super::control::without_statistics;
 use super::figures::Figure;
-use super::page::{FigureView, PageOptions, figure_view, prose};
+use super::page::PageOptions;
 use super::tables::{
-    baseline_table, body_rms, control_table, dynamics_table, error_table, failures,
+    NamedRun, baseline_table, body_rms, control_table, dynamics_table, error_table, failures,
     invariance_table, run_table,
 };
 use crate::evaluate::{Baseline, CoordinateSums, Invariance};
 use crate::typeset::{Table, rounded, significant};
 
-/// A section in the template, escaped.
-pub(super) struct Section {
+/// A section in the template.
+pub(super) struct Section<'a> {
     pub id: &'static str,
     pub title: &'static str,
     pub paragraphs: Vec<String>,
     pub tables: Vec<Table>,
     /// Tables whose captions are the summaries that unfold them.
     pub folded: Vec<Table>,
-    pub figures: Vec<FigureView>,
+    pub figures: &'a [Figure],
 }
 
-impl Section {
+impl<'a> Section<'a> {
     fn new(id: &'static str, title: &'static str, paragraphs: &[&str]) -> Self {
         Self {
             id,
             title,
-            paragraphs: paragraphs.iter().map(|text| prose(text)).collect(),
+            paragraphs: paragraphs.iter().map(|&text| text.to_owned()).collect(),
             tables: Vec::new(),
             folded: Vec::new(),
-            figures: Vec::new(),
+            figures: &[],
         }
     }
 
     /// Adds paragraphs.
     fn and(mut self, notes: impl IntoIterator<Item = String>) -> Self {
-        self.paragraphs
-            .extend(notes.into_iter().map(|note| prose(&note)));
+        self.paragraphs.extend(notes);
         self
     }
 
     /// Adds figures and tables.
-    fn with(self, figures: &[Figure], tables: impl IntoIterator<Item = Table>) -> Self {
+    fn with(self, figures: &'a [Figure], tables: impl IntoIterator<Item = Table>) -> Self {
         Self {
             tables: tables.into_iter().collect(),
-            figures: figures.iter().map(figure_view).collect(),
+            figures,
             ..self
         }
     }
@@ -60,9 +59,7 @@ impl Section {
 
 /// The numbers at the top of the page, each with its name.
 pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
-    let Content {
-        model, assessment, ..
-    } = content;
+    let (model, assessment) = (content.model, content.assessment);
     let every = assessment.restart_every_s;
     let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
     let errors = |sums: &CoordinateSums| {
@@ -70,41 +67,33 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
             .map(|rms| rms.map_or("-".to_owned(), |rms| rounded(1e3 * rms, 2).to_string()));
         format!("{x}, {z} mm")
     };
-    let tile = |name: &str, value: String| (name.to_owned(), value);
-    vec![
-        tile("latent coordinates", model.latent_dim().to_string()),
-        tile(
+    let restarted = format!("body x, z: rms error, restarted every {every} s");
+    let torque_r2 = shown(assessment.lift.torque_r2().contact);
+    let loss = shown(assessment.combined_loss());
+    let tiles = [
+        ("latent coordinates", model.latent_dim().to_string()),
+        (
             "active terms, all phases",
             assessment.active_terms.to_string(),
         ),
-        tile(
+        (
             "body x, z: rms error over whole jumps",
             errors(&assessment.full),
         ),
-        tile(
-            &format!("body x, z: rms error, restarted every {every} s"),
-            errors(&assessment.restarted),
-        ),
-        tile(
-            "torque R² of the plain lift, contact",
-            shown(assessment.lift.torque_r2().contact),
-        ),
-        tile(
-            "combined loss of accuracy and size, L_mod",
-            shown(assessment.combined_loss()),
-        ),
-    ]
+        (&restarted, errors(&assessment.restarted)),
+        ("torque R² of the plain lift, contact", torque_r2),
+        ("combined loss of accuracy and size, L_mod", loss),
+    ];
+    tiles.map(|(name, value)| (name.to_owned(), value)).into()
 }
 
 /// The sections below the jumps, in their order.
-pub(super) fn sections(
+pub(super) fn sections<'a>(
     content: &Content<'_>,
-    figures: &AllFigures,
+    figures: &'a AllFigures,
     options: &PageOptions,
-) -> Vec<Section> {
-    let Content {
-        model, assessment, ..
-    } = *content;
+) -> Vec<Section<'a>> {
+    let (model, assessment) = (content.model, content.assessment);
     let every = assessment.restart_every_s;
     let by_phase = format!(
         "All {} coordinates: root mean square errors over whole jumps and restarted every {every} s; on the right those of \
@@ -114,28 +103,22 @@ pub(super) fn sections(
     let invariance = Invariance::of(model);
     let not_told = invariance.as_ref().err();
     let not_told = not_told.map(|error| format!("Invariance is not told: {error}."));
+    let invariance = invariance.ok().flatten();
+    let dynamics = [dynamics_table(model, assessment).captioned("Each phase of the model")];
+    let dynamics = dynamics
+        .into_iter()
+        .chain(invariance.as_ref().map(invariance_table));
+    let stability = "Phases, stability and inputs";
+    let latent = "Composition of the latent coordinates";
     let mut sections = vec![
         Section::new("coordinates", "Errors of every coordinate", &[])
             .folding([error_table(model, assessment).captioned(by_phase)]),
-        Section::new(
-            "stability",
-            "Phases, stability and inputs",
-            &[DYNAMICS_WORDS],
-        )
-        .and(not_told)
-        .with(
-            &[],
-            std::iter::once(dynamics_table(model, assessment).captioned("Each phase of the model"))
-                .chain(invariance.ok().flatten().as_ref().map(invariance_table)),
-        ),
+        Section::new("stability", stability, &[DYNAMICS_WORDS])
+            .and(not_told)
+            .with(&[], dynamics),
         beside_pendulum(content),
         control(content),
-        Section::new(
-            "latent",
-            "Composition of the latent coordinates",
-            &[ENCODER_WORDS],
-        )
-        .with(&figures.encoder, []),
+        Section::new("latent", latent, &[ENCODER_WORDS]).with(&figures.encoder, []),
         simplification(options),
         Section::new("study", "How many latent coordinates", &[STUDY_WORDS])
             .with(&figures.study, []),
@@ -148,7 +131,7 @@ pub(super) fn sections(
     sections
 }
 
-fn beside_pendulum(content: &Content<'_>) -> Section {
+fn beside_pendulum(content: &Content<'_>) -> Section<'static> {
     let assessment = content.assessment;
     let baselines = assessment.baselines.iter();
     let constants = baselines.map(|b| format!("{}: {}.", b.name, b.template.constants()));
@@ -162,56 +145,49 @@ fn beside_pendulum(content: &Content<'_>) -> Section {
         .with(&[], [table])
 }
 
-fn control(content: &Content<'_>) -> Section {
-    let without = (content.consistent.is_empty())
-        .then(|| without_statistics(content.model))
-        .flatten()
-        .map(|phase| {
-            format!(
-                "The controller did not run: the model has no input statistics of phase {phase}, \
-                 which weigh its inputs. romc import --inputs-from takes them from recordings."
-            )
+fn control(content: &Content<'_>) -> Section<'static> {
+    let (plain, shown) = (content.plain, content.consistent);
+    let without = without_statistics(content.model).filter(|_| shown.is_empty());
+    let without = without.map(|phase| {
+        format!(
+            "The controller did not run: the model has no input statistics of phase {phase}, \
+             which weigh its inputs. romc import --inputs-from takes them from recordings."
+        )
+    });
+    let along = match shown.len() {
+        1 => "",
+        _ => " along the first recording",
+    };
+    let judged = |runs: &[NamedRun], caption: String| control_table(runs).captioned(caption);
+    let beside = "the model and its baselines";
+    let first = shown
+        .get(..1)
+        .map(|first| judged(first, format!("{CONSISTENT}: {beside}{along}")));
+    let every = (shown.len() > 1).then(|| {
+        judged(
+            shown,
+            format!("{CONSISTENT}: the same along every recording"),
+        )
+    });
+    let runs = [(PLAIN, plain), (CONSISTENT, shown)].into_iter();
+    let work = runs
+        .filter(|(_, runs)| !runs.is_empty())
+        .map(|(lift, runs)| {
+            let words = "the solver's work, and what the lift makes of recorded inputs";
+            upright(run_table(runs)).captioned(format!("{lift}: {words}"))
         });
-    let runs = [
-        (PLAIN, content.plain),
-        ("Consistent lift", content.consistent),
-    ];
-    let runs = runs.into_iter().filter(|(_, runs)| !runs.is_empty());
-    let [plain, shown] =
-        [content.plain, content.consistent].map(|runs| Some(runs).filter(|runs| !runs.is_empty()));
-    Section::new(
-        "control",
-        "The controller along the recordings",
-        &CONTROL_WORDS,
-    )
-    .and(without)
-    .and(failures(content.plain))
-    .with(
-        &[],
-        shown.map(|runs| {
-            let along = match runs.len() {
-                1 => "",
-                _ => " along the first recording",
-            };
-            let caption = format!("Consistent lift: the model and its baselines{along}");
-            control_table(&runs[..1]).captioned(caption)
-        }),
-    )
-    .folding(shown.filter(|runs| runs.len() > 1).map(|runs| {
-        control_table(runs).captioned("Consistent lift: the same along every recording")
-    }))
-    .folding(
-        plain.map(|runs| {
-            control_table(runs).captioned(format!("{PLAIN}: the model and its baselines"))
-        }),
-    )
-    .folding(runs.map(|(lift, runs)| {
-        let words = "the solver's work, and what the lift makes of recorded inputs";
-        upright(run_table(runs)).captioned(format!("{lift}: {words}"))
-    }))
+    let title = "The controller along the recordings";
+    Section::new("control", title, &CONTROL_WORDS)
+        .and(without)
+        .and(failures(plain))
+        .with(&[], first)
+        .folding(every)
+        .folding([judged(plain, format!("{PLAIN}: {beside}"))])
+        .folding(work)
 }
 
 const PLAIN: &str = "Plain lift, u = W_e^T u_lat";
+const CONSISTENT: &str = "Consistent lift";
 
 /// Most rows for which a table of runs is turned, so that each is a column.
 const MOST_RUNS: usize = 6;
@@ -224,15 +200,11 @@ fn upright(table: Table) -> Table {
     }
 }
 
-fn simplification(options: &PageOptions) -> Section {
-    let tables = options.simplification.iter().cloned();
-    Section::new(
-        "simplification",
-        "How far the equations can be simplified",
-        &SIMPLIFICATION_WORDS,
-    )
-    .folding(tables)
-    .folding([options.changes.clone()])
+fn simplification(options: &PageOptions) -> Section<'static> {
+    let title = "How far the equations can be simplified";
+    Section::new("simplification", title, &SIMPLIFICATION_WORDS)
+        .folding(options.simplification.iter().cloned())
+        .folding([options.changes.clone()])
 }
 
 const ENCODER_WORDS: &str = "The darker a cell (the brighter on a dark screen), the more of that coordinate the latent one takes.";

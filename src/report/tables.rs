@@ -35,7 +35,7 @@ pub fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Ta
     let every = format!("restarted every {} s", assessment.restart_every_s);
     let mut table = coordinates(assessment);
     let first = assessment.runs.first();
-    let modelled = first.and_then(|run| modelled(model, run.segment.x.column(0).into_owned()).ok());
+    let modelled = first.and_then(|run| modelled(model, run).ok());
     let is_modelled = |row: usize| modelled.as_ref().is_none_or(|modelled| modelled[row]);
     for (title, coefficient, sums) in [
         ("full rms", "full R^2", &assessment.full),
@@ -43,14 +43,11 @@ pub fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Ta
     ] {
         let fits = sums.fits();
         table.column(title, "", fits.iter().copied().map(rms));
-        let cells = fits
-            .iter()
-            .copied()
-            .enumerate()
-            .map(|(row, fit)| match is_modelled(row) {
-                true => r2(fit),
-                false => "not modelled".into(),
-            });
+        let cells = fits.into_iter().enumerate();
+        let cells = cells.map(|(row, fit)| match is_modelled(row) {
+            true => r2(fit),
+            false => "not modelled".into(),
+        });
         table.column(coefficient, "", cells);
     }
     table
@@ -155,75 +152,68 @@ pub fn invariance_table(invariance: &Invariance) -> Table {
         .captioned(words)
 }
 
-/// A row of [`control_table`]: the recording's name, what drives, and its figures.
-struct Driven<'a> {
-    recording: String,
-    controller: &'static str,
-    prediction: Option<&'a PredictionError>,
-    torque_r2: ByContact,
-    recovery_rms_m: Option<f64>,
-}
+/// What drives a robot, its predictions, its torques, how far the body is off after a push.
+type Driven<'a> = (
+    &'static str,
+    Option<&'a PredictionError>,
+    ByContact,
+    Option<f64>,
+);
 
 /// The model and its baselines along each recording: figures that a wrong model changes.
 pub fn control_table(runs: &[NamedRun]) -> Table {
-    let judged = runs
-        .iter()
-        .filter_map(|(path, run)| Some((path, run.metrics.as_ref()?)));
-    let rows: Vec<Driven<'_>> = judged
-        .flat_map(|(path, metrics)| driven(path, metrics))
-        .collect();
-    let millimetres = |metres: Option<f64>| metres.map(|metres| 1e3 * metres);
-    Table::of(&rows)
-        .column("recording", "", |row| row.recording.clone())
-        .column("controller", "", |row| row.controller)
-        .column("x one stage ahead", "mm", |row| {
-            millimetres(row.prediction.map(|error| error.body_x_m))
+    let judged = (runs.iter()).filter_map(|(path, run)| Some((path, run.metrics.as_ref()?)));
+    let rows = judged.flat_map(|(path, metrics)| driven(metrics).map(|row| (path, row)));
+    let stage =
+        |of: fn(&PredictionError) -> f64| move |(_, row): &(&PathBuf, Driven<'_>)| row.1.map(of);
+    let millimetres = |metres: f64| 1e3 * metres;
+    Table::of(rows)
+        .column("recording", "", |(path, _)| file_name(path))
+        .column("controller", "", |(_, row)| row.0)
+        .column(
+            "x one stage ahead",
+            "mm",
+            stage(|error| 1e3 * error.body_x_m),
+        )
+        .column(
+            "z one stage ahead",
+            "mm",
+            stage(|error| 1e3 * error.body_z_m),
+        )
+        .column(
+            "joints one stage ahead",
+            "rad",
+            stage(|error| error.joints_rad),
+        )
+        .column("own input: torque R^2 contact", "", |(_, row)| {
+            row.2.contact
         })
-        .column("z one stage ahead", "mm", |row| {
-            millimetres(row.prediction.map(|error| error.body_z_m))
-        })
-        .column("joints one stage ahead", "rad", |row| {
-            row.prediction.map(|error| error.joints_rad)
-        })
-        .column("own input: torque R^2 contact", "", |row| {
-            row.torque_r2.contact
-        })
-        .column("torque R^2 flight", "", |row| row.torque_r2.flight)
-        .column("off after a push", "mm", |row| {
-            millimetres(row.recovery_rms_m)
-        })
+        .column("torque R^2 flight", "", |(_, row)| row.2.flight)
+        .column("off after a push", "mm", |(_, row)| row.3.map(millimetres))
         .table()
 }
 
-fn driven<'a>(path: &Path, metrics: &'a ControlMetrics) -> [Driven<'a>; 5] {
-    let baseline = &metrics.baseline;
-    let row = |controller, prediction, torque_r2, recovery_rms_m| Driven {
-        recording: file_name(path),
-        controller,
-        prediction,
-        torque_r2,
-        recovery_rms_m,
-    };
-    let none = ByContact::default();
+fn driven(metrics: &ControlMetrics) -> [Driven<'_>; 5] {
+    let (baseline, none) = (&metrics.baseline, ByContact::default());
     let blind = &baseline.knows_nothing;
-    let constant = baseline.constant_velocity.prediction_rms.as_ref();
+    let [own, blinds, constant] = [
+        &metrics.prediction_rms,
+        &blind.prediction_rms,
+        &baseline.constant_velocity.prediction_rms,
+    ]
+    .map(Option::as_ref);
     let [off, replay] = [baseline.feedback_off, baseline.replay].map(|b| b.recovery_rms_m);
     [
-        row(
-            "model",
-            metrics.prediction_rms.as_ref(),
-            metrics.torque_r2,
-            metrics.recovery_rms_m,
-        ),
-        row(
+        ("model", own, metrics.torque_r2, metrics.recovery_rms_m),
+        (
             "knows nothing",
-            blind.prediction_rms.as_ref(),
+            blinds,
             blind.torque_r2,
             blind.recovery_rms_m,
         ),
-        row("constant velocity", constant, none, None),
-        row("feedback off", None, none, off),
-        row("replay", None, none, replay),
+        ("constant velocity", constant, none, None),
+        ("feedback off", None, none, off),
+        ("replay", None, none, replay),
     ]
 }
 
@@ -243,7 +233,7 @@ pub fn failed_runs(runs: &[NamedRun]) -> Vec<String> {
     failed.collect()
 }
 
-fn file_name(path: &Path) -> String {
+pub(super) fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default();
     name.to_string_lossy().into_owned()
 }

@@ -10,6 +10,7 @@ use super::jump::modelled;
 use super::tables::{body_rms, template_rms};
 use crate::evaluate::{CoordinateSums, Fit};
 use crate::model::{ModelError, ReducedModel};
+use crate::recording::Segment;
 use crate::typeset::words::counted;
 use crate::typeset::{Table, rounded};
 
@@ -62,8 +63,7 @@ pub fn verdict(content: &Content<'_>) -> Result<Verdict, ModelError> {
         grade(content, &assessment.restarted, CLOSE_RESTARTED),
     ];
     let is_doubtful = !assessment.remarks.is_empty();
-    let mut sentences = vec![subject(content)?, compared(content)];
-    sentences.push(errors(content));
+    let mut sentences = vec![subject(content)?, compared(content), errors(content)];
     sentences.extend(beside_pendulum(content));
     sentences.extend(commands(content));
     Ok(Verdict {
@@ -106,31 +106,20 @@ fn headline(whole: Grade, short: Grade, is_doubtful: bool) -> &'static str {
 
 /// What the model is.
 fn subject(content: &Content<'_>) -> Result<String, ModelError> {
-    let Content {
-        model, assessment, ..
-    } = *content;
+    let (model, assessment) = (content.model, content.assessment);
     let robot = model.robot().map_or("a robot", |robot| robot.name());
     let n = assessment.names.len();
-    let phases: Vec<&str> = model
-        .phases()
-        .iter()
-        .map(|phase| phase.name.as_str())
-        .collect();
-    let first = assessment.runs.first();
-    let modelled = match first {
-        Some(run) => modelled(model, run.segment.x.column(0).into_owned())?,
+    let phases: Vec<&str> = model.phases().iter().map(|p| p.name.as_str()).collect();
+    let modelled = match assessment.runs.first() {
+        Some(run) => modelled(model, run)?,
         None => vec![true; n],
     };
     let names = assessment.names.iter().zip(modelled);
-    let absent: Vec<&str> = names
-        .filter(|(_, is)| !is)
-        .map(|(name, _)| name.as_str())
-        .collect();
-    let absent = match absent.is_empty() {
-        true => String::new(),
-        false => format!(
-            " {} not modelled: no latent coordinate takes them in, and errors there say nothing about the dynamics.",
-            listed(&absent, "is", "are")
+    let absent = names.filter(|(_, is)| !is).map(|(name, _)| name.as_str());
+    let absent = match listed(&absent.collect::<Vec<_>>(), "is", "are").as_str() {
+        "" => String::new(),
+        names_are => format!(
+            " {names_are} not modelled: no latent coordinate takes them in, and errors there say nothing about the dynamics."
         ),
     };
     Ok(format!(
@@ -152,18 +141,10 @@ fn listed(names: &[&str], one: &str, several: &str) -> String {
 
 /// The digests of the recordings that a model was made with.
 fn known_digests(model: &ReducedModel) -> BTreeSet<&str> {
-    let recordings = model
-        .provenance()
-        .get("recordings")
-        .and_then(|value| value.as_array());
-    let was_test = |entry: &&Value| {
-        entry
-            .get("sets")
-            .is_some_and(|sets| *sets == json!(["test"]))
-    };
-    let entries = recordings.into_iter().flatten();
+    let recordings = model.provenance().get("recordings");
+    let entries = recordings.and_then(Value::as_array).into_iter().flatten();
     entries
-        .filter(|entry| !was_test(entry))
+        .filter(|entry| entry.get("sets") != Some(&json!(["test"])))
         .filter_map(|entry| entry.get("digest")?.as_str())
         .filter(|text| !text.is_empty())
         .collect()
@@ -187,8 +168,8 @@ fn compared(content: &Content<'_>) -> String {
     let known = known_digests(content.model);
     let paths: BTreeSet<&Path> = runs.iter().map(|run| run.segment.path.as_path()).collect();
     let is = |what: Seen| {
+        let paths = paths.iter();
         paths
-            .iter()
             .filter(|path| seen(content, &known, path) == what)
             .count()
     };
@@ -225,14 +206,13 @@ fn errors(content: &Content<'_>) -> String {
     let assessment = content.assessment;
     let [whole, short] =
         [&assessment.full, &assessment.restarted].map(|sums| pair(body_rms(assessment, sums)));
-    let diverged = assessment
-        .runs
-        .iter()
+    let runs = assessment.runs.iter();
+    let diverged = match runs
         .filter(|run| run.full.diverged_at_s().is_some())
-        .count();
-    let diverged = match diverged {
+        .count()
+    {
         0 => String::new(),
-        _ => format!(" The rollout diverges in {}.", counted(diverged, "jump")),
+        diverged => format!(" The rollout diverges in {}.", counted(diverged, "jump")),
     };
     format!(
         "Driven by the recorded torques and contacts over whole jumps, its error is {whole} (root mean square); started \
@@ -245,18 +225,16 @@ fn errors(content: &Content<'_>) -> String {
 fn beside_pendulum(content: &Content<'_>) -> Option<String> {
     let assessment = content.assessment;
     let own = body_rms(assessment, &assessment.full);
-    let templates = assessment
-        .baselines
-        .iter()
-        .map(|baseline| template_rms(&baseline.full));
-    let best = templates.fold([None, None], |best: [Option<f64>; 2], rms| {
-        [0, 1].map(|axis| match (best[axis], rms[axis]) {
-            (Some(best), Some(rms)) => Some(f64::min(best, rms)),
-            (best, rms) => best.or(rms),
-        })
-    });
+    let templates = assessment.baselines.iter();
+    let templates: Vec<_> = templates
+        .map(|baseline| template_rms(&baseline.full))
+        .collect();
     let words = |axis: usize, name: &str| -> Option<String> {
-        let ratio = best[axis]? / own[axis]?;
+        let best = templates
+            .iter()
+            .filter_map(|rms| rms[axis])
+            .reduce(f64::min)?;
+        let ratio = best / own[axis]?;
         let words = match ratio {
             1.05.. => format!("{} times closer in {name}", rounded(ratio, 2)),
             0.96.. => format!("as close in {name}"),
@@ -264,16 +242,13 @@ fn beside_pendulum(content: &Content<'_>) -> Option<String> {
         };
         (ratio.is_finite() && ratio > 0.0).then_some(words)
     };
-    let words: Vec<String> = [words(0, "body.x"), words(1, "body.z")]
+    let words = [words(0, "body.x"), words(1, "body.z")]
         .into_iter()
-        .flatten()
-        .collect();
-    (!words.is_empty()).then(|| {
-        format!(
-            "Beside the better of two spring-loaded pendulums under the same forces it is {}.",
-            words.join(" and ")
-        )
-    })
+        .flatten();
+    let words = words.reduce(|x, z| format!("{x} and {z}"))?;
+    Some(format!(
+        "Beside the better of two spring-loaded pendulums under the same forces it is {words}."
+    ))
 }
 
 /// What the dynamics are worth to the controller: recovery from a push beside the same controller without feedback, and
@@ -323,15 +298,9 @@ fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
         let rms = jump.body_rms_m()?;
         rows.push((jump.place.words, segment, rms));
     }
-    let body = |row: usize| {
-        content
-            .assessment
-            .names
-            .iter()
-            .position(|n| n == ["body.x", "body.z"][row])
-    };
-    let [x, z] = [body(0), body(1)];
-    let moved = |row: Option<usize>, of: fn(&[f64]) -> f64, segment: &crate::recording::Segment| {
+    let names = content.assessment.names.iter();
+    let [x, z] = ["body.x", "body.z"].map(|body| names.clone().position(|name| name == body));
+    let moved = |row: Option<usize>, of: fn(&[f64]) -> f64, segment: &Segment| {
         row.map(|row| {
             let values: Vec<f64> = segment.x.row(row).iter().copied().collect();
             format!("{:.2}", of(&values)).replace("-0.00", "0.00")
@@ -349,15 +318,11 @@ fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
                 Seen::Unknown => "unknown",
             }
         })
-        .column("duration", "s", |(_, segment, _)| {
-            format!("{:.2}", segment.duration_s())
+        .column("duration", "s", |(_, s, _)| {
+            format!("{:.2}", s.duration_s())
         })
-        .column("forward", "m", |(_, segment, _)| {
-            moved(x, travelled, segment)
-        })
-        .column("rise of the body", "m", |(_, segment, _)| {
-            moved(z, risen, segment)
-        })
+        .column("forward", "m", |(_, s, _)| moved(x, travelled, s))
+        .column("rise of the body", "m", |(_, s, _)| moved(z, risen, s))
         .column("body.x rms, whole jump", "mm", |(.., rms)| shown(rms[0]))
         .column("body.z rms, whole jump", "mm", |(.., rms)| shown(rms[1]))
         .table();
@@ -389,9 +354,6 @@ mod tests {
     fn lists_and_counts_read_as_english() {
         assert_eq!(listed(&["a", "b", "c"], "is", "are"), "a, b and c are");
         assert_eq!(listed(&["a"], "is", "are"), "a is");
-        assert_eq!(
-            (counted(1, "jump"), counted(2, "jump")),
-            ("1 jump".to_owned(), "2 jumps".to_owned())
-        );
+        assert_eq!([1, 2].map(|n| counted(n, "jump")), ["1 jump", "2 jumps"]);
     }
 }

@@ -155,48 +155,47 @@ impl Domain {
         };
         let mut tables: BTreeMap<String, BTreeMap<String, [f64; 2]>> =
             toml::from_str(text).map_err(|error| refused(error.to_string()))?;
+        let names = model
+            .phases()
+            .iter()
+            .map(|phase| format!("[{}]", phase.name));
+        let expected = names.collect::<Vec<_>>().join(" or ");
         let mut boxes = Vec::new();
         for phase in model.phases() {
             let Some(mut table) = tables.remove(&phase.name) else {
                 boxes.push(None);
                 continue;
             };
+            let in_phase = |what: String| refused(format!("[{}] {what}", phase.name));
             let mut ranges = Vec::new();
             for variable in LatentVariable::all(model.latent_dim()) {
                 let [lo, hi] = table.remove(&variable.to_string()).ok_or_else(|| {
-                    refused(format!(
-                        "[{}] has no range of `{variable}`, expected {variable} = [LOW, HIGH]",
-                        phase.name
+                    in_phase(format!(
+                        "has no range of `{variable}`, expected {variable} = [LOW, HIGH]"
                     ))
                 })?;
                 // reported as typed: an interval has no ends that are not numbers
                 if !(lo.is_finite() && hi.is_finite() && lo <= hi) {
-                    return Err(refused(format!(
-                        "[{}] {variable} = [{lo}, {hi}], expected finite numbers in order",
-                        phase.name
+                    return Err(in_phase(format!(
+                        "{variable} = [{lo}, {hi}], expected finite numbers in order"
                     )));
                 }
                 ranges.push(Interval::new(lo, hi));
             }
             if let Some(unknown) = table.keys().next() {
-                return Err(refused(format!(
-                    "[{}] has a range of `{unknown}`, which is no variable of the model",
-                    phase.name
+                return Err(in_phase(format!(
+                    "has a range of `{unknown}`, which is no variable of the model"
                 )));
             }
             boxes.push(Some(ranges));
         }
         if let Some(unknown) = tables.keys().next() {
             return Err(refused(format!(
-                "[{unknown}] is no phase of the model, expected {}",
-                in_brackets(model)
+                "[{unknown}] is no phase of the model, expected {expected}"
             )));
         }
         if boxes.iter().all(Option::is_none) {
-            return Err(refused(format!(
-                "no phase has ranges, expected {}",
-                in_brackets(model)
-            )));
+            return Err(refused(format!("no phase has ranges, expected {expected}")));
         }
         Self::new(model, boxes)
     }
@@ -244,13 +243,6 @@ impl Domain {
         let [z, dz, u_lat] = [&samples.z, &samples.dz, &samples.u_lat].map(of);
         library.evaluate_points(&z, &dz, &u_lat)
     }
-}
-
-/// The tables that a file of ranges may have.
-fn in_brackets(model: &ReducedModel) -> String {
-    let phases = model.phases().iter();
-    let names: Vec<String> = phases.map(|phase| format!("[{}]", phase.name)).collect();
-    names.join(" or ")
 }
 
 fn widened(range: Interval, margin: f64) -> Interval {

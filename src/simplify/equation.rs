@@ -132,9 +132,8 @@ impl Equation {
                 }
                 let rewrites = terms.rewrites(row).to_vec();
                 let open = rewrites.iter().filter(|r| self.keeps_known(row, r));
-                let steps = open.map(|rewrite| self.step(terms, row, rewrite));
-                let steps: Vec<Step> = steps.collect();
-                let Some(step) = steps.into_iter().find(|step| self.fits(step, allowed)) else {
+                let mut steps = open.map(|rewrite| self.step(terms, row, rewrite));
+                let Some(step) = steps.find(|step| self.fits(step, allowed)) else {
                     continue;
                 };
                 let cost = step.bound.magnitude();

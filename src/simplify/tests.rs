@@ -1,5 +1,7 @@
 //! Random models and boxes: no point of a box may be off by more than its certificate says.
 
+use std::collections::BTreeMap;
+
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 use nalgebra::{DMatrix, DVector};
@@ -35,6 +37,27 @@ const TERMS: [&str; 20] = [
     "2*z1",
     "log(2.5 + dz1)",
 ];
+
+/// What simplification makes of a model's equations over a domain without samples.
+fn made_of(model: &ReducedModel, domain: &Domain, tolerance: f64) -> Simplified {
+    let tolerance = Tolerance::Absolute(tolerance);
+    simplify(&Equations::of(model), domain, None, tolerance).expect("certified")
+}
+
+/// A domain of one phase with one box.
+fn boxed(model: &ReducedModel, ranges: [(f64, f64); 3]) -> Domain {
+    let ranges = ranges.map(|(lo, hi)| Interval::new(lo, hi)).to_vec();
+    Domain::new(model, vec![Some(ranges)]).expect("a box")
+}
+
+/// The terms of an equation and their coefficients.
+fn terms_of(model: &ReducedModel, phase: usize, output: usize) -> Vec<(String, f64)> {
+    let active = model.active_terms(phase, output).expect("in range");
+    let active = active.into_iter();
+    active
+        .map(|(xi, term)| (term.text().to_owned(), xi))
+        .collect()
+}
 
 struct Random(ChaCha8Rng);
 
@@ -119,13 +142,7 @@ fn no_point_of_a_random_box_is_off_by_more_than_certified() {
         let model = random.model();
         let domain = random.domain(&model);
         let tolerance = 10f64.powf(random.between(-3.0, 0.5));
-        let made = simplify(
-            &Equations::of(&model),
-            &domain,
-            None,
-            Tolerance::Absolute(tolerance),
-        )
-        .expect("certified");
+        let made = made_of(&model, &domain, tolerance);
         for (phase, certificate) in made.certificate.phases.iter().enumerate() {
             let ranges = domain
                 .phase(phase)
@@ -187,16 +204,11 @@ fn changes_of_the_certificate_replayed_give_the_simplified_coefficients() {
             simplify(&Equations::as_learned(&model), &domain, None, tolerance).expect("certified");
         for (phase, certificate) in made.certificate.phases.iter().enumerate() {
             for equation in &certificate.equations {
-                let coefficients =
-                    |model: &ReducedModel| -> std::collections::BTreeMap<String, f64> {
-                        let active = model
-                            .active_terms(phase, equation.output)
-                            .expect("in range");
-                        active
-                            .into_iter()
-                            .map(|(xi, term)| (term.text().to_owned(), xi))
-                            .collect()
-                    };
+                let coefficients = |model: &ReducedModel| -> BTreeMap<String, f64> {
+                    terms_of(model, phase, equation.output)
+                        .into_iter()
+                        .collect()
+                };
                 let mut replayed = coefficients(&model);
                 for change in &equation.changes {
                     let effects = change.effects.iter().map(|e| (&e.term, e.before, e.after));
@@ -252,23 +264,11 @@ fn single(terms: &[(&str, f64)]) -> ReducedModel {
 
 fn simplified(terms: &[(&str, f64)], ranges: [(f64, f64); 3], tolerance: f64) -> Simplified {
     let model = single(terms);
-    let ranges = ranges.map(|(lo, hi)| Interval::new(lo, hi)).to_vec();
-    let domain = Domain::new(&model, vec![Some(ranges)]).expect("a box");
-    simplify(
-        &Equations::of(&model),
-        &domain,
-        None,
-        Tolerance::Absolute(tolerance),
-    )
-    .expect("certified")
+    made_of(&model, &boxed(&model, ranges), tolerance)
 }
 
 fn left(made: &Simplified) -> Vec<(String, f64)> {
-    let active = made.model.active_terms(0, 0).expect("in range");
-    active
-        .into_iter()
-        .map(|(xi, term)| (term.text().to_owned(), xi))
-        .collect()
+    terms_of(&made.model, 0, 0)
 }
 
 const UNIT: (f64, f64) = (-1.0, 1.0);
@@ -294,15 +294,7 @@ fn near_linear_sine_becomes_its_argument_in_a_library_that_gains_the_term() {
 #[test]
 fn model_simplified_twice_keeps_the_first_bounds_in_its_provenance() {
     let once = simplified(&[("z1", 1.234), ("u1", 2.0)], [UNIT; 3], 0.01).model;
-    let domain = Domain::new(&once, vec![Some(vec![Interval::new(-1.0, 1.0); 3])]);
-    let domain = domain.expect("a box");
-    let twice = simplify(
-        &Equations::of(&once),
-        &domain,
-        None,
-        Tolerance::Absolute(0.1),
-    )
-    .expect("certified");
+    let twice = made_of(&once, &boxed(&once, [UNIT; 3]), 0.1);
     assert_eq!(left(&twice)[0], ("z1".to_owned(), 1.2));
     let first = &once.provenance()["simplification"];
     assert_eq!(first["earlier"], serde_json::Value::Null);
@@ -368,16 +360,9 @@ fn bound_of_dropped_independent_terms_is_reached_at_a_corner() {
         ["Phase contact no longer depends on z1, dz1"]
     );
     // 0.3 * 2 + 0.2 * 3
-    assert!(
-        (equation.bound.hi() - 1.2).abs() < 1e-12,
-        "{}",
-        equation.bound
-    );
-    assert!(
-        (equation.bound.lo() + 0.5).abs() < 1e-12,
-        "{}",
-        equation.bound
-    );
+    let bound = equation.bound;
+    assert!((bound.hi() - 1.2).abs() < 1e-12, "{bound}");
+    assert!((bound.lo() + 0.5).abs() < 1e-12, "{bound}");
 }
 
 #[test]
@@ -395,13 +380,8 @@ fn domain_around_samples_has_their_extremes_and_margin() {
     let ranges = domain.phase(0).expect("samples");
     assert_eq!((ranges[0].lo(), ranges[0].hi()), (0.8, 3.2));
     assert_eq!((ranges[1].lo(), ranges[1].hi()), (0.0, 0.0));
-    let made = simplify(
-        &Equations::of(&model),
-        &domain,
-        Some(&samples),
-        Tolerance::ShareOfRms(0.01),
-    )
-    .expect("certified");
+    let (equations, share) = (Equations::of(&model), Tolerance::ShareOfRms(0.01));
+    let made = simplify(&equations, &domain, Some(&samples), share).expect("certified");
     let equation = &made.certificate.phases[0].equations[0];
     assert_eq!(equation.rms, Some((14.0f64 / 3.0).sqrt()));
     let wrong = Domain::around(&model, &Samples { phases: Vec::new() }, 0.1);
@@ -415,12 +395,7 @@ fn domain_around_samples_has_their_extremes_and_margin() {
     let infinite = Interval::new(0.0, f64::INFINITY);
     let wrong = Domain::new(&model, vec![Some(vec![infinite; 3])]);
     assert!(matches!(wrong, Err(SimplifyError::Range { .. })));
-    let refused = simplify(
-        &Equations::of(&model),
-        &domain,
-        None,
-        Tolerance::ShareOfRms(0.01),
-    );
+    let refused = simplify(&equations, &domain, None, share);
     assert!(matches!(refused, Err(SimplifyError::NoSamples)));
 }
 
@@ -450,8 +425,7 @@ fn domain_file_needs_every_variable_and_no_other() {
 #[test]
 fn printing_error_is_bounded_by_what_was_cut_off() {
     let model = single(&[("z1", 0.126), ("u1", 1.0)]);
-    let ranges = vec![Some(vec![Interval::new(-2.0, 1.0); 3])];
-    let domain = Domain::new(&model, ranges).expect("a box");
+    let domain = boxed(&model, [(-2.0, 1.0); 3]);
     let rounding = crate::typeset::Rounding::Decimals(2);
     let printed = printed(&Equations::of(&model), &domain, None, rounding).expect("evaluates");
     let bound = printed[0].bound.expect("has a box");

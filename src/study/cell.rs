@@ -61,15 +61,11 @@ impl Metrics {
 
     /// Whether all of them are numbers.
     pub fn is_finite(&self) -> bool {
-        let Self {
-            decoder_mse,
-            torque_r2,
-            prediction_x_m,
-            prediction_z_m,
-            ..
-        } = self;
-        let values = [decoder_mse, torque_r2, prediction_x_m, prediction_z_m];
-        values.iter().all(|value| value.is_finite())
+        let predictions = [self.prediction_x_m, self.prediction_z_m];
+        let mut values = predictions
+            .into_iter()
+            .chain([self.decoder_mse, self.torque_r2]);
+        values.all(f64::is_finite)
     }
 
     /// `L_mod = 2 E_dec + 2 lambda ln |Xi|` (29), over the active coefficients of all phases; without any, the

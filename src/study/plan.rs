@@ -49,21 +49,13 @@ impl Plan {
         let refuse =
             |found: String, expected: &'static str| Err(StudyError::Range { found, expected });
         if self.latent_dims.is_empty() || self.seeds == 0 {
-            return refuse(
-                format!(
-                    "{} latent dimensions and {} seeds",
-                    self.latent_dims.len(),
-                    self.seeds
-                ),
-                "at least one of each",
-            );
+            let (dims, seeds) = (self.latent_dims.len(), self.seeds);
+            let found = format!("{dims} latent dimensions and {seeds} seeds");
+            return refuse(found, "at least one of each");
         }
         SEEDS.check_count(self.seeds)?;
-        match self
-            .latent_dims
-            .iter()
-            .find(|d| !(1..=STATE_DIM).contains(*d))
-        {
+        let mut dims = self.latent_dims.iter();
+        match dims.find(|d| !(1..=STATE_DIM).contains(*d)) {
             Some(d) => refuse(format!("latent dimension {d}"), "1 to 18"),
             None => Ok(()),
         }
@@ -97,21 +89,16 @@ impl Shard {
         let (index, count) = text.split_once('/').ok_or_else(expected)?;
         let number = |text: &str| text.parse::<usize>().map_err(|_| expected());
         let (index, count) = (number(index)?, number(count)?);
-        if (1..=count).contains(&index) {
-            Ok(Self { index, count })
-        } else {
-            Err(expected())
-        }
+        let is_part = (1..=count).contains(&index);
+        is_part
+            .then_some(Self { index, count })
+            .ok_or_else(expected)
     }
 
     /// The cells of this part: every `count`-th, so that all parts have dimensions of all sizes.
     pub fn of(self, cells: &[CellId]) -> Vec<CellId> {
-        cells
-            .iter()
-            .skip(self.index - 1)
-            .step_by(self.count)
-            .copied()
-            .collect()
+        let own = cells.iter().skip(self.index - 1).step_by(self.count);
+        own.copied().collect()
     }
 }
 
@@ -121,15 +108,10 @@ mod tests {
 
     #[test]
     fn shards_together_are_the_whole_and_share_nothing() {
-        let cells: Vec<CellId> = (1..=7)
-            .map(|seed| CellId {
-                latent_dim: 2,
-                seed,
-            })
-            .collect();
-        let mut joined: Vec<CellId> = (1..=3)
-            .flat_map(|index| Shard { index, count: 3 }.of(&cells))
-            .collect();
+        let latent_dim = 2;
+        let cells: Vec<CellId> = (1..=7).map(|seed| CellId { latent_dim, seed }).collect();
+        let shards = (1..=3).map(|index| Shard { index, count: 3 });
+        let mut joined: Vec<CellId> = shards.flat_map(|shard| shard.of(&cells)).collect();
         joined.sort();
         assert_eq!(joined, cells);
     }

@@ -1,6 +1,5 @@
 //! Trains the missing cells of a study on all cores.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use super::cell::{Cell, Metrics, Outcome};
@@ -30,45 +29,30 @@ pub fn run(
     finished: &(dyn Fn(CellId) + Sync),
 ) -> Result<(), StudyError> {
     let missing = store.missing();
-    let todo: Vec<CellId> = shard
-        .of(&store.plan().cells())
-        .into_iter()
-        .filter(|id| missing.contains(id))
-        .collect();
+    let mut todo = shard.of(&store.plan().cells());
+    todo.retain(|id| missing.contains(id));
     let method = store.plan().method;
     let next = AtomicUsize::new(0);
-    let failed: Mutex<Option<StudyError>> = Mutex::new(None);
+    let worker = || {
+        while let Some(&id) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let options = options(id.latent_dim);
+            let outcome = train(id, [training, validation], robot, options, method);
+            let kept = store.put(&Cell { id, outcome });
+            finished(id);
+            if kept.is_err() {
+                next.store(todo.len(), Ordering::Relaxed);
+                return kept;
+            }
+        }
+        Ok(())
+    };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| {
-        for _ in 0..threads.min(todo.len()) {
-            scope.spawn(|| {
-                while let Some(&id) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let cell = Cell {
-                        id,
-                        outcome: train(
-                            id,
-                            [training, validation],
-                            robot,
-                            options(id.latent_dim),
-                            method,
-                        ),
-                    };
-                    if let Err(error) = store.put(&cell) {
-                        failed
-                            .lock()
-                            .expect("no thread panics")
-                            .get_or_insert(error);
-                        next.store(todo.len(), Ordering::Relaxed);
-                    }
-                    finished(id);
-                }
-            });
-        }
-    });
-    match failed.into_inner().expect("no thread panics") {
-        Some(error) => Err(error),
-        None => Ok(()),
-    }
+        let started = (0..threads.min(todo.len())).map(|_| scope.spawn(worker));
+        let workers: Vec<_> = started.collect();
+        let mut workers = workers.into_iter();
+        workers.try_for_each(|worker| worker.join().expect("no thread panics"))
+    })
 }
 
 fn train(

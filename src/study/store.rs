@@ -1,6 +1,7 @@
 //! The folder of a study: its plan, and one file a finished training.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -27,11 +28,7 @@ impl Store {
     /// [`StudyError::OtherStudy`] if the folder has trainings of another plan, [`StudyError::File`].
     pub fn create(folder: &Path, plan: Plan) -> Result<Self, StudyError> {
         plan.check()?;
-        fs::create_dir_all(folder).map_err(|source| StudyError::File {
-            path: folder.to_owned(),
-            action: "make the folder",
-            source,
-        })?;
+        fs::create_dir_all(folder).map_err(refused(folder, "make the folder"))?;
         let path = folder.join(PLAN);
         if path.exists() {
             let found: Plan = read_json(&path)?;
@@ -94,12 +91,8 @@ impl Store {
     /// # Errors
     /// As [`Self::get`].
     pub fn cells(&self) -> Result<Vec<Cell>, StudyError> {
-        let found = self.plan.cells().into_iter().map(|id| self.get(id));
-        Ok(found
-            .collect::<Result<Vec<_>, _>>()?
-            .into_iter()
-            .flatten()
-            .collect())
+        let ids = self.plan.cells().into_iter();
+        ids.filter_map(|id| self.get(id).transpose()).collect()
     }
 
     /// Trainings of the plan that are not finished.
@@ -154,18 +147,12 @@ fn difference(found: &Plan, expected: &Plan) -> Option<&'static str> {
         ),
         ("the numbers of seeds", found.seeds != expected.seeds),
     ];
-    parts
-        .into_iter()
-        .find(|(_, differs)| *differs)
-        .map(|(name, _)| name)
+    let first = parts.into_iter().find(|(_, differs)| *differs);
+    first.map(|(name, _)| name)
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, StudyError> {
-    let text = fs::read_to_string(path).map_err(|source| StudyError::File {
-        path: path.to_owned(),
-        action: "read",
-        source,
-    })?;
+    let text = fs::read_to_string(path).map_err(refused(path, "read"))?;
     serde_json::from_str(&text).map_err(|error| StudyError::Broken {
         path: path.to_owned(),
         message: error.to_string(),
@@ -173,14 +160,18 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, StudyError> {
 }
 
 fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), StudyError> {
-    let refuse = |source| StudyError::File {
+    let text = serde_json::to_string_pretty(value).map_err(io::Error::from);
+    let written = text.and_then(|text| write_whole(path, |out| writeln!(out, "{text}")));
+    written.map_err(refused(path, "write"))
+}
+
+/// The error for a file or folder that the file system refuses to `action`.
+fn refused(path: &Path, action: &'static str) -> impl Fn(io::Error) -> StudyError {
+    move |source| StudyError::File {
         path: path.to_owned(),
-        action: "write",
+        action,
         source,
-    };
-    let mut text = serde_json::to_string_pretty(value).map_err(|error| refuse(error.into()))?;
-    text.push('\n');
-    write_whole(path, |out| out.write_all(text.as_bytes())).map_err(refuse)
+    }
 }
 
 #[cfg(test)]
@@ -201,6 +192,10 @@ mod tests {
         }
     }
 
+    fn store(folder: &tempfile::TempDir, name: &str, plan: Plan) -> Result<Store, StudyError> {
+        Store::create(&folder.path().join(name), plan)
+    }
+
     fn cell(latent_dim: usize, seed: u64, reason: &str) -> Cell {
         Cell {
             id: CellId { latent_dim, seed },
@@ -211,9 +206,8 @@ mod tests {
     #[test]
     fn merged_parts_hold_the_cells_of_both_and_name_what_is_missing() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let open =
-            |name: &str| Store::create(&folder.path().join(name), plan()).expect("a new folder");
-        let (a, b, whole) = (open("a"), open("b"), open("whole"));
+        let [a, b, whole] =
+            ["a", "b", "whole"].map(|name| store(&folder, name, plan()).expect("new"));
         a.put(&cell(1, 1, "x")).expect("writable");
         b.put(&cell(2, 2, "y")).expect("writable");
         b.put(&cell(1, 1, "x")).expect("writable");
@@ -230,8 +224,7 @@ mod tests {
     #[test]
     fn contradicting_parts_and_other_plans_are_refused() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let a = Store::create(&folder.path().join("a"), plan()).expect("a new folder");
-        let b = Store::create(&folder.path().join("b"), plan()).expect("a new folder");
+        let [a, b] = ["a", "b"].map(|name| store(&folder, name, plan()).expect("new"));
         a.put(&cell(1, 1, "x")).expect("writable");
         b.put(&cell(1, 1, "z")).expect("writable");
         assert!(matches!(a.merge(&b), Err(StudyError::Contradiction { .. })));
@@ -239,13 +232,7 @@ mod tests {
             settings: " --lift-weight 0".to_owned(),
             ..plan()
         };
-        let refused = Store::create(&folder.path().join("a"), other).expect_err("another study");
-        assert!(matches!(
-            refused,
-            StudyError::OtherStudy {
-                difference: "the settings",
-                ..
-            }
-        ));
+        let refused = store(&folder, "a", other).expect_err("another study");
+        assert!(refused.to_string().contains("(the settings differ)"));
     }
 }

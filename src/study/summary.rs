@@ -75,10 +75,8 @@ impl Summary {
     /// The latent dimension of least combined loss (29).
     pub fn best(&self) -> Option<usize> {
         let loss = |row: &&DimensionSummary| row.combined_loss.mean;
-        let best = self
-            .dimensions
-            .iter()
-            .min_by(|a, b| loss(a).total_cmp(&loss(b)));
+        let rows = self.dimensions.iter();
+        let best = rows.min_by(|a, b| loss(a).total_cmp(&loss(b)));
         best.map(|row| row.latent_dim)
     }
 
@@ -100,17 +98,10 @@ impl Summary {
             ("prediction_z_m", |row| row.prediction_z_m),
         ];
         for (name, spread) in columns {
-            let (mean, std) = (format!("{name}_mean"), format!("{name}_std"));
-            table.column(
-                &mean,
-                "",
-                rows.clone().map(|row| spread(row).mean.to_string()),
-            );
-            table.column(
-                &std,
-                "",
-                rows.clone().map(|row| spread(row).std.to_string()),
-            );
+            let means = rows.clone().map(|row| spread(row).mean.to_string());
+            table.column(&format!("{name}_mean"), "", means);
+            let stds = rows.clone().map(|row| spread(row).std.to_string());
+            table.column(&format!("{name}_std"), "", stds);
         }
         table
     }
@@ -175,46 +166,35 @@ mod tests {
 
     #[test]
     fn summary_means_over_seeds_and_counts_refusals() {
-        let trained = |seed: u64, decoder_mse: f64, active: usize| Cell {
-            id: CellId {
-                latent_dim: 2,
-                seed,
-            },
-            outcome: Outcome::Trained(Metrics {
+        let latent_dim = 2;
+        let trained = |decoder_mse: f64, active: usize| {
+            Outcome::Trained(Metrics {
                 decoder_mse,
                 active,
                 active_all_phases: active,
                 torque_r2: 0.5,
                 prediction_x_m: 0.01,
                 prediction_z_m: 0.02,
-            }),
+            })
         };
-        let refused = Cell {
-            id: CellId {
-                latent_dim: 2,
-                seed: 3,
-            },
-            outcome: Outcome::Refused("no \"stable\" model".to_owned()),
-        };
-        let cells = [trained(1, 1.0, 10), trained(2, 3.0, 20), refused];
+        let refused = Outcome::Refused("no \"stable\" model".to_owned());
+        let outcomes = (1..).zip([trained(1.0, 10), trained(3.0, 20), refused]);
+        let cells = outcomes.map(|(seed, outcome)| Cell {
+            id: CellId { latent_dim, seed },
+            outcome,
+        });
+        let cells: Vec<Cell> = cells.collect();
         let summary = Summary::of(&cells, 0.5);
         let row = &summary.dimensions[0];
         assert_eq!((row.trained, row.refused), (2, 1));
-        assert_eq!(
-            row.decoder_mse,
-            Spread {
-                mean: 2.0,
-                std: 2.0_f64.sqrt()
-            }
-        );
+        let spread = (row.decoder_mse.mean, row.decoder_mse.std);
+        assert_eq!(spread, (2.0, 2.0_f64.sqrt()));
         let expected = (2.0 + 10.0_f64.ln() + 6.0 + 20.0_f64.ln()) / 2.0;
         assert!((row.combined_loss.mean - expected).abs() < 1e-12);
         let table = cell_table(&cells, 0.5).csv();
         assert_eq!(table.lines().count(), 4);
         assert!(table.contains("\"no \"\"stable\"\" model\""), "{table}");
-        assert!(
-            table.lines().all(|line| line.matches(',').count() == 9),
-            "{table}"
-        );
+        let mut commas = table.lines().map(|line| line.matches(',').count());
+        assert!(commas.all(|commas| commas == 9), "{table}");
     }
 }

@@ -133,7 +133,7 @@ fn same_when_written(found: &Recording, notation: Notation) {
         notation,
         accelerations: true,
     };
-    write_to(&mut text, found, &options).expect("memory takes every byte");
+    write_to(&mut text, found, None, &options).expect("memory takes every byte");
     let again = recording::read_from_bytes("again.csv", &text);
     let again = again.unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(again.segments.len(), found.segments.len());

@@ -3,7 +3,7 @@
 use super::jump_prior::entries_of;
 use super::manifest::{
     GivenStateEntry, LayerEntry, LibraryEntry, Manifest, MapEntry, Pairs, PhaseEntry, RobotValue,
-    SCHEMA, SCHEMA_2, StatisticsEntry, has_given_state,
+    SCHEMA, SCHEMA_2, StatisticsEntry,
 };
 use super::matrices::to_rows;
 use crate::model::{InputStatistics, Library, LibrarySource, Phase, ReducedModel, StateMap};
@@ -12,28 +12,15 @@ use crate::robot_file::RobotEntry;
 
 /// The content of the model file.
 pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
-    let statistics = model
-        .phases()
-        .iter()
-        .enumerate()
-        .filter_map(|(index, phase)| {
-            let statistics = model.input_statistics(index).ok()?;
-            Some((phase.name.clone(), statistics_entry(statistics)))
-        });
-    let actuators = model.actuators().cloned();
+    let phases = model.phases().iter().enumerate();
+    let statistics = phases.filter_map(|(index, phase)| {
+        let statistics = model.input_statistics(index).ok()?;
+        Some((phase.name.clone(), statistics_entry(statistics)))
+    });
     let frame = model.wrench_frame();
-    let wrench_frame = (frame != WrenchFrame::Body).then_some(frame);
-    let robot = model.robot().ok().map(robot_value);
     let (landmarks, prior) = entries_of(model);
-    let statistics = Pairs(statistics.collect());
-    let is_later = actuators.is_some()
-        || wrench_frame.is_some()
-        || prior.is_some()
-        || matches!(robot, Some(RobotValue::Entry(_)))
-        || has_given_state(&statistics);
-    let schema = if is_later { SCHEMA_2 } else { SCHEMA };
-    Manifest {
-        schema: schema.to_owned(),
+    let mut manifest = Manifest {
+        schema: SCHEMA.to_owned(),
         name: model.name().to_owned(),
         description: model.description().to_owned(),
         state: model.state().cloned(),
@@ -44,15 +31,19 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
         latent_dim: model.latent_dim(),
         library: library_entry(model.library()),
         phases: model.phases().iter().map(phase_entry).collect(),
-        input_statistics: statistics,
-        robot,
-        actuators,
-        wrench_frame,
+        input_statistics: Pairs(statistics.collect()),
+        robot: model.robot().ok().map(robot_value),
+        actuators: model.actuators().cloned(),
+        wrench_frame: (frame != WrenchFrame::Body).then_some(frame),
         sample_time_s: model.sample_time_s().ok(),
         landmarks,
         prior,
         provenance: model.provenance().clone(),
+    };
+    if manifest.later_key().is_some() {
+        manifest.schema = SCHEMA_2.to_owned();
     }
+    manifest
 }
 
 fn robot_value(robot: &Robot) -> RobotValue {
@@ -101,13 +92,10 @@ fn statistics_entry(statistics: &InputStatistics) -> StatisticsEntry {
     StatisticsEntry {
         mean: statistics.mean.as_slice().to_vec(),
         covariance: to_rows(&statistics.covariance),
-        given_state: statistics
-            .given_state
-            .as_ref()
-            .map(|given| GivenStateEntry {
-                mean: to_rows(&given.mean),
-                covariance: to_rows(&given.covariance),
-                acceleration_error: to_rows(&given.acceleration_error),
-            }),
+        given_state: (statistics.given_state.as_ref()).map(|given| GivenStateEntry {
+            mean: to_rows(&given.mean),
+            covariance: to_rows(&given.covariance),
+            acceleration_error: to_rows(&given.acceleration_error),
+        }),
     }
 }

@@ -101,35 +101,28 @@ pub(super) fn prior_of(
         (None, Some(_)) => return Err(incomplete("prior", "landmarks")),
         (Some(landmarks), Some(prior)) => (landmarks, prior),
     };
-    let invalid = |place: &str, found: String, expected: String| {
-        let place = place.to_owned();
-        let fault = ModelError::Invalid {
-            place,
-            found,
-            expected,
-        };
-        refused(file, fault)
+    let invalid = |place: &str, found: String, expected: &str| {
+        refused(file, ModelError::invalid(place, found, expected))
     };
     let (found, expected) = (prior.parts.len(), landmarks.parts.len());
     if found != expected {
         let expected = format!("{expected} as in `landmarks.parts`");
-        return Err(invalid("`prior.parts`", format!("{found} parts"), expected));
+        return Err(invalid(
+            "`prior.parts`",
+            format!("{found} parts"),
+            &expected,
+        ));
     }
     let mut parts = Vec::with_capacity(found);
     for (index, (landmark, entry)) in landmarks.parts.into_iter().zip(prior.parts).enumerate() {
         let phase = phases.iter().position(|phase| phase.name == landmark.phase);
         let place = format!("`landmarks.parts[{index}]`");
         let Some(phase) = phase else {
-            let expected = "the name of a phase".to_owned();
-            return Err(invalid(
-                &place,
-                format!("phase {:?}", landmark.phase),
-                expected,
-            ));
+            let found = format!("phase {:?}", landmark.phase);
+            return Err(invalid(&place, found, "the name of a phase"));
         };
         if let Some(flag) = landmark.feet.iter().find(|flag| **flag > 1) {
-            let expected = "0 or 1 per foot".to_owned();
-            return Err(invalid(&place, format!("a foot {flag}"), expected));
+            return Err(invalid(&place, format!("a foot {flag}"), "0 or 1 per foot"));
         }
         let matrix = |rows: &Rows, key: &str| {
             from_rows(file, &format!("prior.parts[{index}].{key}"), rows, None)

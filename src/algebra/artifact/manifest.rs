@@ -52,34 +52,40 @@ pub(super) struct Manifest {
     pub input_statistics: Pairs<StatisticsEntry>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<RobotValue>,
-    #[serde(
-        default,
-        deserialize_with = "present",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "present")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub actuators: Option<Actuators>,
-    #[serde(
-        default,
-        deserialize_with = "present",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "present")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub wrench_frame: Option<WrenchFrame>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample_time_s: Option<f64>,
-    #[serde(
-        default,
-        deserialize_with = "present",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "present")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub landmarks: Option<LandmarksEntry>,
-    #[serde(
-        default,
-        deserialize_with = "present",
-        skip_serializing_if = "Option::is_none"
-    )]
+    #[serde(default, deserialize_with = "present")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorEntry>,
     #[serde(default, skip_serializing_if = "Map::is_empty")]
     pub provenance: Map<String, Value>,
+}
+
+impl Manifest {
+    /// A key that it has and the first schema does not know.
+    pub(super) fn later_key(&self) -> Option<&'static str> {
+        let mut statistics = self.input_statistics.0.iter();
+        let has_given_state = statistics.any(|(_, entry)| entry.given_state.is_some());
+        let later = [
+            ("actuators", self.actuators.is_some()),
+            ("wrench_frame", self.wrench_frame.is_some()),
+            ("landmarks", self.landmarks.is_some()),
+            ("prior", self.prior.is_some()),
+            ("input_statistics.given_state", has_given_state),
+            ("robot", matches!(self.robot, Some(RobotValue::Entry(_)))),
+        ];
+        let found = later.into_iter().find(|(_, there)| *there);
+        found.map(|(key, _)| key)
+    }
 }
 
 /// A robot of romc's own by its name, or any by its description.
@@ -159,22 +165,14 @@ impl TryFrom<MapFields> for MapEntry {
     type Error = &'static str;
 
     fn try_from(fields: MapFields) -> Result<Self, &'static str> {
-        match fields {
-            MapFields {
-                weights: None,
-                bias: None,
-                layers: Some(layers),
-            } => Ok(Self::Layers { layers }),
-            MapFields {
-                layers: Some(_), ..
-            } => Err("found `layers` beside `weights` or `bias`, expected one of the two"),
-            MapFields { weights: None, .. } => Err("missing field `weights`"),
-            MapFields { bias: None, .. } => Err("missing field `bias`"),
-            MapFields {
-                weights: Some(weights),
-                bias: Some(bias),
-                layers: None,
-            } => Ok(Self::Affine { weights, bias }),
+        match (fields.weights, fields.bias, fields.layers) {
+            (None, None, Some(layers)) => Ok(Self::Layers { layers }),
+            (_, _, Some(_)) => {
+                Err("found `layers` beside `weights` or `bias`, expected one of the two")
+            }
+            (Some(weights), Some(bias), None) => Ok(Self::Affine { weights, bias }),
+            (None, _, None) => Err("missing field `weights`"),
+            (_, None, None) => Err("missing field `bias`"),
         }
     }
 }
@@ -203,12 +201,6 @@ pub(super) struct GivenStateEntry {
     pub mean: Rows,
     pub covariance: Rows,
     pub acceleration_error: Rows,
-}
-
-/// Whether the statistics of a phase say something of inputs given states, which the first schema does not know.
-pub(super) fn has_given_state(statistics: &Pairs<StatisticsEntry>) -> bool {
-    let mut entries = statistics.0.iter();
-    entries.any(|(_, entry)| entry.given_state.is_some())
 }
 
 /// A list of terms, or the shorthand.

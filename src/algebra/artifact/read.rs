@@ -11,7 +11,7 @@ use super::error::{ArtifactError, ArtifactFault, refused};
 use super::jump_prior::prior_of;
 use super::manifest::{
     GivenStateEntry, LibraryEntry, Manifest, MapEntry, PhaseEntry, RobotValue, Rows, SCHEMA,
-    SCHEMA_2, SchemaProbe, StatisticsEntry, has_given_state,
+    SCHEMA_2, SchemaProbe, StatisticsEntry,
 };
 use super::matrices::from_rows;
 use crate::model::{
@@ -62,26 +62,10 @@ pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, Artifac
     }
     check_schema(file, bytes)?;
     let manifest: Manifest = parse(file, bytes)?;
-    if manifest.schema == SCHEMA {
-        let later = [
-            ("actuators", manifest.actuators.is_some()),
-            ("wrench_frame", manifest.wrench_frame.is_some()),
-            ("landmarks", manifest.landmarks.is_some()),
-            ("prior", manifest.prior.is_some()),
-            (
-                "input_statistics.given_state",
-                has_given_state(&manifest.input_statistics),
-            ),
-            (
-                "robot",
-                matches!(manifest.robot, Some(RobotValue::Entry(_))),
-            ),
-        ];
-        if let Some((key, _)) = later.into_iter().find(|(_, there)| *there) {
-            return Err(ArtifactFault::LaterKey { key }.of(file));
-        }
+    match manifest.later_key().filter(|_| manifest.schema == SCHEMA) {
+        Some(key) => Err(ArtifactFault::LaterKey { key }.of(file)),
+        None => to_model(file, manifest),
     }
-    to_model(file, manifest)
 }
 
 fn parse<'de, T: serde::Deserialize<'de>>(
@@ -89,30 +73,25 @@ fn parse<'de, T: serde::Deserialize<'de>>(
     bytes: &'de [u8],
 ) -> Result<T, ArtifactError> {
     let syntax = |place: String, error: &serde_json::Error| {
+        // serde_json ends its messages with line and column, which the fault has anyway.
+        let text = error.to_string();
+        let message = text
+            .rsplit_once(" at line ")
+            .map_or(&*text, |(message, _)| message);
         let fault = ArtifactFault::Syntax {
             place,
             line: error.line(),
             column: error.column(),
-            message: message_without_position(error),
+            message: message.to_owned(),
         };
         fault.of(file)
     };
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
     let value = serde_path_to_error::deserialize(&mut deserializer)
         .map_err(|error| syntax(error.path().to_string(), error.inner()))?;
-    deserializer
-        .end()
-        .map_err(|error| syntax(".".to_owned(), &error))?;
+    let rest = deserializer.end();
+    rest.map_err(|error| syntax(".".to_owned(), &error))?;
     Ok(value)
-}
-
-/// serde_json ends its messages with line and column, which [`ArtifactFault::Syntax`] has anyway.
-fn message_without_position(error: &serde_json::Error) -> String {
-    let message = error.to_string();
-    match message.rfind(" at line ") {
-        Some(end) => message[..end].to_owned(),
-        None => message,
-    }
 }
 
 /// Looks at the schema first: for a file of a later version it is the fault, not unknown keys.
@@ -149,31 +128,25 @@ fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactErro
     let mut builder = ReducedModel::builder(manifest.name, library)
         .description(manifest.description)
         .provenance(manifest.provenance);
-    let robot = match &manifest.robot {
-        None => None,
-        Some(RobotValue::Name(name)) => {
-            Some(Robot::by_name(name).map_err(|source| refused(file, source))?)
-        }
-        Some(RobotValue::Entry(entry)) => {
+    let robot = manifest.robot.map(|robot| match robot {
+        RobotValue::Name(name) => Robot::by_name(&name).map_err(|source| refused(file, source)),
+        RobotValue::Entry(entry) => {
             let robot = entry.robot("robot");
-            Some(robot.map_err(|source| ArtifactFault::Robot(source).of(file))?)
+            robot.map_err(|source| ArtifactFault::Robot(source).of(file))
         }
-    };
+    });
+    let robot = robot.transpose()?;
     let known_dim = robot
         .map(|_| STATE_DIM)
         .or(manifest.state.as_ref().map(|state| state.names.len()));
-    if let Some(robot) = robot {
-        builder = builder.robot(robot);
-    }
-    if let Some(state) = manifest.state {
-        builder = builder.state(state);
-    }
-    if let Some(input) = manifest.input {
-        builder = builder.input(input);
-    }
-    if let Some(scaling) = manifest.scaling {
-        builder = builder.scaling(scaling);
-    }
+    builder = builder
+        .robot(robot)
+        .state(manifest.state)
+        .input(manifest.input)
+        .scaling(manifest.scaling)
+        .actuators(manifest.actuators)
+        .wrench_frame(manifest.wrench_frame.unwrap_or_default())
+        .sample_time_s(manifest.sample_time_s);
     if let Some(entry) = &manifest.encoder {
         builder = builder.encoder(map_of(file, "encoder", entry, known_dim)?);
     }
@@ -189,12 +162,6 @@ fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactErro
     for (name, entry) in manifest.input_statistics.0 {
         let statistics = statistics_of(file, &name, &entry)?;
         builder = builder.input_statistics(name, statistics);
-    }
-    builder = builder
-        .actuators(manifest.actuators)
-        .wrench_frame(manifest.wrench_frame.unwrap_or_default());
-    if let Some(sample_time_s) = manifest.sample_time_s {
-        builder = builder.sample_time_s(sample_time_s);
     }
     builder.build().map_err(|source| refused(file, source))
 }
@@ -217,10 +184,8 @@ fn map_of(
     for (index, entry) in entries.iter().enumerate() {
         let name = format!("{tensor}.layers[{index}]");
         // What the layer before gives, this one takes.
-        let columns = layers
-            .last()
-            .map(|layer| layer.map.output_dim())
-            .or(columns);
+        let before = layers.last().map(|layer| layer.map.output_dim());
+        let columns = before.or(columns);
         let activation: Activation = entry.activation.parse().map_err(refused)?;
         let map = affine_of(file, &name, (&entry.weights, &entry.bias), columns)?;
         layers.push(Layer { map, activation });

@@ -4,6 +4,7 @@ use super::fours::Fours;
 use super::ident::Ident;
 use super::lanes::Row;
 use super::literal::Literal;
+use crate::ir::{Binary, Table};
 
 /// A subscript `offset + sum_i stride_i * name_i`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -58,19 +59,6 @@ impl Index {
     }
 }
 
-/// Operators between two operands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Infix {
-    /// `+`
-    Add,
-    /// `-`
-    Sub,
-    /// `*`
-    Mul,
-    /// `/`
-    Div,
-}
-
 /// Functions of one argument that every target has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MathFunction {
@@ -90,6 +78,21 @@ pub enum MathFunction {
     Log,
 }
 
+impl MathFunction {
+    /// What most targets call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sqrt => "sqrt",
+            Self::Abs => "abs",
+            Self::Sign => "sign",
+            Self::Tan => "tan",
+            Self::Tanh => "tanh",
+            Self::Exp => "exp",
+            Self::Log => "log",
+        }
+    }
+}
+
 /// An expression.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Expr {
@@ -104,7 +107,7 @@ pub enum Expr {
     /// `-a`
     Negate(Box<Expr>),
     /// `a op b`
-    Infix(Infix, Box<Expr>, Box<Expr>),
+    Infix(Binary, Box<Expr>, Box<Expr>),
     /// `f(a)`
     Apply(MathFunction, Box<Expr>),
     /// The sums of all lanes, within a loop of a variable over lanes.
@@ -115,7 +118,7 @@ pub enum Expr {
 
 impl Expr {
     /// `a op b`
-    pub fn infix(op: Infix, a: Expr, b: Expr) -> Self {
+    pub fn infix(op: Binary, a: Expr, b: Expr) -> Self {
         Self::Infix(op, Box::new(a), Box::new(b))
     }
 
@@ -158,15 +161,6 @@ impl Span {
     }
 }
 
-/// An argument of a call of a generated function.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Argument {
-    /// Elements that are read.
-    Read(Span),
-    /// Elements that are written.
-    Write(Span),
-}
-
 /// A statement.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stmt {
@@ -182,15 +176,6 @@ pub enum Stmt {
     AddAssign(Expr, Expr),
     /// A loop of the variable from 0 to below the count.
     For(Ident, usize, Vec<Stmt>),
-    /// Sines and cosines of a span by the kernel.
-    SinCos {
-        /// Arguments.
-        arguments: Span,
-        /// Where the sines go.
-        sines: Span,
-        /// Where the cosines go.
-        cosines: Span,
-    },
     /// Sine and cosine of one argument by the kernel's core, which notes arguments beyond
     /// its limit for the whole block of lanes.
     SinCosLane {
@@ -203,8 +188,15 @@ pub enum Stmt {
         /// Whether sine and cosine are read.
         is_used: [bool; 2],
     },
-    /// A call of another generated function.
-    Call(Ident, Vec<Argument>),
+    /// A call of another generated function or, without a name, of the sine-and-cosine kernel.
+    Call {
+        /// The function.
+        callee: Option<Ident>,
+        /// What it reads; of the kernel the angles.
+        read: Vec<Span>,
+        /// What it writes; of the kernel sines and cosines.
+        written: Vec<Span>,
+    },
     /// The columns of one row; languages with lanes run them side by side.
     Row(Box<Row>),
     /// Sums of vectors of four numbers.
@@ -213,6 +205,16 @@ pub enum Stmt {
     DeclareLanes(Ident),
     /// A loop of the variable over the lanes, or all of them at once.
     ForLanes(Ident, Vec<Stmt>),
+}
+
+impl Stmt {
+    /// The body of a loop; nothing for other statements.
+    pub fn inner(&self) -> &[Stmt] {
+        match self {
+            Self::For(_, _, body) | Self::ForLanes(_, body) => body,
+            _other => &[],
+        }
+    }
 }
 
 /// What a parameter of a generated function is for.
@@ -228,12 +230,12 @@ pub enum Role {
     Scalar,
 }
 
-/// A parameter of a generated function.
+/// A parameter of a generated function, in a language or, with a text for a name, in any.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Parameter {
+pub struct Parameter<N = Ident> {
     /// Its name.
-    pub name: Ident,
-    /// Number of elements.
+    pub name: N,
+    /// Number of elements; an output may have none.
     pub len: usize,
     /// What it is for.
     pub role: Role,
@@ -244,12 +246,8 @@ pub struct Parameter {
 pub struct ConstTable {
     /// Its name.
     pub name: Ident,
-    /// Number of rows.
-    pub rows: usize,
-    /// Number of columns.
-    pub cols: usize,
-    /// Entries, row-major.
-    pub entries: Vec<Literal>,
+    /// Its entries.
+    pub values: Table,
     /// Whether rows are read in lanes.
     pub is_in_lanes: bool,
 }

@@ -1,9 +1,10 @@
 //! What targets spell differently.
 
-use super::code::{Argument, ConstTable, Function, Index, Infix, MathFunction, Parameter};
+use super::code::{ConstTable, Index, MathFunction, Span};
 use super::fours::{FourBlock, Fours};
 use super::literal::Literal;
 use super::printer::subscript;
+use crate::ir::Binary;
 
 /// Spelling of lanes: neighbours of an array that are computed side by side.
 pub trait LaneDialect {
@@ -26,17 +27,11 @@ pub trait LaneDialect {
     fn total(&self, sums: &str) -> String;
 }
 
-/// Spelling of sums of vectors of four numbers.
-pub trait FourDialect {
-    /// Lines that compute the sums of a block, each with its depth of indentation.
-    fn block(&self, fours: &Fours, block: &FourBlock) -> Vec<(usize, String)>;
-}
-
 /// Spelling of a target language. The printer owns precedence and parentheses, the
 /// dialect everything that differs between languages.
 pub trait Dialect {
-    /// Words that no variable may be called.
-    fn reserved(&self) -> &'static [&'static str];
+    /// Words that no variable may be called, with blanks between them.
+    fn reserved(&self) -> &'static str;
 
     /// What ends a statement.
     fn terminator(&self) -> &'static str {
@@ -59,12 +54,12 @@ pub trait Dialect {
     }
 
     /// An operator between numbers, with the spaces around it.
-    fn operator(&self, op: Infix) -> &'static str {
+    fn operator(&self, op: Binary) -> &'static str {
         match op {
-            Infix::Add => " + ",
-            Infix::Sub => " - ",
-            Infix::Mul => "*",
-            Infix::Div => "/",
+            Binary::Add => " + ",
+            Binary::Sub => " - ",
+            Binary::Mul => "*",
+            Binary::Div => "/",
         }
     }
 
@@ -84,19 +79,24 @@ pub trait Dialect {
         None
     }
 
-    /// How four numbers run side by side; other languages take one after the other.
-    fn fours(&self) -> Option<&dyn FourDialect> {
+    /// Lines that compute the sums of a block of vectors of four numbers side by side, each with its depth
+    /// of indentation; other languages take one number after the other.
+    fn fours(&self, _: &Fours, _: &FourBlock) -> Option<Vec<(usize, String)>> {
         None
     }
 
     /// A number in the target's precision.
-    fn literal(&self, literal: Literal) -> String;
+    fn literal(&self, literal: Literal) -> String {
+        literal.to_string()
+    }
 
     /// A function applied to a printed argument.
     fn apply(&self, function: MathFunction, argument: &str) -> String;
 
     /// Definition of a scalar.
-    fn let_scalar(&self, name: &str, value: &str) -> String;
+    fn let_scalar(&self, name: &str, value: &str) -> String {
+        format!("{name} = {value}{}", self.terminator())
+    }
 
     /// Definition of an array by its printed elements.
     fn let_array(&self, name: &str, elements: &[String]) -> String;
@@ -108,31 +108,43 @@ pub trait Dialect {
     fn for_loop(&self, variable: &str, count: usize) -> String;
 
     /// Beginning of the names of constant tables.
-    fn table_base(&self, prefix: &str) -> String;
-
-    /// A mention of a parameter that nothing reads.
-    fn discard(&self, parameter: &str) -> String;
+    fn table_base(&self, _prefix: &str) -> String {
+        "TABLE".to_owned()
+    }
 
     /// Function `f(a, b, c) = a*b + c` for loops, in a language whose compilers never fuse the two
     /// operations by themselves.
-    fn multiply_add(&self) -> Option<&'static str>;
+    fn multiply_add(&self) -> Option<&'static str> {
+        None
+    }
 
     /// A call of the sine-and-cosine kernel, or of a generated function (`callee`).
-    fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String;
+    fn call(&self, callee: Option<&str>, read: &[Span], written: &[Span]) -> String;
 
     /// The kernel's core on one printed argument of a lane: defines sine and cosine, and
-    /// notes an argument beyond its limit.
-    fn sin_cos_lane(&self, argument: &str, names: &[String; 2], is_used: [bool; 2]) -> Vec<String>;
+    /// notes an argument beyond its limit. Blocks of lanes are for compilers: scripts run many
+    /// points as columns.
+    fn sin_cos_lane(&self, _: &str, _: &[String; 2], _is_used: [bool; 2]) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// The rows of a constant table: entries between `open` and `close`, with `between` after every
+    /// eight of them.
+    fn rows(&self, table: &ConstTable, [open, between, close]: [&str; 3]) -> String {
+        let entry = |&value: &f64| {
+            let literal = Literal::new(value).expect("tables of programs are finite");
+            self.literal(literal)
+        };
+        let row = |row: &[f64]| {
+            let entries: Vec<String> = row.iter().map(entry).collect();
+            let lines: Vec<String> = entries.chunks(8).map(|line| line.join(", ")).collect();
+            format!("{open}{}{close}\n", lines.join(between))
+        };
+        (0..table.values.rows())
+            .map(|r| row(table.values.row(r)))
+            .collect()
+    }
 
     /// Definition of a constant table.
     fn table(&self, table: &ConstTable) -> String;
-
-    /// A parameter.
-    fn parameter(&self, parameter: &Parameter) -> String;
-
-    /// The function's name and parameters, without body.
-    fn signature(&self, function: &Function) -> String;
-
-    /// Documentation from its lines.
-    fn docs(&self, lines: &[String]) -> String;
 }

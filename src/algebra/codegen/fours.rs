@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::code::{Expr, Index, Infix, Span, Stmt};
+use super::code::{Expr, Index, Span, Stmt};
 use super::ident::Ident;
 use super::literal::Literal;
-use crate::ir::{QUAD, Quad, QuadSum, Table};
+use crate::ir::{Binary, QUAD, Quad, QuadSum, Table};
 
 /// Sums that are added side by side: what the registers hold beside a weight.
 const SUMS_AT_ONCE: usize = 12;
@@ -130,8 +130,8 @@ impl Fours {
                         let number = self.number(vector, lane);
                         let at = Index::fixed(self.weights.offset + weight);
                         let weight = Expr::Element(self.weights.array.clone(), at);
-                        let product = Expr::infix(Infix::Mul, number, weight);
-                        value = Expr::infix(Infix::Add, value, product);
+                        let product = Expr::infix(Binary::Mul, number, weight);
+                        value = Expr::infix(Binary::Add, value, product);
                     }
                 }
                 let target = self.number(Quad::Sum(position), lane);

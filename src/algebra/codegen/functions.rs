@@ -118,32 +118,20 @@ fn function(
             role: parameter.role,
         })
         .collect();
-    let of_slot = |name: &str| {
-        let position = entry.parameters.iter().position(|p| p.name == name);
+    let of_slot = |slot: &Slot| {
+        let position = entry.parameters.iter().position(|p| p.name == slot.name);
         parameters[position.expect("every slot is a parameter")].clone()
     };
-    let inputs: Vec<Parameter> = entry
-        .program
-        .inputs()
-        .iter()
-        .map(|s| of_slot(&s.name))
-        .collect();
-    let outputs: Vec<Parameter> = entry
-        .program
-        .outputs()
-        .iter()
-        .map(|s| of_slot(&s.name))
-        .collect();
-    let translation = translate(
-        &entry.program,
-        Names {
-            inputs: &inputs,
-            outputs: &outputs,
-            callees,
-            locals: &mut locals,
-            tables,
-        },
-    );
+    let [inputs, outputs] = [entry.program.inputs(), entry.program.outputs()]
+        .map(|slots| slots.iter().map(of_slot).collect::<Vec<_>>());
+    let names = Names {
+        inputs: &inputs,
+        outputs: &outputs,
+        callees,
+        locals: &mut locals,
+        tables,
+    };
+    let translation = translate(&entry.program, names);
     let mut unused = translation.unused;
     let empty = parameters
         .iter()

@@ -16,17 +16,14 @@ impl fmt::Display for Ident {
 /// Mints the names of one scope: identifiers, no keyword, none twice.
 #[derive(Clone, Debug)]
 pub struct Namer {
-    reserved: &'static [&'static str],
     used: BTreeSet<String>,
 }
 
 impl Namer {
-    /// A scope in which the words of the target are taken.
-    pub fn new(reserved: &'static [&'static str]) -> Self {
-        Self {
-            reserved,
-            used: BTreeSet::new(),
-        }
+    /// A scope in which the words of the target are taken, which are a text with blanks between them.
+    pub fn new(reserved: &str) -> Self {
+        let used = reserved.split_whitespace().map(str::to_owned).collect();
+        Self { used }
     }
 
     /// The wanted name if it is free, otherwise the name with the first free number.
@@ -42,7 +39,7 @@ impl Namer {
         }
         let mut name = base.clone();
         let mut number = 1;
-        while self.reserved.contains(&name.as_str()) || !self.used.insert(name.clone()) {
+        while !self.used.insert(name.clone()) {
             number += 1;
             name = format!("{base}{number}");
         }
@@ -56,7 +53,7 @@ mod tests {
 
     #[test]
     fn namer_avoids_keywords_and_repetition() {
-        let mut namer = Namer::new(&["double"]);
+        let mut namer = Namer::new("double");
         let names = ["double", "t", "t", "t", "x; system(1)", "1a"].map(|n| namer.mint(n).0);
         assert_eq!(names, ["double2", "t", "t2", "t3", "x__system_1_", "v1a"]);
     }

@@ -1,13 +1,13 @@
 //! What is generated for a model: programs, with names, roles and documentation.
 
-use super::code::Role;
-use super::map_equations::{MapEquations, in_matrices, without_factors};
+use super::code::{Parameter, Role};
+use super::map_equations::{in_matrices, points, titles, without_factors};
 use super::precision::{Precision, stated_bounds};
 use super::units::Units;
-use crate::equations::{Equations, LatentUnits, Unit};
+use crate::equations::{Equations, LatentUnits, Unit, summand_words};
 use crate::ir::{Program, Slot, Statement, Unary};
 use crate::lower::{self, JacobianPattern, LowerError, LowerOptions};
-use crate::model::{CandidateTerm, CoordinateNames, ModelError, ReducedModel, StateMap};
+use crate::model::{CandidateTerm, CoordinateNames, ModelError, ReducedModel};
 use crate::robot::WrenchFrame;
 use crate::robot::kinematics::{LEAST_HEIGHT, LEAST_SPAN};
 
@@ -22,20 +22,9 @@ pub struct FunctionSpec {
     /// The program.
     pub program: Program,
     /// Parameters in order.
-    pub parameters: Vec<EntryParameter>,
+    pub parameters: Vec<Parameter<String>>,
     /// Lines of documentation.
     pub docs: Vec<String>,
-}
-
-/// A parameter of an entry.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct EntryParameter {
-    /// Name of the slot.
-    pub name: String,
-    /// Number of elements; an output may have none.
-    pub len: usize,
-    /// What it is for.
-    pub role: Role,
 }
 
 /// The functions of one phase.
@@ -207,7 +196,6 @@ fn input_entries(model: &ReducedModel) -> Result<Vec<FunctionSpec>, LowerError> 
              {LEAST_SPAN} of thigh times calf, a foot nearer to its hip's height than {LEAST_HEIGHT} of the \
              leg."
         ),
-        shapes(&input),
     ];
     let torque_docs = vec![
         format!("Torques of the {robot}'s motors behind torques at the links: {losses}"),
@@ -215,7 +203,6 @@ fn input_entries(model: &ReducedModel) -> Result<Vec<FunctionSpec>, LowerError> 
          count (0 to 11). net: the first 12 of u (N m). tau: torques of the motors (N m); limits are the \
          caller's."
             .to_owned(),
-        shapes(&torque),
     ];
     let entries = [(input, input_docs), (torque, torque_docs)];
     let entries = entries.map(|(program, docs)| entry(program.name().to_owned(), program, docs));
@@ -234,12 +221,8 @@ fn map_entries(
     };
     let unit = units.of_robot();
     let n = format!("robot coordinates in {unit}");
-    let is_nonlinear =
-        |map: Result<&StateMap, ModelError>| map.is_ok_and(|m| m.as_affine().is_none());
-    let equations = MapEquations {
-        curved_encoder: is_nonlinear(model.encoder_map()),
-        curved_decoder: is_nonlinear(model.decoder_map()),
-    };
+    let is_nonlinear = [model.encoder_map(), model.decoder_map()]
+        .map(|map| map.is_ok_and(|map| map.as_affine().is_none()));
     let positions = in_units("z", latent.map(|units| &units.position));
     let velocities = match latent {
         None => "(scaled)",
@@ -254,53 +237,36 @@ fn map_entries(
         None => lower::lift_input(model),
         Some(units) => lower::linear_map("lift_input", ("u_lat", "u"), &units.lift),
     };
-    let (at_x, at_z) = equations.points();
+    let [at_x, at_z] = points(is_nonlinear);
+    let (of_x, of_u) = (elements("x", state), elements("u", input));
     let candidates = [
         (
             lower::encode(model),
-            equations.encode(),
-            format!(
-                "x: {n}. z: latent coordinates {positions}.{}",
-                elements("x", state)
-            ),
+            format!("x: {n}. z: latent coordinates {positions}.{of_x}"),
         ),
         (
             lower::encode_velocity(model),
-            equations.encode_velocity(),
             format!("{at_x}dx: velocities of the {n}. dz: latent velocities {velocities}."),
         ),
         (
             lower::decode(model),
-            equations.decode(),
-            format!(
-                "z: latent coordinates {positions}. x: {n}.{}",
-                elements("x", state)
-            ),
+            format!("z: latent coordinates {positions}. x: {n}.{of_x}"),
         ),
         (
             lower::decode_velocity(model),
-            equations.decode_velocity(),
             format!("{at_z}dz: latent velocities {velocities}. dx: velocities of the {n}."),
         ),
         (
             project(),
-            equations.project_input(),
-            format!(
-                "{at_x}u: generalised inputs in {unit}. u_lat: latent inputs {inputs}.{}",
-                elements("u", input)
-            ),
+            format!("{at_x}u: generalised inputs in {unit}. u_lat: latent inputs {inputs}.{of_u}"),
         ),
         (
             lift(),
-            equations.lift_input(),
-            format!(
-                "{at_x}u_lat: latent inputs {inputs}. u: generalised inputs in {unit}.{}",
-                elements("u", input)
-            ),
+            format!("{at_x}u_lat: latent inputs {inputs}. u: generalised inputs in {unit}.{of_u}"),
         ),
     ];
     let mut entries = Vec::new();
-    for (program, title, text) in candidates {
+    for ((program, text), title) in candidates.into_iter().zip(titles(is_nonlinear)) {
         match program {
             Ok(program) => {
                 let title = match (latent, units) {
@@ -308,8 +274,8 @@ fn map_entries(
                     (Some(_), _) => in_matrices(title),
                     (None, Units::Scaled) => without_factors(title),
                 };
-                let docs = vec![title, text, shapes(&program)];
-                entries.push(entry(program.name().to_owned(), program, docs));
+                let name = program.name().to_owned();
+                entries.push(entry(name, program, vec![title, text]));
             }
             Err(LowerError::Model(ModelError::Missing { .. })) => {}
             Err(error) => return Err(error),
@@ -345,20 +311,16 @@ fn phase_entries(
         }
     )];
     docs.extend(equations);
-    docs.push(shapes(&program));
     let dynamics = entry(format!("{identifier}_dynamics"), program, docs);
 
     let (program, pattern) = lower::dynamics_jacobian(system, phase, options)?;
-    let docs = vec![
-        format!(
-            "Latent accelerations of phase `{name}` and the structural nonzeros of their \
-             Jacobian d ddz / d (z, dz, u_lat), row-major."
-        ),
-        shapes(&program),
-    ];
+    let docs = vec![format!(
+        "Latent accelerations of phase `{name}` and the structural nonzeros of their \
+         Jacobian d ddz / d (z, dz, u_lat), row-major."
+    )];
     let mut jacobian = entry(format!("{identifier}_dynamics_jacobian"), program, docs);
     if pattern.is_empty() {
-        jacobian.parameters.push(EntryParameter {
+        jacobian.parameters.push(Parameter {
             name: "jacobian".to_owned(),
             len: 0,
             role: Role::Output,
@@ -366,13 +328,10 @@ fn phase_entries(
     }
 
     let program = lower::rk4_step(system, phase, options)?;
-    let docs = vec![
-        format!(
-            "Advances the latent state of phase `{name}` by h seconds: one step of the classical \
-             Runge-Kutta method with u_lat held."
-        ),
-        shapes(&program),
-    ];
+    let docs = vec![format!(
+        "Advances the latent state of phase `{name}` by h seconds: one step of the classical \
+         Runge-Kutta method with u_lat held."
+    )];
     Ok(PhaseInterface {
         step: entry(format!("{identifier}_step"), program, docs),
         identifier,
@@ -382,33 +341,28 @@ fn phase_entries(
     })
 }
 
-/// An entry whose outputs of the same name as an input are updated in place.
-fn entry(name: String, program: Program, docs: Vec<String>) -> FunctionSpec {
+/// An entry whose outputs of the same name as an input are updated in place; its documentation ends
+/// with the lengths of all arrays.
+fn entry(name: String, program: Program, mut docs: Vec<String>) -> FunctionSpec {
+    docs.push(shapes(&program));
     let is_in = |slots: &[Slot], name: &str| slots.iter().any(|slot| slot.name == name);
-    let mut parameters: Vec<EntryParameter> = program
+    let parameter = |slot: &Slot, role| Parameter {
+        name: slot.name.clone(),
+        len: slot.len,
+        role,
+    };
+    let inputs = program
         .inputs()
         .iter()
-        .map(|slot| EntryParameter {
-            name: slot.name.clone(),
-            len: slot.len,
-            role: if is_in(program.outputs(), &slot.name) {
-                Role::InOut
-            } else if slot.name == "h" {
-                Role::Scalar
-            } else {
-                Role::Input
-            },
-        })
-        .collect();
-    for slot in program.outputs() {
-        if !is_in(program.inputs(), &slot.name) {
-            parameters.push(EntryParameter {
-                name: slot.name.clone(),
-                len: slot.len,
-                role: Role::Output,
-            });
-        }
-    }
+        .map(|slot| match slot.name.as_str() {
+            name if is_in(program.outputs(), name) => parameter(slot, Role::InOut),
+            "h" => parameter(slot, Role::Scalar),
+            _ => parameter(slot, Role::Input),
+        });
+    let outputs = program.outputs().iter();
+    let written = outputs.filter(|slot| !is_in(program.inputs(), &slot.name));
+    let written = written.map(|slot| parameter(slot, Role::Output));
+    let parameters = inputs.chain(written).collect();
     FunctionSpec {
         name,
         program,
@@ -455,13 +409,8 @@ fn equations(system: &Equations<'_>, phase: usize) -> Result<Vec<String>, LowerE
                 (false, false) => " + ",
                 (false, true) => " - ",
             };
-            let text = term.text();
-            let factor = match text {
-                "1" => String::new(),
-                _ if text.contains(['+', '-']) => format!("*({text})"),
-                _ => format!("*{text}"),
-            };
-            right.push_str(&format!("{sign}{:?}{factor}", coefficient.abs()));
+            right.push_str(sign);
+            right.push_str(&summand_words(coefficient.abs(), term.text()));
         }
         if terms.is_empty() {
             right.push('0');

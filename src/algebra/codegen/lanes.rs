@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::code::{Expr, Index, Infix, Stmt};
+use super::code::{Expr, Index, Stmt};
 use super::ident::Ident;
-use crate::ir::LANES;
+use crate::ir::{Binary, LANES};
 
 /// One row of [`Statement::Separable`](crate::ir::Statement); expressions are in terms of the variable
 /// `column`.
@@ -70,7 +70,7 @@ impl Row {
             }
         }
         let total = Expr::LaneTotal(sums.clone());
-        let total = Expr::infix(Infix::Add, self.start.clone(), total);
+        let total = Expr::infix(Binary::Add, self.start.clone(), total);
         body.push(Stmt::Assign(self.sum.clone(), total));
         body
     }
@@ -113,16 +113,16 @@ impl Row {
         }
         let lane_sum = (0..width / LANES)
             .map(|k| Expr::Element(terms.clone(), Index::variable(lane).shifted(LANES * k)))
-            .reduce(|sum, term| Expr::infix(Infix::Add, sum, term));
+            .reduce(|sum, term| Expr::infix(Binary::Add, sum, term));
         let p = |index: Index| Expr::Element(sums.clone(), index);
         let lane_sum = lane_sum.expect("a row has columns");
         let assign = Stmt::Assign(p(Index::variable(lane)), lane_sum);
         body.push(Stmt::Declare(sums.clone(), LANES));
         body.push(Stmt::For(lane.clone(), LANES, vec![assign]));
-        let pair = |a: Expr, b: Expr| Expr::infix(Infix::Add, a, b);
+        let pair = |a: Expr, b: Expr| Expr::infix(Binary::Add, a, b);
         let half = |l: usize| pair(p(Index::fixed(l)), p(Index::fixed(l + LANES / 2)));
         let total = pair(pair(half(0), half(2)), pair(half(1), half(3)));
-        let total = Expr::infix(Infix::Add, self.start.clone(), total);
+        let total = Expr::infix(Binary::Add, self.start.clone(), total);
         body.push(Stmt::Assign(self.sum.clone(), total));
         body
     }

@@ -7,46 +7,37 @@ pub fn braced(elements: &[String], indent: &str) -> String {
     format!("{{{}}}", lines.join(&format!(",{indent}")))
 }
 
-/// Each paragraph broken at spaces into lines of at most `width` bytes where possible;
-/// continued lines are indented by two spaces.
+/// Each paragraph as [`wrapped`]; continued lines are indented by two spaces.
 pub fn comment_lines(paragraphs: &[String], width: usize) -> Vec<String> {
+    let paragraphs = paragraphs.iter();
+    paragraphs
+        .flat_map(|text| wrapped(text, width, " "))
+        .collect()
+}
+
+/// A paragraph broken at spaces into lines of at most `width` bytes where possible; continued lines
+/// begin with `indent`, which a space follows if it is not empty.
+pub fn wrapped(paragraph: &str, width: usize, indent: &str) -> Vec<String> {
     let mut lines = Vec::new();
-    for paragraph in paragraphs {
-        let mut line = String::new();
-        for word in paragraph.split_whitespace() {
-            if !line.is_empty() && line.len() + 1 + word.len() > width {
-                lines.push(std::mem::replace(&mut line, " ".to_owned()));
-            }
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
+    let mut line = String::new();
+    for word in paragraph.split_whitespace() {
+        if !line.is_empty() && line.len() + 1 + word.len() > width {
+            lines.push(std::mem::replace(&mut line, indent.to_owned()));
         }
-        lines.push(line);
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line.push_str(word);
     }
+    lines.push(line);
     lines
 }
 
 /// The text without trailing spaces or several blank lines in a row, ending with one newline.
 pub fn tidy(text: &str) -> String {
-    let mut result = String::with_capacity(text.len());
-    let mut blank = true;
-    for line in text.lines().map(str::trim_end) {
-        if line.is_empty() {
-            if !blank {
-                result.push('\n');
-            }
-            blank = true;
-        } else {
-            result.push_str(line);
-            result.push('\n');
-            blank = false;
-        }
-    }
-    while result.ends_with("\n\n") {
-        result.pop();
-    }
-    result
+    let mut lines: Vec<&str> = text.lines().map(str::trim_end).collect();
+    lines.dedup_by(|next, line| next.is_empty() && line.is_empty());
+    lines.join("\n").trim_matches('\n').to_owned() + "\n"
 }
 
 #[cfg(test)]

@@ -43,25 +43,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn literal_read_back_to_the_same_bits() {
-        for value in [0.36, -0.0, 1e-300, 5e-324, 1e16, 123_456_789.0, 0.1 + 0.2] {
+    fn literals_read_back_to_the_same_bits_and_in_single_precision_to_the_nearest_number() {
+        for value in [
+            0.36,
+            -0.0,
+            1e-300,
+            5e-324,
+            1e16,
+            123_456_789.0,
+            0.1 + 0.2,
+            1e-44,
+            16_777_217.0,
+        ] {
             let literal = Literal::new(value).expect("finite");
-            let text = literal.to_string();
-            let back: f64 = text.parse().expect("a number");
-            assert_eq!(back.to_bits(), value.to_bits(), "{text}");
-            assert!(text.contains(['.', 'e']), "{text} would be an integer in C");
-        }
-    }
-
-    #[test]
-    fn literal_in_single_precision_reads_back_to_the_nearest_number() {
-        for value in [0.36, 1.0 / 3.0, 1e-44, 16_777_217.0, 1e16] {
-            let text = Literal::new(value)
-                .expect("finite")
-                .digits(Precision::Single);
-            let back: f32 = text.parse().expect("a number");
-            assert_eq!(back.to_bits(), (value as f32).to_bits(), "{text}");
-            assert!(text.contains(['.', 'e']), "{text} would be an integer in C");
+            let texts = [Precision::Double, Precision::Single].map(|of| literal.digits(of));
+            let (double, single): (f64, f32) = (
+                texts[0].parse().expect("a number"),
+                texts[1].parse().expect("a number"),
+            );
+            assert_eq!(double.to_bits(), value.to_bits(), "{texts:?}");
+            assert_eq!(single.to_bits(), (value as f32).to_bits(), "{texts:?}");
+            let has_point = |text: &String| text.contains(['.', 'e']);
+            assert!(
+                texts.iter().all(has_point),
+                "{texts:?} would be integers in C"
+            );
         }
     }
 

@@ -19,6 +19,7 @@ mod lanes;
 pub mod line_wrapping;
 mod literal;
 mod map_equations;
+mod phase_text;
 mod precision;
 mod printer;
 mod requirements;

@@ -17,6 +17,14 @@ pub enum Precision {
 }
 
 impl Precision {
+    /// Bits of a number.
+    pub fn bits(self) -> usize {
+        match self {
+            Self::Double => 64,
+            Self::Single => 32,
+        }
+    }
+
     /// Points of a block of a batch: what the widest common registers hold.
     pub fn lanes(self) -> usize {
         match self {

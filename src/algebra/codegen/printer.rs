@@ -1,8 +1,10 @@
 //! The one place that owns precedence, parentheses, indentation and line width.
 
-use super::code::{Argument, ConstTable, Expr, Function, Index, Infix, Stmt};
+use super::code::{Expr, Function, Index, Stmt};
 use super::dialect::{Dialect, LaneDialect};
 use super::fours::Fours;
+use super::ident::Ident;
+use crate::ir::Binary;
 
 /// Longest line before an expression is broken, in characters.
 const WIDTH: usize = 100;
@@ -36,13 +38,17 @@ impl<'a> Printer<'a> {
         }
     }
 
-    /// A function with its documentation; ends without a newline.
-    pub fn function(&self, function: &Function) -> String {
-        let mut text = self.dialect.docs(&function.docs);
-        text.push_str(&self.dialect.signature(function));
-        text.push_str(" {\n");
+    /// A function behind its head, with a mention of each parameter that nothing reads; ends without
+    /// a newline.
+    pub fn function(
+        &self,
+        head: &str,
+        mention: impl Fn(&Ident) -> String,
+        function: &Function,
+    ) -> String {
+        let mut text = format!("{head} {{\n");
         for parameter in &function.unused {
-            self.line(&self.dialect.discard(&parameter.to_string()), 1, &mut text);
+            self.line(&mention(parameter), 1, &mut text);
         }
         self.block(&function.body, 1, &mut text);
         text.push('}');
@@ -64,66 +70,34 @@ impl<'a> Printer<'a> {
         text
     }
 
-    /// A constant table.
-    pub fn table(&self, table: &ConstTable) -> String {
-        self.dialect.table(table)
-    }
-
     fn block(&self, statements: &[Stmt], depth: usize, text: &mut String) {
         for statement in statements {
-            match statement {
+            let line = match statement {
                 Stmt::For(variable, count, body) => {
                     let head = self.dialect.for_loop(&variable.to_string(), *count);
-                    let (open, close) = self.dialect.loop_ends();
-                    self.line(&format!("{head}{open}"), depth, text);
-                    self.in_loop().block(body, depth + 1, text);
-                    if let Some(close) = close {
-                        self.line(close, depth, text);
-                    }
+                    self.in_loop().looped(&head, body, depth, text);
+                    continue;
                 }
-                Stmt::Let(name, value) => {
-                    let value = self.expression(value);
-                    self.line(
-                        &self.dialect.let_scalar(&name.to_string(), &value),
-                        depth,
-                        text,
-                    );
+                Stmt::ForLanes(variable, body) => {
+                    let lanes = self.lane_dialect();
+                    let inside = Self {
+                        lanes: Some(lanes),
+                        ..*self
+                    };
+                    inside.looped(&lanes.for_lanes(&variable.to_string()), body, depth, text);
+                    continue;
                 }
-                Stmt::LetArray(name, elements) => {
-                    let elements: Vec<String> =
-                        elements.iter().map(|e| self.expression(e)).collect();
-                    self.line(
-                        &self.dialect.let_array(&name.to_string(), &elements),
-                        depth,
-                        text,
-                    );
+                Stmt::Row(row) => {
+                    let statements = match self.dialect.lanes() {
+                        Some(_) => row.in_lanes(),
+                        None => row.in_columns(),
+                    };
+                    self.block(&statements, depth, text);
+                    continue;
                 }
-                Stmt::Declare(name, len) => {
-                    self.line(&self.dialect.declare(&name.to_string(), *len), depth, text);
-                }
-                Stmt::Assign(target, value) => self.assign(target, " = ", value, depth, text),
-                Stmt::AddAssign(target, value) => match (self.multiply_add, value) {
-                    (Some(_), Expr::Infix(Infix::Mul, ..)) => {
-                        let sum = Expr::infix(Infix::Add, target.clone(), value.clone());
-                        self.assign(target, " = ", &sum, depth, text);
-                    }
-                    (_, value) if !self.dialect.adds_in_place() => {
-                        let sum = Expr::infix(Infix::Add, target.clone(), value.clone());
-                        self.assign(target, " = ", &sum, depth, text);
-                    }
-                    (_, value) => self.assign(target, " += ", value, depth, text),
-                },
-                Stmt::SinCos {
-                    arguments,
-                    sines,
-                    cosines,
-                } => {
-                    let arguments = [
-                        Argument::Read(arguments.clone()),
-                        Argument::Write(sines.clone()),
-                        Argument::Write(cosines.clone()),
-                    ];
-                    self.line(&self.dialect.call(None, &arguments), depth, text);
+                Stmt::Fours(fours) => {
+                    self.fours(fours, depth, text);
+                    continue;
                 }
                 Stmt::SinCosLane {
                     argument,
@@ -136,44 +110,59 @@ impl<'a> Printer<'a> {
                     for line in self.dialect.sin_cos_lane(&argument, &names, *is_used) {
                         self.line(&line, depth, text);
                     }
+                    continue;
                 }
-                Stmt::Row(row) => match self.dialect.lanes() {
-                    Some(_) => self.block(&row.in_lanes(), depth, text),
-                    None => self.block(&row.in_columns(), depth, text),
-                },
-                Stmt::Fours(fours) => self.fours(fours, depth, text),
-                Stmt::DeclareLanes(sums) => {
-                    let declare = self.lane_dialect().declare(&sums.to_string());
-                    self.line(&declare, depth, text);
+                Stmt::Let(name, value) => {
+                    let value = self.expression(value);
+                    self.dialect.let_scalar(&name.to_string(), &value)
                 }
-                Stmt::ForLanes(variable, body) => {
-                    let lanes = self.lane_dialect();
-                    let head = lanes.for_lanes(&variable.to_string());
-                    let (open, close) = self.dialect.loop_ends();
-                    self.line(&format!("{head}{open}"), depth, text);
-                    let inside = Self {
-                        lanes: Some(lanes),
-                        ..*self
-                    };
-                    inside.block(body, depth + 1, text);
-                    if let Some(close) = close {
-                        self.line(close, depth, text);
+                Stmt::LetArray(name, elements) => {
+                    let elements: Vec<_> = elements.iter().map(|e| self.expression(e)).collect();
+                    self.dialect.let_array(&name.to_string(), &elements)
+                }
+                Stmt::Declare(name, len) => self.dialect.declare(&name.to_string(), *len),
+                Stmt::Assign(target, value) => self.assign(target, " = ", value),
+                Stmt::AddAssign(target, value) => {
+                    let is_product = matches!(value, Expr::Infix(Binary::Mul, ..));
+                    let is_fused = self.multiply_add.is_some() && is_product;
+                    match is_fused || !self.dialect.adds_in_place() {
+                        true => {
+                            let sum = Expr::infix(Binary::Add, target.clone(), value.clone());
+                            self.assign(target, " = ", &sum)
+                        }
+                        false => self.assign(target, " += ", value),
                     }
                 }
-                Stmt::Call(callee, arguments) => {
-                    let call = self.dialect.call(Some(&callee.to_string()), arguments);
-                    self.line(&call, depth, text);
+                Stmt::DeclareLanes(sums) => self.lane_dialect().declare(&sums.to_string()),
+                Stmt::Call {
+                    callee,
+                    read,
+                    written,
+                } => {
+                    let callee = callee.as_ref().map(Ident::to_string);
+                    self.dialect.call(callee.as_deref(), read, written)
                 }
-            }
+            };
+            self.line(&line, depth, text);
+        }
+    }
+
+    /// A loop whose body this printer prints.
+    fn looped(&self, head: &str, body: &[Stmt], depth: usize, text: &mut String) {
+        let (open, close) = self.dialect.loop_ends();
+        self.line(&format!("{head}{open}"), depth, text);
+        self.block(body, depth + 1, text);
+        if let Some(close) = close {
+            self.line(close, depth, text);
         }
     }
 
     fn fours(&self, fours: &Fours, depth: usize, text: &mut String) {
-        let Some(dialect) = self.dialect.fours() else {
-            return self.block(&fours.one_by_one(), depth, text);
-        };
         for block in &fours.blocks {
-            for (inner, line) in dialect.block(fours, block) {
+            let Some(lines) = self.dialect.fours(fours, block) else {
+                return self.block(&fours.one_by_one(), depth, text);
+            };
+            for (inner, line) in lines {
                 self.line(&line, depth + inner, text);
             }
         }
@@ -184,7 +173,7 @@ impl<'a> Printer<'a> {
         self.dialect.lanes().expect("a dialect with lanes")
     }
 
-    fn assign(&self, target: &Expr, op: &str, value: &Expr, depth: usize, text: &mut String) {
+    fn assign(&self, target: &Expr, op: &str, value: &Expr) -> String {
         let value = self.expression(value);
         let outside = Self {
             lanes: None,
@@ -194,8 +183,7 @@ impl<'a> Printer<'a> {
             (Expr::Element(..), Some(lanes)) => lanes.write(&outside.expression(target)),
             _ => self.expression(target),
         };
-        let line = format!("{target}{op}{value}{}", self.dialect.terminator());
-        self.line(&line, depth, text);
+        format!("{target}{op}{value}{}", self.dialect.terminator())
     }
 
     /// Adds a line, broken at spaces if it is too wide.
@@ -247,8 +235,8 @@ impl<'a> Printer<'a> {
                 // Sums and products group to the left; a right operand of the same kind keeps
                 // its parentheses, because floating-point sums do not associate.
                 let (own, right) = match op {
-                    Infix::Add | Infix::Sub => (Precedence::Sum, Precedence::Product),
-                    Infix::Mul | Infix::Div => (Precedence::Product, Precedence::Atom),
+                    Binary::Add | Binary::Sub => (Precedence::Sum, Precedence::Product),
+                    Binary::Mul | Binary::Div => (Precedence::Product, Precedence::Atom),
                 };
                 let right = if starts_with_minus(b) {
                     Precedence::Atom
@@ -272,20 +260,22 @@ impl<'a> Printer<'a> {
 
     /// `a*b + c` and its like by the dialect's function, if it has one; the same two roundings, unless
     /// the target can fuse them.
-    fn multiply_added(&self, op: Infix, a: &Expr, b: &Expr) -> Option<String> {
+    fn multiply_added(&self, op: Binary, a: &Expr, b: &Expr) -> Option<String> {
         let name = self.multiply_add?;
         let (first, second, rest) = match (op, product(a), product(b)) {
-            (Infix::Add, _, Some((x, y))) => (self.expression(x), y, self.expression(a)),
-            (Infix::Add, Some((x, y)), None) => (self.expression(x), y, self.expression(b)),
-            (Infix::Sub, _, Some((x, y))) => {
+            (Binary::Add, _, Some((x, y))) => (self.expression(x), y, self.expression(a)),
+            (Binary::Add, Some((x, y)), None) => (self.expression(x), y, self.expression(b)),
+            (Binary::Sub, _, Some((x, y))) => {
                 let negated = format!("-{}", self.operand(x, Precedence::Atom));
                 (negated, y, self.expression(a))
             }
-            (Infix::Sub, Some((x, y)), None) => {
+            (Binary::Sub, Some((x, y)), None) => {
                 let negated = format!("-{}", self.operand(b, Precedence::Atom));
                 (self.expression(x), y, negated)
             }
-            (Infix::Add | Infix::Sub, None, None) | (Infix::Mul | Infix::Div, ..) => return None,
+            (Binary::Add | Binary::Sub, None, None) | (Binary::Mul | Binary::Div, ..) => {
+                return None;
+            }
         };
         Some(format!(
             "{name}({first}, {}, {rest})",
@@ -314,14 +304,14 @@ fn precedence(expr: &Expr) -> Precedence {
         | Expr::LaneTotal(_)
         | Expr::Apply(..) => Precedence::Atom,
         Expr::Negate(_) => Precedence::Sign,
-        Expr::Infix(Infix::Add | Infix::Sub, ..) => Precedence::Sum,
-        Expr::Infix(Infix::Mul | Infix::Div, ..) => Precedence::Product,
+        Expr::Infix(Binary::Add | Binary::Sub, ..) => Precedence::Sum,
+        Expr::Infix(Binary::Mul | Binary::Div, ..) => Precedence::Product,
     }
 }
 
 fn product(expr: &Expr) -> Option<(&Expr, &Expr)> {
     match expr {
-        Expr::Infix(Infix::Mul, a, b) => Some((a, b)),
+        Expr::Infix(Binary::Mul, a, b) => Some((a, b)),
         _ => None,
     }
 }
@@ -331,8 +321,8 @@ fn starts_with_minus(expr: &Expr) -> bool {
     match expr {
         Expr::Literal(literal) => literal.is_negative(),
         Expr::Negate(_) => true,
-        Expr::Infix(Infix::Mul | Infix::Div, a, _) => starts_with_minus(a),
-        Expr::Infix(Infix::Add | Infix::Sub, ..)
+        Expr::Infix(Binary::Mul | Binary::Div, a, _) => starts_with_minus(a),
+        Expr::Infix(Binary::Add | Binary::Sub, ..)
         | Expr::Name(_)
         | Expr::Element(..)
         | Expr::Entry(..)
@@ -344,22 +334,15 @@ fn starts_with_minus(expr: &Expr) -> bool {
 
 /// A subscript such as `4*i + 3`.
 pub fn subscript(index: &Index) -> String {
-    let mut text = String::new();
-    for (stride, name) in index.terms.iter().filter(|(stride, _)| *stride != 0) {
-        if !text.is_empty() {
-            text.push_str(" + ");
-        }
-        if *stride == 1 {
-            text.push_str(&name.to_string());
-        } else {
-            text.push_str(&format!("{stride}*{name}"));
-        }
+    let terms = index.terms.iter().filter(|(stride, _)| *stride != 0);
+    let terms = terms.map(|(stride, name)| match stride {
+        1 => name.to_string(),
+        _ => format!("{stride}*{name}"),
+    });
+    let offset = (index.offset != 0).then(|| index.offset.to_string());
+    let parts: Vec<String> = terms.chain(offset).collect();
+    match parts.as_slice() {
+        [] => "0".to_owned(),
+        parts => parts.join(" + "),
     }
-    if text.is_empty() {
-        return index.offset.to_string();
-    }
-    if index.offset != 0 {
-        text.push_str(&format!(" + {}", index.offset));
-    }
-    text
 }

@@ -6,17 +6,9 @@ use super::ident::Ident;
 /// Whether the statements call the sine-and-cosine kernel.
 pub fn calls_kernel(body: &[Stmt]) -> bool {
     body.iter().any(|statement| match statement {
-        Stmt::SinCos { .. } | Stmt::SinCosLane { .. } => true,
-        Stmt::For(_, _, body) | Stmt::ForLanes(_, body) => calls_kernel(body),
-        Stmt::Let(..)
-        | Stmt::LetArray(..)
-        | Stmt::Declare(..)
-        | Stmt::Assign(..)
-        | Stmt::AddAssign(..)
-        | Stmt::Call(..)
-        | Stmt::Row(_)
-        | Stmt::Fours(_)
-        | Stmt::DeclareLanes(_) => false,
+        Stmt::Call { callee, .. } => callee.is_none(),
+        Stmt::SinCosLane { .. } => true,
+        other => calls_kernel(other.inner()),
     })
 }
 
@@ -24,18 +16,7 @@ pub fn calls_kernel(body: &[Stmt]) -> bool {
 pub fn assigned_in_lanes(body: &[Stmt]) -> Vec<Ident> {
     let assigned = |statement: &Stmt| match statement {
         Stmt::Row(row) => vec![row.slopes.clone()],
-        Stmt::For(_, _, body) => assigned_in_lanes(body),
-        Stmt::Let(..)
-        | Stmt::LetArray(..)
-        | Stmt::Declare(..)
-        | Stmt::Assign(..)
-        | Stmt::AddAssign(..)
-        | Stmt::SinCos { .. }
-        | Stmt::SinCosLane { .. }
-        | Stmt::Call(..)
-        | Stmt::Fours(_)
-        | Stmt::DeclareLanes(_)
-        | Stmt::ForLanes(..) => Vec::new(),
+        other => assigned_in_lanes(other.inner()),
     };
     body.iter().flat_map(assigned).collect()
 }
@@ -49,19 +30,13 @@ pub fn has_fours(body: &[Stmt]) -> bool {
 /// Whether the statements apply a function.
 pub fn calls_function(body: &[Stmt], function: MathFunction) -> bool {
     body.iter().any(|statement| match statement {
-        Stmt::Let(_, value) => applies(value, function),
+        Stmt::Let(_, value) | Stmt::Assign(_, value) | Stmt::AddAssign(_, value) => {
+            applies(value, function)
+        }
         Stmt::LetArray(_, elements) => elements.iter().any(|value| applies(value, function)),
-        Stmt::Assign(_, value) | Stmt::AddAssign(_, value) => applies(value, function),
         Stmt::SinCosLane { argument, .. } => applies(argument, function),
-        Stmt::For(_, _, body) => calls_function(body, function),
-        Stmt::ForLanes(_, body) => calls_function(body, function),
         // A row has sums of products only.
-        Stmt::Declare(..)
-        | Stmt::SinCos { .. }
-        | Stmt::Call(..)
-        | Stmt::Row(_)
-        | Stmt::Fours(_)
-        | Stmt::DeclareLanes(_) => false,
+        other => calls_function(other.inner(), function),
     })
 }
 

@@ -19,44 +19,33 @@ pub struct KernelText {
     pub sin: Vec<String>,
     /// Coefficients of the cosine.
     pub cos: Vec<String>,
+    /// From bit 1 of a number to its sign.
+    pub to_sign: usize,
 }
 
 impl KernelText {
     /// The constants in a precision, each spelled by `spell`.
     pub fn new(precision: Precision, spell: &dyn Fn(Literal) -> String) -> Self {
-        match precision {
-            Precision::Double => Self::spelled(
-                spell,
-                [sin_cos::LIMIT, sin_cos::TWO_OVER_PI, sin_cos::ROUND],
-                [&sin_cos::PI_2, &sin_cos::SIN, &sin_cos::COS],
-            ),
-            Precision::Single => {
-                let wide = |values: [f32; 3]| values.map(f64::from);
-                Self::spelled(
-                    spell,
-                    wide([
-                        sin_cos_f32::LIMIT,
-                        sin_cos_f32::TWO_OVER_PI,
-                        sin_cos_f32::ROUND,
-                    ]),
-                    [
-                        &wide(sin_cos_f32::PI_2),
-                        &wide(sin_cos_f32::SIN),
-                        &wide(sin_cos_f32::COS),
-                    ],
-                )
+        let wide = |values: [f32; 3]| values.map(f64::from);
+        let (single, lists) = match precision {
+            Precision::Double => {
+                use sin_cos::{COS, LIMIT, PI_2, ROUND, SIN, TWO_OVER_PI};
+                let lists = [PI_2.to_vec(), SIN.to_vec(), COS.to_vec()];
+                ([LIMIT, TWO_OVER_PI, ROUND], lists)
             }
-        }
-    }
-
-    fn spelled(spell: &dyn Fn(Literal) -> String, single: [f64; 3], lists: [&[f64]; 3]) -> Self {
+            Precision::Single => {
+                use sin_cos_f32::{COS, LIMIT, PI_2, ROUND, SIN, TWO_OVER_PI};
+                let lists = [PI_2, SIN, COS].map(|values| wide(values).to_vec());
+                (wide([LIMIT, TWO_OVER_PI, ROUND]), lists)
+            }
+        };
         let text =
             |value: f64| spell(Literal::new(value).expect("the kernel's constants are finite"));
-        let signed = |&value: &f64| match value < 0.0 {
+        let signed = |value: f64| match value < 0.0 {
             true => format!("({})", text(value)),
             false => text(value),
         };
-        let [pi_2, sin, cos] = lists.map(|values| values.iter().map(signed).collect());
+        let [pi_2, sin, cos] = lists.map(|values| values.into_iter().map(signed).collect());
         let [limit, two_over_pi, round] = single.map(text);
         Self {
             limit,
@@ -65,6 +54,7 @@ impl KernelText {
             pi_2,
             sin,
             cos,
+            to_sign: precision.bits() - 2,
         }
     }
 }

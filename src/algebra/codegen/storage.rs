@@ -6,28 +6,27 @@ use super::code::{Expr, Index, Role, Span, Stmt};
 use super::ident::Ident;
 use super::literal::Literal;
 use super::translate::Translator;
-use crate::ir::{ResultEntry, Statement, ValueId};
+use crate::ir::{Statement, ValueId};
 
 /// Arrays shorter than this are copied element by element, not in loops: what reads a short
 /// array wholly would wait for the stores of several loops.
 const LONGEST_LIST: usize = 24;
 
-/// Where the rows of a matrix of values live: `array[offset + stride * row + col]`.
+/// Where the rows of a matrix of values live: `stride` apart in an array, from the home's first element on.
 pub(super) struct MatrixStorage {
-    pub array: Ident,
-    pub offset: usize,
+    pub home: Span,
     pub stride: usize,
 }
 
 impl MatrixStorage {
     /// The entry at two loop variables.
     pub fn element(&self, row: &Ident, col: &Ident) -> Expr {
-        Expr::Element(self.array.clone(), self.index(row, col))
+        Expr::Element(self.home.array.clone(), self.index(row, col))
     }
 
     /// Where in the array that is.
     pub fn index(&self, row: &Ident, col: &Ident) -> Index {
-        let row = Index::fixed(self.offset).plus(self.stride, row);
+        let row = Index::fixed(self.home.offset).plus(self.stride, row);
         row.plus(1, col)
     }
 }
@@ -209,7 +208,7 @@ impl Translator<'_> {
     pub(super) fn allocate(&mut self, first: usize, home: Span) -> Span {
         for k in 0..home.len {
             let index = Index::fixed(home.offset + k);
-            self.spelled[first + k] = Some((Expr::Element(home.array.clone(), index), 0));
+            self.spell(first + k, Expr::Element(home.array.clone(), index));
         }
         home
     }
@@ -217,24 +216,8 @@ impl Translator<'_> {
     /// The output array, if the values are just a run of its elements and nothing in it is
     /// still to be read.
     pub(super) fn output_home(&self, first: usize, len: usize) -> Option<Span> {
-        let results = self.program.results();
-        let at = results
-            .iter()
-            .position(|entry| entry.value.index() == first)?;
-        let run: &[ResultEntry] = results.get(at..at + len)?;
-        let slot = run[0].slot;
-        let fits = run
-            .iter()
-            .enumerate()
-            .all(|(k, entry)| entry.slot == slot && entry.value.index() == first + k);
-        let output = &self.names.outputs[slot];
-        (fits && output.role == Role::Output).then(|| Span {
-            array: output.name.clone(),
-            offset: run[0].index,
-            len,
-            of: output.len,
-            is_parameter: true,
-        })
+        let row = self.output_matrix(first, 1, len)?;
+        Some(row.home)
     }
 
     /// Reserves `rows x cols` elements for values, row by row in an output where they belong
@@ -245,23 +228,23 @@ impl Translator<'_> {
         rows: usize,
         cols: usize,
     ) -> MatrixStorage {
-        let home = self.output_matrix(first, rows, cols).unwrap_or_else(|| {
+        let matrix = self.output_matrix(first, rows, cols).unwrap_or_else(|| {
             let array = self.names.locals.mint("m");
             self.body.push(Stmt::Declare(array.clone(), rows * cols));
             MatrixStorage {
-                array,
-                offset: 0,
+                home: local(array, rows * cols),
                 stride: cols,
             }
         });
         for r in 0..rows {
-            for i in 0..cols {
-                let index = Index::fixed(home.offset + home.stride * r + i);
-                let element = Expr::Element(home.array.clone(), index);
-                self.spelled[first + r * cols + i] = Some((element, 0));
-            }
+            let row = Span {
+                offset: matrix.home.offset + matrix.stride * r,
+                len: cols,
+                ..matrix.home.clone()
+            };
+            self.allocate(first + r * cols, row);
         }
-        home
+        matrix
     }
 
     /// The output array in which each row is a run of elements, all equally far apart.
@@ -288,8 +271,13 @@ impl Translator<'_> {
             })
         });
         (fits && output.role == Role::Output).then(|| MatrixStorage {
-            array: output.name.clone(),
-            offset: results[at].index,
+            home: Span {
+                array: output.name.clone(),
+                offset: results[at].index,
+                len: rows * cols,
+                of: output.len,
+                is_parameter: true,
+            },
             stride,
         })
     }

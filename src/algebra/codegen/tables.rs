@@ -2,7 +2,6 @@
 
 use super::code::ConstTable;
 use super::ident::{Ident, Namer};
-use super::literal::Literal;
 use crate::ir::Table;
 
 /// The constant tables of a file; equal tables are stored once.
@@ -10,7 +9,7 @@ use crate::ir::Table;
 pub struct Tables {
     namer: Namer,
     base: String,
-    known: Vec<(Table, ConstTable)>,
+    known: Vec<ConstTable>,
 }
 
 impl Tables {
@@ -25,7 +24,7 @@ impl Tables {
 
     /// All tables, in the order of their first use.
     pub fn iter(&self) -> impl Iterator<Item = &ConstTable> {
-        self.known.iter().map(|(_, table)| table)
+        self.known.iter()
     }
 
     /// The name of a table, which is stored if it is new.
@@ -41,22 +40,16 @@ impl Tables {
     }
 
     fn stored(&mut self, table: &Table) -> &mut ConstTable {
-        if let Some(known) = self.known.iter().position(|(known, _)| known == table) {
-            return &mut self.known[known].1;
-        }
-        let name = self
-            .namer
-            .mint(&format!("{}_{}", self.base, self.known.len()));
-        let literal = |&value| Literal::new(value).expect("tables of programs are finite");
-        let printed = ConstTable {
-            name,
-            rows: table.rows(),
-            cols: table.cols(),
-            entries: table.entries().iter().map(literal).collect(),
-            is_in_lanes: false,
-        };
-        self.known.push((table.clone(), printed));
-        let last = self.known.len() - 1;
-        &mut self.known[last].1
+        let known = self.known.iter().position(|known| known.values == *table);
+        let place = known.unwrap_or_else(|| {
+            let place = self.known.len();
+            self.known.push(ConstTable {
+                name: self.namer.mint(&format!("{}_{place}", self.base)),
+                values: table.clone(),
+                is_in_lanes: false,
+            });
+            place
+        });
+        &mut self.known[place]
     }
 }

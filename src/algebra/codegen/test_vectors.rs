@@ -1,8 +1,9 @@
 //! Input and output vectors for self-tests of generated code, made by the interpreter.
 
 use super::code::Role;
-use super::interface::{FunctionSpec, PhaseInterface};
-use super::precision::Precision;
+use super::interface::{FunctionSpec, ModelInterface, PhaseInterface};
+use super::literal::Literal;
+use super::precision::{Precision, rounded_up};
 use super::test_points::{BatchPoints, N_BATCH, Random, point};
 use crate::ir::{Range, rounding_errors};
 
@@ -14,13 +15,67 @@ pub const N_POINTS: usize = 6;
 /// none for a wrong coefficient.
 pub const TOLERANCE_F64: f64 = 1e-11;
 
+/// What the self-test of a model compares.
+pub struct TestVectors<'a> {
+    /// Of each function.
+    pub functions: Vec<FunctionVectors>,
+    /// Of the batch of each phase.
+    pub batches: Vec<Batch<'a>>,
+}
+
+impl<'a> TestVectors<'a> {
+    /// The vectors of all functions in a precision.
+    pub fn new(entries: &'a ModelInterface, precision: Precision) -> Self {
+        let functions = entries.all().map(|entry| vectors(entry, precision));
+        let batches = entries.phases.iter();
+        Self {
+            functions: functions.collect(),
+            batches: batches.map(|phase| Batch::new(phase, precision)).collect(),
+        }
+    }
+}
+
+/// The batch of a phase.
+pub struct Batch<'a> {
+    /// Name of the phase as an identifier.
+    pub phase: &'a str,
+    /// First elements of the arrays, and an angle that the batch meets.
+    pub points: BatchPoints,
+    /// Absolute tolerance of single precision.
+    pub tolerance: String,
+}
+
+impl<'a> Batch<'a> {
+    fn new(phase: &'a PhaseInterface, precision: Precision) -> Self {
+        let points = BatchPoints::new(phase, precision);
+        Self {
+            phase: phase.identifier.as_str(),
+            tolerance: match precision {
+                Precision::Double => String::new(),
+                Precision::Single => rounded_up(batch_tolerance(phase, &points)),
+            },
+            points,
+        }
+    }
+}
+
 /// The vectors of a function.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FunctionVectors {
+    /// Name of the function without the model's.
+    pub name: String,
     /// Those of its parameters, in order.
     pub parameters: Vec<ParameterVectors>,
-    /// At how many of the points all results are finite.
-    pub defined: usize,
+    /// Whether all results are finite at one of the points.
+    pub is_defined: bool,
+}
+
+impl FunctionVectors {
+    /// The arguments of a call, each as `spell` prints it.
+    pub fn arguments(&self, spell: impl Fn(&ParameterVectors) -> String) -> String {
+        let arguments: Vec<String> = self.parameters.iter().map(spell).collect();
+        arguments.join(", ")
+    }
 }
 
 /// What a parameter holds at each point: before the call, and what is expected after it.
@@ -41,12 +96,42 @@ pub struct ParameterVectors {
     pub tolerance_single: f64,
 }
 
+impl ParameterVectors {
+    /// Whether the function writes it.
+    pub fn is_written(&self) -> bool {
+        matches!(self.role, Role::Output | Role::InOut)
+    }
+
+    /// The tolerance of single precision in print.
+    pub fn tolerance(&self) -> String {
+        rounded_up(self.tolerance_single)
+    }
+
+    /// Values of all points, a row each: literals as `spell` prints them, and the target's words for
+    /// what is not a number or infinite.
+    pub fn rows(
+        &self,
+        values: &[f64],
+        spell: impl Fn(Literal) -> String,
+        [nan, infinite, negative]: [&str; 3],
+    ) -> Vec<Vec<String>> {
+        let text = |&value: &f64| match Literal::new(value) {
+            Some(literal) => spell(literal),
+            None if value.is_nan() => nan.to_owned(),
+            None if value > 0.0 => infinite.to_owned(),
+            None => negative.to_owned(),
+        };
+        let rows = values.chunks(self.len);
+        rows.map(|row| row.iter().map(text).collect()).collect()
+    }
+}
+
 /// Share of the largest value by which single precision may be off where its errors have no bound.
 const TOLERANCE_UNBOUNDED: f64 = 1e-3;
 
 /// The vectors of all parameters of an entry, at points where its results are finite if such points are found;
 /// inputs are numbers of the precision.
-pub fn vectors(entry: &FunctionSpec, precision: Precision) -> FunctionVectors {
+fn vectors(entry: &FunctionSpec, precision: Precision) -> FunctionVectors {
     let mut random = Random::new();
     let parameters = entry.parameters.iter().map(|parameter| ParameterVectors {
         role: parameter.role,
@@ -57,12 +142,13 @@ pub fn vectors(entry: &FunctionSpec, precision: Precision) -> FunctionVectors {
         tolerance_single: 0.0,
     });
     let mut vectors = FunctionVectors {
+        name: entry.name.clone(),
         parameters: parameters.collect(),
-        defined: 0,
+        is_defined: false,
     };
     for _ in 0..N_POINTS {
         let point = point(entry, precision, &mut random);
-        vectors.defined += usize::from(point.is_defined());
+        vectors.is_defined |= point.is_defined();
         let tolerances = match precision {
             Precision::Double => vec![0.0; point.outputs.len()],
             Precision::Single => {
@@ -88,7 +174,7 @@ pub fn vectors(entry: &FunctionSpec, precision: Precision) -> FunctionVectors {
 
 /// Largest accepted difference between a batch and single calls in single precision, both of which
 /// may be off.
-pub fn batch_tolerance(phase: &PhaseInterface, points: &BatchPoints) -> f64 {
+fn batch_tolerance(phase: &PhaseInterface, points: &BatchPoints) -> f64 {
     let mut worst = 0.0_f64;
     for point in 0..N_BATCH {
         let point = points.at(phase, point, Precision::Single);

@@ -2,11 +2,11 @@
 //!
 //! No mathematics happens here: the tree of operations of the program is kept as it is.
 
-use super::code::{Expr, Index, Infix, MathFunction, Parameter, Role, Stmt};
+use super::code::{Expr, Index, MathFunction, Parameter, Role, Stmt};
 use super::ident::{Ident, Namer};
 use super::literal::Literal;
 use super::tables::Tables;
-use crate::ir::{Binary, Program, Statement, Unary, ValueId};
+use crate::ir::{Program, Statement, Unary, ValueId};
 
 /// Deepest nesting of operations in one expression.
 const DEEPEST: usize = 48;
@@ -94,7 +94,9 @@ fn translate_as(program: &Program, names: Names, lane: Option<Ident>) -> Transla
     };
     for (position, statement) in program.statements().iter().enumerate() {
         if let Statement::Constant(value) = statement {
-            translator.constant(program.values_of(position).start, *value);
+            let literal = Literal::new(*value).expect("constants of programs are finite");
+            let value = program.values_of(position).start;
+            translator.spell(value, Expr::Literal(literal));
         }
     }
     for (position, statement) in program.statements().iter().enumerate() {
@@ -138,7 +140,7 @@ impl Translator<'_> {
                         Expr::Element(parameter.name.clone(), Index::fixed(*index))
                     }
                 };
-                self.spelled[first] = Some((expr, 0));
+                self.spell(first, expr);
             }
             Statement::Unary(op, a) => {
                 let (a, depth) = self.read(*a);
@@ -151,7 +153,7 @@ impl Translator<'_> {
             }
             Statement::Binary(op, a, b) => {
                 let ((a, left), (b, right)) = (self.read(*a), self.read(*b));
-                let expr = Expr::infix(infix(*op), a, b);
+                let expr = Expr::infix(*op, a, b);
                 self.define(first, expr, left.max(right) + 1);
             }
             Statement::SinCos { arguments } => self.sin_cos(first, arguments),
@@ -172,11 +174,6 @@ impl Translator<'_> {
         }
     }
 
-    fn constant(&mut self, value: usize, constant: f64) {
-        let literal = Literal::new(constant).expect("constants of programs are finite");
-        self.spelled[value] = Some((Expr::Literal(literal), 0));
-    }
-
     /// Element of a parameter: `array[index]`, or `array[index][lane]` in a block of lanes.
     fn lane_entry(&self, parameter: &Parameter, index: usize) -> Expr {
         let (array, index) = (parameter.name.clone(), Index::fixed(index));
@@ -191,22 +188,24 @@ impl Translator<'_> {
         if self.n_uses[value] <= 1 && depth < DEEPEST {
             self.spelled[value] = Some((expr, depth));
         } else {
-            let name = self.names.locals.mint("t");
-            self.body.push(Stmt::Let(name.clone(), expr));
-            self.spelled[value] = Some((Expr::Name(name), 0));
+            self.name(value, expr);
         }
+    }
+
+    fn name(&mut self, value: usize, expr: Expr) -> Expr {
+        let name = self.names.locals.mint("t");
+        self.body.push(Stmt::Let(name.clone(), expr));
+        self.spell(value, Expr::Name(name.clone()));
+        Expr::Name(name)
     }
 
     /// A value that is mentioned more than once: a name or an element.
     pub(super) fn named(&mut self, value: ValueId) -> Expr {
         let (expr, depth) = self.read(value);
-        if depth == 0 {
-            return expr;
+        match depth {
+            0 => expr,
+            _ => self.name(value.index(), expr),
         }
-        let name = self.names.locals.mint("t");
-        self.body.push(Stmt::Let(name.clone(), expr));
-        self.spell(value.index(), Expr::Name(name.clone()));
-        Expr::Name(name)
     }
 
     pub(super) fn spell(&mut self, value: usize, expr: Expr) {
@@ -257,15 +256,6 @@ impl Translator<'_> {
             assigned.push(Stmt::Assign(target, value));
         }
         self.body.extend(assigned);
-    }
-}
-
-fn infix(op: Binary) -> Infix {
-    match op {
-        Binary::Add => Infix::Add,
-        Binary::Sub => Infix::Sub,
-        Binary::Mul => Infix::Mul,
-        Binary::Div => Infix::Div,
     }
 }
 

@@ -1,11 +1,11 @@
 //! Array statements as loops.
 
-use super::code::{Argument, Expr, Index, Infix, Span, Stmt};
+use super::code::{Expr, Index, Span, Stmt};
 use super::fours::{FourBlock, Fours};
 use super::ident::Ident;
 use super::lanes::{Row, Run};
 use super::translate::Translator;
-use crate::ir::{Group, LANES, QUAD, QuadSum, Slopes, TableId, ValueId};
+use crate::ir::{Binary, Group, LANES, QUAD, QuadSum, Slopes, TableId, ValueId};
 
 /// A group of functions where its numbers live.
 struct GroupCode {
@@ -29,13 +29,13 @@ impl Translator<'_> {
             }
             return;
         }
-        let arguments = self.span_with_rest(arguments);
+        let read = vec![self.span_with_rest(arguments)];
         let sines = self.padded_home(first, n, "s");
         let cosines = self.padded_home(first + n, n, "c");
-        self.body.push(Stmt::SinCos {
-            arguments,
-            sines,
-            cosines,
+        self.body.push(Stmt::Call {
+            callee: None,
+            read,
+            written: vec![sines, cosines],
         });
     }
 
@@ -79,14 +79,14 @@ impl Translator<'_> {
         for w in weights {
             let product = |index: Index| {
                 let weight = Expr::Element(w.array.clone(), index.clone().shifted(w.offset));
-                Expr::infix(Infix::Mul, entry(index.shifted(row)), weight)
+                Expr::infix(Binary::Mul, entry(index.shifted(row)), weight)
             };
             let blocks = w.len / 4;
             if blocks > 0 {
                 let term = |n: usize| product(Index::fixed(n).plus(4, &k));
-                let front = Expr::infix(Infix::Add, term(0), term(1));
-                let back = Expr::infix(Infix::Add, term(2), term(3));
-                let sum = Expr::infix(Infix::Add, front, back);
+                let front = Expr::infix(Binary::Add, term(0), term(1));
+                let back = Expr::infix(Binary::Add, term(2), term(3));
+                let sum = Expr::infix(Binary::Add, front, back);
                 self.body.push(Stmt::For(k.clone(), blocks, vec![add(sum)]));
             }
             for n in 4 * blocks..w.len {
@@ -173,7 +173,7 @@ impl Translator<'_> {
         }
         let row = Row {
             slope_at: slopes.index(&r, &i),
-            slopes: slopes.array,
+            slopes: slopes.home.array,
             column: i,
             names,
             runs,
@@ -216,11 +216,11 @@ impl Translator<'_> {
 
     pub(super) fn call(&mut self, first: usize, callee: usize, arguments: &[ValueId]) {
         let program = &self.program.callees()[callee];
-        let mut passed = Vec::new();
+        let (mut read, mut written) = (Vec::new(), Vec::new());
         let mut rest = arguments;
         for slot in program.inputs() {
             let (these, others) = rest.split_at(slot.len);
-            passed.push(Argument::Read(self.whole_span(these)));
+            read.push(self.whole_span(these));
             rest = others;
         }
         let mut next = first;
@@ -230,11 +230,15 @@ impl Translator<'_> {
                 Some(home) => self.allocate(next, home),
                 None => self.local_home(next, slot.len, &slot.name),
             };
-            passed.push(Argument::Write(home));
+            written.push(home);
             next += slot.len;
         }
-        let callee = self.names.callees[callee].clone();
-        self.body.push(Stmt::Call(callee, passed));
+        let callee = Some(self.names.callees[callee].clone());
+        self.body.push(Stmt::Call {
+            callee,
+            read,
+            written,
+        });
     }
 }
 
@@ -258,13 +262,13 @@ fn column<'a>(
         let times = |span: &Span| {
             let index = Index::variable(i).shifted(span.offset);
             let element = Expr::Element(span.array.clone(), index);
-            Expr::infix(Infix::Mul, entry(), element)
+            Expr::infix(Binary::Mul, entry(), element)
         };
-        term = Some(joined(term, Infix::Add, times(&group.values)));
+        term = Some(joined(term, Binary::Add, times(&group.values)));
         slope = Some(match &group.slopes {
-            SlopeCode::One => joined(slope, Infix::Add, entry()),
-            SlopeCode::Plus(span) => joined(slope, Infix::Add, times(span)),
-            SlopeCode::Minus(span) => joined(slope, Infix::Sub, times(span)),
+            SlopeCode::One => joined(slope, Binary::Add, entry()),
+            SlopeCode::Plus(span) => joined(slope, Binary::Add, times(span)),
+            SlopeCode::Minus(span) => joined(slope, Binary::Sub, times(span)),
         });
     }
     let invariant = "one group has a part in every column";
@@ -272,10 +276,10 @@ fn column<'a>(
 }
 
 /// `a op b`, or `b` alone (negated for a difference) if there is no `a`.
-fn joined(a: Option<Expr>, op: Infix, b: Expr) -> Expr {
+fn joined(a: Option<Expr>, op: Binary, b: Expr) -> Expr {
     match (a, op) {
         (Some(a), op) => Expr::infix(op, a, b),
-        (None, Infix::Sub) => Expr::Negate(Box::new(b)),
-        (None, Infix::Add | Infix::Mul | Infix::Div) => b,
+        (None, Binary::Sub) => Expr::Negate(Box::new(b)),
+        (None, Binary::Add | Binary::Mul | Binary::Div) => b,
     }
 }

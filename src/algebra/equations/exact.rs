@@ -43,15 +43,20 @@ impl fmt::Display for ExactStep {
 impl ExactStep {
     /// `0.5*sin(z1) + 1.0*z1` for either side; `0` for no term.
     pub fn sum_words(side: &[(f64, String)]) -> String {
-        let words = side.iter().map(|(coefficient, text)| match text.as_str() {
-            "1" => format!("{coefficient:?}"),
-            text if text.contains(['+', '-']) => format!("{coefficient:?}*({text})"),
-            text => format!("{coefficient:?}*{text}"),
-        });
+        let words = side.iter().map(|(xi, text)| summand_words(*xi, text));
         match side {
             [] => "0".to_owned(),
             _ => words.collect::<Vec<_>>().join(" + "),
         }
+    }
+}
+
+/// A coefficient times a term: `0.5*sin(z1)`, `2.0*(z1 + z2)`, `3.0`.
+pub fn summand_words(coefficient: f64, term: &str) -> String {
+    match term {
+        "1" => format!("{coefficient:?}"),
+        _ if term.contains(['+', '-']) => format!("{coefficient:?}*({term})"),
+        _ => format!("{coefficient:?}*{term}"),
     }
 }
 

@@ -36,7 +36,7 @@ mod physical;
 mod system;
 mod unit;
 
-pub use exact::ExactStep;
+pub use exact::{ExactStep, summand_words};
 pub use physical::{LatentUnits, PhysicalError};
 pub use system::{EquationForm, Equations, PhaseEquations, Summand};
 pub use unit::Unit;

@@ -300,10 +300,14 @@ fn locked(lock: io::Result<()>) -> io::Result<()> {
     }
 }
 
+/// Bytes in hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// SHA-256 in hexadecimal digits.
 fn digest(contents: &[u8]) -> String {
-    let bytes = Sha256::digest(contents);
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    hex(&Sha256::digest(contents))
 }
 
 /// Files beside their places.

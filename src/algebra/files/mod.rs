@@ -12,6 +12,6 @@ mod part;
 mod whole;
 
 pub use emitted::EmittedFile;
-pub use folder::{FolderError, check_folder, earlier_files, write_files};
+pub use folder::{FolderError, check_folder, earlier_files, hex, write_files};
 pub use located::{Located, Place};
 pub use whole::{Overwrite, write_whole};

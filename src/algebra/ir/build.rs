@@ -9,7 +9,7 @@ use super::program::{
 use super::validate::{IrError, validate};
 
 /// What makes two scalar statements the same computation.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Key {
     Constant(u64),
     Unary(Unary, ValueId),
@@ -22,16 +22,6 @@ enum Key {
 pub struct ProgramBuilder {
     program: Program,
     known: HashMap<Key, ValueId>,
-}
-
-impl std::fmt::Debug for Key {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Constant(bits) => write!(f, "{}", f64::from_bits(*bits)),
-            Self::Unary(op, a) => write!(f, "{op:?}({a:?})"),
-            Self::Binary(op, a, b) => write!(f, "{op:?}({a:?}, {b:?})"),
-        }
-    }
 }
 
 impl ProgramBuilder {
@@ -83,6 +73,26 @@ impl ProgramBuilder {
         self.numbered(Key::Binary(op, low, high), Statement::Binary(op, a, b))
     }
 
+    /// `a + b`.
+    pub fn add(&mut self, a: ValueId, b: ValueId) -> ValueId {
+        self.binary(Binary::Add, a, b)
+    }
+
+    /// `a - b`.
+    pub fn sub(&mut self, a: ValueId, b: ValueId) -> ValueId {
+        self.binary(Binary::Sub, a, b)
+    }
+
+    /// `a * b`.
+    pub fn mul(&mut self, a: ValueId, b: ValueId) -> ValueId {
+        self.binary(Binary::Mul, a, b)
+    }
+
+    /// `a / b`.
+    pub fn div(&mut self, a: ValueId, b: ValueId) -> ValueId {
+        self.binary(Binary::Div, a, b)
+    }
+
     /// Sines and cosines of all arguments.
     pub fn sin_cos(&mut self, arguments: &[ValueId]) -> (Vec<ValueId>, Vec<ValueId>) {
         let n = arguments.len();
@@ -95,13 +105,7 @@ impl ProgramBuilder {
 
     /// A constant table for the array statements.
     pub fn table(&mut self, table: Table) -> TableId {
-        let tables = &mut self.program.tables;
-        let position = tables.iter().position(|known| *known == table);
-        let position = position.unwrap_or_else(|| {
-            tables.push(table);
-            tables.len() - 1
-        });
-        TableId(position as u32)
+        TableId(place_of(&mut self.program.tables, table) as u32)
     }
 
     /// Matrix-vector accumulation, see [`Statement::Accumulate`].
@@ -155,12 +159,7 @@ impl ProgramBuilder {
 
     /// Evaluates another program; returns the values of each of its outputs.
     pub fn call(&mut self, callee: &Program, arguments: &[ValueId]) -> Vec<Vec<ValueId>> {
-        let callees = &mut self.program.callees;
-        let position = callees.iter().position(|known| known == callee);
-        let position = position.unwrap_or_else(|| {
-            callees.push(callee.clone());
-            callees.len() - 1
-        });
+        let position = place_of(&mut self.program.callees, callee.clone());
         let n = callee.outputs.iter().map(|slot| slot.len).sum();
         let statement = Statement::Call {
             callee: position,
@@ -211,15 +210,6 @@ impl ProgramBuilder {
         }
     }
 
-    /// The value of a constant, `None` for anything computed.
-    pub fn constant_of(&self, value: ValueId) -> Option<f64> {
-        let (statement, _) = self.program.definition(value);
-        match self.program.statements[statement] {
-            Statement::Constant(constant) => Some(constant),
-            _ => None,
-        }
-    }
-
     /// The finished program.
     ///
     /// # Errors
@@ -250,4 +240,13 @@ impl ProgramBuilder {
         let first = self.push(statement, n_values).0;
         (first..first + n_values as u32).map(ValueId).collect()
     }
+}
+
+/// The position of an element equal to `wanted`, which is added if there is none.
+fn place_of<T: PartialEq>(list: &mut Vec<T>, wanted: T) -> usize {
+    let known = list.iter().position(|known| *known == wanted);
+    known.unwrap_or_else(|| {
+        list.push(wanted);
+        list.len() - 1
+    })
 }

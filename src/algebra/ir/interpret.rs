@@ -66,25 +66,11 @@ enum Step<T> {
 struct SeparableStep<T> {
     start: Box<[usize]>,
     base: Option<Box<[usize]>>,
-    groups: Box<[GroupStep]>,
+    groups: Vec<Group>,
     /// Number of variables.
     cols: usize,
     /// One product sum a column, reused by every row; zero behind the last.
     columns: Vec<T>,
-}
-
-#[derive(Clone, Debug)]
-struct GroupStep {
-    table: usize,
-    values: Box<[usize]>,
-    slopes: SlopeStep,
-}
-
-#[derive(Clone, Debug)]
-enum SlopeStep {
-    One,
-    Plus(Box<[usize]>),
-    Minus(Box<[usize]>),
 }
 
 /// A program run inside another one.
@@ -147,7 +133,13 @@ impl<T: Real> Interpreter<T> {
                     groups,
                     cols,
                 } => {
-                    let step = SeparableStep::new(start, base.as_deref(), groups, *cols);
+                    let step = SeparableStep {
+                        start: positions(start),
+                        base: base.as_deref().map(positions),
+                        groups: groups.clone(),
+                        cols: *cols,
+                        columns: vec![T::constant(0.0); cols.next_multiple_of(LANES)],
+                    };
                     steps.push(Step::Separable(Box::new(step), first));
                 }
                 Statement::Call { callee, arguments } => {
@@ -331,25 +323,6 @@ fn accumulate<T: Real>(
 }
 
 impl<T: Real> SeparableStep<T> {
-    fn new(start: &[ValueId], base: Option<&[ValueId]>, groups: &[Group], cols: usize) -> Self {
-        let group = |group: &Group| GroupStep {
-            table: group.table.index(),
-            values: positions(&group.values),
-            slopes: match &group.slopes {
-                Slopes::One => SlopeStep::One,
-                Slopes::Plus(values) => SlopeStep::Plus(positions(values)),
-                Slopes::Minus(values) => SlopeStep::Minus(positions(values)),
-            },
-        };
-        Self {
-            start: positions(start),
-            base: base.map(positions),
-            groups: groups.iter().map(group).collect(),
-            cols,
-            columns: vec![T::constant(0.0); cols.next_multiple_of(LANES)],
-        }
-    }
-
     fn run(&mut self, tables: &[Entries<T>], first: usize, values: &mut [T]) {
         let (rows, cols) = (self.start.len(), self.cols);
         let width = self.base.as_ref().map_or(0, |base| base.len() / rows);
@@ -359,16 +332,17 @@ impl<T: Real> SeparableStep<T> {
                 let base = self.base.as_ref().filter(|_| i < width);
                 let mut slope = base.map(|base| values[base[r * width + i]]);
                 for group in self.groups.iter().filter(|group| i < group.values.len()) {
-                    let t = tables[group.table].row(r)[i];
-                    let product = t * values[group.values[i]];
+                    let t = tables[group.table.index()].row(r)[i];
+                    let times = |factors: &[ValueId]| t * values[factors[i].index()];
+                    let product = times(&group.values);
                     sum = Some(sum.map_or(product, |sum| sum + product));
                     slope = Some(match (&group.slopes, slope) {
-                        (SlopeStep::One, None) => t,
-                        (SlopeStep::One, Some(slope)) => slope + t,
-                        (SlopeStep::Plus(slopes), None) => t * values[slopes[i]],
-                        (SlopeStep::Plus(slopes), Some(slope)) => slope + t * values[slopes[i]],
-                        (SlopeStep::Minus(slopes), None) => -(t * values[slopes[i]]),
-                        (SlopeStep::Minus(slopes), Some(slope)) => slope - t * values[slopes[i]],
+                        (Slopes::One, None) => t,
+                        (Slopes::One, Some(slope)) => slope + t,
+                        (Slopes::Plus(slopes), None) => times(slopes),
+                        (Slopes::Plus(slopes), Some(slope)) => slope + times(slopes),
+                        (Slopes::Minus(slopes), None) => -times(slopes),
+                        (Slopes::Minus(slopes), Some(slope)) => slope - times(slopes),
                     });
                 }
                 self.columns[i] = sum.unwrap_or(T::constant(0.0));
@@ -413,11 +387,8 @@ mod tests {
         for j in 0..3 {
             let expected: f64 =
                 entries[j] + (0..6).map(|i| entries[3 * (i + 1) + j] * x[i]).sum::<f64>();
-            assert!(
-                (y[j] - expected).abs() < 1e-13,
-                "{} against {expected}",
-                y[j]
-            );
+            let found = y[j];
+            assert!((found - expected).abs() < 1e-13, "{found}, {expected}");
         }
     }
 

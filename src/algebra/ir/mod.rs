@@ -38,4 +38,4 @@ pub use program::{
 pub use range::Range;
 pub use real::Real;
 pub use roundoff::{Rounded, rounding_errors};
-pub use validate::IrError;
+pub use validate::{Fault, IrError};

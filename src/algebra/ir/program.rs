@@ -118,7 +118,7 @@ pub enum Binary {
 }
 
 /// Derivatives of a group of functions, one a column.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Slopes {
     /// All are one: the group is the variables themselves.
     One,
@@ -281,21 +281,13 @@ impl Statement {
 
     /// The values that a separable statement reads as arrays, one a group's functions and slopes.
     pub fn arrays(&self) -> Vec<&[ValueId]> {
-        match self {
-            Self::Separable { groups, .. } => groups
-                .iter()
-                .flat_map(|group| [group.values.as_slice(), group.slopes.values()])
-                .collect(),
-            Self::Constant(_)
-            | Self::Input { .. }
-            | Self::Unary(..)
-            | Self::Binary(..)
-            | Self::SinCos { .. }
-            | Self::Accumulate { .. }
-            | Self::Quads { .. }
-            | Self::Constants { .. }
-            | Self::Call { .. } => Vec::new(),
-        }
+        let Self::Separable { groups, .. } = self else {
+            return Vec::new();
+        };
+        groups
+            .iter()
+            .flat_map(|group| [group.values.as_slice(), group.slopes.values()])
+            .collect()
     }
 }
 
@@ -401,24 +393,5 @@ impl Program {
     pub fn definition(&self, value: ValueId) -> (usize, usize) {
         let statement = self.first.partition_point(|&first| first <= value.0) - 1;
         (statement, (value.0 - self.first[statement]) as usize)
-    }
-
-    /// Whether the program calls the target's mathematics library or the
-    /// sine-and-cosine kernel, itself or through a callee.
-    pub fn is_transcendental(&self) -> bool {
-        self.statements.iter().any(|statement| match statement {
-            Statement::SinCos { .. } => true,
-            Statement::Unary(op, _) => {
-                matches!(op, Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log)
-            }
-            Statement::Constant(_)
-            | Statement::Input { .. }
-            | Statement::Binary(..)
-            | Statement::Accumulate { .. }
-            | Statement::Quads { .. }
-            | Statement::Constants { .. }
-            | Statement::Separable { .. }
-            | Statement::Call { .. } => false,
-        }) || self.callees.iter().any(Program::is_transcendental)
     }
 }

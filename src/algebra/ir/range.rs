@@ -14,20 +14,18 @@ pub struct Range {
 }
 
 impl Range {
+    pub(super) const fn new(low: f64, high: f64) -> Self {
+        Self { low, high }
+    }
+
     /// From `-magnitude` to `magnitude`.
     pub fn within(magnitude: f64) -> Self {
-        Self {
-            low: -magnitude,
-            high: magnitude,
-        }
+        Self::new(-magnitude, magnitude)
     }
 
     /// One number.
     pub fn point(value: f64) -> Self {
-        Self {
-            low: value,
-            high: value,
-        }
+        Self::new(value, value)
     }
 
     /// Largest absolute value.
@@ -36,10 +34,7 @@ impl Range {
     }
 
     pub(super) fn hull(self, other: Self) -> Self {
-        Self {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-        }
+        Self::new(self.low.min(other.low), self.high.max(other.high))
     }
 
     pub(super) fn has_zero(self) -> bool {
@@ -48,27 +43,18 @@ impl Range {
 
     /// Each end moved outwards by a share of itself, so that signs stay.
     pub(super) fn widened(self, share: f64) -> Self {
-        Self {
-            low: self.low - share * self.low.abs(),
-            high: self.high + share * self.high.abs(),
-        }
+        let (below, above) = (share * self.low.abs(), share * self.high.abs());
+        Self::new(self.low - below, self.high + above)
     }
 
     /// With zero, if an end is so small that a processor may flush it.
     pub(super) fn flushed(self) -> Self {
         let end = |x: f64| if x.abs() < TINY { 0.0 } else { x };
-        let ends = Self {
-            low: end(self.low),
-            high: end(self.high),
-        };
-        self.hull(ends)
+        self.hull(Self::new(end(self.low), end(self.high)))
     }
 
     pub(super) fn sum(self, other: Self) -> Self {
-        Self {
-            low: self.low + other.low,
-            high: self.high + other.high,
-        }
+        Self::new(self.low + other.low, self.high + other.high)
     }
 
     pub(super) fn product(self, other: Self) -> Self {
@@ -78,52 +64,35 @@ impl Range {
             self.high * other.low,
             self.high * other.high,
         ];
-        Self {
-            low: corners.into_iter().fold(f64::INFINITY, f64::min),
-            high: corners.into_iter().fold(f64::NEG_INFINITY, f64::max),
-        }
+        Self::new(
+            corners.into_iter().fold(f64::INFINITY, f64::min),
+            corners.into_iter().fold(f64::NEG_INFINITY, f64::max),
+        )
     }
 
     pub(super) fn absolute(self) -> Self {
-        let least = if self.has_zero() {
-            0.0
-        } else {
-            self.low.abs().min(self.high.abs())
+        let least = match self.has_zero() {
+            true => 0.0,
+            false => self.low.abs().min(self.high.abs()),
         };
-        Self {
-            low: least,
-            high: self.magnitude(),
-        }
+        Self::new(least, self.magnitude())
     }
 
     pub(super) fn squared(self) -> Self {
-        let absolute = self.absolute();
-        Self {
-            low: absolute.low * absolute.low,
-            high: absolute.high * absolute.high,
-        }
+        self.absolute().mapped(|x| x * x)
     }
 
     /// `1 / self`, which must not hold zero.
     pub(super) fn reciprocal(self) -> Self {
-        Self {
-            low: 1.0 / self.high,
-            high: 1.0 / self.low,
-        }
+        Self::new(1.0 / self.high, 1.0 / self.low)
     }
 
     pub(super) fn mapped(self, increasing: impl Fn(f64) -> f64) -> Self {
-        Self {
-            low: increasing(self.low),
-            high: increasing(self.high),
-        }
+        Self::new(increasing(self.low), increasing(self.high))
     }
 
     pub(super) fn negated(self) -> Self {
-        Self {
-            low: -self.high,
-            high: -self.low,
-        }
+        Self::new(-self.high, -self.low)
     }
 
     /// All cosines of the range.
@@ -151,7 +120,7 @@ mod tests {
 
     #[test]
     fn ranges_of_sines_hold_their_extrema() {
-        let range = |low, high| Range { low, high };
+        let range = Range::new;
         assert_eq!(range(-0.5, 0.5).cosine().high, 1.0);
         assert!(range(-0.5, 0.5).cosine().low > 0.87);
         assert_eq!(range(1.0, 2.0).sine().high, 1.0);

@@ -53,19 +53,26 @@ impl Rounded {
     }
 
     const UNBOUNDED: Self = Self {
-        exact: Range {
-            low: f64::NEG_INFINITY,
-            high: f64::INFINITY,
-        },
-        computed: Range {
-            low: f64::NEG_INFINITY,
-            high: f64::INFINITY,
-        },
+        exact: Range::new(f64::NEG_INFINITY, f64::INFINITY),
+        computed: Range::new(f64::NEG_INFINITY, f64::INFINITY),
         error: f64::INFINITY,
     };
 
+    /// The range of exact and that of computed values under a function.
+    fn mapped(self, of: impl Fn(Range) -> Range) -> [Range; 2] {
+        [of(self.exact), of(self.computed)]
+    }
+
+    /// The same with two operands.
+    fn with(self, other: Self, of: fn(Range, Range) -> Range) -> [Range; 2] {
+        [
+            of(self.exact, other.exact),
+            of(self.computed, other.computed),
+        ]
+    }
+
     /// A result that inherits an error and is then rounded to within `units`.
-    fn result(exact: Range, before: Range, inherited: f64, units: f64) -> Self {
+    fn result([exact, before]: [Range; 2], inherited: f64, units: f64) -> Self {
         let exact = exact.widened(OWN);
         let computed = before.widened(units * UNIT + OWN).flushed();
         let error = inherited + units * UNIT * before.magnitude() + TINY;
@@ -95,16 +102,12 @@ impl Rounded {
         }
         let roots = self.exact.low.sqrt() + self.computed.low.sqrt();
         let inherited = (self.error / roots).min(self.error.sqrt());
-        let (exact, computed) = (
-            self.exact.mapped(f64::sqrt),
-            self.computed.mapped(f64::sqrt),
-        );
-        Self::result(exact, computed, inherited, 1.0)
+        Self::result(self.mapped(|x| x.mapped(f64::sqrt)), inherited, 1.0)
     }
 
     fn sign(self) -> Self {
         let of = |range: Range| range.mapped(|x| f64::from(i8::from(x > 0.0) - i8::from(x < 0.0)));
-        let (exact, computed) = (of(self.exact), of(self.computed));
+        let [exact, computed] = self.mapped(of);
         Self {
             exact,
             computed,
@@ -133,8 +136,8 @@ impl Rounded {
 
     /// An increasing function of the library.
     fn library(self, function: fn(f64) -> f64, inherited: f64) -> Self {
-        let (exact, computed) = (self.exact.mapped(function), self.computed.mapped(function));
-        Self::result(exact, computed, inherited, LIBRARY_UNITS)
+        let ranges = self.mapped(|x| x.mapped(function));
+        Self::result(ranges, inherited, LIBRARY_UNITS)
     }
 }
 
@@ -142,11 +145,8 @@ impl Add for Rounded {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
-        let (exact, computed) = (
-            self.exact.sum(other.exact),
-            self.computed.sum(other.computed),
-        );
-        Self::result(exact, computed, self.error + other.error, 1.0)
+        let sums = self.with(other, Range::sum);
+        Self::result(sums, self.error + other.error, 1.0)
     }
 }
 
@@ -165,13 +165,9 @@ impl Mul for Rounded {
         if self.is_unbounded() || other.is_unbounded() {
             return Self::UNBOUNDED;
         }
-        let (exact, computed) = (
-            self.exact.product(other.exact),
-            self.computed.product(other.computed),
-        );
         let inherited =
             self.error * other.computed.magnitude() + self.exact.magnitude() * other.error;
-        Self::result(exact, computed, inherited, 1.0)
+        Self::result(self.with(other, Range::product), inherited, 1.0)
     }
 }
 
@@ -183,10 +179,10 @@ impl Div for Rounded {
         if self.is_unbounded() || other.is_unbounded() || other.hull().has_zero() {
             return Self::UNBOUNDED;
         }
-        let (above, below) = (other.exact.reciprocal(), other.computed.reciprocal());
+        let [above, below] = other.mapped(Range::reciprocal);
         let (exact, computed) = (self.exact.product(above), self.computed.product(below));
         let inherited = (self.error + exact.magnitude() * other.error) * below.magnitude();
-        Self::result(exact, computed, inherited, 1.0)
+        Self::result([exact, computed], inherited, 1.0)
     }
 }
 
@@ -220,12 +216,7 @@ impl Real for Rounded {
             return Self::UNBOUNDED;
         }
         let inherited = self.error * (self.exact.magnitude() + self.computed.magnitude());
-        Self::result(
-            self.exact.squared(),
-            self.computed.squared(),
-            inherited,
-            1.0,
-        )
+        Self::result(self.mapped(Range::squared), inherited, 1.0)
     }
 
     fn unary(op: Unary, a: Self) -> Self {
@@ -257,8 +248,7 @@ impl Real for Rounded {
             return (Self::UNBOUNDED, Self::UNBOUNDED);
         }
         let of = |function: fn(Range) -> Range| {
-            let (exact, computed) = (function(self.exact), function(self.computed));
-            Self::result(exact, computed, self.error, SIN_COS_UNITS)
+            Self::result(self.mapped(function), self.error, SIN_COS_UNITS)
         };
         (of(Range::sine), of(Range::cosine))
     }

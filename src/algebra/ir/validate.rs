@@ -5,49 +5,15 @@ use super::program::{LANES, Program, QUAD, Quad, Slopes, Statement, TableId, Val
 /// Why a program is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum IrError {
-    /// A statement reads a value that is not defined before it.
-    #[error("program `{program}`: statement {statement} reads value {value}, defined only later")]
-    UndefinedValue {
+    /// A statement breaks a promise; the results count as the last one.
+    #[error("program `{program}`: statement {statement} {fault}")]
+    Statement {
         /// Name of the program.
         program: String,
         /// Position of the statement.
         statement: usize,
-        /// The value that it reads.
-        value: usize,
-    },
-    /// A statement reads an input element that does not exist.
-    #[error("program `{program}`: statement {statement} reads element {index} of input {slot}")]
-    UndefinedInput {
-        /// Name of the program.
-        program: String,
-        /// Position of the statement.
-        statement: usize,
-        /// Input slot.
-        slot: usize,
-        /// Element of the slot.
-        index: usize,
-    },
-    /// A constant is infinite or not a number.
-    #[error("program `{program}`: statement {statement} holds the non-finite constant {value}")]
-    NonFinite {
-        /// Name of the program.
-        program: String,
-        /// Position of the statement.
-        statement: usize,
-        /// The constant.
-        value: f64,
-    },
-    /// An array statement whose operands do not fit its table or callee.
-    #[error("program `{program}`: statement {statement} has {found} operands, expected {expected}")]
-    OperandCount {
-        /// Name of the program.
-        program: String,
-        /// Position of the statement.
-        statement: usize,
-        /// Operands of the statement.
-        found: usize,
-        /// Operands that its table or callee asks for.
-        expected: usize,
+        /// What is wrong with it.
+        fault: Fault,
     },
     /// An input or output without elements, or two with the same name.
     #[error("program `{program}`: the array `{slot}` is empty or named twice")]
@@ -69,15 +35,49 @@ pub enum IrError {
     },
 }
 
+/// What is wrong with a statement.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Fault {
+    /// It reads this value, which is not defined before it.
+    #[error("reads value {0}, defined only later")]
+    UndefinedValue(usize),
+    /// It reads an input element that does not exist.
+    #[error("reads element {index} of input {slot}")]
+    UndefinedInput {
+        /// Input slot.
+        slot: usize,
+        /// Element of the slot.
+        index: usize,
+    },
+    /// A constant is infinite or not a number.
+    #[error("holds the non-finite constant {0}")]
+    NonFinite(f64),
+    /// The operands of an array statement do not fit its table or callee.
+    #[error("has {found} operands, expected {expected}")]
+    OperandCount {
+        /// Operands of the statement.
+        found: usize,
+        /// Operands that its table or callee asks for.
+        expected: usize,
+    },
+}
+
 /// Checks definitions before uses, finite constants, table shapes and slots.
 ///
 /// # Errors
 /// The first promise that is broken, in schedule order.
 pub fn validate(program: &Program) -> Result<(), IrError> {
     check_slots(program)?;
+    let at = |statement: usize, found: Result<(), Fault>| {
+        found.map_err(|fault| IrError::Statement {
+            program: program.name.clone(),
+            statement,
+            fault,
+        })
+    };
     for (position, statement) in program.statements.iter().enumerate() {
-        check_operands(program, position, statement)?;
-        check_shape(program, position, statement)?;
+        at(position, check_operands(program, position, statement))?;
+        at(position, check_shape(program, statement))?;
     }
     let expected = program.outputs.iter().map(|slot| slot.len).sum();
     if program.results.len() != expected {
@@ -88,10 +88,8 @@ pub fn validate(program: &Program) -> Result<(), IrError> {
         });
     }
     let end = program.statements.len();
-    for entry in &program.results {
-        check_value(program, end, entry.value)?;
-    }
-    Ok(())
+    let mut values = program.results.iter().map(|entry| entry.value);
+    values.try_for_each(|value| at(end, check_value(program, end, value)))
 }
 
 fn check_slots(program: &Program) -> Result<(), IrError> {
@@ -111,60 +109,35 @@ fn check_slots(program: &Program) -> Result<(), IrError> {
     Ok(())
 }
 
-fn check_value(program: &Program, position: usize, value: ValueId) -> Result<(), IrError> {
-    if value.0 < program.first[position] {
-        return Ok(());
+fn check_value(program: &Program, position: usize, value: ValueId) -> Result<(), Fault> {
+    match value.0 < program.first[position] {
+        true => Ok(()),
+        false => Err(Fault::UndefinedValue(value.index())),
     }
-    Err(IrError::UndefinedValue {
-        program: program.name.clone(),
-        statement: position,
-        value: value.index(),
-    })
 }
 
-fn check_operands(
-    program: &Program,
-    position: usize,
-    statement: &Statement,
-) -> Result<(), IrError> {
+fn check_operands(program: &Program, position: usize, statement: &Statement) -> Result<(), Fault> {
     for value in statement.operands() {
         check_value(program, position, value)?;
     }
-    if let &Statement::Input { slot, index } = statement
-        && program
-            .inputs
-            .get(slot)
-            .is_none_or(|input| index >= input.len)
-    {
-        return Err(IrError::UndefinedInput {
-            program: program.name.clone(),
-            statement: position,
-            slot,
-            index,
-        });
+    match *statement {
+        Statement::Input { slot, index }
+            if (program.inputs.get(slot)).is_none_or(|input| index >= input.len) =>
+        {
+            Err(Fault::UndefinedInput { slot, index })
+        }
+        _ => Ok(()),
     }
-    Ok(())
 }
 
-fn check_shape(program: &Program, position: usize, statement: &Statement) -> Result<(), IrError> {
-    let count = |found: usize, expected: usize| {
-        if found == expected {
-            return Ok(());
-        }
-        Err(IrError::OperandCount {
-            program: program.name.clone(),
-            statement: position,
-            found,
-            expected,
-        })
+fn check_shape(program: &Program, statement: &Statement) -> Result<(), Fault> {
+    let count = |found: usize, expected: usize| match found == expected {
+        true => Ok(()),
+        false => Err(Fault::OperandCount { found, expected }),
     };
     let finite = |values: &[f64]| match values.iter().find(|value| !value.is_finite()) {
         None => Ok(()),
-        Some(&value) => Err(IrError::NonFinite {
-            program: program.name.clone(),
-            statement: position,
-            value,
-        }),
+        Some(&value) => Err(Fault::NonFinite(value)),
     };
     let table = |id: &TableId| &program.tables[id.index()];
     match statement {
@@ -224,11 +197,8 @@ fn check_shape(program: &Program, position: usize, statement: &Statement) -> Res
                 count(table.rows, start.len())?;
                 count(table.cols, table.cols.next_multiple_of(LANES))?;
                 count(group.values.len(), table.cols)?;
-                match &group.slopes {
-                    Slopes::One => {}
-                    Slopes::Plus(slopes) | Slopes::Minus(slopes) => {
-                        count(slopes.len(), table.cols)?;
-                    }
+                if group.slopes != Slopes::One {
+                    count(group.slopes.values().len(), table.cols)?;
                 }
             }
             Ok(())
@@ -249,15 +219,24 @@ mod tests {
     use super::super::{Binary, Group, ProgramBuilder, Table};
     use super::*;
 
+    fn at(statement: usize, fault: Fault) -> IrError {
+        let program = "p".to_owned();
+        IrError::Statement {
+            program,
+            statement,
+            fault,
+        }
+    }
+
     #[test]
     fn program_with_non_finite_constant_is_refused() {
         let mut builder = ProgramBuilder::new("p");
         let value = builder.constant(f64::INFINITY);
         builder.output("y", &[value]);
-        assert!(matches!(
+        assert_eq!(
             builder.finish(),
-            Err(IrError::NonFinite { statement: 0, .. })
-        ));
+            Err(at(0, Fault::NonFinite(f64::INFINITY)))
+        );
     }
 
     #[test]
@@ -268,18 +247,7 @@ mod tests {
         builder.input("x", 1);
         let sum = builder.binary(Binary::Add, values[0], values[2]);
         builder.output("y", &[sum]);
-        let found = builder.finish();
-        assert!(
-            matches!(
-                found,
-                Err(IrError::UndefinedValue {
-                    statement: 1,
-                    value: 2,
-                    ..
-                })
-            ),
-            "{found:?}"
-        );
+        assert_eq!(builder.finish(), Err(at(1, Fault::UndefinedValue(2))));
     }
 
     #[test]
@@ -289,14 +257,9 @@ mod tests {
         let table = builder.table(Table::new(3, 2, vec![1.0; 6]));
         let y = builder.accumulate(table, vec![x]);
         builder.output("y", &y);
-        let found = builder.finish();
-        let expected = IrError::OperandCount {
-            program: "p".to_owned(),
-            statement: 1,
-            found: 2,
-            expected: 3,
-        };
-        assert_eq!(found, Err(expected));
+        let (found, expected) = (2, 3);
+        let fault = Fault::OperandCount { found, expected };
+        assert_eq!(builder.finish(), Err(at(1, fault)));
     }
 
     /// One row over two variables; the value behind them is zero or not.
@@ -330,7 +293,13 @@ mod tests {
 
     fn assert_count_refused(found: Result<Program, IrError>) {
         assert!(
-            matches!(found, Err(IrError::OperandCount { .. })),
+            matches!(
+                found,
+                Err(IrError::Statement {
+                    fault: Fault::OperandCount { .. },
+                    ..
+                })
+            ),
             "{found:?}"
         );
     }

@@ -35,29 +35,23 @@ pub struct OutOfRange {
 impl Range {
     /// Whole numbers from `least` to `most`.
     pub const fn whole(name: &'static str, least: u32, most: u32) -> Self {
-        Self {
-            name,
-            kind: Kind::Whole,
-            least: least as f64,
-            most: most as f64,
-        }
+        Self::new(name, Kind::Whole, least as f64, most as f64)
     }
 
     /// Numbers from `least` to `most`.
     pub const fn real(name: &'static str, least: f64, most: f64) -> Self {
-        Self {
-            name,
-            kind: Kind::Real,
-            least,
-            most,
-        }
+        Self::new(name, Kind::Real, least, most)
     }
 
     /// Numbers above `least`, up to `most`.
     pub const fn above(name: &'static str, least: f64, most: f64) -> Self {
+        Self::new(name, Kind::Above, least, most)
+    }
+
+    const fn new(name: &'static str, kind: Kind, least: f64, most: f64) -> Self {
         Self {
             name,
-            kind: Kind::Above,
+            kind,
             least,
             most,
         }

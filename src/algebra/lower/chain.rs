@@ -52,7 +52,7 @@ impl Steps<'_> {
         let one = self.0.constant(1.0);
         let of_area = Scalar::Value(self.damped(one, area, least_area));
         let of_lever = Scalar::Value(self.damped(one, lever, least_lever));
-        let torques = torques.map(|torque| Scalar::Value(self.mul(foot, torque)));
+        let torques = torques.map(|torque| Scalar::Value(self.0.mul(foot, torque)));
         // In the plane: (c_2 x n) tau_1 + (n x c_1) tau_2 over the area.
         let of_second = self.cross(columns[2], normal);
         let of_third = self.cross(normal, columns[1]);

@@ -31,16 +31,11 @@ fn distinct(equations: &[Combination]) -> Vec<ExprId> {
         .collect()
 }
 
-/// The accelerations as one matrix-vector product.
-pub(super) fn accelerations(
-    lowering: &mut ExpressionLowering,
-    equations: &[Combination],
-) -> Vec<ValueId> {
-    matrix_vector(lowering, equations)
-}
-
 /// `y_r = constant_r + sum coefficient weight` for all combinations by one table.
-fn matrix_vector(lowering: &mut ExpressionLowering, sums: &[Combination]) -> Vec<ValueId> {
+pub(super) fn matrix_vector(
+    lowering: &mut ExpressionLowering,
+    sums: &[Combination],
+) -> Vec<ValueId> {
     // Weights in the order of their values are runs of arrays, which loops read in place.
     let mut weights: Vec<(ValueId, ExprId)> = distinct(sums)
         .into_iter()
@@ -77,11 +72,8 @@ fn matrix_vector_without_zeros(
         return matrix_vector(lowering, sums);
     }
     let zero = lowering.builder.constant(0.0);
-    let mut values = match rest.is_empty() {
-        true => Vec::new(),
-        false => matrix_vector(lowering, &rest),
-    }
-    .into_iter();
+    let values = (!rest.is_empty()).then(|| matrix_vector(lowering, &rest));
+    let mut values = values.into_iter().flatten();
     let value = |sum: &Combination| match sum.is_zero() {
         true => zero,
         false => values.next().expect("one value a sum"),
@@ -113,26 +105,22 @@ fn sections(
     runs.into_iter().map(values).collect()
 }
 
-/// What a candidate term is to the Jacobian.
-#[derive(Clone, Copy, PartialEq, Eq)]
+/// A candidate term that touches one column of the Jacobian.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Kind {
-    Variable(SymbolId),
-    Sine(SymbolId),
-    Cosine(SymbolId),
-    Other,
+    Variable,
+    Sine,
+    Cosine,
 }
 
-fn kind(pool: &ExprPool, expr: ExprId) -> Kind {
+/// What a candidate term is, and of which variable; nothing for all other terms.
+fn kind(pool: &ExprPool, expr: ExprId) -> Option<(Kind, SymbolId)> {
     match pool.node(expr) {
-        Node::Symbol(symbol) => Kind::Variable(*symbol),
-        Node::Apply(Function::Sin, argument) => {
-            pool.as_symbol(*argument).map_or(Kind::Other, Kind::Sine)
-        }
-        Node::Apply(Function::Cos, argument) => {
-            pool.as_symbol(*argument).map_or(Kind::Other, Kind::Cosine)
-        }
+        Node::Symbol(symbol) => Some((Kind::Variable, *symbol)),
+        Node::Apply(Function::Sin, argument) => Some((Kind::Sine, pool.as_symbol(*argument)?)),
+        Node::Apply(Function::Cos, argument) => Some((Kind::Cosine, pool.as_symbol(*argument)?)),
         Node::Number(_) | Node::Sum(_) | Node::Product(_) | Node::Power(..) | Node::Apply(..) => {
-            Kind::Other
+            None
         }
     }
 }
@@ -159,11 +147,7 @@ fn padded_slopes(
 ) -> Vec<Combination> {
     let mut rows = slopes(pool, equations, variables);
     let last = |row: &Vec<Combination>| row.iter().rposition(|slope| !slope.is_zero());
-    let used = rows
-        .iter()
-        .filter_map(last)
-        .max()
-        .map_or(0, |last| last + 1);
+    let used = (rows.iter().filter_map(last).max()).map_or(0, |last| last + 1);
     for row in &mut rows {
         row.truncate(used);
         row.resize(used.next_multiple_of(LANES), Combination::default());
@@ -195,44 +179,34 @@ impl DenseJacobian {
         let mut has_angles = false;
         for expr in distinct(equations) {
             match kind(pool, expr) {
-                Kind::Variable(_) => {}
-                Kind::Sine(symbol) | Kind::Cosine(symbol) => {
+                Some((Kind::Variable, _)) => {}
+                Some((Kind::Sine | Kind::Cosine, symbol)) => {
                     has_angles = true;
                     curved_set.insert(symbol);
                 }
-                Kind::Other => curved_set.extend(pool.symbols_of(expr)),
+                None => curved_set.extend(pool.symbols_of(expr)),
             }
         }
         let is_linear = |symbol: &SymbolId| {
             let used = |&(_, expr): &(f64, ExprId)| pool.as_symbol(expr) == Some(*symbol);
             !curved_set.contains(symbol) && equations.iter().any(|e| e.items.iter().any(used))
         };
-        let linear: Vec<SymbolId> = columns.iter().copied().filter(is_linear).collect();
-        let curved: Vec<SymbolId> = columns
-            .iter()
-            .copied()
-            .filter(|s| curved_set.contains(s))
-            .collect();
-        let is_used = |symbol: &&SymbolId| curved.contains(symbol) || linear.contains(symbol);
-        let used: Vec<SymbolId> = columns.iter().filter(is_used).copied().collect();
+        let columns = columns.iter().copied();
+        let linear: Vec<SymbolId> = columns.clone().filter(is_linear).collect();
+        let is_curved = |symbol: &SymbolId| curved_set.contains(symbol);
+        let curved: Vec<SymbolId> = columns.clone().filter(is_curved).collect();
+        let is_used = |symbol: &SymbolId| curved.contains(symbol) || linear.contains(symbol);
+        let used: Vec<SymbolId> = columns.filter(is_used).collect();
         // With angles, linear terms share the angles' loop.
-        let in_group = |pool: &ExprPool, expr| match kind(pool, expr) {
-            Kind::Variable(symbol) => has_angles && used.contains(&symbol),
-            Kind::Sine(_) | Kind::Cosine(_) => true,
-            Kind::Other => false,
+        let in_group = |expr| match kind(pool, expr) {
+            Some((Kind::Variable, symbol)) => has_angles && used.contains(&symbol),
+            Some((Kind::Sine | Kind::Cosine, _)) => true,
+            None => false,
         };
-        let rest: Vec<Combination> = equations
-            .iter()
-            .map(|equation| Combination {
-                constant: equation.constant,
-                items: equation
-                    .items
-                    .iter()
-                    .copied()
-                    .filter(|&(_, expr)| !in_group(pool, expr))
-                    .collect(),
-            })
-            .collect();
+        let mut rest = equations.to_vec();
+        for equation in &mut rest {
+            equation.items.retain(|&(_, expr)| !in_group(expr));
+        }
         let rest_slopes = match has_angles {
             true => padded_slopes(pool, &rest, &used),
             false => slopes(pool, &rest, &curved).concat(),
@@ -289,18 +263,15 @@ impl DenseJacobian {
         pool: &ExprPool,
         equations: &[Combination],
         variables: &[SymbolId],
-        of: impl Fn(Kind) -> Option<SymbolId>,
+        of: Kind,
     ) -> Vec<Vec<f64>> {
-        let column: HashMap<SymbolId, usize> = variables
-            .iter()
-            .enumerate()
-            .map(|(col, &symbol)| (symbol, col))
-            .collect();
+        let columns = variables.iter().enumerate();
+        let column: HashMap<_, _> = columns.map(|(col, &s)| ((of, s), col)).collect();
         let row = |equation: &Combination| {
             let mut row = vec![0.0; variables.len()];
             for &(coefficient, expr) in &equation.items {
-                if let Some(col) = of(kind(pool, expr)).and_then(|symbol| column.get(&symbol)) {
-                    row[*col] = coefficient;
+                if let Some(&col) = kind(pool, expr).and_then(|kind| column.get(&kind)) {
+                    row[col] = coefficient;
                 }
             }
             row
@@ -331,7 +302,7 @@ impl DenseJacobian {
         let (sines, cosines) = (of_angles(sines), of_angles(cosines));
         let width = self.used.len().next_multiple_of(LANES);
         let mut is_first = true;
-        let mut group = |of: fn(Kind) -> Option<SymbolId>, values: &[ValueId], slopes: Slopes| {
+        let mut group = |of: Kind, values: &[ValueId], slopes: Slopes| {
             let mut rows = Self::coefficients(lowering.pool, equations, &self.used, of);
             let last = rows
                 .iter()
@@ -362,22 +333,10 @@ impl DenseJacobian {
                 },
             })
         };
-        let variable = |kind| match kind {
-            Kind::Variable(symbol) => Some(symbol),
-            Kind::Sine(_) | Kind::Cosine(_) | Kind::Other => None,
-        };
-        let sine = |kind| match kind {
-            Kind::Sine(symbol) => Some(symbol),
-            Kind::Variable(_) | Kind::Cosine(_) | Kind::Other => None,
-        };
-        let cosine = |kind| match kind {
-            Kind::Cosine(symbol) => Some(symbol),
-            Kind::Variable(_) | Kind::Sine(_) | Kind::Other => None,
-        };
         [
-            group(variable, &values, Slopes::One),
-            group(sine, &sines, Slopes::Plus(cosines.clone())),
-            group(cosine, &cosines, Slopes::Minus(sines.clone())),
+            group(Kind::Variable, &values, Slopes::One),
+            group(Kind::Sine, &sines, Slopes::Plus(cosines.clone())),
+            group(Kind::Cosine, &cosines, Slopes::Minus(sines.clone())),
         ]
         .into_iter()
         .flatten()
@@ -392,11 +351,7 @@ impl DenseJacobian {
         if self.linear.is_empty() {
             return Vec::new();
         }
-        let pool = lowering.pool;
-        let rows = Self::coefficients(pool, equations, &self.linear, |kind| match kind {
-            Kind::Variable(symbol) => Some(symbol),
-            Kind::Sine(_) | Kind::Cosine(_) | Kind::Other => None,
-        });
+        let rows = Self::coefficients(lowering.pool, equations, &self.linear, Kind::Variable);
         let table = Table::new(rows.len(), self.linear.len(), rows.concat());
         let table = lowering.builder.table(table);
         lowering.builder.constants(table)

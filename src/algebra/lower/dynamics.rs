@@ -51,7 +51,7 @@ pub fn dynamics(
     let (mut builder, ddz) = if options.uses_tables(&equations) {
         let mut lowering = start(system, &pool, "dynamics");
         lowering.prepare(&expressions(&equations));
-        let ddz = dense::accelerations(&mut lowering, &equations);
+        let ddz = dense::matrix_vector(&mut lowering, &equations);
         (lowering.builder, ddz)
     } else {
         let demand = Demand::new(&mut pool, &equations);
@@ -83,9 +83,10 @@ pub fn dynamics_jacobian(
         rows: Vec::new(),
         cols: Vec::new(),
     };
+    let columns = columns(system);
     for (row, equation) in equations.iter().enumerate() {
-        for (col, variable) in LatentVariable::all(system.latent_dim()).enumerate() {
-            let derivative = equation.derivative(&mut pool, system.symbol(variable));
+        for (col, &variable) in columns.iter().enumerate() {
+            let derivative = equation.derivative(&mut pool, variable);
             check_finite(system, phase, row, &derivative)?;
             if !derivative.is_zero() {
                 pattern.rows.push(row);
@@ -95,19 +96,14 @@ pub fn dynamics_jacobian(
         }
     }
     let n_terms = equations.iter().chain(&entries).map(|sum| sum.items.len());
-    let gradient = Gradient::new(
-        options,
-        &mut pool,
-        &equations,
-        &columns(system),
-        n_terms.sum(),
-    );
+    let n_terms = n_terms.sum();
+    let gradient = Gradient::new(options, &mut pool, &equations, &columns, n_terms);
     let (mut builder, ddz, jacobian) = if let Some(gradient) = gradient {
         polynomial_jacobian(system, &pool, &gradient, &pattern)
     } else if options.uses_tables(&equations) {
-        dense_jacobian(system, &mut pool, &equations, &pattern)
+        dense_jacobian(system, &mut pool, &equations, &columns, &pattern)
     } else {
-        let sums = nested_jacobian(system, &mut pool, &equations, entries, &pattern);
+        let sums = nested_jacobian(&mut pool, &equations, &columns, entries, &pattern);
         let mut lowering = start(system, &pool, "dynamics_jacobian");
         let mut ddz = values(&mut lowering, &sums);
         let jacobian = ddz.split_off(equations.len());
@@ -123,18 +119,17 @@ pub fn dynamics_jacobian(
 /// Accelerations, then the entries of the pattern, in nested form: what a variable was taken
 /// out of in an acceleration is a part of its derivative by that variable.
 fn nested_jacobian(
-    system: &Equations<'_>,
     pool: &mut ExprPool,
     equations: &[Combination],
+    columns: &[SymbolId],
     entries: Vec<Combination>,
     pattern: &JacobianPattern,
 ) -> Vec<Nested> {
     let demand = Demand::new(pool, equations.iter().chain(&entries));
     let nest = |equation| demand.nest(pool, equation);
     let mut sums: Vec<Nested> = equations.iter().map(nest).collect();
-    let variables: Vec<LatentVariable> = LatentVariable::all(system.latent_dim()).collect();
     for ((&row, &col), mut entry) in pattern.rows.iter().zip(&pattern.cols).zip(entries) {
-        let variable = pool.symbol_expr(system.symbol(variables[col]));
+        let variable = pool.symbol_expr(columns[col]);
         let shared = sums[row].part_of(variable, &entry).map(|group| {
             let known = &sums[row].groups[group].single.items;
             entry.items.retain(|item| !known.contains(item));
@@ -174,10 +169,10 @@ fn dense_jacobian(
     system: &Equations<'_>,
     pool: &mut ExprPool,
     equations: &[Combination],
+    columns: &[SymbolId],
     pattern: &JacobianPattern,
 ) -> (ProgramBuilder, Vec<ValueId>, Vec<ValueId>) {
-    let columns = columns(system);
-    let dense = DenseJacobian::new(pool, equations, &columns);
+    let dense = DenseJacobian::new(pool, equations, columns);
     let mut lowering = start(system, pool, "dynamics_jacobian");
     let mut roots = expressions(equations);
     roots.extend(dense.expressions());

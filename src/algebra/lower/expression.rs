@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use super::combination::Combination;
 use super::nested::Nested;
 use super::sums::{Term, linear_combination, scaled};
-use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
+use crate::ir::{ProgramBuilder, Unary, ValueId};
 use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
 
 /// Turns expressions of one pool into values of one program; an expression that occurs
@@ -141,7 +141,7 @@ impl<'a> ExpressionLowering<'a> {
                 (true, false) => self.combination(&group.repeated),
                 (false, false) => {
                     let repeated = self.combination(&group.repeated);
-                    self.builder.binary(Binary::Add, single, repeated)
+                    self.builder.add(single, repeated)
                 }
             };
             let factor = self.value(group.factor);
@@ -150,7 +150,7 @@ impl<'a> ExpressionLowering<'a> {
             let mut exprs = items.map(|(_, expr)| expr).chain([&group.factor]);
             terms.push(Term {
                 coefficient: 1.0,
-                value: self.builder.binary(Binary::Mul, factor, inner),
+                value: self.builder.mul(factor, inner),
                 late: exprs.any(|expr| self.late.contains(expr)),
             });
             singles.push(single);
@@ -179,7 +179,7 @@ impl<'a> ExpressionLowering<'a> {
             };
             *side = Some(match *side {
                 None => value,
-                Some(product) => self.builder.binary(Binary::Mul, product, value),
+                Some(product) => self.builder.mul(product, value),
             });
         }
         self.quotient(over, under)
@@ -189,15 +189,12 @@ impl<'a> ExpressionLowering<'a> {
         let over = over.unwrap_or_else(|| self.builder.constant(1.0));
         match under {
             None => over,
-            Some(under) => self.builder.binary(Binary::Div, over, under),
+            Some(under) => self.builder.div(over, under),
         }
     }
 
     fn power(&mut self, base: ExprId, exponent: ExprId) -> ValueId {
-        let integer = self
-            .pool
-            .as_number(exponent)
-            .and_then(|number| number.as_integer());
+        let integer = self.pool.as_integer(exponent);
         match integer.map(|exponent| (exponent, u32::try_from(exponent.unsigned_abs()))) {
             Some((exponent, Ok(magnitude))) => {
                 let base = self.value(base);
@@ -211,7 +208,7 @@ impl<'a> ExpressionLowering<'a> {
             _ => {
                 let (base, exponent) = (self.value(base), self.value(exponent));
                 let logarithm = self.builder.unary(Unary::Log, base);
-                let product = self.builder.binary(Binary::Mul, exponent, logarithm);
+                let product = self.builder.mul(exponent, logarithm);
                 self.builder.unary(Unary::Exp, product)
             }
         }
@@ -224,11 +221,11 @@ impl<'a> ExpressionLowering<'a> {
             1 => base,
             _ => {
                 let half = self.integer_power(base, exponent / 2);
-                let square = self.builder.binary(Binary::Mul, half, half);
+                let square = self.builder.mul(half, half);
                 if exponent.is_multiple_of(2) {
                     square
                 } else {
-                    self.builder.binary(Binary::Mul, square, base)
+                    self.builder.mul(square, base)
                 }
             }
         }
@@ -279,7 +276,7 @@ fn reciprocal_power(pool: &ExprPool, factor: ExprId) -> Option<(ExprId, u32)> {
     let Node::Power(base, exponent) = pool.node(factor) else {
         return None;
     };
-    let exponent = pool.as_number(*exponent)?.as_integer()?;
+    let exponent = pool.as_integer(*exponent)?;
     let magnitude = u32::try_from(exponent.checked_neg()?).ok()?;
     Some((*base, magnitude))
 }

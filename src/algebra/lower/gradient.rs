@@ -193,7 +193,7 @@ fn monomial(pool: &ExprPool, expr: ExprId, columns: &[SymbolId]) -> Option<Monom
     let mut factors = Monomial::new();
     for &factor in pool.factors_of(expr) {
         let (base, exponent) = match pool.node(factor) {
-            Node::Power(base, exponent) => (*base, pool.as_number(*exponent)?.as_integer()?),
+            Node::Power(base, exponent) => (*base, pool.as_integer(*exponent)?),
             _ => (factor, 1),
         };
         let symbol = pool.as_symbol(base)?;

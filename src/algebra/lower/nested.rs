@@ -173,7 +173,7 @@ impl Demand {
 fn base_of(pool: &ExprPool, factor: ExprId) -> Option<(ExprId, i64)> {
     match pool.node(factor) {
         Node::Power(base, exponent) => {
-            let exponent = pool.as_number(*exponent)?.as_integer()?;
+            let exponent = pool.as_integer(*exponent)?;
             (exponent > 0).then_some((*base, exponent))
         }
         _ => Some((factor, 1)),
@@ -233,20 +233,16 @@ mod tests {
             "1.25*w*x*z - 2.5*w*w*w + 0.125*w*y*y - 6*y*z + w",
         ];
         texts.map(|text| {
-            let expr = pool.parse(text, &|_| true).expect("valid expression");
-            let terms = pool.terms_of(expr);
-            let summands = terms
-                .into_iter()
-                .map(|(number, expr)| (number.to_f64(), expr));
-            Combination::collect(pool, summands)
+            let expr = pool.parsed(text);
+            Combination::collect(pool, [(1.0, expr)])
         })
     }
 
     /// Values of the sums at a point, and how many products that takes.
-    fn evaluated(pool: &ExprPool, sums: &[Nested], point: &[f64; 4]) -> (Vec<f64>, usize) {
+    fn evaluated(pool: &mut ExprPool, sums: &[Nested], point: &[f64; 4]) -> (Vec<f64>, usize) {
         let mut builder = ProgramBuilder::new("sums");
         let inputs = builder.input("x", VARIABLES.len());
-        let symbols = VARIABLES.map(|name| pool.find_symbol(name).expect("occurs"));
+        let symbols = VARIABLES.map(|name| pool.symbol_id(name));
         let variables = symbols.into_iter().zip(inputs).collect();
         let mut lowering = ExpressionLowering::new(pool, builder, variables);
         let values: Vec<_> = sums
@@ -275,8 +271,8 @@ mod tests {
             groups: Vec::new(),
         });
         for point in [[0.5, -1.25, 2.0, 0.75], [-3.0, 0.1, 0.7, -0.3]] {
-            let (expected, n_flat) = evaluated(&pool, &flat, &point);
-            let (found, n_nested) = evaluated(&pool, &nested, &point);
+            let (expected, n_flat) = evaluated(&mut pool, &flat, &point);
+            let (found, n_nested) = evaluated(&mut pool, &nested, &point);
             assert!(n_nested + 4 <= n_flat, "{n_nested} against {n_flat}");
             for (a, b) in found.iter().zip(&expected) {
                 assert!((a - b).abs() <= 1e-13 * b.abs().max(1.0), "{a} {b}");
@@ -290,13 +286,12 @@ mod tests {
         let [sum, _] = sums(&mut pool);
         let demand = Demand::new(&mut pool, [&sum]);
         let nested = demand.nest(&mut pool, &sum);
-        let symbol = pool.find_symbol("w").expect("occurs");
+        let symbol = pool.symbol_id("w");
         let factor = pool.symbol_expr(symbol);
         let derivative = sum.derivative(&mut pool, symbol);
-        let group = nested
-            .part_of(factor, &derivative)
-            .expect("w was taken out");
-        let other = pool.find_symbol("z").expect("occurs");
+        let group = nested.part_of(factor, &derivative);
+        let group = group.expect("w was taken out");
+        let other = pool.symbol_id("z");
         let wrong = sum.derivative(&mut pool, other);
         assert_eq!(nested.groups[group].factor, factor);
         assert_eq!(nested.part_of(factor, &wrong), None);
@@ -305,10 +300,8 @@ mod tests {
     #[test]
     fn product_that_many_sums_share_stays_flat() {
         let mut pool = ExprPool::new();
-        let expr = pool.parse("2*x*y", &|_| true).expect("valid expression");
-        let terms = pool.terms_of(expr);
-        let summands = terms.iter().map(|(number, expr)| (number.to_f64(), *expr));
-        let sum = Combination::collect(&pool, summands);
+        let expr = pool.parsed("2*x*y");
+        let sum = Combination::collect(&pool, [(1.0, expr)]);
         let sums = vec![sum; 5];
         let demand = Demand::new(&mut pool, &sums);
         for sum in &sums {

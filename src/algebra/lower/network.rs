@@ -5,72 +5,64 @@
 //! Velocities run forwards through the layers, lifted inputs backwards; the projection takes the
 //! Jacobian row by row and solves with it.
 
+use nalgebra::DVector;
+
 use super::error::LowerError;
 use super::solve::pinv_times;
-use crate::ir::{Binary, Program, ProgramBuilder, Table, Unary, ValueId};
+use super::sums::scaled;
+use crate::ir::{Program, ProgramBuilder, Table, Unary, ValueId};
 use crate::model::{
     Activation, DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, ReducedModel, StateMap, TAIL,
 };
 
 /// `z = E(s_x x)`.
 pub(super) fn encode(model: &ReducedModel) -> Result<Program, LowerError> {
-    let factors = model.state_factors()?;
-    let mut network = Network::new("encode", model.encoder_map()?);
-    let x = network.builder.input("x", factors.len());
-    let z = network.forward(&x, factors.as_slice(), None);
+    let mut network = Network::of_encoder("encode", model)?;
+    let x = network.input("x");
+    let (z, _) = network.forward(&x);
     network.finish("z", &z)
 }
 
 /// `dz = J_E(s_x x) (s_x dx)`.
 pub(super) fn encode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
-    let factors = model.state_factors()?;
-    let mut network = Network::new("encode_velocity", model.encoder_map()?);
-    let x = network.builder.input("x", factors.len());
-    let dx = network.builder.input("dx", factors.len());
-    let slopes = network.slopes(&x, factors.as_slice());
-    let dz = network.tangent(&dx, factors.as_slice(), &slopes);
+    let mut network = Network::of_encoder("encode_velocity", model)?;
+    let (x, dx) = (network.input("x"), network.input("dx"));
+    let (_, slopes) = network.forward(&x);
+    let dz = network.tangent(&dx, &slopes);
     network.finish("dz", &dz)
 }
 
 /// `x = D(z) / s_x`.
 pub(super) fn decode(model: &ReducedModel) -> Result<Program, LowerError> {
-    let factors = model.state_factors()?;
-    let mut network = Network::new("decode", model.decoder_map()?);
-    let ones = vec![1.0; model.latent_dim()];
-    let z = network.builder.input("z", ones.len());
-    let scaled = network.forward(&z, &ones, None);
-    let x = network.divided(&scaled, factors.as_slice());
+    let mut network = Network::of_decoder("decode", model)?;
+    let z = network.input("z");
+    let (scaled, _) = network.forward(&z);
+    let x = network.divided(&scaled, &model.state_factors()?);
     network.finish("x", &x)
 }
 
 /// `dx = J_D(z) dz / s_x`.
 pub(super) fn decode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
-    let factors = model.state_factors()?;
-    let mut network = Network::new("decode_velocity", model.decoder_map()?);
-    let ones = vec![1.0; model.latent_dim()];
-    let z = network.builder.input("z", ones.len());
-    let dz = network.builder.input("dz", ones.len());
-    let slopes = network.slopes(&z, &ones);
-    let scaled = network.tangent(&dz, &ones, &slopes);
-    let dx = network.divided(&scaled, factors.as_slice());
+    let mut network = Network::of_decoder("decode_velocity", model)?;
+    let (z, dz) = (network.input("z"), network.input("dz"));
+    let (_, slopes) = network.forward(&z);
+    let scaled = network.tangent(&dz, &slopes);
+    let dx = network.divided(&scaled, &model.state_factors()?);
     network.finish("dx", &dx)
 }
 
 /// `u_lat = pinv(J_E(s_x x)^T) (s_u u)`.
 pub(super) fn project_input(model: &ReducedModel) -> Result<Program, LowerError> {
-    let state_factors = model.state_factors()?;
-    let input_factors = model.input_factors()?;
-    let mut network = Network::new("project_input", model.encoder_map()?);
-    let x = network.builder.input("x", state_factors.len());
-    let u = network.builder.input("u", input_factors.len());
-    let slopes = network.slopes(&x, state_factors.as_slice());
+    let mut network = Network::of_encoder("project_input", model)?;
+    let factors = model.input_factors()?;
+    let x = network.input("x");
+    let u = network.builder.input("u", factors.len());
+    let (_, slopes) = network.forward(&x);
     let rows: Vec<Vec<ValueId>> = (0..model.latent_dim())
         .map(|row| network.jacobian_row(row, &slopes))
         .collect();
-    let scaled: Vec<ValueId> = u
-        .iter()
-        .zip(&input_factors)
-        .map(|(&u, &factor)| super::sums::scaled(&mut network.builder, factor, u))
+    let scaled: Vec<ValueId> = (u.iter().zip(&factors))
+        .map(|(&u, &factor)| scaled(&mut network.builder, factor, u))
         .collect();
     let u_lat = pinv_times(&mut network.builder, &rows, &scaled);
     network.finish("u_lat", &u_lat)
@@ -78,16 +70,14 @@ pub(super) fn project_input(model: &ReducedModel) -> Result<Program, LowerError>
 
 /// `u = (J_E(s_x x)^T u_lat) / s_u`.
 pub(super) fn lift_input(model: &ReducedModel) -> Result<Program, LowerError> {
-    let state_factors = model.state_factors()?;
-    let input_factors = model.input_factors()?;
-    let mut network = Network::new("lift_input", model.encoder_map()?);
-    let x = network.builder.input("x", state_factors.len());
+    let mut network = Network::of_encoder("lift_input", model)?;
+    let x = network.input("x");
     let u_lat = network.builder.input("u_lat", model.latent_dim());
-    let slopes = network.slopes(&x, state_factors.as_slice());
+    let (_, slopes) = network.forward(&x);
     let last = network.map.layers().len() - 1;
     let seed = network.times_slopes(&u_lat, &slopes[last]);
     let scaled = network.backward(last, seed, &slopes);
-    let u = network.divided(&scaled, input_factors.as_slice());
+    let u = network.divided(&scaled, &model.input_factors()?);
     network.finish("u", &u)
 }
 
@@ -98,14 +88,29 @@ type Slopes = Option<Vec<ValueId>>;
 struct Network<'a> {
     builder: ProgramBuilder,
     map: &'a StateMap,
+    /// What the map's inputs are multiplied by, as part of the first layer.
+    factors: DVector<f64>,
 }
 
 impl<'a> Network<'a> {
-    fn new(name: &str, map: &'a StateMap) -> Self {
-        Self {
+    fn of_encoder(name: &str, model: &'a ReducedModel) -> Result<Self, LowerError> {
+        Ok(Self {
             builder: ProgramBuilder::new(name),
-            map,
-        }
+            factors: model.state_factors()?,
+            map: model.encoder_map()?,
+        })
+    }
+
+    fn of_decoder(name: &str, model: &'a ReducedModel) -> Result<Self, LowerError> {
+        Ok(Self {
+            builder: ProgramBuilder::new(name),
+            factors: DVector::from_element(model.latent_dim(), 1.0),
+            map: model.decoder_map()?,
+        })
+    }
+
+    fn input(&mut self, name: &str) -> Vec<ValueId> {
+        self.builder.input(name, self.factors.len())
     }
 
     fn finish(mut self, output: &str, values: &[ValueId]) -> Result<Program, LowerError> {
@@ -113,44 +118,26 @@ impl<'a> Network<'a> {
         Ok(self.builder.finish()?)
     }
 
-    /// The map of `factors * input`; collects the slopes of each layer when asked.
-    fn forward(
-        &mut self,
-        input: &[ValueId],
-        factors: &[f64],
-        mut slopes: Option<&mut Vec<Slopes>>,
-    ) -> Vec<ValueId> {
+    /// The map of `factors * input`, and the slopes of each layer.
+    fn forward(&mut self, input: &[ValueId]) -> (Vec<ValueId>, Vec<Slopes>) {
         let mut y = input.to_vec();
-        for index in 0..self.map.layers().len() {
-            let a = self.product(index, &y, factors_of(index, factors), true);
+        let mut slopes = Vec::new();
+        for (index, layer) in self.map.layers().iter().enumerate() {
+            let a = self.product(index, &y, true).into_iter();
             let activated: Vec<(ValueId, Option<ValueId>)> = a
-                .iter()
-                .map(|&a| activation(&mut self.builder, self.map.layers()[index].activation, a))
+                .map(|a| activation(&mut self.builder, layer.activation, a))
                 .collect();
             y = activated.iter().map(|pair| pair.0).collect();
-            if let Some(slopes) = slopes.as_deref_mut() {
-                slopes.push(activated.into_iter().map(|pair| pair.1).collect());
-            }
+            slopes.push(activated.into_iter().map(|pair| pair.1).collect());
         }
-        y
-    }
-
-    fn slopes(&mut self, input: &[ValueId], factors: &[f64]) -> Vec<Slopes> {
-        let mut slopes = Vec::new();
-        self.forward(input, factors, Some(&mut slopes));
-        slopes
+        (y, slopes)
     }
 
     /// `J (factors * direction)`, from the first layer to the last.
-    fn tangent(
-        &mut self,
-        direction: &[ValueId],
-        factors: &[f64],
-        slopes: &[Slopes],
-    ) -> Vec<ValueId> {
+    fn tangent(&mut self, direction: &[ValueId], slopes: &[Slopes]) -> Vec<ValueId> {
         let mut v = direction.to_vec();
         for (index, slopes) in slopes.iter().enumerate() {
-            let a = self.product(index, &v, factors_of(index, factors), false);
+            let a = self.product(index, &v, false);
             v = self.times_slopes(&a, slopes);
         }
         v
@@ -174,7 +161,7 @@ impl<'a> Network<'a> {
         let mut g: Vec<ValueId> = Vec::with_capacity(weights.ncols());
         for &weight in weights.row(row).iter() {
             g.push(match slope {
-                Some(slope) => super::sums::scaled(&mut self.builder, weight, slope),
+                Some(slope) => scaled(&mut self.builder, weight, slope),
                 None => self.builder.constant(weight),
             });
         }
@@ -185,14 +172,8 @@ impl<'a> Network<'a> {
         self.backward(last - 1, seed, slopes)
     }
 
-    /// `W (factors * y)` of a layer, plus its bias if asked.
-    fn product(
-        &mut self,
-        index: usize,
-        y: &[ValueId],
-        factors: Option<&[f64]>,
-        is_biased: bool,
-    ) -> Vec<ValueId> {
+    /// `W y` of a layer, of the first `W (factors * y)`; plus its bias if asked.
+    fn product(&mut self, index: usize, y: &[ValueId], is_biased: bool) -> Vec<ValueId> {
         let map = &self.map.layers()[index].map;
         let (rows, cols) = map.weights().shape();
         let mut entries = match is_biased {
@@ -200,7 +181,7 @@ impl<'a> Network<'a> {
             false => vec![0.0; rows],
         };
         for col in 0..cols {
-            let factor = factors.map_or(1.0, |factors| factors[col]);
+            let factor = if index == 0 { self.factors[col] } else { 1.0 };
             entries.extend(map.weights().column(col).iter().map(|w| w * factor));
         }
         let table = self.builder.table(Table::new(cols + 1, rows, entries));
@@ -225,26 +206,19 @@ impl<'a> Network<'a> {
             Some(slopes) => values
                 .iter()
                 .zip(slopes)
-                .map(|(&value, &slope)| self.builder.binary(Binary::Mul, value, slope))
+                .map(|(&value, &slope)| self.builder.mul(value, slope))
                 .collect(),
         }
     }
 
-    fn divided(&mut self, values: &[ValueId], factors: &[f64]) -> Vec<ValueId> {
-        values
-            .iter()
-            .zip(factors)
+    fn divided(&mut self, values: &[ValueId], factors: &DVector<f64>) -> Vec<ValueId> {
+        (values.iter().zip(factors))
             .map(|(&value, &factor)| {
                 let factor = self.builder.constant(factor);
-                self.builder.binary(Binary::Div, value, factor)
+                self.builder.div(value, factor)
             })
             .collect()
     }
-}
-
-/// The scale factors belong to the first layer only.
-fn factors_of(index: usize, factors: &[f64]) -> Option<&[f64]> {
-    (index == 0).then_some(factors)
 }
 
 /// `phi(a)` and, unless it is one everywhere, `phi'(a)`.
@@ -267,11 +241,11 @@ fn activation(
             let above = steps.positive_part(a);
             let slope = steps.0.unary(Unary::Exp, below);
             let shifted = steps.minus(slope, 1.0);
-            (steps.add(above, shifted), slope)
+            (steps.0.add(above, shifted), slope)
         }
         Activation::Tanh => {
             let value = steps.0.unary(Unary::Tanh, a);
-            let square = steps.mul(value, value);
+            let square = steps.0.mul(value, value);
             (value, steps.one_minus(square))
         }
         Activation::Sigmoid => steps.sigmoid(a),
@@ -283,8 +257,8 @@ fn activation(
         Activation::GeluTanh => steps.gelu_tanh(a),
         Activation::Silu => {
             let (s, slope) = steps.sigmoid(a);
-            let bend = steps.mul(a, slope);
-            (steps.mul(a, s), steps.add(s, bend))
+            let bend = steps.0.mul(a, slope);
+            (steps.0.mul(a, s), steps.0.add(s, bend))
         }
         Activation::Softplus => {
             let magnitude = steps.0.unary(Unary::Abs, a);
@@ -294,53 +268,45 @@ fn activation(
             let log = steps.0.unary(Unary::Log, sum);
             let above = steps.positive_part(a);
             let (s, _) = steps.sigmoid(a);
-            (steps.add(above, log), s)
+            (steps.0.add(above, log), s)
         }
     };
     (value, Some(slope))
 }
 
-/// The builder, with operations by name.
+/// The builder, with longer operations by name.
 struct Steps<'b>(&'b mut ProgramBuilder);
 
 impl Steps<'_> {
-    fn add(&mut self, a: ValueId, b: ValueId) -> ValueId {
-        self.0.binary(Binary::Add, a, b)
-    }
-
-    fn mul(&mut self, a: ValueId, b: ValueId) -> ValueId {
-        self.0.binary(Binary::Mul, a, b)
-    }
-
     fn plus(&mut self, a: ValueId, number: f64) -> ValueId {
         let number = self.0.constant(number);
-        self.add(number, a)
+        self.0.add(number, a)
     }
 
     fn minus(&mut self, a: ValueId, number: f64) -> ValueId {
         let number = self.0.constant(number);
-        self.0.binary(Binary::Sub, a, number)
+        self.0.sub(a, number)
     }
 
     fn one_minus(&mut self, a: ValueId) -> ValueId {
         let one = self.0.constant(1.0);
-        self.0.binary(Binary::Sub, one, a)
+        self.0.sub(one, a)
     }
 
     fn times(&mut self, number: f64, a: ValueId) -> ValueId {
         let number = self.0.constant(number);
-        self.mul(number, a)
+        self.0.mul(number, a)
     }
 
     fn negative_part(&mut self, a: ValueId) -> ValueId {
         let magnitude = self.0.unary(Unary::Abs, a);
-        let twice = self.0.binary(Binary::Sub, a, magnitude);
+        let twice = self.0.sub(a, magnitude);
         self.times(0.5, twice)
     }
 
     fn positive_part(&mut self, a: ValueId) -> ValueId {
         let magnitude = self.0.unary(Unary::Abs, a);
-        let twice = self.add(a, magnitude);
+        let twice = self.0.add(a, magnitude);
         self.times(0.5, twice)
     }
 
@@ -350,9 +316,9 @@ impl Steps<'_> {
         let e = self.0.unary(Unary::Exp, negative);
         let sum = self.plus(e, 1.0);
         let one = self.0.constant(1.0);
-        let value = self.0.binary(Binary::Div, one, sum);
+        let value = self.0.div(one, sum);
         let rest = self.one_minus(value);
-        (value, self.mul(value, rest))
+        (value, self.0.mul(value, rest))
     }
 
     /// `a Phi(a)` and `Phi(a) + a phi(a)`, as in `model/normal.rs`.
@@ -361,7 +327,7 @@ impl Steps<'_> {
         let x = self.times(std::f64::consts::FRAC_1_SQRT_2, magnitude);
         let below = self.plus(x, 2.0);
         let two = self.0.constant(2.0);
-        let t = self.0.binary(Binary::Div, two, below);
+        let t = self.0.div(two, below);
         let twice = self.times(2.0, t);
         let w = self.minus(twice, 1.0);
         let twice_w = self.times(2.0, w);
@@ -369,47 +335,47 @@ impl Steps<'_> {
         let mut last = self.0.constant(0.0);
         let mut next = self.0.constant(TAIL[TAIL.len() - 1]);
         for &coefficient in TAIL[1..TAIL.len() - 1].iter().rev() {
-            let product = self.mul(twice_w, next);
-            let rest = self.0.binary(Binary::Sub, product, last);
+            let product = self.0.mul(twice_w, next);
+            let rest = self.0.sub(product, last);
             (next, last) = (self.plus(rest, coefficient), next);
         }
-        let product = self.mul(w, next);
-        let rest = self.0.binary(Binary::Sub, product, last);
+        let product = self.0.mul(w, next);
+        let rest = self.0.sub(product, last);
         let q = self.plus(rest, TAIL[0]);
-        let square = self.mul(a, a);
+        let square = self.0.mul(a, a);
         let exponent = self.times(-0.5, square);
         let e = self.0.unary(Unary::Exp, exponent);
         let half_t = self.times(0.5, t);
-        let share = self.mul(half_t, q);
-        let tail = self.mul(share, e);
+        let share = self.0.mul(half_t, q);
+        let tail = self.0.mul(share, e);
         // (1 + sign)/2 - sign tail: the tail below zero, one minus it above, a half at zero.
         let sign = self.0.unary(Unary::Sign, a);
         let above = self.plus(sign, 1.0);
         let above = self.times(0.5, above);
-        let signed = self.mul(sign, tail);
-        let cumulative = self.0.binary(Binary::Sub, above, signed);
+        let signed = self.0.mul(sign, tail);
+        let cumulative = self.0.sub(above, signed);
         let density = self.times(DENSITY_AT_ZERO, e);
-        let bend = self.mul(a, density);
-        (self.mul(a, cumulative), self.add(cumulative, bend))
+        let bend = self.0.mul(a, density);
+        (self.0.mul(a, cumulative), self.0.add(cumulative, bend))
     }
 
     /// `a h` with `h = (1 + tanh(r (a + c a^3)))/2`, and `h + a r (1 + 3 c a^2) (1 - tanh^2)/2`.
     fn gelu_tanh(&mut self, a: ValueId) -> (ValueId, ValueId) {
-        let square = self.mul(a, a);
+        let square = self.0.mul(a, a);
         let cubic = self.times(GELU_RATE * GELU_CUBIC, square);
         let rate = self.plus(cubic, GELU_RATE);
-        let argument = self.mul(a, rate);
+        let argument = self.0.mul(a, rate);
         let t = self.0.unary(Unary::Tanh, argument);
         let sum = self.plus(t, 1.0);
         let half = self.times(0.5, sum);
         let slope = self.times(3.0, cubic);
         let slope = self.plus(slope, GELU_RATE);
-        let t_square = self.mul(t, t);
+        let t_square = self.0.mul(t, t);
         let rest = self.one_minus(t_square);
-        let bend = self.mul(slope, rest);
+        let bend = self.0.mul(slope, rest);
         let half_a = self.times(0.5, a);
-        let bend = self.mul(half_a, bend);
-        (self.mul(a, half), self.add(half, bend))
+        let bend = self.0.mul(half_a, bend);
+        (self.0.mul(a, half), self.0.add(half, bend))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Least squares of small, known size as straight-line operations.
 
-use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
+use crate::ir::{ProgramBuilder, Unary, ValueId};
 
 /// `pinv(J^T) w = (J J^T)^-1 J w` for the `d x n` matrix with these rows, `d <= n`.
 ///
@@ -22,14 +22,14 @@ pub(super) fn pinv_times(
         for j in 0..i {
             let entry = dot(builder, &rows[i], &rows[j]);
             let entry = minus_products(builder, entry, &row, &lower[j]);
-            row.push(builder.binary(Binary::Div, entry, pivots[j]));
+            row.push(builder.div(entry, pivots[j]));
         }
         let square = dot(builder, &rows[i], &rows[i]);
         let square = minus_products(builder, square, &row, &row);
         let pivot = builder.unary(Unary::Sqrt, square);
         let right = dot(builder, &rows[i], w);
         let right = minus_products(builder, right, &row, &y);
-        y.push(builder.binary(Binary::Div, right, pivot));
+        y.push(builder.div(right, pivot));
         pivots.push(pivot);
         lower.push(row);
     }
@@ -38,7 +38,7 @@ pub(super) fn pinv_times(
     for i in (0..d).rev() {
         let column: Vec<ValueId> = (i + 1..d).map(|k| lower[k][i]).collect();
         let right = minus_products(builder, solution[i], &column, &solution[i + 1..]);
-        solution[i] = builder.binary(Binary::Div, right, pivots[i]);
+        solution[i] = builder.div(right, pivots[i]);
     }
     solution
 }
@@ -47,14 +47,14 @@ pub(super) fn pinv_times(
 fn dot(builder: &mut ProgramBuilder, a: &[ValueId], b: &[ValueId]) -> ValueId {
     let mut sums: [Option<ValueId>; 2] = [None; 2];
     for (k, (&a, &b)) in a.iter().zip(b).enumerate() {
-        let product = builder.binary(Binary::Mul, a, b);
+        let product = builder.mul(a, b);
         sums[k % 2] = Some(match sums[k % 2] {
             None => product,
-            Some(sum) => builder.binary(Binary::Add, sum, product),
+            Some(sum) => builder.add(sum, product),
         });
     }
     match sums {
-        [Some(even), Some(odd)] => builder.binary(Binary::Add, even, odd),
+        [Some(even), Some(odd)] => builder.add(even, odd),
         [Some(only), None] => only,
         [None, _] => builder.constant(0.0),
     }
@@ -68,8 +68,8 @@ fn minus_products(
     b: &[ValueId],
 ) -> ValueId {
     a.iter().zip(b).fold(start, |sum, (&a, &b)| {
-        let product = builder.binary(Binary::Mul, a, b);
-        builder.binary(Binary::Sub, sum, product)
+        let product = builder.mul(a, b);
+        builder.sub(sum, product)
     })
 }
 

@@ -4,7 +4,7 @@ use super::cost::LowerOptions;
 use super::dynamics::dynamics;
 use super::error::LowerError;
 use crate::equations::Equations;
-use crate::ir::{Binary, Program, ProgramBuilder, ValueId};
+use crate::ir::{Program, ProgramBuilder, ValueId};
 
 /// The program of one fourth-order Runge-Kutta step of `d/dt (z, dz) = (dz, ddz)` over
 /// `h` seconds with constant `u_lat`: inputs `z`, `dz`, `u_lat`, `h`; outputs `z`, `dz`
@@ -25,8 +25,8 @@ pub fn rk4_step(
     let u_lat = builder.input("u_lat", d);
     let h = builder.input("h", 1)[0];
     let (half, sixth) = (builder.constant(0.5), builder.constant(6.0));
-    let half_step = builder.binary(Binary::Mul, half, h);
-    let sixth_step = builder.binary(Binary::Div, h, sixth);
+    let half_step = builder.mul(half, h);
+    let sixth_step = builder.div(h, sixth);
 
     let mut velocities = vec![dz.clone()];
     let mut slopes: Vec<Vec<ValueId>> = Vec::new();
@@ -59,8 +59,8 @@ fn advance(
         .iter()
         .zip(slope)
         .map(|(&start, &slope)| {
-            let change = builder.binary(Binary::Mul, length, slope);
-            builder.binary(Binary::Add, start, change)
+            let change = builder.mul(length, slope);
+            builder.add(start, change)
         })
         .collect()
 }
@@ -75,9 +75,7 @@ fn weighted(
     let two = builder.constant(2.0);
     let mut sum = |a: &[ValueId], b: &[ValueId]| -> Vec<ValueId> {
         let pairs = a.iter().zip(b);
-        pairs
-            .map(|(&a, &b)| builder.binary(Binary::Add, a, b))
-            .collect()
+        pairs.map(|(&a, &b)| builder.add(a, b)).collect()
     };
     let outer = sum(&stages[0], &stages[3]);
     let inner = sum(&stages[1], &stages[2]);
@@ -85,8 +83,8 @@ fn weighted(
         .into_iter()
         .zip(inner)
         .map(|(outer, inner)| {
-            let inner = builder.binary(Binary::Mul, two, inner);
-            builder.binary(Binary::Add, outer, inner)
+            let inner = builder.mul(two, inner);
+            builder.add(outer, inner)
         })
         .collect();
     advance(builder, start, sixth_step, &mean)

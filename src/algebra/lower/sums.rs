@@ -21,8 +21,7 @@ pub(super) fn linear_combination(
     constant: f64,
     terms: &[Term],
 ) -> ValueId {
-    let early: Vec<Term> = terms.iter().copied().filter(|term| !term.late).collect();
-    let late: Vec<Term> = terms.iter().copied().filter(|term| term.late).collect();
+    let (late, early): (Vec<Term>, Vec<Term>) = terms.iter().partition(|term| term.late);
     let start = (constant != 0.0).then(|| builder.constant(constant));
     let sum = partial_sums(builder, start, &early);
     let sum = if late.len() <= 3 {
@@ -54,7 +53,7 @@ fn partial_sums(
         sums = sums
             .chunks(2)
             .map(|pair| match pair {
-                [Some(a), Some(b)] => Some(builder.binary(Binary::Add, *a, *b)),
+                [Some(a), Some(b)] => Some(builder.add(*a, *b)),
                 [one] | [one, None] => *one,
                 [None, other] => *other,
                 _ => None,
@@ -90,6 +89,6 @@ pub(super) fn scaled(builder: &mut ProgramBuilder, coefficient: f64, value: Valu
         builder.unary(Unary::Neg, value)
     } else {
         let coefficient = builder.constant(coefficient);
-        builder.binary(Binary::Mul, coefficient, value)
+        builder.mul(coefficient, value)
     }
 }

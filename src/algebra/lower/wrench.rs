@@ -19,8 +19,9 @@
 //! `d / max(d^2, least^2)`, see
 //! [`LegGeometry::least_levers`](crate::robot::LegGeometry::least_levers).
 
+use super::chain::JointAngles;
 use super::error::LowerError;
-use crate::ir::{Binary, Program, ProgramBuilder, Unary, ValueId};
+use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
 use crate::model::ReducedModel;
 use crate::robot::actuators::DRY_SPEED_RAD_S;
 use crate::robot::joints::LEG_JOINT_DIM;
@@ -90,7 +91,7 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     let net: Vec<ValueId> = (0..JOINT_DIM)
         .map(|joint| match steps.friction(rule, joint, dx[joint]) {
             None => tau[joint],
-            Some(friction) => steps.sub(tau[joint], friction),
+            Some(friction) => steps.0.sub(tau[joint], friction),
         })
         .collect();
     let joint = |kind: usize| (0..FOOT_DIM).map(move |leg| LEG_JOINT_DIM * leg + kind);
@@ -100,7 +101,7 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     for leg in Leg::ALL {
         let k = LEG_JOINT_DIM * leg.index() + 1;
         angles.push(match robot.geometry(leg) {
-            LegGeometry::Planar(_) => builder.binary(Binary::Add, x[k], x[k + 1]),
+            LegGeometry::Planar(_) => builder.add(x[k], x[k + 1]),
             LegGeometry::Chain(_) => x[k + 1],
         });
     }
@@ -115,19 +116,11 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
         .map(|leg| {
             let k = leg.index();
             let at = |group: usize| (sines[FOOT_DIM * group + k], cosines[FOOT_DIM * group + k]);
+            let angles = [at(0), at(1), at(2)];
             let torques = std::array::from_fn(|i| net[LEG_JOINT_DIM * k + i]);
             let wrench = match robot.geometry(leg) {
-                LegGeometry::Planar(planar) => {
-                    let angles = LegAngles {
-                        abduction: at(0),
-                        thigh: at(1),
-                        calf: at(2),
-                    };
-                    steps.leg_wrench(planar, angles, torques, feet[k])
-                }
-                LegGeometry::Chain(chain) => {
-                    steps.chain_wrench(chain, [at(0), at(1), at(2)], torques, feet[k])
-                }
+                LegGeometry::Planar(planar) => steps.leg_wrench(planar, angles, torques, feet[k]),
+                LegGeometry::Chain(chain) => steps.chain_wrench(chain, angles, torques, feet[k]),
             };
             match frame {
                 WrenchFrame::Body => wrench,
@@ -136,9 +129,9 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
         })
         .collect();
     let wrench: [ValueId; BODY_DIM] = std::array::from_fn(|i| {
-        let front = steps.add(of_legs[0][i], of_legs[1][i]);
-        let rear = steps.add(of_legs[2][i], of_legs[3][i]);
-        steps.add(front, rear)
+        let front = steps.0.add(of_legs[0][i], of_legs[1][i]);
+        let rear = steps.0.add(of_legs[2][i], of_legs[3][i]);
+        steps.0.add(front, rear)
     });
     let wrench = match frame {
         WrenchFrame::Body => wrench,
@@ -155,56 +148,28 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     Ok(builder.finish()?)
 }
 
-/// Sine and cosine of each angle of a leg.
-struct LegAngles {
-    abduction: (ValueId, ValueId),
-    thigh: (ValueId, ValueId),
-    /// Flexion plus knee.
-    calf: (ValueId, ValueId),
-}
-
-/// The builder, with operations by name.
+/// The builder, with longer operations by name.
 pub(super) struct Steps<'b>(pub(super) &'b mut ProgramBuilder);
 
 impl Steps<'_> {
-    fn add(&mut self, a: ValueId, b: ValueId) -> ValueId {
-        self.0.binary(Binary::Add, a, b)
-    }
-
-    fn sub(&mut self, a: ValueId, b: ValueId) -> ValueId {
-        self.0.binary(Binary::Sub, a, b)
-    }
-
-    pub(super) fn mul(&mut self, a: ValueId, b: ValueId) -> ValueId {
-        self.0.binary(Binary::Mul, a, b)
-    }
-
-    fn div(&mut self, a: ValueId, b: ValueId) -> ValueId {
-        self.0.binary(Binary::Div, a, b)
-    }
-
-    fn neg(&mut self, a: ValueId) -> ValueId {
-        self.0.unary(Unary::Neg, a)
-    }
-
     /// `a b - c d`.
     fn minor(&mut self, (a, b): (ValueId, ValueId), (c, d): (ValueId, ValueId)) -> ValueId {
-        let (left, right) = (self.mul(a, b), self.mul(c, d));
-        self.sub(left, right)
+        let (left, right) = (self.0.mul(a, b), self.0.mul(c, d));
+        self.0.sub(left, right)
     }
 
     /// `factor value`; nothing is computed for a factor of zero.
     fn scaled(&mut self, factor: f64, value: ValueId) -> Option<ValueId> {
         (factor != 0.0).then(|| {
             let factor = self.0.constant(factor);
-            self.mul(factor, value)
+            self.0.mul(factor, value)
         })
     }
 
     /// `a value_a + b value_b`.
     fn combined(&mut self, (a, of_a): (f64, ValueId), (b, of_b): (f64, ValueId)) -> ValueId {
         match (self.scaled(a, of_a), self.scaled(b, of_b)) {
-            (Some(a), Some(b)) => self.add(a, b),
+            (Some(a), Some(b)) => self.0.add(a, b),
             (Some(only), None) | (None, Some(only)) => only,
             (None, None) => self.0.constant(0.0),
         }
@@ -213,7 +178,7 @@ impl Steps<'_> {
     /// The sum of what is there.
     fn sum(&mut self, a: Option<ValueId>, b: Option<ValueId>) -> Option<ValueId> {
         match (a, b) {
-            (Some(a), Some(b)) => Some(self.add(a, b)),
+            (Some(a), Some(b)) => Some(self.0.add(a, b)),
             (one, None) | (None, one) => one,
         }
     }
@@ -225,24 +190,24 @@ impl Steps<'_> {
         let dry = actuators.dry[joint];
         let dry = (dry != 0.0).then(|| {
             let speed = self.0.constant(DRY_SPEED_RAD_S);
-            let share = self.div(velocity, speed);
+            let share = self.0.div(velocity, speed);
             let share = self.0.unary(Unary::Tanh, share);
             let dry = self.0.constant(dry);
-            self.mul(dry, share)
+            self.0.mul(dry, share)
         });
         self.sum(viscous, dry)
     }
 
     /// `numerator / divisor`, with `divisor / max(divisor^2, least^2)` for the reciprocal.
     pub(super) fn damped(&mut self, numerator: ValueId, divisor: ValueId, least: f64) -> ValueId {
-        let (square, floor) = (self.mul(divisor, divisor), self.0.constant(least * least));
-        let (sum, difference) = (self.add(square, floor), self.sub(square, floor));
+        let (square, floor) = (self.0.mul(divisor, divisor), self.0.constant(least * least));
+        let (sum, difference) = (self.0.add(square, floor), self.0.sub(square, floor));
         let difference = self.0.unary(Unary::Abs, difference);
-        let twice_larger = self.add(sum, difference);
+        let twice_larger = self.0.add(sum, difference);
         let two = self.0.constant(2.0);
-        let product = self.mul(numerator, divisor);
-        let product = self.mul(two, product);
-        self.div(product, twice_larger)
+        let product = self.0.mul(numerator, divisor);
+        let product = self.0.mul(two, product);
+        self.0.div(product, twice_larger)
     }
 
     /// The same wrench with its moment about the body's origin instead of the hip `[x, y, z]`.
@@ -252,7 +217,7 @@ impl Steps<'_> {
             let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
             for (lever, force) in [(hip[next], wrench[last]), (-hip[last], wrench[next])] {
                 if let Some(part) = self.scaled(lever, force) {
-                    moved[3 + axis] = self.add(moved[3 + axis], part);
+                    moved[3 + axis] = self.0.add(moved[3 + axis], part);
                 }
             }
         }
@@ -286,53 +251,53 @@ impl Steps<'_> {
 
     /// `a b + c d`.
     fn cross_sum(&mut self, (a, b): (ValueId, ValueId), (c, d): (ValueId, ValueId)) -> ValueId {
-        let (left, right) = (self.mul(a, b), self.mul(c, d));
-        self.add(left, right)
+        let (left, right) = (self.0.mul(a, b), self.0.mul(c, d));
+        self.0.add(left, right)
     }
 
-    /// Force and moment of one leg about its hip, in axes parallel to the body's.
+    /// Force and moment of one leg about its hip, in axes parallel to the body's; the third angle is that
+    /// of the calf, flexion plus knee.
     fn leg_wrench(
         &mut self,
         geometry: &PlanarLeg,
-        angles: LegAngles,
+        [abduction, of_thigh, (calf_sin, calf_cos)]: JointAngles,
         torques: [ValueId; LEG_JOINT_DIM],
         foot: ValueId,
     ) -> [ValueId; BODY_DIM] {
         let (thigh, calf, forward) = (geometry.thigh_m, geometry.calf_m, geometry.foot_forward_m);
-        let (calf_sin, calf_cos) = angles.calf;
         let calf_forward = self.combined((-calf, calf_sin), (forward, calf_cos));
         let calf_up = self.combined((-calf, calf_cos), (-forward, calf_sin));
-        let thigh_forward = self.combined((-thigh, angles.thigh.0), (0.0, angles.thigh.0));
-        let thigh_up = self.combined((-thigh, angles.thigh.1), (0.0, angles.thigh.1));
-        let fwd = self.add(thigh_forward, calf_forward);
-        let up = self.add(thigh_up, calf_up);
+        let thigh_forward = self.combined((-thigh, of_thigh.0), (0.0, of_thigh.0));
+        let thigh_up = self.combined((-thigh, of_thigh.1), (0.0, of_thigh.1));
+        let fwd = self.0.add(thigh_forward, calf_forward);
+        let up = self.0.add(thigh_up, calf_up);
         // The same as up c_fwd - fwd c_up, without what cancels.
         let det = self.minor((thigh_up, calf_forward), (thigh_forward, calf_up));
         let [least_det, least_up] = geometry.least_levers();
 
-        let [tau_0, tau_1, tau_2] = torques.map(|torque| self.mul(foot, torque));
+        let [tau_0, tau_1, tau_2] = torques.map(|torque| self.0.mul(foot, torque));
         let hip = self.0.constant(geometry.hip_m);
         let across = self.minor((fwd, tau_2), (calf_forward, tau_1));
         let f_x = self.damped(across, det, least_det);
         let along = self.minor((calf_up, tau_1), (up, tau_2));
         let f_e = self.damped(along, det, least_det);
-        let of_hip = self.mul(hip, f_e);
-        let rest = self.sub(tau_0, of_hip);
+        let of_hip = self.0.mul(hip, f_e);
+        let rest = self.0.sub(tau_0, of_hip);
         let f_n = self.damped(rest, up, least_up);
         let m_x = self.cross_sum((up, f_n), (hip, f_e));
-        let m_x = self.neg(m_x);
+        let m_x = self.0.unary(Unary::Neg, m_x);
         let m_e = self.minor((hip, f_x), (fwd, f_n));
         let m_n = self.cross_sum((fwd, f_e), (up, f_x));
 
-        let [f_y, f_z] = self.turned(angles.abduction, f_e, f_n);
-        let [m_y, m_z] = self.turned(angles.abduction, m_e, m_n);
+        let [f_y, f_z] = self.turned(abduction, f_e, f_n);
+        let [m_y, m_z] = self.turned(abduction, m_e, m_n);
         [f_x, f_y, f_z, m_x, m_y, m_z]
     }
 
     /// The components along y and z of `a e + b n`.
     fn turned(&mut self, (s, c): (ValueId, ValueId), a: ValueId, b: ValueId) -> [ValueId; 2] {
-        let (a_s, b_c) = (self.mul(a, s), self.mul(b, c));
-        [self.add(a_s, b_c), self.minor((b, s), (a, c))]
+        let (a_s, b_c) = (self.0.mul(a, s), self.0.mul(b, c));
+        [self.0.add(a_s, b_c), self.minor((b, s), (a, c))]
     }
 }
 

@@ -6,11 +6,11 @@ use serde_json::{Map, Value};
 
 use super::checks::{check_map, check_robot_names, check_widths, identifier_of};
 use super::coordinate_names::CoordinateNames;
-use super::error::{ModelError, check_finite, check_shape};
+use super::error::{ModelError, check_tensor};
 use super::identifier::Identifier;
 use super::jump_prior::JumpPrior;
 use super::library::Library;
-use super::phase::{Phase, all_patterns};
+use super::phase::{Phase, all_patterns, selected};
 use super::projection::pinv_of_transpose;
 use super::rom::ReducedModel;
 use super::scaling::Scaling;
@@ -24,24 +24,24 @@ const MAX_DESCRIPTION_LEN: usize = 10_000;
 const MAX_SAMPLE_TIME_S: f64 = 1.0;
 
 /// Collects the parts of a model; [`ModelBuilder::build`] checks them against each other.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ModelBuilder {
-    name: String,
-    description: String,
-    library: Library,
-    phases: Vec<Phase>,
-    statistics: Vec<(String, InputStatistics)>,
-    state: Option<CoordinateNames>,
-    input: Option<CoordinateNames>,
-    scaling: Option<Scaling>,
-    encoder: Option<StateMap>,
-    decoder: Option<StateMap>,
-    robot: Option<&'static Robot>,
-    actuators: Option<Actuators>,
-    wrench_frame: WrenchFrame,
-    jump_prior: Option<JumpPrior>,
-    sample_time_s: Option<f64>,
-    provenance: Map<String, Value>,
+    pub(super) name: String,
+    pub(super) description: String,
+    pub(super) library: Library,
+    pub(super) phases: Vec<Phase>,
+    pub(super) statistics: Vec<(String, InputStatistics)>,
+    pub(super) state: Option<CoordinateNames>,
+    pub(super) input: Option<CoordinateNames>,
+    pub(super) scaling: Option<Scaling>,
+    pub(super) encoder: Option<StateMap>,
+    pub(super) decoder: Option<StateMap>,
+    pub(super) robot: Option<&'static Robot>,
+    pub(super) actuators: Option<Actuators>,
+    pub(super) wrench_frame: WrenchFrame,
+    pub(super) jump_prior: Option<JumpPrior>,
+    pub(super) sample_time_s: Option<f64>,
+    pub(super) provenance: Map<String, Value>,
 }
 
 impl ModelBuilder {
@@ -63,33 +63,6 @@ impl ModelBuilder {
             jump_prior: None,
             sample_time_s: None,
             provenance: Map::new(),
-        }
-    }
-
-    pub(super) fn from_model(model: ReducedModel) -> Self {
-        let statistics = model
-            .phases
-            .iter()
-            .zip(model.statistics)
-            .filter_map(|(phase, statistics)| Some((phase.name.clone(), statistics?)))
-            .collect();
-        Self {
-            name: model.name,
-            description: model.description,
-            library: model.library,
-            phases: model.phases,
-            statistics,
-            state: model.state,
-            input: model.input,
-            scaling: model.scaling,
-            encoder: model.encoder,
-            decoder: model.decoder,
-            robot: model.robot,
-            actuators: model.actuators,
-            wrench_frame: model.wrench_frame,
-            jump_prior: model.jump_prior,
-            sample_time_s: model.sample_time_s,
-            provenance: model.provenance,
         }
     }
 
@@ -140,20 +113,20 @@ impl ModelBuilder {
     }
 
     /// Sets names and units of the state.
-    pub fn state(mut self, state: CoordinateNames) -> Self {
-        self.state = Some(state);
+    pub fn state(mut self, state: impl Into<Option<CoordinateNames>>) -> Self {
+        self.state = state.into();
         self
     }
 
     /// Sets names and units of the input.
-    pub fn input(mut self, input: CoordinateNames) -> Self {
-        self.input = Some(input);
+    pub fn input(mut self, input: impl Into<Option<CoordinateNames>>) -> Self {
+        self.input = input.into();
         self
     }
 
     /// Sets the scale factors.
-    pub fn scaling(mut self, scaling: Scaling) -> Self {
-        self.scaling = Some(scaling);
+    pub fn scaling(mut self, scaling: impl Into<Option<Scaling>>) -> Self {
+        self.scaling = scaling.into();
         self
     }
 
@@ -172,8 +145,8 @@ impl ModelBuilder {
     }
 
     /// Sets the robot.
-    pub fn robot(mut self, robot: &'static Robot) -> Self {
-        self.robot = Some(robot);
+    pub fn robot(mut self, robot: impl Into<Option<&'static Robot>>) -> Self {
+        self.robot = robot.into();
         self
     }
 
@@ -196,8 +169,8 @@ impl ModelBuilder {
     }
 
     /// Sets the sampling period of the recordings, s.
-    pub fn sample_time_s(mut self, sample_time_s: f64) -> Self {
-        self.sample_time_s = Some(sample_time_s);
+    pub fn sample_time_s(mut self, sample_time_s: impl Into<Option<f64>>) -> Self {
+        self.sample_time_s = sample_time_s.into();
         self
     }
 
@@ -212,7 +185,7 @@ impl ModelBuilder {
     /// # Errors
     /// The first of the [`ModelError`]s that applies: names, shapes, finite values, scale factors,
     /// rank of the encoder (singular values, [`super::RANK_TOLERANCE`]), reachable phases, covariances.
-    pub fn build(self) -> Result<ReducedModel, ModelError> {
+    pub fn build(mut self) -> Result<ReducedModel, ModelError> {
         let identifier = identifier_of("model name", &self.name)?;
         let phase_identifiers = self.check_phase_names()?;
         self.check_phases()?;
@@ -229,30 +202,15 @@ impl ModelBuilder {
             Some(encoder) => Some(pinv_of_transpose(encoder.weights(), "`encoder.weights`")?),
             None => None,
         };
-        let statistics = self.check_statistics(state_dim)?;
+        self.check_statistics(state_dim)?;
         if let Some(prior) = &self.jump_prior {
             self.check_prior(prior)?;
         }
         Ok(ReducedModel {
-            name: self.name,
+            parts: self,
             identifier,
-            description: self.description,
-            library: self.library,
-            phases: self.phases,
             phase_identifiers,
-            statistics,
-            state: self.state,
-            input: self.input,
-            scaling: self.scaling,
-            encoder: self.encoder,
-            decoder: self.decoder,
             input_projection,
-            robot: self.robot,
-            actuators: self.actuators,
-            wrench_frame: self.wrench_frame,
-            jump_prior: self.jump_prior,
-            sample_time_s: self.sample_time_s,
-            provenance: self.provenance,
         })
     }
 
@@ -282,8 +240,7 @@ impl ModelBuilder {
         let expected = (self.library.len(), self.library.latent_dim());
         for (index, phase) in self.phases.iter().enumerate() {
             let tensor = format!("phases[{index}].xi");
-            check_shape(&tensor, phase.xi.shape(), expected)?;
-            check_finite(&tensor, &phase.xi)?;
+            check_tensor(&tensor, &phase.xi, expected)?;
             if let FeetRule::Patterns(patterns) = &phase.feet {
                 let repeated = (1..patterns.len())
                     .find(|&second| patterns[..second].contains(&patterns[second]));
@@ -295,11 +252,7 @@ impl ModelBuilder {
             }
         }
         for (index, phase) in self.phases.iter().enumerate() {
-            let selects = |feet| {
-                let first = self.phases.iter().position(|p| p.feet.matches(feet));
-                first == Some(index)
-            };
-            if !all_patterns().any(selects) {
+            if !all_patterns().any(|feet| selected(&self.phases, feet) == Some(index)) {
                 return Err(ModelError::UnreachablePhase {
                     phase: index,
                     name: phase.name.clone(),
@@ -337,16 +290,10 @@ impl ModelBuilder {
             .or(named(&self.input))
             .or(self.encoder.as_ref().map(StateMap::input_dim))
             .or(self.decoder.as_ref().map(StateMap::output_dim));
-        if (self.encoder.is_some() || self.decoder.is_some()) && self.scaling.is_none() {
-            let part = if self.encoder.is_some() {
-                "encoder"
-            } else {
-                "decoder"
-            };
-            return Err(ModelError::Incomplete {
-                part,
-                needs: "scaling",
-            });
+        let (encoder, decoder) = (self.encoder.is_some(), self.decoder.is_some());
+        if (encoder || decoder) && self.scaling.is_none() {
+            let (part, needs) = (if encoder { "encoder" } else { "decoder" }, "scaling");
+            return Err(ModelError::Incomplete { part, needs });
         }
         let Some(dim) = state_dim else {
             return Ok(None);
@@ -414,29 +361,23 @@ impl ModelBuilder {
     }
 
     /// Checks the statistics and puts them in the order of the phases.
-    fn check_statistics(
-        &self,
-        state_dim: Option<usize>,
-    ) -> Result<Vec<Option<InputStatistics>>, ModelError> {
-        let mut ordered = vec![None; self.phases.len()];
-        for (name, statistics) in &self.statistics {
-            let slot = self
-                .phases
+    fn check_statistics(&mut self, state_dim: Option<usize>) -> Result<(), ModelError> {
+        let place_of = |name: &str| self.phases.iter().position(|phase| phase.name == name);
+        for (index, (name, statistics)) in self.statistics.iter().enumerate() {
+            let is_repeated = self.statistics[..index]
                 .iter()
-                .position(|phase| phase.name == *name)
-                .map(|phase| &mut ordered[phase])
-                .filter(|slot| slot.is_none())
-                .ok_or_else(|| {
-                    let expected = "the name of one phase, each once";
-                    ModelError::invalid("`input_statistics`", format!("{name:?}"), expected)
-                })?;
+                .any(|(first, _)| first == name);
+            if place_of(name).is_none() || is_repeated {
+                let (found, expected) = (format!("{name:?}"), "the name of one phase, each once");
+                return Err(ModelError::invalid("`input_statistics`", found, expected));
+            }
             let dim = state_dim.ok_or(ModelError::Incomplete {
                 part: "input_statistics",
                 needs: "encoder",
             })?;
             statistics.check(name, dim, self.library.latent_dim())?;
-            *slot = Some(statistics.clone());
         }
-        Ok(ordered)
+        self.statistics.sort_by_key(|(name, _)| place_of(name));
+        Ok(())
     }
 }

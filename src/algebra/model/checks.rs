@@ -48,11 +48,8 @@ pub(super) fn check_map(
     expected: (usize, usize),
 ) -> Result<(), ModelError> {
     if let Some(affine) = map.as_affine() {
-        return check_shape(
-            &format!("{name}.weights"),
-            affine.weights().shape(),
-            expected,
-        );
+        let (tensor, found) = (format!("{name}.weights"), affine.weights().shape());
+        return check_shape(&tensor, found, expected);
     }
     let last = map.layers().len() - 1;
     let ends = [(0, None, Some(expected.1)), (last, Some(expected.0), None)];
@@ -72,12 +69,11 @@ pub(super) fn check_widths(encoder: &StateMap, latent_dim: usize) -> Result<(), 
         None => Ok(()),
         Some((layer, found)) => {
             let expected = format!("at least {latent_dim}, one per latent coordinate");
-            let place = format!("`encoder.layers[{layer}]`");
-            Err(ModelError::invalid(
-                place,
+            let (place, found) = (
+                format!("`encoder.layers[{layer}]`"),
                 format!("{found} units"),
-                expected,
-            ))
+            );
+            Err(ModelError::invalid(place, found, expected))
         }
     }
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::{ModelError, check_shape};
+use crate::robot::Robot;
 
 const MAX_TEXT_LEN: usize = 64;
 
@@ -20,6 +21,18 @@ pub struct CoordinateNames {
 }
 
 impl CoordinateNames {
+    /// Those of the robots' state and input.
+    pub fn of_robot() -> [Self; 2] {
+        [
+            (Robot::state_names(), Robot::state_units()),
+            (Robot::input_names(), Robot::input_units()),
+        ]
+        .map(|(names, units)| Self {
+            names: names.to_vec(),
+            units: units.to_vec(),
+        })
+    }
+
     /// Number of coordinates.
     pub fn dim(&self) -> usize {
         self.names.len()

@@ -126,7 +126,7 @@ pub enum ModelError {
 
 impl ModelError {
     /// `found` at a place, where `expected` should be.
-    pub(super) fn invalid(
+    pub(crate) fn invalid(
         place: impl Into<String>,
         found: impl ToString,
         expected: impl Into<String>,
@@ -150,14 +150,13 @@ impl ModelError {
         found: usize,
         expected: usize,
     ) -> Result<(), ModelError> {
-        if found == expected {
-            Ok(())
-        } else {
-            Err(ModelError::Dimension {
+        match found == expected {
+            true => Ok(()),
+            false => Err(ModelError::Dimension {
                 what,
                 found,
                 expected,
-            })
+            }),
         }
     }
 }
@@ -171,13 +170,19 @@ pub(super) fn check_shape(
     if found == expected {
         return Ok(());
     }
-    let shape = |(rows, columns): (usize, usize)| format!("{rows} x {columns}");
-    let expected = shape(expected) + " (rows x columns)";
-    Err(ModelError::invalid(
-        format!("`{tensor}`"),
-        shape(found),
-        expected,
-    ))
+    let [found, expected] = [found, expected].map(|(rows, columns)| format!("{rows} x {columns}"));
+    let (place, expected) = (format!("`{tensor}`"), expected + " (rows x columns)");
+    Err(ModelError::invalid(place, found, expected))
+}
+
+/// Refuses a tensor of another shape than expected, or with an entry that is no number.
+pub(super) fn check_tensor<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
+    tensor: &str,
+    found: &Matrix<f64, R, C, S>,
+    expected: (usize, usize),
+) -> Result<(), ModelError> {
+    check_shape(tensor, found.shape(), expected)?;
+    check_finite(tensor, found)
 }
 
 /// Refuses the first entry that is infinite or not a number.

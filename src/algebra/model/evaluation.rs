@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId};
+use crate::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId, integer_power};
 
 /// The terms of a library as steps, each of which reads the results of earlier ones.
 #[derive(Clone, Debug)]
@@ -59,7 +59,7 @@ impl Tape {
                 Step::Product(operands) => {
                     operands.iter().map(|&operand| values[operand]).product()
                 }
-                Step::Integer(base, exponent) => power(values[*base], *exponent),
+                Step::Integer(base, exponent) => integer_power(values[*base], (*exponent).into()),
                 Step::Power(base, exponent) => values[*base].powf(values[*exponent]),
                 Step::Sine(argument) => Function::Sin.evaluate(values[*argument]),
                 Step::Cosine(argument) => Function::Cos.evaluate(values[*argument]),
@@ -127,19 +127,4 @@ impl Builder<'_> {
             self.steps.len() - 2
         })
     }
-}
-
-/// `base ^ exponent` by repeated squaring.
-fn power(base: f64, exponent: i32) -> f64 {
-    let mut result = 1.0;
-    let mut square = base;
-    let mut rest = exponent.unsigned_abs();
-    while rest > 0 {
-        if rest % 2 == 1 {
-            result *= square;
-        }
-        square *= square;
-        rest /= 2;
-    }
-    if exponent < 0 { 1.0 / result } else { result }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::error::{ModelError, check_finite, check_shape};
+use super::error::{ModelError, check_tensor};
 use super::projection::complement;
 use super::statistics::{check_covariance, symmetric};
 
@@ -71,9 +71,8 @@ impl InputGivenState {
     }
 
     pub(super) fn check(&self, place: &str, latent_dim: usize) -> Result<(), ModelError> {
-        let mean = format!("{place}.mean");
-        check_shape(&mean, self.mean.shape(), (latent_dim, 1 + 2 * latent_dim))?;
-        check_finite(&mean, &self.mean)?;
+        let (mean, shape) = (format!("{place}.mean"), (latent_dim, 1 + 2 * latent_dim));
+        check_tensor(&mean, &self.mean, shape)?;
         for (key, matrix) in [
             ("covariance", &self.covariance),
             ("acceleration_error", &self.acceleration_error),

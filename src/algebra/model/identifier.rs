@@ -206,49 +206,72 @@ mod tests {
     }
 
     #[test]
-    fn identifier_from_smuggled_text_is_refused_at_its_place() {
-        for (name, position, found) in [
-            ("x; system(\"x\")", 1, ';'),
-            ("a\nb", 1, '\n'),
-            ("a\u{0}", 1, '\u{0}'),
-            ("z\u{301}", 1, '\u{301}'),
-            ("\\input{x}", 0, '\\'),
-            ("../x", 2, '/'),
+    fn names_that_are_no_identifiers_are_refused_with_the_reason() {
+        use IdentifierError::{Character, Empty, End, Keyword, Reserved, Start, Taken, TooLong};
+        let character = |position, found| Character { position, found };
+        let keyword = |word: &str, language| Keyword {
+            identifier: word.to_owned(),
+            language,
+        };
+        let taken = |word: &str, list: usize| Taken {
+            identifier: word.to_owned(),
+            owner: TAKEN[list].0,
+        };
+        let identifier = || "a_".to_owned();
+        let long = "a".repeat(41);
+        for (name, expected) in [
+            ("", Empty),
+            (long.as_str(), TooLong { found: 41 }),
+            ("x; system(\"x\")", character(1, ';')),
+            ("a\nb", character(1, '\n')),
+            ("a\u{0}", character(1, '\u{0}')),
+            ("z\u{301}", character(1, '\u{301}')),
+            ("\\input{x}", character(0, '\\')),
+            ("../x", character(2, '/')),
+            ("2d", Start { found: '2' }),
+            ("_x", Start { found: '_' }),
+            (
+                "a-_",
+                Reserved {
+                    identifier: identifier() + "_",
+                },
+            ),
+            (
+                "a_",
+                End {
+                    identifier: identifier(),
+                },
+            ),
+            (
+                "a-",
+                End {
+                    identifier: identifier(),
+                },
+            ),
+            (
+                "a.",
+                End {
+                    identifier: identifier(),
+                },
+            ),
+            (
+                "a ",
+                End {
+                    identifier: identifier(),
+                },
+            ),
+            ("double", keyword("double", "C")),
+            ("template", keyword("template", "C++")),
+            ("and-eq", keyword("and_eq", "C++")),
+            ("loop", keyword("loop", "Rust")),
+            ("LOOP", keyword("LOOP", "Rust")),
+            ("math", taken("math", 0)),
+            ("Stdint", taken("Stdint", 0)),
+            ("main", taken("main", 1)),
+            ("core", taken("core", 2)),
+            ("nul", taken("nul", 3)),
         ] {
-            assert_eq!(
-                Identifier::from_name(name),
-                Err(IdentifierError::Character { position, found }),
-                "{name:?}"
-            );
-        }
-    }
-
-    #[test]
-    fn identifier_from_keyword_of_any_language_is_refused_whatever_its_case() {
-        for (name, language) in [
-            ("double", "C"),
-            ("template", "C++"),
-            ("loop", "Rust"),
-            ("LOOP", "Rust"),
-            ("and-eq", "C++"),
-        ] {
-            match Identifier::from_name(name) {
-                Err(IdentifierError::Keyword { language: l, .. }) => assert_eq!(l, language),
-                other => panic!("{name}: {other:?}"),
-            }
-        }
-    }
-
-    #[test]
-    fn identifier_that_shadows_header_crate_or_device_is_refused() {
-        for name in ["math", "core", "main", "nul", "Stdint"] {
-            assert!(
-                matches!(
-                    Identifier::from_name(name),
-                    Err(IdentifierError::Taken { .. })
-                ),
-                "{name}"
-            );
+            assert_eq!(Identifier::from_name(name), Err(expected), "{name:?}");
         }
     }
 
@@ -264,32 +287,6 @@ mod tests {
                 assert!(!name.ends_with('_') && !name.contains("__"));
                 assert!(name.len() <= MAX_IDENTIFIER_LEN);
             }
-        }
-    }
-
-    #[test]
-    fn identifier_with_bad_start_length_or_underscores_is_refused() {
-        assert_eq!(Identifier::from_name(""), Err(IdentifierError::Empty));
-        assert_eq!(
-            Identifier::from_name("2d"),
-            Err(IdentifierError::Start { found: '2' })
-        );
-        assert_eq!(
-            Identifier::from_name("_x"),
-            Err(IdentifierError::Start { found: '_' })
-        );
-        assert_eq!(
-            Identifier::from_name(&"a".repeat(41)),
-            Err(IdentifierError::TooLong { found: 41 })
-        );
-        assert!(matches!(
-            Identifier::from_name("a-_b"),
-            Err(IdentifierError::Reserved { .. })
-        ));
-        for name in ["a_", "a-", "a.", "a "] {
-            let found = Identifier::from_name(name);
-            let identifier = "a_".to_owned();
-            assert_eq!(found, Err(IdentifierError::End { identifier }), "{name}");
         }
     }
 }

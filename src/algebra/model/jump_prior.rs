@@ -8,8 +8,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::error::{ModelError, check_finite, check_shape};
-use super::phase::Phase;
+use super::error::{ModelError, check_tensor};
+use super::phase::{Phase, selected};
 use crate::robot::{ContactFlags, STATE_DIM};
 
 /// Numbers of a goal: distance, rise of the body at the apex, height of the body at the start, m.
@@ -144,14 +144,14 @@ impl JumpPrior {
 
     /// Complains unless every table fits the model's dimensions and phases and every number is one.
     pub(super) fn check(&self, d: usize, phases: &[Phase]) -> Result<(), ModelError> {
-        let numbers = self.jumps.iter().flatten();
-        if self.jumps.len() < 2 || numbers.clone().any(|v| !(v.is_finite() && v.abs() < 1e3)) {
+        let mut numbers = self.jumps.iter().flatten();
+        if self.jumps.len() < 2 || numbers.any(|v| !(v.is_finite() && v.abs() < 1e3)) {
             let found = format!("{} jumps, or numbers that are none", self.jumps.len());
             let expected = "2 or more, all numbers below 1000 m";
             return Err(ModelError::invalid("`landmarks.jumps`", found, expected));
         }
-        check_vector("landmarks.start", &self.start, STATE_DIM)?;
-        check_vector("prior.state_std", &self.state_std, 2 * d)?;
+        check_tensor("landmarks.start", &self.start, (STATE_DIM, 1))?;
+        check_tensor("prior.state_std", &self.state_std, (2 * d, 1))?;
         if let Some(found) = self.state_std.iter().find(|v| **v <= 0.0) {
             return Err(ModelError::invalid("`prior.state_std`", found, "positive"));
         }
@@ -161,21 +161,16 @@ impl JumpPrior {
             self.landing_height_m,
         ];
         if heights.iter().any(|v| !v.is_finite()) || heights[0] > heights[1] {
-            let place = "`landmarks`, heights at the end";
-            return Err(ModelError::invalid(
-                place,
-                format!("{heights:?}"),
-                "ordered",
-            ));
+            let (place, found) = ("`landmarks`, heights at the end", format!("{heights:?}"));
+            return Err(ModelError::invalid(place, found, "ordered"));
         }
         if self.parts.len() < 2 {
             let found = format!("{} parts", self.parts.len());
             return Err(ModelError::invalid("`landmarks.parts`", found, "2 or more"));
         }
-        let parts = self.parts.iter().enumerate();
-        parts
-            .into_iter()
-            .try_for_each(|(i, part)| check_part(part, &format!("prior.parts[{i}]"), d, phases))?;
+        for (index, part) in self.parts.iter().enumerate() {
+            check_part(part, &format!("prior.parts[{index}]"), d, phases)?;
+        }
         let in_air = |part: &&JumpPart| !part.feet.contains(&true);
         let first = &self.parts[0];
         if self.parts.iter().filter(in_air).count() != 1 || in_air(&first) {
@@ -186,69 +181,49 @@ impl JumpPrior {
     }
 }
 
-fn check_vector(tensor: &str, vector: &DVector<f64>, len: usize) -> Result<(), ModelError> {
-    check_shape(tensor, vector.shape(), (len, 1))?;
-    check_finite(tensor, vector)
-}
-
 fn check_part(part: &JumpPart, name: &str, d: usize, phases: &[Phase]) -> Result<(), ModelError> {
+    let invalid = |key: &str, found: String, expected: &str| {
+        Err(ModelError::invalid(
+            format!("`{name}{key}`"),
+            found,
+            expected,
+        ))
+    };
     let Some(phase) = phases.get(part.phase) else {
         let expected = format!("one below {}", phases.len());
-        return Err(ModelError::invalid(
-            format!("`{name}`"),
-            part.phase,
-            expected,
-        ));
+        return invalid("", part.phase.to_string(), &expected);
     };
-    if phases.iter().position(|p| p.feet.matches(part.feet)) != Some(part.phase) {
+    if selected(phases, part.feet) != Some(part.phase) {
         let expected = format!("feet that select {}", phase.name);
-        let found = format!("{:?}", part.feet);
-        return Err(ModelError::invalid(format!("`{name}`"), found, expected));
+        return invalid("", format!("{:?}", part.feet), &expected);
     }
     let nodes = part.nodes();
     if !(3..=MAX_NODES).contains(&nodes) {
-        let expected = format!("3 to {MAX_NODES}");
-        return Err(ModelError::invalid(
-            format!("`{name}.z`"),
-            format!("{nodes} nodes"),
-            expected,
-        ));
+        return invalid(".z", format!("{nodes} nodes"), &format!("3 to {MAX_NODES}"));
     }
-    for (table, key) in [(&part.z, "z"), (&part.dz, "dz"), (&part.u_lat, "u_lat")] {
-        let tensor = format!("{name}.{key}");
-        check_shape(&tensor, table.shape(), (nodes, FEATURE_DIM * d))?;
-        check_finite(&tensor, table)?;
+    let of_nodes = (nodes, FEATURE_DIM * d);
+    for (key, table, shape) in [
+        ("z", Some(&part.z), of_nodes),
+        ("dz", Some(&part.dz), of_nodes),
+        ("u_lat", Some(&part.u_lat), of_nodes),
+        ("xi", part.xi.as_ref(), (3 * d, d)),
+        ("input_covariance", Some(&part.input_covariance), (d, d)),
+    ] {
+        if let Some(table) = table {
+            check_tensor(&format!("{name}.{key}"), table, shape)?;
+        }
     }
-    if let Some(xi) = &part.xi {
-        check_shape(&format!("{name}.xi"), xi.shape(), (3 * d, d))?;
-        check_finite(&format!("{name}.xi"), xi)?;
-    }
-    let tensor = format!("{name}.input_covariance");
-    check_shape(&tensor, part.input_covariance.shape(), (d, d))?;
-    check_finite(&tensor, &part.input_covariance)?;
     if part.input_covariance.clone().cholesky().is_none() {
-        let expected = "a positive definite matrix";
-        return Err(ModelError::invalid(
-            format!("`{tensor}`"),
-            "another",
-            expected,
-        ));
+        let (found, expected) = ("another".to_owned(), "a positive definite matrix");
+        return invalid(".input_covariance", found, expected);
     }
-    check_vector(
-        &format!("{name}.acceleration_std"),
-        &part.acceleration_std,
-        d,
-    )?;
-    let durations = part.duration_s.iter().chain(&part.duration_range_s);
+    let tensor = format!("{name}.acceleration_std");
+    check_tensor(&tensor, &part.acceleration_std, (d, 1))?;
+    let mut durations = part.duration_s.iter().chain(&part.duration_range_s);
     let [least, most] = part.duration_range_s;
-    if durations.clone().any(|v| !v.is_finite()) || !(0.0 < least && least <= most) {
+    if durations.any(|v| !v.is_finite()) || !(0.0 < least && least <= most) {
         let found = format!("{:?} within {:?}", part.duration_s, part.duration_range_s);
-        let expected = "finite durations, the range positive";
-        return Err(ModelError::invalid(
-            format!("`{name}.duration_s`"),
-            found,
-            expected,
-        ));
+        return invalid(".duration_s", found, "finite durations, the range positive");
     }
     Ok(())
 }

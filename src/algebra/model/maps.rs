@@ -17,8 +17,8 @@ use super::state_map::StateMap;
 impl ReducedModel {
     /// Whether encoder and decoder, as far as the model has them, are single affine maps.
     pub fn is_linear(&self) -> bool {
-        let maps = self.encoder.iter().chain(&self.decoder);
-        maps.into_iter().all(|map| map.as_affine().is_some())
+        let mut maps = self.parts.encoder.iter().chain(&self.parts.decoder);
+        maps.all(|map| map.as_affine().is_some())
     }
 
     /// The encoder, linear or not, in scaled units.
@@ -27,7 +27,7 @@ impl ReducedModel {
     /// [`ModelError::Missing`] for a latent-only model.
     pub fn encoder_map(&self) -> Result<&StateMap, ModelError> {
         let purpose = "going from robot to latent coordinates";
-        self.require(&self.encoder, "encoder", purpose)
+        self.require(self.parts.encoder.as_ref(), "encoder", purpose)
     }
 
     /// The decoder, linear or not, in scaled units.
@@ -36,7 +36,7 @@ impl ReducedModel {
     /// [`ModelError::Missing`] if the model has none.
     pub fn decoder_map(&self) -> Result<&StateMap, ModelError> {
         let purpose = "going from latent to robot coordinates";
-        self.require(&self.decoder, "decoder", purpose)
+        self.require(self.parts.decoder.as_ref(), "decoder", purpose)
     }
 
     /// The encoder of a linear model, in scaled units: `W_e` is `latent_dim x state_dim`.
@@ -63,7 +63,8 @@ impl ReducedModel {
     /// [`ModelError::Missing`] for a latent-only model, [`ModelError::Nonlinear`].
     pub fn input_projection(&self) -> Result<&DMatrix<f64>, ModelError> {
         self.encoder()?;
-        self.require(&self.input_projection, "encoder", "projecting inputs")
+        let projection = self.input_projection.as_ref();
+        self.require(projection, "encoder", "projecting inputs")
     }
 
     /// The linear model whose maps have the same value and the same Jacobian at the state `x` (SI
@@ -84,7 +85,7 @@ impl ReducedModel {
         if encoder.as_affine().is_none() {
             builder = builder.encoder(tangent("encoder", encoder, &scaled)?);
         }
-        if let Some(decoder) = &self.decoder
+        if let Some(decoder) = &self.parts.decoder
             && decoder.as_affine().is_none()
         {
             builder = builder.decoder(tangent("decoder", decoder, &z)?);
@@ -146,7 +147,7 @@ impl ReducedModel {
 
     fn nonlinear(&self, part: &'static str, purpose: &'static str) -> ModelError {
         ModelError::Nonlinear {
-            model: self.name.clone(),
+            model: self.parts.name.clone(),
             part,
             purpose,
         }

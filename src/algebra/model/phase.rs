@@ -10,6 +10,11 @@ pub(super) fn all_patterns() -> impl Iterator<Item = ContactFlags> {
     (0u8..16).map(|bits| std::array::from_fn(|foot| bits >> foot & 1 == 1))
 }
 
+/// Index of the first phase whose rule matches the feet.
+pub(super) fn selected(phases: &[Phase], feet: ContactFlags) -> Option<usize> {
+    phases.iter().position(|phase| phase.feet.matches(feet))
+}
+
 /// One dynamics regime: `ddz = Xi^T Theta(z, dz, u_lat)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phase {

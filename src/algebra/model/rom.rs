@@ -22,7 +22,7 @@ use super::error::ModelError;
 use super::identifier::Identifier;
 use super::jump_prior::JumpPrior;
 use super::library::{CandidateTerm, Library};
-use super::phase::Phase;
+use super::phase::{Phase, selected};
 use super::scaling::Scaling;
 use super::state_map::StateMap;
 use super::statistics::InputStatistics;
@@ -31,26 +31,12 @@ use crate::robot::{Actuators, ContactFlags, InputRule, Robot, WrenchFrame};
 /// A checked reduced-order model; made by [`ReducedModel::builder`] or read from a model file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReducedModel {
-    pub(super) name: String,
+    /// As given, statistics in the order of the phases.
+    pub(super) parts: ModelBuilder,
     pub(super) identifier: Identifier,
-    pub(super) description: String,
-    pub(super) library: Library,
-    pub(super) phases: Vec<Phase>,
     pub(super) phase_identifiers: Vec<Identifier>,
-    pub(super) statistics: Vec<Option<InputStatistics>>,
-    pub(super) state: Option<CoordinateNames>,
-    pub(super) input: Option<CoordinateNames>,
-    pub(super) scaling: Option<Scaling>,
-    pub(super) encoder: Option<StateMap>,
-    pub(super) decoder: Option<StateMap>,
     /// `pinv(W_e^T)`, `latent_dim x input_dim`; there when the encoder is, and is linear.
     pub(super) input_projection: Option<DMatrix<f64>>,
-    pub(super) robot: Option<&'static Robot>,
-    pub(super) actuators: Option<Actuators>,
-    pub(super) wrench_frame: WrenchFrame,
-    pub(super) jump_prior: Option<JumpPrior>,
-    pub(super) sample_time_s: Option<f64>,
-    pub(super) provenance: Map<String, Value>,
 }
 
 impl ReducedModel {
@@ -61,12 +47,12 @@ impl ReducedModel {
 
     /// Takes the model apart for a change; `build` checks the result again.
     pub fn into_builder(self) -> ModelBuilder {
-        ModelBuilder::from_model(self)
+        self.parts
     }
 
     /// Name as in the model file.
     pub fn name(&self) -> &str {
-        &self.name
+        &self.parts.name
     }
 
     /// The name as it appears in generated code.
@@ -76,37 +62,37 @@ impl ReducedModel {
 
     /// Free text about the model; may hold any printable character, so never paste it into code.
     pub fn description(&self) -> &str {
-        &self.description
+        &self.parts.description
     }
 
     /// Where the model comes from: free JSON.
     pub fn provenance(&self) -> &Map<String, Value> {
-        &self.provenance
+        &self.parts.provenance
     }
 
     /// Number of latent coordinates, `d`.
     pub fn latent_dim(&self) -> usize {
-        self.library.latent_dim()
+        self.parts.library.latent_dim()
     }
 
     /// Number of robot coordinates, `n`; `None` for a latent-only model.
     pub fn state_dim(&self) -> Option<usize> {
-        let encoder = self.encoder.as_ref().map(StateMap::input_dim);
-        let decoder = self.decoder.as_ref().map(StateMap::output_dim);
+        let encoder = self.parts.encoder.as_ref().map(StateMap::input_dim);
+        let decoder = self.parts.decoder.as_ref().map(StateMap::output_dim);
         encoder
             .or(decoder)
-            .or(self.state.as_ref().map(CoordinateNames::dim))
-            .or(self.input.as_ref().map(CoordinateNames::dim))
+            .or(self.state().map(CoordinateNames::dim))
+            .or(self.input().map(CoordinateNames::dim))
     }
 
     /// The candidate terms.
     pub fn library(&self) -> &Library {
-        &self.library
+        &self.parts.library
     }
 
     /// The phases in the order in which their foot rules are tried.
     pub fn phases(&self) -> &[Phase] {
-        &self.phases
+        &self.parts.phases
     }
 
     /// A phase's name as it appears in generated code.
@@ -116,24 +102,25 @@ impl ReducedModel {
 
     /// Index of the first phase whose rule matches the feet.
     pub fn phase_for(&self, feet: ContactFlags) -> Option<usize> {
-        self.phases
-            .iter()
-            .position(|phase| phase.feet.matches(feet))
+        selected(&self.parts.phases, feet)
     }
 
     /// Index of the phase with this name.
     pub fn phase_named(&self, name: &str) -> Option<usize> {
-        self.phases.iter().position(|phase| phase.name == name)
+        self.parts
+            .phases
+            .iter()
+            .position(|phase| phase.name == name)
     }
 
     /// Names and units of the state, if the file has them.
     pub fn state(&self) -> Option<&CoordinateNames> {
-        self.state.as_ref()
+        self.parts.state.as_ref()
     }
 
     /// Names and units of the input, if the file has them.
     pub fn input(&self) -> Option<&CoordinateNames> {
-        self.input.as_ref()
+        self.parts.input.as_ref()
     }
 
     /// The scale factors.
@@ -141,11 +128,8 @@ impl ReducedModel {
     /// # Errors
     /// [`ModelError::Missing`] if the model has none.
     pub fn scaling(&self) -> Result<&Scaling, ModelError> {
-        self.require(
-            &self.scaling,
-            "scaling",
-            "going between SI and scaled units",
-        )
+        let purpose = "going between SI and scaled units";
+        self.require(self.parts.scaling.as_ref(), "scaling", purpose)
     }
 
     /// `s_x`, one factor a robot coordinate.
@@ -169,19 +153,18 @@ impl ReducedModel {
     /// # Errors
     /// [`ModelError::Missing`] if the file names none.
     pub fn robot(&self) -> Result<&'static Robot, ModelError> {
-        self.require(&self.robot, "robot", "kinematics and limits")
-            .copied()
+        self.require(self.parts.robot, "robot", "kinematics and limits")
     }
 
     /// What the joints take of the motors' torques before they count as input; none if the model's
     /// inputs are the motors' torques.
     pub fn actuators(&self) -> Option<&Actuators> {
-        self.actuators.as_ref()
+        self.parts.actuators.as_ref()
     }
 
     /// Axes of the force and moment in the model's inputs.
     pub fn wrench_frame(&self) -> WrenchFrame {
-        self.wrench_frame
+        self.parts.wrench_frame
     }
 
     /// How samples of the robot become the model's inputs: what everything that feeds recorded
@@ -190,12 +173,8 @@ impl ReducedModel {
     /// # Errors
     /// [`ModelError::Missing`] if the file names no robot.
     pub fn input_rule(&self) -> Result<InputRule, ModelError> {
-        let robot = self.robot()?;
-        Ok(InputRule::new(
-            robot,
-            self.actuators.clone(),
-            self.wrench_frame,
-        ))
+        let (robot, actuators) = (self.robot()?, self.parts.actuators.clone());
+        Ok(InputRule::new(robot, actuators, self.parts.wrench_frame))
     }
 
     /// Sampling period of the recordings behind the model, s.
@@ -203,8 +182,7 @@ impl ReducedModel {
     /// # Errors
     /// [`ModelError::Missing`] if the file does not tell.
     pub fn sample_time_s(&self) -> Result<f64, ModelError> {
-        self.require(&self.sample_time_s, "sample_time_s", "sampling")
-            .copied()
+        self.require(self.parts.sample_time_s, "sample_time_s", "sampling")
     }
 
     /// Landmarks and prior of the training jumps.
@@ -213,7 +191,7 @@ impl ReducedModel {
     /// [`ModelError::Missing`] if the file has none.
     pub fn jump_prior(&self) -> Result<&JumpPrior, ModelError> {
         let purpose = "planning; `romc train` on jumps of one kind with a linear encoder makes it";
-        self.require(&self.jump_prior, "prior", purpose)
+        self.require(self.parts.jump_prior.as_ref(), "prior", purpose)
     }
 
     /// Mean and covariance of the training inputs of one phase, SI units.
@@ -221,12 +199,12 @@ impl ReducedModel {
     /// # Errors
     /// [`ModelError::Missing`] if the file has none for the phase, [`ModelError::PhaseIndex`].
     pub fn input_statistics(&self, phase: usize) -> Result<&InputStatistics, ModelError> {
-        self.phase(phase)?;
-        self.require(
-            &self.statistics[phase],
-            "input_statistics",
-            "weighing inputs in control; `romc import --inputs-from` takes it from recordings",
-        )
+        let phase = &self.phase(phase)?.name;
+        let mut statistics = self.parts.statistics.iter();
+        let found = statistics.find_map(|(name, found)| (name == phase).then_some(found));
+        let purpose =
+            "weighing inputs in control; `romc import --inputs-from` takes it from recordings";
+        self.require(found, "input_statistics", purpose)
     }
 
     /// Latent acceleration `ddz = Xi^T Theta(z, dz, u_lat)` of one phase, term by term in library
@@ -242,7 +220,7 @@ impl ReducedModel {
         u_lat: &DVector<f64>,
     ) -> Result<DVector<f64>, ModelError> {
         let xi = &self.phase(phase)?.xi;
-        let theta = self.library.evaluate(z, dz, u_lat)?;
+        let theta = self.parts.library.evaluate(z, dz, u_lat)?;
         Ok(DVector::from_fn(self.latent_dim(), |output, _| {
             let mut sum = 0.0;
             for (&coefficient, &value) in xi.column(output).iter().zip(theta.iter()) {
@@ -274,7 +252,7 @@ impl ReducedModel {
         }
         Ok(phase
             .active_terms(output)
-            .map(|(term, coefficient)| (coefficient, self.library.term(term)))
+            .map(|(term, coefficient)| (coefficient, self.parts.library.term(term)))
             .collect())
     }
 
@@ -283,26 +261,25 @@ impl ReducedModel {
     /// # Errors
     /// [`ModelError::PhaseIndex`].
     pub fn phase(&self, phase: usize) -> Result<&Phase, ModelError> {
-        self.phases.get(phase).ok_or(ModelError::PhaseIndex {
+        self.parts.phases.get(phase).ok_or(ModelError::PhaseIndex {
             found: phase,
-            count: self.phases.len(),
+            count: self.parts.phases.len(),
         })
     }
 
     fn require_state_dim(&self) -> Result<usize, ModelError> {
-        let dim = self.state_dim();
-        self.require(&dim, "encoder", "a vector in robot coordinates")
-            .copied()
+        let purpose = "a vector in robot coordinates";
+        self.require(self.state_dim(), "encoder", purpose)
     }
 
-    pub(super) fn require<'a, T>(
+    pub(super) fn require<T>(
         &self,
-        part: &'a Option<T>,
+        part: Option<T>,
         name: &'static str,
         purpose: &'static str,
-    ) -> Result<&'a T, ModelError> {
-        part.as_ref().ok_or_else(|| ModelError::Missing {
-            model: self.name.clone(),
+    ) -> Result<T, ModelError> {
+        part.ok_or_else(|| ModelError::Missing {
+            model: self.parts.name.clone(),
             part: name,
             purpose,
         })

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::activation::Activation;
 use super::affine::AffineMap;
-use super::error::ModelError;
+use super::error::{ModelError, check_shape};
 
 /// Most layers of a map.
 pub const MAX_LAYERS: usize = 16;
@@ -50,31 +50,28 @@ impl StateMap {
     /// [`MAX_LAYER_WIDTH`] units, and each takes the outputs of the layer before it.
     pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self, ModelError> {
         if !(1..=MAX_LAYERS).contains(&layers.len()) {
-            let (place, found) = (format!("`{tensor}.layers`"), layers.len());
-            let expected = format!("1 to {MAX_LAYERS}");
-            return Err(ModelError::invalid(
-                place,
-                format!("{found} layers"),
-                expected,
-            ));
+            let place = format!("`{tensor}.layers`");
+            let (found, expected) = (
+                format!("{} layers", layers.len()),
+                format!("1 to {MAX_LAYERS}"),
+            );
+            return Err(ModelError::invalid(place, found, expected));
         }
         for (index, layer) in layers.iter().enumerate() {
             let (rows, columns) = layer.map.weights().shape();
+            let name = format!("{tensor}.layers[{index}].weights");
             if rows > MAX_LAYER_WIDTH {
-                let place = format!("`{tensor}.layers[{index}].weights`");
-                let expected = format!("at most {MAX_LAYER_WIDTH}");
-                return Err(ModelError::invalid(
-                    place,
+                let (found, expected) = (
                     format!("{rows} units"),
-                    expected,
-                ));
+                    format!("at most {MAX_LAYER_WIDTH}"),
+                );
+                return Err(ModelError::invalid(format!("`{name}`"), found, expected));
             }
             let expected = match index {
                 0 => columns,
                 _ => layers[index - 1].map.output_dim(),
             };
-            let name = format!("{tensor}.layers[{index}].weights");
-            super::error::check_shape(&name, (rows, columns), (rows, expected))?;
+            check_shape(&name, (rows, columns), (rows, expected))?;
         }
         Ok(Self { layers })
     }
@@ -99,7 +96,11 @@ impl StateMap {
 
     /// Number of coordinates that leave.
     pub fn output_dim(&self) -> usize {
-        self.last().map.output_dim()
+        self.layers
+            .last()
+            .expect("a map has a layer")
+            .map
+            .output_dim()
     }
 
     /// Shape of the Jacobian, `output_dim x input_dim`.
@@ -112,13 +113,10 @@ impl StateMap {
     /// # Errors
     /// [`ModelError::Dimension`] if `x` is not `input_dim` long.
     pub fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        let mut y = self.layers[0].map.apply(x)?;
-        activate(&self.layers[0], &mut y);
-        for layer in &self.layers[1..] {
-            y = layer.map.apply(&y)?;
-            activate(layer, &mut y);
-        }
-        Ok(y)
+        let (first, rest) = self.layers.split_first().expect("a map has a layer");
+        let y = first.activated(first.map.apply(x)?);
+        rest.iter()
+            .try_fold(y, |y, layer| Ok(layer.activated(layer.map.apply(&y)?)))
     }
 
     /// How velocities map: `J(x) dx`.
@@ -200,15 +198,14 @@ impl StateMap {
         }
         text
     }
-
-    fn last(&self) -> &Layer {
-        self.layers.last().expect("a map has a layer")
-    }
 }
 
-fn activate(layer: &Layer, a: &mut DVector<f64>) {
-    if layer.activation != Activation::Linear {
-        a.apply(|a| *a = layer.activation.value(*a));
+impl Layer {
+    fn activated(&self, mut a: DVector<f64>) -> DVector<f64> {
+        if self.activation != Activation::Linear {
+            a.apply(|a| *a = self.activation.value(*a));
+        }
+        a
     }
 }
 

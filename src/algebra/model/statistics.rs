@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::error::{ModelError, check_finite, check_shape};
+use super::error::{ModelError, check_tensor};
 use super::given_state::InputGivenState;
 
 /// Largest asymmetry, and most negative eigenvalue, that count as rounding: relative to the
@@ -59,9 +59,7 @@ impl InputStatistics {
         latent_dim: usize,
     ) -> Result<(), ModelError> {
         let place = format!("input_statistics.{phase}");
-        let mean = format!("{place}.mean");
-        check_shape(&mean, self.mean.shape(), (dim, 1))?;
-        check_finite(&mean, &self.mean)?;
+        check_tensor(&format!("{place}.mean"), &self.mean, (dim, 1))?;
         check_covariance(&format!("{place}.covariance"), &self.covariance, dim)?;
         match &self.given_state {
             None => Ok(()),
@@ -80,8 +78,7 @@ pub(super) fn check_covariance(
     found: &DMatrix<f64>,
     dim: usize,
 ) -> Result<(), ModelError> {
-    check_shape(tensor, found.shape(), (dim, dim))?;
-    check_finite(tensor, found)?;
+    check_tensor(tensor, found, (dim, dim))?;
     check_symmetric(tensor, found)?;
     check_positive(tensor, found)
 }

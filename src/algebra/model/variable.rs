@@ -29,6 +29,16 @@ impl LatentVariable {
         }
     }
 
+    /// Its place in [`Self::all`], if it is there at `latent_dim`.
+    pub fn place(self, latent_dim: usize) -> Option<usize> {
+        let (block, index) = match self {
+            LatentVariable::Z(index) => (0, index),
+            LatentVariable::Dz(index) => (1, index),
+            LatentVariable::U(index) => (2, index),
+        };
+        (index < latent_dim).then_some(block * latent_dim + index)
+    }
+
     /// All variables at `latent_dim`: z, then dz, then u.
     pub fn all(latent_dim: usize) -> impl Iterator<Item = Self> {
         let indices = move || 0..latent_dim;

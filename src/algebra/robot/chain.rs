@@ -127,7 +127,7 @@ impl ChainLeg {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::kinematics::PlanarLeg;
+    use crate::robot::{LegGeometry, PlanarLeg};
 
     const PLANAR: PlanarLeg = PlanarLeg {
         hip_m: -0.08,
@@ -135,17 +135,6 @@ mod tests {
         calf_m: 0.2,
         foot_forward_m: -0.02,
     };
-
-    fn of_planar(leg: PlanarLeg) -> ChainLeg {
-        ChainLeg {
-            axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
-            links: [
-                [0.0, leg.hip_m, 0.0],
-                [0.0, 0.0, -leg.thigh_m],
-                [leg.foot_forward_m, 0.0, -leg.calf_m],
-            ],
-        }
-    }
 
     /// Tilted axes, the last two parallel, links in all directions.
     fn odd() -> ChainLeg {
@@ -174,6 +163,7 @@ mod tests {
 
     #[test]
     fn chain_of_planar_links_is_the_planar_leg_damping_included() {
+        let of_planar = |leg| LegGeometry::Planar(leg).chain();
         let chain = of_planar(PLANAR);
         let mut damped = 0;
         for q in postures() {
@@ -184,16 +174,17 @@ mod tests {
                 foot_forward_m: 0.0,
                 ..PLANAR
             };
-            match (
+            let both = [
                 of_planar(bent).damped_force_map(&q),
                 bent.damped_force_map(&q),
-            ) {
-                (None, None) => {}
-                (Some(a), Some(b)) => {
+            ];
+            match both {
+                [None, None] => {}
+                [Some(a), Some(b)] => {
                     assert!((a - b).norm() < 1e-11 * b.norm(), "{q:?}: {a} {b}");
                     damped += 1;
                 }
-                (a, b) => panic!("{q:?}: {a:?} {b:?}"),
+                [a, b] => panic!("{q:?}: {a:?} {b:?}"),
             }
         }
         assert!(damped > 5);

@@ -218,25 +218,6 @@ mod tests {
     }
 
     #[test]
-    fn foot_jacobian_agrees_with_central_differences() {
-        let step = 1e-6;
-        for geometry in [LEG, RIGHT, BENT] {
-            for q in postures() {
-                let exact = geometry.foot_jacobian(&q);
-                for joint in 0..3 {
-                    let (mut lower, mut upper) = (q, q);
-                    lower[joint] -= step;
-                    upper[joint] += step;
-                    let slope = (geometry.foot_position(&upper) - geometry.foot_position(&lower))
-                        / (2.0 * step);
-                    let error = (exact.column(joint) - slope).norm();
-                    assert!(error < 1e-9, "{q:?} joint {joint}: {error:e}");
-                }
-            }
-        }
-    }
-
-    #[test]
     fn manipulability_is_the_normalised_determinant() {
         for geometry in [LEG, RIGHT, BENT] {
             for q in postures() {

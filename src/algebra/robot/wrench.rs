@@ -168,7 +168,6 @@ impl Robot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::SVector;
 
     fn go1() -> &'static Robot {
         Robot::by_name("go1").unwrap()
@@ -231,20 +230,6 @@ mod tests {
             .foot_force(Leg::FrontRight, &[f64::INFINITY, 0.7, -1.4], &[0.0; 3])
             .unwrap_err();
         assert!(error.to_string().contains("joint angle inf"));
-    }
-
-    #[test]
-    fn body_wrench_is_the_wrench_map_times_torques() {
-        for contact in [
-            [true; 4],
-            [false, false, true, true],
-            [true, false, false, true],
-        ] {
-            let wrench = go1().body_wrench(&stand(), &torques(), contact).unwrap();
-            let map = go1().wrench_map(&stand(), contact).unwrap();
-            let product = map * SVector::<f64, 12>::from(torques());
-            assert!((wrench - product).norm() < 1e-10 * wrench.norm());
-        }
     }
 
     #[test]

@@ -49,12 +49,13 @@ impl ActuatorsEntry {
         };
         match arrays.into_keys().next() {
             None => Ok(entry),
-            Some(name) => Err(RobotFileError::at(
-                "",
-                format!("actuators.{name}"),
-                "an unknown array",
-                "viscous, dry and armature alone",
-            )),
+            Some(name) => {
+                let (place, expected) = (
+                    format!("actuators.{name}"),
+                    "viscous, dry and armature alone",
+                );
+                Err(RobotFileError::at("", place, "an unknown array", expected))
+            }
         }
     }
 
@@ -65,12 +66,10 @@ impl ActuatorsEntry {
     pub fn actuators(&self, file: &str) -> Result<Actuators, RobotFileError> {
         let joints = |name: &str, values: &[f64]| match values.len() {
             found @ (3 | JOINT_DIM) => Ok(std::array::from_fn(|joint| values[joint % found])),
-            found => Err(RobotFileError::at(
-                file,
-                format!("actuators.{name}"),
-                format!("{found} numbers"),
-                COUNT,
-            )),
+            found => {
+                let (place, found) = (format!("actuators.{name}"), format!("{found} numbers"));
+                Err(RobotFileError::at(file, place, found, COUNT))
+            }
         };
         let actuators = Actuators {
             viscous: joints("viscous", &self.viscous)?,
@@ -79,12 +78,11 @@ impl ActuatorsEntry {
         };
         match actuators.unusable() {
             None => Ok(actuators),
-            Some((name, joint, found)) => Err(RobotFileError::at(
-                file,
-                format!("actuators.{name}, joint {}", JOINT_NAMES[joint]),
-                found.to_string(),
-                "a number of at least 0",
-            )),
+            Some((name, joint, found)) => {
+                let place = format!("actuators.{name}, joint {}", JOINT_NAMES[joint]);
+                let (found, expected) = (found.to_string(), "a number of at least 0");
+                Err(RobotFileError::at(file, place, found, expected))
+            }
         }
     }
 }
@@ -100,12 +98,10 @@ pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators, R
         actuators,
     } = from_toml_text(&file, &text_of(path)?)?;
     match (of, robot.map(Robot::name)) {
-        (Some(found), Some(expected)) if found != expected => Err(RobotFileError::at(
-            &file,
-            "robot",
-            found,
-            format!("{expected}, whose recordings these are, or no such line"),
-        )),
+        (Some(found), Some(expected)) if found != expected => {
+            let expected = format!("{expected}, whose recordings these are, or no such line");
+            Err(RobotFileError::at(&file, "robot", found, expected))
+        }
         _ => actuators.actuators(&file),
     }
 }

@@ -44,11 +44,9 @@ pub(super) fn build(file: &str, entry: &RobotEntry) -> Result<Robot, RobotFileEr
     let reader = Reader { file };
     reader.name("name", &entry.name)?;
     reader.positive("mass_kg", entry.mass_kg)?;
-    if entry.leg.len() != FOOT_DIM {
-        let found = format!("{} legs", entry.leg.len());
-        let expected = "four: models, inputs and controllers are those of quadrupeds";
-        return Err(RobotFileError::at(file, "leg", found, expected));
-    }
+    let found = format!("{} legs", entry.leg.len());
+    let expected = "four: models, inputs and controllers are those of quadrupeds";
+    reader.check(entry.leg.len() == FOOT_DIM, "leg", found, expected)?;
     let places = reader.places(&entry.leg)?;
     let mut robot = Robot {
         name: word(&entry.name),
@@ -71,12 +69,11 @@ pub(super) fn build(file: &str, entry: &RobotEntry) -> Result<Robot, RobotFileEr
         for (offset, joint) in entry.joint.iter().enumerate() {
             let place = format!("{place}.joint[{offset}]");
             let at = LEG_JOINT_DIM * k + offset;
-            reader.name(&format!("{place}.name"), &joint.name)?;
-            if names.contains(&joint.name.as_str()) {
-                let found = format!("{:?} a second time", joint.name);
-                let entry = format!("{place}.name");
-                return Err(RobotFileError::at(file, entry, found, "each name once"));
-            }
+            let of_name = format!("{place}.name");
+            reader.name(&of_name, &joint.name)?;
+            let is_new = !names.contains(&joint.name.as_str());
+            let found = format!("{:?} a second time", joint.name);
+            reader.check(is_new, &of_name, found, "each name once")?;
             names.push(&joint.name);
             robot.joint_names[at] = word(&joint.name);
             robot.joint_limit_rad[at] = reader.limits(&place, joint)?;
@@ -90,54 +87,40 @@ pub(super) fn build(file: &str, entry: &RobotEntry) -> Result<Robot, RobotFileEr
 }
 
 impl Reader<'_> {
+    /// Refuses `found` unless it is fine.
+    fn check(
+        &self,
+        is_fine: bool,
+        place: &str,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> Result<(), RobotFileError> {
+        match is_fine {
+            true => Ok(()),
+            false => Err(RobotFileError::at(self.file, place, found, expected)),
+        }
+    }
+
     fn name(&self, place: &str, name: &str) -> Result<(), RobotFileError> {
         let is_fine = !name.trim().is_empty()
             && name.len() <= MAX_NAME_LEN
             && !name.chars().any(char::is_control)
             // Generated headers list names in comments.
             && !name.contains("*/");
-        match is_fine {
-            true => Ok(()),
-            false => {
-                let expected = format!("a name of at most {MAX_NAME_LEN} bytes on one line");
-                Err(RobotFileError::at(
-                    self.file,
-                    place,
-                    format!("{name:?}"),
-                    expected,
-                ))
-            }
-        }
+        let expected = format!("a name of at most {MAX_NAME_LEN} bytes on one line");
+        self.check(is_fine, place, format!("{name:?}"), expected)
     }
 
     fn positive(&self, place: &str, value: f64) -> Result<f64, RobotFileError> {
-        match value.is_finite() && value > 0.0 {
-            true => Ok(value),
-            false => {
-                let expected = "a finite number above 0";
-                Err(RobotFileError::at(
-                    self.file,
-                    place,
-                    value.to_string(),
-                    expected,
-                ))
-            }
-        }
+        let is_fine = value.is_finite() && value > 0.0;
+        self.check(is_fine, place, value.to_string(), "a finite number above 0")?;
+        Ok(value)
     }
 
-    fn vector(&self, place: &str, vector: [f64; 3]) -> Result<[f64; 3], RobotFileError> {
-        match vector.iter().all(|v| v.abs() <= MAX_LINK_M) {
-            true => Ok(vector),
-            false => {
-                let expected = format!("three lengths of at most {MAX_LINK_M} m");
-                Err(RobotFileError::at(
-                    self.file,
-                    place,
-                    format!("{vector:?}"),
-                    expected,
-                ))
-            }
-        }
+    fn vector(&self, place: &str, vector: [f64; 3]) -> Result<(), RobotFileError> {
+        let is_fine = vector.iter().all(|v| v.abs() <= MAX_LINK_M);
+        let expected = format!("three lengths of at most {MAX_LINK_M} m");
+        self.check(is_fine, place, format!("{vector:?}"), expected)
     }
 
     fn limits(&self, place: &str, joint: &JointEntry) -> Result<(f64, f64), RobotFileError> {
@@ -150,30 +133,21 @@ impl Reader<'_> {
                 return Err(RobotFileError::at(self.file, place, found, expected));
             }
         };
-        match low.is_finite() && high.is_finite() && low < high {
-            true => Ok((low, high)),
-            false => {
-                let found = format!("{low} to {high}");
-                let place = format!("{place}.{key}");
-                Err(RobotFileError::at(
-                    self.file,
-                    place,
-                    found,
-                    "the lower limit first",
-                ))
-            }
-        }
+        let is_fine = low.is_finite() && high.is_finite() && low < high;
+        let (place, found) = (format!("{place}.{key}"), format!("{low} to {high}"));
+        self.check(is_fine, &place, found, "the lower limit first")?;
+        Ok((low, high))
     }
 
     /// Which leg each entry is, by where its first joint stands.
     fn places(&self, legs: &[LegEntry]) -> Result<[Leg; FOOT_DIM], RobotFileError> {
         for (index, leg) in legs.iter().enumerate() {
-            if leg.joint.len() != LEG_JOINT_DIM {
-                let found = format!("{} joints", leg.joint.len());
-                let place = format!("leg[{index}].joint");
-                let expected = "three, from the trunk to the foot";
-                return Err(RobotFileError::at(self.file, place, found, expected));
-            }
+            let (place, count) = (format!("leg[{index}].joint"), leg.joint.len());
+            let (found, expected) = (
+                format!("{count} joints"),
+                "three, from the trunk to the foot",
+            );
+            self.check(count == LEG_JOINT_DIM, &place, found, expected)?;
         }
         let hips: Vec<[f64; 3]> = legs.iter().map(|leg| leg.joint[0].at).collect();
         let middle =
@@ -190,11 +164,9 @@ impl Reader<'_> {
         match <[Leg; FOOT_DIM]>::try_from(found) {
             Ok(found) if is_one_each => Ok(found),
             _ => {
-                let hips: Vec<String> = hips
-                    .iter()
-                    .map(|hip| format!("({}, {})", hip[0], hip[1]))
-                    .collect();
-                let found = format!("first joints at (x, y) = {} m", hips.join(", "));
+                let hips = hips.iter().map(|hip| format!("({}, {})", hip[0], hip[1]));
+                let hips = hips.collect::<Vec<_>>().join(", ");
+                let found = format!("first joints at (x, y) = {hips} m");
                 let expected = "one at each corner of the trunk: x forward, y left";
                 Err(RobotFileError::at(self.file, "leg", found, expected))
             }
@@ -202,23 +174,19 @@ impl Reader<'_> {
     }
 
     fn axis(&self, place: &str, joint: &JointEntry) -> Result<Vector3<f64>, RobotFileError> {
-        let place = || format!("{place}.axis");
+        let place = format!("{place}.axis");
         let Some(given) = joint.axis.vector() else {
             let found = format!("{:?}", joint.axis);
             let expected = "\"x\", \"y\", \"z\", \"-x\", \"-y\", \"-z\" or three numbers";
-            return Err(RobotFileError::at(self.file, place(), found, expected));
+            return Err(RobotFileError::at(self.file, place, found, expected));
         };
         let vector = Vector3::from(given);
         let norm = vector.norm();
-        if !(norm.is_finite() && norm > 1e-6) {
-            let found = format!("{given:?}");
-            return Err(RobotFileError::at(self.file, place(), found, "a direction"));
-        }
-        if joint.sign.abs() != 1.0 || !joint.offset_rad.is_finite() {
-            let found = format!("sign {} and offset_rad {}", joint.sign, joint.offset_rad);
-            let expected = "sign 1 or -1, offset_rad finite";
-            return Err(RobotFileError::at(self.file, place(), found, expected));
-        }
+        let is_fine = norm.is_finite() && norm > 1e-6;
+        self.check(is_fine, &place, format!("{given:?}"), "a direction")?;
+        let is_fine = joint.sign.abs() == 1.0 && joint.offset_rad.is_finite();
+        let found = format!("sign {} and offset_rad {}", joint.sign, joint.offset_rad);
+        self.check(is_fine, &place, found, "sign 1 or -1, offset_rad finite")?;
         // What is a unit vector already stays as it is, to the last bit.
         let unit = match (norm - 1.0).abs() < 1e-12 {
             true => vector,
@@ -258,22 +226,19 @@ impl Reader<'_> {
             let [a, b] = [a, b].map(|joint| leg.joint[joint].name.as_str());
             format!("the axes of {a} and {b}")
         };
-        if axes[1].cross(&axes[2]).norm() > MAX_TILT {
-            let found = format!("{} in different directions", names(1, 2));
-            let expected = "a leg whose last two joints turn about parallel axes";
-            return Err(RobotFileError::at(self.file, place, found, expected));
-        }
-        if axes[0].cross(&axes[1]).norm() < MIN_ABDUCTION {
-            let found = format!("{} almost parallel", names(0, 1));
-            let expected = "a first joint that moves the plane of the leg";
-            return Err(RobotFileError::at(self.file, place, found, expected));
-        }
+        let is_tilted = axes[1].cross(&axes[2]).norm() > MAX_TILT;
+        let found = format!("{} in different directions", names(1, 2));
+        let expected = "a leg whose last two joints turn about parallel axes";
+        self.check(!is_tilted, place, found, expected)?;
+        let is_stiff = axes[0].cross(&axes[1]).norm() < MIN_ABDUCTION;
+        let found = format!("{} almost parallel", names(0, 1));
+        let expected = "a first joint that moves the plane of the leg";
+        self.check(!is_stiff, place, found, expected)?;
         let lengths = chain.lengths();
-        if lengths.iter().any(|length| *length < MIN_LINK_M) {
-            let found = format!("thigh and calf of {} and {} m", lengths[0], lengths[1]);
-            let expected = "lengths across the axes of the last two joints";
-            return Err(RobotFileError::at(self.file, place, found, expected));
-        }
+        let is_short = lengths.iter().any(|length| *length < MIN_LINK_M);
+        let found = format!("thigh and calf of {} and {} m", lengths[0], lengths[1]);
+        let expected = "lengths across the axes of the last two joints";
+        self.check(!is_short, place, found, expected)?;
         Ok(chain)
     }
 }

@@ -10,7 +10,7 @@ use super::entry::RobotEntry;
 use super::error::{RobotFileError, RobotFileFault};
 use super::{legs, urdf};
 use crate::files::{Located, Place};
-use crate::robot::{Robot, RobotError};
+use crate::robot::Robot;
 
 /// Largest file of a robot; a URDF with meshes beside it is far smaller.
 const MAX_FILE_BYTES: u64 = 16 << 20;
@@ -24,13 +24,13 @@ pub fn find(name_or_file: &str) -> Result<&'static Robot, RobotFileError> {
         Ok(robot) => Ok(robot),
         Err(unknown) => match ending(Path::new(name_or_file)).as_str() {
             "toml" | "urdf" | "xml" => read(Path::new(name_or_file), &[]),
-            _ => Err(unknown_robot(unknown)),
+            _ => Err(Located::new(
+                "",
+                Place::Whole,
+                RobotFileFault::Unknown(unknown),
+            )),
         },
     }
-}
-
-fn unknown_robot(error: RobotError) -> RobotFileError {
-    Located::new("", Place::Whole, RobotFileFault::Unknown(error))
 }
 
 fn ending(path: &Path) -> String {

@@ -64,13 +64,8 @@ pub(super) fn entry(file: &str, text: &str, feet: &[String]) -> Result<RobotEntr
     })?;
     let root = document.root_element();
     if root.tag_name().name() != "robot" {
-        let found = format!("<{}>", root.tag_name().name());
-        return Err(RobotFileError::at(
-            file,
-            "the root element",
-            found,
-            "<robot>",
-        ));
+        let (place, found) = ("the root element", format!("<{}>", root.tag_name().name()));
+        return Err(RobotFileError::at(file, place, found, "<robot>"));
     }
     let tree = Tree::new(file, root)?;
     let trunk = tree.trunk(root)?;
@@ -78,9 +73,7 @@ pub(super) fn entry(file: &str, text: &str, feet: &[String]) -> Result<RobotEntr
         [] => tree.found_legs(trunk)?,
         feet => tree.named_legs(trunk, feet)?,
     };
-    let leg = legs
-        .iter()
-        .map(|(joints, foot)| tree.leg(trunk, joints, foot));
+    let leg = (legs.iter()).map(|(joints, foot)| tree.leg(trunk, joints, foot));
     let leg = leg.collect::<Result<_, _>>()?;
     let mass = root.descendants().filter(|node| node.has_tag_name("mass"));
     let mass: Result<Vec<f64>, _> = mass
@@ -128,20 +121,13 @@ fn triple(
     let Some(text) = node.and_then(|node| node.attribute(key)) else {
         return Ok(None);
     };
-    let numbers: Vec<f64> = text
-        .split_whitespace()
-        .map_while(|word| word.parse().ok())
-        .collect();
-    match numbers[..] {
-        [x, y, z] if text.split_whitespace().count() == 3 => Ok(Some(Vector3::new(x, y, z))),
+    let numbers: Option<Vec<f64>> =
+        (text.split_whitespace().map(|word| word.parse().ok())).collect();
+    match numbers.as_deref() {
+        Some(&[x, y, z]) => Ok(Some(Vector3::new(x, y, z))),
         _ => {
-            let found = format!("{text:?}");
-            Err(RobotFileError::at(
-                file,
-                format!("{of}, {key}"),
-                found,
-                "three numbers",
-            ))
+            let (place, found) = (format!("{of}, {key}"), format!("{text:?}"));
+            Err(RobotFileError::at(file, place, found, "three numbers"))
         }
     }
 }
@@ -160,16 +146,16 @@ impl<'x> Tree<'x> {
             tree.below.entry(joint.parent).or_default().push(index);
             if tree.above.insert(joint.child, index).is_some() {
                 let found = format!("link `{}` below two joints", joint.child);
-                return Err(RobotFileError::at(
-                    file,
-                    "the tree",
-                    found,
-                    "one joint above each",
-                ));
+                return Err(tree.refused(found, "one joint above each"));
             }
             tree.joints.push(joint);
         }
         Ok(tree)
+    }
+
+    /// Another tree than that of a quadruped.
+    fn refused(&self, found: String, expected: &str) -> RobotFileError {
+        RobotFileError::at(self.file, "the tree", found, expected)
     }
 
     fn joint(&self, node: Node<'x, 'x>) -> Result<Joint<'x>, RobotFileError> {
@@ -201,18 +187,11 @@ impl<'x> Tree<'x> {
     fn trunk(&self, root: Node<'x, 'x>) -> Result<&'x str, RobotFileError> {
         let links = root.children().filter(|node| node.has_tag_name("link"));
         let names: Vec<&str> = links.filter_map(|node| node.attribute("name")).collect();
-        let roots: Vec<&&str> = names
-            .iter()
-            .filter(|name| !self.above.contains_key(**name))
-            .collect();
+        let is_root = |name: &&&str| !self.above.contains_key(**name);
+        let roots: Vec<&&str> = names.iter().filter(is_root).collect();
         let [only] = roots[..] else {
             let found = format!("{} links without a joint above them", roots.len());
-            return Err(RobotFileError::at(
-                self.file,
-                "the tree",
-                found,
-                "one, the trunk",
-            ));
+            return Err(self.refused(found, "one, the trunk"));
         };
         Ok(match self.below.get(only).map(Vec::as_slice) {
             Some(&[joint]) if matches!(self.joints[joint].kind, "floating" | "planar") => {
@@ -248,33 +227,19 @@ impl<'x> Tree<'x> {
 
     fn limb(&self, first: usize) -> Limb {
         let mut joints = vec![first];
-        loop {
-            let next = self.next_moving(self.joints[joints[joints.len() - 1]].child);
-            match next[..] {
-                [] => {
-                    return Limb {
-                        joints,
-                        is_chain: true,
-                    };
-                }
-                [only] => joints.push(only),
-                _ => {
-                    return Limb {
-                        joints,
-                        is_chain: false,
-                    };
-                }
-            }
+        let mut next = self.next_moving(self.joints[first].child);
+        while let [only] = next[..] {
+            joints.push(only);
+            next = self.next_moving(self.joints[only].child);
         }
+        let is_chain = next.is_empty();
+        Limb { joints, is_chain }
     }
 
     /// Moving joints and foot of each leg.
     fn found_legs(&self, trunk: &'x str) -> Result<Vec<(Vec<usize>, &'x str)>, RobotFileError> {
-        let limbs: Vec<Limb> = self
-            .next_moving(trunk)
-            .into_iter()
-            .map(|j| self.limb(j))
-            .collect();
+        let limbs = self.next_moving(trunk).into_iter().map(|j| self.limb(j));
+        let limbs: Vec<Limb> = limbs.collect();
         let is_leg = |limb: &&Limb| limb.is_chain && limb.joints.len() == LEG_JOINT_DIM;
         let legs: Vec<&Limb> = limbs.iter().filter(is_leg).collect();
         if legs.len() != FOOT_DIM {
@@ -291,7 +256,7 @@ impl<'x> Tree<'x> {
             let found = format!("{} limbs on `{trunk}`{texts}", limbs.len());
             let expected = "four legs of three joints each, the only robots that romc models; \
                             --feet (romc robot) names their feet where limbs have more joints";
-            return Err(RobotFileError::at(self.file, "the tree", found, expected));
+            return Err(self.refused(found, expected));
         }
         let with_foot = |limb: &Limb| Ok((limb.joints.clone(), self.foot(limb)?));
         legs.into_iter().map(with_foot).collect()
@@ -305,10 +270,8 @@ impl<'x> Tree<'x> {
             name.contains("foot") || name.contains("toe")
         };
         let named: Vec<&&str> = held.iter().filter(says_so).collect();
-        let ends: Vec<&&str> = held
-            .iter()
-            .filter(|link| !self.below.contains_key(**link))
-            .collect();
+        let is_end = |link: &&&str| !self.below.contains_key(**link);
+        let ends: Vec<&&str> = held.iter().filter(is_end).collect();
         match (&named[..], &ends[..]) {
             ([only], _) | ([], [only]) => Ok(only),
             ([first, rest @ ..], _) if rest.iter().all(|link| self.is_same_place(first, link)) => {
@@ -352,13 +315,8 @@ impl<'x> Tree<'x> {
     ) -> Result<Vec<(Vec<usize>, &'x str)>, RobotFileError> {
         let leg = |foot: &String| {
             let Some((&foot, _)) = self.above.get_key_value(foot.as_str()) else {
-                let place = format!("link `{foot}`");
-                return Err(RobotFileError::at(
-                    self.file,
-                    place,
-                    "no such link",
-                    "a foot",
-                ));
+                let (place, found) = (format!("link `{foot}`"), "no such link");
+                return Err(RobotFileError::at(self.file, place, found, "a foot"));
             };
             let mut joints = Vec::new();
             let mut link = foot;
@@ -386,10 +344,8 @@ impl<'x> Tree<'x> {
         let (origin, frame) = self.along(trunk);
         let seen = |link: &str| {
             let (position, turn) = self.along(link);
-            (
-                frame.inverse() * (position - origin),
-                frame.inverse() * turn,
-            )
+            let back = frame.inverse();
+            (back * (position - origin), back * turn)
         };
         let mut entries = Vec::with_capacity(joints.len());
         let mut before = Vector3::zeros();
@@ -421,12 +377,8 @@ impl<'x> Tree<'x> {
             "continuous" => true,
             kind => return Err(refused(&format!("type {kind:?}"), "revolute or continuous")),
         };
-        let limit = joint.limit.ok_or_else(|| {
-            refused(
-                "no <limit>",
-                "<limit lower=... upper=... effort=... velocity=...>",
-            )
-        })?;
+        let attributes = "<limit lower=... upper=... effort=... velocity=...>";
+        let limit = (joint.limit).ok_or_else(|| refused("no <limit>", attributes))?;
         let value = |key: &str| number(self.file, limit, key, &format!("{of}, <limit>"));
         let limits = match is_endless {
             true => [-ENDLESS_RAD, ENDLESS_RAD],

@@ -2,7 +2,6 @@
 
 use super::interval::Interval;
 use super::node::{ExprId, Function, Node, SymbolId};
-use super::number::Number;
 use super::pool::ExprPool;
 
 impl ExprPool {
@@ -58,17 +57,13 @@ impl ExprPool {
     ) -> Interval {
         let mut reduced = domain.to_vec();
         for ((_, range), slope) in reduced.iter_mut().zip(slopes) {
-            let to_low_end = match side {
-                Side::Low => slope.lo() >= 0.0,
-                Side::High => slope.hi() <= 0.0,
+            let away = match side {
+                Side::Low => *slope,
+                Side::High => -*slope,
             };
-            let to_high_end = match side {
-                Side::Low => slope.hi() <= 0.0,
-                Side::High => slope.lo() >= 0.0,
-            };
-            if to_low_end {
+            if away.lo() >= 0.0 {
                 *range = Interval::point(range.lo());
-            } else if to_high_end {
+            } else if away.hi() <= 0.0 {
                 *range = Interval::point(range.hi());
             }
         }
@@ -95,12 +90,10 @@ impl ExprPool {
         nodes.iter().all(|node| match *self.node(*node) {
             Node::Number(_) | Node::Sum(_) | Node::Product(_) => true,
             Node::Symbol(_) => range(*node).magnitude().is_finite() && !range(*node).is_empty(),
-            Node::Power(base, exponent) => {
-                match self.as_number(exponent).and_then(Number::as_integer) {
-                    Some(integer) => integer > 0 || !range(base).contains(0.0),
-                    None => range(base).lo() > 0.0,
-                }
-            }
+            Node::Power(base, exponent) => match self.as_integer(exponent) {
+                Some(integer) => integer > 0 || !range(base).contains(0.0),
+                None => range(base).lo() > 0.0,
+            },
             Node::Apply(function, argument) => match function {
                 Function::Sin | Function::Cos | Function::Tanh | Function::Exp | Function::Abs => {
                     true
@@ -133,7 +126,7 @@ mod tests {
 
     fn bound(text: &str, lo: f64, hi: f64) -> Interval {
         let mut pool = ExprPool::new();
-        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let expr = pool.parsed(text);
         let domain: Vec<(SymbolId, Interval)> = pool
             .symbols_of(expr)
             .into_iter()

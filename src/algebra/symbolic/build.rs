@@ -60,6 +60,10 @@ impl ExprPool {
         self.scale(Number::MINUS_ONE, a)
     }
 
+    pub(super) fn negated_if(&mut self, condition: bool, a: ExprId) -> ExprId {
+        if condition { self.neg(a) } else { a }
+    }
+
     /// `a * b`.
     pub fn mul(&mut self, a: ExprId, b: ExprId) -> ExprId {
         self.product(&[a, b])
@@ -149,19 +153,14 @@ impl ExprPool {
                 let negated = terms.iter().map(|term| self.neg(*term)).collect();
                 self.intern(Node::Sum(negated))
             }
-            _ if self.starts_negative(rest) || self.is_unfolded(rest) => {
-                let factor = self.constant(coefficient);
-                self.product(&[factor, rest])
-            }
-            Node::Product(factors) => {
-                let factors = factors.clone();
-                let factor = self.constant(coefficient);
-                let all = std::iter::once(factor).chain(factors).collect();
-                self.intern(Node::Product(all))
-            }
             _ => {
                 let factor = self.constant(coefficient);
-                self.intern(Node::Product([factor, rest].into()))
+                if self.starts_negative(rest) || self.is_unfolded(rest) {
+                    return self.product(&[factor, rest]);
+                }
+                let factors = self.factors_of(rest).iter().copied();
+                let all = std::iter::once(factor).chain(factors).collect();
+                self.intern(Node::Product(all))
             }
         }
     }

@@ -108,7 +108,7 @@ impl ExprPool {
                     }
                     _ => 0,
                 };
-                let exponent = match self.as_number(*exponent).and_then(Number::as_integer) {
+                let exponent = match self.as_integer(*exponent) {
                     Some(1 | -1) => 1,
                     Some(integer) => power + u64::from(integer < 0),
                     None => FUNCTION + length_of(*exponent),
@@ -137,27 +137,20 @@ impl ExprPool {
 
     /// Functions among the factors of the terms.
     fn n_functions(&self, expr: ExprId) -> u64 {
-        let is_function = |factor: &ExprId| self.function_power(*factor).is_some();
-        let of_term = |term: ExprId| {
-            self.factors_of(term)
-                .iter()
-                .filter(|f| is_function(f))
-                .count()
+        let of_term = |term: &ExprId| {
+            let powers = self.factors_of(*term).iter();
+            powers.filter_map(|f| self.function_power(*f)).count() as u64
         };
         match self.node(expr) {
-            Node::Sum(terms) => terms.iter().map(|term| of_term(*term) as u64).sum(),
-            _ => of_term(expr) as u64,
+            Node::Sum(terms) => terms.iter().map(of_term).sum(),
+            _ => of_term(&expr),
         }
     }
 
     fn n_terms(&self, expr: ExprId) -> u64 {
         match self.node(expr) {
             Node::Sum(terms) => terms.len() as u64,
-            Node::Number(_)
-            | Node::Symbol(_)
-            | Node::Product(_)
-            | Node::Power(..)
-            | Node::Apply(..) => 1,
+            _ => 1,
         }
     }
 }
@@ -184,7 +177,7 @@ mod tests {
 
     fn cost(text: &str) -> u64 {
         let mut pool = ExprPool::new();
-        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let expr = pool.parsed(text);
         pool.cost(expr)
     }
 

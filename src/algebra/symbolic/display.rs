@@ -141,18 +141,16 @@ impl Printer<'_> {
     }
 
     fn push_power(&mut self, base: ExprId, exponent: Exponent) {
+        let mut pieces = vec![Piece::Operand(base), Piece::Text("^")];
         let number = match exponent {
             Exponent::Expr(exponent) => {
-                return self.push_all(vec![
-                    Piece::Operand(base),
-                    Piece::Text("^"),
-                    Piece::Operand(exponent),
-                ]);
+                pieces.push(Piece::Operand(exponent));
+                return self.push_all(pieces);
             }
             Exponent::Number(number) => number,
         };
-        let exponent = match number.as_rational() {
-            Some((1, 1)) => return self.stack.push(self.factor_piece(base)),
+        pieces.extend(match number.as_rational() {
+            Some((1, 1)) => return self.stack.push(Piece::Operand(base)),
             // `sqrt(36)` would read as 6, though the power itself is beyond every float;
             // `sqrt(0)` as zero, though its negative powers are not.
             Some((halves, 2)) if !self.has_exact_root(base) => {
@@ -166,9 +164,7 @@ impl Printer<'_> {
             Some((_, 1)) => vec![Piece::Number(number)],
             None if !number.is_negative() => vec![Piece::Number(number)],
             Some(_) | None => vec![Piece::Text("("), Piece::Number(number), Piece::Text(")")],
-        };
-        let mut pieces = vec![Piece::Operand(base), Piece::Text("^")];
-        pieces.extend(exponent);
+        });
         self.push_all(pieces);
     }
 
@@ -176,16 +172,6 @@ impl Printer<'_> {
     fn has_exact_root(&self, expr: ExprId) -> bool {
         let number = self.pool.as_number(expr);
         number.is_some_and(|number| number.checked_root(2).is_some())
-    }
-
-    /// A factor with exponent one: only sums need parentheses between other factors.
-    fn factor_piece(&self, base: ExprId) -> Piece {
-        match self.pool.node(base) {
-            Node::Apply(..) | Node::Symbol(_) => Piece::Expr(base),
-            Node::Number(_) | Node::Sum(_) | Node::Product(_) | Node::Power(..) => {
-                Piece::Operand(base)
-            }
-        }
     }
 
     fn push_operand(&mut self, expr: ExprId) {
@@ -271,9 +257,7 @@ mod tests {
     fn display_of_canonical_text_reads_back_to_the_same_id() {
         for text in CANONICAL {
             let mut pool = ExprPool::new();
-            let expr = pool
-                .parse(text, &|_| true)
-                .unwrap_or_else(|error| panic!("{text}: {error}"));
+            let expr = pool.parsed(text);
             let printed = pool.display(expr).to_string();
             assert_eq!(printed.replace("e+", "e"), text.replace("e+", "e"));
             assert_eq!(pool.parse(&printed, &|_| true), Ok(expr), "{text}");

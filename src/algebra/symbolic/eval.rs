@@ -1,8 +1,8 @@
 //! Numeric values.
 
 use super::node::{ExprId, Node, SymbolId};
-use super::number::Number;
 use super::pool::ExprPool;
+use super::rounding::power_by;
 
 impl ExprPool {
     /// The value of `expr` where symbols have the values that `value_of` gives.
@@ -29,12 +29,10 @@ impl ExprPool {
                 .map(|factor| child(*factor))
                 .reduce(|a, b| a * b)
                 .expect("products have two factors or more"),
-            Node::Power(base, exponent) => {
-                match pool.as_number(*exponent).and_then(Number::as_integer) {
-                    Some(integer) => power(child(*base), integer),
-                    None => child(*base).powf(child(*exponent)),
-                }
-            }
+            Node::Power(base, exponent) => match pool.as_integer(*exponent) {
+                Some(integer) => integer_power(child(*base), integer),
+                None => child(*base).powf(child(*exponent)),
+            },
             Node::Apply(function, argument) => function.evaluate(child(*argument)),
         })
     }
@@ -65,17 +63,10 @@ impl ExprPool {
 }
 
 /// `base ^ exponent` by squaring.
-fn power(base: f64, exponent: i64) -> f64 {
-    let mut remaining = exponent.unsigned_abs();
-    let (mut result, mut square) = (1.0, base);
-    while remaining > 0 {
-        if remaining % 2 == 1 {
-            result *= square;
-        }
-        square *= square;
-        remaining /= 2;
-    }
-    if exponent < 0 { 1.0 / result } else { result }
+#[inline]
+pub fn integer_power(base: f64, exponent: i64) -> f64 {
+    let power = power_by(base, exponent.unsigned_abs(), |a, b| a * b);
+    if exponent < 0 { 1.0 / power } else { power }
 }
 
 #[cfg(test)]
@@ -85,7 +76,7 @@ mod tests {
 
     fn at_two(text: &str) -> f64 {
         let mut pool = ExprPool::new();
-        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let expr = pool.parsed(text);
         pool.evaluate(expr, &|_| 2.0)
     }
 

@@ -23,15 +23,10 @@ pub struct Interval {
 
 impl Interval {
     /// All reals.
-    pub const ENTIRE: Interval = Interval {
-        lo: f64::NEG_INFINITY,
-        hi: f64::INFINITY,
-    };
+    pub const ENTIRE: Interval = Interval::between(f64::NEG_INFINITY, f64::INFINITY);
     /// No points: the value of an expression that is defined nowhere in its domain.
-    pub const EMPTY: Interval = Interval {
-        lo: f64::INFINITY,
-        hi: f64::NEG_INFINITY,
-    };
+    pub const EMPTY: Interval = Interval::between(f64::INFINITY, f64::NEG_INFINITY);
+    const NON_NEGATIVE: Interval = Interval::between(0.0, f64::INFINITY);
 
     /// The interval from `lo` to `hi`; empty if `lo > hi`, all reals if a bound is NaN.
     pub fn new(lo: f64, hi: f64) -> Interval {
@@ -40,8 +35,13 @@ impl Interval {
         } else if lo > hi {
             Interval::EMPTY
         } else {
-            Interval { lo, hi }
+            Interval::between(lo, hi)
         }
+    }
+
+    /// As [`new`](Interval::new), from bounds that are no NaN.
+    const fn between(lo: f64, hi: f64) -> Interval {
+        Interval { lo, hi }
     }
 
     /// The interval of one point.
@@ -89,20 +89,12 @@ impl Interval {
 
     /// The smallest interval that contains both.
     pub fn hull(self, other: Interval) -> Interval {
-        Interval {
-            lo: self.lo.min(other.lo),
-            hi: self.hi.max(other.hi),
-        }
+        Interval::between(self.lo.min(other.lo), self.hi.max(other.hi))
     }
 
     /// The points that lie in both.
     pub fn intersection(self, other: Interval) -> Interval {
-        let (lo, hi) = (self.lo.max(other.lo), self.hi.min(other.hi));
-        if lo > hi {
-            Interval::EMPTY
-        } else {
-            Interval { lo, hi }
-        }
+        Interval::new(self.lo.max(other.lo), self.hi.min(other.hi))
     }
 
     /// `1/x` for the points other than zero.
@@ -112,14 +104,8 @@ impl Interval {
         }
         match (self.lo < 0.0, self.hi > 0.0) {
             (true, true) => Interval::ENTIRE,
-            (false, _) => Interval {
-                lo: recip_down(self.hi),
-                hi: if self.lo == 0.0 {
-                    f64::INFINITY
-                } else {
-                    recip_up(self.lo)
-                },
-            },
+            (false, _) if self.lo == 0.0 => Interval::between(recip_down(self.hi), f64::INFINITY),
+            (false, _) => Interval::between(recip_down(self.hi), recip_up(self.lo)),
             (true, false) => -(-self).recip(),
         }
     }
@@ -131,10 +117,7 @@ impl Interval {
         } else if self.hi <= 0.0 {
             -self
         } else {
-            Interval {
-                lo: 0.0,
-                hi: self.magnitude(),
-            }
+            Interval::between(0.0, self.magnitude())
         }
     }
 
@@ -143,10 +126,7 @@ impl Interval {
         if self.is_empty() {
             return self;
         }
-        Interval {
-            lo: sign(self.lo),
-            hi: sign(self.hi),
-        }
+        Interval::between(sign(self.lo), sign(self.hi))
     }
 
     /// `x^exponent`.
@@ -158,22 +138,21 @@ impl Interval {
             let positive = exponent.checked_neg().unwrap_or(i64::MAX);
             return self.powi(positive).recip();
         }
-        if exponent % 2 == 0 {
-            let magnitude = self.abs();
-            let lo = power_down(magnitude.lo, exponent);
-            let hi = power_up(magnitude.hi, exponent);
-            return Interval { lo, hi };
-        }
-        let odd = |x: f64, down: bool| match (x < 0.0, down) {
-            (false, true) => power_down(x, exponent),
-            (false, false) => power_up(x, exponent),
-            (true, true) => -power_up(-x, exponent),
-            (true, false) => -power_down(-x, exponent),
+        let exponent = exponent.unsigned_abs();
+        let down = |x: f64| match x < 0.0 {
+            true => -power_up(-x, exponent),
+            false => power_down(x, exponent),
         };
-        Interval {
-            lo: odd(self.lo, true),
-            hi: odd(self.hi, false),
-        }
+        let up = |x: f64| match x < 0.0 {
+            true => -power_down(-x, exponent),
+            false => power_up(x, exponent),
+        };
+        let base = if exponent.is_multiple_of(2) {
+            self.abs()
+        } else {
+            self
+        };
+        Interval::between(down(base.lo), up(base.hi))
     }
 
     /// `x^exponent`, for all pairs of points for which that is real: exponents of a negative base
@@ -182,8 +161,7 @@ impl Interval {
         if self.is_empty() || exponent.is_empty() {
             return Interval::EMPTY;
         }
-        let non_negative = self.intersection(Interval::new(0.0, f64::INFINITY));
-        let power = non_negative.pow_non_negative(exponent);
+        let power = (self.intersection(Interval::NON_NEGATIVE)).pow_non_negative(exponent);
         if self.lo >= 0.0 || exponent.lo.ceil() > exponent.hi {
             return power;
         }
@@ -205,34 +183,29 @@ impl Interval {
 
     /// Square roots of the points that are not negative.
     pub fn sqrt(self) -> Interval {
-        let inside = self.intersection(Interval::new(0.0, f64::INFINITY));
+        let inside = self.intersection(Interval::NON_NEGATIVE);
         if inside.is_empty() {
             return inside;
         }
-        let (lo, hi) = (inside.lo.sqrt(), inside.hi.sqrt());
-        Interval {
-            lo: if is_exact_root(lo, inside.lo) {
-                lo
-            } else {
-                lo.next_down().max(0.0)
-            },
-            hi: if is_exact_root(hi, inside.hi) {
-                hi
-            } else {
-                hi.next_up()
-            },
+        let (mut lo, mut hi) = (inside.lo.sqrt(), inside.hi.sqrt());
+        if !is_exact_root(lo, inside.lo) {
+            lo = lo.next_down().max(0.0);
         }
+        if !is_exact_root(hi, inside.hi) {
+            hi = hi.next_up();
+        }
+        Interval::between(lo, hi)
     }
 
     /// `exp(x)`.
     pub fn exp(self) -> Interval {
         self.increasing(f64::exp)
-            .intersection(Interval::new(0.0, f64::INFINITY))
+            .intersection(Interval::NON_NEGATIVE)
     }
 
     /// Natural logarithms of the positive points.
     pub fn log(self) -> Interval {
-        let inside = self.intersection(Interval::new(0.0, f64::INFINITY));
+        let inside = self.intersection(Interval::NON_NEGATIVE);
         if inside.hi == 0.0 {
             return Interval::EMPTY;
         }
@@ -260,7 +233,7 @@ impl Interval {
         if self.is_empty() {
             return self;
         }
-        if self.magnitude() > LARGEST_ANGLE || self.contains_half_turn(0.5) {
+        if self.magnitude() > LARGEST_ANGLE || self.contains_angle(1.0, 0.5) {
             return Interval::ENTIRE;
         }
         self.increasing(f64::tan)
@@ -280,43 +253,29 @@ impl Interval {
             return self;
         }
         if self.magnitude() > LARGEST_ANGLE {
-            return Interval { lo: -1.0, hi: 1.0 };
+            return Interval::between(-1.0, 1.0);
         }
         let (at_lo, at_hi) = (function(self.lo), function(self.hi));
-        let has_maximum = self.contains_turn(offset);
-        let has_minimum = self.contains_turn(offset + 1.0);
-        Interval {
-            lo: if has_minimum {
-                -1.0
-            } else {
-                widen_down(at_lo.min(at_hi)).max(-1.0)
-            },
-            hi: if has_maximum {
-                1.0
-            } else {
-                widen_up(at_lo.max(at_hi)).min(1.0)
-            },
-        }
+        let lo = match self.contains_angle(2.0, offset + 1.0) {
+            true => -1.0,
+            false => widen_down(at_lo.min(at_hi)).max(-1.0),
+        };
+        let hi = match self.contains_angle(2.0, offset) {
+            true => 1.0,
+            false => widen_up(at_lo.max(at_hi)).min(1.0),
+        };
+        Interval::between(lo, hi)
     }
 
-    /// Whether `(2k + offset) pi` may lie inside for an integer `k`.
-    fn contains_turn(self, offset: f64) -> bool {
-        let turns = (self / PI - Interval::point(offset)) * Interval::point(0.5);
-        turns.lo.ceil() <= turns.hi
-    }
-
-    /// Whether `(k + offset) pi` may lie inside for an integer `k`.
-    fn contains_half_turn(self, offset: f64) -> bool {
-        let turns = self / PI - Interval::point(offset);
+    /// Whether `(k period + offset) pi` may lie inside for an integer `k`.
+    fn contains_angle(self, period: f64, offset: f64) -> bool {
+        let turns = (self / PI - Interval::point(offset)) * Interval::point(1.0 / period);
         turns.lo.ceil() <= turns.hi
     }
 }
 
 /// The two floats around pi.
-const PI: Interval = Interval {
-    lo: std::f64::consts::PI,
-    hi: std::f64::consts::PI.next_up(),
-};
+const PI: Interval = Interval::between(std::f64::consts::PI, std::f64::consts::PI.next_up());
 
 impl fmt::Display for Interval {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -332,10 +291,7 @@ impl std::ops::Neg for Interval {
     type Output = Interval;
 
     fn neg(self) -> Interval {
-        Interval {
-            lo: -self.hi,
-            hi: -self.lo,
-        }
+        Interval::between(-self.hi, -self.lo)
     }
 }
 
@@ -346,10 +302,7 @@ impl std::ops::Add for Interval {
         if self.is_empty() || other.is_empty() {
             return Interval::EMPTY;
         }
-        Interval {
-            lo: -sub_up(-self.lo, other.lo),
-            hi: sub_up(self.hi, -other.hi),
-        }
+        Interval::between(-sub_up(-self.lo, other.lo), sub_up(self.hi, -other.hi))
     }
 }
 
@@ -374,16 +327,12 @@ impl std::ops::Mul for Interval {
             (self.hi, other.lo),
             (self.hi, other.hi),
         ];
-        Interval {
-            lo: corners
-                .map(|(a, b)| -mul_up(-a, b))
-                .into_iter()
-                .fold(f64::INFINITY, f64::min),
-            hi: corners
-                .map(|(a, b)| mul_up(a, b))
-                .into_iter()
-                .fold(f64::NEG_INFINITY, f64::max),
-        }
+        let lower = corners.map(|(a, b)| -mul_up(-a, b)).into_iter();
+        let upper = corners.map(|(a, b)| mul_up(a, b)).into_iter();
+        Interval::between(
+            lower.fold(f64::INFINITY, f64::min),
+            upper.fold(f64::NEG_INFINITY, f64::max),
+        )
     }
 }
 

@@ -36,12 +36,10 @@ impl ExprPool {
                 .iter()
                 .map(|factor| child(*factor))
                 .fold(Interval::point(1.0), |a, b| a * b),
-            Node::Power(base, exponent) => {
-                match pool.as_number(*exponent).and_then(Number::as_integer) {
-                    Some(integer) => child(*base).powi(integer),
-                    None => child(*base).pow(child(*exponent)),
-                }
-            }
+            Node::Power(base, exponent) => match pool.as_integer(*exponent) {
+                Some(integer) => child(*base).powi(integer),
+                None => child(*base).pow(child(*exponent)),
+            },
             Node::Apply(function, argument) => {
                 let argument = child(*argument);
                 match function {
@@ -83,7 +81,7 @@ mod tests {
 
     fn bounds(text: &str, range: Interval) -> Interval {
         let mut pool = ExprPool::new();
-        let expr = pool.parse(text, &|_| true).expect("test text parses");
+        let expr = pool.parsed(text);
         pool.evaluate_interval(expr, &|_| range)
     }
 

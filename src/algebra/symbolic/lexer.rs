@@ -34,22 +34,37 @@ pub(super) fn tokenize(text: &str) -> Result<Vec<Token<'_>>, ParseError> {
     let mut rest = text;
     let mut position = 1;
     while let Some(first) = rest.chars().next() {
-        let length = match first {
+        let (kind, length) = match first {
             ' ' | '\t' | '\n' | '\r' => {
                 rest = &rest[1..];
                 position += 1;
                 continue;
             }
-            '0'..='9' | '.' => number_length(rest),
-            'a'..='z' | 'A'..='Z' | '_' => name_length(rest),
-            '+' | '-' | '*' | '/' | '^' | '(' | ')' => 1,
+            '0'..='9' | '.' => {
+                let length = number_length(rest);
+                let number = &rest[..length];
+                let refused = || ParseErrorKind::Number(short(number)).at(position);
+                let value = read_number(number).ok_or_else(refused)?;
+                (TokenKind::Number(value), length)
+            }
+            'a'..='z' | 'A'..='Z' | '_' => {
+                let length = name_length(rest);
+                (TokenKind::Name(&rest[..length]), length)
+            }
+            '+' => (TokenKind::Plus, 1),
+            '-' => (TokenKind::Minus, 1),
+            '*' => (TokenKind::Times, 1),
+            '/' => (TokenKind::Divide, 1),
+            '^' => (TokenKind::Caret, 1),
+            '(' => (TokenKind::Open, 1),
+            ')' => (TokenKind::Close, 1),
             _ => return Err(ParseErrorKind::Character(first).at(position)),
         };
-        let (token, after) = rest.split_at(length);
+        let (text, after) = rest.split_at(length);
         tokens.push(Token {
-            kind: kind_of(first, token, position)?,
+            kind,
             position,
-            text: token,
+            text,
         });
         // Tokens are ASCII: bytes are characters.
         position += length;
@@ -61,23 +76,6 @@ pub(super) fn tokenize(text: &str) -> Result<Vec<Token<'_>>, ParseError> {
         text: "",
     });
     Ok(tokens)
-}
-
-fn kind_of(first: char, token: &str, position: usize) -> Result<TokenKind<'_>, ParseError> {
-    Ok(match first {
-        '+' => TokenKind::Plus,
-        '-' => TokenKind::Minus,
-        '*' => TokenKind::Times,
-        '/' => TokenKind::Divide,
-        '^' => TokenKind::Caret,
-        '(' => TokenKind::Open,
-        ')' => TokenKind::Close,
-        '0'..='9' | '.' => {
-            let refused = || ParseErrorKind::Number(short(token)).at(position);
-            TokenKind::Number(read_number(token).ok_or_else(refused)?)
-        }
-        _ => TokenKind::Name(token),
-    })
 }
 
 /// Digits, a point, digits, and an exponent with at least one digit.
@@ -163,19 +161,9 @@ mod tests {
 
     #[test]
     fn exponent_without_digits_is_a_name() {
-        assert_eq!(
-            kinds("2e"),
-            [float(2.0), TokenKind::Name("e"), TokenKind::End]
-        );
-        assert_eq!(
-            kinds("2e+"),
-            [
-                float(2.0),
-                TokenKind::Name("e"),
-                TokenKind::Plus,
-                TokenKind::End
-            ]
-        );
+        let (two, name, end) = (float(2.0), TokenKind::Name("e"), TokenKind::End);
+        assert_eq!(kinds("2e"), [two, name, end]);
+        assert_eq!(kinds("2e+"), [two, name, TokenKind::Plus, end]);
     }
 
     #[test]

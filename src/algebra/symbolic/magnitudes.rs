@@ -2,7 +2,6 @@
 
 use super::node::{ExprId, Function, Node};
 use super::number::Number;
-use super::order::Exponent;
 use super::pool::ExprPool;
 
 impl ExprPool {
@@ -14,14 +13,10 @@ impl ExprPool {
         let factors = self.factors_of(argument).to_vec();
         let mut parts = Vec::with_capacity(factors.len());
         for factor in factors {
-            let part = match self.base_and_exponent(factor) {
-                (base, Exponent::Number(exponent)) if exponent.as_integer().is_some() => {
-                    let magnitude = self.apply(Function::Abs, base);
-                    self.pow_number(magnitude, exponent)
-                }
-                _ => self.apply(Function::Abs, factor),
-            };
-            parts.push(part);
+            parts.push(match self.integer_power(factor) {
+                Some((base, power)) => self.apply_power(Function::Abs, base, power),
+                None => self.apply(Function::Abs, factor),
+            });
         }
         let product = self.product(&parts);
         let whole = self.intern(Node::Apply(Function::Abs, argument));
@@ -56,24 +51,22 @@ impl ExprPool {
             }
             return self.product(&rest);
         }
-        self.merge_factors(Function::Sign, &factors).unwrap_or(expr)
+        self.merge_factors(Function::Sign, expr)
     }
 
     /// `f(a)*f(b) = f(a*b)`, for magnitudes and signs.
-    fn merge_factors(&mut self, function: Function, factors: &[ExprId]) -> Option<ExprId> {
-        let (mut inside, mut outside) = (Vec::new(), Vec::new());
-        for &factor in factors {
-            match self.function_power(factor) {
-                Some((of_factor, argument, 1)) if of_factor == function => inside.push(argument),
-                _ => outside.push(factor),
-            }
-        }
+    pub(super) fn merge_factors(&mut self, function: Function, expr: ExprId) -> ExprId {
+        let (inside, mut outside) =
+            self.partition_factors(expr, |pool, factor| match pool.function_power(factor) {
+                Some((of_factor, argument, 1)) if of_factor == function => Some(argument),
+                _ => None,
+            });
         if inside.len() < 2 {
-            return None;
+            return expr;
         }
         let product = self.product(&inside);
         outside.push(self.apply(function, product));
-        Some(self.product(&outside))
+        self.product(&outside)
     }
 
     /// What loses a factor and what takes its place when `sign(argument)` is multiplied in:
@@ -85,25 +78,12 @@ impl ExprPool {
     ) -> Option<(ExprId, ExprId)> {
         let magnitude = self.apply(Function::Abs, argument);
         for (base, other) in [(magnitude, argument), (argument, magnitude)] {
-            let occurs = factors.iter().any(|factor| {
-                let (found, exponent) = self.base_and_exponent(*factor);
-                let exponent = match exponent {
-                    Exponent::Number(number) => number.as_integer(),
-                    Exponent::Expr(_) => None,
-                };
-                found == base && exponent.is_some_and(|exponent| exponent > 0)
-            });
-            if occurs {
+            let mut powers = (factors.iter()).filter_map(|factor| self.integer_power(*factor));
+            if powers.any(|(found, power)| found == base && power > 0) {
                 return Some((base, other));
             }
         }
         None
-    }
-
-    /// `abs(a)*abs(b) = abs(a*b)`.
-    pub(super) fn merge_abs(&mut self, expr: ExprId) -> ExprId {
-        let factors = self.factors_of(expr).to_vec();
-        self.merge_factors(Function::Abs, &factors).unwrap_or(expr)
     }
 
     /// `abs(a)/a = sign(a)`.
@@ -113,13 +93,8 @@ impl ExprPool {
             let Some((Function::Abs, argument, 1)) = self.function_power(factor) else {
                 continue;
             };
-            let is_divisor = |factor: &ExprId| match self.base_and_exponent(*factor) {
-                (base, Exponent::Number(number)) => {
-                    base == argument && number.is_negative() && number.as_integer().is_some()
-                }
-                (_, Exponent::Expr(_)) => false,
-            };
-            if factors.iter().any(is_divisor) {
+            let mut powers = (factors.iter()).filter_map(|factor| self.integer_power(*factor));
+            if powers.any(|(base, power)| base == argument && power < 0) {
                 let mut merged = factors.clone();
                 merged[place] = self.apply(Function::Sign, argument);
                 merged.push(argument);

@@ -63,10 +63,13 @@ mod shorten;
 mod simplify;
 mod substitute;
 mod tangents;
+#[cfg(test)]
+mod testing;
 mod trig;
 
 pub use canonical::{CanonicalForm, CanonicalForms, Coefficient, Literal, Rational};
 pub use display::Display;
+pub(crate) use eval::integer_power;
 pub use interval::Interval;
 pub use node::{ExprId, Function, Node, Parity, SymbolId};
 pub use number::Number;

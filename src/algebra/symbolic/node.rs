@@ -52,6 +52,19 @@ pub enum Node {
     Apply(Function, ExprId),
 }
 
+impl Node {
+    /// The operands, left to right.
+    pub(super) fn operands(&self) -> impl Iterator<Item = ExprId> + '_ {
+        let (pair, list): ([Option<ExprId>; 2], &[ExprId]) = match self {
+            Node::Number(_) | Node::Symbol(_) => ([None, None], &[]),
+            Node::Sum(operands) | Node::Product(operands) => ([None, None], operands),
+            Node::Power(base, exponent) => ([Some(*base), Some(*exponent)], &[]),
+            Node::Apply(_, argument) => ([Some(*argument), None], &[]),
+        };
+        pair.into_iter().flatten().chain(list.iter().copied())
+    }
+}
+
 /// The elementary functions. Arguments are real, in radians where they are angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Function {

@@ -12,6 +12,8 @@
 use std::cmp::Ordering;
 use std::fmt;
 
+use num_integer::Integer;
+
 /// Largest magnitude below which every integer is a float: `2^53`.
 const EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
 /// Most digits of a decimal fraction that is taken as exact.
@@ -26,8 +28,8 @@ pub struct Number(Repr);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Repr {
-    /// In lowest terms, with a positive denominator and neither part equal to `i64::MIN`.
-    Rational { numerator: i64, denominator: i64 },
+    /// Numerator and denominator in lowest terms, the latter positive and neither `i64::MIN`.
+    Rational(i64, i64),
     /// The bits of a finite float which is not an integer of magnitude up to `2^53`.
     Float(u64),
 }
@@ -40,18 +42,12 @@ impl Number {
     /// The exact `-1`.
     pub const MINUS_ONE: Number = Number::integer(-1);
     /// The exact `1/2`.
-    pub const HALF: Number = Number(Repr::Rational {
-        numerator: 1,
-        denominator: 2,
-    });
+    pub const HALF: Number = Number(Repr::Rational(1, 2));
 
     /// The exact integer `value` (`i64::MIN` is taken one higher, the range being symmetric).
     pub const fn integer(value: i64) -> Number {
         let numerator = if value == i64::MIN { -i64::MAX } else { value };
-        Number(Repr::Rational {
-            numerator,
-            denominator: 1,
-        })
+        Number(Repr::Rational(numerator, 1))
     }
 
     /// `numerator / denominator` in lowest terms; `None` for a zero denominator.
@@ -76,14 +72,10 @@ impl Number {
         if denominator == 0 {
             return None;
         }
-        let divisor = gcd(numerator.unsigned_abs(), denominator.unsigned_abs());
-        let divisor = i128::try_from(divisor).ok()? * denominator.signum();
+        let divisor = gcd(numerator, denominator) * denominator.signum();
         let (numerator, denominator) = (numerator / divisor, denominator / divisor);
         match (i64::try_from(numerator), i64::try_from(denominator)) {
-            (Ok(n), Ok(d)) if n != i64::MIN => Some(Number(Repr::Rational {
-                numerator: n,
-                denominator: d,
-            })),
+            (Ok(n), Ok(d)) if n != i64::MIN => Some(Number(Repr::Rational(n, d))),
             _ => {
                 let rounded = Number::from_f64(numerator as f64 / denominator as f64);
                 rounded.filter(|rounded| !rounded.is_exact())
@@ -95,17 +87,14 @@ impl Number {
     /// denominator for an exact fraction.
     pub fn to_f64(self) -> f64 {
         match self.0 {
-            Repr::Rational {
-                numerator,
-                denominator,
-            } => numerator as f64 / denominator as f64,
+            Repr::Rational(numerator, denominator) => numerator as f64 / denominator as f64,
             Repr::Float(bits) => f64::from_bits(bits),
         }
     }
 
     /// Whether the value is known exactly (an integer or a fraction).
     pub fn is_exact(self) -> bool {
-        matches!(self.0, Repr::Rational { .. })
+        matches!(self.0, Repr::Rational(..))
     }
 
     /// Whether this is the exact zero; no other number has that value.
@@ -121,7 +110,7 @@ impl Number {
     /// Whether the value is below zero.
     pub fn is_negative(self) -> bool {
         match self.0 {
-            Repr::Rational { numerator, .. } => numerator < 0,
+            Repr::Rational(numerator, _) => numerator < 0,
             Repr::Float(bits) => f64::from_bits(bits) < 0.0,
         }
     }
@@ -129,10 +118,7 @@ impl Number {
     /// The exact fraction in lowest terms, `(numerator, denominator)`.
     pub fn as_rational(self) -> Option<(i64, i64)> {
         match self.0 {
-            Repr::Rational {
-                numerator,
-                denominator,
-            } => Some((numerator, denominator)),
+            Repr::Rational(numerator, denominator) => Some((numerator, denominator)),
             Repr::Float(_) => None,
         }
     }
@@ -235,30 +221,14 @@ impl Number {
     /// `self ^ exponent` as a multiplication chain (`0^0 = 1`); `None` for zero to a negative
     /// power, overflow or underflow.
     pub fn checked_powi(self, exponent: i64) -> Option<Number> {
-        let mut remaining = exponent.unsigned_abs();
         if self.abs().is_one() {
-            return Some(if remaining.is_multiple_of(2) {
-                Number::ONE
-            } else {
-                self
-            });
+            return Some(if exponent % 2 == 0 { Number::ONE } else { self });
         }
-        let mut result = Number::ONE;
-        let mut square = self;
-        loop {
-            if remaining % 2 == 1 {
-                result = result.checked_mul(square)?;
-            }
-            remaining /= 2;
-            if remaining == 0 {
-                break;
-            }
-            square = square.checked_mul(square)?;
-        }
-        if exponent < 0 {
-            Number::ONE.checked_div(result)
-        } else {
-            Some(result)
+        let product = |a: &Number, b: &Number| a.checked_mul(*b);
+        let power = power(Number::ONE, self, exponent.unsigned_abs(), product)?;
+        match exponent {
+            0.. => Some(power),
+            _ => Number::ONE.checked_div(power),
         }
     }
 
@@ -281,30 +251,35 @@ impl Number {
 
 /// The number of a float that is zero or has all its digits; `None` for anything else.
 fn normal(value: f64) -> Option<Number> {
-    if value.is_normal() {
-        Number::from_f64(value)
-    } else {
-        None
-    }
+    Number::from_f64(value).filter(|_| value.is_normal())
 }
 
-/// Greatest common divisor; `gcd(0, n) = n`.
-fn gcd(mut a: u128, mut b: u128) -> u128 {
-    while b != 0 {
-        // Division of 128-bit integers is slow and the operands are nearly always short.
-        if let (Ok(short_a), Ok(short_b)) = (u64::try_from(a), u64::try_from(b)) {
-            return u128::from(gcd_short(short_a, short_b));
+/// `base ^ exponent` as a chain of squares and products, which may fail.
+pub(super) fn power<T>(
+    one: T,
+    base: T,
+    exponent: u64,
+    mut product: impl FnMut(&T, &T) -> Option<T>,
+) -> Option<T> {
+    let (mut power, mut square, mut remaining) = (one, base, exponent);
+    loop {
+        if remaining % 2 == 1 {
+            power = product(&power, &square)?;
         }
-        (a, b) = (b, a % b);
+        remaining /= 2;
+        if remaining == 0 {
+            return Some(power);
+        }
+        square = product(&square, &square)?;
     }
-    a
 }
 
-pub(super) fn gcd_short(mut a: u64, mut b: u64) -> u64 {
-    while b != 0 {
-        (a, b) = (b, a % b);
+/// Greatest common divisor. Arithmetic with 128 bits is slow, and the operands are nearly always short.
+fn gcd(a: i128, b: i128) -> i128 {
+    match (i64::try_from(a), i64::try_from(b)) {
+        (Ok(a), Ok(b)) => a.unsigned_abs().gcd(&b.unsigned_abs()).into(),
+        _ => a.gcd(&b),
     }
-    a
 }
 
 /// The integer whose `root`-th power is `value`, for a non-negative `value`.
@@ -318,16 +293,10 @@ impl std::ops::Neg for Number {
     type Output = Number;
 
     fn neg(self) -> Number {
-        match self.0 {
-            Repr::Rational {
-                numerator,
-                denominator,
-            } => Number(Repr::Rational {
-                numerator: -numerator,
-                denominator,
-            }),
-            Repr::Float(bits) => Number(Repr::Float((-f64::from_bits(bits)).to_bits())),
-        }
+        Number(match self.0 {
+            Repr::Rational(numerator, denominator) => Repr::Rational(-numerator, denominator),
+            Repr::Float(bits) => Repr::Float((-f64::from_bits(bits)).to_bits()),
+        })
     }
 }
 
@@ -355,14 +324,10 @@ impl Ord for Number {
 impl fmt::Display for Number {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
-            Repr::Rational {
-                numerator,
-                denominator: 1,
-            } => write!(formatter, "{numerator}"),
-            Repr::Rational {
-                numerator,
-                denominator,
-            } => write!(formatter, "{numerator}/{denominator}"),
+            Repr::Rational(numerator, 1) => write!(formatter, "{numerator}"),
+            Repr::Rational(numerator, denominator) => {
+                write!(formatter, "{numerator}/{denominator}")
+            }
             Repr::Float(bits) => write!(formatter, "{:?}", f64::from_bits(bits)),
         }
     }
@@ -421,10 +386,8 @@ mod tests {
     fn root_is_folded_only_when_exact_or_correctly_rounded() {
         let ratio = Number::rational(9, 16).expect("denominator is not zero");
         assert_eq!(ratio.checked_root(2), Number::rational(3, 4));
-        assert_eq!(
-            Number::integer(27).checked_root(3),
-            Some(Number::integer(3))
-        );
+        let cube = Number::integer(27);
+        assert_eq!(cube.checked_root(3), Some(Number::integer(3)));
         assert_eq!(Number::integer(2).checked_root(2), None);
         assert_eq!(float(2.5).checked_root(2), Some(float(2.5f64.sqrt())));
         assert_eq!(Number::integer(-4).checked_root(2), None);
@@ -444,10 +407,8 @@ mod tests {
     fn display_is_the_shortest_text_that_reads_back() {
         assert_eq!(float(0.36).to_string(), "0.36");
         assert_eq!(float(1e-7).to_string(), "1e-7");
-        assert_eq!(
-            Number::rational(-2, 3).map(|n| n.to_string()),
-            Some("-2/3".into())
-        );
+        let ratio = Number::rational(-2, 3).expect("denominator is not zero");
+        assert_eq!(ratio.to_string(), "-2/3");
         assert_eq!(float(7.0).to_string(), "7");
     }
 }

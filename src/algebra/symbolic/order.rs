@@ -95,13 +95,12 @@ impl ExprPool {
                 return Step::Compare(base_a, base_b);
             }
             match (exponent_a, exponent_b) {
-                (Exponent::Number(m), Exponent::Number(n)) if m == n => {}
+                (m, n) if m == n => {}
                 (Exponent::Number(m), Exponent::Number(n)) => return Step::Decided(n.cmp(&m)),
                 (Exponent::Number(_), Exponent::Expr(_)) => return Step::Decided(Ordering::Less),
                 (Exponent::Expr(_), Exponent::Number(_)) => {
                     return Step::Decided(Ordering::Greater);
                 }
-                (Exponent::Expr(m), Exponent::Expr(n)) if m == n => {}
                 (Exponent::Expr(m), Exponent::Expr(n)) => return Step::Compare(m, n),
             }
         }
@@ -114,9 +113,7 @@ impl ExprPool {
             Node::Number(_) => 0,
             Node::Symbol(_) => 1,
             Node::Apply(..) => 2,
-            Node::Power(..) => 3,
-            Node::Product(_) => 4,
-            Node::Sum(_) => 5,
+            Node::Power(..) | Node::Product(_) | Node::Sum(_) => 3,
         };
         match (self.node(a), self.node(b)) {
             (Node::Number(m), Node::Number(n)) => Step::Decided(m.cmp(n)),
@@ -168,11 +165,10 @@ impl ExprPool {
                 .map(|factor| self.grade(*factor))
                 .fold(0, combine_grades),
             Node::Power(base, exponent) => {
-                let degree = self
-                    .as_number(*exponent)
-                    .and_then(Number::as_integer)
-                    .and_then(|n| u32::try_from(n).ok())
-                    .map(|degree| degree.min(NOT_POLYNOMIAL - 1));
+                let degree = self.as_integer(*exponent).map(u32::try_from);
+                let degree = degree
+                    .and_then(Result::ok)
+                    .map(|n| n.min(NOT_POLYNOMIAL - 1));
                 match (degree, self.as_symbol(*base)) {
                     (Some(degree), Some(_)) => degree,
                     (Some(degree), None) => NOT_POLYNOMIAL | degree,
@@ -196,10 +192,7 @@ mod tests {
     /// The texts of the terms of a sum, in canonical order.
     fn sorted(terms: &[&str]) -> Vec<String> {
         let mut pool = ExprPool::new();
-        let ids: Vec<ExprId> = terms
-            .iter()
-            .map(|text| pool.parse(text, &|_| true).expect("test term parses"))
-            .collect();
+        let ids: Vec<ExprId> = terms.iter().map(|text| pool.parsed(text)).collect();
         let sum = pool.sum(&ids);
         let terms = pool.terms_of(sum);
         terms

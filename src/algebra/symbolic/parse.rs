@@ -166,7 +166,7 @@ impl ExprPool {
             allowed,
             literal,
             limits,
-            groups: vec![Group::new(Opener::Text)],
+            groups: vec![Group::default()],
             depth: 0,
         };
         parser.run(&tokens)
@@ -174,8 +174,9 @@ impl ExprPool {
 }
 
 /// What a group of terms was opened by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Opener {
+    #[default]
     Text,
     Parenthesis,
     Call(Function),
@@ -183,6 +184,7 @@ enum Opener {
 
 /// An expression being read: finished terms, the factors of the current term, and the operand
 /// being read, which may be an exponent of pending powers.
+#[derive(Default)]
 struct Group {
     opener: Opener,
     terms: Vec<ExprId>,
@@ -195,20 +197,6 @@ struct Group {
     negative: bool,
     /// Bases whose exponent is being read, each with its own sign.
     powers: Vec<(ExprId, bool)>,
-}
-
-impl Group {
-    fn new(opener: Opener) -> Group {
-        Group {
-            opener,
-            terms: Vec::new(),
-            factors: Vec::new(),
-            subtract: false,
-            divide: false,
-            negative: false,
-            powers: Vec::new(),
-        }
-    }
 }
 
 struct Parser<'p> {
@@ -226,9 +214,8 @@ impl Parser<'_> {
     fn run(&mut self, tokens: &[Token]) -> Result<ExprId, ParseError> {
         let mut next = 0;
         loop {
-            let operand = match self.read_operand(tokens, &mut next)? {
-                Some(operand) => operand,
-                None => continue,
+            let Some(operand) = self.read_operand(tokens, &mut next)? else {
+                continue;
             };
             if let Some(result) = self.after_operand(tokens, &mut next, operand)? {
                 return Ok(result);
@@ -340,7 +327,10 @@ impl Parser<'_> {
 
     fn open(&mut self, opener: Opener, token: &Token) -> Result<(), ParseError> {
         self.deepen(token)?;
-        self.groups.push(Group::new(opener));
+        self.groups.push(Group {
+            opener,
+            ..Group::default()
+        });
         Ok(())
     }
 
@@ -360,9 +350,8 @@ impl Parser<'_> {
     fn finish_operand(&mut self, atom: ExprId, token: &Token) -> Result<(), ParseError> {
         let mut value = atom;
         loop {
-            if std::mem::take(&mut self.group().negative) {
-                value = self.pool.neg(value);
-            }
+            let negative = std::mem::take(&mut self.group().negative);
+            value = self.pool.negated_if(negative, value);
             let Some((base, negative)) = self.group().powers.pop() else {
                 break;
             };
@@ -409,10 +398,8 @@ impl Parser<'_> {
         let group = self.group();
         let factors = std::mem::take(&mut group.factors);
         let subtract = std::mem::take(&mut group.subtract);
-        let mut term = self.pool.product(&factors);
-        if subtract {
-            term = self.pool.neg(term);
-        }
+        let term = self.pool.product(&factors);
+        let term = self.pool.negated_if(subtract, term);
         self.group().terms.push(term);
     }
 }

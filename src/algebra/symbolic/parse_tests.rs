@@ -49,67 +49,44 @@ fn functions_apply_to_their_argument_alone() {
 }
 
 #[test]
-fn smuggled_code_or_tex_is_refused_by_its_character() {
-    for (text, found, position) in [
-        ("x; system(\"x\")", ';', 2),
-        ("\\input{x}", '\\', 1),
-        ("z1 /* c */ \u{0}", '\u{0}', 12),
-        ("z1 = 2", '=', 4),
-        ("z1 # note", '#', 4),
-        ("z1\u{202e}", '\u{202e}', 3),
+fn faults_have_their_place_and_what_was_found() {
+    let found = |found: &str, expected| ParseErrorKind::Unexpected {
+        found: found.to_owned(),
+        expected,
+    };
+    let operand = |token| found(token, "a number, a name, `(` or a sign");
+    for (text, position, kind) in [
+        // Code and TeX are refused by their characters.
+        ("x; system(\"x\")", 2, ParseErrorKind::Character(';')),
+        ("\\input{x}", 1, ParseErrorKind::Character('\\')),
+        ("z1 /* c */ \u{0}", 12, ParseErrorKind::Character('\u{0}')),
+        ("z1 = 2", 4, ParseErrorKind::Character('=')),
+        ("z1 # note", 4, ParseErrorKind::Character('#')),
+        ("z1\u{202e}", 3, ParseErrorKind::Character('\u{202e}')),
+        // Names and functions are told apart.
+        ("z1 + z9", 6, ParseErrorKind::UnknownName("z9".into())),
+        (
+            "system(z1)",
+            1,
+            ParseErrorKind::UnknownFunction("system".into()),
+        ),
+        ("sin + 1", 5, found("`+`", "`(` after a function")),
+        // Misplaced tokens.
+        ("", 1, operand("end of text")),
+        ("z1 +", 5, operand("end of text")),
+        ("z1 * / z2", 6, operand("`/`")),
+        ("()", 2, operand("`)`")),
+        ("2 z1", 3, found("`z1`", "an operator or the end")),
+        ("z1)", 3, found("`)`", "an operator or the end")),
+        ("(z1", 4, found("end of text", "an operator or `)`")),
+        ("sin(z1 z2)", 8, found("`z2`", "an operator or `)`")),
     ] {
-        assert_eq!(
-            error(text),
-            ParseErrorKind::Character(found).at(position),
-            "{text}"
-        );
+        assert_eq!(error(text), kind.at(position), "{text}");
     }
     assert_eq!(
         error("x; system(\"x\")").to_string(),
         "character 2: found `;`, expected numbers, names, functions and + - * / ^ ( )"
     );
-}
-
-#[test]
-fn unknown_names_and_functions_are_told_apart() {
-    assert_eq!(
-        error("z1 + z9"),
-        ParseErrorKind::UnknownName("z9".into()).at(6)
-    );
-    assert_eq!(
-        error("system(z1)"),
-        ParseErrorKind::UnknownFunction("system".into()).at(1)
-    );
-    assert_eq!(
-        error("sin + 1"),
-        ParseErrorKind::Unexpected {
-            found: "`+`".into(),
-            expected: "`(` after a function"
-        }
-        .at(5)
-    );
-}
-
-#[test]
-fn misplaced_tokens_name_what_was_found_and_expected() {
-    let operand = "a number, a name, `(` or a sign";
-    for (text, position, found, expected) in [
-        ("", 1, "end of text", operand),
-        ("z1 +", 5, "end of text", operand),
-        ("z1 * / z2", 6, "`/`", operand),
-        ("()", 2, "`)`", operand),
-        ("2 z1", 3, "`z1`", "an operator or the end"),
-        ("z1)", 3, "`)`", "an operator or the end"),
-        ("(z1", 4, "end of text", "an operator or `)`"),
-        ("sin(z1 z2)", 8, "`z2`", "an operator or `)`"),
-    ] {
-        let found = found.to_owned();
-        assert_eq!(
-            error(text),
-            ParseErrorKind::Unexpected { found, expected }.at(position),
-            "{text}"
-        );
-    }
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Sums that are powers of shorter sums.
 
+use num_integer::Integer;
+
 use super::expand::Terms;
 use super::node::{ExprId, Node};
 use super::number::Number;
@@ -79,8 +81,7 @@ fn root_of(polynomial: &Monomials, power: i64) -> Option<(Number, Monomials)> {
     let mut denominators = root.values().map(|number| number.as_rational());
     let common = denominators.try_fold(1_i64, |common, number| {
         let (_, denominator) = number?;
-        let shared = super::number::gcd_short(common.unsigned_abs(), denominator.unsigned_abs());
-        common.checked_mul(denominator / i64::try_from(shared).ok()?)
+        common.checked_mul(denominator / common.gcd(&denominator))
     })?;
     let common = Number::integer(common);
     let content = leading.checked_div(common.checked_powi(power)?)?;
@@ -139,7 +140,7 @@ mod tests {
             ("x^2 + 1", "none"),
         ] {
             let mut pool = ExprPool::new();
-            let expr = pool.parse(text, &|_| true).expect("test text parses");
+            let expr = pool.parsed(text);
             let found = (pool.as_power(expr)).map(|power| pool.display(power).to_string());
             assert_eq!(found.as_deref().unwrap_or("none"), expected, "{text}");
         }

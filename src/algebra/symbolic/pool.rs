@@ -118,10 +118,7 @@ impl ExprPool {
         let all = (0..self.nodes.len() as u32).map(ExprId);
         let is_restriction = |expr: &ExprId| match self.node(*expr) {
             Node::Apply(Function::Log | Function::Sqrt, _) => true,
-            Node::Power(_, exponent) => {
-                let number = self.as_number(*exponent);
-                number.is_none_or(|number| number.as_integer().is_none())
-            }
+            Node::Power(_, exponent) => self.as_integer(*exponent).is_none(),
             _ => false,
         };
         all.filter(is_restriction).collect()
@@ -161,11 +158,6 @@ impl ExprPool {
         self.symbol_expr(id)
     }
 
-    /// The variable of that name if the pool has it.
-    pub fn find_symbol(&self, name: &str) -> Option<SymbolId> {
-        self.symbol_ids.get(name).copied()
-    }
-
     /// A variable as an expression.
     pub fn symbol_expr(&self, symbol: SymbolId) -> ExprId {
         self.symbols[symbol.index()].expr
@@ -191,6 +183,11 @@ impl ExprPool {
             Node::Number(number) => Some(*number),
             _ => None,
         }
+    }
+
+    /// The value of a constant whole number.
+    pub fn as_integer(&self, expr: ExprId) -> Option<i64> {
+        self.as_number(expr)?.as_integer()
     }
 
     /// The variable that `expr` is.
@@ -240,13 +237,7 @@ impl ExprPool {
 
     /// The operands of the top level, left to right.
     pub fn children(&self, expr: ExprId) -> impl Iterator<Item = ExprId> + '_ {
-        let (pair, list): ([Option<ExprId>; 2], &[ExprId]) = match self.node(expr) {
-            Node::Number(_) | Node::Symbol(_) => ([None, None], &[]),
-            Node::Sum(operands) | Node::Product(operands) => ([None, None], operands),
-            Node::Power(base, exponent) => ([Some(*base), Some(*exponent)], &[]),
-            Node::Apply(_, argument) => ([Some(*argument), None], &[]),
-        };
-        pair.into_iter().flatten().chain(list.iter().copied())
+        self.node(expr).operands()
     }
 
     /// Every expression that `roots` are made of, each once, operands before what uses them.
@@ -385,15 +376,10 @@ impl ExprPool {
     }
 
     fn symbols_in(&self, node: &Node) -> u64 {
-        let of = |expr: &ExprId| self.facts[expr.index()].symbols;
+        let of = |expr: ExprId| self.facts[expr.index()].symbols;
         match node {
-            Node::Number(_) => 0,
             Node::Symbol(symbol) => symbol_bit(*symbol),
-            Node::Sum(operands) | Node::Product(operands) => {
-                operands.iter().fold(0, |mask, operand| mask | of(operand))
-            }
-            Node::Power(base, exponent) => of(base) | of(exponent),
-            Node::Apply(_, argument) => of(argument),
+            _ => node.operands().fold(0, |mask, operand| mask | of(operand)),
         }
     }
 }
@@ -412,10 +398,9 @@ mod tests {
         let first = pool.symbol("z1");
         assert_eq!(pool.symbol("z1"), first);
         assert_ne!(pool.symbol("z2"), first);
-        let id = pool.find_symbol("z1").expect("z1 was made");
+        let id = pool.symbol_id("z1");
         assert_eq!(pool.symbol_name(id), "z1");
         assert_eq!(pool.as_symbol(first), Some(id));
-        assert_eq!(pool.find_symbol("z3"), None);
     }
 
     #[test]

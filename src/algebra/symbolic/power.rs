@@ -1,7 +1,9 @@
 //! Canonical constructors of powers and functions.
 
+use num_integer::Integer;
+
 use super::node::{ExprId, Function, Node, Parity};
-use super::number::{Number, gcd_short};
+use super::number::Number;
 use super::order::Exponent;
 use super::pool::{ExprPool, Sign};
 
@@ -43,10 +45,9 @@ impl ExprPool {
             (Exponent::Number(m), _) if !m.is_one() => {
                 if let Some(combined) = self.folded(m.checked_mul(exponent)) {
                     // (x^2)^(1/2) = |x|: only even integers lose the sign of the base.
-                    let inner = if m.is_even() && !is_integer {
-                        self.apply(Function::Abs, inner)
-                    } else {
-                        inner
+                    let inner = match m.is_even() && !is_integer {
+                        true => self.apply(Function::Abs, inner),
+                        false => inner,
                     };
                     return self.pow_number(inner, combined);
                 }
@@ -62,11 +63,7 @@ impl ExprPool {
             (_, Node::Sum(_)) if is_integer && self.starts_negative(base) => {
                 let positive = self.neg(base);
                 let power = self.pow_number(positive, exponent);
-                return if exponent.is_even() {
-                    power
-                } else {
-                    self.neg(power)
-                };
+                return self.negated_if(!exponent.is_even(), power);
             }
             (_, &Node::Apply(Function::Abs, argument)) if exponent.is_even() => {
                 return self.pow_number(argument, exponent);
@@ -93,10 +90,10 @@ impl ExprPool {
     /// Integer powers go to every factor; of others only a number with an exact root leaves.
     fn pow_of_product(&mut self, factors: &[ExprId], exponent: Number) -> ExprId {
         if exponent.as_integer().is_some() {
-            let powers: Vec<ExprId> = factors
+            let powers = factors
                 .iter()
-                .map(|factor| self.pow_number(*factor, exponent))
-                .collect();
+                .map(|factor| self.pow_number(*factor, exponent));
+            let powers: Vec<ExprId> = powers.collect();
             return self.product(&powers);
         }
         if let Some((mut roots, common)) = self.common_power(factors)
@@ -111,15 +108,14 @@ impl ExprPool {
             let root = self.product(&roots);
             return self.pow_number(root, combined);
         }
-        let (coefficient, rest) = match self.as_number(factors[0]) {
-            Some(number) if self.as_number(factors[1]).is_none() => {
-                (number, self.product(&factors[1..]))
-            }
-            _ => {
-                let base = self.intern(Node::Product(factors.into()));
-                return self.raw_power(base, exponent);
-            }
+        let whole = |pool: &mut ExprPool| {
+            let base = pool.intern(Node::Product(factors.into()));
+            pool.raw_power(base, exponent)
         };
+        let [Some(coefficient), None] = [factors[0], factors[1]].map(|f| self.as_number(f)) else {
+            return whole(self);
+        };
+        let rest = self.product(&factors[1..]);
         match self.folded(exact_power(coefficient, exponent)) {
             Some(outside) => {
                 let rest = self.pow_number(rest, exponent);
@@ -130,10 +126,7 @@ impl ExprPool {
                 let rest = self.pow_number(rest, exponent);
                 self.product(&[outside, rest])
             }
-            None => {
-                let base = self.intern(Node::Product(factors.into()));
-                self.raw_power(base, exponent)
-            }
+            None => whole(self),
         }
     }
 
@@ -148,7 +141,7 @@ impl ExprPool {
             let exponent = exponent
                 .as_integer()
                 .filter(|_| self.as_number(base).is_none())?;
-            common = gcd_short(common, exponent.unsigned_abs());
+            common = exponent.unsigned_abs().gcd(&common);
             powers.push((base, exponent));
         }
         let common = i64::try_from(common).ok().filter(|&common| common > 1)?;
@@ -174,11 +167,7 @@ impl ExprPool {
             // Only a positive base is left under a power: (-x)^n = +-(x^n).
             let magnitude = self.constant(base.abs());
             let power = self.raw_power(magnitude, exponent);
-            return if base.is_negative() && !exponent.is_even() {
-                self.neg(power)
-            } else {
-                power
-            };
+            return self.negated_if(base.is_negative() && !exponent.is_even(), power);
         }
         if let Some(value) = self.folded(exact_power(base, exponent)) {
             return self.constant(value);
@@ -229,16 +218,12 @@ impl ExprPool {
         if function.parity() != Parity::Neither && self.starts_negative(argument) {
             let positive = self.neg(argument);
             let value = self.apply(function, positive);
-            return match function.parity() {
-                Parity::Odd => self.neg(value),
-                Parity::Even | Parity::Neither => value,
-            };
+            return self.negated_if(function.parity() == Parity::Odd, value);
         }
         self.intern(Node::Apply(function, argument))
     }
 
     fn special_value(&mut self, function: Function, argument: ExprId) -> Option<ExprId> {
-        let number = self.as_number(argument);
         let is_zero = argument == ExprId::ZERO;
         match (function, self.node(argument)) {
             (Function::Sin | Function::Tan | Function::Tanh, _) if is_zero => Some(ExprId::ZERO),
@@ -258,22 +243,17 @@ impl ExprPool {
                 let magnitude = self.apply(Function::Abs, rest);
                 Some(self.scale(coefficient.abs(), magnitude))
             }
-            (Function::Sign, _) => match number {
-                Some(number) if number.is_zero() => Some(ExprId::ZERO),
-                Some(number) if number.is_negative() => Some(self.integer(-1)),
-                Some(_) => Some(ExprId::ONE),
-                None => match self.node(argument) {
-                    _ if self.sign(argument) == Sign::Positive => Some(ExprId::ONE),
-                    Node::Apply(Function::Sign, _) => Some(argument),
-                    _ => {
-                        let (coefficient, rest) = self.split(argument);
-                        if coefficient.is_one() || coefficient.is_negative() {
-                            return None;
-                        }
-                        Some(self.apply(Function::Sign, rest))
-                    }
-                },
-            },
+            (Function::Sign, _) if is_zero => Some(ExprId::ZERO),
+            (Function::Sign, _) if self.sign(argument) == Sign::Positive => Some(ExprId::ONE),
+            (Function::Sign, Node::Number(_)) => Some(self.integer(-1)),
+            (Function::Sign, Node::Apply(Function::Sign, _)) => Some(argument),
+            (Function::Sign, _) => {
+                let (coefficient, rest) = self.split(argument);
+                if coefficient.is_one() || coefficient.is_negative() {
+                    return None;
+                }
+                Some(self.apply(Function::Sign, rest))
+            }
             _ => None,
         }
     }

@@ -80,8 +80,7 @@ impl ExprPool {
 
     /// Bases with negative integer exponents in a term, and the magnitudes of these.
     fn denominators_of(&self, rest: ExprId) -> Vec<(ExprId, Number)> {
-        self.numeric_powers(rest)
-            .into_iter()
+        (self.numeric_powers(rest).into_iter())
             .filter(|(_, exponent)| exponent.is_negative() && exponent.as_integer().is_some())
             .map(|(base, exponent)| (base, -exponent))
             .collect()
@@ -146,7 +145,7 @@ impl ExprPool {
             lowered(self.monomials(&terms[1], &bases)?),
         ];
         while !b.is_empty() {
-            (a, b) = (b.clone(), remainder(a, &b)?);
+            (a, b) = (b.clone(), divided(a, &b)?.1);
         }
         let (degree, leading) = a.last_key_value()?;
         if degree[0] == 0 {
@@ -168,27 +167,20 @@ impl ExprPool {
     fn divide_exactly(&mut self, dividend: ExprId, divisor: ExprId) -> Option<ExprId> {
         let (dividend, divisor) = (self.terms_of(dividend), self.terms_of(divisor));
         let bases = self.bases_of(dividend.iter().chain(&divisor))?;
-        let (mut remainder, least) = lowered(self.monomials(&dividend, &bases)?);
+        let (dividend, least) = lowered(self.monomials(&dividend, &bases)?);
         let (divisor, least_of_divisor) = lowered(self.monomials(&divisor, &bases)?);
-        let (leading, leading_coefficient) = divisor.last_key_value()?;
-        let mut quotient = Monomials::new();
-        for _ in 0..MAX_STEPS {
-            let Some((exponents, coefficient)) = remainder.last_key_value() else {
-                return self.sum_of_monomials(&quotient, &bases);
-            };
-            let step: Vec<i64> = exponents.iter().zip(leading).map(|(a, b)| a - b).collect();
-            if step.iter().any(|exponent| *exponent < 0) {
-                return None;
-            }
-            let factor = coefficient.checked_div(*leading_coefficient)?;
-            for (exponents, coefficient) in &divisor {
-                let place: Vec<i64> = exponents.iter().zip(&step).map(|(a, b)| a + b).collect();
-                add(&mut remainder, place, -coefficient.checked_mul(factor)?)?;
-            }
-            let place = (step.iter().zip(&least)).zip(&least_of_divisor);
-            quotient.insert(place.map(|((step, a), b)| step + a - b).collect(), factor);
+        let (quotient, remainder) = divided(dividend, &divisor)?;
+        if !remainder.is_empty() {
+            return None;
         }
-        None
+        let place = |step: Vec<i64>| {
+            let exponents = step.iter().zip(&least).zip(&least_of_divisor);
+            exponents.map(|((step, a), b)| step + a - b).collect()
+        };
+        let quotient = quotient
+            .into_iter()
+            .map(|(step, factor)| (place(step), factor));
+        self.sum_of_monomials(&quotient.collect(), &bases)
     }
 
     /// The bases of the powers in some terms; `None` for roots of numbers and for exponents without
@@ -297,95 +289,83 @@ fn lowered(polynomial: Monomials) -> (Monomials, Vec<i64>) {
     (lowered.collect(), least)
 }
 
-/// What is left of a polynomial in one base when another is divided out; nothing if a coefficient is
-/// no longer exact.
-fn remainder(mut of: Monomials, divisor: &Monomials) -> Option<Monomials> {
-    let (degree, leading) = divisor.last_key_value()?;
+/// The quotient of two polynomials, and what is left once the highest monomial of the divisor is no
+/// part of that of the dividend; nothing if a coefficient is no longer exact.
+fn divided(dividend: Monomials, divisor: &Monomials) -> Option<(Monomials, Monomials)> {
+    let (lowest, leading) = divisor.last_key_value()?;
+    let (mut quotient, mut left) = (Monomials::new(), dividend);
     for _ in 0..MAX_STEPS {
-        let Some((highest, coefficient)) = of.last_key_value() else {
-            return Some(of);
+        let Some((highest, coefficient)) = left.last_key_value() else {
+            return Some((quotient, left));
         };
-        let step = highest[0] - degree[0];
-        if step < 0 {
-            return Some(of);
+        let step: Vec<i64> = highest.iter().zip(lowest).map(|(a, b)| a - b).collect();
+        if step.iter().any(|exponent| *exponent < 0) {
+            return Some((quotient, left));
         }
         let factor = coefficient.checked_div(*leading)?;
         for (exponents, coefficient) in divisor {
-            let term = -coefficient.checked_mul(factor)?;
-            add(&mut of, vec![exponents[0] + step], term)?;
+            let place = exponents.iter().zip(&step).map(|(a, b)| a + b).collect();
+            add(&mut left, place, -coefficient.checked_mul(factor)?)?;
         }
+        quotient.insert(step, factor);
     }
     None
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::assert_rewritten;
     use super::*;
-
-    fn together(text: &str) -> String {
-        let mut pool = ExprPool::new();
-        let expr = pool.parse(text, &|_| true).expect("test text parses");
-        let result = pool.together(expr, &mut 100_000);
-        pool.display(result).to_string()
-    }
 
     #[test]
     fn together_finds_the_common_denominator_and_cancels() {
-        assert_eq!(together("x/(x + y) + y/(x + y)"), "1");
-        assert_eq!(together("(x^2 - 1)/(x - 1)"), "1 + x");
-        assert_eq!(together("1/(x + 1) - 1/(x + 2)"), "1/((1 + x)*(2 + x))");
-        assert_eq!(together("1/x - 1/(x*(x + 1))"), "1/(1 + x)");
-        assert_eq!(together("(x + 1)/(x^2 - 1)"), "-1/(1 - x)");
-        assert_eq!(
-            together("(x^2 + 3*x + 2)/(x^2 + 4*x + 3)"),
-            "(2 + x)/(3 + x)"
+        let together = |pool: &mut ExprPool, expr| pool.together(expr, &mut 100_000);
+        assert_rewritten(
+            together,
+            &[
+                ("x/(x + y) + y/(x + y)", "1"),
+                ("(x^2 - 1)/(x - 1)", "1 + x"),
+                ("1/(x + 1) - 1/(x + 2)", "1/((1 + x)*(2 + x))"),
+                ("1/x - 1/(x*(x + 1))", "1/(1 + x)"),
+                ("(x + 1)/(x^2 - 1)", "-1/(1 - x)"),
+                ("(x^2 + 3*x + 2)/(x^2 + 4*x + 3)", "(2 + x)/(3 + x)"),
+                ("(exp(x)^2 - 1)/(2*exp(x) + 2)", "-1/2 + 1/2*exp(x)"),
+                ("(x + y)/(x^2 - y^2)", "1/(x - y)"),
+                ("(x^2 + 1)/(x^2 - 1)", "-(1 + x^2)/(1 - x^2)"),
+                ("(x^3 - y^3)/(x - y)^2", "(x^2 + x*y + y^2)/(x - y)"),
+                // Without sums in denominators nothing changes.
+                ("1/x + 1/y", "1/x + 1/y"),
+                ("x + y", "x + y"),
+            ],
         );
-        assert_eq!(
-            together("(exp(x)^2 - 1)/(2*exp(x) + 2)"),
-            "-1/2 + 1/2*exp(x)"
-        );
-        assert_eq!(together("(x + y)/(x^2 - y^2)"), "1/(x - y)");
-        assert_eq!(together("(x^2 + 1)/(x^2 - 1)"), "-(1 + x^2)/(1 - x^2)");
-        assert_eq!(
-            together("(x^3 - y^3)/(x - y)^2"),
-            "(x^2 + x*y + y^2)/(x - y)"
-        );
-    }
-
-    #[test]
-    fn together_without_sums_in_denominators_changes_nothing() {
-        assert_eq!(together("1/x + 1/y"), "1/x + 1/y");
-        assert_eq!(together("x + y"), "x + y");
     }
 
     #[test]
     fn divide_exactly_refuses_remainders_and_long_floats() {
         let mut pool = ExprPool::new();
         let mut divide = |a: &str, b: &str| {
-            let a = pool.parse(a, &|_| true).expect("test text parses");
-            let b = pool.parse(b, &|_| true).expect("test text parses");
-            pool.divide_exactly(a, b)
-                .map(|quotient| pool.display(quotient).to_string())
+            let (a, b) = (pool.parsed(a), pool.parsed(b));
+            let quotient = pool.divide_exactly(a, b)?;
+            Some(pool.display(quotient).to_string())
         };
-        assert_eq!(divide("x^2 + 2*x*y + y^2", "x + y"), Some("x + y".into()));
-        assert_eq!(divide("2*x + 2", "3*x + 3"), Some("2/3".into()));
-        assert_eq!(divide("0.5*x^2 - 0.5", "x - 1"), Some("0.5 + 0.5*x".into()));
-        assert_eq!(divide("x - 1", "sqrt(x) - 1"), Some("1 + sqrt(x)".into()));
-        assert_eq!(
-            divide("x - y", "sqrt(x) - sqrt(y)"),
-            Some("sqrt(x) + sqrt(y)".into())
-        );
-        assert_eq!(divide("1/x - x", "1 - x"), Some("1 + 1/x".into()));
-        assert_eq!(
-            divide("exp(2*x + y) - exp(-y)", "exp(x + y) - 1"),
-            Some("exp(x) + exp(-y)".into())
-        );
-        assert_eq!(
-            divide("exp(0.6*x) - 1", "exp(0.3*x) - 1"),
-            Some("1 + exp(0.3*x)".into())
-        );
-        assert_eq!(divide("x^2 + 1", "x + 1"), None);
-        assert_eq!(divide("exp(x) + 1", "exp(y) + 1"), None);
-        assert_eq!(divide("0.12345678901234567*x - 1", "x - 1"), None);
+        for (a, b, expected) in [
+            ("x^2 + 2*x*y + y^2", "x + y", Some("x + y")),
+            ("2*x + 2", "3*x + 3", Some("2/3")),
+            ("0.5*x^2 - 0.5", "x - 1", Some("0.5 + 0.5*x")),
+            ("x - 1", "sqrt(x) - 1", Some("1 + sqrt(x)")),
+            ("x - y", "sqrt(x) - sqrt(y)", Some("sqrt(x) + sqrt(y)")),
+            ("1/x - x", "1 - x", Some("1 + 1/x")),
+            (
+                "exp(2*x + y) - exp(-y)",
+                "exp(x + y) - 1",
+                Some("exp(x) + exp(-y)"),
+            ),
+            ("exp(0.6*x) - 1", "exp(0.3*x) - 1", Some("1 + exp(0.3*x)")),
+            ("x^2 + 1", "x + 1", None),
+            ("exp(x) + 1", "exp(y) + 1", None),
+            ("0.12345678901234567*x - 1", "x - 1", None),
+        ] {
+            assert_eq!(divide(a, b).as_deref(), expected, "({a})/({b})");
+        }
     }
 }

@@ -87,23 +87,42 @@ impl ExprPool {
     fn is_atom(&self, expr: ExprId) -> bool {
         match *self.node(expr) {
             Node::Apply(..) => true,
-            Node::Power(_, exponent) => self
-                .as_number(exponent)
-                .and_then(Number::as_integer)
-                .is_none(),
+            Node::Power(_, exponent) => self.as_integer(exponent).is_none(),
             Node::Number(_) | Node::Symbol(_) | Node::Sum(_) | Node::Product(_) => false,
+        }
+    }
+
+    /// A factor as an integer power.
+    pub(super) fn integer_power(&self, factor: ExprId) -> Option<(ExprId, i64)> {
+        match self.base_and_exponent(factor) {
+            (base, Exponent::Number(number)) => Some((base, number.as_integer()?)),
+            (_, Exponent::Expr(_)) => None,
         }
     }
 
     /// A factor as an integer power of a function call: `sin(x)^2` is `(Sin, x, 2)`.
     pub(super) fn function_power(&self, factor: ExprId) -> Option<(Function, ExprId, i64)> {
-        let (base, exponent) = self.base_and_exponent(factor);
-        match (self.node(base), exponent) {
-            (Node::Apply(function, argument), Exponent::Number(number)) => {
-                Some((*function, *argument, number.as_integer()?))
-            }
+        let (base, power) = self.integer_power(factor)?;
+        match self.node(base) {
+            Node::Apply(function, argument) => Some((*function, *argument, power)),
             _ => None,
         }
+    }
+
+    /// What `pick` takes of the factors of a product, and its other factors.
+    pub(super) fn partition_factors<T>(
+        &mut self,
+        expr: ExprId,
+        mut pick: impl FnMut(&mut ExprPool, ExprId) -> Option<T>,
+    ) -> (Vec<T>, Vec<ExprId>) {
+        let (mut picked, mut others) = (Vec::new(), Vec::new());
+        for factor in self.factors_of(expr).to_vec() {
+            match pick(self, factor) {
+                Some(found) => picked.push(found),
+                None => others.push(factor),
+            }
+        }
+        (picked, others)
     }
 
     /// `function(argument)^exponent`.
@@ -125,23 +144,17 @@ mod tests {
     #[test]
     fn rewrite_region_stops_at_functions_and_roots() {
         let mut pool = ExprPool::new();
-        let expr = pool
-            .parse("x + (x + y)^2*sin(x) + x^0.3", &|_| true)
-            .expect("test text parses");
+        let expr = pool.parsed("x + (x + y)^2*sin(x) + x^0.3");
         let (x, z) = (pool.symbol("x"), pool.symbol("z"));
         let result = pool.rewrite_region(expr, |_, node| if node == x { z } else { node });
-        let expected = pool
-            .parse("z + (z + y)^2*sin(x) + x^0.3", &|_| true)
-            .expect("test text parses");
+        let expected = pool.parsed("z + (z + y)^2*sin(x) + x^0.3");
         assert_eq!(result, expected);
     }
 
     #[test]
     fn map_regions_finishes_every_region_once_from_the_inside() {
         let mut pool = ExprPool::new();
-        let expr = pool
-            .parse("sin(x + y)*cos(x + y) + exp(sin(x + y))", &|_| true)
-            .expect("test text parses");
+        let expr = pool.parsed("sin(x + y)*cos(x + y) + exp(sin(x + y))");
         let mut seen = Vec::new();
         let result = pool.map_regions(expr, |pool, region| {
             seen.push(pool.display(region).to_string());

@@ -3,6 +3,8 @@
 //! The processor rounds to nearest; the rounding error of a sum or product, found exactly, tells
 //! whether the neighbour is needed. Rounding down is rounding up of the negative.
 
+use super::number::power;
+
 /// Steps by which the value of an elementary function is widened.
 const FUNCTION_ULPS: usize = 4;
 
@@ -75,28 +77,19 @@ pub(super) fn recip_down(x: f64) -> f64 {
 }
 
 /// `x^exponent` rounded up for `x >= 0`.
-pub(super) fn power_up(x: f64, exponent: i64) -> f64 {
-    power(x, exponent, mul_up)
+pub(super) fn power_up(x: f64, exponent: u64) -> f64 {
+    power_by(x, exponent, mul_up)
 }
 
 /// `x^exponent` rounded down for `x >= 0`.
-pub(super) fn power_down(x: f64, exponent: i64) -> f64 {
-    power(x, exponent, |a, b| (-mul_up(-a, b)).max(0.0))
+pub(super) fn power_down(x: f64, exponent: u64) -> f64 {
+    power_by(x, exponent, |a, b| (-mul_up(-a, b)).max(0.0))
 }
 
-/// A power by squaring, all factors non-negative and `product` monotone.
-fn power(x: f64, exponent: i64, product: impl Fn(f64, f64) -> f64) -> f64 {
-    let (mut result, mut square, mut remaining) = (1.0, x, exponent);
-    loop {
-        if remaining % 2 == 1 {
-            result = product(result, square);
-        }
-        remaining /= 2;
-        if remaining == 0 {
-            return result;
-        }
-        square = product(square, square);
-    }
+/// A power by squaring; a bound if `product` is monotone and all factors are non-negative.
+pub(super) fn power_by(x: f64, exponent: u64, product: impl Fn(f64, f64) -> f64) -> f64 {
+    let power = power(1.0, x, exponent, |a, b| Some(product(*a, *b)));
+    power.expect("no product fails")
 }
 
 /// Whether a computed square root is the exact one.

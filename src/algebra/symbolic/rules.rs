@@ -58,20 +58,14 @@ impl ExprPool {
 
     /// One node rewritten towards fewer function calls.
     pub(super) fn compact_rules(&mut self, expr: ExprId) -> ExprId {
-        match self.node(expr) {
-            Node::Product(_) => {
-                let expr = self.merge_tangents(expr);
-                let expr = self.merge_double_angles(expr);
-                let expr = self.merge_hyperbolic_tangent(expr);
-                let expr = self.merge_abs(expr);
-                self.abs_to_sign(expr)
-            }
-            Node::Number(_)
-            | Node::Symbol(_)
-            | Node::Sum(_)
-            | Node::Power(..)
-            | Node::Apply(..) => expr,
+        if !matches!(self.node(expr), Node::Product(_)) {
+            return expr;
         }
+        let expr = self.merge_tangents(expr);
+        let expr = self.merge_double_angles(expr);
+        let expr = self.merge_hyperbolic_tangent(expr);
+        let expr = self.merge_factors(Function::Abs, expr);
+        self.abs_to_sign(expr)
     }
 
     /// `exp(n*log(a) + b) = a^n*exp(b)`.
@@ -117,17 +111,7 @@ impl ExprPool {
             let log = self.apply(Function::Log, base);
             return Some(self.scale(exponent, log));
         }
-        let factors = self.factors_of(argument).to_vec();
-        let mut outside = Vec::new();
-        let mut inside = Vec::new();
-        for factor in factors {
-            match self.function_power(factor) {
-                Some((Function::Exp, exponent, power)) => {
-                    outside.push(self.scale(Number::integer(power), exponent));
-                }
-                _ => inside.push(factor),
-            }
-        }
+        let (mut outside, inside) = self.split_exponentials(argument);
         if outside.is_empty() {
             return None;
         }
@@ -138,15 +122,13 @@ impl ExprPool {
 
     /// `1/(a^2 + a*b) = 1/(a*(a + b))`, also with the least negative powers in front.
     fn split_divisor(&mut self, expr: ExprId) -> ExprId {
-        let (base, Exponent::Number(exponent)) = self.base_and_exponent(expr) else {
+        let Some((base, power @ ..0)) = self.integer_power(expr) else {
             return expr;
         };
-        if !exponent.is_negative() || exponent.as_integer().is_none() {
-            return expr;
-        }
         let Node::Sum(terms) = self.node(base) else {
             return expr;
         };
+        let exponent = Number::integer(power);
         let terms = terms.to_vec();
         let mut shared: Vec<(ExprId, Number)> = Vec::new();
         let powers: Vec<Vec<(ExprId, Number)>> = (terms.iter())
@@ -210,20 +192,19 @@ impl ExprPool {
         powers
     }
 
-    fn merge_exponentials(&mut self, expr: ExprId) -> ExprId {
-        let mut exponents = Vec::new();
-        let mut others = Vec::new();
-        let mut n_merged = 0;
-        for factor in self.factors_of(expr).to_vec() {
-            match self.function_power(factor) {
-                Some((Function::Exp, argument, power)) => {
-                    n_merged += if power == 1 { 1 } else { 2 };
-                    exponents.push(self.scale(Number::integer(power), argument));
-                }
-                _ => others.push(factor),
+    /// The exponents of the exponentials among the factors of a product, and its other factors.
+    fn split_exponentials(&mut self, expr: ExprId) -> (Vec<ExprId>, Vec<ExprId>) {
+        self.partition_factors(expr, |pool, factor| match pool.function_power(factor) {
+            Some((Function::Exp, argument, power)) => {
+                Some(pool.scale(Number::integer(power), argument))
             }
-        }
-        if n_merged < 2 {
+            _ => None,
+        })
+    }
+
+    fn merge_exponentials(&mut self, expr: ExprId) -> ExprId {
+        let (exponents, mut others) = self.split_exponentials(expr);
+        if exponents.is_empty() {
             return expr;
         }
         let exponent = self.sum(&exponents);
@@ -281,8 +262,7 @@ impl ExprPool {
                 continue;
             };
             let Some((below, unit)) = factors.iter().enumerate().find_map(|(below, factor)| {
-                let (base, Exponent::Number(Number::MINUS_ONE)) = self.base_and_exponent(*factor)
-                else {
+                let (base, -1) = self.integer_power(*factor)? else {
                     return None;
                 };
                 let [(unit, c), (other, d)] = self.two_exponentials(base)?;
@@ -364,17 +344,15 @@ impl ExprPool {
 
     /// A term with exactly one logarithm, as cofactor and argument.
     pub(super) fn as_log_term(&mut self, rest: ExprId) -> Option<(ExprId, ExprId)> {
-        let mut cofactors = Vec::new();
-        let mut found = None;
-        for factor in self.factors_of(rest).to_vec() {
-            match *self.node(factor) {
-                Node::Apply(Function::Log, argument) if found.is_none() => found = Some(argument),
-                Node::Apply(Function::Log, _) => return None,
-                _ => cofactors.push(factor),
-            }
+        let (logs, cofactors) =
+            self.partition_factors(rest, |pool, factor| match *pool.node(factor) {
+                Node::Apply(Function::Log, argument) => Some(argument),
+                _ => None,
+            });
+        match logs[..] {
+            [argument] => Some((self.product(&cofactors), argument)),
+            _ => None,
         }
-        let argument = found?;
-        Some((self.product(&cofactors), argument))
     }
 }
 
@@ -392,72 +370,71 @@ pub(super) fn common_unit(numbers: impl Iterator<Item = Number> + Clone) -> Numb
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::assert_rewritten;
     use super::*;
-
-    fn rewritten(text: &str, rule: fn(&mut ExprPool, ExprId) -> ExprId) -> String {
-        let mut pool = ExprPool::new();
-        let expr = pool.parse(text, &|_| true).expect("test text parses");
-        let result = pool.rewrite_region(expr, rule);
-        pool.display(result).to_string()
-    }
 
     #[test]
     fn normal_rules_rewrite_each_left_side() {
-        for (text, expected) in [
-            ("exp(a)*exp(b)", "exp(a + b)"),
-            ("exp(a)^3", "exp(3*a)"),
-            ("exp(a)/exp(a + 1)", "exp(-1)"),
-            ("log(a^3)", "3*log(a)"),
-            ("log(a^2)", "2*log(abs(a))"),
-            ("log(b*exp(2*a))", "2*a + log(b)"),
-            ("log(sqrt(a))", "1/2*log(a)"),
-            ("log(a) + log(b)", "log(a*b)"),
-            ("0.3*c*log(a) - 0.3*c*log(b)", "0.3*c*log(a/b)"),
-            ("log(a) - 2*log(b) + c", "c + log(a/b^2)"),
-            ("log(a) + 9*log(b)", "log(a) + 9*log(b)"),
-            ("3*log(a) - 2*log(b)", "log(a^3/b^2)"),
-            ("log(sign(a))", "0"),
-            ("log(1/2)", "-log(2)"),
-            ("abs(a*b)", "abs(a)*abs(b)"),
-            ("abs(a)^3", "a^2*abs(a)"),
-            ("abs(a)*sign(a)", "a"),
-            ("a^2*sign(a)", "a*abs(a)"),
-            ("sign(a)^5", "sign(a)"),
-            ("sign(a)^2", "sign(a)^2"),
-            ("sqrt(a)*sqrt(b)", "sqrt(a*b)"),
-            ("sqrt(a)^3/sqrt(b)", "a*sqrt(a*b)/b"),
-            ("sqrt(2)*sqrt(2*a)*b", "2*sqrt(a)*b"),
-            ("sqrt(exp(a))", "exp(1/2*a)"),
-            ("b/(a^2 + a*b)", "b/(a*(a + b))"),
-            ("1/(1/a + 1/b)", "a*b/(a + b)"),
-            ("1/(a + b)", "1/(a + b)"),
-            ("1/(1 + exp(-a))", "exp(a)/(1 + exp(a))"),
-            ("1/(exp(a) + exp(2*a - b))", "exp(-a + b)/(exp(a) + exp(b))"),
-        ] {
-            assert_eq!(rewritten(text, ExprPool::normal_rules), expected, "{text}");
-        }
+        let normal = |pool: &mut ExprPool, expr| pool.rewrite_region(expr, ExprPool::normal_rules);
+        assert_rewritten(
+            normal,
+            &[
+                ("exp(a)*exp(b)", "exp(a + b)"),
+                ("exp(a)^3", "exp(3*a)"),
+                ("exp(a)/exp(a + 1)", "exp(-1)"),
+                ("log(a^3)", "3*log(a)"),
+                ("log(a^2)", "2*log(abs(a))"),
+                ("log(b*exp(2*a))", "2*a + log(b)"),
+                ("log(sqrt(a))", "1/2*log(a)"),
+                ("log(a) + log(b)", "log(a*b)"),
+                ("0.3*c*log(a) - 0.3*c*log(b)", "0.3*c*log(a/b)"),
+                ("log(a) - 2*log(b) + c", "c + log(a/b^2)"),
+                ("log(a) + 9*log(b)", "log(a) + 9*log(b)"),
+                ("3*log(a) - 2*log(b)", "log(a^3/b^2)"),
+                ("log(sign(a))", "0"),
+                ("log(1/2)", "-log(2)"),
+                ("abs(a*b)", "abs(a)*abs(b)"),
+                ("abs(a)^3", "a^2*abs(a)"),
+                ("abs(a)*sign(a)", "a"),
+                ("a^2*sign(a)", "a*abs(a)"),
+                ("sign(a)^5", "sign(a)"),
+                ("sign(a)^2", "sign(a)^2"),
+                ("sqrt(a)*sqrt(b)", "sqrt(a*b)"),
+                ("sqrt(a)^3/sqrt(b)", "a*sqrt(a*b)/b"),
+                ("sqrt(2)*sqrt(2*a)*b", "2*sqrt(a)*b"),
+                ("sqrt(exp(a))", "exp(1/2*a)"),
+                ("b/(a^2 + a*b)", "b/(a*(a + b))"),
+                ("1/(1/a + 1/b)", "a*b/(a + b)"),
+                ("1/(a + b)", "1/(a + b)"),
+                ("1/(1 + exp(-a))", "exp(a)/(1 + exp(a))"),
+                ("1/(exp(a) + exp(2*a - b))", "exp(-a + b)/(exp(a) + exp(b))"),
+            ],
+        );
     }
 
     #[test]
     fn compact_rules_save_calls() {
-        for (text, expected) in [
-            ("sin(a)/cos(a)", "tan(a)"),
-            ("sin(a)^2/cos(a)^3*b", "b*tan(a)^2/cos(a)"),
-            ("cos(a)/sin(a)", "1/tan(a)"),
-            ("sin(a)*cos(a)", "sin(a)*cos(a)"),
-            ("abs(a)*abs(b)*c", "c*abs(a*b)"),
-            ("abs(a)*b/a", "b*sign(a)"),
-            ("(exp(a) - exp(-a))/(exp(a) + exp(-a))", "tanh(a)"),
-            ("b*(1 - exp(-2*a))/(2 + 2*exp(-2*a))", "1/2*b*tanh(a)"),
-            ("b*tan(a)/(1 - tan(a)^2)", "1/2*b*tan(2*a)"),
-            ("tanh(a)/(1 + tanh(a)^2)", "1/2*tanh(2*a)"),
-            ("tanh(a)/(1 - tanh(a)^2)", "tanh(a)/(1 - tanh(a)^2)"),
-            ("sin(2*a)/(1 + cos(2*a))", "tan(a)"),
-            ("sin(a)/(1 - cos(a))", "1/tan(1/2*a)"),
-            ("b*(1 - cos(2*a))/sin(2*a)", "b*tan(a)"),
-            ("(exp(a) - 1)/(exp(a) + 2)", "-(1 - exp(a))/(2 + exp(a))"),
-        ] {
-            assert_eq!(rewritten(text, ExprPool::compact_rules), expected, "{text}");
-        }
+        let compact =
+            |pool: &mut ExprPool, expr| pool.rewrite_region(expr, ExprPool::compact_rules);
+        assert_rewritten(
+            compact,
+            &[
+                ("sin(a)/cos(a)", "tan(a)"),
+                ("sin(a)^2/cos(a)^3*b", "b*tan(a)^2/cos(a)"),
+                ("cos(a)/sin(a)", "1/tan(a)"),
+                ("sin(a)*cos(a)", "sin(a)*cos(a)"),
+                ("abs(a)*abs(b)*c", "c*abs(a*b)"),
+                ("abs(a)*b/a", "b*sign(a)"),
+                ("(exp(a) - exp(-a))/(exp(a) + exp(-a))", "tanh(a)"),
+                ("b*(1 - exp(-2*a))/(2 + 2*exp(-2*a))", "1/2*b*tanh(a)"),
+                ("b*tan(a)/(1 - tan(a)^2)", "1/2*b*tan(2*a)"),
+                ("tanh(a)/(1 + tanh(a)^2)", "1/2*tanh(2*a)"),
+                ("tanh(a)/(1 - tanh(a)^2)", "tanh(a)/(1 - tanh(a)^2)"),
+                ("sin(2*a)/(1 + cos(2*a))", "tan(a)"),
+                ("sin(a)/(1 - cos(a))", "1/tan(1/2*a)"),
+                ("b*(1 - cos(2*a))/sin(2*a)", "b*tan(a)"),
+                ("(exp(a) - 1)/(exp(a) + 2)", "-(1 - exp(a))/(2 + exp(a))"),
+            ],
+        );
     }
 }

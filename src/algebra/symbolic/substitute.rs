@@ -74,14 +74,10 @@ impl ExprPool {
 mod tests {
     use super::*;
 
-    fn parse(pool: &mut ExprPool, text: &str) -> ExprId {
-        pool.parse(text, &|_| true).expect("test text parses")
-    }
-
     #[test]
     fn substitution_is_simultaneous() {
         let mut pool = ExprPool::new();
-        let expr = parse(&mut pool, "x - 2*sin(y)");
+        let expr = pool.parsed("x - 2*sin(y)");
         let (x, y) = (pool.symbol_id("x"), pool.symbol_id("y"));
         let swapped = [(x, pool.symbol_expr(y)), (y, pool.symbol_expr(x))];
         let result = pool.substitute(expr, &swapped);
@@ -91,21 +87,18 @@ mod tests {
     #[test]
     fn substitution_of_a_map_into_robot_coordinates() {
         let mut pool = ExprPool::new();
-        let expr = parse(&mut pool, "0.36 + z1^2*sin(z1)");
-        let encoder = parse(&mut pool, "0.5*body.x - 0.1");
+        let expr = pool.parsed("0.36 + z1^2*sin(z1)");
+        let encoder = pool.parsed("0.5*body.x - 0.1");
         let z1 = pool.symbol_id("z1");
         let result = pool.substitute(expr, &[(z1, encoder)]);
-        let expected = parse(
-            &mut pool,
-            "0.36 + (0.5*body.x - 0.1)^2*sin(0.5*body.x - 0.1)",
-        );
+        let expected = pool.parsed("0.36 + (0.5*body.x - 0.1)^2*sin(0.5*body.x - 0.1)");
         assert_eq!(result, expected);
     }
 
     #[test]
     fn substitution_of_absent_symbol_changes_nothing() {
         let mut pool = ExprPool::new();
-        let expr = parse(&mut pool, "x + y");
+        let expr = pool.parsed("x + y");
         let z = pool.symbol_id("z");
         assert_eq!(pool.substitute(expr, &[(z, ExprId::ONE)]), expr);
     }

@@ -47,22 +47,14 @@ impl ExprPool {
                 continue;
             };
             let (is_below, is_above) = (side == Number::MINUS_ONE, side.is_one());
+            let (two, half) = (Number::integer(2), Number::HALF);
             // The other factor with its power, the new function, what its angle and the product are multiplied by.
             let (partner, wanted, new, multiple, scale) = match (inner, power, sign) {
-                (Function::Tan, 2, Number::MINUS_ONE) if is_below => (
-                    Function::Tan,
-                    1,
-                    (Function::Tan, 1),
-                    Number::integer(2),
-                    Number::HALF,
-                ),
-                (Function::Tanh, 2, Number::ONE) if is_below => (
-                    Function::Tanh,
-                    1,
-                    (Function::Tanh, 1),
-                    Number::integer(2),
-                    Number::HALF,
-                ),
+                (Function::Tan, 2, Number::MINUS_ONE) | (Function::Tanh, 2, Number::ONE)
+                    if is_below =>
+                {
+                    (inner, 1, (inner, 1), two, half)
+                }
                 (Function::Cos, 1, Number::ONE | Number::MINUS_ONE) if is_below || is_above => {
                     let wanted = if is_below { 1 } else { -1 };
                     let new = if sign.is_one() { wanted } else { -wanted };
@@ -70,19 +62,16 @@ impl ExprPool {
                         Function::Sin,
                         wanted,
                         (Function::Tan, new),
-                        Number::HALF,
+                        half,
                         Number::ONE,
                     )
                 }
                 _ => continue,
             };
-            let has_partner = factors.iter().any(|other| {
-                self.function_power(*other)
-                    .is_some_and(|(function, of, power)| {
-                        (function, of) == (partner, angle) && power * wanted > 0
-                    })
-            });
-            if !has_partner {
+            let mut powers = factors
+                .iter()
+                .filter_map(|other| self.function_power(*other));
+            if !powers.any(|(f, of, n)| (f, of) == (partner, angle) && n * wanted > 0) {
                 continue;
             }
             let angle_of_new = self.scale(multiple, angle);

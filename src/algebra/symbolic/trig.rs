@@ -12,9 +12,10 @@
 
 use std::collections::BTreeMap;
 
+use num_integer::Integer;
+
 use super::node::{ExprId, Function, Node};
 use super::number::Number;
-use super::order::Exponent;
 use super::pool::ExprPool;
 
 /// Largest multiple of an angle, and most angles in one argument, that are expanded.
@@ -49,14 +50,13 @@ impl ExprPool {
         self.note_units(expr, &mut units);
         self.note_units(other, &mut units);
         self.rewrite_region(expr, |pool, node| match *pool.node(node) {
-            Node::Apply(Function::Sin, argument) => match pool.sine_and_cosine(argument, &units) {
-                Some((sine, _)) => sine,
-                None => node,
-            },
-            Node::Apply(Function::Cos, argument) => match pool.sine_and_cosine(argument, &units) {
-                Some((_, cosine)) => cosine,
-                None => node,
-            },
+            Node::Apply(function @ (Function::Sin | Function::Cos), argument) => {
+                match (pool.sine_and_cosine(argument, &units), function) {
+                    (Some((sine, _)), Function::Sin) => sine,
+                    (Some((_, cosine)), _) => cosine,
+                    (None, _) => node,
+                }
+            }
             _ => node,
         })
     }
@@ -97,11 +97,7 @@ impl ExprPool {
         for (unit, rest, multiple) in multiples {
             let angle = self.scale(unit, rest);
             let unit_sine = self.apply(Function::Sin, angle);
-            let unit_sine = if multiple < 0 {
-                self.neg(unit_sine)
-            } else {
-                unit_sine
-            };
+            let unit_sine = self.negated_if(multiple < 0, unit_sine);
             let unit_cosine = self.apply(Function::Cos, angle);
             for _ in 0..multiple.abs() {
                 // sin(a + b) = sin a cos b + cos a sin b; cos(a + b) = cos a cos b - sin a sin b.
@@ -207,7 +203,7 @@ impl ExprPool {
     /// `1/(a + b*sin(x)) = (a - b*sin(x))/(a^2 - b^2*(1 - cos(x)^2))`, for the first angle of a sum with
     /// sines to the first power.
     pub(super) fn without_sine_below(&mut self, expr: ExprId) -> ExprId {
-        let (base, Exponent::Number(Number::MINUS_ONE)) = self.base_and_exponent(expr) else {
+        let Some((base, -1)) = self.integer_power(expr) else {
             return expr;
         };
         if !matches!(self.node(base), Node::Sum(_)) {
@@ -236,8 +232,7 @@ impl ExprPool {
     }
 
     fn combine_angles_of_term(&mut self, rest: ExprId) -> ExprId {
-        let mut others = Vec::new();
-        let (mut above, mut below) = (Vec::new(), Vec::new());
+        let (mut others, mut above, mut below) = (Vec::new(), Vec::new(), Vec::new());
         for factor in self.factors_of(rest).to_vec() {
             match self.function_power(factor) {
                 Some((function @ (Function::Sin | Function::Cos), argument, exponent))
@@ -319,75 +314,63 @@ fn note_unit(units: &mut Units, coefficient: Number, rest: ExprId) {
     let common = || {
         let a = known_numerator.checked_mul(denominator)?;
         let b = numerator.checked_mul(known_denominator)?;
-        Number::rational(gcd(a, b), known_denominator.checked_mul(denominator)?)
+        Number::rational(a.gcd(&b), known_denominator.checked_mul(denominator)?)
     };
     *unit = common().unwrap_or(*unit);
 }
 
-fn gcd(mut a: i64, mut b: i64) -> i64 {
-    while b != 0 {
-        (a, b) = (b, a % b);
-    }
-    a
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::testing::assert_rewritten;
     use super::*;
-
-    fn rewritten(text: &str, rewrite: fn(&mut ExprPool, ExprId) -> ExprId) -> String {
-        let mut pool = ExprPool::new();
-        let expr = pool.parse(text, &|_| true).expect("test text parses");
-        let result = rewrite(&mut pool, expr);
-        pool.display(result).to_string()
-    }
 
     #[test]
     fn expand_angles_of_sums_and_multiples() {
-        let expand = |text| rewritten(text, ExprPool::expand_angles);
-        assert_eq!(expand("sin(x + y)"), "sin(x)*cos(y) + sin(y)*cos(x)");
-        assert_eq!(expand("cos(x - y)"), "sin(x)*sin(y) + cos(x)*cos(y)");
-        assert_eq!(expand("sin(x) + sin(2*x)"), "sin(x) + 2*sin(x)*cos(x)");
-        assert_eq!(
-            expand("cos(x/2) + cos(x)"),
-            "cos(1/2*x) - sin(1/2*x)^2 + cos(1/2*x)^2"
+        assert_rewritten(
+            ExprPool::expand_angles,
+            &[
+                ("sin(x + y)", "sin(x)*cos(y) + sin(y)*cos(x)"),
+                ("cos(x - y)", "sin(x)*sin(y) + cos(x)*cos(y)"),
+                ("sin(x) + sin(2*x)", "sin(x) + 2*sin(x)*cos(x)"),
+                (
+                    "cos(x/2) + cos(x)",
+                    "cos(1/2*x) - sin(1/2*x)^2 + cos(1/2*x)^2",
+                ),
+                ("sin(2*x)", "sin(2*x)"),
+                ("tan(x)", "sin(x)/cos(x)"),
+                ("sin(0.3*x)", "sin(0.3*x)"),
+                ("sin(x) + sin(100*x)", "sin(x) + sin(100*x)"),
+            ],
         );
-        assert_eq!(expand("sin(2*x)"), "sin(2*x)");
-        assert_eq!(expand("tan(x)"), "sin(x)/cos(x)");
-        assert_eq!(expand("sin(0.3*x)"), "sin(0.3*x)");
-        assert_eq!(expand("sin(x) + sin(100*x)"), "sin(x) + sin(100*x)");
     }
 
     #[test]
     fn reduce_squares_either_way() {
-        assert_eq!(
-            rewritten("sin(x)^2", ExprPool::sines_to_cosines),
-            "1 - cos(x)^2"
+        assert_rewritten(
+            ExprPool::cosines_to_sines,
+            &[("cos(x)^3", "cos(x)*(1 - sin(x)^2)")],
         );
-        assert_eq!(
-            rewritten("cos(x)^3", ExprPool::cosines_to_sines),
-            "cos(x)*(1 - sin(x)^2)"
-        );
-        assert_eq!(
-            rewritten("1/sin(x)", ExprPool::sines_to_cosines),
-            "sin(x)/(1 - cos(x)^2)"
-        );
-        assert_eq!(
-            rewritten("sin(sin(x)^2)", ExprPool::sines_to_cosines),
-            "sin(sin(x)^2)"
+        assert_rewritten(
+            ExprPool::sines_to_cosines,
+            &[
+                ("sin(x)^2", "1 - cos(x)^2"),
+                ("1/sin(x)", "sin(x)/(1 - cos(x)^2)"),
+                ("sin(sin(x)^2)", "sin(sin(x)^2)"),
+            ],
         );
     }
 
     #[test]
     fn combine_angles_turns_products_into_sums() {
-        let combine = |text| rewritten(text, ExprPool::combine_angles);
-        assert_eq!(combine("2*sin(x)*cos(x)"), "sin(2*x)");
-        assert_eq!(combine("sin(x)^2"), "1/2 - 1/2*cos(2*x)");
-        assert_eq!(combine("cos(x)^2 - sin(x)^2"), "cos(2*x)");
-        assert_eq!(
-            combine("z*sin(x)*sin(y)"),
-            "1/2*z*cos(x - y) - 1/2*z*cos(x + y)"
+        assert_rewritten(
+            ExprPool::combine_angles,
+            &[
+                ("2*sin(x)*cos(x)", "sin(2*x)"),
+                ("sin(x)^2", "1/2 - 1/2*cos(2*x)"),
+                ("cos(x)^2 - sin(x)^2", "cos(2*x)"),
+                ("z*sin(x)*sin(y)", "1/2*z*cos(x - y) - 1/2*z*cos(x + y)"),
+                ("sin(x) + y", "y + sin(x)"),
+            ],
         );
-        assert_eq!(combine("sin(x) + y"), "y + sin(x)");
     }
 }

@@ -1,5 +1,7 @@
 //! Numbers as they are printed: how many digits, and what that costs.
 
+use std::fmt;
+
 /// How coefficients are rounded for print.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rounding {
@@ -62,11 +64,7 @@ impl Decimal {
 
     /// An integer with all its digits.
     pub fn integer(value: i64) -> Self {
-        Self {
-            negative: value < 0,
-            digits: value.unsigned_abs().to_string(),
-            exponent: None,
-        }
+        Self::plain(value as f64, value.unsigned_abs().to_string())
     }
 
     /// `value` rounded for print; the exact binary value is rounded, ties to even.
@@ -105,7 +103,7 @@ impl Decimal {
             return Self::plain(value, "0".to_owned());
         }
         let text = format!("{:.*e}", digits - 1, value.abs());
-        let exponent = exponent_of(&text);
+        let (_, exponent) = parts(&text);
         if exponent < -4 || exponent > 6.max(digits as i32) {
             return Self::scientific(value, text);
         }
@@ -132,12 +130,10 @@ impl Decimal {
 
     /// From Rust's `1.25e-7` form.
     fn scientific(value: f64, text: String) -> Self {
-        let exponent = exponent_of(&text);
-        let digits = text.split('e').next().unwrap_or("0").to_owned();
+        let (digits, exponent) = parts(&text);
         Self {
-            negative: value < 0.0,
-            digits,
             exponent: (exponent != 0).then_some(exponent),
+            ..Self::plain(value, digits.to_owned())
         }
     }
 
@@ -153,10 +149,7 @@ impl Decimal {
 
     /// Whether it prints as nothing but zeros.
     pub fn is_zero(&self) -> bool {
-        !self
-            .digits
-            .bytes()
-            .any(|byte| (b'1'..=b'9').contains(&byte))
+        !self.digits.contains(|digit| ('1'..='9').contains(&digit))
     }
 
     /// Whether it prints as one.
@@ -182,51 +175,62 @@ impl Decimal {
         &self.digits
     }
 
+    /// How many digits stand before and after the point.
+    pub(super) fn places(&self) -> (usize, usize) {
+        let (before, after) = self.digits.split_once('.').unwrap_or((&self.digits, ""));
+        (before.len(), after.len())
+    }
+
     /// The power of ten that the digits are multiplied with, if one is printed.
     pub fn exponent(&self) -> Option<i32> {
         self.exponent
     }
 }
 
-fn exponent_of(scientific: &str) -> i32 {
-    scientific
-        .split('e')
-        .nth(1)
-        .and_then(|text| text.parse().ok())
-        .unwrap_or(0)
+/// Digits and exponent of Rust's `1.25e-7` form.
+fn parts(scientific: &str) -> (&str, i32) {
+    let parts = scientific.split_once('e');
+    let (digits, exponent) = parts.expect("a float's scientific form has an exponent");
+    (digits, exponent.parse().expect("which is an integer"))
+}
+
+impl fmt::Display for Decimal {
+    /// Plain text: `-1.25e-7`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sign = if self.negative { "-" } else { "" };
+        write!(f, "{sign}{}", self.digits)?;
+        self.exponent.map_or(Ok(()), |power| write!(f, "e{power}"))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn text(value: f64, rounding: Rounding) -> String {
-        let decimal = Decimal::rounded(value, rounding);
-        let sign = if decimal.is_negative() { "-" } else { "" };
-        match decimal.exponent() {
-            Some(exponent) => format!("{sign}{}e{exponent}", decimal.digits()),
-            None => format!("{sign}{}", decimal.digits()),
+    #[test]
+    fn numbers_are_rounded_by_decimals_by_significant_digits_or_as_each_needs() {
+        let adaptive = Rounding::default();
+        for (value, rounding, text) in [
+            (-1.0, Rounding::Decimals(2), "-1.00"),
+            (51.05, Rounding::Decimals(2), "51.05"),
+            (0.004, Rounding::Decimals(2), "0.00"),
+            (0.36, adaptive, "0.36"),
+            (-1.0, adaptive, "-1.00"),
+            (0.05, adaptive, "0.05"),
+            (0.0537, adaptive, "0.054"),
+            (0.00612, adaptive, "0.006"),
+            (3.14e-9, adaptive, "3.1e-9"),
+            (123456789.0, adaptive, "1.2e8"),
+            (0.36, Rounding::Significant(3), "0.360"),
+            (51.05, Rounding::Significant(3), "51.0"),
+            (51234.0, Rounding::Significant(3), "51200"),
+            (9.996, Rounding::Significant(3), "10.0"),
+            (-1.25e-7, Rounding::Significant(2), "-1.2e-7"),
+        ] {
+            let rounded = Decimal::rounded(value, rounding).to_string();
+            assert_eq!(rounded, text, "{value} by {rounding:?}");
         }
-    }
-
-    #[test]
-    fn fixed_decimals_keep_trailing_zeros_and_may_vanish() {
-        assert_eq!(text(-1.0, Rounding::Decimals(2)), "-1.00");
-        assert_eq!(text(51.05, Rounding::Decimals(2)), "51.05");
-        assert_eq!(text(0.004, Rounding::Decimals(2)), "0.00");
         assert!(Decimal::rounded(-0.004, Rounding::Decimals(2)).is_zero());
-    }
-
-    #[test]
-    fn adaptive_rounding_adds_decimals_only_where_two_mislead() {
-        let rounding = Rounding::default();
-        assert_eq!(text(0.36, rounding), "0.36");
-        assert_eq!(text(-1.0, rounding), "-1.00");
-        assert_eq!(text(0.05, rounding), "0.05");
-        assert_eq!(text(0.0537, rounding), "0.054");
-        assert_eq!(text(0.00612, rounding), "0.006");
-        assert_eq!(text(3.14e-9, rounding), "3.1e-9");
-        assert_eq!(text(123456789.0, rounding), "1.2e8");
     }
 
     #[test]
@@ -238,15 +242,6 @@ mod tests {
             assert!((printed - value).abs() <= 0.05 * value, "{value} {printed}");
             value *= 1.713;
         }
-    }
-
-    #[test]
-    fn significant_digits_count_from_the_first_nonzero() {
-        assert_eq!(text(0.36, Rounding::Significant(3)), "0.360");
-        assert_eq!(text(51.05, Rounding::Significant(3)), "51.0");
-        assert_eq!(text(51234.0, Rounding::Significant(3)), "51200");
-        assert_eq!(text(9.996, Rounding::Significant(3)), "10.0");
-        assert_eq!(text(-1.25e-7, Rounding::Significant(2)), "-1.2e-7");
     }
 
     #[test]

@@ -92,7 +92,7 @@ struct Layout<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum FactorKey {
     Number,
-    Variable(Option<Variable>),
+    Variable(Variable),
     Group,
     Function,
 }
@@ -174,7 +174,7 @@ impl Layout<'_> {
     }
 
     fn small_power(&self, exponent: ExprId) -> Option<usize> {
-        let integer = self.number(exponent)?.as_integer()?;
+        let integer = self.pool.as_number(exponent)?.as_integer()?;
         usize::try_from(integer).ok().filter(|power| *power <= 64)
     }
 
@@ -184,10 +184,7 @@ impl Layout<'_> {
             match self.pool.node(*factor) {
                 Node::Number(number) => self.take_number(*number, &mut parts),
                 Node::Power(base, exponent) => self.take_power(*base, *exponent, &mut parts)?,
-                _other => {
-                    let factor = self.factor(*factor)?;
-                    parts.top.push(factor);
-                }
+                _other => parts.top.push(self.factor(*factor)?),
             }
         }
         if parts.negative {
@@ -221,14 +218,13 @@ impl Layout<'_> {
         exponent: ExprId,
         parts: &mut Quotient,
     ) -> Result<(), UnknownSymbol> {
-        match self.number(exponent) {
-            Some(number) if number.is_negative() => {
-                let factor = self.numeric_power(base, number.abs())?;
-                parts.bottom.push(factor);
-            }
+        match self.pool.as_number(exponent) {
             Some(number) => {
-                let factor = self.numeric_power(base, number)?;
-                parts.top.push(factor);
+                let factor = self.numeric_power(base, number.abs())?;
+                match number.is_negative() {
+                    true => parts.bottom.push(factor),
+                    false => parts.top.push(factor),
+                }
             }
             None => {
                 let exponent = self.signed(exponent)?.into_math();
@@ -326,7 +322,7 @@ impl Layout<'_> {
                     name: name.to_owned(),
                 })?;
                 let symbol = Math::Symbol(self.symbols.symbol(variable.quantity, variable.index));
-                (FactorKey::Variable(Some(variable)), symbol)
+                (FactorKey::Variable(variable), symbol)
             }
             Node::Apply(function, argument) => {
                 (FactorKey::Function, self.apply(*function, *argument)?)
@@ -355,13 +351,6 @@ impl Layout<'_> {
             Function::Abs => Math::Absolute(argument),
             named => Math::Function(named, None, argument),
         })
-    }
-
-    fn number(&self, expr: ExprId) -> Option<Number> {
-        match self.pool.node(expr) {
-            Node::Number(number) => Some(*number),
-            _other => None,
-        }
     }
 }
 

@@ -225,12 +225,11 @@ mod tests {
 
     #[test]
     fn coordinate_symbols_fall_back_to_numbers_when_names_look_alike() {
-        let names = ["a.b".to_owned(), "a-b".to_owned()];
-        let symbols = coordinate_symbols(&names);
-        assert_eq!(symbols[0].to_string(), "q_1");
-        let names = ["fr.hx".to_owned(), "body.x".to_owned()];
-        let symbols = coordinate_symbols(&names);
-        assert_eq!(symbols[0].to_string(), "q_fr,hx");
-        assert_eq!(symbols[1].to_string(), "q_body,x");
+        let symbols = |names: [&str; 2]| -> Vec<String> {
+            let symbols = coordinate_symbols(&names.map(str::to_owned));
+            symbols.iter().map(Symbol::to_string).collect()
+        };
+        assert_eq!(symbols(["a.b", "a-b"]), ["q_1", "q_2"]);
+        assert_eq!(symbols(["fr.hx", "body.x"]), ["q_fr,hx", "q_body,x"]);
     }
 }

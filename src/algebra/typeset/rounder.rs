@@ -55,16 +55,9 @@ fn are_whole_exact(rounding: Rounding, coefficients: impl Iterator<Item = f64>) 
         Rounding::Adaptive { decimals, .. } => decimals,
     };
     let needs = |value: f64| {
-        let text = Decimal::exact(value);
-        let after = text
-            .digits()
-            .split_once('.')
-            .map_or(0, |(_, after)| after.len());
-        if text.exponent().is_some() {
-            usize::MAX
-        } else {
-            after
-        }
+        let number = Decimal::exact(value);
+        let (_, after) = number.places();
+        number.exponent().map_or(after, |_| usize::MAX)
     };
     let (mut count, mut all) = (0, 0);
     for coefficient in coefficients.filter(|value| *value != 0.0) {

@@ -297,16 +297,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn significant_keeps_four_digits() {
-        assert_eq!(significant(0.0123449), "0.01234");
-        assert_eq!(significant(12.3456), "12.35");
-        assert_eq!(significant(0.0), "0");
-        assert_eq!(significant(1.23456e-7), "1.235e-7");
-        assert_eq!(significant(f64::NAN), "diverged");
-    }
-
-    #[test]
-    fn rounding_keeps_so_many_digits() {
+    fn numbers_keep_so_many_digits() {
+        for (value, text) in [
+            (0.0123449, "0.01234"),
+            (12.3456, "12.35"),
+            (0.0, "0"),
+            (1.23456e-7, "1.235e-7"),
+            (f64::NAN, "diverged"),
+        ] {
+            assert_eq!(significant(value), text);
+        }
         assert_eq!(rounded(-0.123456, 2), -0.12);
         assert_eq!(rounded(99.6, 1), 100.0);
         assert_eq!(rounded(6.02214e23, 3), 6.02e23);

@@ -130,13 +130,8 @@ mod tests {
     }
 
     #[test]
-    fn break_lines_leaves_a_term_wider_than_the_line_alone_on_it() {
-        let terms = numbers(3);
-        assert_eq!(break_lines(&terms, 0.5, 0.0, 0.0).len(), 3);
-    }
-
-    #[test]
-    fn break_lines_of_nothing_is_nothing() {
+    fn break_lines_leaves_a_term_wider_than_the_line_alone_on_it_and_nothing_of_nothing() {
+        assert_eq!(break_lines(&numbers(3), 0.5, 0.0, 0.0).len(), 3);
         assert!(break_lines(&[], 20.0, 0.0, 0.0).is_empty());
     }
 }

@@ -33,11 +33,7 @@ impl Spelling for Plain {
     }
 
     fn number(number: &Decimal) -> String {
-        let sign = if number.is_negative() { "-" } else { "" };
-        let power = number
-            .exponent()
-            .map_or(String::new(), |power| format!("e{power}"));
-        format!("{sign}{}{power}", number.digits())
+        number.to_string()
     }
 
     fn term(_: &Math, text: &str) -> String {
@@ -235,17 +231,16 @@ mod tests {
         }
         assert_eq!(words(&front), "a front foot on the ground");
         assert_ne!(words(&front[1..]), "a front foot on the ground");
-        let rear = [[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 1, 1]];
-        assert_eq!(words(&rear), "a rear foot and no front foot on the ground");
-        assert_eq!(
-            words(&[[1, 1, 0, 0]]),
-            "both front feet and no rear foot on the ground"
-        );
-        assert_eq!(words(&[[1, 1, 1, 1]]), "all four feet on the ground");
-        assert_eq!(words(&[[0; 4]]), "no foot on the ground");
-        let trot = [[1, 0, 0, 1], [0, 1, 1, 0]];
-        assert_eq!(words(&trot), "fr and rl, or fl and rr on the ground");
-        let alone = [[1, 0, 0, 0], [1, 1, 1, 0]];
-        assert_eq!(words(&alone), "fr alone, or fr, fl and rr on the ground");
+        let rear = &[[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 1, 1]];
+        for (patterns, text) in [
+            (&rear[..], "a rear foot and no front foot"),
+            (&[[1, 1, 0, 0]], "both front feet and no rear foot"),
+            (&[[1, 1, 1, 1]], "all four feet"),
+            (&[[0; 4]], "no foot"),
+            (&[[1, 0, 0, 1], [0, 1, 1, 0]], "fr and rl, or fl and rr"),
+            (&[[1, 0, 0, 0], [1, 1, 1, 0]], "fr alone, or fr, fl and rr"),
+        ] {
+            assert_eq!(words(patterns), format!("{text} on the ground"));
+        }
     }
 }

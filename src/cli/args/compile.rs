@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::number::{count, real};
 use super::reading::ReadingArguments;
+use super::value::{count, real};
 use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::Target;
 use crate::limits::table::{DIGITS, MARGIN, SIGNIFICANT, WIDTH};

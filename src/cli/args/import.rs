@@ -4,9 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::number::{count, real};
 use super::reading::ReadingArguments;
-use super::robot::{RobotParser, wrench_frame};
+use super::value::{RobotParser, count, real, wrench_frame};
 use crate::import::{
     Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
 };

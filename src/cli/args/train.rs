@@ -6,9 +6,8 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
-use super::number::{count, finite, real};
 use super::reading::ReadingArguments;
-use super::robot::{RobotParser, wrench_frame};
+use super::value::{RobotParser, count, finite, real, wrench_frame};
 use crate::limits::table;
 use crate::model::Activation;
 use crate::recording::smoothing::SavitzkyGolay;

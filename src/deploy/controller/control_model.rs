@@ -5,7 +5,7 @@ use nalgebra::Dim;
 use nalgebra::storage::RawStorage;
 
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
-use crate::mpc::{ControlModel, ControlPhase, InputGivenState};
+use crate::mpc::{ControlModel, ControlModelParts, ControlPhase};
 use crate::robot::{Leg, LegGeometry, Robot, STATE_DIM, WrenchFrame};
 
 /// Numbers per line.
@@ -26,69 +26,33 @@ pub struct ControlModelText<'a> {
     frame: &'static str,
     /// Names and values of the actuators' arrays.
     actuators: Vec<(&'static str, String)>,
-    latent_dim: usize,
-    state_dim: usize,
-    encoder: Numbers,
-    encoder_bias: Numbers,
-    decoder: Numbers,
-    decoder_bias: Numbers,
-    lift: Numbers,
-    projection: Numbers,
-    phase_of_feet: String,
+    plant: &'a ControlModel,
+    parts: &'a ControlModelParts,
     /// Whether a phase knows its inputs given states.
     knows_inputs: bool,
-    phases: Vec<PhaseNumbers<'a>>,
+    /// Each phase with its constants' beginning.
+    phases: Vec<(String, &'a PhaseInterface, &'a ControlPhase)>,
 }
 
-struct PhaseNumbers<'a> {
-    name: &'a str,
-    identifier: &'a str,
-    upper: String,
-    is_grounded: bool,
-    latent_mean: Numbers,
-    latent_root: Numbers,
-    given_state: Option<GivenStateNumbers>,
-    torque_mean: Numbers,
-    torque_precision: Numbers,
-}
-
-/// The matrices of an [`InputGivenState`].
-struct GivenStateNumbers {
-    mean: Numbers,
-    covariance: Numbers,
-    acceleration_error: Numbers,
-}
-
-/// A matrix as a Rust array, row by row.
-struct Numbers {
-    len: usize,
-    text: String,
-}
-
-impl Numbers {
-    fn new<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
-        matrix: &nalgebra::Matrix<f64, R, C, S>,
-    ) -> Self {
-        let texts: Vec<String> = matrix
-            .row_iter()
-            .flat_map(|row| {
-                row.iter()
-                    .map(|value| format!("{value:?}"))
-                    .collect::<Vec<_>>()
-            })
-            .collect();
-        let lines: Vec<String> = texts.chunks(WIDTH).map(|line| line.join(", ")).collect();
-        Self {
-            len: texts.len(),
-            text: format!("[\n    {},\n]", lines.join(",\n    ")),
-        }
-    }
+/// Type and value of a matrix as a Rust array, row by row.
+fn array<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
+    matrix: &nalgebra::Matrix<f64, R, C, S>,
+) -> String {
+    let rows = matrix.row_iter();
+    let texts: Vec<String> = rows
+        .flat_map(|row| row.iter().map(|v| format!("{v:?}")).collect::<Vec<_>>())
+        .collect();
+    let lines: Vec<String> = texts.chunks(WIDTH).map(|line| line.join(", ")).collect();
+    format!(
+        "[f64; {}] = [\n    {},\n]",
+        texts.len(),
+        lines.join(",\n    ")
+    )
 }
 
 impl<'a> ControlModelText<'a> {
     /// The text for a plant.
     pub fn new(entries: &'a ModelInterface, plant: &'a ControlModel, banner: String) -> Self {
-        let parts = plant.parts();
         let rule = plant.input_rule();
         let pairs = entries.phases.iter().zip(plant.phases());
         Self {
@@ -105,21 +69,14 @@ impl<'a> ControlModelText<'a> {
                 .flat_map(|actuators| actuators.named())
                 .map(|(name, values)| (name, format!("{values:?}")))
                 .collect(),
-            latent_dim: plant.latent_dim(),
-            state_dim: STATE_DIM,
-            encoder: Numbers::new(&parts.encoder),
-            encoder_bias: Numbers::new(&parts.encoder_bias),
-            decoder: Numbers::new(&parts.decoder),
-            decoder_bias: Numbers::new(&parts.decoder_bias),
-            lift: Numbers::new(&parts.lift),
-            projection: Numbers::new(&parts.projection),
-            phase_of_feet: format!("{:?}", parts.phase_of_feet),
+            plant,
+            parts: plant.parts(),
             knows_inputs: plant
                 .phases()
                 .iter()
                 .any(|phase| phase.given_state.is_some()),
             phases: pairs
-                .map(|(entries, phase)| PhaseNumbers::new(entries, phase))
+                .map(|(entries, phase)| (entries.identifier.to_ascii_uppercase(), entries, phase))
                 .collect(),
         }
     }
@@ -156,30 +113,4 @@ fn robot_text(robot: &Robot) -> String {
     ];
     let fields = fields.map(|(name, value)| format!("    {name}: {value},\n"));
     format!("Robot {{\n{}}}", fields.concat())
-}
-
-impl GivenStateNumbers {
-    fn new(given: &InputGivenState) -> Self {
-        Self {
-            mean: Numbers::new(&given.mean),
-            covariance: Numbers::new(&given.covariance),
-            acceleration_error: Numbers::new(&given.acceleration_error),
-        }
-    }
-}
-
-impl<'a> PhaseNumbers<'a> {
-    fn new(entries: &'a PhaseInterface, phase: &'a ControlPhase) -> Self {
-        Self {
-            name: &phase.name,
-            identifier: &entries.identifier,
-            upper: entries.identifier.to_ascii_uppercase(),
-            is_grounded: phase.is_grounded,
-            latent_mean: Numbers::new(&phase.latent_mean),
-            latent_root: Numbers::new(&phase.latent_root),
-            given_state: phase.given_state.as_ref().map(GivenStateNumbers::new),
-            torque_mean: Numbers::new(&phase.torque_mean),
-            torque_precision: Numbers::new(&phase.torque_precision),
-        }
-    }
 }

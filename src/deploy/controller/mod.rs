@@ -11,12 +11,13 @@ mod sources;
 use askama::Template;
 
 use crate::codegen::interface::ModelInterface;
-use crate::codegen::line_wrapping::tidy;
+use crate::codegen::line_wrapping::{tidy, wrapped};
 use crate::codegen::{Precision, SineCosine, Units, rust};
 use crate::deploy::{EmitError, PlannedJump};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::lower::LowerOptions;
+use crate::model::ReducedModel;
 use crate::mpc::ControlModel;
 use crate::mpc::interface::{Settings, TEXTS};
 use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
@@ -73,13 +74,7 @@ pub fn emit(
     provenance: &str,
     plan: Option<&PlannedJump>,
 ) -> Result<Vec<EmittedFile>, EmitError> {
-    let model = equations.model();
-    if !model.is_linear() {
-        return Err(EmitError::Nonlinear {
-            model: model.name().to_owned(),
-        });
-    }
-    let plant = ControlModel::new(model)?;
+    let plant = plant(equations.model())?;
     let entries = &ModelInterface::new(equations, options, Units::Si)?;
     let name = entries.identifier.as_str();
     let folder = format!("{name}-controller");
@@ -103,6 +98,19 @@ pub fn emit(
         files.extend(plan.files(&format!("{folder}/examples"), name, provenance));
     }
     Ok(files)
+}
+
+/// What a controller knows of a model.
+///
+/// # Errors
+/// [`EmitError::Nonlinear`] and [`EmitError::Control`].
+pub(super) fn plant(model: &ReducedModel) -> Result<ControlModel, EmitError> {
+    match model.is_linear() {
+        true => Ok(ControlModel::new(model)?),
+        false => Err(EmitError::Nonlinear {
+            model: model.name().to_owned(),
+        }),
+    }
 }
 
 /// How the controller's inputs come from torques, for the header's first comment.
@@ -131,16 +139,7 @@ pub(super) fn input_in_words(rule: &InputRule, name: &str) -> String {
     let text = format!(
         "Of u, {torques}; {wrench}. {name}_generalised_input() of the model makes it{of_torques}."
     );
-    let mut lines = vec![String::new()];
-    for word in text.split(' ') {
-        let last = lines.last_mut().expect("never empty");
-        match last.len() + word.len() {
-            ..100 if last.is_empty() => last.push_str(word),
-            ..100 => *last += &format!(" {word}"),
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines.join("\n * ")
+    wrapped(&text, 100, "").join("\n * ")
 }
 
 /// What is the same for all models but for names.

@@ -9,71 +9,30 @@ pub const LICENCES: [(&str, &str); 2] = [
     ("LICENSE-MIT", include_str!("../../../LICENSE-MIT")),
 ];
 
+/// Path below `src` and text of files, by their folders.
 macro_rules! sources {
-    ($($path:literal),* $(,)?) => {
-        [$(($path, include_str!(concat!("../../", $path)))),*]
+    ($($folder:literal: $($file:ident)*;)*) => {
+        &[$($((
+            concat!($folder, "/", stringify!($file), ".rs"),
+            include_str!(concat!("../../", $folder, "/", stringify!($file), ".rs")),
+        )),*),*]
     };
 }
 
-/// Path below `src` and text.
-const SOURCES: [(&str, &str); 56] = sources![
-    "motion/mpc/online/command.rs",
-    "motion/mpc/online/control_model.rs",
-    "motion/mpc/online/controller.rs",
-    "motion/mpc/online/dense.rs",
-    "motion/mpc/online/dynamics.rs",
-    "motion/mpc/online/effectiveness.rs",
-    "motion/mpc/online/engine.rs",
-    "motion/mpc/online/error.rs",
-    "motion/mpc/online/estimate.rs",
-    "motion/mpc/online/fallback.rs",
-    "motion/mpc/online/horizon.rs",
-    "motion/mpc/online/interface/codes.rs",
-    "motion/mpc/online/interface/handle.rs",
-    "motion/mpc/online/interface/mod.rs",
-    "motion/mpc/online/interface/settings.rs",
-    "motion/mpc/online/interface/values.rs",
-    "motion/mpc/online/layout.rs",
-    "motion/mpc/online/lift.rs",
-    "motion/mpc/online/lift_cones.rs",
-    "motion/mpc/online/lift_pyramids.rs",
-    "motion/mpc/online/linearise.rs",
-    "motion/mpc/online/mod.rs",
-    "motion/mpc/online/nonlinear.rs",
-    "motion/mpc/online/plan.rs",
-    "motion/mpc/online/problem.rs",
-    "motion/mpc/online/prune.rs",
-    "motion/mpc/online/qp.rs",
-    "motion/mpc/online/reference.rs",
-    "motion/mpc/online/settings.rs",
-    "motion/mpc/online/sparse.rs",
-    "motion/mpc/online/step.rs",
-    "motion/mpc/online/structured.rs",
-    "motion/mpc/online/swing.rs",
-    "motion/mpc/online/transcribe.rs",
-    "algebra/robot/actuators.rs",
-    "algebra/robot/chain.rs",
-    "algebra/robot/error.rs",
-    "algebra/robot/feet.rs",
-    "algebra/robot/geometry.rs",
-    "algebra/robot/input_rule.rs",
-    "algebra/robot/joints.rs",
-    "algebra/robot/kinematics.rs",
-    "algebra/robot/mod.rs",
-    "algebra/robot/registry.rs",
-    "algebra/robot/wrench.rs",
-    "motion/solver/interior.rs",
-    "motion/solver/links.rs",
-    "motion/solver/lower.rs",
-    "motion/solver/mod.rs",
-    "motion/solver/point.rs",
-    "motion/solver/problem.rs",
-    "motion/solver/riccati.rs",
-    "motion/solver/rows.rs",
-    "motion/solver/scalar.rs",
-    "motion/solver/solve.rs",
-    "motion/solver/wide.rs",
-];
+const SOURCES: &[(&str, &str)] = sources! {
+    "motion/mpc/online":
+        command control_model controller dense dynamics effectiveness engine error estimate fallback
+        horizon;
+    "motion/mpc/online/interface":
+        codes handle mod settings values;
+    "motion/mpc/online":
+        layout lift lift_cones lift_pyramids linearise mod nonlinear plan problem prune qp reference
+        settings sparse step structured swing transcribe;
+    "algebra/robot":
+        actuators chain error feet geometry input_rule joints kinematics mod registry wrench;
+    "motion/solver":
+        interior links lower mod point problem riccati rows scalar solve wide;
+};
 
 /// The sources below the generated crate, each with a first line that says what it is.
 pub fn files(provenance: &str) -> impl Iterator<Item = (String, String)> {

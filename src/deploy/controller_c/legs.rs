@@ -1,7 +1,7 @@
 //! The legs of a robot as constants of the controller in C.
 
 use super::numbers::{Numbers, integers, nested};
-use crate::robot::{ChainLeg, Leg, LegGeometry, PlanarLeg, Robot, SINGULAR_BOUND};
+use crate::robot::{ChainLeg, Leg, LegGeometry, PlanarLeg, Robot};
 
 /// Initialisers for the four legs, in the order of [`Leg::ALL`]; a leg of one kind is zeros in the
 /// table of the other.
@@ -14,7 +14,6 @@ pub(super) struct Legs {
     pub links: String,
     pub least_levers: String,
     pub volumes: String,
-    pub singular_bound: f64,
     pub hips: String,
 }
 
@@ -48,7 +47,6 @@ impl Legs {
             links: table(1),
             least_levers: numbers.matrix(legs.map(LegGeometry::least_levers)),
             volumes: numbers.vector(legs.map(LegGeometry::volume_m3)),
-            singular_bound: SINGULAR_BOUND,
             hips: numbers.matrix(Leg::ALL.map(|leg| {
                 let hip = robot.hip_position(leg);
                 [hip.x, hip.y, hip.z]

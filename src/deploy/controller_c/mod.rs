@@ -18,8 +18,8 @@ use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::tidy;
 use crate::codegen::{Precision, Units, c};
 use crate::deploy::EmitError;
-use crate::deploy::controller::{constant, input_in_words, texts};
-use crate::deploy::emit::EmitOptions;
+use crate::deploy::controller::{constant, input_in_words, plant, texts};
+use crate::deploy::emit::{EmitOptions, compiled};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::mpc::interface::Settings;
@@ -88,12 +88,7 @@ pub fn emit(
     provenance: &str,
 ) -> Result<Vec<EmittedFile>, EmitError> {
     let model = equations.model();
-    if !model.is_linear() {
-        return Err(EmitError::Nonlinear {
-            model: model.name().to_owned(),
-        });
-    }
-    let plant = ControlModel::new(model)?;
+    let plant = plant(model)?;
     // Rates are chosen when it runs: the rows are those of 1 N m a stage.
     let unit_rate = MpcSettings {
         torque_rate_nm_s: Some(1.0),
@@ -101,11 +96,7 @@ pub fn emit(
         ..MpcSettings::default()
     };
     let rows = StageRows::new(&plant, &unit_rate);
-    let mut entries = ModelInterface::new(equations, &options.lower, Units::Si)?;
-    options.precision.check(&entries)?;
-    if options.precision == Precision::Single {
-        entries.state_bounds();
-    }
+    let entries = compiled(equations, options, Units::Si)?;
     let own = |phase: &&PhaseInterface| phase.identifier.eq_ignore_ascii_case("controller");
     if let Some(phase) = entries.phases.iter().find(own) {
         return Err(EmitError::PhaseName {

@@ -20,7 +20,7 @@ impl Numbers {
 
     /// `{1.0, 2.0}`; one zero if there are none, as C has no empty arrays.
     pub(super) fn vector(self, values: impl IntoIterator<Item = f64>) -> String {
-        list(values.into_iter().map(|value| self.one(value)), "0")
+        list(values.into_iter().map(|value| self.one(value)))
     }
 
     /// Rows of vectors; one row of zeros if there are none.
@@ -43,13 +43,14 @@ pub(super) fn nested(rows: impl IntoIterator<Item = String>) -> String {
 
 /// An initialiser of integers.
 pub(super) fn integers(values: impl IntoIterator<Item = i64>) -> String {
-    list(values.into_iter().map(|value| value.to_string()), "0")
+    list(values.into_iter().map(|value| value.to_string()))
 }
 
-fn list(values: impl Iterator<Item = String>, empty: &str) -> String {
+/// An initialiser with one zero at least.
+fn list(values: impl Iterator<Item = String>) -> String {
     let values: Vec<String> = values.collect();
     if values.is_empty() {
-        return format!("{{{empty}}}");
+        return "{0}".to_owned();
     }
     let lines: Vec<String> = values.chunks(WIDTH).map(|line| line.join(", ")).collect();
     format!("{{{}}}", lines.join(",\n     "))

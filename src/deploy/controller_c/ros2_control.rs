@@ -3,7 +3,11 @@
 use std::ops::Deref;
 
 use crate::deploy::EmitError;
+// The bounds of a plan's values are those beyond which `recording` reports a sample as implausible.
 use crate::recording::check::{BODY_SPEED_M_S, JOINT_MARGIN_RAD};
+
+/// Share of a plan's step that the controller's may be, as for `romc mpc`.
+const STEP_SLACK: f64 = 0.99;
 
 /// What its files take besides the facts of the controller.
 struct Facts<'a> {
@@ -11,11 +15,6 @@ struct Facts<'a> {
     /// Name of the package, its namespace and its library.
     package: String,
     version: &'static str,
-    /// Bounds of a plan's values, those beyond which `recording` reports a sample as implausible.
-    joint_margin_rad: f64,
-    body_speed_m_s: f64,
-    /// Share of a plan's step that the controller's may be, as for `romc mpc`.
-    step_slack: f64,
 }
 
 impl<'a> Deref for Facts<'a> {
@@ -51,9 +50,6 @@ pub(super) fn files(
         controller,
         package: format!("{}_ros2_control", controller.name.to_ascii_lowercase()),
         version: env!("CARGO_PKG_VERSION"),
-        joint_margin_rad: JOINT_MARGIN_RAD,
-        body_speed_m_s: BODY_SPEED_M_S,
-        step_slack: 0.99,
     };
     let (hash, slashes) = (format!("# {provenance}"), format!("// {provenance}"));
     let texts = [

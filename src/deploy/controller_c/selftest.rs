@@ -39,9 +39,6 @@ struct SelfTest<'a> {
     horizon: usize,
     torques: String,
     statuses: String,
-    push_z: f64,
-    push_pitch: f64,
-    push_dz: f64,
     tolerance: f64,
     others: usize,
 }
@@ -102,9 +99,6 @@ pub(super) fn text(
         horizon: MpcSettings::default().horizon,
         torques: nested(torques),
         statuses: nested(statuses),
-        push_z: PUSH[0],
-        push_pitch: PUSH[1],
-        push_dz: PUSH[2],
         tolerance: TOLERANCE_NM[place],
         others: OTHER_STATUSES[place],
     };

@@ -1,14 +1,15 @@
 //! `NAME_controller.c`.
 
+use std::ops::Deref;
+
 use askama::Template;
 
 use super::Facts;
 use super::legs::Legs;
 use super::numbers::{Numbers, integers, nested};
 use crate::codegen::Precision;
-use crate::codegen::interface::ModelInterface;
+use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::deploy::controller::texts;
-use crate::mpc::interface::Settings;
 use crate::mpc::problem::{Row, StageRows, pairs};
 use crate::mpc::shared::{
     DEVIATION_FLOOR, EFFECTIVENESS_RANGE, GAP, HALF_WINDOW_S, LARGEST_WEIGHT, LIFT_CURVATURE,
@@ -16,8 +17,10 @@ use crate::mpc::shared::{
     SLACK_PRICE, SOFTENED_FROM, STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
 };
 use crate::mpc::{ControlModel, FallbackSettings, InputGivenState, MpcSettings};
-use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
-use crate::solver;
+use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, SINGULAR_BOUND, WrenchFrame};
+use crate::solver::{
+    AGAIN, COLD, FAR, FAR_CHANGE, LEFT, MARGIN, MARGIN_FACTOR, PATIENCE, SHORT_STEP, WARM,
+};
 
 /// Complementarity and residual in single precision, at which rounding ends the progress.
 const SINGLE: (f64, f64) = (1e-4, 1e-3);
@@ -32,36 +35,22 @@ const SINGLE_RATE: (f64, f64) = (1e-5, 1e-4);
 #[derive(Template)]
 #[template(path = "controller_c/source.askama", config = "templates/askama.toml")]
 pub(super) struct Source<'a> {
-    banner: &'a str,
-    name: &'a str,
-    upper: &'a str,
-    real: &'static str,
-    f: &'static str,
-    n_phases: usize,
+    facts: &'a Facts<'a>,
     n_torque: usize,
     n_torque_pairs: usize,
     n_joint: usize,
     max_nnz: usize,
     has_actuators: bool,
-    has_given_state: bool,
     given_state: String,
     given_covariance: String,
     acceleration_error: String,
-    half_window_s: f64,
     is_body_frame: bool,
     solver: SolverNumbers,
-    reference: ReferenceNumbers,
-    effectiveness: EffectivenessNumbers,
     legs: Legs,
     torque_mean: String,
     torque_deviation: String,
     weight_n: f64,
-    most_turn_rad: f64,
-    lift_curvature: f64,
-    lift_iterations: u32,
     fallback: FallbackSettings,
-    softened_from: f64,
-    defaults: Settings,
     texts: Vec<(i32, String)>,
     encoder: String,
     encoder_bias: String,
@@ -78,7 +67,6 @@ pub(super) struct Source<'a> {
     torque_bound: String,
     torque_per_loss: String,
     torque_joint: String,
-    n_rate: usize,
     rate_rows: String,
     joint_rows: String,
     joint_bound: String,
@@ -88,48 +76,24 @@ pub(super) struct Source<'a> {
     viscous: String,
     dry: String,
     armature: String,
-    dry_speed_rad_s: f64,
-    phases: Vec<PhaseNames<'a>>,
+    phases: &'a [PhaseInterface],
 }
 
-struct PhaseNames<'a> {
-    identifier: &'a str,
-    upper: String,
+impl<'a> Deref for Source<'a> {
+    type Target = Facts<'a>;
+
+    fn deref(&self) -> &Facts<'a> {
+        self.facts
+    }
 }
 
+/// Where iterations end, by the precision.
 struct SolverNumbers {
-    slack_price: String,
-    tolerance: String,
-    lift_tolerance: String,
-    gap: String,
-    rate_tolerance: String,
-    rate_softness: String,
-    left: String,
-    accepted_residual: String,
-    margin: (String, String),
-    margin_factor: String,
-    warm: (String, String),
-    cold: (String, String),
-    far: (String, String),
-    far_change: String,
-    again: (String, String),
-    short_step: String,
-    patience: u32,
-    sqrt_half: String,
-}
-
-struct EffectivenessNumbers {
-    prior_weight: f64,
-    largest_weight: f64,
-    range: (f64, f64),
-}
-
-struct ReferenceNumbers {
-    posture_share: f64,
-    still_share: f64,
-    still_time_s: f64,
-    deviation_floor: f64,
-    state_reach: f64,
+    tolerance: f64,
+    lift_tolerance: f64,
+    rate_tolerance: f64,
+    rate_softness: f64,
+    accepted_residual: f64,
 }
 
 impl<'a> Source<'a> {
@@ -160,52 +124,25 @@ impl<'a> Source<'a> {
             nested(given.map(|given| matrix(part(given), facts.latent_dim)))
         };
         Self {
-            banner: &facts.banner,
-            name: facts.name,
-            upper: &facts.upper,
-            real: facts.real,
-            f: facts.f,
-            n_phases: facts.n_phases,
+            facts,
             n_torque: rows.torque.len(),
             n_torque_pairs: pairs(&rows.torque),
             n_joint: rows.joint.len(),
             max_nnz: (entries.phases.iter())
                 .map(|phase| phase.pattern.len())
                 .fold(1, usize::max),
-            has_given_state: facts.has_given_state,
             given_state: of_given(|given| &given.mean),
             given_covariance: of_given(|given| &given.covariance),
             acceleration_error: of_given(|given| &given.acceleration_error),
-            half_window_s: HALF_WINDOW_S,
             has_actuators: plant.input_rule().actuators().is_some(),
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: SolverNumbers::new(precision, mpc.qp.accepted_residual),
-            reference: ReferenceNumbers {
-                posture_share: POSTURE_SHARE,
-                still_share: STILL_SHARE,
-                still_time_s: STILL_TIME_S,
-                deviation_floor: DEVIATION_FLOOR,
-                state_reach: STATE_REACH,
-            },
-            effectiveness: EffectivenessNumbers {
-                prior_weight: PRIOR_WEIGHT,
-                largest_weight: LARGEST_WEIGHT,
-                range: EFFECTIVENESS_RANGE,
-            },
             legs: Legs::of(robot, numbers),
-            torque_mean: numbers.matrix(
-                phases
-                    .iter()
-                    .map(|phase| phase.torque_mean.iter().copied().collect::<Vec<_>>()),
-            ),
+            torque_mean: numbers
+                .matrix(phases.iter().map(|phase| phase.torque_mean.iter().copied())),
             torque_deviation: nested(deviations.iter().map(|rows| numbers.matrix(*rows))),
             weight_n,
-            most_turn_rad: MOST_TURN_RAD,
-            lift_curvature: LIFT_CURVATURE,
-            lift_iterations: LIFT_ITERATIONS,
             fallback: mpc.fallback,
-            softened_from: SOFTENED_FROM,
-            defaults: Settings::default(),
             texts: texts().collect(),
             encoder: matrix(&parts.encoder, facts.latent_dim),
             encoder_bias: numbers.vector(parts.encoder_bias.iter().copied()),
@@ -221,11 +158,8 @@ impl<'a> Source<'a> {
                 (parts.phase_of_feet.iter()).map(|phase| phase.map_or(-1, |phase| phase as i64)),
             ),
             is_grounded: integers(phases.iter().map(|phase| i64::from(phase.is_grounded))),
-            input_mean: numbers.matrix(
-                phases
-                    .iter()
-                    .map(|phase| phase.latent_mean.iter().copied().collect::<Vec<_>>()),
-            ),
+            input_mean: numbers
+                .matrix(phases.iter().map(|phase| phase.latent_mean.iter().copied())),
             input_root: nested(
                 phases
                     .iter()
@@ -235,7 +169,6 @@ impl<'a> Source<'a> {
             torque_bound: numbers.vector(rows.torque.iter().map(|row| row.bound)),
             torque_per_loss: numbers.vector(rows.torque.iter().map(|row| row.per_loss)),
             torque_joint: integers(rows.torque.iter().map(|row| row.joint as i64)),
-            n_rate: rows.rate.len(),
             rate_rows: row_matrix(&rows.rate),
             joint_rows: row_matrix(&rows.joint),
             joint_bound: numbers.vector(rows.joint.iter().map(|row| row.bound)),
@@ -245,51 +178,28 @@ impl<'a> Source<'a> {
             viscous: losses(0),
             dry: losses(1),
             armature: losses(2),
-            dry_speed_rad_s: DRY_SPEED_RAD_S,
-            phases: (entries.phases.iter())
-                .map(|phase| PhaseNames {
-                    identifier: &phase.identifier,
-                    upper: format!("{}_{}", facts.upper, phase.identifier.to_ascii_uppercase()),
-                })
-                .collect(),
+            phases: &entries.phases,
         }
     }
 }
 
 impl SolverNumbers {
     fn new(precision: Precision, accepted_residual: f64) -> Self {
-        let (tolerance, accepted) = match precision {
-            Precision::Double => (TOLERANCE, accepted_residual),
-            Precision::Single => SINGLE,
-        };
-        let (rate_tolerance, rate_softness) = match precision {
-            Precision::Double => (RATE_TOLERANCE, RATE_SOFTNESS),
-            Precision::Single => SINGLE_RATE,
-        };
-        let one = |value: f64| format!("{value:?}");
-        let pair = |(first, second)| (one(first), one(second));
-        Self {
-            slack_price: one(SLACK_PRICE),
-            tolerance: one(tolerance),
-            lift_tolerance: one(match precision {
-                Precision::Double => TOLERANCE,
-                Precision::Single => SINGLE_LIFT,
-            }),
-            gap: one(GAP),
-            rate_tolerance: one(rate_tolerance),
-            rate_softness: one(rate_softness),
-            left: one(solver::LEFT),
-            accepted_residual: one(accepted),
-            margin: pair(solver::MARGIN),
-            margin_factor: one(solver::MARGIN_FACTOR),
-            warm: pair(solver::WARM),
-            cold: pair(solver::COLD),
-            far: pair(solver::FAR),
-            far_change: one(solver::FAR_CHANGE),
-            again: pair(solver::AGAIN),
-            short_step: one(solver::SHORT_STEP),
-            patience: solver::PATIENCE,
-            sqrt_half: one(std::f64::consts::FRAC_1_SQRT_2),
+        match precision {
+            Precision::Double => Self {
+                tolerance: TOLERANCE,
+                lift_tolerance: TOLERANCE,
+                rate_tolerance: RATE_TOLERANCE,
+                rate_softness: RATE_SOFTNESS,
+                accepted_residual,
+            },
+            Precision::Single => Self {
+                tolerance: SINGLE.0,
+                lift_tolerance: SINGLE_LIFT,
+                rate_tolerance: SINGLE_RATE.0,
+                rate_softness: SINGLE_RATE.1,
+                accepted_residual: SINGLE.1,
+            },
         }
     }
 }

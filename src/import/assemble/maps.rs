@@ -19,13 +19,12 @@ impl<'a> Assembly<'a, '_> {
     pub(super) fn maps(&mut self) -> Result<(Option<StateMap>, Option<StateMap>), ImportError> {
         let maps = (self.map(Part::Encoder)?, self.map(Part::Decoder)?);
         let is_deep = |map: &StateMap| map.layers().len() > 1;
-        match self.options.activation {
-            Some(activation) if !maps.0.iter().chain(&maps.1).any(is_deep) => {
-                let found = format!("{activation}, but no map with several layers");
-                let expected = "tensors of layers, such as encoder.0.weight and encoder.2.weight";
-                return Err(ImportFault::option("--activation", found, expected));
-            }
-            _ => {}
+        if let Some(activation) = self.options.activation
+            && !maps.0.iter().chain(&maps.1).any(is_deep)
+        {
+            let found = format!("{activation}, but no map with several layers");
+            let expected = "tensors of layers, such as encoder.0.weight and encoder.2.weight";
+            return Err(ImportFault::option("--activation", found, expected));
         }
         let has = |layout| {
             let mut used = self.notes.used.iter();
@@ -56,20 +55,14 @@ impl<'a> Assembly<'a, '_> {
         let is_mixed = layers.len() > 1 && layers[0].0.role == Role::Weights(part, None);
         if layers.len() > 1 && (is_mixed || self.options.activation.is_none()) {
             let name = part.name();
-            let texts: Vec<String> = layers.iter().map(|(a, _)| a.info.describe()).collect();
-            let found = format!("{}, the layers of a deeper {name}", texts.join(", "));
+            let found = format!("{}, the layers of a deeper {name}", described(&layers));
             let expected = match is_mixed {
                 true => format!("numbers for all of them, or one with --map {name}.weight=TENSOR"),
                 false => "one linear layer, or --activation NAME (elu, relu, gelu, silu, softplus, tanh, \
                           sigmoid) to say what is between them"
                     .to_owned(),
             };
-            return Err(ImportFault::at(
-                self.tensors.file(),
-                Place::Whole,
-                found,
-                expected,
-            ));
+            return Err(self.tensors.refused(Place::Whole, found, expected));
         }
         Ok(layers)
     }
@@ -105,15 +98,14 @@ impl<'a> Assembly<'a, '_> {
                 false => part_name.to_owned(),
             };
             let map = AffineMap::new(&name, matrix, bias);
-            let map = map.map_err(|source| ImportFault::model(self.tensors.file(), source))?;
+            let map = map.map_err(|source| self.unusable(source))?;
             let activation = match self.options.activation {
                 Some(activation) if place < last => activation,
                 _ => Activation::Linear,
             };
             layers.push(Layer { map, activation });
         }
-        let map = StateMap::new(part_name, layers)
-            .map_err(|source| ImportFault::model(self.tensors.file(), source))?;
+        let map = StateMap::new(part_name, layers).map_err(|source| self.unusable(source))?;
         if is_deep {
             let (part, layers) = (part_name, map.summary());
             self.notes.notes.push(Note::Layers { part, layers });
@@ -133,10 +125,10 @@ impl<'a> Assembly<'a, '_> {
             (Some(WeightVectors::Row), _) => &[Layout::Row],
             (None, _) => &[Layout::Column, Layout::Row],
         };
-        let fitting = ways.iter().filter_map(|&layout| {
-            let known = ends(part, &shapes, layout, self.known)?;
-            Some((layout, known))
-        });
+        let known = |layout| ends(part, &shapes, layout, self.known);
+        let fitting = ways
+            .iter()
+            .filter_map(|&layout| Some((layout, known(layout)?)));
         let fitting: Vec<(Layout, Known)> = fitting.collect();
         let expected = || match layers {
             [_] => self.expected_weights(part),
@@ -145,8 +137,7 @@ impl<'a> Assembly<'a, '_> {
                     Part::Encoder => "n to d",
                     Part::Decoder => "d to n",
                 };
-                let found: Vec<String> = layers.iter().map(|(a, _)| a.info.describe()).collect();
-                let found = found.join(", ");
+                let found = described(layers);
                 format!(
                     "layers from {ends}, each taking the outputs of the one before, among {found}"
                 )
@@ -177,6 +168,12 @@ impl<'a> Assembly<'a, '_> {
             None => format!("{column} (column vectors) or {row} (row vectors){bound}"),
         }
     }
+}
+
+/// The weights in words, for messages.
+fn described(layers: &[Tensors<'_>]) -> String {
+    let texts: Vec<String> = layers.iter().map(|(a, _)| a.info.describe()).collect();
+    texts.join(", ")
 }
 
 /// Rows and columns as stored; a list is the only row of an encoder or the only column of a decoder.

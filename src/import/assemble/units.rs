@@ -9,7 +9,7 @@ use super::super::report::Note;
 use super::super::role::Role;
 use super::{Assembly, Parts};
 use crate::model::{
-    AffineMap, CoordinateOrder, InputStatistics, Layer, ScaleFactors, Scaling, StateMap,
+    AffineMap, CoordinateOrder, InputStatistics, Layer, ModelError, ScaleFactors, Scaling, StateMap,
 };
 use crate::robot::STATE_DIM;
 
@@ -76,15 +76,12 @@ impl<'a> Assembly<'a, '_> {
         };
         let mut values = self.list(assigned, dim)?;
         if is_deviation {
-            if let Some(index) = values
-                .iter()
-                .position(|&v| !(v > 0.0 && (1.0 / v).is_finite()))
-            {
-                let found = values[index].to_string();
+            let is_usable = |&v: &f64| v > 0.0 && (1.0 / v).is_finite();
+            if let Some(index) = values.iter().position(|v| !is_usable(v)) {
+                let (place, found) = (assigned.place(&[index]), values[index].to_string());
                 let expected =
                     "a positive standard deviation (1 for a coordinate that never moved)";
-                let place = assigned.place(&[index]);
-                return Err(ImportFault::at(self.tensors.file(), place, found, expected));
+                return Err(self.tensors.refused(place, found, expected));
             }
             values.apply(|value| *value = 1.0 / *value);
         }
@@ -107,22 +104,36 @@ impl<'a> Assembly<'a, '_> {
         let dim = encoder.input_dim();
         let mean = self.list(assigned, dim)?;
         let offset = scaling.state.expand(dim).component_mul(&mean);
-        let first = shifted(encoder, 0, |map| -(map.weights() * &offset));
-        parts.encoder = Some(self.checked(first)?);
-        if let Some(decoder) = &parts.decoder {
-            let last = decoder.layers().len() - 1;
-            let moved = shifted(decoder, last, |_| offset.clone());
-            parts.decoder = Some(self.checked(moved)?);
-        }
+        self.change_ends(
+            parts,
+            |first| {
+                let bias = first.bias() - first.weights() * &offset;
+                (first.weights().clone(), bias)
+            },
+            |last| (last.weights().clone(), last.bias() + &offset),
+        )?;
         self.notes.notes.push(Note::FoldedMean);
         Ok(())
     }
 
-    fn checked(
+    /// Changes weights and bias of the layers on the robot's side: the encoder's first, the decoder's last.
+    fn change_ends(
         &self,
-        map: Result<StateMap, crate::model::ModelError>,
-    ) -> Result<StateMap, ImportError> {
-        map.map_err(|source| ImportFault::model(self.tensors.file(), source))
+        parts: &mut Parts,
+        of_encoder: impl Fn(&AffineMap) -> (DMatrix<f64>, DVector<f64>),
+        of_decoder: impl Fn(&AffineMap) -> (DMatrix<f64>, DVector<f64>),
+    ) -> Result<(), ImportError> {
+        let unusable = |source| self.unusable(source);
+        if let Some(encoder) = &mut parts.encoder {
+            let first = of_encoder(&encoder.layers()[0].map);
+            *encoder = replaced(encoder, 0, first).map_err(unusable)?;
+        }
+        if let Some(decoder) = &mut parts.decoder {
+            let end = decoder.layers().len() - 1;
+            let last = of_decoder(&decoder.layers()[end].map);
+            *decoder = replaced(decoder, end, last).map_err(unusable)?;
+        }
+        Ok(())
     }
 
     /// Brings everything that is over the robot's coordinates into the robot's order.
@@ -137,24 +148,17 @@ impl<'a> Assembly<'a, '_> {
                 None => "no encoder or decoder".to_owned(),
                 Some(dim) => format!("an encoder or decoder of {dim} coordinates"),
             };
-            return Err(ImportFault::option(
-                "--order",
-                found,
-                "one of 18 coordinates",
-            ));
+            let expected = "one of 18 coordinates";
+            return Err(ImportFault::option("--order", found, expected));
         }
-        if let Some(encoder) = &parts.encoder {
-            parts.encoder = Some(self.checked(sorted(encoder, 0, |map| {
-                let weights = order.sorted_rows(&map.weights().transpose()).transpose();
-                (weights, map.bias().clone())
-            }))?);
-        }
-        if let Some(decoder) = &parts.decoder {
-            let last = decoder.layers().len() - 1;
-            parts.decoder = Some(self.checked(sorted(decoder, last, |map| {
-                (order.sorted_rows(map.weights()), order.sorted(map.bias()))
-            }))?);
-        }
+        self.change_ends(
+            parts,
+            |first| {
+                let weights = order.sorted_rows(&first.weights().transpose()).transpose();
+                (weights, first.bias().clone())
+            },
+            |last| (order.sorted_rows(last.weights()), order.sorted(last.bias())),
+        )?;
         if let Some(scaling) = &mut parts.scaling {
             for factors in [&mut scaling.state, &mut scaling.input] {
                 if let ScaleFactors::PerCoordinate(values) = factors
@@ -173,25 +177,13 @@ impl<'a> Assembly<'a, '_> {
     }
 }
 
-/// The map with something added to the bias of one layer.
-fn shifted(
-    map: &StateMap,
-    layer: usize,
-    addend: impl Fn(&AffineMap) -> DVector<f64>,
-) -> Result<StateMap, crate::model::ModelError> {
-    sorted(map, layer, |map| {
-        (map.weights().clone(), map.bias() + addend(map))
-    })
-}
-
 /// The map with other weights and bias in one layer.
-fn sorted(
+fn replaced(
     map: &StateMap,
     layer: usize,
-    change: impl Fn(&AffineMap) -> (DMatrix<f64>, DVector<f64>),
-) -> Result<StateMap, crate::model::ModelError> {
+    (weights, bias): (DMatrix<f64>, DVector<f64>),
+) -> Result<StateMap, ModelError> {
     let mut layers: Vec<Layer> = map.layers().to_vec();
-    let (weights, bias) = change(&layers[layer].map);
     layers[layer].map = AffineMap::new("layer", weights, bias)?;
     StateMap::new("map", layers)
 }

@@ -27,13 +27,9 @@ impl Reader<'_> {
     /// Whether a fraction of two integers follows.
     pub(super) fn is_fraction_of_integers(&self) -> bool {
         let is_fraction = matches!(self.kind(self.at), Some(Kind::Command(name)) if has("frac dfrac tfrac cfrac", name));
-        let of_groups = [1, 3, 4, 6].map(|place| self.kind(self.at + place))
-            == [
-                Some(&Kind::Open),
-                Some(&Kind::Close),
-                Some(&Kind::Open),
-                Some(&Kind::Close),
-            ];
+        let braces = [Kind::Open, Kind::Close, Kind::Open, Kind::Close];
+        let of_groups =
+            [1, 3, 4, 6].map(|place| self.kind(self.at + place)) == braces.each_ref().map(Some);
         let places = if of_groups { [2, 5] } else { [1, 2] };
         is_fraction && places.iter().all(|&place| self.is_integer(self.at + place))
     }
@@ -43,15 +39,7 @@ impl Reader<'_> {
         let is_one_of = |at: usize, all: &str| matches!(self.kind(at), Some(Kind::Character(c)) if all.contains(*c));
         let is_last = match self.kind(self.at + 3) {
             Some(Kind::Character(c)) => ".,".contains(*c),
-            Some(kind) => matches!(
-                kind,
-                Kind::Align
-                    | Kind::Break
-                    | Kind::Label(_)
-                    | Kind::Comment(_)
-                    | Kind::Paragraph
-                    | Kind::Close
-            ),
+            Some(kind) => kind.ends_term(),
             None => true,
         };
         is_one_of(self.at, "([")

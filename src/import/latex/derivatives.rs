@@ -2,7 +2,7 @@
 
 use super::names::is_greek;
 use super::reader::{FONTS, INVISIBLE, has};
-use super::token::{Kind, Token};
+use super::token::{Kind, Token, group_length};
 
 /// Most dots that have a command.
 const MAX_DOTS: usize = 3;
@@ -12,16 +12,20 @@ const MAX_GROUP: usize = 32;
 /// The tokens with `z_1''`, `z_1^{\prime\prime}` and `\frac{d^2 z_1}{dt^2}` or `\frac{d^2}{dt^2} z_1` written
 /// `\ddot{z_1}`; others stay. What is written anew stands at the place of its first token.
 pub(super) fn with_dots(tokens: &[Token]) -> Vec<Token> {
-    of_primes(&of_fractions(tokens))
+    with_each(&with_each(tokens, fraction), primed)
 }
 
-fn of_fractions(tokens: &[Token]) -> Vec<Token> {
+/// A derivative: its order, its variable, and the place behind it.
+type Derivative = (usize, Vec<Token>, usize);
+
+/// The tokens with dots for each derivative that `find` finds at a place.
+fn with_each(tokens: &[Token], find: fn(&[Token], usize) -> Option<Derivative>) -> Vec<Token> {
     let mut dotted = Vec::with_capacity(tokens.len());
     let mut at = 0;
     while at < tokens.len() {
-        match fraction(tokens, at) {
+        match find(tokens, at) {
             Some((dots, variable, behind)) => {
-                dotted.extend(under_dots(&tokens[at], dots, variable));
+                dotted.extend(under_dots(&tokens[at], dots, &variable));
                 at = behind;
             }
             None => {
@@ -33,8 +37,8 @@ fn of_fractions(tokens: &[Token]) -> Vec<Token> {
     dotted
 }
 
-/// A derivative at `at`: its order, its variable, and the place behind it.
-fn fraction(tokens: &[Token], at: usize) -> Option<(usize, &[Token], usize)> {
+/// A derivative written as a fraction at `at`.
+fn fraction(tokens: &[Token], at: usize) -> Option<Derivative> {
     let is_fraction = ["frac", "dfrac", "tfrac"]
         .iter()
         .any(|name| tokens[at].is_command(name));
@@ -53,10 +57,10 @@ fn fraction(tokens: &[Token], at: usize) -> Option<(usize, &[Token], usize)> {
     }
     if of_variable < top.len() {
         let end = variable_end(top, of_variable)?;
-        return (end == top.len()).then_some((order, &top[of_variable..], behind));
+        return (end == top.len()).then(|| (order, top[of_variable..].to_vec(), behind));
     }
     let end = variable_end(tokens, behind)?;
-    ends_product(&tokens[end..]).then_some((order, &tokens[behind..end], end))
+    ends_product(&tokens[end..]).then(|| (order, tokens[behind..end].to_vec(), end))
 }
 
 /// Whether what follows is no power and no further factor, which a derivative in front might mean as well.
@@ -75,16 +79,7 @@ fn ends_product(tokens: &[Token]) -> bool {
             "cdot times ast right coloneqq coloneq triangleq equiv approx simeq rvert vert } text textrm mbox tag label",
             name,
         ),
-        Some(kind) => matches!(
-            kind,
-            Kind::Align
-                | Kind::Break
-                | Kind::Close
-                | Kind::End(_)
-                | Kind::Label(_)
-                | Kind::Comment(_)
-                | Kind::Paragraph
-        ),
+        Some(kind) => kind.ends_term() || matches!(kind, Kind::End(_)),
     }
 }
 
@@ -132,18 +127,8 @@ fn group(tokens: &[Token], at: usize) -> Option<(&[Token], usize)> {
     if tokens.get(at)?.kind != Kind::Open {
         return None;
     }
-    let mut depth = 0;
-    for (place, token) in tokens.iter().enumerate().skip(at).take(MAX_GROUP) {
-        match token.kind {
-            Kind::Open => depth += 1,
-            Kind::Close => depth -= 1,
-            _ => {}
-        }
-        if depth == 0 {
-            return Some((&tokens[at + 1..place], place + 1));
-        }
-    }
-    None
+    let behind = at + group_length(tokens[at..].iter().take(MAX_GROUP))?;
+    Some((&tokens[at + 1..behind - 1], behind))
 }
 
 /// The place behind the letter or word at `at` with its dots and subscript.
@@ -179,36 +164,20 @@ fn argument_end(tokens: &[Token], at: usize) -> Option<usize> {
     }
 }
 
-fn of_primes(tokens: &[Token]) -> Vec<Token> {
-    let mut dotted = Vec::with_capacity(tokens.len());
-    let mut at = 0;
-    while at < tokens.len() {
-        let found = letter_end(tokens, at).and_then(|letter| {
-            let subscript = subscript_end(tokens, letter);
-            let (dots, behind) = primes(tokens, subscript.unwrap_or(letter))?;
-            let mut variable = tokens[at..subscript.unwrap_or(letter)].to_vec();
-            // Primes may stand before the subscript.
-            let after = match (subscript, subscript_end(tokens, behind)) {
-                (None, Some(end)) => {
-                    variable.extend_from_slice(&tokens[behind..end]);
-                    end
-                }
-                _ => behind,
-            };
-            Some((dots, variable, after))
-        });
-        match found {
-            Some((dots, variable, after)) => {
-                dotted.extend(under_dots(&tokens[at], dots, &variable));
-                at = after;
-            }
-            None => {
-                dotted.push(tokens[at].clone());
-                at += 1;
-            }
-        }
-    }
-    dotted
+/// A variable with primes at `at`.
+fn primed(tokens: &[Token], at: usize) -> Option<Derivative> {
+    let letter = letter_end(tokens, at)?;
+    let subscript = subscript_end(tokens, letter);
+    let end = subscript.unwrap_or(letter);
+    let (dots, behind) = primes(tokens, end)?;
+    let mut variable = tokens[at..end].to_vec();
+    // Primes may stand before the subscript.
+    let after = match subscript {
+        None => subscript_end(tokens, behind).unwrap_or(behind),
+        Some(_) => behind,
+    };
+    variable.extend_from_slice(&tokens[behind..after]);
+    Some((dots, variable, after))
 }
 
 /// How many primes stand at `at`, at most as many as there are dots, and the place behind them.
@@ -230,15 +199,11 @@ fn primes(tokens: &[Token], at: usize) -> Option<(usize, usize)> {
 /// `\ddot{z_1}` at the place of `first`.
 fn under_dots(first: &Token, dots: usize, variable: &[Token]) -> Vec<Token> {
     let command = ["dot", "ddot", "dddot"][dots - 1].to_owned();
-    let of = |kind| Token {
-        kind,
-        ..first.clone()
-    };
-    let mut dotted = vec![of(Kind::Command(command)), of(Kind::Open)];
+    let mut dotted = vec![first.with(Kind::Command(command)), first.with(Kind::Open)];
     dotted.extend_from_slice(match group(variable, 0) {
         Some((inside, behind)) if behind == variable.len() => inside,
         _ => variable,
     });
-    dotted.push(of(Kind::Close));
+    dotted.push(first.with(Kind::Close));
     dotted
 }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::super::equations::refused;
 use super::super::error::ImportError;
 use super::derivatives::with_dots;
-use super::token::{Kind, Token};
+use super::token::{Kind, Token, group_length};
 
 /// Most tokens that macros may make of one display.
 const MAX_EXPANDED: usize = 200_000;
@@ -26,6 +26,17 @@ pub(super) enum Item {
     Display(Vec<Token>),
     /// The tokens of mathematics inside a paragraph.
     Inline(Vec<Token>),
+}
+
+impl Item {
+    /// The tokens in which equations are looked for: of a display, or of mathematics in a line.
+    pub(super) fn equations(&self, in_lines: bool) -> Option<&[Token]> {
+        match self {
+            Item::Display(tokens) if !in_lines => Some(tokens),
+            Item::Inline(tokens) if in_lines => Some(tokens),
+            Item::Comment(_) | Item::Display(_) | Item::Inline(_) => None,
+        }
+    }
 }
 
 /// A macro; without a body if its definition has a form that is not read.
@@ -70,13 +81,11 @@ pub(super) fn items(file: &str, tokens: &[Token]) -> Result<Vec<Item>, ImportErr
             }
             Kind::Display => Some(scanner.until(token, &Kind::Display, None)?),
             Kind::Dollar => {
-                let inline = scanner.inline(&Kind::Dollar);
-                items.extend(scanner.in_line(inline));
+                items.extend(scanner.inline(&Kind::Dollar));
                 None
             }
             Kind::Command(name) if name == "(" => {
-                let inline = scanner.inline(&Kind::Command(")".to_owned()));
-                items.extend(scanner.in_line(inline));
+                items.extend(scanner.inline(&Kind::Command(")".to_owned())));
                 None
             }
             Kind::Command(name) => {
@@ -129,51 +138,30 @@ impl<'t> Scanner<'t> {
                 depth += 1;
             }
         }
-        let end = Token {
-            kind: end.clone(),
-            ..start.clone()
-        }
-        .quoted();
         let found = format!("{} without its end", start.quoted());
-        Err(refused(self.file, start.line, start.column, found, end))
+        Err(refused(self.file, start.place, found, end.quoted()))
     }
 
-    /// Mathematics inside a paragraph, up to its end.
-    fn inline(&mut self, end: &Kind) -> &'t [Token] {
-        let first = self.at;
-        while let Some(token) = self.next() {
-            if token.kind == *end || token.kind == Kind::Paragraph {
-                return &self.tokens[first..self.at - 1];
-            }
-        }
-        &self.tokens[first..]
-    }
-
-    /// Mathematics inside a paragraph with its macros replaced; none whose macros are not read, since it may be no equation.
-    fn in_line(&self, tokens: &[Token]) -> Option<Item> {
-        let expanded = self.expanded(tokens).ok()?;
+    /// Mathematics inside a paragraph, up to its end, which is passed, with its macros replaced; none whose macros are
+    /// not read, since it may be no equation.
+    fn inline(&mut self, end: &Kind) -> Option<Item> {
+        let rest = &self.tokens[self.at..];
+        let is_end = |token: &Token| token.kind == *end || token.kind == Kind::Paragraph;
+        let length = rest.iter().position(is_end).unwrap_or(rest.len());
+        self.at += length + 1;
+        let expanded = self.expanded(&rest[..length]).ok()?;
         Some(Item::Inline(with_dots(&expanded)))
     }
 
-    /// The tokens of a group, or one token.
+    /// The tokens of a group, or one token; none at the end, or of a group without one, which passes all that is left.
     fn argument(&mut self) -> Option<&'t [Token]> {
         let first = self.at;
-        let token = self.next()?;
-        if token.kind != Kind::Open {
+        if self.next()?.kind != Kind::Open {
             return Some(&self.tokens[first..=first]);
         }
-        let mut depth = 1;
-        while let Some(token) = self.next() {
-            match token.kind {
-                Kind::Open => depth += 1,
-                Kind::Close => depth -= 1,
-                _ => {}
-            }
-            if depth == 0 {
-                return Some(&self.tokens[first + 1..self.at - 1]);
-            }
-        }
-        None
+        let length = group_length(self.tokens[first..].iter());
+        self.at = length.map_or(self.tokens.len(), |length| first + length);
+        length.map(|_| &self.tokens[first + 1..self.at - 1])
     }
 
     /// Keeps the macro that a command defines, if it defines one.
@@ -207,14 +195,11 @@ impl<'t> Scanner<'t> {
         let body = match is_operator {
             false => body.to_vec(),
             true => {
-                let of = |kind| Token {
-                    kind,
-                    ..self.tokens[self.at - 1].clone()
-                };
-                let mut operator =
-                    vec![of(Kind::Command("operatorname".to_owned())), of(Kind::Open)];
+                let last = &self.tokens[self.at - 1];
+                let name = Kind::Command("operatorname".to_owned());
+                let mut operator = vec![last.with(name), last.with(Kind::Open)];
                 operator.extend_from_slice(body);
-                operator.push(of(Kind::Close));
+                operator.push(last.with(Kind::Close));
                 operator
             }
         };
@@ -269,42 +254,23 @@ impl<'t> Scanner<'t> {
             };
             let refuse = |found: &str, expected: &str| {
                 let found = format!("{}, {found}", token.quoted());
-                Err(refused(
-                    self.file,
-                    token.line,
-                    token.column,
-                    found,
-                    expected,
-                ))
+                Err(refused(self.file, token.place, found, expected))
             };
             let Some(body) = &found.body else {
-                return refuse(
-                    "a macro with optional or delimited arguments",
-                    "a macro with plain arguments",
-                );
+                let form = "a macro with optional or delimited arguments";
+                return refuse(form, "a macro with plain arguments");
             };
-            let mut arguments = Vec::new();
-            for _ in 0..found.parameters {
-                match take_argument(&mut pending) {
-                    Some(argument) => arguments.push(argument),
-                    None => {
-                        return refuse(
-                            "a macro without its arguments",
-                            "an argument for each parameter",
-                        );
-                    }
-                }
-            }
+            let arguments = (0..found.parameters).map(|_| take_argument(&mut pending));
+            let Some(arguments) = arguments.collect::<Option<Vec<_>>>() else {
+                let expected = "an argument for each parameter";
+                return refuse("a macro without its arguments", expected);
+            };
             let parts = body.iter().rev().flat_map(|part| match &part.kind {
                 Kind::Parameter(number) => match arguments.get(number.wrapping_sub(1)) {
                     Some(argument) => argument.iter().rev().cloned().collect(),
                     None => Vec::new(),
                 },
-                kind => vec![Token {
-                    kind: kind.clone(),
-                    line: token.line,
-                    column: token.column,
-                }],
+                kind => vec![token.with(kind.clone())],
             });
             let before = pending.len();
             pending.extend(parts.take(budget + 1));
@@ -320,22 +286,11 @@ impl<'t> Scanner<'t> {
 
 /// Takes a group without its braces, or one token, from the end of a reversed list.
 fn take_argument(pending: &mut Vec<Token>) -> Option<Vec<Token>> {
-    let first = pending.pop()?;
-    if first.kind != Kind::Open {
-        return Some(vec![first]);
+    if pending.last()?.kind != Kind::Open {
+        return pending.pop().map(|token| vec![token]);
     }
-    let mut argument = Vec::new();
-    let mut depth = 1;
-    while let Some(token) = pending.pop() {
-        match token.kind {
-            Kind::Open => depth += 1,
-            Kind::Close => depth -= 1,
-            _ => {}
-        }
-        if depth == 0 {
-            return Some(argument);
-        }
-        argument.push(token);
-    }
-    None
+    let length = group_length(pending.iter().rev())?;
+    let mut group = pending.split_off(pending.len() - length);
+    group.reverse();
+    Some(group[1..length - 1].to_vec())
 }

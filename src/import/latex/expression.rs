@@ -4,10 +4,13 @@
 //! `z_1/2u_1`), a number after a variable. Nesting is limited, so the machine's stack is safe.
 
 use super::super::equations::Equation;
-use super::reader::{BARE, Last, MAX_DEPTH, Read, Reader, Symbol, has};
+use super::reader::{BARE, Last, Read, Reader, Symbol, has};
 use super::token::{Kind, Token};
 use super::variables::function;
 use crate::model::LatentVariable;
+
+/// Commands whose argument is text.
+const WORDS: &str = "text textrm textit mbox intertext shortintertext";
 
 impl Reader<'_> {
     /// Reads `\ddot z_1 =` at `at`; the left side and the place behind it.
@@ -23,16 +26,9 @@ impl Reader<'_> {
 
     /// `=`, or what is written for it where something is defined or was rounded.
     fn relation(&mut self) -> bool {
-        const NAMES: [&str; 6] = [
-            "coloneqq",
-            "coloneq",
-            "triangleq",
-            "equiv",
-            "approx",
-            "simeq",
-        ];
+        const NAMES: &str = "coloneqq coloneq triangleq equiv approx simeq";
         self.character(':');
-        self.character('=') || NAMES.iter().any(|name| self.command(name))
+        self.character('=') || NAMES.split(' ').any(|name| self.command(name))
     }
 
     /// Latent coordinate of a left side, from 0.
@@ -41,10 +37,6 @@ impl Reader<'_> {
             LatentVariable::Z(index) => Some(index),
             LatentVariable::Dz(_) | LatentVariable::U(_) => None,
         }
-    }
-
-    pub(super) fn tokens(&self) -> &[Token] {
-        &self.tokens
     }
 
     /// Whether anything is printed between two places; the first such token.
@@ -70,29 +62,23 @@ impl Reader<'_> {
         self.sum(true)?;
         self.rest_of_line()?;
         self.end = total;
-        Ok(Equation::new(
+        Ok(Equation {
             output,
             line,
-            std::mem::take(&mut self.pieces),
-        ))
+            pieces: std::mem::take(&mut self.pieces),
+        })
     }
 
     /// Passes punctuation and words behind an equation.
     pub(super) fn rest_of_line(&mut self) -> Read<()> {
         loop {
-            let (is_mark, is_text) = match self.peek().map(|token| &token.kind) {
+            match self.next_kind() {
                 None => return Ok(()),
-                Some(Kind::Character(',' | '.' | ';')) => (true, false),
-                Some(Kind::Command(name)) => (
-                    false,
-                    has("text textrm textit mbox intertext shortintertext", name),
-                ),
-                Some(_) => (false, false),
-            };
-            match (is_mark, is_text) {
-                (true, _) => self.at += 1,
-                (_, true) => self.at = self.after_argument(self.at + 1),
-                _ => return self.unexpected("an operator or the end of the equation"),
+                Some(Kind::Character(',' | '.' | ';')) => self.at += 1,
+                Some(Kind::Command(name)) if has(WORDS, &name) => {
+                    self.at = self.after_argument(self.at + 1);
+                }
+                Some(_) => return self.unexpected("an operator or the end of the equation"),
             }
         }
     }
@@ -131,11 +117,8 @@ impl Reader<'_> {
         loop {
             let from = self.at;
             let place = self.here();
-            let next = self.peek().map(|token| token.kind.clone());
-            match next {
-                Some(Kind::Command(name))
-                    if matches!(name.as_str(), "cdot" | "times" | "ast" | "cdotp") =>
-                {
+            match self.next_kind() {
+                Some(Kind::Command(name)) if has("cdot times ast cdotp", &name) => {
                     if last == Last::BareNumber {
                         return self.unexpected(BARE);
                     }
@@ -169,36 +152,31 @@ impl Reader<'_> {
                     last = Last::Other;
                 }
                 Some(kind) if self.starts_factor(&kind) => {
-                    if after_slash {
-                        return self.unexpected(
-                            "`\\frac`, or parentheses around what the slash divides by",
-                        );
-                    }
-                    if self.breaks_before(self.at) {
-                        return self.unexpected("an operator where a row or column goes on");
-                    }
-                    if behind_literal == Some(from) && self.is_fraction_of_integers() {
-                        return self.unexpected(
+                    let is_mixed = behind_literal == Some(from) && self.is_fraction_of_integers();
+                    let expected = match (last, &kind) {
+                        _ if after_slash => {
+                            Some("`\\frac`, or parentheses around what the slash divides by")
+                        }
+                        _ if self.breaks_before(self.at) => {
+                            Some("an operator where a row or column goes on")
+                        }
+                        _ if is_mixed => Some(
                             "`\\cdot` or `+` between a number and a fraction, which print as a mixed number",
-                        );
-                    }
-                    match (last, &kind) {
-                        (Last::Bare, Kind::Command(name)) if function(name).is_some() => {}
-                        (Last::Bare | Last::BareNumber, _) => return self.unexpected(BARE),
+                        ),
+                        (Last::Bare, Kind::Command(name)) if function(name).is_some() => None,
+                        (Last::Bare | Last::BareNumber, _) => Some(BARE),
                         (_, Kind::Command(name)) if name == "num" => {
-                            return self.unexpected("an operator before the number");
+                            Some("an operator before the number")
                         }
                         (_, Kind::Number(_)) => {
-                            return self.unexpected(
-                                "an operator before the number, or braces around a subscript",
-                            );
+                            Some("an operator before the number, or braces around a subscript")
                         }
-                        _ if self.is_lone_integer() => {
-                            return self.unexpected(
-                                "`\\tag{...}` for the number of an equation, or `\\cdot` before a factor",
-                            );
-                        }
-                        _ => {}
+                        _ => self.is_lone_integer().then_some(
+                            "`\\tag{...}` for the number of an equation, or `\\cdot` before a factor",
+                        ),
+                    };
+                    if let Some(expected) = expected {
+                        return self.unexpected(expected);
                     }
                     self.push(place, "*");
                     last = self.factor(false)?;
@@ -220,26 +198,12 @@ impl Reader<'_> {
         match kind {
             Kind::Character('|') => self.bars.last() != Some(&true),
             Kind::Character(c) => !"+-=,.;)]<>:!*/".contains(*c),
-            Kind::Command(name) => !has(
-                "right rvert rVert } rbrace rangle text textrm textit mbox intertext shortintertext \
-                     leq geq le ge lt gt approx equiv sim in",
-                name,
-            ),
-            Kind::Number(_)
-            | Kind::Open
-            | Kind::Begin(_)
-            | Kind::End(_)
-            | Kind::Superscript
-            | Kind::Subscript
-            | Kind::Parameter(_)
-            | Kind::Display
-            | Kind::Dollar => true,
-            Kind::Close
-            | Kind::Align
-            | Kind::Break
-            | Kind::Label(_)
-            | Kind::Comment(_)
-            | Kind::Paragraph => false,
+            Kind::Command(name) => {
+                let ends =
+                    "right rvert rVert } rbrace rangle leq geq le ge lt gt approx equiv sim in";
+                !has(ends, name) && !has(WORDS, name)
+            }
+            kind => !kind.ends_term(),
         }
     }
 
@@ -258,12 +222,7 @@ impl Reader<'_> {
                 Ok(Last::Number)
             }
             Kind::Command(name) if name == "num" => self.macro_number(place),
-            Kind::Command(name)
-                if matches!(
-                    name.as_str(),
-                    "frac" | "dfrac" | "tfrac" | "cfrac" | "nicefrac" | "sfrac"
-                ) =>
-            {
+            Kind::Command(name) if has("frac dfrac tfrac cfrac nicefrac sfrac", name) => {
                 self.at += 1;
                 self.push(place, "((");
                 let top = self.inside(|reader| reader.group_sum(leads))?;
@@ -278,9 +237,7 @@ impl Reader<'_> {
                 })
             }
             Kind::Command(name) if name == "sqrt" => self.root(place),
-            Kind::Command(name) if matches!(name.as_str(), "abs" | "lvert" | "vert") => {
-                self.absolute(place, name)
-            }
+            Kind::Command(name) if has("abs lvert vert", name) => self.absolute(place, name),
             Kind::Character('|') => self.absolute(place, "|"),
             Kind::Command(name) if name == "left" && self.opens_bar() => {
                 self.absolute(place, "left")
@@ -332,11 +289,7 @@ impl Reader<'_> {
             }
         })?;
         self.push(place, ")");
-        if last == Last::Bare
-            && self
-                .peek()
-                .is_some_and(|token| token.kind == Kind::Superscript)
-        {
+        if last == Last::Bare && self.is_next(&Kind::Superscript) {
             return self.unexpected("parentheses around the function or its argument");
         }
         self.powers(place)?;
@@ -365,12 +318,7 @@ impl Reader<'_> {
         if opener == "abs" {
             self.inside(|reader| reader.sum(false))?;
         } else {
-            self.deepen()?;
-            self.bars.push(true);
-            self.sum(false)?;
-            self.bars.pop();
-            self.depth -= 1;
-            let has_right = self.command("right");
+            let has_right = self.sum_between(true)?;
             let closed =
                 self.character('|') || ["rvert", "vert", "|"].iter().any(|name| self.command(name));
             if !closed || has_right != (opener == "left") {
@@ -382,12 +330,14 @@ impl Reader<'_> {
         Ok(Last::Other)
     }
 
-    pub(super) fn deepen(&mut self) -> Read<()> {
-        self.depth += 1;
-        match self.depth > MAX_DEPTH {
-            true => self.unexpected(&format!("at most {MAX_DEPTH} nested groups")),
-            false => Ok(()),
-        }
+    /// A sum between bars or parentheses; whether `\right` stands behind it.
+    fn sum_between(&mut self, are_bars: bool) -> Read<bool> {
+        self.deepen()?;
+        self.bars.push(are_bars);
+        self.sum(false)?;
+        self.bars.pop();
+        self.depth -= 1;
+        Ok(self.command("right"))
     }
 
     /// Parentheses of any kind and size, with their powers.
@@ -399,7 +349,7 @@ impl Reader<'_> {
 
     pub(super) fn delimited(&mut self, place: (usize, usize)) -> Read<()> {
         let has_left = self.command("left");
-        let closer = match self.peek().map(|token| token.kind.clone()) {
+        let closer = match self.next_kind() {
             Some(Kind::Character('(')) => Kind::Character(')'),
             Some(Kind::Character('[')) => Kind::Character(']'),
             Some(Kind::Command(name)) if name == "{" => Kind::Command("}".to_owned()),
@@ -408,20 +358,9 @@ impl Reader<'_> {
         };
         self.at += 1;
         self.push(place, "(");
-        self.deepen()?;
-        self.bars.push(false);
-        self.sum(false)?;
-        self.bars.pop();
-        self.depth -= 1;
-        let has_right = self.command("right");
-        let closes = self.peek().is_some_and(|token| token.kind == closer);
-        if !closes || has_left != has_right {
-            let quoted = Token {
-                kind: closer,
-                line: 1,
-                column: 1,
-            }
-            .quoted();
+        let has_right = self.sum_between(false)?;
+        if !self.is_next(&closer) || has_left != has_right {
+            let quoted = closer.quoted();
             let right = if has_left { "`\\right` and " } else { "" };
             return self.unexpected(&format!("an operator or {right}{quoted}"));
         }
@@ -439,10 +378,7 @@ impl Reader<'_> {
 
     /// The power behind a factor.
     pub(super) fn powers(&mut self, place: (usize, usize)) -> Read<()> {
-        if self
-            .peek()
-            .is_none_or(|token| token.kind != Kind::Superscript)
-        {
+        if !self.is_next(&Kind::Superscript) {
             return Ok(());
         }
         self.at += 1;
@@ -457,11 +393,9 @@ impl Reader<'_> {
         self.push(place, "^(");
         self.inside(|reader| reader.sum(false))?;
         self.push(place, ")");
-        match self.peek().map(|token| &token.kind) {
-            Some(Kind::Superscript) => {
-                self.unexpected("one power, or parentheses around the first")
-            }
-            _ => Ok(()),
+        match self.is_next(&Kind::Superscript) {
+            true => self.unexpected("one power, or parentheses around the first"),
+            false => Ok(()),
         }
     }
 }

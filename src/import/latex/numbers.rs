@@ -13,21 +13,18 @@ impl Reader<'_> {
             return format!("{text}e{exponent}");
         }
         let is_integer = text.bytes().all(|byte| byte.is_ascii_digit());
-        match self.digits {
-            Some(digits) if leads && is_integer && text != "0" => match digits {
-                Digits::Decimals(0) => format!("{text}."),
-                Digits::Significant(count) if text.len() == count => format!("{text}."),
-                Digits::Significant(count) if text.len() > count => {
-                    let (kept, zeros) = text.split_at(count.max(1));
-                    match zeros.bytes().all(|byte| byte == b'0') {
-                        true => format!("{kept}e{}", zeros.len()),
-                        false => text.to_owned(),
-                    }
+        match self.digits.filter(|_| leads && is_integer && text != "0") {
+            Some(Digits::Decimals(0)) => return format!("{text}."),
+            Some(Digits::Significant(count)) if text.len() == count => return format!("{text}."),
+            Some(Digits::Significant(count)) if text.len() > count => {
+                let (kept, zeros) = text.split_at(count.max(1));
+                if zeros.bytes().all(|byte| byte == b'0') {
+                    return format!("{kept}e{}", zeros.len());
                 }
-                Digits::Decimals(_) | Digits::Significant(_) => text.to_owned(),
-            },
-            _ => text.to_owned(),
+            }
+            _ => {}
         }
+        text.to_owned()
     }
 
     /// Passes `\times 10^{-3}`, and gives its exponent.
@@ -37,14 +34,12 @@ impl Reader<'_> {
             if !self.command("times") && !self.command("cdot") {
                 return None;
             }
-            if self.peek()?.kind != Kind::Number("10".to_owned()) {
-                return None;
+            for wanted in [Kind::Number("10".to_owned()), Kind::Superscript] {
+                if !self.is_next(&wanted) {
+                    return None;
+                }
+                self.at += 1;
             }
-            self.at += 1;
-            if self.peek()?.kind != Kind::Superscript {
-                return None;
-            }
-            self.at += 1;
             let behind = self.after_argument(self.at);
             let text: String = (self.tokens[self.at..behind].iter())
                 .map(|token| match &token.kind {
@@ -55,17 +50,23 @@ impl Reader<'_> {
                 })
                 .collect();
             let is_one_token = behind == self.at + 1;
-            let exponent: i32 = text
-                .parse()
-                .ok()
-                .filter(|e: &i32| !is_one_token || *e < 10)?;
-            self.at = behind;
-            Some(exponent)
+            let exponent = text.parse().ok();
+            let exponent = exponent.filter(|e: &i32| !is_one_token || *e < 10)?;
+            Some((exponent, behind))
         })();
-        if found.is_none() {
-            self.at = start;
+        self.at = found.map_or(start, |(_, behind)| behind);
+        found.map(|(exponent, _)| exponent)
+    }
+
+    /// Takes the number that comes next.
+    pub(super) fn number(&mut self, expected: &str) -> Read<String> {
+        match self.next_kind() {
+            Some(Kind::Number(text)) => {
+                self.at += 1;
+                Ok(text)
+            }
+            _ => self.unexpected(expected),
         }
-        found
     }
 
     /// `\num{-1.2e-3}`.
@@ -84,25 +85,16 @@ impl Reader<'_> {
             if !is_negative {
                 reader.character('+');
             }
-            match reader.peek().map(|token| token.kind.clone()) {
-                Some(Kind::Number(text)) => {
-                    reader.at += 1;
-                    Ok(if is_negative {
-                        format!("(-{text})")
-                    } else {
-                        text
-                    })
-                }
-                _ => reader.unexpected("a number such as 1.2e-3"),
-            }
+            let text = reader.number("a number such as 1.2e-3")?;
+            Ok(if is_negative {
+                format!("(-{text})")
+            } else {
+                text
+            })
         })?;
         let is_negative = text.starts_with('(');
         self.push(place, text);
-        if is_negative
-            && self
-                .peek()
-                .is_some_and(|token| token.kind == Kind::Superscript)
-        {
+        if is_negative && self.is_next(&Kind::Superscript) {
             return self.unexpected("parentheses around the negative number");
         }
         self.powers(place)?;

@@ -1,12 +1,14 @@
 //! A display being read: its tokens, groups, and the pieces made of it.
 
-use super::super::equations::refused;
+use std::ops::Range;
+
+use super::super::equations::{Piece, refused};
 use super::super::error::ImportError;
 use super::names::SymbolNames;
 use super::token::{Kind, Token};
 
 /// Most nested groups.
-pub(super) const MAX_DEPTH: usize = 60;
+const MAX_DEPTH: usize = 60;
 /// Commands that change only how the page looks; those of the second list take an argument.
 pub(super) const INVISIBLE: &str = ", ; : ! > quad qquad enspace thinspace medspace thickspace negthinspace \
     displaystyle textstyle scriptstyle limits nolimits nonumber notag allowbreak nobreak \
@@ -68,7 +70,7 @@ pub(super) struct Reader<'a> {
     pub(super) depth: usize,
     /// Whether each open delimiter is a bar.
     pub(super) bars: Vec<bool>,
-    pub(super) pieces: Vec<(usize, usize, String)>,
+    pub(super) pieces: Vec<Piece>,
 }
 
 pub(super) const BARE: &str = "parentheses around the argument of the function before";
@@ -96,42 +98,43 @@ impl<'a> Reader<'a> {
     /// [`ImportError`] for braces without partner.
     pub(super) fn new(file: &'a str, names: &'a SymbolNames, tokens: &[Token]) -> Read<Self> {
         let tokens = with_split_digits(tokens);
-        let mut closing = vec![0; tokens.len()];
-        let mut open = Vec::new();
-        for (place, token) in tokens.iter().enumerate() {
-            match token.kind {
-                Kind::Open => open.push(place),
-                Kind::Close => match open.pop() {
-                    Some(start) => closing[start] = place,
-                    None => open.extend([place, place]),
-                },
-                _ => {}
-            }
-        }
-        if let Some(token) = open.first().map(|place| &tokens[*place]) {
-            let found = format!("{} without its partner", token.quoted());
-            return Err(refused(
-                file,
-                token.line,
-                token.column,
-                found,
-                "braces in pairs",
-            ));
-        }
         let end = tokens.len();
-        Ok(Self {
+        let mut reader = Self {
             file,
             names,
             alone: false,
             digits: None,
+            closing: vec![0; end],
             tokens,
-            closing,
             at: 0,
             end,
             depth: 0,
             bars: Vec::new(),
             pieces: Vec::new(),
-        })
+        };
+        match reader.link(0..end).map(|place| &reader.tokens[place]) {
+            None => Ok(reader),
+            Some(token) => {
+                let found = format!("{} without its partner", token.quoted());
+                Err(refused(file, token.place, found, "braces in pairs"))
+            }
+        }
+    }
+
+    /// Finds where the braces between two places close; the first without a partner.
+    pub(super) fn link(&mut self, places: Range<usize>) -> Option<usize> {
+        let mut open = Vec::new();
+        for place in places {
+            match self.tokens[place].kind {
+                Kind::Open => open.push(place),
+                Kind::Close => match open.pop() {
+                    Some(start) => self.closing[start] = place,
+                    None => open.extend([place, place]),
+                },
+                _ => {}
+            }
+        }
+        open.first().copied()
     }
 
     /// Passes what prints nothing; what follows, or nothing at the end.
@@ -151,6 +154,16 @@ impl<'a> Reader<'a> {
         (self.at < self.end).then(|| &self.tokens[self.at])
     }
 
+    /// The kind of what [`Self::peek`] gives.
+    pub(super) fn next_kind(&mut self) -> Option<Kind> {
+        self.peek().map(|token| token.kind.clone())
+    }
+
+    /// Whether `wanted` comes next.
+    pub(super) fn is_next(&mut self, wanted: &Kind) -> bool {
+        self.peek().is_some_and(|token| token.kind == *wanted)
+    }
+
     pub(super) fn kind(&self, at: usize) -> Option<&Kind> {
         self.tokens[..self.end].get(at).map(|token| &token.kind)
     }
@@ -165,9 +178,7 @@ impl<'a> Reader<'a> {
     }
 
     pub(super) fn character(&mut self, wanted: char) -> bool {
-        let found = self
-            .peek()
-            .is_some_and(|token| token.kind == Kind::Character(wanted));
+        let found = self.is_next(&Kind::Character(wanted));
         self.at += usize::from(found);
         found
     }
@@ -180,29 +191,32 @@ impl<'a> Reader<'a> {
 
     /// Refuses what comes next.
     pub(super) fn unexpected<T>(&mut self, expected: &str) -> Read<T> {
-        let (line, column, found) = match self.peek() {
-            Some(token) => (token.line, token.column, token.quoted()),
+        self.peek();
+        let (place, found) = match self.tokens.get(self.at.min(self.end)) {
+            Some(next) => (next.place, next.quoted()),
             None => {
-                let last = self.tokens[..self.end].last();
-                match self.tokens.get(self.end) {
-                    Some(next) => (next.line, next.column, next.quoted()),
-                    None => {
-                        let (line, column) = last.map_or((1, 1), |last| (last.line, last.column));
-                        (line, column, "the end of the equation".to_owned())
-                    }
-                }
+                let place = self.tokens.last().map_or((1, 1), |last| last.place);
+                (place, "the end of the equation".to_owned())
             }
         };
-        Err(refused(self.file, line, column, found, expected))
+        Err(refused(self.file, place, found, expected))
     }
 
     pub(super) fn here(&mut self) -> (usize, usize) {
-        self.peek()
-            .map_or((1, 1), |token| (token.line, token.column))
+        self.peek().map_or((1, 1), |token| token.place)
     }
 
-    pub(super) fn push(&mut self, (line, column): (usize, usize), text: impl Into<String>) {
-        self.pieces.push((line, column, text.into()));
+    pub(super) fn push(&mut self, place: (usize, usize), text: impl Into<String>) {
+        self.pieces.push((place, text.into()));
+    }
+
+    /// One more nested group.
+    pub(super) fn deepen(&mut self) -> Read<()> {
+        self.depth += 1;
+        match self.depth > MAX_DEPTH {
+            true => self.unexpected(&format!("at most {MAX_DEPTH} nested groups")),
+            false => Ok(()),
+        }
     }
 
     /// Runs `read` on the group or token that comes next, which must be used up.
@@ -210,24 +224,20 @@ impl<'a> Reader<'a> {
         if self.peek().is_none() {
             return self.unexpected("an argument");
         }
-        self.depth += 1;
-        if self.depth > MAX_DEPTH {
-            return self.unexpected(&format!("at most {MAX_DEPTH} nested groups"));
-        }
-        let mut range = (self.at, self.at + 1);
-        let mut after = self.at + 1;
-        match &self.tokens[self.at].kind {
-            Kind::Open => {
-                after = self.closing[self.at] + 1;
-                range = (self.at + 1, after - 1);
-            }
+        self.deepen()?;
+        let (first, end, after) = match &self.tokens[self.at].kind {
+            Kind::Open => (
+                self.at + 1,
+                self.closing[self.at],
+                self.closing[self.at] + 1,
+            ),
             Kind::Number(text) if text.len() > 1 => {
                 return self.unexpected("braces around an argument of several digits");
             }
-            _ => {}
-        }
-        let outer_end = std::mem::replace(&mut self.end, range.1);
-        self.at = range.0;
+            _ => (self.at, self.at + 1, self.at + 1),
+        };
+        let outer_end = std::mem::replace(&mut self.end, end);
+        self.at = first;
         let bars = std::mem::take(&mut self.bars);
         let value = read(self)?;
         if self.peek().is_some() {
@@ -253,22 +263,14 @@ fn with_split_digits(tokens: &[Token]) -> Vec<Token> {
             split.push(token.clone());
             continue;
         };
-        let digits = text
-            .bytes()
-            .take_while(u8::is_ascii_digit)
-            .count()
-            .min(arguments);
-        let parts = (0..digits).map(|place| (place, &text[place..=place]));
-        for (place, part) in
-            parts.chain(Some((digits, &text[digits..])).filter(|rest| !rest.1.is_empty()))
-        {
-            let kind = Kind::Number(part.to_owned());
-            split.push(Token {
-                kind,
-                line: token.line,
-                column: token.column + place,
-            });
-        }
+        let digits = text.bytes().take(arguments).take_while(u8::is_ascii_digit);
+        let digits = digits.count();
+        let single = (0..digits).map(|from| (from, &text[from..=from]));
+        let rest = (digits < text.len()).then(|| (digits, &text[digits..]));
+        split.extend(single.chain(rest).map(|(from, part)| Token {
+            kind: Kind::Number(part.to_owned()),
+            place: (token.place.0, token.place.1 + from),
+        }));
     }
     split
 }

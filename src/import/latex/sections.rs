@@ -5,7 +5,7 @@ use super::super::error::ImportError;
 use super::document::{Item, WITH_COLUMNS, is_one_of, items};
 use super::names::SymbolNames;
 use super::reader::{Digits, Reader};
-use super::token::{Kind, Token, of_markdown, of_tex};
+use super::token::{Kind, Token, group_length, of_markdown, of_tex};
 
 /// Environments that only arrange lines.
 const LAYOUTS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath dgroup \
@@ -55,45 +55,37 @@ pub(in crate::import) fn read(
             break;
         }
         (document.digits, document.phase, document.starts_phase) = (stated, None, false);
-        let alone = !has_indexed_left_side(file, &items, in_lines)?;
+        let alone = !has_indexed_left_side(file, &items, in_lines);
         for item in &items {
-            match item {
-                Item::Comment(text) => document.comment(text),
-                Item::Display(tokens) if !in_lines => document.display(tokens, alone)?,
-                Item::Inline(tokens) if in_lines => document.display(tokens, alone)?,
-                Item::Display(_) | Item::Inline(_) => {}
+            if let Item::Comment(text) = item {
+                document.comment(text);
+            }
+            if let Some(tokens) = item.equations(in_lines) {
+                document.display(tokens, alone)?;
             }
         }
     }
     if let (true, Some((token, found))) = (document.sections.is_empty(), document.strange) {
         let expected = format!("\\ddot z_1 and so on, with {}", names.expected());
-        return Err(refused(file, token.line, token.column, found, expected));
+        return Err(refused(file, token.place, found, expected));
     }
     let expected = "an equation such as \\begin{align} \\ddot z_1 &= 0.5 z_1 + u_1 \\end{align}";
     complete(file, document.sections, text.lines().count(), expected)
 }
 
 /// Whether a left side `\ddot z_1` has an index, so that `z` alone is no coordinate.
-fn has_indexed_left_side(file: &str, items: &[Item], in_lines: bool) -> Result<bool, ImportError> {
+fn has_indexed_left_side(file: &str, items: &[Item], in_lines: bool) -> bool {
     let default = SymbolNames::default();
-    for item in items {
-        let tokens = match item {
-            Item::Display(tokens) if !in_lines => tokens,
-            Item::Inline(tokens) if in_lines => tokens,
-            Item::Comment(_) | Item::Display(_) | Item::Inline(_) => continue,
-        };
+    let mut displays = items.iter().filter_map(|item| item.equations(in_lines));
+    displays.any(|tokens| {
         let Ok(mut reader) = Reader::new(file, &default, tokens) else {
-            continue;
+            return false;
         };
-        for at in dotted(reader.tokens()) {
-            if let Some((symbol, _)) = reader.left_side(at)
-                && reader.output(&symbol).is_some()
-            {
-                return Ok(true);
-            }
-        }
-    }
-    Ok(false)
+        dotted(&reader.tokens).into_iter().any(|at| {
+            let left_side = reader.left_side(at);
+            left_side.is_some_and(|(symbol, _)| reader.output(&symbol).is_some())
+        })
+    })
 }
 
 /// Places of `\ddot`.
@@ -126,15 +118,8 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
                     at += 3;
                 }
                 if is_one_of(WITH_COLUMNS, name) && kind(at) == Some(&Kind::Open) {
-                    let mut depth = 0;
-                    while let Some(kind) = kind(at) {
-                        depth += usize::from(*kind == Kind::Open);
-                        depth -= usize::from(*kind == Kind::Close);
-                        at += 1;
-                        if depth == 0 {
-                            break;
-                        }
-                    }
+                    let rest = &tokens[at..];
+                    at += group_length(rest.iter()).unwrap_or(rest.len());
                 }
             }
             Kind::End(name)
@@ -144,18 +129,10 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
             {
                 if open.pop().map(|begin| &begin.kind) != Some(&Kind::Begin(name.clone())) {
                     let expected = "environments that end in the order in which they begin";
-                    return Err(refused(
-                        file,
-                        token.line,
-                        token.column,
-                        token.quoted(),
-                        expected,
-                    ));
+                    return Err(refused(file, token.place, token.quoted(), expected));
                 }
-                if tokens
-                    .get(at)
-                    .is_some_and(|token| token.is_command("right"))
-                {
+                let next = tokens.get(at);
+                if next.is_some_and(|token| token.is_command("right")) {
                     at += 2;
                 }
             }
@@ -166,13 +143,8 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
         None => Ok(flat),
         Some(token) => {
             let found = format!("{} without its end", token.quoted());
-            Err(refused(
-                file,
-                token.line,
-                token.column,
-                found,
-                "environments that end inside their display",
-            ))
+            let expected = "environments that end inside their display";
+            Err(refused(file, token.place, found, expected))
         }
     }
 }
@@ -241,11 +213,11 @@ impl Document<'_> {
         (reader.alone, reader.digits) = (alone, self.digits);
         let mut left_sides = Vec::new();
         let mut strange = None;
-        for at in dotted(reader.tokens()) {
+        for at in dotted(&reader.tokens) {
             let Some((symbol, after)) = reader.left_side(at) else {
                 continue;
             };
-            let token = reader.tokens()[at].clone();
+            let token = reader.tokens[at].clone();
             match reader.output(&symbol) {
                 Some(output) => left_sides.push((output, at, after, token)),
                 None if strange.is_none() => strange = Some((token, symbol.quoted())),
@@ -265,13 +237,7 @@ impl Document<'_> {
         }
         flat?;
         let refuse = |token: &Token, found: String, expected: &str| {
-            Err(refused(
-                self.file,
-                token.line,
-                token.column,
-                found,
-                expected,
-            ))
+            Err(refused(self.file, token.place, found, expected))
         };
         if let Some((token, found)) = strange {
             return refuse(&token, found, &self.names.expected());
@@ -279,23 +245,23 @@ impl Document<'_> {
         if let Some(token) = reader.printed(0, left_sides[0].1) {
             return refuse(&token, token.quoted(), "a left side such as `\\ddot z_1 =`");
         }
-        let total = reader.tokens().len();
-        let shared = self.label(&reader.tokens()[..left_sides[0].1]);
+        let total = reader.tokens.len();
+        let shared = self.label(&reader.tokens[..left_sides[0].1]);
         for (place, (output, _, after, token)) in left_sides.iter().enumerate() {
             let end = left_sides.get(place + 1).map_or(total, |next| next.1);
             let label = shared
                 .clone()
-                .or_else(|| self.label(&reader.tokens()[*after..end]));
+                .or_else(|| self.label(&reader.tokens[*after..end]));
             let before = place
                 .checked_sub(1)
                 .map_or(0, |previous| left_sides[previous].2);
-            for token in &reader.tokens()[before..*after] {
+            for token in &reader.tokens[before..*after] {
                 if let Kind::Comment(text) = &token.kind {
                     let text = text.clone();
                     self.comment(&text);
                 }
             }
-            let equation = reader.equation(*output, token.line, *after, end)?;
+            let equation = reader.equation(*output, token.place.0, *after, end)?;
             let section = self.section(*output, token, label)?;
             section.equations.push(equation);
         }
@@ -364,17 +330,11 @@ impl Document<'_> {
             {
                 let name = named.unwrap_or_default();
                 let found = format!("phase `{name}` again, as in line {}", earlier.line);
-                return Err(refused(
-                    self.file,
-                    token.line,
-                    token.column,
-                    found,
-                    "each phase once",
-                ));
+                return Err(refused(self.file, token.place, found, "each phase once"));
             }
             self.sections.push(Section {
                 phase: named,
-                line: token.line,
+                line: token.place.0,
                 equations: Vec::new(),
             });
         }

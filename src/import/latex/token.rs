@@ -3,12 +3,11 @@
 /// The minus of Unicode.
 const MINUS: char = '\u{2212}';
 
-/// One token and where it starts, both counted from 1.
+/// One token and where it starts: line and column, from 1.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Token {
     pub(super) kind: Kind,
-    pub(super) line: usize,
-    pub(super) column: usize,
+    pub(super) place: (usize, usize),
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -42,10 +41,10 @@ pub(super) enum Kind {
     Character(char),
 }
 
-impl Token {
-    /// The token in quotes, for messages.
+impl Kind {
+    /// A token of the kind in quotes, for messages.
     pub(super) fn quoted(&self) -> String {
-        let text = match &self.kind {
+        let text = match self {
             Kind::Command(name) => format!("\\{name}"),
             Kind::Begin(name) => format!("\\begin{{{name}}}"),
             Kind::End(name) => format!("\\end{{{name}}}"),
@@ -69,9 +68,50 @@ impl Token {
         format!("`{short}`")
     }
 
+    /// Whether it ends every term that it stands behind.
+    pub(super) fn ends_term(&self) -> bool {
+        matches!(
+            self,
+            Kind::Align
+                | Kind::Break
+                | Kind::Close
+                | Kind::Label(_)
+                | Kind::Comment(_)
+                | Kind::Paragraph
+        )
+    }
+}
+
+impl Token {
+    /// Another kind of token at the same place.
+    pub(super) fn with(&self, kind: Kind) -> Self {
+        let place = self.place;
+        Self { kind, place }
+    }
+
+    pub(super) fn quoted(&self) -> String {
+        self.kind.quoted()
+    }
+
     pub(super) fn is_command(&self, name: &str) -> bool {
         matches!(&self.kind, Kind::Command(command) if command == name)
     }
+}
+
+/// How many tokens there are to the brace that closes the first, an opening one; none without.
+pub(super) fn group_length<'t>(tokens: impl Iterator<Item = &'t Token>) -> Option<usize> {
+    let mut depth = 0;
+    for (place, token) in tokens.enumerate() {
+        match token.kind {
+            Kind::Open => depth += 1,
+            Kind::Close => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 {
+            return Some(place + 1);
+        }
+    }
+    None
 }
 
 /// Tokens of a TeX file.
@@ -91,24 +131,19 @@ pub(super) fn of_markdown(text: &str) -> Vec<Token> {
     let mut in_display = false;
     for (index, line) in text.lines().enumerate() {
         let number = index + 1;
-        let mut push = |kind| {
-            tokens.push(Token {
-                kind,
-                line: number,
-                column: 1,
-            });
+        let mut push = |kind, column| {
+            let place = (number, column);
+            tokens.push(Token { kind, place });
         };
         let content = line.trim();
         if let Some(is_math) = fence {
-            match (content == "```", is_math) {
-                (true, _) => {
-                    fence = None;
-                    if is_math {
-                        push(Kind::Display);
-                    }
+            if content == "```" {
+                fence = None;
+                if is_math {
+                    push(Kind::Display, 1);
                 }
-                (false, true) => Line::new(line, number, 1).read(&mut tokens),
-                (false, false) => {}
+            } else if is_math {
+                Line::new(line, number, 1).read(&mut tokens);
             }
             continue;
         }
@@ -116,33 +151,28 @@ pub(super) fn of_markdown(text: &str) -> Vec<Token> {
             let is_math = language.trim() == "math";
             fence = Some(is_math);
             if is_math {
-                push(Kind::Display);
+                push(Kind::Display, 1);
             }
             continue;
         }
         if !in_display && content.starts_with('#') {
             let heading = content.trim_start_matches('#').trim();
-            push(Kind::Comment(unescaped(heading)));
+            push(Kind::Comment(unescaped(heading)), 1);
             continue;
         }
         let mut column = 1;
-        for (place, part) in line.split("$$").enumerate() {
-            if place > 0 {
+        for (index, part) in line.split("$$").enumerate() {
+            let place = (number, column);
+            if index > 0 {
                 in_display = !in_display;
-                tokens.push(Token {
-                    kind: Kind::Display,
-                    line: number,
-                    column: column - 2,
-                });
+                let (kind, place) = (Kind::Display, (number, column - 2));
+                tokens.push(Token { kind, place });
             }
             if in_display {
                 Line::new(part, number, column).read(&mut tokens);
             } else if !part.trim().is_empty() {
-                tokens.push(Token {
-                    kind: Kind::Comment(part.to_owned()),
-                    line: number,
-                    column,
-                });
+                let kind = Kind::Comment(part.to_owned());
+                tokens.push(Token { kind, place });
             }
             column += part.chars().count() + 2;
         }
@@ -177,9 +207,8 @@ struct Line {
 
 impl Line {
     fn new(text: &str, number: usize, start: usize) -> Self {
-        let characters = text.chars().collect();
         Self {
-            characters,
+            characters: text.chars().collect(),
             next: 0,
             number,
             start,
@@ -200,26 +229,18 @@ impl Line {
 
     fn read(mut self, tokens: &mut Vec<Token>) {
         if self.characters.iter().all(|c| c.is_whitespace()) {
-            let kind = Kind::Paragraph;
-            tokens.push(Token {
-                kind,
-                line: self.number,
-                column: self.start,
-            });
+            let (kind, place) = (Kind::Paragraph, (self.number, self.start));
+            tokens.push(Token { kind, place });
         }
         while let Some(first) = self.peek(0) {
-            let column = self.start + self.next;
+            let place = (self.number, self.start + self.next);
             if first.is_whitespace() {
                 self.next += 1;
                 continue;
             }
             let of_unicode = self.dotted_or_raised(first);
             let kinds = of_unicode.unwrap_or_else(|| vec![self.token(first)]);
-            tokens.extend(kinds.into_iter().map(|kind| Token {
-                kind,
-                line: self.number,
-                column,
-            }));
+            tokens.extend(kinds.into_iter().map(|kind| Token { kind, place }));
         }
     }
 
@@ -271,10 +292,8 @@ impl Line {
             (None, _) => return self.raised(),
         };
         self.next += length;
-        Some(vec![
-            Kind::Command(dots.to_owned()),
-            Kind::Character(letter),
-        ])
+        let dots = Kind::Command(dots.to_owned());
+        Some(vec![dots, Kind::Character(letter)])
     }
 
     /// `²`, `⁻¹` and `₁₀` as powers and subscripts in braces.
@@ -352,16 +371,13 @@ impl Line {
             "newline" => return Kind::Break,
             _ => return Kind::Command(name),
         };
-        let open = self.next
-            + self.characters[self.next..]
-                .iter()
-                .take_while(|c| **c == ' ')
-                .count();
-        let rest = &self.characters[open.min(self.characters.len())..];
-        match (rest.first(), rest.iter().position(|c| *c == '}')) {
+        let rest = &self.characters[self.next..];
+        let open = rest.iter().take_while(|c| **c == ' ').count();
+        match (rest.get(open), rest.iter().position(|c| *c == '}')) {
             (Some('{'), Some(close)) => {
-                self.next = open + close + 1;
-                kind(rest[1..close].iter().collect::<String>().trim().to_owned())
+                let inside: String = rest[open + 1..close].iter().collect();
+                self.next += close + 1;
+                kind(inside.trim().to_owned())
             }
             _ => Kind::Command(name),
         }

@@ -31,9 +31,7 @@ impl Reader<'_> {
             "e" if self.kind(close + 1) == Some(&Kind::Superscript) => {
                 return Some(("e".to_owned(), close + 2));
             }
-            "sgn" | "sign" => "sign",
-            "abs" => "abs",
-            "sqrt" => "sqrt",
+            word @ ("abs" | "sqrt") => word,
             word => function(word)?,
         };
         Some((name.to_owned(), close + 1))
@@ -46,7 +44,7 @@ impl Reader<'_> {
         let word: String = letters
             .map_while(|(place, token)| match token.kind {
                 Kind::Character(letter) if letter.is_ascii_alphabetic() => {
-                    let is_next = token.line == first.line && token.column == first.column + place;
+                    let is_next = token.place == (first.place.0, first.place.1 + place);
                     is_next.then_some(letter)
                 }
                 _ => None,
@@ -67,27 +65,14 @@ impl Reader<'_> {
             return self.exponential(place);
         }
         let mut power = None;
-        if self
-            .peek()
-            .is_some_and(|token| token.kind == Kind::Superscript)
-        {
+        if self.is_next(&Kind::Superscript) {
             self.at += 1;
-            power =
-                Some(self.inside(|reader| {
-                    match reader.peek().map(|token| token.kind.clone()) {
-                        Some(Kind::Number(text)) => {
-                            reader.at += 1;
-                            Ok(text)
-                        }
-                        _ => reader.unexpected(
-                            "a positive power; an inverse function has no reading here",
-                        ),
-                    }
-                })?);
+            let expected = "a positive power; an inverse function has no reading here";
+            power = Some(self.inside(|reader| reader.number(expected))?);
         }
         let before = self.pieces.len();
         let argument = self.here();
-        let last = match self.peek().map(|token| token.kind.clone()) {
+        let last = match self.next_kind() {
             Some(Kind::Character('(' | '[')) => self.delimited(argument).map(|()| Last::Other)?,
             Some(Kind::Command(opener)) if opener == "left" && !self.opens_bar() => {
                 self.delimited(argument).map(|()| Last::Other)?
@@ -101,8 +86,7 @@ impl Reader<'_> {
                         reader.bare_argument()
                     }
                 })?;
-                let next = self.peek().map(|token| &token.kind);
-                if last != Last::Other && next == Some(&Kind::Superscript) {
+                if last != Last::Other && self.is_next(&Kind::Superscript) {
                     return self.unexpected(BARE);
                 }
                 Last::Other
@@ -140,14 +124,13 @@ impl Reader<'_> {
         self.deepen()?;
         let first = self.factor(false)?;
         let place = self.here();
-        let next = self.peek().map(|token| token.kind.clone());
+        let next = self.next_kind();
         let goes_on = match &next {
             Some(Kind::Command(name)) if function(name).is_some() => false,
             Some(kind) => self.starts_factor(kind) && !matches!(kind, Kind::Number(_)),
             None => false,
         };
-        let is_dot =
-            matches!(&next, Some(Kind::Command(name)) if matches!(name.as_str(), "cdot" | "times"));
+        let is_dot = matches!(&next, Some(Kind::Command(name)) if has("cdot times", name));
         let is_number = first == Last::Number && (is_dot || !goes_on);
         if first == Last::Number && !is_number {
             self.push(place, "*");
@@ -169,14 +152,8 @@ impl Reader<'_> {
             }
             (Some(LatentVariable::Z(index)), 1) => LatentVariable::Dz(index).to_string(),
             _ => {
-                let (line, column) = symbol.place;
-                return Err(refused(
-                    self.file,
-                    line,
-                    column,
-                    symbol.quoted(),
-                    self.names.expected(),
-                ));
+                let (found, expected) = (symbol.quoted(), self.names.expected());
+                return Err(refused(self.file, symbol.place, found, expected));
             }
         };
         self.push(place, name);
@@ -204,39 +181,23 @@ impl Reader<'_> {
         self.subscript(&mut symbol)?;
         // A power may stand before the subscript: both follow the same letter.
         let power = self.at;
-        if !symbol.name.contains('_') && self.peek().is_some_and(|t| t.kind == Kind::Superscript) {
+        if !symbol.name.contains('_') && self.is_next(&Kind::Superscript) {
             let behind = self.after_argument(self.at + 1);
             if self.kind(behind) == Some(&Kind::Subscript) {
                 self.at = behind;
                 self.subscript(&mut symbol)?;
                 let end = self.at;
                 self.tokens[power..end].rotate_left(behind - power);
-                self.relink(power, end);
+                self.link(power..end);
                 self.at = power + (end - behind);
             }
         }
         Ok(Some(symbol))
     }
 
-    /// Finds the partners of braces again between two places.
-    pub(super) fn relink(&mut self, from: usize, to: usize) {
-        let mut open = Vec::new();
-        for place in from..to {
-            match self.tokens[place].kind {
-                Kind::Open => open.push(place),
-                Kind::Close => {
-                    if let Some(start) = open.pop() {
-                        self.closing[start] = place;
-                    }
-                }
-                _ => {}
-            }
-        }
-    }
-
     /// A letter, a Greek letter or a word, with dots above it.
     pub(super) fn glyph(&mut self, depth: usize) -> Read<Option<(String, usize)>> {
-        let Some(kind) = self.peek().map(|token| token.kind.clone()) else {
+        let Some(kind) = self.next_kind() else {
             return Ok(None);
         };
         let at = self.at;
@@ -249,9 +210,7 @@ impl Reader<'_> {
                 self.at += 1;
                 Ok(Some((name.clone(), 0)))
             }
-            Kind::Command(name)
-                if depth < 8 && matches!(name.as_str(), "dot" | "ddot" | "dddot") =>
-            {
+            Kind::Command(name) if depth < 8 && has("dot ddot dddot", name) => {
                 self.at += 1;
                 let more = name.len() - 2;
                 let inner = self.inside(|reader| {
@@ -297,22 +256,16 @@ impl Reader<'_> {
 
     /// Reads `_1`, `_{10}`, `_{\mathrm{lat},1}` behind a variable.
     pub(super) fn subscript(&mut self, symbol: &mut Symbol) -> Read<()> {
-        if self
-            .peek()
-            .is_none_or(|token| token.kind != Kind::Subscript)
-        {
+        if !self.is_next(&Kind::Subscript) {
             return Ok(());
         }
         self.at += 1;
-        let parts = self.inside(|reader| {
-            let word = reader.word(reader.at, reader.end);
-            match word {
-                Some(word) => {
-                    reader.at = reader.end;
-                    Ok(word)
-                }
-                None => reader.unexpected("a subscript of letters, digits and commas"),
+        let parts = self.inside(|reader| match reader.word(reader.at, reader.end) {
+            Some(word) => {
+                reader.at = reader.end;
+                Ok(word)
             }
+            None => reader.unexpected("a subscript of letters, digits and commas"),
         })?;
         if symbol.name.contains('_') {
             return self.unexpected("one subscript");
@@ -339,20 +292,10 @@ impl Reader<'_> {
 }
 
 /// The grammar's name of a function that LaTeX has a command for.
-pub(super) fn function(command: &str) -> Option<&'static str> {
-    Some(match command {
-        "sin" => "sin",
-        "cos" => "cos",
-        "tan" => "tan",
-        "tanh" => "tanh",
-        "exp" => "exp",
-        "sec" => "sec",
-        "csc" => "csc",
-        "cot" => "cot",
-        "sinh" => "sinh",
-        "cosh" => "cosh",
-        "ln" | "log" => "log",
-        "sgn" | "sign" => "sign",
-        _ => return None,
-    })
+pub(super) fn function(command: &str) -> Option<&str> {
+    match command {
+        "ln" => Some("log"),
+        "sgn" => Some("sign"),
+        known => has("sin cos tan tanh exp sec csc cot sinh cosh log sign", known).then_some(known),
+    }
 }

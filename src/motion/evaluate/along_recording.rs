@@ -30,7 +30,7 @@ use crate::mpc::{
     StanceState, Status, foot_forces, to_upright,
 };
 use crate::recording::{Recording, Segment};
-use crate::robot::{ContactFlags, GRAVITY_M_S2, JOINT_DIM, STATE_DIM};
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, STATE_DIM};
 
 /// Where the controller's input reference comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
@@ -138,19 +138,13 @@ pub fn along_recording(
             });
         }
     }
-    let schedules: Vec<Vec<usize>> = recording
-        .segments
-        .iter()
+    let segments = recording.segments.iter();
+    let schedules: Vec<Vec<usize>> = (segments.clone())
         .map(|segment| control_samples(&segment.time_s, step_s))
         .collect();
     let total = schedules.iter().map(Vec::len).sum();
     if total == 0 {
-        let duration = |segment: &Segment| segment.time_s[segment.len() - 1] - segment.time_s[0];
-        let durations = recording
-            .segments
-            .iter()
-            .filter(|s| !s.is_empty())
-            .map(duration);
+        let durations = segments.map(Segment::duration_s);
         return Err(MpcError::NoStep {
             path: recording.path.clone(),
             found_s: step_s,
@@ -275,7 +269,8 @@ fn one_step(
     let limits = controller.plant().robot().torque_limit_nm();
     tally.limit_violations += usize::from(exceeds(&command.torque_nm, limits, 1.0));
     if command.status.has_plan() {
-        tally.tracking.extend(controller.planned_deviations());
+        let planned = controller.planned_deviations();
+        planned.for_each(|deviation| tally.tracking.add(deviation * deviation));
     }
     let stance = stance(controller, segment, sample);
     if let Some(violated) = friction_violated(controller, &command, stance.as_ref()) {
@@ -335,7 +330,7 @@ fn held_torque(segment: &Segment, sample: usize, step_s: f64) -> Option<[f64; JO
 }
 
 fn stance(controller: &Controller, segment: &Segment, sample: usize) -> Option<StanceState> {
-    let feet: ContactFlags = segment.feet[sample];
+    let feet = segment.feet[sample];
     Some(StanceState {
         joints_rad: segment.joints(sample),
         attitude_rad: std::array::from_fn(|angle| segment.x[(15 + angle, sample)]),

@@ -5,9 +5,13 @@ use std::ops::Range;
 use nalgebra::{DMatrix, Rotation3, Vector2, Vector3};
 
 use super::metrics::FitSums;
+use crate::recording::segment::between;
 use crate::recording::{RecordingError, Segment};
 use crate::robot::{InputRule, JOINT_DIM, Leg, Robot, WrenchFrame};
-use crate::sim::{IntegrationOptions, OdeSystem, Restart, SimError, integrate, restart_windows};
+use crate::sim::{
+    IntegrationOptions, OdeSystem, Restart, SimError, integrate, integrate_stretches,
+    restart_windows,
+};
 
 /// Constants of the pendulum.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,34 +93,29 @@ impl Aslip {
     ) {
         let (x, z) = (BODY_X, BODY_Z);
         let start = window.start;
-        let mut state = [
+        let initial = [
             segment.x[(x, start)],
             segment.x[(z, start)],
             segment.dx[(x, start)],
             segment.dx[(z, start)],
         ];
-        position_m[start] = Some(Vector2::new(state[0], state[1]));
-        let mut first = start;
-        while first < window.end {
-            let down = stances[first].is_some();
-            let same = (first..window.end).take_while(|&k| stances[k].is_some() == down);
-            let end = first + same.count();
-            let times = &segment.time_s[first..(end + 1).min(window.end)];
-            let mut span = PendulumSpan {
-                pendulum: self,
-                stances: &stances[first..end],
-                times,
-            };
-            let states = integrate(&mut span, &state, times, &IntegrationOptions::default()).states;
-            for column in 1..states.ncols() {
-                let reached = Vector2::new(states[(0, column)], states[(1, column)]);
-                position_m[first + column] = Some(reached);
-            }
-            if states.ncols() < times.len() {
-                return;
-            }
-            state.copy_from_slice(states.column(states.ncols() - 1).as_slice());
-            first = end;
+        let down = |sample: usize| stances[sample].is_some();
+        let found = integrate_stretches(
+            &initial,
+            &segment.time_s,
+            window,
+            |a, b| down(a) == down(b),
+            |stretch, state, times| {
+                let mut span = PendulumSpan {
+                    pendulum: self,
+                    stances: &stances[stretch],
+                    times,
+                };
+                integrate(&mut span, state, times, &IntegrationOptions::default())
+            },
+        );
+        for (state, position) in found.states.column_iter().zip(&mut position_m[start..]) {
+            *position = Some(Vector2::new(state[0], state[1]));
         }
     }
 }
@@ -131,16 +130,9 @@ struct PendulumSpan<'a> {
 impl PendulumSpan<'_> {
     /// The stance with the force interpolated between samples, held after the last.
     fn stance_at(&self, time_s: f64) -> Option<Stance> {
-        let n = self.stances.len();
-        let after = self.times[..n].partition_point(|&t| t <= time_s);
-        let (left, right) = (after.saturating_sub(1), after.min(n - 1));
+        let times = &self.times[..self.stances.len()];
+        let (left, right, share) = between(times, time_s);
         let (from, to) = (self.stances[left]?, self.stances[right]?);
-        let step = self.times[right] - self.times[left];
-        let share = if step > 0.0 {
-            (time_s - self.times[left]) / step
-        } else {
-            0.0
-        };
         Some(Stance {
             foot_m: from.foot_m,
             force_n: from.force_n.lerp(&to.force_n, share),
@@ -225,11 +217,7 @@ pub(super) fn stances(
             continue;
         }
         let foot = *foot_m.get_or_insert_with(|| mean_foot(rule.robot(), segment, sample));
-        let force = Vector3::new(
-            wrench[(0, sample)],
-            wrench[(1, sample)],
-            wrench[(2, sample)],
-        );
+        let force = wrench.fixed_view::<3, 1>(0, sample).into_owned();
         let force = match rule.wrench_frame() {
             WrenchFrame::Body => orientation(segment, sample) * force,
             WrenchFrame::World => force,
@@ -268,33 +256,17 @@ fn mean_foot(robot: &Robot, segment: &Segment, sample: usize) -> Vector2<f64> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
-
     use super::*;
-    use crate::robot::STATE_DIM;
 
     /// A body at rest at `height`, legs bent, without torques; `feet` for all samples.
     fn at_rest(height: f64, feet: [bool; 4], count: usize) -> Segment {
-        let mut x = DMatrix::zeros(STATE_DIM, count);
-        for (row, mut values) in x.row_iter_mut().enumerate() {
-            values.fill(match row {
-                BODY_Z => height,
-                row if row < JOINT_DIM => [0.0, 0.8, -1.6][row % 3],
-                _ => 0.0,
-            });
+        let mut segment = Segment::still("rest", (0..count).map(|k| 0.002 * k as f64).collect());
+        segment.x.row_mut(BODY_Z).fill(height);
+        for joint in 0..JOINT_DIM {
+            segment.x.row_mut(joint).fill([0.0, 0.8, -1.6][joint % 3]);
         }
-        Segment {
-            path: PathBuf::from("rest"),
-            first_row: 2,
-            row_stride: 1.0,
-            time_s: (0..count).map(|k| 0.002 * k as f64).collect(),
-            dx: DMatrix::zeros(STATE_DIM, count),
-            ddx: DMatrix::zeros(STATE_DIM, count),
-            x,
-            torque_nm: DMatrix::zeros(JOINT_DIM, count),
-            feet: vec![feet; count],
-            body_wrench: None,
-        }
+        segment.feet.fill(feet);
+        segment
     }
 
     fn rms_z(segment: &Segment) -> f64 {

@@ -73,16 +73,13 @@ impl<'a> Assessment<'a> {
             .flat_map(|recording| &recording.segments)
             .collect();
         let compiled = CompiledModel::new(model)?;
-        let signals = model.state();
+        let (names, units) = match model.state() {
+            Some(state) => (state.names.clone(), state.units.clone()),
+            None => (Robot::state_names().to_vec(), Robot::state_units().to_vec()),
+        };
         let mut assessment = Self {
-            names: signals.map_or_else(
-                || Robot::state_names().to_vec(),
-                |state| state.names.clone(),
-            ),
-            units: signals.map_or_else(
-                || Robot::state_units().to_vec(),
-                |state| state.units.clone(),
-            ),
+            names,
+            units,
             restart_every_s,
             runs: Vec::with_capacity(segments.len()),
             full: CoordinateSums::new(model)?,

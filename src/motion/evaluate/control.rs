@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::metrics::Mean;
 use super::torque::{ByContact, Comparison};
 use crate::mpc::{Command, Status};
 
@@ -62,29 +63,14 @@ pub(super) struct Tally {
     failed: usize,
     times_us: Vec<f64>,
     pub(super) preparations_us: Vec<f64>,
-    inconsistency: (f64, usize),
+    inconsistency: Mean,
     pub(super) torque: Comparison,
     pub(super) lift: Comparison,
-    pub(super) tracking: MeanSquare,
+    /// Squares of planned minus reference positions.
+    pub(super) tracking: Mean,
     pub(super) limit_violations: usize,
     pub(super) friction_violations: Option<usize>,
     pub(super) implausible: usize,
-}
-
-/// A running mean of squares.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct MeanSquare {
-    sum: f64,
-    count: usize,
-}
-
-impl Extend<f64> for MeanSquare {
-    fn extend<T: IntoIterator<Item = f64>>(&mut self, values: T) {
-        for value in values {
-            self.sum += value * value;
-            self.count += 1;
-        }
-    }
 }
 
 impl Tally {
@@ -96,15 +82,13 @@ impl Tally {
         }
         self.times_us.push(command.solve_us);
         if let Some(value) = command.inconsistency {
-            self.inconsistency.0 += value;
-            self.inconsistency.1 += 1;
+            self.inconsistency.add(value);
         }
     }
 
     pub(super) fn summary(mut self) -> Summary {
         self.times_us.sort_by(f64::total_cmp);
         self.preparations_us.sort_by(f64::total_cmp);
-        let (sum, count) = self.inconsistency;
         Summary {
             steps: self.times_us.len(),
             solved: self.solved,
@@ -115,11 +99,10 @@ impl Tally {
             torque_r2: self.torque.r2(),
             lift_r2: self.lift.r2(),
             torque_rms_nm: self.torque.rms(),
-            tracking_rms: (self.tracking.count > 0)
-                .then(|| (self.tracking.sum / self.tracking.count as f64).sqrt()),
+            tracking_rms: self.tracking.get().map(f64::sqrt),
             limit_violations: self.limit_violations,
             friction_violations: self.friction_violations,
-            inconsistency: (count > 0).then(|| sum / count as f64),
+            inconsistency: self.inconsistency.get(),
             implausible: self.implausible,
         }
     }

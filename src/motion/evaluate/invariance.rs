@@ -143,11 +143,8 @@ fn velocities() -> [DVector<f64>; 4] {
 
 /// Mean training input of a phase, SI; zero if the model has none.
 fn mean_input(model: &ReducedModel, phase: usize) -> DVector<f64> {
-    model
-        .input_statistics(phase)
-        .map_or(DVector::zeros(STATE_DIM), |statistics| {
-            statistics.mean.clone()
-        })
+    let statistics = model.input_statistics(phase);
+    statistics.map_or(DVector::zeros(STATE_DIM), |known| known.mean.clone())
 }
 
 /// A state and an input of the robot, SI, `state_dim` each.

@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 
+use super::metrics::Mean;
 use super::torque::{ByContact, Comparison, is_plausible};
 use crate::model::ReducedModel;
 use crate::recording::Segment;
@@ -17,7 +18,7 @@ const SMALL_FORCE_N: f64 = 1.0;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LiftSums {
     torque: Comparison,
-    inconsistency: (f64, usize),
+    inconsistency: Mean,
 }
 
 impl LiftSums {
@@ -63,8 +64,8 @@ impl LiftSums {
         };
         let force = lifted.rows(JOINT_DIM, 6).into_owned();
         if force.norm() > SMALL_FORCE_N {
-            self.inconsistency.0 += (&force - produced).norm() / force.norm();
-            self.inconsistency.1 += 1;
+            self.inconsistency
+                .add((&force - produced).norm() / force.norm());
         }
     }
 
@@ -81,8 +82,7 @@ impl LiftSums {
     /// Mean of `|F_lift - G tau_lift| / |F_lift|` over samples with a foot down: how far the lifted
     /// body wrench is from what the lifted torques produce.
     pub fn inconsistency(&self) -> Option<f64> {
-        let (sum, count) = self.inconsistency;
-        (count > 0).then(|| sum / count as f64)
+        self.inconsistency.get()
     }
 }
 

@@ -129,45 +129,21 @@ mod tests {
 
     use crate::model::{FeetRule, Library, Phase, ReducedModel};
 
-    #[test]
-    fn a_phase_whose_gain_is_not_finite_at_its_mean_has_no_linearisation() {
-        let terms = ["dz1", "log(u1)"].map(str::to_owned);
-        let library = Library::from_terms(1, &terms).expect("terms parse");
+    /// The one phase of a model with these terms, linearised at the mean of two samples of all coordinates.
+    fn linearised(terms: &[(&str, f64)], samples: [f64; 2]) -> Option<LinearisedPhase> {
+        let names: Vec<String> = terms.iter().map(|(term, _)| (*term).to_owned()).collect();
+        let library = Library::from_terms(1, &names).expect("terms parse");
+        let xi = terms.iter().map(|(_, coefficient)| *coefficient);
         let model = ReducedModel::builder("hopper", library)
             .phase(Phase {
                 name: "contact".to_owned(),
                 feet: FeetRule::Any,
-                xi: DMatrix::from_column_slice(2, 1, &[-2.0, 3.0]),
+                xi: DMatrix::from_iterator(terms.len(), 1, xi),
             })
             .build()
             .expect("valid");
         let compiled = CompiledModel::new(&model).expect("compiles");
-        let zero = DMatrix::zeros(1, 2);
-        let segment = LatentSegment {
-            time_s: vec![0.0, 0.002],
-            z: zero.clone(),
-            dz: zero.clone(),
-            ddz: zero.clone(),
-            u_lat: zero,
-            phase: vec![0, 0],
-        };
-        assert_eq!(linearise_phases(&compiled, &[&segment]), [None]);
-    }
-
-    #[test]
-    fn damped_oscillator_has_its_textbook_eigenvalues_and_gain() {
-        let terms = ["z1", "dz1", "u1"].map(str::to_owned);
-        let library = Library::from_terms(1, &terms).expect("terms parse");
-        let model = ReducedModel::builder("hopper", library)
-            .phase(Phase {
-                name: "contact".to_owned(),
-                feet: FeetRule::Any,
-                xi: DMatrix::from_column_slice(3, 1, &[-40.0, -2.0, 3.0]),
-            })
-            .build()
-            .expect("valid");
-        let compiled = CompiledModel::new(&model).expect("compiles");
-        let row = DMatrix::from_row_slice(1, 2, &[0.1, 0.2]);
+        let row = DMatrix::from_row_slice(1, 2, &samples);
         let segment = LatentSegment {
             time_s: vec![0.0, 0.002],
             z: row.clone(),
@@ -177,7 +153,20 @@ mod tests {
             phase: vec![0, 0],
         };
         let found = linearise_phases(&compiled, &[&segment]);
-        let phase = found[0].as_ref().expect("two samples");
+        assert_eq!(found.len(), 1);
+        found.into_iter().next().flatten()
+    }
+
+    #[test]
+    fn a_phase_whose_gain_is_not_finite_at_its_mean_has_no_linearisation() {
+        let found = linearised(&[("dz1", -2.0), ("log(u1)", 3.0)], [0.0; 2]);
+        assert_eq!(found, None);
+    }
+
+    #[test]
+    fn damped_oscillator_has_its_textbook_eigenvalues_and_gain() {
+        let terms = [("z1", -40.0), ("dz1", -2.0), ("u1", 3.0)];
+        let phase = linearised(&terms, [0.1, 0.2]).expect("two samples");
         // s^2 + 2 s + 40 = 0
         assert!((phase.growth_rate().expect("one pair") + 1.0).abs() < 1e-12);
         assert!((phase.eigenvalues[0].im - 39f64.sqrt()).abs() < 1e-9);

@@ -40,6 +40,15 @@ impl FitSums {
         self.deviation_square += other.deviation_square;
     }
 
+    /// Pairs of several coordinates or phases together, see [`FitSums::merge_keeping_means`].
+    pub fn jointly(parts: &[Self]) -> Self {
+        let mut total = Self::default();
+        parts
+            .iter()
+            .for_each(|part| total.merge_keeping_means(part));
+        total
+    }
+
     /// Number of pairs added.
     pub fn count(&self) -> usize {
         self.count
@@ -52,6 +61,30 @@ impl FitSums {
             r2: (self.deviation_square > 0.0)
                 .then(|| 1.0 - self.residual_square / self.deviation_square),
         })
+    }
+
+    /// Coefficient of determination of all pairs added so far, see [`Fit::r2`].
+    pub fn r2(&self) -> Option<f64> {
+        self.fit()?.r2
+    }
+}
+
+/// A running mean.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Mean {
+    sum: f64,
+    count: usize,
+}
+
+impl Mean {
+    pub fn add(&mut self, value: f64) {
+        self.sum += value;
+        self.count += 1;
+    }
+
+    /// The mean of all values added so far; `None` before the first.
+    pub fn get(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.sum / self.count as f64)
     }
 }
 

@@ -15,6 +15,7 @@
 use nalgebra::Vector3;
 
 use super::along_recording::{ReferenceInput, control_samples, set_reference};
+use super::metrics::Mean;
 use crate::mpc::{Controller, Measurement, MpcError};
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
@@ -51,21 +52,20 @@ pub(super) enum Driver {
 /// Deviations after pushes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Recovery {
-    squares: f64,
-    count: usize,
-    deviations: (f64, usize),
+    /// Squares of the body's deviations, and of planned minus reference positions.
+    deviations: Mean,
+    planned: Mean,
 }
 
 impl Recovery {
     /// Root mean square of the body's deviation from the recording after pushes of 0.1 m/s, over times and pushes, m.
     pub fn rms_m(&self) -> Option<f64> {
-        (self.count > 0).then(|| (self.squares / self.count as f64).sqrt())
+        self.deviations.get().map(f64::sqrt)
     }
 
     /// Root mean square of planned minus reference positions, in standard deviations of the reference.
     pub fn tracking_rms(&self) -> Option<f64> {
-        let (sum, count) = self.deviations;
-        (count > 0).then(|| (sum / count as f64).sqrt())
+        self.planned.get().map(f64::sqrt)
     }
 }
 
@@ -136,8 +136,7 @@ fn run(
             });
             if command.status.has_plan() {
                 for planned in controller.planned_deviations() {
-                    recovery.deviations.0 += planned * planned;
-                    recovery.deviations.1 += 1;
+                    recovery.planned.add(planned * planned);
                 }
             }
             command.torque_nm
@@ -149,11 +148,8 @@ fn run(
             let torque = command.unwrap_or(recorded);
             let difference = std::array::from_fn(|i| torque[i] - recorded[i]);
             deviation.advance(segment, sample, robot, &difference);
-            recovery.squares += deviation
-                .position_m
-                .norm_squared()
-                .min(LARGEST_M * LARGEST_M);
-            recovery.count += 1;
+            let square = deviation.position_m.norm_squared();
+            recovery.deviations.add(square.min(LARGEST_M * LARGEST_M));
         }
     }
 }

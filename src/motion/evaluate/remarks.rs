@@ -2,7 +2,7 @@
 
 use super::coordinates::PointwiseSums;
 use super::error::EvaluateError;
-use super::metrics::{Fit, FitSums};
+use super::metrics::FitSums;
 use crate::model::ReducedModel;
 use crate::recording::Recording;
 use crate::recording::mismatch::notes;
@@ -39,11 +39,11 @@ const BELOW_TRAINING: f64 = 1.5;
 /// Phases whose accelerations the mean would explain better, and clearly worse than those of the training are explained.
 /// Flight is left out: accelerations hardly vary there, and any model is as far off as their mean.
 fn unexplained(model: &ReducedModel, pointwise: &PointwiseSums) -> Vec<String> {
-    let accelerations = pointwise.acceleration.iter().map(FitSums::fit);
+    let accelerations = pointwise.acceleration.iter().map(FitSums::r2);
     let phases = model.phases().iter().zip(accelerations).enumerate();
-    let unlike = phases.filter_map(|(index, (phase, fit))| {
+    let unlike = phases.filter_map(|(index, (phase, r2))| {
         let bound = training_r2(model, index).map_or(0.0, |r2| (r2 - BELOW_TRAINING).min(0.0));
-        let r2 = fit.and_then(|fit: Fit| fit.r2)?;
+        let r2 = r2?;
         (!phase.feet.matches([false; 4]) && r2 < bound).then(|| {
             format!(
                 "in {} the latent accelerations are further off than their mean would be (R^2 {r2:.2}): \

@@ -280,9 +280,7 @@ impl<'m> Samples<'m> {
                 sums.add(y, back);
             }
         }
-        let mut total = FitSums::default();
-        sums.iter().for_each(|sums| total.merge_keeping_means(sums));
-        let r2 = total.fit().and_then(|fit| fit.r2);
+        let r2 = FitSums::jointly(&sums).r2();
         Ok(r2.map_or(0.0, |r2| 1.0 - r2))
     }
 
@@ -294,10 +292,8 @@ impl<'m> Samples<'m> {
             .chain(factors)
             .chain([Slip::Centred, Slip::Standardised]);
         let best = self.best_of(one)?;
-        if best
-            .as_ref()
-            .is_some_and(|(_, error)| *error < SMALL_ERROR * EXPLAINED)
-        {
+        let error_of = |found: &Option<(Slip, f64)>| found.as_ref().map_or(f64::MAX, |f| f.1);
+        if error_of(&best) < SMALL_ERROR * EXPLAINED {
             return Ok(best);
         }
         let two = orders.into_iter().flat_map(|order| {
@@ -305,7 +301,6 @@ impl<'m> Samples<'m> {
             [both(Slip::Centred), both(Slip::Standardised)]
         });
         let two = self.best_of(two)?;
-        let error_of = |found: &Option<(Slip, f64)>| found.as_ref().map_or(f64::MAX, |f| f.1);
         Ok(match EXPLAINED * error_of(&two) < error_of(&best) {
             true => two,
             false => best,
@@ -321,10 +316,8 @@ impl<'m> Samples<'m> {
             let error = self.error(&self.with(&slip))?;
             found.push((slip, error));
         }
-        let least = found
-            .iter()
-            .map(|(_, error)| *error)
-            .fold(f64::INFINITY, f64::min);
+        let errors = found.iter().map(|(_, error)| *error);
+        let least = errors.fold(f64::INFINITY, f64::min);
         Ok(found.into_iter().find(|(_, error)| *error <= ALIKE * least))
     }
 }
@@ -347,15 +340,11 @@ fn accelerations(
         }
         sums.add(model, segment, &latent)?;
     }
-    let r2 = |sums: &FitSums| sums.fit().and_then(|fit| fit.r2);
     let names = model.phases().iter().map(|phase| phase.name.clone());
-    let mut all = FitSums::default();
-    sums.acceleration
-        .iter()
-        .for_each(|phase| all.merge_keeping_means(phase));
+    let by_phase = names.zip(sums.acceleration.iter().map(FitSums::r2));
     Ok((
-        names.zip(sums.acceleration.iter().map(r2)).collect(),
-        r2(&all),
+        by_phase.collect(),
+        FitSums::jointly(&sums.acceleration).r2(),
     ))
 }
 

@@ -66,28 +66,20 @@ impl Comparison {
     /// `k` in contact or in flight.
     pub fn r2(&self) -> ByContact {
         ByContact {
-            contact: jointly(&self.contact).fit().and_then(|fit| fit.r2),
-            flight: jointly(&self.flight).fit().and_then(|fit| fit.r2),
+            contact: FitSums::jointly(&self.contact).r2(),
+            flight: FitSums::jointly(&self.flight).r2(),
         }
     }
 
     /// The same over all samples, with the mean over all samples.
     pub fn r2_all(&self) -> Option<f64> {
-        jointly(&self.all).fit().and_then(|fit| fit.r2)
+        FitSums::jointly(&self.all).r2()
     }
 
     /// Root mean square of the difference over all samples and joints, N m.
     pub fn rms(&self) -> Option<f64> {
-        jointly(&self.all).fit().map(|fit| fit.rms)
+        FitSums::jointly(&self.all).fit().map(|fit| fit.rms)
     }
-}
-
-fn jointly(joints: &JointSums) -> FitSums {
-    let mut total = FitSums::default();
-    joints
-        .iter()
-        .for_each(|sums| total.merge_keeping_means(sums));
-    total
 }
 
 #[cfg(test)]

@@ -68,7 +68,9 @@ impl SampleEquations {
         delay_s: f64,
     ) -> Self {
         let n = segment.len();
-        let (recorded, clipped_torques) = limited_torques(segment, robot);
+        let recorded = segment.torque_within_limits(robot);
+        let pairs = recorded.iter().zip(segment.torque_nm.iter());
+        let clipped_torques = pairs.filter(|(kept, all)| all.abs() > kept.abs()).count();
         let torque = delayed(&segment.time_s, &recorded, delay_s);
         let torque_rate = differences(&segment.time_s, &torque);
         let mut equations = Self {
@@ -88,7 +90,6 @@ impl SampleEquations {
                 let of = |m: &DMatrix<f64>| m.fixed_view::<3, 1>(first, sample).into_owned();
                 let state = LegSample {
                     frame: motion.legs[sample][leg.index()],
-                    abduction: motion.legs[sample][leg.index()].abduction,
                     trunk_rate: motion.trunk_rate[sample],
                     rate: of(&segment.dx),
                     acceleration: of(&motion.coordinates),
@@ -186,8 +187,6 @@ const OWN: [usize; 7] = [
 /// One leg at one sample; vectors over joints unless they are directions.
 struct LegSample {
     frame: LegFrame,
-    /// Axis of abduction in the world.
-    abduction: Vector3<f64>,
     /// Angular velocity of the trunk in the world, rad/s.
     trunk_rate: Vector3<f64>,
     rate: Vector3<f64>,
@@ -202,34 +201,25 @@ impl LegSample {
     /// Components of a moment (world axes) about the three joints.
     fn about_joints(&self, moment: &Vector3<f64>) -> Vector3<f64> {
         let flexion = self.frame.flexion.dot(moment);
-        Vector3::new(self.abduction.dot(moment), flexion, flexion)
+        Vector3::new(self.frame.abduction.dot(moment), flexion, flexion)
     }
 
     /// Angular velocity of the calf in the world, rad/s.
     fn calf_rate(&self) -> Vector3<f64> {
         self.trunk_rate
-            + self.abduction * self.rate[0]
+            + self.frame.abduction * self.rate[0]
             + self.frame.flexion * (self.rate[1] + self.rate[2])
     }
 
     /// Coefficients of [`joint_unknowns`] and the torque of one joint.
     fn joint(&self, kind: usize) -> [f64; JOINT_ROWS] {
         let rate = self.rate[kind];
-        let own = self.own.map(|torque| torque[kind]);
-        [
-            rate,
-            (rate / DRY_SPEED_RAD_S).tanh(),
-            self.acceleration[kind],
-            own[0],
-            own[1],
-            own[2],
-            own[3],
-            own[4],
-            own[5],
-            own[6],
-            self.torque_rate[kind],
-            self.torque[kind],
-        ]
+        let dry = (rate / DRY_SPEED_RAD_S).tanh();
+        let mut out = [0.0; JOINT_ROWS];
+        out[..3].copy_from_slice(&[rate, dry, self.acceleration[kind]]);
+        out[3..][..OWN.len()].copy_from_slice(&self.own.map(|torque| torque[kind]));
+        out[JOINT_ROWS - 2..].copy_from_slice(&[self.torque_rate[kind], self.torque[kind]]);
+        out
     }
 }
 
@@ -284,21 +274,6 @@ fn own_torques(
         on_thigh(&frame.thigh_front, second.thigh_front),
         on_calf(&frame.calf_front, second.calf_front),
     ]
-}
-
-/// The recorded torques within the robot's limits, and how many were beyond them.
-fn limited_torques(segment: &Segment, robot: &Robot) -> (DMatrix<f64>, usize) {
-    let mut torque = segment.torque_nm.clone();
-    let mut clipped = 0;
-    for (joint, limit) in robot.torque_limit_nm().iter().enumerate() {
-        for value in torque.row_mut(joint).iter_mut() {
-            if value.abs() > *limit {
-                *value = limit.copysign(*value);
-                clipped += 1;
-            }
-        }
-    }
-    (torque, clipped)
 }
 
 /// Rows as they were `delay_s` before each time, by straight lines; held at the ends.

@@ -1,5 +1,7 @@
 //! Errors of identification and of its file.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use thiserror::Error;
 
 use crate::files::Located;
@@ -17,11 +19,8 @@ pub enum IdentifyError {
          away from a change of feet and from a singular leg, expected at least {expected}"
     )]
     Contact {
-        /// Number of recordings.
         recordings: usize,
-        /// Samples found.
         found: usize,
-        /// Samples needed.
         expected: usize,
     },
     /// The feet do not move enough for the joints' losses to have a direction.
@@ -30,11 +29,8 @@ pub enum IdentifyError {
          at least {expected}; a robot that stands still does not show its losses"
     )]
     Still {
-        /// Number of recordings.
         recordings: usize,
-        /// Windows found.
         found: usize,
-        /// Windows needed.
         expected: usize,
     },
     /// The feet's forces do not explain the trunk's acceleration by any mass.
@@ -44,11 +40,8 @@ pub enum IdentifyError {
          torques those of `{robot}`?"
     )]
     Mass {
-        /// Estimate of one over the mass, 1/kg.
         inverse: f64,
-        /// That of the robot's registered mass.
         expected: f64,
-        /// The robot's name.
         robot: String,
     },
     /// A file of an identification cannot be used.
@@ -67,10 +60,5 @@ pub enum IdentifyFault {
     Syntax(String),
     /// A value that no robot has.
     #[error("found {found}, expected {expected}")]
-    Value {
-        /// The value.
-        found: f64,
-        /// The values accepted.
-        expected: &'static str,
-    },
+    Value { found: f64, expected: &'static str },
 }

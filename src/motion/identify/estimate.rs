@@ -14,7 +14,7 @@ use super::parameters::{
     ARMATURE, CALF, CALF_SECOND, DELAY, DRY, GRAVITY, INVERSE_MASS, LEG_SIDE, PARAMETER_DIM, THIGH,
     THIGH_SECOND, VISCOUS, priors,
 };
-use super::windows::{Group, Windows};
+use super::windows::{Group, Row, Windows};
 use crate::recording::check::check;
 use crate::recording::clock::{Timed, timed};
 use crate::recording::{Recording, Segment};
@@ -75,7 +75,7 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
         ));
     }
     notes.extend(round.notes());
-    let mut found = state.result(robot, &segments, &round.windows, notes)?;
+    let mut found = state.result(robot, &segments, &round.windows, notes);
     found.notes.extend(found.contradiction());
     found.notes.extend(found.doubts(robot.mass_kg()));
     Ok(found)
@@ -100,35 +100,29 @@ impl Round {
             windows: Windows::default(),
             clipped_torques: 0,
         };
-        for Prepared {
-            segment,
-            motion,
-            lost,
-        } in segments
-        {
+        for prepared in segments {
+            let (segment, motion) = (&prepared.segment, &prepared.motion);
             let equations =
                 SampleEquations::of(segment, motion, robot, state.gravity_m_s2, state.delay_s);
             round.clipped_torques += equations.clipped_torques;
-            round.windows.add(segment, &equations, lost)?;
+            round.windows.add(segment, &equations, &prepared.lost)?;
         }
         Ok(round)
     }
 
     fn require_enough(&self, recordings: usize) -> Result<(), IdentifyError> {
-        let found = self.windows.contact_samples;
-        if found < LEAST_CONTACT_SAMPLES {
-            let expected = LEAST_CONTACT_SAMPLES;
+        let (found, expected) = (self.windows.contact_samples, LEAST_CONTACT_SAMPLES);
+        if found < expected {
             return Err(IdentifyError::Contact {
                 recordings,
                 found,
                 expected,
             });
         }
-        let is_moving = |group: Group, moving: bool| moving && group == Group::Contact(0);
-        let rows = self.windows.rows.iter();
-        let found = rows.filter(|row| is_moving(row.group, row.moving)).count();
-        if found < LEAST_WINDOWS {
-            let expected = LEAST_WINDOWS;
+        let is_moving = |row: &&Row| row.moving && row.group == Group::Contact(0);
+        let found = self.windows.rows.iter().filter(is_moving).count();
+        let expected = LEAST_WINDOWS;
+        if found < expected {
             return Err(IdentifyError::Still {
                 recordings,
                 found,
@@ -220,7 +214,7 @@ impl State {
         segments: &[Prepared],
         windows: &Windows,
         notes: Vec<String>,
-    ) -> Result<Identification, IdentifyError> {
+    ) -> Identification {
         let priors = priors(robot.geometry(Leg::FrontLeft), self.mass_kg, &self.losses);
         let estimate = self.iteration.estimate.unwrap_or_default();
         // When within a step a torque acts is not recorded: uniform over it.
@@ -251,7 +245,7 @@ impl State {
         let joints = |first: usize| -> [f64; JOINT_DIM] {
             std::array::from_fn(|joint| value(first + joint % 3))
         };
-        Ok(Identification {
+        Identification {
             robot: robot.name().to_owned(),
             gravity_m_s2: self.gravity_m_s2,
             mass_kg: self.mass_kg,
@@ -272,22 +266,23 @@ impl State {
                 legs: legs(&per_mass),
             },
             r2: fit_of(windows, &estimate),
-            force_alone: self.force_alone(windows)?,
+            force_alone: alone(windows),
             samples: Samples {
                 contact: windows.contact_samples,
                 flight: windows.flight_samples,
             },
             notes,
-        })
+        }
     }
+}
 
-    fn force_alone(&self, windows: &Windows) -> Result<ForceAlone, IdentifyError> {
-        let estimate = force_alone(&windows.rows).unwrap_or_default();
-        Ok(ForceAlone {
-            gravity_m_s2: estimate[GRAVITY],
-            mass_kg: 1.0 / estimate[INVERSE_MASS],
-            r2: fit_of(windows, &estimate),
-        })
+/// The regression on the feet's forces alone.
+fn alone(windows: &Windows) -> ForceAlone {
+    let estimate = force_alone(&windows.rows).unwrap_or_default();
+    ForceAlone {
+        gravity_m_s2: estimate[GRAVITY],
+        mass_kg: 1.0 / estimate[INVERSE_MASS],
+        r2: fit_of(windows, &estimate),
     }
 }
 
@@ -319,11 +314,10 @@ fn implausible(recording: &Recording, robot: &Robot) -> Option<String> {
 /// What was mended in the segments of a recording.
 fn mended(path: &Path, segments: &[Timed]) -> Option<String> {
     let mut faults = Vec::new();
-    let rebuilt: Vec<f64> = (segments.iter())
-        .filter(|timed| timed.rebuilt)
-        .map(|timed| timed.elapsed_ratio)
-        .collect();
-    if let Some(longest) = rebuilt.iter().copied().reduce(f64::max) {
+    let rebuilt = segments
+        .iter()
+        .filter_map(|timed| timed.mended.elapsed_ratio);
+    if let Some(longest) = rebuilt.reduce(f64::max) {
         faults.push(format!(
             "{longest:.2} s of motion pass in a recorded second (displacements against velocities; \
              samples lost?), times were rebuilt"
@@ -334,7 +328,7 @@ fn mended(path: &Path, segments: &[Timed]) -> Option<String> {
     if lost > 0 {
         faults.push(format!("{lost} samples between distant ones are left out"));
     }
-    if segments.iter().any(|timed| timed.rates_replaced) {
+    if segments.iter().any(|timed| timed.mended.rates_replaced) {
         faults.push("angular rates disagree with the angles and were replaced".to_owned());
     }
     (!faults.is_empty()).then(|| format!("{}: {}", path.display(), faults.join("; ")))

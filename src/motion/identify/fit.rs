@@ -38,20 +38,16 @@ struct Normal {
 }
 
 impl Normal {
-    const ZERO: Self = Self {
-        matrix: Square::from_array_storage(nalgebra::ArrayStorage(
-            [[0.0; PARAMETER_DIM]; PARAMETER_DIM],
-        )),
-        side: Estimate::from_array_storage(nalgebra::ArrayStorage([[0.0; PARAMETER_DIM]; 1])),
-    };
+    fn zero() -> Self {
+        Self {
+            matrix: Square::zeros(),
+            side: Estimate::zeros(),
+        }
+    }
 
     fn add(&mut self, row: &Row, left: f64, weight: f64) {
-        for (i, a) in row
-            .coefficients
-            .iter()
-            .enumerate()
-            .filter(|(_, a)| **a != 0.0)
-        {
+        let coefficients = row.coefficients.iter().enumerate();
+        for (i, a) in coefficients.filter(|(_, a)| **a != 0.0) {
             self.side[i] += weight * a * left;
             for (j, b) in row.coefficients.iter().enumerate().take(i + 1) {
                 self.matrix[(i, j)] += weight * a * b;
@@ -122,16 +118,10 @@ impl Normal {
             free.sort_unstable();
             estimate = self.solve(&free)?;
         }
-        Some((
-            estimate.map_with_location(|i, _, value| {
-                if NOT_NEGATIVE.contains(&i) {
-                    value.max(0.0)
-                } else {
-                    value
-                }
-            }),
-            free,
-        ))
+        for unknown in NOT_NEGATIVE {
+            estimate[unknown] = estimate[unknown].max(0.0);
+        }
+        Some((estimate, free))
     }
 }
 
@@ -156,7 +146,7 @@ impl Iteration {
     ///
     /// `None` if the equations are singular even with the priors (not finite numbers).
     pub fn step(&mut self, rows: &[Row], priors: &[Prior], mass_kg: f64) -> Option<()> {
-        let normal = self.normal(rows, priors, mass_kg, |_| true);
+        let normal = self.normal(rows, priors, mass_kg);
         let (estimate, _) = normal.solve_not_negative()?;
         self.estimate = Some(estimate);
         let mut sums = [(0.0, 0.0); Group::COUNT];
@@ -192,7 +182,7 @@ impl Iteration {
         mass_kg: f64,
         delay_deviation_s: f64,
     ) -> Option<Estimate> {
-        let whole = self.normal(rows, priors, mass_kg, |_| true);
+        let whole = self.normal(rows, priors, mass_kg);
         let (_, bounded) = whole.solve_not_negative()?;
         let everything: Vec<usize> = (0..PARAMETER_DIM).collect();
         let parts = groupings
@@ -220,7 +210,7 @@ impl Iteration {
     /// The normal equations of every group that has rows.
     fn parts(&self, rows: &[Row], grouping: &[usize], mass_kg: f64) -> Vec<Normal> {
         let count = grouping.iter().max().map_or(0, |last| last + 1);
-        let mut parts = vec![Normal::ZERO; count];
+        let mut parts = vec![Normal::zero(); count];
         for row in rows.iter().filter(|row| row.moving) {
             parts[grouping[row.block]].add(row, left(row, mass_kg), self.weight(row, mass_kg));
         }
@@ -228,15 +218,9 @@ impl Iteration {
         used.map(Normal::symmetric).collect()
     }
 
-    fn normal(
-        &self,
-        rows: &[Row],
-        priors: &[Prior],
-        mass_kg: f64,
-        keep: impl Fn(&Row) -> bool,
-    ) -> Normal {
-        let mut normal = Normal::ZERO;
-        for row in rows.iter().filter(|row| row.moving && keep(row)) {
+    fn normal(&self, rows: &[Row], priors: &[Prior], mass_kg: f64) -> Normal {
+        let mut normal = Normal::zero();
+        for row in rows.iter().filter(|row| row.moving) {
             normal.add(row, left(row, mass_kg), self.weight(row, mass_kg));
         }
         let mut normal = normal.symmetric();
@@ -292,11 +276,9 @@ fn spread(whole: &Normal, parts: &[Normal], free: &[usize]) -> Option<Estimate> 
 
 /// Gravity and inverse mass by the feet's forces alone, over rows in contact; `None` without any.
 pub fn force_alone(rows: &[Row]) -> Option<Estimate> {
-    let mut normal = Normal::ZERO;
-    for row in rows
-        .iter()
-        .filter(|row| matches!(row.group, Group::Contact(_)))
-    {
+    let mut normal = Normal::zero();
+    let is_contact = |row: &&Row| matches!(row.group, Group::Contact(_));
+    for row in rows.iter().filter(is_contact) {
         normal.add(row, row.left, 1.0);
     }
     normal.symmetric().solve(&[GRAVITY, INVERSE_MASS])

@@ -12,6 +12,7 @@ use super::equations::{BODY_ROWS, JOINT_ROWS, SampleEquations, joint_unknowns};
 use super::error::IdentifyError;
 use super::parameters::PARAMETER_DIM;
 use crate::recording::Segment;
+use crate::recording::segment::stretches;
 use crate::recording::smoothing::SavitzkyGolay;
 use crate::robot::JOINT_DIM;
 
@@ -109,12 +110,14 @@ impl Windows {
         let per_block = samples(BLOCK_S).max(1);
         let number = self.segments;
         self.segments += 1;
-        for stance in stances(segment) {
+        let feet = &segment.feet;
+        for stance in stretches(0..segment.len(), |a, b| feet[a] == feet[b]) {
             let margin = samples(MARGIN_S);
             let inner = stance.start + margin..stance.end.saturating_sub(margin).max(stance.start);
             self.singular_samples += inner.clone().filter(|s| equations.singular[*s]).count();
-            for span in runs(inner, |sample| !equations.singular[sample] && !lost[sample]) {
-                if span.len() < window {
+            let kept = |sample: usize| !equations.singular[sample] && !lost[sample];
+            for span in stretches(inner, |a, b| kept(a) == kept(b)) {
+                if !kept(span.start) || span.len() < window {
                     continue;
                 }
                 let centres = (window / 2..span.len() - window / 2)
@@ -163,10 +166,9 @@ impl Windows {
     ) {
         let feet = segment.feet[averaged.span.start];
         let in_contact = feet.contains(&true);
-        let count = if in_contact {
-            &mut self.contact_samples
-        } else {
-            &mut self.flight_samples
+        let (group, count): (fn(usize) -> Group, _) = match in_contact {
+            true => (Group::Contact, &mut self.contact_samples),
+            false => (Group::Flight, &mut self.flight_samples),
         };
         *count += averaged.span.len();
         let mean_speed = |is_meant: fn(usize) -> bool| {
@@ -192,11 +194,7 @@ impl Windows {
                 self.rows.push(Row {
                     coefficients: std::array::from_fn(|i| means[(row + i, centre)]),
                     left: means[(row + PARAMETER_DIM, centre)],
-                    group: if in_contact {
-                        Group::Contact(axis)
-                    } else {
-                        Group::Flight(axis)
-                    },
+                    group: group(axis),
                     block: block(centre),
                     moving: !in_contact || moving,
                 });
@@ -250,30 +248,6 @@ impl Averaged<'_> {
         let part = rows.columns(self.span.start, self.span.len()).into_owned();
         (self.filter.smooth(&part)).expect("invariant: a stretch is as long as the window")
     }
-}
-
-/// Stretches of samples with the same feet on the ground.
-fn stances(segment: &Segment) -> Vec<Range<usize>> {
-    let mut out: Vec<Range<usize>> = Vec::new();
-    for sample in 0..segment.len() {
-        match out.last_mut() {
-            Some(open) if segment.feet[open.start] == segment.feet[sample] => open.end = sample + 1,
-            Some(_) | None => out.push(sample..sample + 1),
-        }
-    }
-    out
-}
-
-/// Maximal stretches of a range in which all samples are kept.
-fn runs(range: Range<usize>, keep: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
-    let mut out: Vec<Range<usize>> = Vec::new();
-    for sample in range.filter(|sample| keep(*sample)) {
-        match out.last_mut() {
-            Some(open) if open.end == sample => open.end = sample + 1,
-            Some(_) | None => out.push(sample..sample + 1),
-        }
-    }
-    out
 }
 
 #[cfg(test)]

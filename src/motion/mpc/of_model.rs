@@ -135,9 +135,8 @@ fn phases_under(
     projection: &DMatrix<f64>,
 ) -> Result<Vec<ControlPhase>, MpcError> {
     let phases = 0..model.phases().len();
-    phases
-        .map(|phase| phase_under(model, phase, projection))
-        .collect()
+    let phases = phases.map(|phase| phase_under(model, phase, projection));
+    phases.collect()
 }
 
 fn phase_under(
@@ -151,18 +150,10 @@ fn phase_under(
     let unusable = || MpcError::Statistics {
         phase: name.clone(),
     };
-    let latent_root = Cholesky::new(with_floor(latent_covariance))
-        .ok_or_else(unusable)?
-        .unpack();
-    let torque_covariance = with_floor(
-        input
-            .covariance
-            .view((0, 0), (JOINT_DIM, JOINT_DIM))
-            .into_owned(),
-    );
-    let torque_precision = Cholesky::new(torque_covariance)
-        .ok_or_else(unusable)?
-        .inverse();
+    let factor = |covariance| Cholesky::new(with_floor(covariance)).ok_or_else(unusable);
+    let latent_root = factor(latent_covariance)?.unpack();
+    let torques = input.covariance.view((0, 0), (JOINT_DIM, JOINT_DIM));
+    let torque_precision = factor(torques.into_owned())?.inverse();
     Ok(ControlPhase {
         is_grounded: model.phase_for([false; 4]) != Some(phase),
         torque_mean: SVector::from_fn(|joint, _| input.mean[joint]),
@@ -181,10 +172,9 @@ fn phase_under(
 fn with_floor(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
     let dim = covariance.nrows();
     let mean_variance = covariance.trace() / dim as f64;
-    let floor = if mean_variance > 0.0 {
-        VARIANCE_FLOOR * mean_variance
-    } else {
-        VARIANCE_FLOOR
+    let floor = match mean_variance > 0.0 {
+        true => VARIANCE_FLOOR * mean_variance,
+        false => VARIANCE_FLOOR,
     };
     for index in 0..dim {
         covariance[(index, index)] += floor;

@@ -23,6 +23,12 @@ impl Affine {
         }
     }
 
+    /// The expression with `factor` times a variable on top.
+    pub fn plus(mut self, variable: usize, factor: f64) -> Self {
+        self.add(variable, factor);
+        self
+    }
+
     /// Adds `factor` times another expression.
     pub fn add_scaled(&mut self, other: &Affine, factor: f64) {
         self.constant += factor * other.constant;

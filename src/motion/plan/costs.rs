@@ -31,9 +31,7 @@ fn each(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
     let (d, settings) = (task.layout.latent_dim, task.settings);
     let share = 1.0 / d as f64;
     let one = |variable: usize, weight: f64, square: &mut dyn FnMut(&Affine, f64)| {
-        let mut expression = Affine::default();
-        expression.add(variable, 1.0);
-        square(&expression, weight);
+        square(&Affine::default().plus(variable, 1.0), weight);
     };
     for (part, of) in task.seed.parts.iter().enumerate() {
         let step = of.duration_s / of.intervals() as f64;
@@ -52,9 +50,8 @@ fn each(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
                 let next = task.layout.node(part, node + 1);
                 let per_unit = (TIME_UNIT_S / step).powi(2) * step / TIME_UNIT_S;
                 for i in 0..d {
-                    let mut change = Affine::default();
-                    change.add(next + 2 * d + i, 1.0);
-                    change.add(at + 2 * d + i, -1.0);
+                    let change = Affine::default().plus(next + 2 * d + i, 1.0);
+                    let change = change.plus(at + 2 * d + i, -1.0);
                     square(&change, settings.smoothness * share * per_unit);
                 }
             }
@@ -120,7 +117,7 @@ pub fn moved_foot(
         let mut moved = Affine::of(now.at[axis] - before.at[axis]);
         for i in 0..task.layout.latent_dim {
             let slope = now.by_z[(axis, i)];
-            moved.add_scaled(&task.z(part, node, i), slope);
+            moved.add_scaled(&task.latent(part, node, i), slope);
             moved.constant -= slope * z[i];
         }
         moved

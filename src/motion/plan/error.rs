@@ -1,5 +1,7 @@
 //! Why there is no plan.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use thiserror::Error;
 
 use crate::lower::LowerError;
@@ -13,11 +15,8 @@ pub enum PlanError {
     /// A number of the goal or of the settings that no jump has.
     #[error("{what}: found {found}, expected {expected}")]
     Goal {
-        /// The number.
         what: &'static str,
-        /// Its value.
         found: f64,
-        /// What could be.
         expected: String,
     },
     /// The convex programs have no solution from here on.
@@ -25,11 +24,8 @@ pub enum PlanError {
         "no plan for {distance_m} m with an apex of {apex_m} m: {outcome:?} in convex program {iteration}"
     )]
     Unsolved {
-        /// The goal's distance, m.
         distance_m: f64,
-        /// The goal's apex, m.
         apex_m: f64,
-        /// How the solver ended.
         outcome: Outcome,
         /// Number of the program, from 1.
         iteration: usize,
@@ -40,13 +36,10 @@ pub enum PlanError {
          {defect:.1e} after {iterations} convex programs"
     )]
     NotConverged {
-        /// The goal's distance, m.
         distance_m: f64,
-        /// The goal's apex, m.
         apex_m: f64,
         /// Largest violation of an equation, in standard deviations of its coordinate.
         defect: f64,
-        /// Programs solved.
         iterations: usize,
     },
     /// The model lacks what planning needs.

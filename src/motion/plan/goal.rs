@@ -24,20 +24,15 @@ impl Goal {
     /// [`PlanError::Goal`] for numbers that are not finite, a jump that goes nowhere or backwards, and
     /// an apex that is not above the start.
     pub fn new(distance_m: f64, apex_m: f64) -> Result<Self, PlanError> {
-        let refused = |what, found, expected: &str| {
-            let expected = expected.to_owned();
-            Err(PlanError::Goal {
-                what,
-                found,
-                expected,
-            })
-        };
-        if !(distance_m.is_finite() && distance_m > 0.0) {
-            return refused("distance", distance_m, "a positive number of metres");
-        }
-        if !(apex_m.is_finite() && apex_m > 0.0) {
-            let expected = "a positive number of metres above the height at the start";
-            return refused("apex", apex_m, expected);
+        let above = " above the height at the start";
+        for (what, found, above) in [("distance", distance_m, ""), ("apex", apex_m, above)] {
+            if !(found.is_finite() && found > 0.0) {
+                return Err(PlanError::Goal {
+                    what,
+                    found,
+                    expected: format!("a positive number of metres{above}"),
+                });
+            }
         }
         Ok(Self {
             distance_m,

@@ -4,13 +4,11 @@
 //! passes through the nodes of the program. Torques are the lifted input with what the joints take
 //! of the very motion that is written, so that who reads the recording finds the planned input.
 
-use std::path::PathBuf;
-
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 
 use super::costs::moved_foot;
 use super::error::PlanError;
-use super::transcribe::Task;
+use super::transcribe::{NodeValues, Task};
 use crate::recording::Segment;
 use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
 
@@ -52,51 +50,33 @@ pub fn motion(
     let total = ends[ends.len() - 1];
     let steps = (total / sample_time_s).round().max(1.0) as usize;
     let count = steps + 1;
-    let mut motion = empty(count);
+    let times = (0..count).map(|sample| total * (sample as f64 / steps as f64));
+    let mut motion = Segment::still(SOURCE, times.collect());
     let mut input = DMatrix::zeros(STATE_DIM, count);
     for sample in 0..count {
-        let time = total * (sample as f64 / steps as f64);
+        let time = motion.time_s[sample];
         let part = ends.partition_point(|end| *end <= time).min(ends.len() - 1);
         let start = if part == 0 { 0.0 } else { ends[part - 1] };
-        let at = at(task, y, part, (time - start, ends[part] - start));
-        motion.time_s.push(time);
+        let (at, ddz) = at(task, y, part, (time - start, ends[part] - start));
         let x = &task.seed.decode * at.z + &task.seed.decode_bias;
         motion.x.set_column(sample, &x);
         motion.dx.set_column(sample, &(&task.seed.decode * at.dz));
-        motion.ddx.set_column(sample, &(&task.seed.decode * at.ddz));
+        motion.ddx.set_column(sample, &(&task.seed.decode * ddz));
         input.set_column(sample, &(&task.seed.lift * at.u_lat));
-        motion.feet.push(task.seed.parts[part].part.feet);
+        motion.feet[sample] = task.seed.parts[part].part.feet;
     }
-    let torque_nm = input.rows(0, JOINT_DIM) + motion.losses(&task.seed.rule);
-    motion.torque_nm = torque_nm;
+    motion.torque_nm = input.rows(0, JOINT_DIM) + motion.losses(&task.seed.rule);
     let margins = margins(task, y, (&motion, &input));
     Ok((motion, margins))
 }
 
-fn empty(count: usize) -> Segment {
-    Segment {
-        path: PathBuf::from(SOURCE),
-        first_row: 2,
-        row_stride: 1.0,
-        time_s: Vec::with_capacity(count),
-        x: DMatrix::zeros(STATE_DIM, count),
-        dx: DMatrix::zeros(STATE_DIM, count),
-        ddx: DMatrix::zeros(STATE_DIM, count),
-        torque_nm: DMatrix::zeros(JOINT_DIM, count),
-        feet: Vec::with_capacity(count),
-        body_wrench: None,
-    }
-}
-
-struct At {
-    z: DVector<f64>,
-    dz: DVector<f64>,
-    ddz: DVector<f64>,
-    u_lat: DVector<f64>,
-}
-
-/// Values at a time since the start of a part of this duration.
-fn at(task: &Task<'_>, y: &[f64], part: usize, (time_s, duration_s): (f64, f64)) -> At {
+/// Values and acceleration at a time since the start of a part of this duration.
+fn at(
+    task: &Task<'_>,
+    y: &[f64],
+    part: usize,
+    (time_s, duration_s): (f64, f64),
+) -> (NodeValues, DVector<f64>) {
     let of = &task.seed.parts[part];
     let step = duration_s / of.intervals() as f64;
     let interval = ((time_s / step) as usize).min(of.intervals() - 1);
@@ -106,12 +86,12 @@ fn at(task: &Task<'_>, y: &[f64], part: usize, (time_s, duration_s): (f64, f64))
     let next = task.values(part, interval + 1, y);
     let ddz = (&next.dz - &here.dz) / step;
     let drift = &of.drift[interval];
-    At {
+    let values = NodeValues {
         z: here.z + (&here.dz + drift) * since + &ddz * (0.5 * since * since),
         dz: here.dz + &ddz * since,
         u_lat: &here.u_lat + (&next.u_lat - &here.u_lat) * share,
-        ddz,
-    }
+    };
+    (values, ddz)
 }
 
 fn margins(task: &Task<'_>, y: &[f64], (motion, input): (&Segment, &DMatrix<f64>)) -> Margins {

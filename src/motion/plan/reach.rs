@@ -3,7 +3,7 @@
 use super::error::PlanError;
 use super::goal::Goal;
 use super::settings::PlanSettings;
-use super::solve::{Plan, plan};
+use super::solve::plan;
 use crate::model::ReducedModel;
 
 /// Steps of a map across the recorded range of distances and of apexes; it goes on as far at either side.
@@ -74,28 +74,17 @@ fn point(
     settings: &PlanSettings,
 ) -> Result<ReachPoint, PlanError> {
     let clock = std::time::Instant::now();
-    let made: Result<Plan, PlanError> =
-        Goal::new(goal_m[0], goal_m[1]).and_then(|goal| plan(model, &goal, settings));
+    let made = Goal::new(goal_m[0], goal_m[1]).and_then(|goal| plan(model, &goal, settings));
     let solve_ms = 1e3 * clock.elapsed().as_secs_f64();
-    Ok(match made {
-        Ok(plan) => ReachPoint {
-            goal_m,
-            status: plan.verdict.word(),
-            input_deviation: Some(plan.input_deviation),
-            solve_ms,
-        },
+    let (status, input_deviation) = match made {
+        Ok(plan) => (plan.verdict.word(), Some(plan.input_deviation)),
         Err(error @ (PlanError::Model(_) | PlanError::Lower(_))) => return Err(error),
-        Err(
-            PlanError::Goal { .. }
-            | PlanError::Unsolved { .. }
-            | PlanError::NotConverged { .. }
-            | PlanError::Control(_)
-            | PlanError::Recording(_),
-        ) => ReachPoint {
-            goal_m,
-            status: "no plan",
-            input_deviation: None,
-            solve_ms,
-        },
+        Err(_) => ("no plan", None), // for this goal
+    };
+    Ok(ReachPoint {
+        goal_m,
+        status,
+        input_deviation,
+        solve_ms,
     })
 }

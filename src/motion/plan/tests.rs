@@ -14,10 +14,8 @@ use crate::robot::{GRAVITY_M_S2, Robot};
 use crate::train::{Method, Origin, Progress, Recordings, TrainOptions, Watch};
 
 fn recordings(split: &str, count: usize) -> Vec<Recording> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/recordings/go1");
-    let path = |k: usize| -> PathBuf { folder.join(format!("{split}_{k:02}.csv.gz")) };
-    let read = (1..=count).map(|k| crate::recording::read(&path(k)));
-    read.collect::<Result<_, _>>().expect("shipped recordings")
+    let names = (1..=count).map(|k| format!("go1/{split}_{k:02}"));
+    names.map(|name| crate::recording::shipped(&name)).collect()
 }
 
 fn model() -> &'static ReducedModel {
@@ -47,12 +45,15 @@ fn plan_inside_the_recorded_range_reaches_its_goal_within_its_bounds() {
         let plan = planned(distance, apex).expect("a plan");
         let [reached, rise] = plan.reached_m;
         assert!((reached - distance).abs() < 2e-3, "{reached} {distance}");
-        assert!((rise - apex).abs() < 4e-3, "{rise} {apex}");
+        assert!((rise - apex).abs() < 1e-3, "{rise} {apex}");
         assert_eq!(plan.verdict, Verdict::Trusted, "{plan:?}");
         assert!(plan.margins.torque_share <= 1.0);
         assert!(plan.margins.beyond_joint_limit_rad <= 2e-3);
         assert!(plan.input_deviation < 1.5, "{}", plan.input_deviation);
     }
+    // The body is highest there however legs swing in flight.
+    let [_, rise] = planned(0.3, 0.16).expect("a plan").reached_m;
+    assert!((rise - 0.16).abs() < 1e-3, "{rise}");
 }
 
 #[test]
@@ -90,28 +91,29 @@ fn plan_read_as_a_recording_has_the_planned_torques_inside_their_limits() {
     };
     let mut bytes = Vec::new();
     let options = crate::recording::WriteOptions::default();
-    crate::recording::write::write_to(&mut bytes, &recording, &options).unwrap();
+    crate::recording::write::write_to(&mut bytes, &recording, None, &options).unwrap();
     let read = crate::recording::read_from_bytes("plan.csv", &bytes).unwrap();
     assert_eq!(read.segments[0].torque_nm, plan.motion.torque_nm);
     let limits = Robot::by_name("go1").unwrap().torque_limit_nm();
     for column in read.segments[0].torque_nm.column_iter() {
-        let inside = column
-            .iter()
-            .zip(limits)
-            .all(|(t, limit)| t.abs() <= *limit);
-        assert!(inside, "{column}");
+        let mut each = column.iter().zip(limits);
+        assert!(each.all(|(t, limit)| t.abs() <= *limit), "{column}");
     }
+}
+
+/// The start of a jump, rolled so far from how it is recorded, and a plan from there.
+fn rolled_start(roll_rad: f64) -> (DVector<f64>, Plan) {
+    let first = &recordings("test", 1)[0].segments[0];
+    let [mut x, dx] = [&first.x, &first.dx].map(|rows| rows.column(0).into_owned());
+    x[15] += roll_rad;
+    let goal = Goal::new(0.3, 0.12).unwrap().from_start(x.clone(), dx);
+    let plan = plan(model(), &goal, &PlanSettings::default());
+    (x, plan.expect("a plan"))
 }
 
 #[test]
 fn plan_starts_from_the_state_it_is_given() {
-    let first = &recordings("test", 1)[0].segments[0];
-    let (x, dx) = (
-        first.x.column(0).into_owned(),
-        first.dx.column(0).into_owned(),
-    );
-    let goal = Goal::new(0.3, 0.12).unwrap().from_start(x.clone(), dx);
-    let plan = plan(model(), &goal, &PlanSettings::default()).expect("a plan");
+    let (x, plan) = rolled_start(0.0);
     let z = model().encode(&x).unwrap();
     let started = model()
         .encode(&plan.motion.x.column(0).into_owned())
@@ -122,14 +124,7 @@ fn plan_starts_from_the_state_it_is_given() {
 
 #[test]
 fn start_that_the_latent_coordinates_drop_is_told() {
-    let first = &recordings("test", 1)[0].segments[0];
-    let (mut x, dx) = (
-        first.x.column(0).into_owned(),
-        first.dx.column(0).into_owned(),
-    );
-    x[15] += 0.3;
-    let goal = Goal::new(0.3, 0.12).unwrap().from_start(x, dx);
-    let plan = plan(model(), &goal, &PlanSettings::default()).expect("a plan");
+    let (_, plan) = rolled_start(0.3);
     let Verdict::Extrapolates(reasons) = &plan.verdict else {
         panic!("{:?}", plan.verdict)
     };
@@ -172,16 +167,10 @@ fn absurd_goals_have_reasons_and_no_plan() {
             ),
         }
     }
-    for (distance, apex) in [
-        (f64::NAN, 0.1),
-        (0.3, f64::NAN),
-        (f64::INFINITY, 0.1),
-        (0.3, 0.0),
-    ] {
-        assert!(matches!(
-            Goal::new(distance, apex),
-            Err(PlanError::Goal { .. })
-        ));
+    for wrong in [f64::NAN, f64::INFINITY, 0.0] {
+        for goal in [Goal::new(wrong, 0.1), Goal::new(0.3, wrong)] {
+            assert!(matches!(goal, Err(PlanError::Goal { .. })), "{wrong}");
+        }
     }
 }
 
@@ -230,16 +219,4 @@ fn jumps_recorded_up_to_touch_down_are_planned_up_to_it() {
     assert!(plan.motion.dx[(seed::BODY_Z, last)] < -0.3, "still falling");
     assert!((plan.reached_m[0] - distance.mean).abs() < 3e-3);
     assert!((plan.reached_m[1] - apex.mean).abs() < 3e-3);
-}
-
-#[test]
-fn apex_is_where_the_body_is_highest_however_legs_swing_in_flight() {
-    for (distance, apex) in [(0.25, 0.115), (0.38, 0.13), (0.3, 0.16)] {
-        let plan = planned(distance, apex).expect("a plan");
-        assert!(
-            (plan.reached_m[1] - apex).abs() < 1e-3,
-            "{:?}",
-            plan.reached_m
-        );
-    }
 }

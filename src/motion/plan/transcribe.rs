@@ -169,23 +169,15 @@ impl<'a> Task<'a> {
         sum
     }
 
-    /// Latent position `i` of a node.
-    pub fn z(&self, part: usize, node: usize, i: usize) -> Affine {
-        let mut value = Affine::of(self.seed.parts[part].z[node][i]);
-        value.add(
-            self.layout.node(part, node) + i,
-            self.seed.prior.state_std[i],
-        );
-        value
-    }
-
-    /// Latent velocity `i` of a node.
-    pub fn dz(&self, part: usize, node: usize, i: usize) -> Affine {
-        let d = self.layout.latent_dim;
-        let mut value = Affine::of(self.seed.parts[part].dz[node][i]);
-        let variable = self.layout.node(part, node) + d + i;
-        value.add(variable, self.seed.prior.state_std[d + i]);
-        value
+    /// Latent position `i` of a node, from `latent_dim` on a velocity.
+    pub fn latent(&self, part: usize, node: usize, i: usize) -> Affine {
+        let of = &self.seed.parts[part];
+        let prior = match i.checked_sub(self.layout.latent_dim) {
+            None => of.z[node][i],
+            Some(i) => of.dz[node][i],
+        };
+        let variable = self.layout.node(part, node) + i;
+        Affine::of(prior).plus(variable, self.seed.prior.state_std[i])
     }
 
     /// A coordinate of the decoded state at a node.
@@ -193,17 +185,17 @@ impl<'a> Task<'a> {
         let mut value = Affine::of(self.seed.decode_bias[coordinate]);
         for i in 0..self.layout.latent_dim {
             let factor = self.seed.decode[(coordinate, i)];
-            value.add_scaled(&self.z(part, node, i), factor);
+            value.add_scaled(&self.latent(part, node, i), factor);
         }
         value
     }
 
     /// A coordinate of the decoded velocity at a node.
     pub fn dx(&self, part: usize, node: usize, coordinate: usize) -> Affine {
-        let mut value = Affine::default();
-        for i in 0..self.layout.latent_dim {
+        let (mut value, d) = (Affine::default(), self.layout.latent_dim);
+        for i in 0..d {
             let factor = self.seed.decode[(coordinate, i)];
-            value.add_scaled(&self.dz(part, node, i), factor);
+            value.add_scaled(&self.latent(part, node, d + i), factor);
         }
         value
     }
@@ -251,9 +243,7 @@ impl<'a> Task<'a> {
         for bound in Bound::ALL {
             let slack = self.layout.slack(bound);
             builder.linear(slack, SLACK_COST);
-            let mut positive = Affine::default();
-            positive.add(slack, -1.0);
-            builder.at_most(positive);
+            builder.at_most(Affine::default().plus(slack, -1.0));
         }
         builder.program(self.layout.len())
     }
@@ -277,9 +267,7 @@ impl<'a> Task<'a> {
         for sign in [-1.0, 1.0] {
             let tau = self.layout.duration(part);
             let bound = DURATION_BOUND.min(sign * y[tau] + DURATION_STEP);
-            let mut row = Affine::of(-bound);
-            row.add(tau, sign);
-            builder.at_most(row);
+            builder.at_most(Affine::of(-bound).plus(tau, sign));
         }
     }
 
@@ -288,21 +276,17 @@ impl<'a> Task<'a> {
     fn equation(&self, part: usize, interval: usize, i: usize, step: f64) -> (Affine, Affine) {
         let d = self.layout.latent_dim;
         let [here, next] = [interval, interval + 1];
-        let (rate, mut row) = match i.checked_sub(d) {
+        let rate = match i.checked_sub(d) {
             None => {
                 let mut rate = Affine::of(self.seed.parts[part].drift[interval][i]);
-                rate.add_scaled(&self.dz(part, here, i), 0.5);
-                rate.add_scaled(&self.dz(part, next, i), 0.5);
-                let mut row = self.z(part, next, i);
-                row.add_scaled(&self.z(part, here, i), -1.0);
-                (rate, row)
+                rate.add_scaled(&self.latent(part, here, d + i), 0.5);
+                rate.add_scaled(&self.latent(part, next, d + i), 0.5);
+                rate
             }
-            Some(i) => {
-                let mut row = self.dz(part, next, i);
-                row.add_scaled(&self.dz(part, here, i), -1.0);
-                (self.acceleration(part, interval, i), row)
-            }
+            Some(i) => self.acceleration(part, interval, i),
         };
+        let mut row = self.latent(part, next, i);
+        row.add_scaled(&self.latent(part, here, i), -1.0);
         row.add_scaled(&rate, -step);
         (row, rate)
     }
@@ -327,23 +311,18 @@ impl<'a> Task<'a> {
     fn ends(&self, y: &[f64], builder: &mut Builder) {
         let d = self.layout.latent_dim;
         let std = &self.seed.prior.state_std;
-        for i in 0..d {
-            let mut position = self.z(0, 0, i);
-            position.constant -= self.seed.start[0][i];
-            builder.equal(scaled(position, std[i]));
-            let mut velocity = self.dz(0, 0, i);
-            velocity.constant -= self.seed.start[1][i];
-            builder.equal(scaled(velocity, std[d + i]));
+        let each = || (0..d).flat_map(|i| [i, d + i]);
+        for i in each() {
+            let mut row = self.latent(0, 0, i);
+            row.constant -= self.seed.start[i / d][i % d];
+            builder.equal(scaled(row, std[i]));
         }
         for part in 1..self.seed.parts.len() {
             let last = self.seed.parts[part - 1].intervals();
-            for i in 0..d {
-                let mut position = self.z(part, 0, i);
-                position.add_scaled(&self.z(part - 1, last, i), -1.0);
-                builder.equal(scaled(position, std[i]));
-                let mut velocity = self.dz(part, 0, i);
-                velocity.add_scaled(&self.dz(part - 1, last, i), -1.0);
-                builder.equal(scaled(velocity, std[d + i]));
+            for i in each() {
+                let mut row = self.latent(part, 0, i);
+                row.add_scaled(&self.latent(part - 1, last, i), -1.0);
+                builder.equal(scaled(row, std[i]));
             }
         }
         builder.equal(scaled(self.apex(y), 0.1));
@@ -366,12 +345,8 @@ impl<'a> Task<'a> {
         let (part, node) = self.last();
         let speed = self.settings.end_speed_m_s;
         for coordinate in [BODY_X, BODY_Z] {
-            within(
-                builder,
-                &self.dx(part, node, coordinate),
-                [-speed, speed],
-                None,
-            );
+            let rate = self.dx(part, node, coordinate);
+            within(builder, &rate, [-speed, speed], None);
         }
         let pitch = self.settings.end_pitch_rad;
         within(builder, &self.x(part, node, PITCH), [-pitch, pitch], None);
@@ -405,13 +380,8 @@ impl<'a> Task<'a> {
                 near(builder, &command, y, ([-share, share], far), torque);
                 let (least, most) = robot.joint_limit_rad()[j];
                 let far = least + FAR_JOINT_RAD..most - FAR_JOINT_RAD;
-                near(
-                    builder,
-                    &self.x(part, node, j),
-                    y,
-                    ([least, most], far),
-                    joint,
-                );
+                let angle = self.x(part, node, j);
+                near(builder, &angle, y, ([least, most], far), joint);
             }
             if of.is_grounded() {
                 self.friction(part, node, friction, builder);
@@ -458,13 +428,18 @@ fn scaled(mut expression: Affine, unit: f64) -> Affine {
 /// Rows that keep an expression in a range, with a violation if there is a variable for it.
 fn within(builder: &mut Builder, value: &Affine, range: [f64; 2], slack: Option<usize>) {
     for (sign, bound) in [(-1.0, -range[0]), (1.0, range[1])] {
-        let mut row = Affine::of(-bound);
-        row.add_scaled(value, sign);
-        if let Some(slack) = slack {
-            row.add(slack, -1.0);
-        }
-        builder.at_most(row);
+        side(builder, value, (sign, bound), slack);
     }
+}
+
+/// The row `sign value <= bound`, with a violation if there is a variable for it.
+fn side(builder: &mut Builder, value: &Affine, (sign, bound): (f64, f64), slack: Option<usize>) {
+    let mut row = Affine::of(-bound);
+    row.add_scaled(value, sign);
+    if let Some(slack) = slack {
+        row.add(slack, -1.0);
+    }
+    builder.at_most(row);
 }
 
 /// The same rows where the expression is not inside `far` at the iterate.
@@ -476,15 +451,10 @@ fn near(
     slack: usize,
 ) {
     let now = value.at(y);
-    for (sign, bound, is_near) in [
-        (-1.0, -range[0], now < far.start),
-        (1.0, range[1], now > far.end),
-    ] {
-        if is_near {
-            let mut row = Affine::of(-bound);
-            row.add_scaled(value, sign);
-            row.add(slack, -1.0);
-            builder.at_most(row);
-        }
+    if now < far.start {
+        side(builder, value, (-1.0, -range[0]), Some(slack));
+    }
+    if now > far.end {
+        side(builder, value, (1.0, range[1]), Some(slack));
     }
 }

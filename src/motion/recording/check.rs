@@ -11,7 +11,8 @@ use nalgebra::DMatrix;
 
 use super::columns::Column;
 use super::error::{RecordingError, RecordingFault};
-use super::segment::{Recording, Segment};
+use super::preprocess::median;
+use super::segment::{Recording, Segment, stretches};
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::kinematics::{LEAST_HEIGHT, LEAST_SPAN};
 use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
@@ -172,25 +173,18 @@ pub fn without(
             let end = finding.samples.end.min(keep.len());
             keep[finding.samples.start.min(end)..end].fill(false);
         }
-        let mut start = 0;
-        while start < keep.len() {
-            let kept = keep[start..].iter().take_while(|k| **k).count();
-            if kept >= 2 {
-                segments.push(segment.slice(start..start + kept));
-            }
-            start += kept + 1;
-        }
+        let kept = stretches(0..keep.len(), |a, b| keep[a] == keep[b]);
+        let kept = kept
+            .into_iter()
+            .filter(|range| keep[range.start] && range.len() >= 2);
+        segments.extend(kept.map(|range| segment.slice(range)));
     }
     if segments.is_empty() {
         let row = recording.segments.first().map_or(1, |s| s.first_row);
         let (found, expected) = (0, 2);
         return Err(RecordingFault::TooShort { found, expected }.at(&recording.path, row));
     }
-    let out = Recording {
-        path: recording.path.clone(),
-        segments,
-        ignored_columns: recording.ignored_columns.clone(),
-    };
+    let out = recording.with_segments(segments);
     let dropped = recording.sample_count() - out.sample_count();
     Ok((out, dropped))
 }
@@ -287,23 +281,23 @@ impl Scan<'_> {
     fn consistency(&mut self) {
         let segment = self.segment;
         for i in 0..STATE_DIM {
-            let (x, dx, ddx) = (
-                row(&segment.x, i),
-                row(&segment.dx, i),
-                row(&segment.ddx, i),
+            let [x, dx, ddx] = [&segment.x, &segment.dx, &segment.ddx].map(|m| row(m, i));
+            let velocity = (Implausible::Velocity, Column::Velocity(i), VELOCITY_FLOOR);
+            let acceleration = (
+                Implausible::Acceleration,
+                Column::Acceleration(i),
+                ACCELERATION_FLOOR,
             );
-            let slack = VELOCITY_FLOOR[group(i)]
-                + CONSISTENCY_SHARE * quantile(dx.iter().map(|v| v.abs()), 0.95)
-                + noise(&segment.time_s, &x);
-            self.column(Implausible::Velocity, Column::Velocity(i), |j| {
-                disagrees(&segment.time_s, &x, &dx, j, slack)
-            });
-            let slack = ACCELERATION_FLOOR[group(i)]
-                + CONSISTENCY_SHARE * quantile(ddx.iter().map(|v| v.abs()), 0.95)
-                + noise(&segment.time_s, &dx);
-            self.column(Implausible::Acceleration, Column::Acceleration(i), |j| {
-                disagrees(&segment.time_s, &dx, &ddx, j, slack)
-            });
+            for ((kind, column, floor), values, rates) in
+                [(velocity, &x, &dx), (acceleration, &dx, &ddx)]
+            {
+                let slack = floor[group(i)]
+                    + CONSISTENCY_SHARE * quantile(rates.iter().map(|v| v.abs()), 0.95)
+                    + noise(&segment.time_s, values);
+                self.column(kind, column, |j| {
+                    disagrees(&segment.time_s, values, rates, j, slack)
+                });
+            }
         }
     }
 
@@ -321,14 +315,10 @@ impl Scan<'_> {
             // In flight nothing pushes the body forwards or sideways: a velocity that does not change is right there.
             let glides = |j: usize| BODY_XY.contains(&i) && segment.feet[j] == [false; 4];
             let at_extreme = |j: usize| segment.dx[(i, j)].abs() == extreme && !glides(j);
-            let mut start = 0;
             let mut clipped = vec![false; n];
-            while start < n {
-                let run = (start..n).take_while(|j| at_extreme(*j)).count();
-                if run >= CLIPPED_SAMPLES {
-                    clipped[start..start + run].fill(true);
-                }
-                start += run + 1;
+            for run in stretches(0..n, |a, b| at_extreme(a) == at_extreme(b)) {
+                let is_long = run.len() >= CLIPPED_SAMPLES;
+                clipped[run.clone()].fill(is_long && at_extreme(run.start));
             }
             self.column(Implausible::Clipped, Column::Velocity(i), |j| {
                 clipped[j].then_some((segment.dx[(i, j)], extreme))
@@ -338,11 +328,8 @@ impl Scan<'_> {
 
     fn time_steps(&mut self) {
         let segment = self.segment;
-        let mut steps: Vec<f64> = segment.time_s.windows(2).map(|w| w[1] - w[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        let Some(median) = steps.get(steps.len() / 2).copied() else {
-            return;
-        };
+        let steps = segment.time_s.windows(2).map(|pair| pair[1] - pair[0]);
+        let median = median(steps);
         self.column(Implausible::TimeStep, Column::Time, |j| {
             let step = segment.time_s[j] - segment.time_s[j.checked_sub(1)?];
             ((step - median).abs() > STEP_SHARE * median).then_some((step, median))
@@ -375,7 +362,7 @@ fn row(matrix: &DMatrix<f64>, index: usize) -> Vec<f64> {
 }
 
 /// The value below which a share of the values lies; 0 if there are none.
-fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
+pub(super) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);
     let place = (sorted.len().saturating_sub(1) as f64 * share) as usize;

@@ -5,8 +5,6 @@
 //! moved by velocity times elapsed time, in every coordinate. A clock is wrong for all of them alike: where they
 //! disagree, a coordinate is wrong, not the clock.
 
-use nalgebra::DMatrix;
-
 use super::error::RecordingError;
 use super::preprocess::{differences, median, resampled};
 use super::segment::Segment;
@@ -38,15 +36,21 @@ pub struct Timed {
     pub segment: Segment,
     /// Time that passed by the motion, over time that passed by the stamps.
     pub elapsed_ratio: f64,
-    /// Whether the times were rebuilt from the motion.
-    pub rebuilt: bool,
-    /// Whether the trunk's angular rates are differences of its angles, because those of the file
-    /// disagree with them.
-    pub rates_replaced: bool,
-    /// Whether the steps were uneven and the samples are interpolated.
-    pub resampled: bool,
+    /// What was mended.
+    pub mended: Mended,
     /// Samples that stand in for lost ones: straight lines across more than five steps.
     pub lost: Vec<bool>,
+}
+
+/// What was mended in a segment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mended {
+    /// Time that passed by the motion over time that passed by the stamps, where times were rebuilt.
+    pub elapsed_ratio: Option<f64>,
+    /// Whether steps were uneven and the segment is resampled.
+    pub resampled: bool,
+    /// Whether the trunk's angular rates are differences of its angles, because those of the file disagree with them.
+    pub rates_replaced: bool,
 }
 
 /// The segment at even time steps; its times are rebuilt where they disagree with the motion, its
@@ -72,24 +76,26 @@ pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
     };
     let step_s = segment.mean_step_s();
     let resamples = !is_even(&chosen);
-    let mut mended = match resamples {
+    let mut segment = match resamples {
         false => chosen.clone(),
         true => {
             let rows = (chosen.duration_s() / step_s).round() as usize + 1;
             resampled(&chosen, rows)?
         }
     };
-    let lost = lost(&chosen.time_s, &mended.time_s, step_s);
-    let rates_replaced = replace_angular_rates(&mut mended);
+    let lost = lost(&chosen.time_s, &segment.time_s, step_s);
+    let rates_replaced = replace_angular_rates(&mut segment);
     if rebuilt || rates_replaced {
-        mended.ddx = differences(&mended.time_s, &mended.dx);
+        segment.ddx = differences(&segment.time_s, &segment.dx);
     }
     Ok(Timed {
-        segment: mended,
+        segment,
         elapsed_ratio,
-        rebuilt,
-        rates_replaced,
-        resampled: resamples,
+        mended: Mended {
+            elapsed_ratio: rebuilt.then_some(elapsed_ratio),
+            resampled: resamples,
+            rates_replaced,
+        },
         lost,
     })
 }
@@ -217,18 +223,10 @@ impl Interval {
 
 /// Some samples of a segment, at other times.
 fn chosen(segment: &Segment, samples: &[usize], time_s: Vec<f64>) -> Segment {
-    let columns = |m: &DMatrix<f64>| m.select_columns(samples);
+    let feet = samples.iter().map(|sample| segment.feet[*sample]);
     let rows = segment.row(segment.len() - 1) - segment.row(0);
     Segment {
-        path: segment.path.clone(),
-        first_row: segment.first_row,
         row_stride: rows as f64 / samples.len().saturating_sub(1).max(1) as f64,
-        time_s,
-        x: columns(&segment.x),
-        dx: columns(&segment.dx),
-        ddx: columns(&segment.ddx),
-        torque_nm: columns(&segment.torque_nm),
-        feet: samples.iter().map(|sample| segment.feet[*sample]).collect(),
-        body_wrench: segment.body_wrench.as_ref().map(columns),
+        ..segment.remade(time_s, feet.collect(), |m| m.select_columns(samples))
     }
 }

@@ -193,13 +193,6 @@ mod tests {
     }
 
     #[test]
-    fn from_header_without_accelerations_is_accepted() {
-        let names = header(|c| !c.is_force() && !c.is_acceleration());
-        let layout = Layout::from_header(Path::new("a.csv"), names).unwrap();
-        assert!(!layout.has_acceleration);
-    }
-
-    #[test]
     fn from_header_some_forces_lists_the_others() {
         let names = header(|c| !c.is_force() || *c == Column::Force(2));
         let error = Layout::from_header(Path::new("a.csv"), names).unwrap_err();

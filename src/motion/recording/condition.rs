@@ -157,8 +157,6 @@ fn long_enough(mut recording: Recording, least: usize) -> Result<Recording, Reco
 
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
-
     use super::*;
 
     /// A robot that stands still, with noise on the accelerations, and one torque that no motor gives.
@@ -167,28 +165,17 @@ mod tests {
         let mut torque_nm = DMatrix::from_element(12, n, 1.0);
         torque_nm[(4, 60)] = 900.0;
         torque_nm[(4, 70)] = 900.0;
-        let path = PathBuf::from("stand.csv");
         let standing = |i: usize, _| match i {
             0..12 => [0.0, 0.7, -1.4][i % 3],
             14 => 0.3,
             _ => 0.0,
         };
-        Recording {
-            path: path.clone(),
-            segments: vec![Segment {
-                path,
-                first_row: 2,
-                row_stride: 1.0,
-                time_s: (0..n).map(|i| 0.002 * i as f64).collect(),
-                x: DMatrix::from_fn(18, n, standing),
-                dx: DMatrix::zeros(18, n),
-                ddx: DMatrix::from_fn(18, n, |_, j| if j % 2 == 0 { 0.5 } else { -0.5 }),
-                torque_nm,
-                feet: vec![[true; 4]; n],
-                body_wrench: None,
-            }],
-            ignored_columns: Vec::new(),
-        }
+        Recording::from(Segment {
+            x: DMatrix::from_fn(18, n, standing),
+            ddx: DMatrix::from_fn(18, n, |_, j| if j % 2 == 0 { 0.5 } else { -0.5 }),
+            torque_nm,
+            ..Segment::still("stand.csv", (0..n).map(|i| 0.002 * i as f64).collect())
+        })
     }
 
     fn go1() -> &'static Robot {
@@ -201,17 +188,12 @@ mod tests {
         let out = condition(recording.clone(), go1(), &ConditionOptions::default()).expect("sound");
         assert_eq!(out.recording, recording);
         assert_eq!(out.left_out, 0);
-        let places: Vec<_> = out
-            .findings
-            .iter()
+        let places: Vec<_> = (out.findings.iter())
             .map(|f| (f.first_row, f.value))
             .collect();
         assert_eq!(places, [(62, 900.0), (72, 900.0)]);
-        assert!(
-            out.findings[0].column.contains("fl.hy"),
-            "{:?}",
-            out.findings[0].column
-        );
+        let column = &out.findings[0].column;
+        assert!(column.contains("fl.hy"), "{column}");
     }
 
     #[test]
@@ -245,9 +227,11 @@ mod tests {
             ..ConditionOptions::default()
         };
         let before = recording();
-        let out = condition(before.clone(), go1(), &smooth)
-            .expect("sound")
-            .recording;
+        let made = |options| {
+            let made = condition(before.clone(), go1(), options);
+            made.expect("sound").recording
+        };
+        let out = made(&smooth);
         let ddx = |recording: &Recording| recording.segments[0].ddx.clone();
         assert!(ddx(&out).norm() < 0.3 * ddx(&before).norm());
         assert_eq!(out.segments[0].torque_nm, before.segments[0].torque_nm);
@@ -256,9 +240,7 @@ mod tests {
             accelerations: Accelerations::Differences,
             ..ConditionOptions::default()
         };
-        let out = condition(before.clone(), go1(), &differences)
-            .expect("sound")
-            .recording;
+        let out = made(&differences);
         assert_eq!(ddx(&out).amax(), 0.0);
     }
 

@@ -4,21 +4,15 @@
 //! header; columns by name in any order; gzip found from the first two bytes.
 //! Memory is bounded by the samples kept: lines and rows have a limit.
 
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
-
-use flate2::bufread::MultiGzDecoder;
 
 use super::columns::Layout;
 use super::error::{RecordingError, RecordingFault};
 use super::foreign::Assembled;
-use super::lines::{Lines, split_cells};
+use super::lines::{Lines, cells};
 use super::segment::Recording;
 use super::segments::DERIVED_DDX;
 use super::table::Table;
-
-pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// Reads a recording, plain or gzip.
 ///
@@ -33,11 +27,7 @@ pub fn read(path: &Path) -> Result<Recording, RecordingError> {
 /// # Errors
 /// As [`read`].
 pub(super) fn read_noted(path: &Path) -> Result<Assembled, RecordingError> {
-    let file = File::open(path).map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => RecordingFault::Missing.of(path),
-        _ => RecordingFault::io("open", source).of(path),
-    })?;
-    unpacked(path, file)
+    read_lines(path, Lines::open(path)?)
 }
 
 /// Reads a recording from memory; `name` stands for the file in messages.
@@ -45,37 +35,11 @@ pub(super) fn read_noted(path: &Path) -> Result<Assembled, RecordingError> {
 /// # Errors
 /// As [`read`]. No bytes make it panic.
 pub fn read_from_bytes(name: &str, bytes: &[u8]) -> Result<Recording, RecordingError> {
-    read_from(Path::new(name), bytes)
+    let path = Path::new(name);
+    read_lines(path, Lines::of(path, bytes)?).map(|assembled| assembled.recording)
 }
 
-/// Reads a recording from any source; `path` stands for it in messages.
-///
-/// # Errors
-/// As [`read`].
-pub fn read_from(path: &Path, source: impl Read) -> Result<Recording, RecordingError> {
-    unpacked(path, source).map(|assembled| assembled.recording)
-}
-
-fn unpacked(path: &Path, mut source: impl Read) -> Result<Assembled, RecordingError> {
-    let mut start = Vec::with_capacity(2);
-    (&mut source)
-        .take(2)
-        .read_to_end(&mut start)
-        .map_err(|source| RecordingFault::io("read", source).of(path))?;
-    let compressed = start == GZIP_MAGIC;
-    let source = BufReader::new(io::Cursor::new(start).chain(source));
-    if compressed {
-        let unpacked = BufReader::new(MultiGzDecoder::new(source));
-        read_lines(path, Lines::new(path, unpacked, true))
-    } else {
-        read_lines(path, Lines::new(path, source, false))
-    }
-}
-
-fn read_lines<R: BufRead>(
-    path: &Path,
-    mut lines: Lines<'_, R>,
-) -> Result<Assembled, RecordingError> {
+fn read_lines(path: &Path, mut lines: Lines<'_>) -> Result<Assembled, RecordingError> {
     let (delimiter, layout) = read_header(path, &mut lines)?;
     let mut table = Table::new(path, delimiter, &layout);
     let mut blank = None;
@@ -101,13 +65,9 @@ fn read_lines<R: BufRead>(
     })
 }
 
-fn read_header<R: BufRead>(
-    path: &Path,
-    lines: &mut Lines<'_, R>,
-) -> Result<(char, Layout), RecordingError> {
-    let (row, line) = match lines.next_row()? {
-        None => return Err(RecordingFault::Empty.of(path)),
-        Some(found) => found,
+fn read_header(path: &Path, lines: &mut Lines<'_>) -> Result<(char, Layout), RecordingError> {
+    let Some((row, line)) = lines.next_row()? else {
+        return Err(RecordingFault::Empty.of(path));
     };
     if line.trim().is_empty() {
         while let Some((row, line)) = lines.next_row()? {
@@ -120,19 +80,9 @@ fn read_header<R: BufRead>(
         }
         return Err(RecordingFault::Empty.of(path));
     }
-    let delimiter = if line.contains(';') {
-        ';'
-    } else if line.contains('\t') {
-        '\t'
-    } else if line.contains(',') {
-        ','
-    } else {
-        return Err(RecordingFault::delimiter(line, "`;`, a tab or `,`").at(path, row));
-    };
-    let mut names = Vec::new();
-    split_cells::<RecordingError>(line, delimiter, |cell| {
-        names.push(cell.to_owned());
-        Ok(())
-    })?;
+    let delimiter = ([';', '\t', ','].into_iter())
+        .find(|mark| line.contains(*mark))
+        .ok_or_else(|| RecordingFault::delimiter(line, "`;`, a tab or `,`").at(path, row))?;
+    let names = cells(line, delimiter).map(str::to_owned).collect();
     Ok((delimiter, Layout::from_header(path, names)?))
 }

@@ -1,5 +1,7 @@
 //! Faults between a file and a segment ready for training.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use std::io;
 use std::path::Path;
 
@@ -39,9 +41,7 @@ pub enum RecordingFault {
     /// The file cannot be opened, read or written.
     #[error("cannot {action}")]
     Io {
-        /// `open`, `read` or `write`.
         action: &'static str,
-        /// The system's reason.
         source: io::Error,
     },
     /// The gzip stream is damaged or ends early.
@@ -56,9 +56,7 @@ pub enum RecordingFault {
     /// A row is not separated as its header is, or the header not at all.
     #[error("found `{found}`, expected cells separated by {expected}")]
     Delimiter {
-        /// The start of the line.
         found: String,
-        /// The separators expected.
         expected: &'static str,
     },
     /// Columns that the format requires are absent.
@@ -69,28 +67,18 @@ pub enum RecordingFault {
         foreign_hint(columns)
     )]
     MissingColumns {
-        /// Their names, in the order of the format.
         columns: Vec<String>,
-        /// The names found.
         found: Vec<String>,
     },
     /// Two columns have the same name.
     #[error("occurs twice, as number {first} and {second}")]
-    DuplicateColumn {
-        /// Its first place, counted from 1.
-        first: usize,
-        /// Its second place.
-        second: usize,
-    },
+    DuplicateColumn { first: usize, second: usize },
     /// A row has fewer cells than the header, or more; the place is the first column without a
     /// cell, or the last column.
     #[error("found {found} cells, expected {expected}{hint}")]
     RowLength {
-        /// Cells found.
         found: usize,
-        /// Columns of the header.
         expected: usize,
-        /// A likely reason, or nothing.
         hint: &'static str,
     },
     /// A map of columns is no valid TOML, or has a key that maps do not have.
@@ -98,22 +86,12 @@ pub enum RecordingFault {
     MapSyntax(String),
     /// A key of a map of columns does not fit the map or the log.
     #[error("found {found}, expected {expected}")]
-    Map {
-        /// What the map says, or lacks.
-        found: String,
-        /// What would fit.
-        expected: String,
-    },
+    Map { found: String, expected: String },
     /// A topic with a clock of its own has no sample for longer than is interpolated; in s.
     #[error(
         "found no sample for {found} s, expected at most {expected} s (`max_gap_s` in `[time]`)"
     )]
-    Gap {
-        /// Distance of two samples.
-        found: f64,
-        /// Largest distance accepted.
-        expected: f64,
-    },
+    Gap { found: f64, expected: f64 },
     /// The clocks of a log's topics have no two samples in common.
     #[error("found clocks that do not overlap, expected topics of the same time")]
     NoOverlap,
@@ -123,9 +101,7 @@ pub enum RecordingFault {
     /// A cell is not a finite number.
     #[error("found `{found}`, expected {expected}")]
     Number {
-        /// The cell's text, cut after 40 characters.
         found: String,
-        /// The notation of numbers in this file.
         expected: &'static str,
     },
     /// A contact flag is neither 0 nor 1.
@@ -135,36 +111,16 @@ pub enum RecordingFault {
     #[error(
         "found a sample every {found} s on average, expected at most {expected} s; is `Time` in milliseconds?"
     )]
-    Sampling {
-        /// Mean distance between samples.
-        found: f64,
-        /// Largest distance accepted.
-        expected: f64,
-    },
+    Sampling { found: f64, expected: f64 },
     /// Time stands still, or steps back by less than a new segment would.
     #[error("found {found} s after {previous} s, expected a later time or a new segment")]
-    Time {
-        /// The row's time.
-        found: f64,
-        /// The time of the row before.
-        previous: f64,
-    },
+    Time { found: f64, previous: f64 },
     /// A stretch of samples, which begins at the row, is too short for what is asked of it.
     #[error("found {found} consecutive samples, expected at least {expected}")]
-    TooShort {
-        /// Samples found.
-        found: usize,
-        /// Samples needed.
-        expected: usize,
-    },
-    /// The text is not UTF-8.
+    TooShort { found: usize, expected: usize },
+    /// The text is not UTF-8; bytes of a line count from 1.
     #[error("found 0x{found:02x} as byte {byte}, expected UTF-8 text")]
-    Encoding {
-        /// Byte in the line, counted from 1.
-        byte: usize,
-        /// The byte.
-        found: u8,
-    },
+    Encoding { byte: usize, found: u8 },
     /// A line is longer than this many bytes, and so no recording's.
     #[error("found a line of more than {0} bytes, expected a recording")]
     LineTooLong(usize),
@@ -180,9 +136,7 @@ pub enum RecordingFault {
         listed(phases, 8)
     )]
     NoPhase {
-        /// The first row's contact flags.
         feet: [bool; 4],
-        /// Names of the rule's phases.
         phases: Vec<String>,
     },
     /// A smoothing window and polynomial order that do not fit together; no file's fault.
@@ -190,12 +144,7 @@ pub enum RecordingFault {
         "smoothing window {window} with order {order}: expected an odd window above the order, \
              at most 1001, and an order of at most 12"
     )]
-    Smoothing {
-        /// Samples of the window.
-        window: usize,
-        /// Degree of the polynomial.
-        order: usize,
-    },
+    Smoothing { window: usize, order: usize },
     /// A batch of this many rows was asked for; no file's fault.
     #[error("found a batch of {0} rows, expected at least 2")]
     Batch(usize),
@@ -207,6 +156,14 @@ pub enum RecordingFault {
 impl RecordingFault {
     pub(super) fn io(action: &'static str, source: io::Error) -> Self {
         RecordingFault::Io { action, source }
+    }
+
+    /// A file that cannot be opened or read; there may be none.
+    pub(super) fn unreadable(action: &'static str, source: io::Error) -> Self {
+        match source.kind() {
+            io::ErrorKind::NotFound => RecordingFault::Missing,
+            _ => RecordingFault::io(action, source),
+        }
     }
 
     /// A line that is not separated as expected.

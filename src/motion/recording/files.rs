@@ -214,25 +214,15 @@ impl RecordingFiles {
         recording: &Recording,
     ) -> Result<ConditionOptions, RecordingError> {
         let mut options = self.options.clone();
-        let rebuilt = reading
-            .mended
-            .iter()
-            .any(|mended| mended.elapsed_ratio.is_some());
-        let step_s = recording
-            .segments
-            .iter()
-            .map(Segment::mean_step_s)
-            .fold(0.0, f64::max);
+        let rebuilt = (reading.mended.iter()).any(|mended| mended.elapsed_ratio.is_some());
+        let segments = || recording.segments.iter();
+        let step_s = segments().map(Segment::mean_step_s).fold(0.0, f64::max);
         let half = (HALF_SMOOTHING_S / step_s).round();
-        let window = if half.is_finite() {
-            2 * half as usize + 1
-        } else {
-            1
+        let window = match half.is_finite() {
+            true => 2 * half as usize + 1,
+            false => 1,
         };
-        let fits = recording
-            .segments
-            .iter()
-            .all(|segment| segment.len() >= window);
+        let fits = segments().all(|segment| segment.len() >= window);
         if options.smoothing.is_none() && rebuilt && window > SMOOTHING_ORDER && fits {
             let filter = SavitzkyGolay::new(window, SMOOTHING_ORDER)?;
             options.smoothing = Some((filter, SmoothedRows::All));
@@ -246,11 +236,7 @@ impl RecordingFiles {
     /// The recordings of one file, and its reading without samples. Checks that only report are made once.
     fn read(&self, file: &RecordingFile) -> Result<Ready, RecordingError> {
         let mut reading = self.reader.read(&file.path)?;
-        let empty = Recording {
-            path: file.path.clone(),
-            segments: Vec::new(),
-            ignored_columns: Vec::new(),
-        };
+        let empty = reading.recording.with_segments(Vec::new());
         let recording = std::mem::replace(&mut reading.recording, empty);
         let options = self.options_for(&mut reading, &recording)?;
         let keeps = self.options.implausible == ImplausibleSamples::Keep;
@@ -276,16 +262,11 @@ impl RecordingFiles {
 /// The recordings of one file, conditioned, and what reading did.
 type Ready = (Vec<Conditioned>, Reading);
 
-/// The whole recording of a file, or the segments that are asked for.
+/// The whole recording of a file, or a recording for each segment that is asked for.
 fn chosen(file: &RecordingFile, recording: Recording) -> Vec<Recording> {
-    match &file.segments {
-        None => vec![recording],
-        Some(chosen) => single_segments(recording, chosen),
-    }
-}
-
-/// A recording for each chosen segment.
-fn single_segments(recording: Recording, chosen: &[usize]) -> Vec<Recording> {
+    let Some(chosen) = &file.segments else {
+        return vec![recording];
+    };
     let single = |segment| Recording {
         path: recording.path.clone(),
         segments: vec![segment],

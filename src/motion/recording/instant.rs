@@ -34,12 +34,11 @@ impl Instant {
     /// A decimal number of any length, with a decimal point; `None` for other text.
     pub fn from_decimal(text: &str) -> Option<Self> {
         let (whole, rest) = text.split_once('.').unwrap_or((text, "0"));
-        let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-        if !digits(rest) || !digits(whole) {
+        if !is_digits(rest) {
             return None;
         }
         Some(Instant {
-            whole: whole.parse().ok()?,
+            whole: self::whole(whole)?,
             rest: format!("0.{rest}").parse().ok()?,
         })
     }
@@ -88,19 +87,19 @@ fn without_zone(time: &str) -> Option<(&str, i64)> {
     Some((clock, sign * (hours * 3600 + minutes * 60)))
 }
 
+fn is_digits(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit())
+}
+
 fn whole(text: &str) -> Option<i64> {
-    let digits = !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-    digits.then(|| text.parse().ok()).flatten()
+    text.parse().ok().filter(|_| is_digits(text))
 }
 
 /// Days from 1970-01-01 to a date of the Gregorian calendar, `2026-03-01`.
 fn days_since_1970(date: &str) -> Option<i64> {
     let mut parts = date.trim().split(['-', '/']);
-    let (year, month, day) = (
-        whole(parts.next()?)?,
-        whole(parts.next()?)?,
-        whole(parts.next()?)?,
-    );
+    let mut next = || whole(parts.next()?);
+    let (year, month, day) = (next()?, next()?, next()?);
     let valid = (1..=12).contains(&month) && (1..=31).contains(&day) && year < 10_000;
     if parts.next().is_some() || !valid {
         return None;

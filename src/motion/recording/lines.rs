@@ -1,7 +1,10 @@
 //! Lines of a file in bounded memory, and their cells.
 
-use std::io::{BufRead, Read};
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
+
+use flate2::bufread::MultiGzDecoder;
 
 use super::error::{RecordingError, RecordingFault};
 
@@ -11,9 +14,11 @@ pub(super) const MAX_LINE_BYTES: usize = 1 << 16;
 /// Most empty lines in a row, and in all beyond one for each that is not; compressed, billions would fit into a small file.
 const MAX_BLANK_ROWS: usize = 10_000;
 
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+
 /// The rows of a text, without line ends, byte order mark or trailing blanks.
-pub(super) struct Lines<'a, R> {
-    source: R,
+pub(super) struct Lines<'a> {
+    source: Box<dyn BufRead + 'a>,
     path: &'a Path,
     compressed: bool,
     row: usize,
@@ -22,16 +27,34 @@ pub(super) struct Lines<'a, R> {
     buffer: Vec<u8>,
 }
 
-impl<'a, R: BufRead> Lines<'a, R> {
-    pub fn new(path: &'a Path, source: R, compressed: bool) -> Self {
-        Lines {
-            source,
+impl<'a> Lines<'a> {
+    /// Of a file, plain or gzip.
+    pub fn open(path: &'a Path) -> Result<Self, RecordingError> {
+        let file = File::open(path)
+            .map_err(|source| RecordingFault::unreadable("open", source).of(path))?;
+        Self::of(path, file)
+    }
+
+    /// Of any source, plain or gzip, found from the first two bytes; `path` stands for it in messages.
+    pub fn of(path: &'a Path, mut source: impl Read + 'a) -> Result<Self, RecordingError> {
+        let mut start = Vec::with_capacity(2);
+        (&mut source)
+            .take(2)
+            .read_to_end(&mut start)
+            .map_err(|source| RecordingFault::io("read", source).of(path))?;
+        let compressed = start == GZIP_MAGIC;
+        let source = BufReader::new(io::Cursor::new(start).chain(source));
+        Ok(Lines {
+            source: match compressed {
+                true => Box::new(BufReader::new(MultiGzDecoder::new(source))),
+                false => Box::new(source),
+            },
             path,
             compressed,
             row: 0,
             blank: [0; 2],
             buffer: Vec::new(),
-        }
+        })
     }
 
     /// The next row's number and text; `None` at the end of the file.
@@ -96,33 +119,22 @@ impl<'a, R: BufRead> Lines<'a, R> {
     }
 }
 
-/// Calls `visit` with each cell of a line, trimmed and without its quotes.
+/// The cells of a line, trimmed and without their quotes.
 ///
-/// A delimiter inside a pair of double quotes does not separate.
-pub(super) fn split_cells<E>(
-    line: &str,
-    delimiter: char,
-    mut visit: impl FnMut(&str) -> Result<(), E>,
-) -> Result<(), E> {
-    if count(line, '"') == 0 && delimiter.is_ascii() {
-        let mut start = 0;
-        for (end, byte) in line.bytes().enumerate() {
-            if byte == delimiter as u8 {
-                visit(trimmed(&line[start..end]))?;
-                start = end + 1;
-            }
-        }
-        return visit(trimmed(&line[start..]));
-    }
-    let mut quoted = false;
-    let separates = |c: char| {
-        quoted ^= c == '"';
-        c == delimiter && !quoted
-    };
-    line.split(separates).try_for_each(|cell| {
-        let cell = cell.trim();
+/// A delimiter (an ASCII character) inside a pair of double quotes does not separate.
+pub(super) fn cells(line: &str, delimiter: char) -> impl Iterator<Item = &str> {
+    let mut rest = Some(line);
+    std::iter::from_fn(move || {
+        let text = rest?;
+        let mut quoted = false;
+        let end = text.bytes().position(|byte| {
+            quoted ^= byte == b'"';
+            byte == delimiter as u8 && !quoted
+        });
+        let cell = trimmed(&text[..end.unwrap_or(text.len())]);
+        rest = end.map(|end| &text[end + 1..]);
         let bare = cell.strip_prefix('"').and_then(|c| c.strip_suffix('"'));
-        visit(bare.unwrap_or(cell).trim())
+        Some(bare.map_or(cell, str::trim))
     })
 }
 
@@ -144,44 +156,26 @@ fn trimmed(cell: &str) -> &str {
 mod tests {
     use super::*;
 
-    fn cells(line: &str, delimiter: char) -> Vec<String> {
-        let mut out = Vec::new();
-        split_cells::<()>(line, delimiter, |cell| {
-            out.push(cell.to_owned());
-            Ok(())
-        })
-        .unwrap();
-        out
-    }
-
     #[test]
-    fn split_cells_quoted_delimiter_does_not_separate() {
-        assert_eq!(cells("\"0,5\", 1 ,\"a\"", ','), ["0,5", "1", "a"]);
-        assert_eq!(cells("a;;b;", ';'), ["a", "", "b", ""]);
-        assert_eq!(cells("\"a;b", ';'), ["\"a;b"]);
-    }
-
-    #[test]
-    fn next_row_strips_mark_and_line_ends() {
-        let text = b"\xef\xbb\xbfa\r\nb\n\nc";
-        let mut lines = Lines::new(Path::new("t"), &text[..], false);
-        let mut rows = Vec::new();
-        while let Some((row, text)) = lines.next_row().unwrap() {
-            rows.push((row, text.to_owned()));
+    fn cells_quoted_delimiter_does_not_separate() {
+        for (line, delimiter, expected) in [
+            ("\"0,5\", 1 ,\"a\"", ',', &["0,5", "1", "a"][..]),
+            ("a;;b;", ';', &["a", "", "b", ""]),
+            ("\"a;b", ';', &["\"a;b"]),
+        ] {
+            assert_eq!(cells(line, delimiter).collect::<Vec<_>>(), expected);
         }
-        let expected = [(1, "a"), (2, "b"), (3, ""), (4, "c")];
-        assert!(rows.iter().map(|(r, t)| (*r, t.as_str())).eq(expected));
     }
 
     #[test]
     fn next_row_longest_line_is_read_and_one_byte_more_is_not() {
-        let mut text = vec![b'1'; MAX_LINE_BYTES];
-        text.push(b'\n');
-        let mut lines = Lines::new(Path::new("t"), &text[..], false);
-        assert!(lines.next_row().unwrap().is_some());
-        text.insert(0, b'1');
-        let mut lines = Lines::new(Path::new("t"), &text[..], false);
-        let error = lines.next_row().unwrap_err();
+        let read = |ones: usize| {
+            let text = [vec![b'1'; ones], b"\n".to_vec()].concat();
+            let mut lines = Lines::of(Path::new("t"), &text[..]).unwrap();
+            lines.next_row().map(|row| row.is_some())
+        };
+        assert!(read(MAX_LINE_BYTES).unwrap());
+        let error = read(MAX_LINE_BYTES + 1).unwrap_err();
         assert!(matches!(error.kind, RecordingFault::LineTooLong(_)));
         assert_eq!(error.place.row(), Some(1));
     }

@@ -48,8 +48,9 @@ const ORIGIN: (f64, f64) = (1.0, 0.5);
 /// Height of the feet that are on the ground, m.
 const FLOOR_M: f64 = 0.1;
 
-/// What does not fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+/// What does not fit; in JSON one word such as `foot_slip`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum MismatchKind {
     /// Feet on the ground move.
     FootSlip,
@@ -71,24 +72,6 @@ pub enum MismatchKind {
     Origin,
     /// Feet on the ground are not at height zero.
     Floor,
-}
-
-impl MismatchKind {
-    /// The kind in one word, as JSON has it.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::FootSlip => "foot_slip",
-            Self::LegsOrSigns => "legs_or_signs",
-            Self::FeetColumns => "feet_columns",
-            Self::Fall => "fall",
-            Self::Weight => "weight",
-            Self::HipTorques => "hip_torques",
-            Self::Accelerations => "accelerations",
-            Self::OtherRobot => "other_robot",
-            Self::Origin => "origin",
-            Self::Floor => "floor",
-        }
-    }
 }
 
 /// Something about a whole recording that cannot be true of the robot.
@@ -198,27 +181,25 @@ fn origin(recording: &Recording) -> Option<Mismatch> {
         let starts = starts.map(|start| start[JOINT_DIM + coordinate].abs());
         starts.fold(0.0, f64::max)
     });
-    let (far, turned) = (x.max(y), yaw);
-    let (kind, advice) = (
-        MismatchKind::Origin,
-        "models expect jumps that begin near the origin and run along x",
-    );
-    if far > ORIGIN.0 {
-        return Some(Mismatch {
-            kind,
-            value: far,
-            bound: ORIGIN.0,
-            words: format!(
-                "a segment begins {far:.2} m from the origin: {advice}; `origin = \"start\"` in a map of columns \
-                 counts x and y from the first sample"
-            ),
-        });
-    }
-    (turned > ORIGIN.1).then(|| Mismatch {
-        kind,
-        value: turned,
-        bound: ORIGIN.1,
-        words: format!("a segment begins turned by {turned:.2} rad about the vertical: {advice}"),
+    let far = x.max(y);
+    let advice = "models expect jumps that begin near the origin and run along x";
+    let (value, bound, words) = if far > ORIGIN.0 {
+        let words = format!(
+            "a segment begins {far:.2} m from the origin: {advice}; `origin = \"start\"` in a map of columns counts x \
+             and y from the first sample"
+        );
+        (far, ORIGIN.0, words)
+    } else if yaw > ORIGIN.1 {
+        let words = format!("a segment begins turned by {yaw:.2} rad about the vertical: {advice}");
+        (yaw, ORIGIN.1, words)
+    } else {
+        return None;
+    };
+    Some(Mismatch {
+        kind: MismatchKind::Origin,
+        value,
+        bound,
+        words,
     })
 }
 

@@ -13,14 +13,11 @@
 //! # let folder = std::env::temp_dir().join(format!("romc-doc-{}", std::process::id()));
 //! # std::fs::create_dir_all(&folder)?;
 //! # let path = folder.join("hop.csv");
-//! # let feet = |i: usize| [!(3..6).contains(&i); 4];
-//! # let constant = |rows: usize, value: f64| nalgebra::DMatrix::from_element(rows, 8, value);
-//! # recording::write(&path, &recording::Recording { path: path.clone(), ignored_columns: vec![],
-//! #     segments: vec![recording::Segment { path: path.clone(), first_row: 2, row_stride: 1.0,
-//! #     time_s: (0..8).map(|i| 0.002 * i as f64).collect(),
-//! #     x: nalgebra::DMatrix::from_fn(18, 8, |i, _| if i < 12 { [0.0, 0.7, -1.4][i % 3] } else { 0.3 }),
-//! #     dx: constant(18, 0.0), ddx: constant(18, 0.0),
-//! #     torque_nm: constant(12, 1.0), feet: (0..8).map(feet).collect(), body_wrench: None }] })?;
+//! # let mut hop = recording::Segment::still(&path, (0..8).map(|i| 0.002 * i as f64).collect());
+//! # hop.x = nalgebra::DMatrix::from_fn(18, 8, |i, _| if i < 12 { [0.0, 0.7, -1.4][i % 3] } else { 0.3 });
+//! # hop.torque_nm.fill(1.0);
+//! # hop.feet[3..6].fill([false; 4]);
+//! # recording::write(&path, &hop.into())?;
 //! let jump = recording::read(&path)?;
 //! let segment = &jump.segments[0];
 //! let rule = InputRule::published(Robot::by_name("go1")?);
@@ -55,7 +52,8 @@ mod segments;
 mod table;
 
 pub use self::csv::{read, read_from_bytes};
-pub use self::write::{WriteOptions, write, write_inputs_with, write_mcap, write_with};
+pub use self::write::{WriteOptions, write, write_mcap, write_with};
+pub use clock::Mended;
 pub use condition::{
     Accelerations, ConditionOptions, Conditioned, ImplausibleSamples, SmoothedRows, condition,
 };
@@ -63,5 +61,12 @@ pub use error::{RecordingError, RecordingFault};
 pub use files::{RecordingFile, RecordingFiles, Source};
 pub use foreign::map::ColumnMap;
 pub use phases::{PhaseRule, PhaseSpan, Stance};
-pub use reader::{Clocks, Mended, Reader, Reading, ReadingNotes};
+pub use reader::{Clocks, Reader, Reading, ReadingNotes};
 pub use segment::{Recording, Segment};
+
+/// A recording below `examples/recordings`, such as `go1/test_01`.
+#[cfg(test)]
+pub(crate) fn shipped(name: &str) -> Recording {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/recordings");
+    read(format!("{folder}/{name}.csv.gz").as_ref()).expect("a shipped recording")
+}

@@ -1,25 +1,19 @@
 //! Cells as numbers, with a decimal point or a decimal comma.
 
-/// The decimal mark of a file: the first one met holds for the rest.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum DecimalMark {
-    Unknown,
-    Point,
-    Comma,
-}
-
 /// Reads cells, and learns the file's decimal mark from them.
 #[derive(Debug)]
 pub(super) struct NumberReader {
-    mark: DecimalMark,
+    /// `.` or `,`: the first one met holds for the rest.
+    mark: Option<u8>,
     /// A cell with its comma replaced, kept to spare an allocation a cell.
     pointed: String,
 }
 
 impl NumberReader {
-    pub fn new(mark: DecimalMark) -> Self {
+    /// Of cells that are separated by this character: between commas the mark is a point.
+    pub fn new(delimiter: char) -> Self {
         NumberReader {
-            mark,
+            mark: (delimiter == ',').then_some(b'.'),
             pointed: String::new(),
         }
     }
@@ -27,9 +21,9 @@ impl NumberReader {
     /// What a number looks like, for messages.
     pub fn expected(&self) -> &'static str {
         match self.mark {
-            DecimalMark::Unknown => "a number",
-            DecimalMark::Point => "a number with a decimal point",
-            DecimalMark::Comma => "a number with a decimal comma",
+            None => "a number",
+            Some(b'.') => "a number with a decimal point",
+            Some(_) => "a number with a decimal comma",
         }
     }
 
@@ -39,15 +33,12 @@ impl NumberReader {
         let Some(place) = cell.bytes().position(|b| b == b'.' || b == b',') else {
             return cell.parse().ok();
         };
-        let found = match cell.as_bytes()[place] {
-            b',' => DecimalMark::Comma,
-            _ => DecimalMark::Point,
-        };
-        if self.mark != found && self.mark != DecimalMark::Unknown {
+        let found = cell.as_bytes()[place];
+        if self.mark.is_some_and(|mark| mark != found) {
             return None;
         }
         let value = match found {
-            DecimalMark::Comma => {
+            b',' => {
                 // A second mark of either kind fails to parse.
                 self.pointed.clear();
                 self.pointed.push_str(&cell[..place]);
@@ -55,9 +46,9 @@ impl NumberReader {
                 self.pointed.push_str(&cell[place + 1..]);
                 self.pointed.parse().ok()?
             }
-            DecimalMark::Point | DecimalMark::Unknown => cell.parse().ok()?,
+            _ => cell.parse().ok()?,
         };
-        self.mark = found;
+        self.mark = Some(found);
         Some(value)
     }
 }
@@ -67,7 +58,7 @@ mod tests {
     use super::*;
 
     fn unknown() -> NumberReader {
-        NumberReader::new(DecimalMark::Unknown)
+        NumberReader::new(';')
     }
 
     #[test]
@@ -91,11 +82,5 @@ mod tests {
         ] {
             assert_eq!(unknown().parse(cell), None, "{cell}");
         }
-    }
-
-    #[test]
-    fn parse_not_finite_text_is_returned_for_the_caller_to_refuse() {
-        assert!(unknown().parse("NaN").unwrap().is_nan());
-        assert_eq!(unknown().parse("1e999"), Some(f64::INFINITY));
     }
 }

@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use super::error::{RecordingError, RecordingFault};
-use super::segment::Segment;
+use super::segment::{Segment, stretches};
 use crate::robot::{ContactFlags, FeetRule};
 
 /// Fewest samples of a span: fewer are chatter of contact and join the span before them.
@@ -112,18 +112,18 @@ impl PhaseRule {
     pub fn spans(&self, segment: &Segment) -> Result<Vec<PhaseSpan>, RecordingError> {
         let feet = &segment.feet;
         let mut phases: Vec<Option<usize>> = feet.iter().map(|f| self.phase_of(*f)).collect();
-        let Some(first_known) = phases.iter().position(Option::is_some) else {
-            return match feet.first() {
-                None => Ok(Vec::new()),
-                Some(&feet) => {
-                    let phases = self.names();
-                    let fault = RecordingFault::NoPhase { feet, phases };
-                    Err(fault.at(&segment.path, segment.row(0)))
-                }
+        if phases.iter().all(Option::is_none) {
+            let Some(&feet) = feet.first() else {
+                return Ok(Vec::new());
             };
-        };
-        assign_transitional(&mut phases, feet, first_known);
-        let runs = runs_of(phases.into_iter().flatten());
+            let phases = self.names();
+            let fault = RecordingFault::NoPhase { feet, phases };
+            return Err(fault.at(&segment.path, segment.row(0)));
+        }
+        assign_transitional(&mut phases, feet);
+        let phases: Vec<usize> = phases.into_iter().flatten().collect();
+        let runs = stretches(0..phases.len(), |a, b| phases[a] == phases[b]).into_iter();
+        let runs = runs.map(|range| (phases[range.start], range));
         let runs = merge_short(runs, self.min_samples);
         Ok(with_stance(runs, feet))
     }
@@ -140,42 +140,31 @@ fn feet_down(feet: ContactFlags) -> usize {
     feet.iter().filter(|down| **down).count()
 }
 
-fn assign_transitional(phases: &mut [Option<usize>], feet: &[ContactFlags], first_known: usize) {
-    let known = phases[first_known];
-    phases[..first_known].fill(known);
-    let mut at = first_known;
-    while at < phases.len() {
-        if phases[at].is_some() {
-            at += 1;
+/// Gives runs of samples without phase that of a neighbour, of which at least one has a phase.
+fn assign_transitional(phases: &mut [Option<usize>], feet: &[ContactFlags]) {
+    let runs = stretches(0..phases.len(), |a, b| {
+        phases[a].is_some() == phases[b].is_some()
+    });
+    for run in runs {
+        if phases[run.start].is_some() {
             continue;
         }
-        let before = phases[at - 1];
-        let end = phases[at..].iter().position(Option::is_some);
-        let Some(end) = end.map(|offset| at + offset) else {
-            phases[at..].fill(before);
-            return;
+        let before = run.start.checked_sub(1);
+        let after = (run.end < phases.len()).then_some(run.end);
+        let down = |sample: Option<usize>| sample.map(|sample| feet_down(feet[sample]));
+        let joined = if down(after) > down(before) {
+            after
+        } else {
+            before
         };
-        let joins_next = feet_down(feet[end]) > feet_down(feet[at - 1]);
-        let phase = if joins_next { phases[end] } else { before };
-        phases[at..end].fill(phase);
-        at = end;
+        let phase = joined.and_then(|sample| phases[sample]);
+        phases[run].fill(phase);
     }
 }
 
 type Run = (usize, Range<usize>);
 
-fn runs_of(phases: impl Iterator<Item = usize>) -> Vec<Run> {
-    let mut runs: Vec<Run> = Vec::new();
-    for (sample, phase) in phases.enumerate() {
-        match runs.last_mut() {
-            Some((last, range)) if *last == phase => range.end = sample + 1,
-            _ => runs.push((phase, sample..sample + 1)),
-        }
-    }
-    runs
-}
-
-fn merge_short(runs: Vec<Run>, min_samples: usize) -> Vec<Run> {
+fn merge_short(runs: impl Iterator<Item = Run>, min_samples: usize) -> Vec<Run> {
     let mut out: Vec<Run> = Vec::new();
     for (phase, range) in runs {
         match out.last_mut() {
@@ -198,10 +187,8 @@ fn with_stance(runs: Vec<Run>, feet: &[ContactFlags]) -> Vec<PhaseSpan> {
     runs.into_iter()
         .map(|(phase, range)| {
             // Most samples decide: a span may have swallowed chatter.
-            let airborne = feet[range.clone()]
-                .iter()
-                .filter(|feet| feet_down(**feet) == 0)
-                .count();
+            let own = feet[range.clone()].iter();
+            let airborne = own.filter(|feet| feet_down(**feet) == 0).count();
             let kind = if 2 * airborne > range.len() {
                 flown = true;
                 Stance::Flight
@@ -220,63 +207,80 @@ mod tests {
     use super::*;
     use crate::recording::segment::tests::sample_segment;
 
-    fn segment(pattern: &[(usize, [u8; 4])]) -> Segment {
-        let feet: Vec<ContactFlags> = pattern
-            .iter()
-            .flat_map(|(count, feet)| std::iter::repeat_n(feet.map(|f| f == 1), *count))
-            .collect();
-        let mut segment = sample_segment(feet.len());
-        segment.feet = feet;
-        segment
+    /// Feet sample after sample: `2x0011` for two samples with the rear feet down.
+    fn segment(runs: &str) -> Segment {
+        let run = |run: &str| -> Vec<ContactFlags> {
+            let (count, feet) = run.split_once('x').unwrap();
+            let feet = std::array::from_fn(|foot| feet.as_bytes()[foot] == b'1');
+            vec![feet; count.parse().unwrap()]
+        };
+        let feet: Vec<ContactFlags> = runs.split(' ').flat_map(run).collect();
+        Segment {
+            feet: feet.clone(),
+            ..sample_segment(feet.len())
+        }
     }
 
-    fn brief(rule: &PhaseRule, segment: &Segment) -> Vec<(usize, Stance, Range<usize>)> {
+    /// The spans in words: `0 Launch 0..13` for phase, place and samples.
+    fn brief(rule: &PhaseRule, segment: &Segment) -> Vec<String> {
         let spans = rule.spans(segment).unwrap();
         assert_eq!(spans.first().map(|s| s.range.start), Some(0));
         assert_eq!(spans.last().map(|s| s.range.end), Some(segment.len()));
-        spans
-            .into_iter()
-            .map(|s| (s.phase, s.kind, s.range))
-            .collect()
+        let text = |span: PhaseSpan| format!("{} {:?} {:?}", span.phase, span.kind, span.range);
+        spans.into_iter().map(text).collect()
     }
 
     #[test]
-    fn spans_two_phase_transitional_samples_join_launch_and_landing() {
-        let jump = segment(&[
-            (10, [1, 1, 1, 1]),
-            (2, [0, 0, 1, 1]),
-            (1, [0, 0, 0, 1]),
-            (20, [0, 0, 0, 0]),
-            (3, [0, 1, 0, 0]),
-            (9, [1, 1, 1, 1]),
+    fn spans_join_what_is_no_phase_or_too_short_to_a_neighbour() {
+        let exact = |name: &str, feet: [u8; 4]| {
+            pattern(name, FeetRule::Patterns(vec![feet.map(|f| f == 1)]))
+        };
+        let exact = PhaseRule::new(vec![
+            exact("all", [1; 4]),
+            exact("rear", [0, 0, 1, 1]),
+            exact("none", [0; 4]),
         ]);
-        assert_eq!(
-            brief(&PhaseRule::two_phase(), &jump),
-            [
-                (0, Stance::Launch, 0..13),
-                (1, Stance::Flight, 13..33),
-                (0, Stance::Landing, 33..45)
-            ]
-        );
-    }
-
-    #[test]
-    fn spans_three_phase_separates_the_rear_stance() {
-        let jump = segment(&[
-            (10, [1, 1, 1, 1]),
-            (2, [0, 1, 1, 1]),
-            (30, [0, 0, 1, 1]),
-            (1, [0, 0, 1, 0]),
-            (20, [0, 0, 0, 0]),
-        ]);
-        assert_eq!(
-            brief(&PhaseRule::three_phase(), &jump),
-            [
-                (0, Stance::Launch, 0..12),
-                (1, Stance::Launch, 12..43),
-                (2, Stance::Flight, 43..63)
-            ]
-        );
+        for (rule, runs, expected) in [
+            // samples in transition join launch and landing
+            (
+                PhaseRule::two_phase(),
+                "10x1111 2x0011 1x0001 20x0000 3x0100 9x1111",
+                &["0 Launch 0..13", "1 Flight 13..33", "0 Landing 33..45"][..],
+            ),
+            // three phases separate the rear stance
+            (
+                PhaseRule::three_phase(),
+                "10x1111 2x0111 30x0011 1x0010 20x0000",
+                &["0 Launch 0..12", "1 Launch 12..43", "2 Flight 43..63"],
+            ),
+            // exact patterns give transitions to the side with more feet
+            (
+                exact,
+                "1x1011 5x1111 2x0111 5x0011 1x0001 5x0000 2x1000 5x1111 1x1100",
+                &[
+                    "0 Launch 0..8",
+                    "1 Launch 8..14",
+                    "2 Flight 14..19",
+                    "0 Landing 19..27",
+                ],
+            ),
+            // chatter shorter than the minimum joins its neighbour
+            (
+                PhaseRule::two_phase().with_min_samples(3),
+                "1x0000 9x1111 2x0000 4x1111 20x0000 1x1111 2x0000",
+                &["0 Launch 0..16", "1 Flight 16..39"],
+            ),
+            // a single sample is one span
+            (
+                PhaseRule::two_phase().with_min_samples(10),
+                "1x1111",
+                &["0 Launch 0..1"],
+            ),
+        ] {
+            assert_eq!(brief(&rule, &segment(runs)), expected, "{runs}");
+        }
+        let chatter = segment("1x0000 9x1111 2x0000 4x1111 20x0000 1x1111 2x0000");
+        assert_eq!(PhaseRule::two_phase().spans(&chatter).unwrap().len(), 7);
     }
 
     #[test]
@@ -290,70 +294,12 @@ mod tests {
     }
 
     #[test]
-    fn spans_exact_patterns_give_transitions_to_the_side_with_more_feet() {
-        let exact = |name: &str, feet: [u8; 4]| {
-            pattern(name, FeetRule::Patterns(vec![feet.map(|f| f == 1)]))
-        };
-        let rule = PhaseRule::new(vec![
-            exact("all", [1, 1, 1, 1]),
-            exact("rear", [0, 0, 1, 1]),
-            exact("none", [0; 4]),
-        ]);
-        let jump = segment(&[
-            (1, [1, 0, 1, 1]),
-            (5, [1, 1, 1, 1]),
-            (2, [0, 1, 1, 1]),
-            (5, [0, 0, 1, 1]),
-            (1, [0, 0, 0, 1]),
-            (5, [0, 0, 0, 0]),
-            (2, [1, 0, 0, 0]),
-            (5, [1, 1, 1, 1]),
-            (1, [1, 1, 0, 0]),
-        ]);
-        assert_eq!(
-            brief(&rule, &jump),
-            [
-                (0, Stance::Launch, 0..8),
-                (1, Stance::Launch, 8..14),
-                (2, Stance::Flight, 14..19),
-                (0, Stance::Landing, 19..27)
-            ]
-        );
-    }
-
-    #[test]
     fn spans_no_pattern_matches_is_an_error_with_row_and_feet() {
         let rule = PhaseRule::new(vec![pattern("flight", FeetRule::None)]);
-        let error = rule.spans(&segment(&[(3, [1, 1, 0, 0])])).unwrap_err();
+        let error = rule.spans(&segment("3x1100")).unwrap_err();
         let text = error.to_string();
         assert!(matches!(error.kind, RecordingFault::NoPhase { .. }));
         assert_eq!(error.place.row(), Some(2));
         assert!(text.contains("none of the phases `flight`"), "{text}");
-    }
-
-    #[test]
-    fn spans_chatter_shorter_than_the_minimum_joins_its_neighbour() {
-        let jump = segment(&[
-            (1, [0; 4]),
-            (9, [1; 4]),
-            (2, [0; 4]),
-            (4, [1; 4]),
-            (20, [0; 4]),
-            (1, [1; 4]),
-            (2, [0; 4]),
-        ]);
-        let rule = PhaseRule::two_phase().with_min_samples(3);
-        assert_eq!(
-            brief(&rule, &jump),
-            [(0, Stance::Launch, 0..16), (1, Stance::Flight, 16..39)]
-        );
-        assert_eq!(PhaseRule::two_phase().spans(&jump).unwrap().len(), 7);
-    }
-
-    #[test]
-    fn spans_single_sample_is_one_span() {
-        let rule = PhaseRule::two_phase().with_min_samples(10);
-        let one = segment(&[(1, [1; 4])]);
-        assert_eq!(brief(&rule, &one), [(0, Stance::Launch, 0..1)]);
     }
 }

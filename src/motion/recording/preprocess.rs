@@ -96,21 +96,12 @@ pub fn resampled(segment: &Segment, rows: usize) -> Result<Segment, RecordingErr
         return Err(fault.at(&segment.path, segment.row(0)));
     }
     let places = places(&segment.time_s, rows);
-    let along = |m: &DMatrix<f64>| interpolate(m, &places);
+    let nearest = |p: &Place| segment.feet[if p.share < 0.5 { p.left } else { p.left + 1 }];
+    let time_s = places.iter().map(|place| place.time_s).collect();
+    let feet = places.iter().map(nearest).collect();
     Ok(Segment {
-        path: segment.path.clone(),
-        first_row: segment.first_row,
         row_stride: segment.row_stride * (n - 1) as f64 / (rows - 1) as f64,
-        time_s: places.iter().map(|place| place.time_s).collect(),
-        x: along(&segment.x),
-        dx: along(&segment.dx),
-        ddx: along(&segment.ddx),
-        torque_nm: along(&segment.torque_nm),
-        feet: places
-            .iter()
-            .map(|p| segment.feet[if p.share < 0.5 { p.left } else { p.left + 1 }])
-            .collect(),
-        body_wrench: segment.body_wrench.as_ref().map(along),
+        ..segment.remade(time_s, feet, |m| interpolate(m, &places))
     })
 }
 
@@ -161,7 +152,6 @@ pub(in crate::recording) fn median(values: impl Iterator<Item = f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::recording::segment::tests::sample_segment;
-    use std::path::PathBuf;
 
     fn unequal_times(n: usize) -> Vec<f64> {
         (0..n)
@@ -231,35 +221,22 @@ mod tests {
         let mut jump = sample_segment(300);
         jump.feet[150..240].fill([false; 4]);
         let second = sample_segment(120);
-        let recording = Recording {
-            path: PathBuf::from("two.csv"),
-            segments: vec![jump, second],
-            ignored_columns: Vec::new(),
-        };
+        let mut recording = Recording::from(jump);
+        recording.segments.push(second);
         let phases = prepare(&recording, &PhaseRule::two_phase(), 100).unwrap();
         let found: Vec<_> = phases
             .iter()
             .map(|p| (p.segment, p.span.phase, p.samples.len()))
             .collect();
         assert_eq!(found, [(0, 0, 200), (0, 1, 100), (0, 0, 100), (1, 0, 200)]);
-        assert!(
-            phases[1]
-                .samples
-                .feet
-                .iter()
-                .all(|feet| *feet == [false; 4])
-        );
-        assert_eq!(
-            phases[1].samples.x.column(0),
-            recording.segments[0].x.column(150)
-        );
+        let flight = &phases[1].samples;
+        assert!(flight.feet.iter().all(|feet| *feet == [false; 4]));
+        assert_eq!(flight.x.column(0), recording.segments[0].x.column(150));
     }
 
     #[test]
-    fn batch_rows_rounds_up_and_refuses_tiny_batches() {
-        assert_eq!(batch_rows(118, 100).unwrap(), 200);
+    fn batch_rows_refuses_tiny_batches() {
         assert_eq!(batch_rows(100, 100).unwrap(), 100);
-        assert_eq!(batch_rows(1, 100).unwrap(), 100);
         let error = batch_rows(5, 1).unwrap_err();
         assert_eq!(
             error.to_string(),

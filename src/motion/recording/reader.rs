@@ -6,7 +6,7 @@ use std::sync::Arc;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-use super::clock::{Timed, timed};
+use super::clock::{Mended, timed};
 use super::csv;
 use super::error::{RecordingError, RecordingFault};
 use super::foreign::guess::guess_of;
@@ -45,17 +45,6 @@ pub struct Reading {
     pub mended: Vec<Mended>,
 }
 
-/// What was mended in a segment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mended {
-    /// Time that passed by the motion over time that passed by the stamps, where times were rebuilt.
-    pub elapsed_ratio: Option<f64>,
-    /// Whether steps were uneven and the segment is resampled.
-    pub resampled: bool,
-    /// Whether angular rates are differences of the angles.
-    pub rates_replaced: bool,
-}
-
 impl Reader {
     /// A reader by a map of columns, or romc's own names, that treats clocks as told.
     pub fn new(map: Option<ColumnMap>, clocks: Clocks) -> Self {
@@ -92,7 +81,7 @@ impl Reader {
         if self.clocks == Clocks::Repaired {
             for segment in &mut recording.segments {
                 let timed = timed(segment)?;
-                mended.push(Mended::of(&timed));
+                mended.push(timed.mended);
                 *segment = timed.segment;
             }
         }
@@ -120,16 +109,6 @@ fn by_guess(path: &Path) -> Result<Assembled, RecordingError> {
     let note = "topics are taken by their names (`romc inspect --guess` prints the map)";
     assembled.notes.push(note.to_owned());
     Ok(assembled)
-}
-
-impl Mended {
-    fn of(timed: &Timed) -> Self {
-        Self {
-            elapsed_ratio: timed.rebuilt.then_some(timed.elapsed_ratio),
-            resampled: timed.resampled,
-            rates_replaced: timed.rates_replaced,
-        }
-    }
 }
 
 /// What was done to several recordings besides reading.
@@ -171,11 +150,9 @@ impl ReadingNotes {
         };
         let mut clocks = Vec::new();
         if let Some((least, most)) = self.ratios {
-            let least = format!("{least:.2}");
-            let most = format!("{most:.2}");
-            let ratio = match least == most {
-                true => most,
-                false => format!("{least} to {most}"),
+            let ratio = match [least, most].map(|ratio| format!("{ratio:.2}")) {
+                [least, most] if least == most => most,
+                [least, most] => format!("{least} to {most}"),
             };
             clocks.push(format!(
                 "times are rebuilt from the motion, which takes {ratio} s in a recorded second{}",
@@ -193,10 +170,8 @@ impl ReadingNotes {
         }
         let mut lines = Vec::new();
         if !clocks.is_empty() {
-            lines.push(format!(
-                "{} (--clock recorded: as recorded)",
-                clocks.join("; ")
-            ));
+            let clocks = clocks.join("; ");
+            lines.push(format!("{clocks} (--clock recorded: as recorded)"));
         }
         let others = self.others.iter();
         lines.extend(others.map(|(note, count)| format!("{note}{}", of(*count))));
@@ -212,13 +187,8 @@ mod tests {
     use crate::recording::{WriteOptions, write_with};
 
     fn reading(elapsed_ratio: Option<f64>, note: &str) -> Reading {
-        let segment = sample_segment(3);
         Reading {
-            recording: Recording {
-                path: segment.path.clone(),
-                segments: vec![segment],
-                ignored_columns: Vec::new(),
-            },
+            recording: Recording::from(sample_segment(3)),
             notes: vec![note.to_owned()],
             mended: vec![Mended {
                 elapsed_ratio,
@@ -251,11 +221,8 @@ mod tests {
                 accelerations,
                 ..WriteOptions::default()
             };
-            write_with(&path, &recording, &options).unwrap();
-            let notes = Reader::new(None, Clocks::Recorded)
-                .read(&path)
-                .unwrap()
-                .notes;
+            write_with(&path, &recording, None, &options).unwrap();
+            let notes = Reader::default().read(&path).unwrap().notes;
             let expected = [DERIVED_DDX];
             assert_eq!(notes, expected[usize::from(accelerations)..]);
         }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use nalgebra::DMatrix;
 
 use super::error::{RecordingError, RecordingFault};
-use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, STATE_DIM};
+use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
 /// Time over which accelerations of joints are averaged before the inertia of the motors counts, in
 /// s: 11 samples at 500 Hz.
@@ -24,6 +24,15 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// These segments as a recording of the same file.
+    pub fn with_segments(&self, segments: Vec<Segment>) -> Self {
+        Self {
+            path: self.path.clone(),
+            segments,
+            ignored_columns: self.ignored_columns.clone(),
+        }
+    }
+
     /// Number of samples in all segments.
     pub fn sample_count(&self) -> usize {
         self.segments.iter().map(Segment::len).sum()
@@ -66,7 +75,70 @@ pub struct Segment {
     pub body_wrench: Option<DMatrix<f64>>,
 }
 
+/// The longest stretches of samples in which each is like the one before it, by `alike(before, sample)`.
+pub fn stretches(samples: Range<usize>, alike: impl Fn(usize, usize) -> bool) -> Vec<Range<usize>> {
+    let mut out: Vec<Range<usize>> = Vec::new();
+    for sample in samples {
+        match out.last_mut() {
+            Some(open) if alike(open.end - 1, sample) => open.end = sample + 1,
+            _ => out.push(sample..sample + 1),
+        }
+    }
+    out
+}
+
+/// The samples left and right of a time and how much of the way it is from one to the other; outside the times the
+/// nearest sample twice.
+pub fn between(times_s: &[f64], time_s: f64) -> (usize, usize, f64) {
+    let after = times_s.partition_point(|&t| t <= time_s);
+    let (left, right) = (after.saturating_sub(1), after.min(times_s.len() - 1));
+    let step = times_s[right] - times_s[left];
+    let share = match step > 0.0 {
+        true => (time_s - times_s[left]) / step,
+        false => 0.0,
+    };
+    (left, right, share)
+}
+
 impl Segment {
+    /// Samples at these times, all zero, with all feet on the ground.
+    pub fn still(path: impl Into<PathBuf>, time_s: Vec<f64>) -> Self {
+        let zeros = |rows: usize| DMatrix::zeros(rows, time_s.len());
+        Self {
+            path: path.into(),
+            first_row: 2,
+            row_stride: 1.0,
+            x: zeros(STATE_DIM),
+            dx: zeros(STATE_DIM),
+            ddx: zeros(STATE_DIM),
+            torque_nm: zeros(JOINT_DIM),
+            feet: vec![[true; 4]; time_s.len()],
+            body_wrench: None,
+            time_s,
+        }
+    }
+
+    /// Other samples of the same rows: `samples` makes each matrix of this one's.
+    pub(super) fn remade(
+        &self,
+        time_s: Vec<f64>,
+        feet: Vec<ContactFlags>,
+        samples: impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
+    ) -> Self {
+        Self {
+            path: self.path.clone(),
+            first_row: self.first_row,
+            row_stride: self.row_stride,
+            time_s,
+            x: samples(&self.x),
+            dx: samples(&self.dx),
+            ddx: samples(&self.ddx),
+            torque_nm: samples(&self.torque_nm),
+            feet,
+            body_wrench: self.body_wrench.as_ref().map(samples),
+        }
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.time_s.len()
@@ -128,19 +200,17 @@ impl Segment {
             _ => 0,
         };
         let mut out = DMatrix::zeros(JOINT_DIM, self.len());
-        let mut start = 0;
-        while start < self.len() {
-            let down = self.feet[start].contains(&true);
-            let same = self.feet[start..].iter();
-            let end = start + same.take_while(|f| f.contains(&true) == down).count();
-            for sample in start..end {
-                let reach = half.min(sample - start).min(end - 1 - sample);
+        let down = |sample: usize| self.feet[sample].contains(&true);
+        for stretch in stretches(0..self.len(), |a, b| down(a) == down(b)) {
+            for sample in stretch.clone() {
+                let reach = half
+                    .min(sample - stretch.start)
+                    .min(stretch.end - 1 - sample);
                 let window = self
                     .ddx
                     .view((0, sample - reach), (JOINT_DIM, 2 * reach + 1));
                 out.set_column(sample, &(window.column_sum() / window.ncols() as f64));
             }
-            start = end;
         }
         out
     }
@@ -188,12 +258,16 @@ impl Segment {
     /// # Errors
     /// As [`Segment::wrench`].
     pub fn input_within_limits(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
-        let limits = rule.robot().torque_limit_nm();
+        self.input_of(rule, &self.torque_within_limits(rule.robot()))
+    }
+
+    /// The recorded torques, N m; those beyond a limit of the robot count as the limit.
+    pub fn torque_within_limits(&self, robot: &Robot) -> DMatrix<f64> {
         let mut torque_nm = self.torque_nm.clone();
-        for (mut row, limit) in torque_nm.row_iter_mut().zip(limits) {
+        for (mut row, limit) in torque_nm.row_iter_mut().zip(robot.torque_limit_nm()) {
             row.apply(|torque| *torque = torque.clamp(-limit, *limit));
         }
-        self.input_of(rule, &torque_nm)
+        torque_nm
     }
 
     /// The input of these torques of the motors; the file's wrench is that of the recorded ones.
@@ -230,18 +304,12 @@ impl Segment {
     /// # Panics
     /// If the range leaves the segment, as indexing a slice does.
     pub fn slice(&self, range: Range<usize>) -> Segment {
-        let columns = |m: &DMatrix<f64>| m.columns(range.start, range.len()).into_owned();
+        let (time_s, feet) = (&self.time_s[range.clone()], &self.feet[range.clone()]);
         Segment {
-            path: self.path.clone(),
             first_row: self.row(range.start),
-            row_stride: self.row_stride,
-            time_s: self.time_s[range.clone()].to_vec(),
-            x: columns(&self.x),
-            dx: columns(&self.dx),
-            ddx: columns(&self.ddx),
-            torque_nm: columns(&self.torque_nm),
-            feet: self.feet[range.clone()].to_vec(),
-            body_wrench: self.body_wrench.as_ref().map(columns),
+            ..self.remade(time_s.to_vec(), feet.to_vec(), |m| {
+                m.columns(range.start, range.len()).into_owned()
+            })
         }
     }
 }
@@ -249,7 +317,7 @@ impl Segment {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::robot::{Actuators, Robot, RobotError, WrenchFrame};
+    use crate::robot::{Actuators, RobotError, WrenchFrame};
 
     /// A segment whose entries all differ, of a robot that stands.
     pub fn sample_segment(n: usize) -> Segment {
@@ -263,16 +331,11 @@ pub(super) mod tests {
             }
         }
         Segment {
-            path: PathBuf::from("sample.csv"),
-            first_row: 2,
-            row_stride: 1.0,
-            time_s: (0..n).map(|j| 0.002 * j as f64).collect(),
             x,
             dx: fill(STATE_DIM, 1.0),
             ddx: fill(STATE_DIM, 2.0),
             torque_nm: fill(JOINT_DIM, 3.0),
-            feet: vec![[true; 4]; n],
-            body_wrench: None,
+            ..Segment::still("sample.csv", (0..n).map(|j| 0.002 * j as f64).collect())
         }
     }
 

@@ -32,6 +32,21 @@ pub(super) struct Sample {
     pub feet: ContactFlags,
 }
 
+impl Sample {
+    /// Puts a value where its column belongs; a foot with 1 is down.
+    pub fn set(&mut self, column: Column, value: f64) {
+        match column {
+            Column::Time => self.time_s = value,
+            Column::Position(i) => self.x[i] = value,
+            Column::Velocity(i) => self.dx[i] = value,
+            Column::Acceleration(i) => self.ddx[i] = value,
+            Column::Torque(i) => self.torque_nm[i] = value,
+            Column::Force(i) => self.force[i] = value,
+            Column::Foot(i) => self.feet[i] = value == 1.0,
+        }
+    }
+}
+
 /// The samples of a segment so far, each quantity sample after sample.
 #[derive(Default)]
 struct Open {
@@ -135,17 +150,14 @@ impl<'a> SegmentBuilder<'a> {
 
     /// Differences of huge velocities over tiny steps can overflow.
     fn require_finite(&self, open: &Open, ddx: &DMatrix<f64>) -> Result<(), RecordingError> {
-        match ddx.iter().position(|value| !value.is_finite()) {
-            None => Ok(()),
-            Some(place) => {
-                let found = format!("{} from differences", ddx[place]);
-                let expected = "a finite number";
-                let row = open.first_row + place / STATE_DIM;
-                let column = Column::Acceleration(place % STATE_DIM).name();
-                let fault = RecordingFault::Number { found, expected };
-                Err(fault.in_cell(self.path, row, &column))
-            }
-        }
+        let Some(place) = ddx.iter().position(|value| !value.is_finite()) else {
+            return Ok(());
+        };
+        let found = format!("{} from differences", ddx[place]);
+        let expected = "a finite number";
+        let row = open.first_row + place / STATE_DIM;
+        let column = Column::Acceleration(place % STATE_DIM).name();
+        Err(RecordingFault::Number { found, expected }.in_cell(self.path, row, &column))
     }
 
     /// The segments of a file of so many columns.
@@ -164,10 +176,8 @@ impl<'a> SegmentBuilder<'a> {
 /// # Errors
 /// [`RecordingFault::Time`] if time stands still, or steps back by less.
 pub(super) fn begins_segment(open_s: &[f64], time_s: f64) -> Result<bool, RecordingFault> {
-    let (first, last) = match open_s {
-        [] => return Ok(false),
-        [first, .., last] => (*first, *last),
-        [only] => (*only, *only),
+    let (Some(&first), Some(&last)) = (open_s.first(), open_s.last()) else {
+        return Ok(false);
     };
     let before = match open_s {
         [.., a, b] => b - a,

@@ -140,13 +140,6 @@ mod tests {
     }
 
     #[test]
-    fn smooth_noise_is_reduced() {
-        let rows = DMatrix::from_fn(1, 101, |_, j| if j % 2 == 0 { 1.0 } else { -1.0 });
-        let smooth = SavitzkyGolay::new(11, 2).unwrap().smooth(&rows).unwrap();
-        assert!(smooth.norm() < 0.3 * rows.norm());
-    }
-
-    #[test]
     fn smooth_fewer_samples_than_the_window_is_none() {
         let filter = SavitzkyGolay::new(11, 2).unwrap();
         assert!(filter.smooth(&DMatrix::zeros(3, 10)).is_none());

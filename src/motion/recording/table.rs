@@ -5,8 +5,8 @@ use std::path::Path;
 use super::columns::{Column, Layout};
 use super::error::{RecordingError, RecordingFault, shortened};
 use super::instant::Instant;
-use super::lines::{count, split_cells};
-use super::number::{DecimalMark, NumberReader};
+use super::lines::{cells, count};
+use super::number::NumberReader;
 use super::segment::Segment;
 use super::segments::{Sample, SegmentBuilder};
 
@@ -27,15 +27,11 @@ pub(super) struct Table<'a> {
 
 impl<'a> Table<'a> {
     pub fn new(path: &'a Path, delimiter: char, layout: &'a Layout) -> Self {
-        let mark = match delimiter {
-            ',' => DecimalMark::Point,
-            _ => DecimalMark::Unknown,
-        };
         Table {
             path,
             delimiter,
             layout,
-            numbers: NumberReader::new(mark),
+            numbers: NumberReader::new(delimiter),
             rows: 0,
             start: None,
             segments: SegmentBuilder::new(path, layout.has_acceleration, layout.has_force),
@@ -63,71 +59,50 @@ impl<'a> Table<'a> {
             return Err(self.length_error(row, found));
         }
         let mut sample = Sample::default();
-        let mut place = 0;
-        split_cells(line, self.delimiter, |cell| {
-            if let Some(column) = self.layout.columns[place] {
-                let value = match (column, truth(cell)) {
-                    (Column::Foot(_), Some(down)) => f64::from(u8::from(down)),
-                    (Column::Time, _) => self.time(row, place, cell)?,
-                    _ => self.number(row, place, cell)?,
-                };
-                match column {
-                    Column::Time => sample.time_s = value,
-                    Column::Position(i) => sample.x[i] = value,
-                    Column::Velocity(i) => sample.dx[i] = value,
-                    Column::Acceleration(i) => sample.ddx[i] = value,
-                    Column::Torque(i) => sample.torque_nm[i] = value,
-                    Column::Force(i) => sample.force[i] = value,
-                    Column::Foot(i) => sample.feet[i] = self.flag(row, place, value)?,
-                }
-            }
-            place += 1;
-            Ok(())
-        })?;
+        for (place, cell) in cells(line, self.delimiter).enumerate() {
+            let Some(column) = self.layout.columns[place] else {
+                continue;
+            };
+            let name = &self.layout.names[place];
+            let value = self.value(column, cell);
+            sample.set(
+                column,
+                value.map_err(|fault| fault.in_cell(self.path, row, name))?,
+            );
+        }
         Ok(sample)
     }
 
     fn count_cells(&self, line: &str) -> usize {
-        if count(line, '"') == 0 {
-            return 1 + count(line, self.delimiter);
-        }
-        let mut count = 0;
-        let counted: Result<(), std::convert::Infallible> =
-            split_cells(line, self.delimiter, |_| {
-                count += 1;
-                Ok(())
-            });
-        match counted {
-            Ok(()) => count,
-            Err(never) => match never {},
+        match count(line, '"') {
+            0 => 1 + count(line, self.delimiter),
+            _ => cells(line, self.delimiter).count(),
         }
     }
 
-    fn number(&mut self, row: usize, place: usize, cell: &str) -> Result<f64, RecordingError> {
+    /// A cell's value: a time in s, of which dates count from the first one; 0 or 1 of a foot; or a number.
+    fn value(&mut self, column: Column, cell: &str) -> Result<f64, RecordingFault> {
+        let is_foot = matches!(column, Column::Foot(_));
+        if is_foot && let Some(down) = truth(cell) {
+            return Ok(f64::from(u8::from(down)));
+        }
+        if column == Column::Time
+            && let Some(date) = Instant::from_iso(cell)
+        {
+            return Ok(date.since(*self.start.get_or_insert(date)));
+        }
         let expected = match self.numbers.parse(cell) {
-            Some(value) if value.is_finite() => return Ok(value),
+            Some(value) if value.is_finite() => {
+                return match is_foot && value != 0.0 && value != 1.0 {
+                    true => Err(RecordingFault::Contact(value)),
+                    false => Ok(value),
+                };
+            }
             Some(_) => "a finite number",
             None => self.numbers.expected(),
         };
         let found = shortened(cell);
-        let fault = RecordingFault::Number { found, expected };
-        Err(fault.in_cell(self.path, row, &self.layout.names[place]))
-    }
-
-    /// A time in s; dates count from the first one.
-    fn time(&mut self, row: usize, place: usize, cell: &str) -> Result<f64, RecordingError> {
-        match Instant::from_iso(cell) {
-            Some(date) => Ok(date.since(*self.start.get_or_insert(date))),
-            None => self.number(row, place, cell),
-        }
-    }
-
-    fn flag(&self, row: usize, place: usize, value: f64) -> Result<bool, RecordingError> {
-        if value == 0.0 || value == 1.0 {
-            return Ok(value == 1.0);
-        }
-        let column = &self.layout.names[place];
-        Err(RecordingFault::Contact(value).in_cell(self.path, row, column))
+        Err(RecordingFault::Number { found, expected })
     }
 
     pub fn length_error(&self, row: usize, found: usize) -> RecordingError {

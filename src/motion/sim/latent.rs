@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::error::SimError;
 use crate::model::ReducedModel;
 use crate::recording::phases::{CHATTER_SAMPLES, PhasePattern};
+use crate::recording::segment::between;
 use crate::recording::{PhaseRule, Segment};
 
 /// Latent samples of one recorded segment; every matrix is `latent_dim x n`, a column a sample.
@@ -68,18 +69,7 @@ impl LatentSegment {
 
     /// Latent input at a time between samples, interpolated linearly; held outside the record.
     pub fn input_at(&self, time_s: f64, u_lat: &mut [f64]) {
-        let after = self.time_s.partition_point(|&t| t <= time_s);
-        let (left, right) = match after {
-            0 => (0, 0),
-            n if n == self.len() => (n - 1, n - 1),
-            n => (n - 1, n),
-        };
-        let step = self.time_s[right] - self.time_s[left];
-        let share = if step > 0.0 {
-            (time_s - self.time_s[left]) / step
-        } else {
-            0.0
-        };
+        let (left, right, share) = between(&self.time_s, time_s);
         for (row, value) in u_lat.iter_mut().enumerate() {
             let (from, to) = (self.u_lat[(row, left)], self.u_lat[(row, right)]);
             *value = from + share * (to - from);

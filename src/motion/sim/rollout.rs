@@ -7,9 +7,10 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::integrate::{IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
+use super::integrate::{Integration, IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
 use super::latent::LatentSegment;
 use crate::lower::CompiledModel;
+use crate::recording::segment::stretches;
 
 /// When a rollout starts again from the recorded latent state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,40 +135,66 @@ fn roll_window(
 ) -> Window {
     let recorded = dynamics.recorded;
     let d = recorded.z.nrows();
-    let mut state: Vec<f64> = (recorded.z.column(samples.start).iter())
+    let initial: Vec<f64> = (recorded.z.column(samples.start).iter())
         .chain(recorded.dz.column(samples.start).iter())
         .copied()
         .collect();
-    let mut states = DMatrix::zeros(2 * d, samples.len());
-    states.column_mut(0).copy_from_slice(&state);
+    let phase = &recorded.phase;
+    let found = integrate_stretches(
+        &initial,
+        &recorded.time_s,
+        samples.clone(),
+        |a, b| phase[a] == phase[b],
+        |stretch, state, times| {
+            dynamics.phase = phase[stretch.start];
+            integrate(dynamics, state, times, options)
+        },
+    );
+    Window {
+        samples,
+        z: found.states.rows(0, d).into_owned(),
+        dz: found.states.rows(d, d).into_owned(),
+        diverged_at_s: found.diverged_at_s,
+        stiff: found.method == IntegrationMethod::Implicit,
+    }
+}
+
+/// States of a window of samples from `initial` at its first one, stretch after stretch of like samples; implicit if
+/// any stretch is.
+///
+/// `of_stretch` integrates one from a state over its times, which end at the first sample of the next.
+pub fn integrate_stretches(
+    initial: &[f64],
+    time_s: &[f64],
+    window: Range<usize>,
+    alike: impl Fn(usize, usize) -> bool,
+    mut of_stretch: impl FnMut(Range<usize>, &[f64], &[f64]) -> Integration,
+) -> Integration {
+    let mut found = Integration {
+        states: DMatrix::zeros(initial.len(), window.len()),
+        diverged_at_s: None,
+        method: IntegrationMethod::Explicit,
+    };
+    found.states.column_mut(0).copy_from_slice(initial);
     let mut reached = 1;
-    let mut window_end = (None, false);
-    for span in spans(&recorded.phase, &samples) {
-        // the last step of a span ends on the first sample of the next
-        let times = &recorded.time_s[span.start..(span.end + 1).min(samples.end)];
-        dynamics.phase = recorded.phase[span.start];
-        let result = integrate(dynamics, &state, times, options);
-        for column in 1..result.states.ncols() {
-            let sample = span.start + column - samples.start;
-            states
-                .column_mut(sample)
-                .copy_from(&result.states.column(column));
-            reached = sample + 1;
+    for stretch in stretches(window.clone(), alike) {
+        let times = &time_s[stretch.start..(stretch.end + 1).min(window.end)];
+        let first = stretch.start - window.start;
+        let state = found.states.column(first).into_owned();
+        let part = of_stretch(stretch, state.as_slice(), times);
+        reached = first + part.states.ncols();
+        let mut to = found.states.columns_mut(first, part.states.ncols());
+        to.copy_from(&part.states);
+        if part.method == IntegrationMethod::Implicit {
+            found.method = part.method;
         }
-        window_end.1 |= result.method == IntegrationMethod::Implicit;
-        if result.diverged_at_s.is_some() {
-            window_end.0 = result.diverged_at_s;
+        found.diverged_at_s = part.diverged_at_s;
+        if found.diverged_at_s.is_some() {
             break;
         }
-        state.copy_from_slice(states.column(reached - 1).as_slice());
     }
-    Window {
-        z: states.view((0, 0), (d, reached)).into_owned(),
-        dz: states.view((d, 0), (d, reached)).into_owned(),
-        samples,
-        diverged_at_s: window_end.0,
-        stiff: window_end.1,
-    }
+    found.states = found.states.columns(0, reached).into_owned();
+    found
 }
 
 /// `y = [z; dz]` under one phase and the recorded input.
@@ -199,18 +226,6 @@ impl OdeSystem for PhaseDynamics<'_> {
         jacobian.view_mut((0, d), (d, d)).fill_with_identity();
         (jacobian.rows_mut(d, d)).copy_from(&self.partials.columns(0, 2 * d));
     }
-}
-
-/// Runs of samples with one phase.
-fn spans(phase: &[usize], samples: &Range<usize>) -> Vec<Range<usize>> {
-    let mut out: Vec<Range<usize>> = Vec::new();
-    for sample in samples.clone() {
-        match out.last_mut() {
-            Some(span) if phase[span.start] == phase[sample] => span.end = sample + 1,
-            _ => out.push(sample..sample + 1),
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -37,9 +37,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             stage.keep_columns();
             if !is_warm {
                 let rows = self.rows_of(k);
-                for multiplier in rows.multiplier.iter_mut() {
-                    *multiplier = T::ZERO;
-                }
+                rows.multiplier.fill(T::ZERO);
                 if soft > 0 {
                     rows.multiplier[slack_row] = price;
                 }
@@ -178,14 +176,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             }
             let mut hessian = Lower::diagonal(&self.cost.input);
             let input = &self.matrices.input[stage.input_rows..];
-            let input_numbers = (&w[..shape.input], &y[..shape.input]);
-            add_weighted(
-                input_numbers,
-                input,
-                shape.pairs.input,
-                &mut hessian,
-                &mut by_v,
-            );
+            let (numbers, pairs) = ((&w[..shape.input], &y[..shape.input]), shape.pairs.input);
+            add_weighted(numbers, input, pairs, &mut hessian, &mut by_v);
             let first_link = w.len() - shape.link;
             let links = (&w[first_link..], &y[first_link..]);
             let (w, y) = (&w[shape.input..], &y[shape.input..]);
@@ -409,10 +401,9 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         let rest = T::ONE - length;
         *point = Point {
             left: rest * point.left,
-            kept: if LINKED {
-                point.kept
-            } else {
-                rest * point.kept
+            kept: match LINKED {
+                true => point.kept,
+                false => rest * point.kept,
             },
             residual: if LINKED { residual } else { point.residual },
             sum,

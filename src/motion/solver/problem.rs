@@ -155,10 +155,9 @@ pub struct Cost<T, const NX: usize, const NU: usize> {
 
 impl<T: Real, const NX: usize, const NU: usize> Cost<T, NX, NU> {
     pub(super) fn state_at(&self, stage: usize, horizon: usize) -> &[T; NX] {
-        if stage + 1 == horizon {
-            &self.terminal
-        } else {
-            &self.state
+        match stage + 1 == horizon {
+            true => &self.terminal,
+            false => &self.state,
         }
     }
 }
@@ -187,10 +186,9 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     #[inline(always)]
     pub fn at(&self, stage: usize) -> usize {
         let place = self.first + stage;
-        if place < self.stages.len() {
-            place
-        } else {
-            place - self.stages.len()
+        match place < self.stages.len() {
+            true => place,
+            false => place - self.stages.len(),
         }
     }
 

@@ -18,7 +18,7 @@ pub(super) struct Rows<'a, T> {
     pub inverse: &'a mut [T],
 }
 
-impl<'a, T> Rows<'a, T> {
+impl<'a, T: Real> Rows<'a, T> {
     #[inline(always)]
     pub fn of(memory: &'a mut [T], count: usize) -> Self {
         let (bound, rest) = memory.split_at_mut(count);
@@ -45,10 +45,7 @@ impl<'a, T> Rows<'a, T> {
 
     /// Weights of the rows, and multipliers aimed at by a step that does not centre, in `dmultiplier`.
     #[inline(always)]
-    pub fn weigh(&mut self, left: T)
-    where
-        T: Real,
-    {
+    pub fn weigh(&mut self, left: T) {
         for i in 0..self.slack.len() {
             let inverse = T::ONE / self.slack[i];
             let weight = self.multiplier[i] * inverse;
@@ -60,10 +57,7 @@ impl<'a, T> Rows<'a, T> {
 
     /// The same of rows that are softened.
     #[inline(always)]
-    pub fn weigh_softened(&mut self, softness: T)
-    where
-        T: Real,
-    {
+    pub fn weigh_softened(&mut self, softness: T) {
         for i in 0..self.slack.len() {
             let yield_of_row = softness * self.multiplier[i];
             let inverse = T::ONE / (self.slack[i] + yield_of_row);
@@ -77,10 +71,7 @@ impl<'a, T> Rows<'a, T> {
     /// Changes of slacks and multipliers of rows that are softened, from the products of the rows in `target` and
     /// the multipliers aimed at in `dmultiplier`; into `target`, how often they go into what is left of each.
     #[inline(always)]
-    pub fn change_softened(&mut self, softness: T)
-    where
-        T: Real,
-    {
+    pub fn change_softened(&mut self, softness: T) {
         for i in 0..self.slack.len() {
             let change = self.target[i];
             let dmultiplier = self.dmultiplier[i] - self.multiplier[i] + self.weight[i] * change;
@@ -116,12 +107,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         let (count, memory) = (shape.rows(), shape.memory());
         let rows = Rows::of(&mut self.rows[place * memory..][..memory], count);
         let (input, rest) = rows.target.split_at_mut(shape.input);
-        times(
-            &matrices.input[stage.input_rows..],
-            shape.pairs.input,
-            v,
-            input,
-        );
+        let on_input = &matrices.input[stage.input_rows..];
+        times(on_input, shape.pairs.input, v, input);
         let (soft, rest) = rest.split_at_mut(shape.soft);
         if shape.soft > 0 {
             let z: &[T; NU] = part(x, 0);
@@ -157,12 +144,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     ) -> T {
         let (shape, stage, matrices) = (self.shape, &self.stages[self.at(k)], self.matrices);
         let (input, rest) = y.split_at(shape.input);
-        add_rows(
-            input,
-            &matrices.input[stage.input_rows..],
-            shape.pairs.input,
-            by_v,
-        );
+        let on_input = &matrices.input[stage.input_rows..];
+        add_rows(input, on_input, shape.pairs.input, by_v);
         let mut by_t = T::ZERO;
         if shape.soft > 0 {
             by_t = self.cost.slack;
@@ -188,9 +171,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
 /// Entries of a vector from this one on.
 #[inline(always)]
 pub(super) fn part<T, const NX: usize, const NU: usize>(x: &[T; NX], first: usize) -> &[T; NU] {
-    x[first..]
-        .first_chunk()
-        .expect("a part ends before its vector")
+    (x[first..].first_chunk()).expect("a part ends before its vector")
 }
 
 #[inline(always)]
@@ -198,9 +179,7 @@ pub(super) fn part_mut<T, const NX: usize, const NU: usize>(
     x: &mut [T; NX],
     first: usize,
 ) -> &mut [T; NU] {
-    x[first..]
-        .first_chunk_mut()
-        .expect("a part ends before its vector")
+    (x[first..].first_chunk_mut()).expect("a part ends before its vector")
 }
 
 /// Pairs of numbers, and the numbers behind them.
@@ -285,9 +264,8 @@ pub(super) fn largest_of<T: Real>(values: &[T], so_far: T) -> T {
     for (lane, value) in lanes.iter_mut().zip(rest) {
         *lane = value.or_larger(*lane);
     }
-    lanes[0]
-        .or_larger(lanes[1])
-        .or_larger(lanes[2].or_larger(lanes[3]))
+    let (first, second) = (lanes[0].or_larger(lanes[1]), lanes[2].or_larger(lanes[3]));
+    first.or_larger(second)
 }
 
 /// The sum of numbers in four parts, those of every fourth one.

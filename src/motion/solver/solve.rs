@@ -151,9 +151,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             let price = self.cost.slack;
             let slack_row = self.shape.input + soft;
             let rows = self.rows_of(k);
-            for multiplier in rows.multiplier.iter_mut() {
-                *multiplier = T::ZERO;
-            }
+            rows.multiplier.fill(T::ZERO);
             if soft > 0 {
                 rows.multiplier[slack_row] = price;
             }
@@ -169,10 +167,9 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         let mut v_before = [T::ZERO; NU];
         for k in 0..horizon {
             let stage = &self.stages[self.at(k)];
-            let before = if k == 0 {
-                *x0
-            } else {
-                self.stages[self.at(k - 1)].x
+            let before = match k {
+                0 => *x0,
+                _ => self.stages[self.at(k - 1)].x,
             };
             let next = plus_product(&stage.b, &stage.v, plus_product(&stage.a, &before, stage.c));
             let (v, x, t) = (stage.v, stage.x, stage.t);

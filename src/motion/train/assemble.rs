@@ -2,32 +2,24 @@
 
 use std::path::Path;
 
-use nalgebra::DMatrix;
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
 use super::dataset::Dataset;
+use super::dynamics_fit::Fitted;
 use super::error::TrainError;
-use super::features::{FeatureValues, Features};
-use super::latent::Latent;
+use super::features::FeatureValues;
+use super::latent::{EncodedSet, Latent};
 use super::metrics::PLACE;
 use super::options::{EncoderOptions, TrainOptions};
 use super::report::TrainReport;
+use super::task::Task;
+use crate::files::hex;
 use crate::model::{
-    CoordinateNames, InputGivenState, InputStatistics, JumpPrior, Library, Phase, ReducedModel,
-    ScaleFactors, Scaling, StateMap,
+    CoordinateNames, InputGivenState, InputStatistics, JumpPrior, Phase, ReducedModel,
+    ScaleFactors, Scaling,
 };
 use crate::recording::Recording;
-use crate::robot::Robot;
-
-/// The trained parts of a model.
-pub(super) struct Parts {
-    pub library: Library,
-    pub encoder: StateMap,
-    pub decoder: StateMap,
-    pub xi: Vec<DMatrix<f64>>,
-    pub jumps: Option<JumpPrior>,
-}
 
 /// Where a training's numbers come from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -76,107 +68,85 @@ impl Origin {
 
 /// SHA-256 of a file's bytes, with the name of the algorithm in front, as provenances have it.
 pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes)
-        .iter()
-        .fold(String::from("sha256:"), |text, byte| {
-            text + &format!("{byte:02x}")
-        })
+    format!("sha256:{}", hex(&Sha256::digest(bytes)))
 }
 
-/// Puts the parts together.
-pub(super) fn assemble(
-    parts: Parts,
-    dataset: &Dataset,
-    robot: &'static Robot,
-    options: &TrainOptions,
-    method: &str,
-    origin: &Origin,
-    report: &TrainReport,
-) -> Result<ReducedModel, TrainError> {
-    let builder = ReducedModel::builder(options.name.clone(), parts.library.clone())
-        .description(description(options, robot))
-        .robot(robot)
-        .actuators(options.actuators.clone())
-        .wrench_frame(options.wrench_frame)
-        .state(signals(Robot::state_names(), Robot::state_units()))
-        .input(signals(Robot::input_names(), Robot::input_units()))
-        .scaling(Scaling {
-            state: ScaleFactors::Uniform(options.scaling.state),
-            input: ScaleFactors::PerCoordinate(options.scaling.factors().input),
-        })
-        .sample_time_s(median_step_s(dataset))
-        .provenance(provenance(options, method, origin, report)?);
-    let given_state = inputs_given_states(&parts, dataset)?;
-    let mut builder = builder
-        .encoder(parts.encoder)
-        .decoder(parts.decoder)
-        .jump_prior(parts.jumps);
-    let phases = dataset.phases.patterns.iter().zip(parts.xi);
-    for (index, ((pattern, xi), given_state)) in phases.zip(given_state).enumerate() {
-        let statistics = InputStatistics {
-            given_state,
-            ..dataset.input_statistics(index)
-        };
-        builder = builder
-            .phase(Phase {
-                name: pattern.name.clone(),
-                feet: pattern.feet.clone(),
-                xi,
+impl Task<'_> {
+    /// The model of fitted numbers, with what was learned of the jumps.
+    pub fn assemble(
+        &self,
+        fitted: Fitted,
+        jumps: Option<JumpPrior>,
+        provenance: Map<String, Value>,
+    ) -> Result<ReducedModel, TrainError> {
+        let (options, robot, training) = (self.options, self.robot, &self.training);
+        let (d, name) = (options.latent_dim, robot.name());
+        let given_state = self.inputs_given_states(&fitted)?;
+        let [state, input] = CoordinateNames::of_robot();
+        let mut builder = ReducedModel::builder(options.name.clone(), self.library.clone())
+            .description(format!("{d} latent coordinates of {name} jumps"))
+            .robot(robot)
+            .actuators(options.actuators.clone())
+            .wrench_frame(options.wrench_frame)
+            .state(state)
+            .input(input)
+            .scaling(Scaling {
+                state: ScaleFactors::Uniform(options.scaling.state),
+                input: ScaleFactors::PerCoordinate(options.scaling.factors().input),
             })
-            .input_statistics(pattern.name.clone(), statistics);
+            .sample_time_s(median_step_s(training))
+            .provenance(provenance)
+            .encoder(fitted.encoder)
+            .decoder(fitted.decoder)
+            .jump_prior(jumps);
+        let phases = training.phases.patterns.iter().zip(fitted.xi);
+        for (index, ((pattern, xi), given_state)) in phases.zip(given_state).enumerate() {
+            let statistics = InputStatistics {
+                given_state,
+                ..training.input_statistics(index)
+            };
+            builder = builder
+                .phase(Phase {
+                    name: pattern.name.clone(),
+                    feet: pattern.feet.clone(),
+                    xi,
+                })
+                .input_statistics(pattern.name.clone(), statistics);
+        }
+        Ok(builder.build()?)
     }
-    Ok(builder.build()?)
-}
 
-/// What the latent state says of the latent input, one entry a phase; of linear encoders.
-fn inputs_given_states(
-    parts: &Parts,
-    dataset: &Dataset,
-) -> Result<Vec<Option<InputGivenState>>, TrainError> {
-    let Some(encoder) = parts.encoder.as_affine() else {
-        return Ok(vec![None; parts.xi.len()]);
-    };
-    // Where the robot is, and which way it looks, is in `z` but says nothing of its inputs.
-    let shifts = encoder.weights().select_columns(&PLACE);
-    let latent = Latent::of(dataset, &parts.encoder)?;
-    let features = Features::new(&parts.library);
-    let phases = parts.xi.iter().enumerate();
-    let given = phases.map(|(phase, xi)| {
-        let blocks = || {
-            let mut values = FeatureValues::default();
-            let blocks = Latent::regression_blocks(dataset, &latent, phase);
-            let features = &features;
-            blocks.map(move |(variables, ddz)| {
-                let left = ddz - features.evaluate(&variables, &mut values) * xi;
-                (variables, left)
-            })
+    /// What the latent state says of the latent input, one entry a phase; of linear encoders.
+    fn inputs_given_states(
+        &self,
+        fitted: &Fitted,
+    ) -> Result<Vec<Option<InputGivenState>>, TrainError> {
+        let Some(encoder) = fitted.encoder.as_affine() else {
+            return Ok(vec![None; fitted.xi.len()]);
         };
-        InputGivenState::of_blocks(dataset.samples(Some(phase)), &shifts, blocks)
-    });
-    Ok(given.collect())
-}
-
-fn description(options: &TrainOptions, robot: &Robot) -> String {
-    format!(
-        "{} latent coordinates of {} jumps",
-        options.latent_dim,
-        robot.name()
-    )
-}
-
-fn signals<const N: usize>(names: [String; N], units: [String; N]) -> CoordinateNames {
-    CoordinateNames {
-        names: names.into(),
-        units: units.into(),
+        // Where the robot is, and which way it looks, is in `z` but says nothing of its inputs.
+        let shifts = encoder.weights().select_columns(&PLACE);
+        let training = &self.training;
+        let latent = Latent::of(training, &fitted.encoder)?;
+        let phases = fitted.xi.iter().enumerate();
+        let given = phases.map(|(phase, xi)| {
+            let blocks = || {
+                let mut values = FeatureValues::default();
+                let blocks = EncodedSet::new(training, &latent).regression_blocks(phase);
+                blocks.map(move |(variables, ddz)| {
+                    let left = ddz - self.features.evaluate(&variables, &mut values) * xi;
+                    (variables, left)
+                })
+            };
+            InputGivenState::of_blocks(training.samples(Some(phase)), &shifts, blocks)
+        });
+        Ok(given.collect())
     }
 }
 
 fn median_step_s(dataset: &Dataset) -> f64 {
-    let mut steps: Vec<f64> = dataset
-        .jumps
-        .iter()
-        .flat_map(|jump| jump.time_s.windows(2).map(|pair| pair[1] - pair[0]))
-        .collect();
+    let pairs = dataset.jumps.iter().flat_map(|jump| jump.time_s.windows(2));
+    let mut steps: Vec<f64> = pairs.map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
     // Recorded times carry rounding; a microsecond is below every sampling.
     steps
@@ -184,31 +154,31 @@ fn median_step_s(dataset: &Dataset) -> f64 {
         .map_or(0.002, |step| (step * 1e6).round() / 1e6)
 }
 
-fn provenance(
+/// How a model came to be: command, version, settings, recordings and figures.
+pub(super) fn provenance(
     options: &TrainOptions,
     method: &str,
     origin: &Origin,
     report: &TrainReport,
-) -> Result<Map<String, Value>, TrainError> {
-    let recordings: Vec<Value> = origin
-        .recordings
-        .iter()
-        .map(|file| match file.sets.is_empty() {
-            true => json!({ "path": file.path, "digest": file.digest }),
-            false => json!({ "path": file.path, "digest": file.digest, "sets": file.sets }),
-        })
-        .collect();
-    let mut map = Map::new();
-    map.insert("command".into(), json!(origin.command));
-    map.insert("romc_version".into(), json!(env!("CARGO_PKG_VERSION")));
-    map.insert("method".into(), json!(method));
-    map.insert("seed".into(), json!(options.seed));
+) -> Map<String, Value> {
+    let recordings = origin.recordings.iter();
+    let recordings = recordings.map(|file| match file.sets.is_empty() {
+        true => json!({ "path": file.path, "digest": file.digest }),
+        false => json!({ "path": file.path, "digest": file.digest, "sets": file.sets }),
+    });
     let encoder = EncoderOptions {
         coordinates: options.coordinates(),
         ..options.encoder.clone()
     };
-    map.insert("encoder_options".into(), json!(encoder));
-    map.insert("recordings".into(), Value::Array(recordings));
-    map.insert("report".into(), json!(report));
-    Ok(map)
+    let entries = [
+        ("command", json!(origin.command)),
+        ("romc_version", json!(env!("CARGO_PKG_VERSION"))),
+        ("method", json!(method)),
+        ("seed", json!(options.seed)),
+        ("encoder_options", json!(encoder)),
+        ("recordings", recordings.collect()),
+        ("report", json!(report)),
+    ];
+    let entries = entries.map(|(name, value)| (name.to_owned(), value));
+    entries.into_iter().collect()
 }

@@ -46,7 +46,7 @@ pub fn closed_form(
         }
         seeds.add(seed, fit(&task, seed, watch), watch)?;
     }
-    seeds.into_model(task, robot, "closed-form", origin)
+    seeds.into_model(task, "closed-form", origin)
 }
 
 /// The numbers of one seed, and its score.
@@ -60,13 +60,12 @@ fn fit(
     let search = SubspaceOptions {
         lift_weight: options.encoder.lift_weight,
         coordinate_weights: options.encoder.coordinate_weights(),
-        iterations: 2000,
         restarts: options.encoder.restarts,
         seed,
     };
-    let subspace = find_subspace(&task.moments, &task.frame, options.latent_dim, &search)?;
-    let encoder = task.encoder_over(&subspace.basis)?.into();
-    let decoder = least_squares_decoder(&task.sets.training, &encoder)?.into();
+    let basis = find_subspace(&task.moments, &task.frame, options.latent_dim, &search);
+    let encoder = task.encoder_over(&basis)?.into();
+    let decoder = least_squares_decoder(&task.training, &encoder)?.into();
     let fitted = task.fit_dynamics((encoder, decoder), watch)?;
     let report = task.seed_report(&fitted, (seed, fitted.score()), None)?;
     Ok((report, fitted))

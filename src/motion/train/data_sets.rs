@@ -1,10 +1,6 @@
 //! Training and validation jumps of one training.
 
-use super::dataset::Dataset;
-use super::error::TrainError;
-use super::options::TrainOptions;
 use crate::recording::Source;
-use crate::robot::Robot;
 
 /// Recordings to learn from and to choose by.
 #[derive(Clone, Debug)]
@@ -21,41 +17,6 @@ impl<'a> Recordings<'a> {
         Self {
             training: training.into(),
             validation: validation.into(),
-        }
-    }
-}
-
-/// The recordings cut into phases, scaled.
-pub(super) struct DataSets {
-    pub training: Dataset,
-    pub validation: Dataset,
-}
-
-impl DataSets {
-    /// Cuts the recordings into phases, checks options and samples.
-    pub fn new(
-        recordings: Recordings<'_>,
-        robot: &'static Robot,
-        options: &TrainOptions,
-    ) -> Result<Self, TrainError> {
-        options.check()?;
-        let (scaling, smoothing) = (options.scaling.factors(), options.regression.smoothing);
-        let rule = options.input_rule(robot);
-        let read = |set: Source<'_>| Dataset::new(set, &rule, &options.phases, &scaling, smoothing);
-        let training = read(recordings.training)?;
-        training.check_for_training()?;
-        Ok(Self {
-            training,
-            validation: read(recordings.validation)?,
-        })
-    }
-
-    /// The jumps that candidates are judged by.
-    pub fn judged(&self) -> &Dataset {
-        if self.validation.jumps.is_empty() {
-            &self.training
-        } else {
-            &self.validation
         }
     }
 }

@@ -255,23 +255,20 @@ impl Dataset {
         self.cut(quantity, phase, block_widths(self.samples(phase)))
     }
 
-    fn cut(
-        &self,
+    fn cut<'a>(
+        &'a self,
         quantity: Quantity,
         phase: Option<usize>,
         widths: impl Iterator<Item = usize>,
     ) -> impl Iterator<Item = DMatrix<f64>> {
-        let mut spans: Vec<(&DMatrix<f64>, Range<usize>)> = Vec::new();
-        for jump in &self.jumps {
-            let samples = match quantity {
-                Quantity::X => &jump.x,
-                Quantity::U => &jump.u,
-            };
-            let own = jump.spans.iter();
-            let own = own.filter(|(index, _)| phase.is_none_or(|wanted| wanted == *index));
-            spans.extend(own.map(|(_, range)| (samples, range.clone())));
-        }
-        let mut spans = spans.into_iter().peekable();
+        let of = move |jump: &'a Jump| match quantity {
+            Quantity::X => &jump.x,
+            Quantity::U => &jump.u,
+        };
+        let spans = self.spans(phase);
+        let mut spans = spans
+            .map(move |(jump, range)| (of(&self.jumps[jump]), range))
+            .peekable();
         widths.map(move |width| {
             let mut block = DMatrix::zeros(STATE_DIM, width);
             let mut at = 0;
@@ -292,7 +289,7 @@ impl Dataset {
 
     /// Mean of one quantity over the samples of one phase or of all.
     pub fn mean(&self, quantity: Quantity, phase: Option<usize>) -> DVector<f64> {
-        mean(self.blocks(quantity, phase), self.samples(phase))
+        mean(STATE_DIM, self.samples(phase), self.blocks(quantity, phase))
     }
 
     /// Standard deviation of every state over all samples.
@@ -335,12 +332,15 @@ impl Dataset {
 
     /// Number of samples of one phase or of all.
     pub fn samples(&self, phase: Option<usize>) -> usize {
-        self.jumps
-            .iter()
-            .flat_map(|jump| &jump.spans)
-            .filter(|(index, _)| phase.is_none_or(|wanted| wanted == *index))
-            .map(|(_, range)| range.len())
-            .sum()
+        self.spans(phase).map(|(_, range)| range.len()).sum()
+    }
+
+    /// Maximal runs of one phase or of all, each with the index of its jump.
+    pub fn spans(&self, phase: Option<usize>) -> impl Iterator<Item = (usize, Range<usize>)> {
+        let jumps = self.jumps.iter().enumerate();
+        let all = jumps.flat_map(|(jump, of)| of.spans.iter().map(move |span| (jump, span)));
+        let own = all.filter(move |(_, (of, _))| phase.is_none_or(|wanted| wanted == *of));
+        own.map(|(jump, (_, range))| (jump, range.clone()))
     }
 
     /// Complains unless there are jumps and enough samples of every phase.
@@ -390,10 +390,7 @@ impl Dataset {
             time_s: segment.time_s.clone(),
             x: scaled(segment.x.clone(), &self.scaling.state),
             u: scaled(segment.input(&self.rule)?, &self.scaling.input),
-            rates: match self.files {
-                None => Some(self.rates(segment, &spans)),
-                Some(_) => None,
-            },
+            rates: (self.files.is_none()).then(|| self.rates(segment, &spans)),
             phase,
             spans,
             implausible: (0..n)
@@ -429,9 +426,13 @@ pub fn block_widths(mut samples: usize) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Mean of `n` samples in the columns of blocks.
-fn mean(blocks: impl Iterator<Item = DMatrix<f64>>, n: usize) -> DVector<f64> {
-    let mut mean = DVector::zeros(STATE_DIM);
+/// Mean of `n` samples of so many coordinates in the columns of blocks.
+pub fn mean(
+    coordinates: usize,
+    n: usize,
+    blocks: impl Iterator<Item = DMatrix<f64>>,
+) -> DVector<f64> {
+    let mut mean = DVector::zeros(coordinates);
     for block in blocks {
         for column in block.column_iter() {
             mean.axpy(1.0 / n as f64, &column, 1.0);
@@ -441,7 +442,7 @@ fn mean(blocks: impl Iterator<Item = DMatrix<f64>>, n: usize) -> DVector<f64> {
 }
 
 /// Every row times its factor.
-fn scaled(mut rows: DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
+pub fn scaled(mut rows: DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
     rows.row_iter_mut()
         .zip(factors.iter())
         .for_each(|(mut row, factor)| row *= *factor);

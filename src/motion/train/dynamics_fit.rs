@@ -7,7 +7,7 @@ use super::error::TrainError;
 use super::features::Features;
 use super::joint::Losses;
 use super::judge::Judge;
-use super::latent::{Latent, input_projection, lift_samples, mean_jacobian};
+use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jacobian};
 use super::metrics::{Assessed, BODY_X, BODY_Z, SetMetrics, measure, measure_encoded};
 use super::progress::Watch;
 use super::report::{PhaseTerms, SeedReport, TrainReport};
@@ -58,14 +58,14 @@ impl Task<'_> {
         let learned = self.canonical_basis(basis).0;
         let rows: Vec<_> = held.chain(learned.column_iter()).collect();
         let weights = DMatrix::from_columns(&rows).transpose();
-        let bias = -(&weights * self.sets.training.mean(Quantity::X, None));
+        let bias = -(&weights * self.training.mean(Quantity::X, None));
         Ok(AffineMap::new("encoder", weights, bias)?)
     }
 
     /// `basis T` (`18 x d`) and the orthogonal `T` (`d x d`) for which its columns are simple in the sense of varimax,
     /// with body x and body z first and positive dominant entries.
     pub fn canonical_basis(&self, basis: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
-        let std = self.sets.training.state_std();
+        let std = self.training.state_std();
         let loadings = |basis: &DMatrix<f64>| DMatrix::from_diagonal(&std) * basis;
         let mut basis = basis.clone();
         let mut turn = DMatrix::identity(basis.ncols(), basis.ncols());
@@ -90,19 +90,18 @@ impl Task<'_> {
         (encoder, decoder): (StateMap, StateMap),
         watch: &mut Watch<'_>,
     ) -> Result<Fitted, TrainError> {
-        let (training, judged) = (&self.sets.training, self.sets.judged());
+        let (training, judged) = (&self.training, self.judged());
         let latent = Latent::of(training, &encoder)?;
-        let validated = match self.sets.validation.jumps.is_empty() {
+        let validated = match self.validation.jumps.is_empty() {
             true => None,
             false => Some(Latent::of(judged, &encoder)?),
         };
         let judged_latent = validated.as_ref().unwrap_or(&latent);
-        let options = &self.options.regression;
-        let judge = Judge::new(judged, judged_latent, options.rollout_weight);
+        let (options, features) = (&self.options.regression, &self.features);
+        let judge = Judge::new(features, EncodedSet::new(judged, judged_latent));
         let target = Target {
-            dataset: training,
-            latent: &latent,
-            features: &self.features,
+            set: EncodedSet::new(training, &latent),
+            features,
             knowledge: &self.knowledge,
         };
         let selected = select(target, &judge, options, watch)?;
@@ -118,7 +117,7 @@ impl Task<'_> {
             choice: Some((selected.choice, selected.candidates)),
             training: None,
         };
-        let measured = measure_encoded(fitted.assessed(&self.features), training, &latent)?;
+        let measured = measure_encoded(fitted.assessed(features), target.set)?;
         fitted.training = Some(measured);
         Ok(fitted)
     }
@@ -130,7 +129,7 @@ impl Task<'_> {
         (seed, score): (u64, f64),
         losses: Option<Losses>,
     ) -> Result<SeedReport, TrainError> {
-        let std = self.sets.training.state_std();
+        let std = self.training.state_std();
         let names = Robot::state_names();
         let rows = fitted.weights.row_iter();
         Ok(SeedReport {
@@ -141,7 +140,7 @@ impl Task<'_> {
             dominant: rows
                 .map(|row| names[row.transpose().component_mul(&std).iamax()].clone())
                 .collect(),
-            judged: measure(fitted.assessed(&self.features), self.sets.judged())?,
+            judged: measure(fitted.assessed(&self.features), self.judged())?,
         })
     }
 
@@ -149,15 +148,14 @@ impl Task<'_> {
     pub fn report(&self, fitted: &Fitted) -> Result<TrainReport, TrainError> {
         let assessed = fitted.assessed(&self.features);
         let names = Robot::state_names();
-        let sets = &self.sets;
-        let phases = sets.training.phases.names().into_iter().zip(&fitted.xi);
+        let phases = self.training.phases.names().into_iter().zip(&fitted.xi);
         let (choice, candidates) = fitted.choice.clone().unzip();
-        let validated = !sets.validation.jumps.is_empty();
+        let validated = !self.validation.jumps.is_empty();
         let training = match &fitted.training {
             Some(measured) => measured.clone(),
-            None => measure(assessed, &sets.training)?,
+            None => measure(assessed, &self.training)?,
         };
-        let validation = validated.then(|| measure(assessed, &sets.validation));
+        let validation = validated.then(|| measure(assessed, &self.validation));
         Ok(TrainReport {
             encoded: self.active.iter().map(|&i| names[i].clone()).collect(),
             lift_loss: self.lift_loss(&fitted.encoder)?,
@@ -184,7 +182,7 @@ impl Task<'_> {
             let carried = &input_projection(weights) * input * weights.transpose();
             return Ok(1.0 - carried.trace() / input.trace().max(f64::MIN_POSITIVE));
         }
-        let training = &self.sets.training;
+        let training = &self.training;
         let latent = Latent::of(training, encoder)?;
         let (mut missed, mut total) = (0.0, 0.0);
         for (jump, samples) in training.jumps.iter().zip(&latent) {

@@ -73,11 +73,8 @@ impl Features {
                 Step::Power(base, exponent) => bent(of(base).max(of(exponent))),
             });
         }
-        self.tape
-            .terms
-            .iter()
-            .map(|&step| degree[step] < 2)
-            .collect()
+        let terms = self.tape.terms.iter();
+        terms.map(|&step| degree[step] < 2).collect()
     }
 
     /// For every term whether it depends on a variable, counted over `z`, `dz`, `u_lat`.
@@ -378,13 +375,8 @@ fn slope(function: Function, argument: f64, value: f64) -> f64 {
         Function::Exp => value,
         Function::Log => 1.0 / argument,
         Function::Sqrt => 0.5 / value,
-        Function::Abs => {
-            if argument == 0.0 {
-                0.0
-            } else {
-                argument.signum()
-            }
-        }
+        Function::Abs if argument == 0.0 => 0.0,
+        Function::Abs => argument.signum(),
         Function::Sign => 0.0,
     }
 }
@@ -439,15 +431,10 @@ mod tests {
         for sample in 0..7 {
             let block =
                 |i: usize| DVector::from(variables.row(sample).columns(2 * i, 2).transpose());
-            let expected = library
-                .evaluate(&block(0), &block(1), &block(2))
-                .expect("dimensions fit");
-            for term in 0..library.len() {
-                assert!(
-                    (theta[(sample, term)] - expected[term]).abs() < 1e-14,
-                    "{}",
-                    library.terms()[term].text()
-                );
+            let expected = library.evaluate(&block(0), &block(1), &block(2));
+            let off = theta.row(sample).transpose() - expected.expect("dimensions fit");
+            for (off, term) in off.iter().zip(library.terms()) {
+                assert!(off.abs() < 1e-14, "{}", term.text());
             }
         }
     }
@@ -458,23 +445,18 @@ mod tests {
         let variables = Random::new(8).matrix(3, 6, 0.9);
         let weights = Random::new(9).matrix(3, features.library_dim(), 1.0);
         let mut values = FeatureValues::default();
-        let loss = |at: &DMatrix<f64>| {
-            features
-                .evaluate(at, &mut FeatureValues::default())
-                .dot(&weights)
-        };
         features.evaluate(&variables, &mut values);
         let mut gradient = DMatrix::zeros(3, 6);
         features.backward(&weights, &mut values, &mut gradient);
         for index in 0..variables.len() {
-            let (mut above, mut below) = (variables.clone(), variables.clone());
-            above[index] += 1e-6;
-            below[index] -= 1e-6;
-            let difference = (loss(&above) - loss(&below)) / 2e-6;
-            assert!(
-                (difference - gradient[index]).abs() < 1e-7 * difference.abs().max(1.0),
-                "{index}"
-            );
+            let mut at = |step: f64| {
+                let mut moved = variables.clone();
+                moved[index] += step;
+                features.evaluate(&moved, &mut values).dot(&weights)
+            };
+            let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
+            let off = (difference - gradient[index]).abs();
+            assert!(off < 1e-7 * difference.abs().max(1.0), "{index}");
         }
     }
 }

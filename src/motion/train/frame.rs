@@ -56,19 +56,15 @@ impl Frame {
         if coordinates == Coordinates::Free {
             return Ok(Self::plain(active));
         }
-        let body: &[usize] = if latent_dim < 2 {
-            &[BODY_X, BODY_Z]
-        } else {
-            &[]
+        let (body, held): (&[usize], _) = match latent_dim {
+            0 | 1 => (&[BODY_X, BODY_Z], DMatrix::zeros(STATE_DIM, 0)),
+            _ => (&[], centre_of_mass(training, robot)?),
         };
         let single = body.iter().chain(&[PITCH]).filter(|i| active.contains(i));
         let mut free: Vec<DVector<f64>> = single.map(|&i| unit(i)).collect();
         free.extend(mirrored_joints(active, robot));
         Ok(Self {
-            held: match latent_dim {
-                0 | 1 => DMatrix::zeros(STATE_DIM, 0),
-                _ => centre_of_mass(training, robot)?,
-            },
+            held,
             free: match free.is_empty() {
                 true => DMatrix::zeros(STATE_DIM, 0),
                 false => DMatrix::from_columns(&free),
@@ -183,28 +179,11 @@ fn unit(index: usize) -> DVector<f64> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
-    use crate::recording::Recording;
-    use crate::robot::{InputRule, Robot};
-    use crate::train::TrainOptions;
+    use crate::train::oscillator::go1;
 
     fn robot() -> &'static Robot {
         Robot::by_name("go1").expect("a known robot")
-    }
-
-    fn go1(name: &str) -> Dataset {
-        let path = format!("examples/recordings/go1/{name}.csv.gz");
-        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("../..")
-            .join(path);
-        let jump = crate::recording::read(&path).expect("a shipped recording");
-        let options = TrainOptions::new("test", 4);
-        let rule = InputRule::published(robot());
-        let scaling = options.scaling.factors();
-        let jumps: [Recording; 1] = [jump];
-        Dataset::new(&jumps[..], &rule, &options.phases, &scaling, 11).expect("a jump")
     }
 
     /// Mean and standard deviation of the acceleration along a row over the windows in flight, m/s^2.
@@ -214,19 +193,14 @@ mod tests {
             .expect("held in memory");
         let scale = dataset.scaling.state[BODY_Z];
         let values: Vec<f64> = all.iter().map(|ddx| row.dot(ddx) / scale).collect();
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let square = values
-            .iter()
-            .map(|value| (value - mean).powi(2))
-            .sum::<f64>();
-        (mean, (square / n).sqrt())
+        let values = DVector::from_vec(values);
+        (values.mean(), values.variance().sqrt())
     }
 
     #[test]
     fn centre_of_mass_learned_from_one_jump_falls_freely_in_another_where_the_body_does_not() {
-        let rows = centre_of_mass(&go1("train_01"), robot()).expect("held in memory");
-        let other = go1("test_02");
+        let rows = centre_of_mass(&go1(["train_01"]), robot()).expect("held in memory");
+        let other = go1(["test_02"]);
         let (mean, spread) = in_flight(&other, rows.column(1).into_owned());
         assert!(
             (mean + GRAVITY_M_S2).abs() < 0.1 && spread < 0.3,
@@ -242,7 +216,7 @@ mod tests {
 
     #[test]
     fn named_rows_say_nothing_of_sideways_motion_and_are_the_same_mirrored() {
-        let dataset = go1("train_01");
+        let dataset = go1(["train_01"]);
         let active: Vec<usize> = (0..STATE_DIM).collect();
         let frame =
             Frame::new(&dataset, &active, 6, Coordinates::Named, robot()).expect("in memory");

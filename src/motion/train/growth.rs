@@ -11,7 +11,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::dataset::Dataset;
 use super::features::{FeatureValues, Features};
-use super::latent::Latent;
+use super::latent::EncodedSet;
 use crate::evaluate::{eigenvalues, state_matrix};
 
 /// Steps of least change before coefficients are scaled down instead.
@@ -43,19 +43,14 @@ struct Mode {
 
 impl Growth {
     /// Of these jumps: the mean state of each phase, and the most frequent order of phases with its mean durations.
-    pub fn of_jumps(
-        bound_per_s: Option<f64>,
-        dataset: &Dataset,
-        latent: &[Latent],
-        features: &Features,
-    ) -> Self {
-        let phases = 0..dataset.phases.patterns.len();
+    pub fn of_jumps(bound_per_s: Option<f64>, set: EncodedSet<'_>, features: &Features) -> Self {
+        let phases = 0..set.dataset.phases.patterns.len();
         Self {
             bound_per_s,
             slopes: phases
-                .map(|phase| slopes_at(&mean_of(phase, dataset, latent), features))
+                .map(|phase| slopes_at(&mean_of(phase, set), features))
                 .collect(),
-            sequence: usual_sequence(dataset),
+            sequence: usual_sequence(set.dataset),
         }
     }
 
@@ -276,19 +271,20 @@ fn dot(a: &[DMatrix<f64>], b: &[DMatrix<f64>]) -> f64 {
 }
 
 /// Mean of `z`, `dz`, `u_lat` over the samples of a phase, 0 if there are none.
-fn mean_of(phase: usize, dataset: &Dataset, latent: &[Latent]) -> Vec<f64> {
-    let d = latent.first().map_or(0, |first| first.z.nrows());
-    let (mut mean, mut samples) = (vec![0.0; 3 * d], 0usize);
-    for (jump, latent) in dataset.jumps.iter().zip(latent) {
-        for sample in (0..jump.len()).filter(|&sample| jump.phase[sample] == phase) {
+fn mean_of(phase: usize, set: EncodedSet<'_>) -> Vec<f64> {
+    let d = set.latent_dim();
+    let mut mean = vec![0.0; 3 * d];
+    for (jump, range) in set.dataset.spans(Some(phase)) {
+        let latent = &set.latent[jump];
+        let of = [&latent.z, &latent.dz, &latent.u_lat];
+        for sample in range {
             for (i, total) in mean.iter_mut().enumerate() {
-                *total += [&latent.z, &latent.dz, &latent.u_lat][i / d][(i % d, sample)];
+                *total += of[i / d][(i % d, sample)];
             }
-            samples += 1;
         }
     }
-    mean.iter_mut()
-        .for_each(|total| *total /= samples.max(1) as f64);
+    let samples = set.dataset.samples(Some(phase)).max(1) as f64;
+    mean.iter_mut().for_each(|total| *total /= samples);
     mean
 }
 
@@ -296,10 +292,8 @@ fn mean_of(phase: usize, dataset: &Dataset, latent: &[Latent]) -> Vec<f64> {
 /// no finite one.
 fn slopes_at(mean: &[f64], features: &Features) -> DMatrix<f64> {
     let d = features.latent_dim();
-    let step = DIFFERENCE
-        * mean
-            .iter()
-            .fold(1.0, |most: f64, value| most.max(value.abs()));
+    let largest = mean.iter().fold(1.0, |most: f64, v| most.max(v.abs()));
+    let step = DIFFERENCE * largest;
     let variables = DMatrix::from_fn(4 * d, 3 * d, |row, i| match (row / 2 == i, row % 2) {
         (true, 0) => mean[i] + step,
         (true, _) => mean[i] - step,
@@ -323,10 +317,8 @@ fn usual_sequence(dataset: &Dataset) -> Vec<(usize, f64)> {
             *total_s += jump.time_s[span.end - 1] - jump.time_s[span.start];
         }
     }
-    let usual = orders
-        .into_iter()
-        .rev()
-        .max_by_key(|(_, (jumps, _))| *jumps);
+    let all = orders.into_iter().rev();
+    let usual = all.max_by_key(|(_, (jumps, _))| *jumps);
     let (order, (jumps, total_s)) = usual.unwrap_or_default();
     let mean_s = total_s.iter().map(|total_s| total_s / jumps as f64);
     order.into_iter().zip(mean_s).collect()
@@ -341,10 +333,8 @@ mod tests {
     fn growth() -> (Growth, Vec<DMatrix<f64>>) {
         let (dataset, latent) = oscillator::jumps(3);
         let (features, truth) = oscillator::known();
-        (
-            Growth::of_jumps(Some(1.0), &dataset, &latent, &features),
-            truth,
-        )
+        let set = EncodedSet::new(&dataset, &latent);
+        (Growth::of_jumps(Some(1.0), set, &features), truth)
     }
 
     /// Changes weigh the same in all coefficients.
@@ -412,9 +402,7 @@ mod tests {
         let (growth, mut xi) = growth();
         xi[0][(3, 0)] = 50.0;
         let inputs = xi[0].rows(5, 2).into_owned();
-        growth.hold(&mut xi, |gradient| {
-            gradient.iter().map(|g| g * 0.0).collect()
-        });
+        growth.hold(&mut xi, |all| all.iter().map(|g| g * 0.0).collect());
         assert!(growth.admits(&xi) && xi[0].rows(5, 2) == inputs);
         let unbounded = Growth {
             bound_per_s: None,

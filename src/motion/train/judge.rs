@@ -5,9 +5,12 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::dataset::Dataset;
-use super::latent::Latent;
+use super::features::Features;
+use super::latent::{EncodedSet, Latent};
 use super::rollout::{Candidate, Change, Window, predict, predict_changed, restarted, whole};
 
+/// Weight of whole-jump rollouts against predictions of 0.1 s in a score.
+const ROLLOUT_WEIGHT: f64 = 0.2;
 /// Samples between errors that coefficients are refined by.
 const THINNED: usize = 5;
 /// Samples of a part, of which there are several only for more recordings than fit into little memory.
@@ -18,58 +21,51 @@ const LEAST_ERROR: f64 = 1e-3;
 const SHORT: usize = 0;
 const LONG: usize = 1;
 
-/// Samples to judge candidates on.
+/// A library, and samples to judge its coefficients on (`library_dim x latent_dim` a phase).
 #[derive(Clone)]
 pub struct Judge<'a> {
-    dataset: &'a Dataset,
-    latent: &'a [Latent],
+    /// The library.
+    pub features: &'a Features,
+    set: EncodedSet<'a>,
     windows: [Vec<Window>; 2],     // short and long
     parts: Vec<[Range<usize>; 2]>, // those of consecutive jumps
     scales: [Vec<f64>; 2],         // what errors are multiplied by, a coordinate
-    rollout_weight: f64,
 }
 
 impl<'a> Judge<'a> {
     /// Judges on these jumps.
-    pub fn new(dataset: &'a Dataset, latent: &'a [Latent], rollout_weight: f64) -> Self {
-        Self::in_parts(dataset, latent, rollout_weight, PART)
+    pub fn new(features: &'a Features, set: EncodedSet<'a>) -> Self {
+        Self::in_parts(features, set, PART)
     }
 
-    fn in_parts(
-        dataset: &'a Dataset,
-        latent: &'a [Latent],
-        rollout_weight: f64,
-        samples: usize,
-    ) -> Self {
-        let d = latent.first().map_or(0, |first| first.z.nrows());
-        let inverse_std: Vec<f64> = (0..d)
-            .map(|row| 1.0 / row_std(latent, row).max(f64::MIN_POSITIVE))
+    fn in_parts(features: &'a Features, set: EncodedSet<'a>, samples: usize) -> Self {
+        let inverse_std: Vec<f64> = (0..set.latent_dim())
+            .map(|row| 1.0 / row_std(set.latent, row).max(f64::MIN_POSITIVE))
             .collect();
-        let windows = [restarted(dataset, 0.1), whole(dataset)];
+        let windows = [restarted(set.dataset, 0.1), whole(set.dataset)];
         let of_jumps = |windows: &Vec<Window>, jumps: &Range<usize>| {
             let before = |jump| windows.partition_point(|window| window.jump < jump);
             before(jumps.start)..before(jumps.end)
         };
-        let parts = parts_of(dataset, samples)
+        let parts = parts_of(set.dataset, samples)
             .map(|jumps| windows.each_ref().map(|windows| of_jumps(windows, &jumps)));
         Self {
+            features,
             parts: parts.collect(),
-            dataset,
-            latent,
+            set,
             windows,
             scales: [inverse_std.clone(), inverse_std],
-            rollout_weight,
         }
     }
 
-    /// Judges by errors relative to those of `candidate`, each coordinate's over 0.1 s and over whole jumps by itself.
+    /// Judges by errors relative to those of `xi`, each coordinate's over 0.1 s and over whole jumps by itself.
     ///
     /// In standard deviations a millimetre of a body that jumps half a metre is nothing beside a leg's error, though
     /// both are a tenth of what can be predicted: this way a tenth less counts the same wherever it is.
-    pub fn relative_to(&self, candidate: Candidate<'_>) -> Self {
+    pub fn relative_to(&self, xi: &[DMatrix<f64>]) -> Self {
         let mut relative = self.clone();
         for kind in [SHORT, LONG] {
-            let squares = self.mean_squares(candidate, kind);
+            let squares = self.mean_squares(xi, kind);
             for (scale, square) in relative.scales[kind].iter_mut().zip(&squares) {
                 let error = square.sqrt().max(LEAST_ERROR / *scale);
                 if error.is_finite() {
@@ -80,18 +76,18 @@ impl<'a> Judge<'a> {
         relative
     }
 
-    /// Score of a candidate, see [`Choice::score`](super::select::Choice::score); infinite if a rollout diverges.
-    pub fn score(&self, candidate: Candidate<'_>) -> f64 {
-        self.score_within(candidate, f64::MAX)
+    /// Score of coefficients, see [`Choice::score`](super::select::Choice::score); infinite if a rollout diverges.
+    pub fn score(&self, xi: &[DMatrix<f64>]) -> f64 {
+        self.score_within(xi, f64::MAX)
     }
 
     /// The same, or a number above `limit` if the score is: whole jumps are left out if 0.1 s are enough to know.
-    pub fn score_within(&self, candidate: Candidate<'_>, limit: f64) -> f64 {
-        let short = self.error(candidate, SHORT);
-        if short > limit || self.rollout_weight == 0.0 {
+    pub fn score_within(&self, xi: &[DMatrix<f64>], limit: f64) -> f64 {
+        let short = self.error(xi, SHORT);
+        if short > limit {
             return short;
         }
-        short + self.rollout_weight * self.error(candidate, LONG)
+        short + ROLLOUT_WEIGHT * self.error(xi, LONG)
     }
 
     /// Parts that [`Self::errors`] can be asked for, one by one so that few predictions are held at a time.
@@ -101,31 +97,29 @@ impl<'a> Judge<'a> {
 
     /// Scaled errors of 0.1 s predictions and of whole jumps of a part, every [`THINNED`]th sample;
     /// none if a rollout diverges.
-    pub fn errors(&self, candidate: Candidate<'_>, part: usize) -> Option<[DVector<f64>; 2]> {
+    pub fn errors(&self, xi: &[DMatrix<f64>], part: usize) -> Option<[DVector<f64>; 2]> {
         let errors = [SHORT, LONG].map(|kind| {
-            let windows = self.windows_of(part, kind);
-            let predictions = predict(candidate, self.dataset, self.latent, windows);
             let mut errors = Vec::new();
-            for (window, prediction) in windows.iter().zip(&predictions) {
-                self.add_errors(kind, window, prediction, &mut errors);
+            for (window, prediction) in self.predictions(xi, part, kind) {
+                self.add_errors(kind, window, &prediction, &mut errors);
             }
             DVector::from_vec(errors)
         });
         are_finite(&errors).then_some(errors)
     }
 
-    /// The same for the candidate with each of the `changes`, one at a time.
+    /// The same with each of the `changes`, one at a time.
     pub fn errors_changed(
         &self,
-        candidate: Candidate<'_>,
+        xi: &[DMatrix<f64>],
         changes: &[Change],
         part: usize,
     ) -> Option<Vec<[DVector<f64>; 2]>> {
+        let candidate = self.candidate(xi);
         let of_kind = |kind: usize| {
             let mut errors = vec![Vec::new(); changes.len()];
             for window in self.windows_of(part, kind) {
-                let predictions =
-                    predict_changed(candidate, changes, self.dataset, self.latent, *window);
+                let predictions = predict_changed(candidate, changes, self.set, *window);
                 for (errors, prediction) in errors.iter_mut().zip(&predictions) {
                     self.add_errors(kind, window, prediction, errors);
                 }
@@ -135,6 +129,23 @@ impl<'a> Judge<'a> {
         let pairs = of_kind(SHORT).zip(of_kind(LONG));
         let finite = |errors: [DVector<f64>; 2]| are_finite(&errors).then_some(errors);
         pairs.map(|(short, long)| finite([short, long])).collect()
+    }
+
+    fn candidate<'x>(&'x self, xi: &'x [DMatrix<f64>]) -> Candidate<'x> {
+        let features = self.features;
+        Candidate { features, xi }
+    }
+
+    /// The windows of a part with what is predicted in them.
+    fn predictions(
+        &self,
+        xi: &[DMatrix<f64>],
+        part: usize,
+        kind: usize,
+    ) -> impl Iterator<Item = (&Window, DMatrix<f64>)> {
+        let windows = self.windows_of(part, kind);
+        let predictions = predict(self.candidate(xi), self.set, windows);
+        windows.iter().zip(predictions)
     }
 
     fn windows_of(&self, part: usize, kind: usize) -> &[Window] {
@@ -149,7 +160,7 @@ impl<'a> Judge<'a> {
         prediction: &DMatrix<f64>,
         errors: &mut Vec<f64>,
     ) {
-        let z = &self.latent[window.jump].z;
+        let z = &self.set.latent[window.jump].z;
         for step in (THINNED - 1..window.steps).step_by(THINNED) {
             for (row, scale) in self.scales[kind].iter().enumerate() {
                 let truth = z[(row, window.start + 1 + step)];
@@ -159,8 +170,8 @@ impl<'a> Judge<'a> {
     }
 
     /// Root mean square of the scaled errors; infinite if a rollout diverges.
-    fn error(&self, candidate: Candidate<'_>, kind: usize) -> f64 {
-        let squares = self.mean_squares(candidate, kind);
+    fn error(&self, xi: &[DMatrix<f64>], kind: usize) -> f64 {
+        let squares = self.mean_squares(xi, kind);
         let scaled = squares.iter().zip(&self.scales[kind]);
         let sum: f64 = scaled.map(|(square, scale)| square * scale * scale).sum();
         let error = (sum / squares.len().max(1) as f64).sqrt();
@@ -172,25 +183,20 @@ impl<'a> Judge<'a> {
     }
 
     /// Mean squares of the errors, a coordinate.
-    fn mean_squares(&self, candidate: Candidate<'_>, kind: usize) -> Vec<f64> {
+    fn mean_squares(&self, xi: &[DMatrix<f64>], kind: usize) -> Vec<f64> {
         let (mut squares, mut count) = (vec![0.0; self.scales[kind].len()], 0);
         for part in self.parts() {
-            let windows = self.windows_of(part, kind);
-            let predictions = predict(candidate, self.dataset, self.latent, windows);
-            for (window, prediction) in windows.iter().zip(&predictions) {
-                let truth = self.latent[window.jump]
-                    .z
-                    .columns(window.start + 1, window.steps);
+            for (window, prediction) in self.predictions(xi, part, kind) {
+                let z = &self.set.latent[window.jump].z;
+                let truth = z.columns(window.start + 1, window.steps);
                 for (row, square) in squares.iter_mut().enumerate() {
                     *square += (prediction.row(row) - truth.row(row)).norm_squared();
                 }
                 count += window.steps;
             }
         }
-        squares
-            .iter()
-            .map(|square| square / count.max(1) as f64)
-            .collect()
+        let means = squares.iter().map(|square| square / count.max(1) as f64);
+        means.collect()
     }
 }
 
@@ -235,38 +241,30 @@ mod tests {
         let (dataset, latent) = oscillator::jumps(3);
         let (features, truth) = oscillator::known();
         let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();
-        let of = |xi| Candidate {
-            features: &features,
-            xi,
-        };
-        let judge = Judge::new(&dataset, &latent, 0.2).relative_to(of(&off));
-        assert!((judge.score(of(&off)) - 1.2).abs() < 1e-12);
-        assert!(judge.score(of(&truth)) < 0.05);
-        let errors = judge.errors(of(&off), 0).expect("no divergence");
+        let plain = Judge::new(&features, EncodedSet::new(&dataset, &latent));
+        let judge = plain.relative_to(&off);
+        assert!((judge.score(&off) - 1.2).abs() < 1e-12);
+        assert!(judge.score(&truth) < 0.05);
+        let errors = judge.errors(&off, 0).expect("no divergence");
         for errors in errors {
             // Every fifth error of a window, which begins with the least.
             let mean_square = errors.norm_squared() / errors.len() as f64;
             assert!((0.5..2.0).contains(&mean_square), "{mean_square}");
         }
         // What cannot be told apart from none is not divided by.
-        let exact = Judge::new(&dataset, &latent, 0.2).relative_to(of(&truth));
-        assert!(exact.score(of(&off)).is_finite());
+        assert!(plain.relative_to(&truth).score(&off).is_finite());
     }
 
     #[test]
     fn score_within_a_limit_is_the_score_or_above_the_limit() {
         let (dataset, latent) = oscillator::jumps(3);
         let (features, truth) = oscillator::known();
-        let judge = Judge::new(&dataset, &latent, 0.2);
+        let judge = Judge::new(&features, EncodedSet::new(&dataset, &latent));
         let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();
-        let candidate = Candidate {
-            features: &features,
-            xi: &off,
-        };
-        let (score, short) = (judge.score(candidate), judge.error(candidate, SHORT));
-        assert_eq!(judge.score_within(candidate, score), score);
-        assert_eq!(judge.score_within(candidate, 0.99 * short), short);
-        assert!(judge.score_within(candidate, 0.99 * score) > 0.99 * score);
+        let (score, short) = (judge.score(&off), judge.error(&off, SHORT));
+        assert_eq!(judge.score_within(&off, score), score);
+        assert_eq!(judge.score_within(&off, 0.99 * short), short);
+        assert!(judge.score_within(&off, 0.99 * score) > 0.99 * score);
     }
 
     #[test]
@@ -274,24 +272,21 @@ mod tests {
         let (dataset, latent) = oscillator::jumps(5);
         let (features, truth) = oscillator::known();
         let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();
-        let candidate = Candidate {
-            features: &features,
-            xi: &off,
-        };
         let change = Change {
             place: (0, 1, 0),
             by: 0.01,
         };
         let errors = |judge: &Judge<'_>, part| {
-            let changed = judge.errors_changed(candidate, &[change], part)?;
-            Some([judge.errors(candidate, part)?, changed[0].clone()])
+            let changed = judge.errors_changed(&off, &[change], part)?;
+            Some([judge.errors(&off, part)?, changed[0].clone()])
         };
-        let together = Judge::new(&dataset, &latent, 0.2);
+        let set = EncodedSet::new(&dataset, &latent);
+        let together = Judge::new(&features, set);
         assert_eq!(together.parts(), 0..1);
         let all = errors(&together, 0).expect("no rollout diverges");
         assert_ne!(all[0], all[1]);
         for (samples, n_parts) in [(2 * dataset.jumps[0].len(), 3), (1, 5)] {
-            let judge = Judge::in_parts(&dataset, &latent, 0.2, samples);
+            let judge = Judge::in_parts(&features, set, samples);
             assert_eq!(judge.parts(), 0..n_parts);
             let parts = judge.parts().map(|part| errors(&judge, part));
             let parts: Option<Vec<_>> = parts.collect();
@@ -302,7 +297,7 @@ mod tests {
                     assert!(found.eq(all.iter()), "{samples} samples, kind {kind}");
                 }
             }
-            let (score, whole) = (judge.score(candidate), together.score(candidate));
+            let (score, whole) = (judge.score(&off), together.score(&off));
             assert!((score - whole).abs() < 1e-12 * whole, "{score} of {whole}");
         }
     }

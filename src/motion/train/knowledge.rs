@@ -116,24 +116,14 @@ impl Knowledge {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Library, StandardLibrary};
+    use crate::model::Library;
     use crate::robot::STATE_DIM;
     use crate::train::oscillator;
     use crate::train::sparse::{Pruning, Regression};
 
-    /// Terms 1, z1, z2, dz1, dz2, u1, u2.
-    fn features() -> Features {
-        let standard = StandardLibrary {
-            degree: 1,
-            trigonometric: false,
-            inputs: true,
-        };
-        Features::new(&Library::standard(2, standard).expect("small library"))
-    }
-
     #[test]
     fn terms_are_found_by_what_they_depend_on() {
-        let features = features();
+        let (features, _) = oscillator::known();
         assert_eq!(features.constant_term(), Some(0));
         assert_eq!(features.variable_term(4), Some(5));
         assert_eq!(
@@ -151,13 +141,7 @@ mod tests {
     #[test]
     fn centre_of_mass_is_moved_by_forces_alone_and_in_flight_by_none() {
         let (dataset, _) = oscillator::jumps(1);
-        let standard = StandardLibrary {
-            degree: 2,
-            trigonometric: true,
-            inputs: true,
-        };
-        let library = Library::standard(3, standard).expect("small library");
-        let features = Features::new(&library);
+        let features = Features::new(&oscillator::standard_library(3, 2, true));
         let frame = Frame {
             held: DMatrix::zeros(STATE_DIM, HELD),
             free: DMatrix::zeros(STATE_DIM, 1),

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixViewMut, DVector};
 
-use super::dataset::{Dataset, Jump, Quantity, Rates, block_widths, centred, sum_product};
+use super::dataset::{Dataset, Jump, Quantity, Rates, block_widths, centred, mean, sum_product};
 use super::error::TrainError;
 use crate::model::{AffineMap, ModelError, StateMap};
 
@@ -75,19 +75,48 @@ impl Latent {
         latent
     }
 
+    /// Writes `[z, dz, u_lat]` of some samples into the rows of `variables`.
+    pub fn copy_variables(&self, range: Range<usize>, variables: &mut DMatrixViewMut<'_, f64>) {
+        let d = self.z.nrows();
+        for (block, source) in [&self.z, &self.dz, &self.u_lat].into_iter().enumerate() {
+            variables
+                .columns_mut(block * d, d)
+                .tr_copy_from(&source.columns_range(range.clone()));
+        }
+    }
+}
+
+/// A dataset with its latent samples, one of each jump.
+#[derive(Clone, Copy, Debug)]
+pub struct EncodedSet<'a> {
+    /// The jumps.
+    pub dataset: &'a Dataset,
+    /// Their latent samples.
+    pub latent: &'a [Latent],
+}
+
+impl<'a> EncodedSet<'a> {
+    /// These latent samples of a dataset.
+    pub fn new(dataset: &'a Dataset, latent: &'a [Latent]) -> Self {
+        Self { dataset, latent }
+    }
+
+    /// Number of latent coordinates, 0 without a jump.
+    pub fn latent_dim(self) -> usize {
+        self.latent.first().map_or(0, |first| first.z.nrows())
+    }
+
     /// Blocks of the samples of one phase: `[z, dz, u_lat]`, `n x 3 latent_dim`, and `ddz^T`, `n x latent_dim`.
-    pub fn regression_blocks<'a>(
-        dataset: &'a Dataset,
-        latent: &'a [Latent],
+    pub fn regression_blocks(
+        self,
         phase: usize,
-    ) -> impl Iterator<Item = (DMatrix<f64>, DMatrix<f64>)> + 'a {
-        let d = latent.first().map_or(0, |first| first.z.nrows());
-        let jumps = dataset.jumps.iter().zip(latent);
-        let spans = jumps.flat_map(move |(jump, samples)| {
-            let own = jump.spans.iter().filter(move |(index, _)| *index == phase);
-            own.map(move |(_, range)| (samples, range.clone()))
-        });
-        let mut spans = spans.peekable();
+    ) -> impl Iterator<Item = (DMatrix<f64>, DMatrix<f64>)> {
+        let Self { dataset, latent } = self;
+        let d = self.latent_dim();
+        let spans = dataset.spans(Some(phase));
+        let mut spans = spans
+            .map(move |(jump, range)| (&latent[jump], range))
+            .peekable();
         block_widths(dataset.samples(Some(phase))).map(move |width| {
             let (mut variables, mut target) =
                 (DMatrix::zeros(width, 3 * d), DMatrix::zeros(width, d));
@@ -110,25 +139,11 @@ impl Latent {
     }
 
     /// Jump and sample of a row of [`Self::regression_blocks`], if there are so many.
-    pub fn place_of_row(dataset: &Dataset, phase: usize, row: usize) -> Option<(&Jump, usize)> {
-        let spans = dataset
-            .jumps
-            .iter()
-            .flat_map(|jump| jump.spans.iter().map(move |span| (jump, span)));
-        spans
-            .filter(|(_, (index, _))| *index == phase)
-            .flat_map(|(jump, (_, range))| range.clone().map(move |sample| (jump, sample)))
-            .nth(row)
-    }
-
-    /// Writes `[z, dz, u_lat]` of some samples into the rows of `variables`.
-    pub fn copy_variables(&self, range: Range<usize>, variables: &mut DMatrixViewMut<'_, f64>) {
-        let d = self.z.nrows();
-        for (block, source) in [&self.z, &self.dz, &self.u_lat].into_iter().enumerate() {
-            variables
-                .columns_mut(block * d, d)
-                .tr_copy_from(&source.columns_range(range.clone()));
-        }
+    pub fn place_of_row(self, phase: usize, row: usize) -> Option<(&'a Jump, usize)> {
+        let spans = self.dataset.spans(Some(phase));
+        let mut places = spans.flat_map(|(jump, range)| range.map(move |sample| (jump, sample)));
+        let (jump, sample) = places.nth(row)?;
+        Some((&self.dataset.jumps[jump], sample))
     }
 }
 
@@ -172,9 +187,8 @@ pub fn lift_samples(encoder: &StateMap, x: &DMatrix<f64>, u_lat: &DMatrix<f64>) 
     }
     let mut lifted = DMatrix::zeros(x.nrows(), x.ncols());
     for (sample, mut column) in lifted.column_iter_mut().enumerate() {
-        let jacobian = encoder
-            .jacobian(&x.column(sample).into_owned())
-            .expect(FITS);
+        let x = x.column(sample).into_owned();
+        let jacobian = encoder.jacobian(&x).expect(FITS);
         column.copy_from(&jacobian.tr_mul(&u_lat.column(sample)));
     }
     lifted
@@ -186,11 +200,10 @@ pub fn mean_jacobian(encoder: &StateMap, x: &DMatrix<f64>) -> DMatrix<f64> {
         return linear.weights().clone();
     }
     let (rows, columns) = encoder.shape();
-    let sum = x
-        .column_iter()
-        .fold(DMatrix::zeros(rows, columns), |sum, x| {
-            sum + encoder.jacobian(&x.into_owned()).expect(FITS)
-        });
+    let mut sum = DMatrix::zeros(rows, columns);
+    for x in x.column_iter() {
+        sum += encoder.jacobian(&x.into_owned()).expect(FITS);
+    }
     sum / x.ncols().max(1) as f64
 }
 
@@ -204,16 +217,11 @@ pub fn least_squares_decoder(
 ) -> Result<AffineMap, TrainError> {
     let d = encoder.output_dim();
     let x_mean = dataset.mean(Quantity::X, None);
-    let share = 1.0 / dataset.samples(None) as f64;
     let encoded = || {
         let blocks = dataset.blocks(Quantity::X, None);
         blocks.map(|x| (map_samples(encoder, &x), x))
     };
-    let mut z_mean = DVector::zeros(d);
-    for (z, _) in encoded() {
-        let columns = z.column_iter();
-        columns.for_each(|column| z_mean.axpy(share, &column, 1.0));
-    }
+    let z_mean = mean(d, dataset.samples(None), encoded().map(|(z, _)| z));
     let mut gram = DMatrix::zeros(d, d);
     let mut cross = DMatrix::zeros(x_mean.len(), d);
     for (z, x) in encoded() {

@@ -1,12 +1,10 @@
 //! Layers of the maps to be trained.
 
-use serde::{Deserialize, Serialize};
-
 use super::error::TrainError;
 use crate::model::{Activation, MAX_LAYER_WIDTH, MAX_LAYERS};
 
 /// Layers of encoder and decoder; without hidden layers both are affine maps.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MapOptions {
     /// Widths of the encoder's hidden layers; a linear layer to the latent coordinates follows.
     pub encoder_layers: Vec<usize>,

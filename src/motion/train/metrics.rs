@@ -1,12 +1,12 @@
 //! How good a model is on a set of jumps.
 
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::dataset::{Dataset, Rates, Scaling};
+use super::dataset::{Dataset, Rates, Scaling, mean};
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
-use super::latent::{Latent, lift_samples, map_samples};
+use super::latent::{EncodedSet, Latent, lift_samples, map_samples};
 use super::rollout::{Candidate, Window, predict, restarted, whole};
 use crate::model::{ReducedModel, StateMap};
 use crate::recording::Source;
@@ -25,7 +25,7 @@ const SHORT_S: f64 = 0.1;
 const SMOOTHING: usize = 11;
 
 /// Figures of one model on one set of jumps.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SetMetrics {
     /// Mean square of `x - decode(encode(x))` over samples and coordinates, scaled units.
     pub decoder_mse: f64,
@@ -75,11 +75,7 @@ pub fn assess<'a>(
         SMOOTHING,
     )?;
     let features = Features::new(model.library());
-    let xi: Vec<_> = model
-        .phases()
-        .iter()
-        .map(|phase| phase.xi.clone())
-        .collect();
+    let xi: Vec<_> = (model.phases().iter().map(|phase| phase.xi.clone())).collect();
     let assessed = Assessed {
         candidate: Candidate {
             features: &features,
@@ -94,24 +90,24 @@ pub fn assess<'a>(
 /// Measures a model on a dataset.
 pub(super) fn measure(model: Assessed<'_>, dataset: &Dataset) -> Result<SetMetrics, TrainError> {
     let latent = Latent::of(dataset, model.encoder)?;
-    measure_encoded(model, dataset, &latent)
+    measure_encoded(model, EncodedSet::new(dataset, &latent))
 }
 
 /// Measures a model on a dataset that it has encoded already.
 pub(super) fn measure_encoded(
     model: Assessed<'_>,
-    dataset: &Dataset,
-    latent: &[Latent],
+    set: EncodedSet<'_>,
 ) -> Result<SetMetrics, TrainError> {
-    let [prediction_x_m, prediction_z_m] =
-        body_rms(model, dataset, latent, &restarted(dataset, SHORT_S));
-    let [rollout_x_m, rollout_z_m] = body_rms(model, dataset, latent, &whole(dataset));
+    let short = restarted(set.dataset, SHORT_S);
+    let [prediction_x_m, prediction_z_m] = body_rms(model, set, &short);
+    let [rollout_x_m, rollout_z_m] = body_rms(model, set, &whole(set.dataset));
+    let phases = 0..set.dataset.phases.patterns.len();
     Ok(SetMetrics {
-        decoder_mse: decoder_mse(model, dataset, latent),
-        ddz_r2: (0..dataset.phases.patterns.len())
-            .map(|phase| ddz_r2(model.candidate, dataset, latent, phase))
+        decoder_mse: decoder_mse(model, set),
+        ddz_r2: phases
+            .map(|phase| ddz_r2(model.candidate, set, phase))
             .collect(),
-        torque_r2: torque_r2(model.encoder, dataset, latent)?,
+        torque_r2: torque_r2(model.encoder, set)?,
         prediction_x_m,
         prediction_z_m,
         rollout_x_m: rollout_x_m.is_finite().then_some(rollout_x_m),
@@ -120,53 +116,40 @@ pub(super) fn measure_encoded(
 }
 
 /// Root mean square errors of decoded body x and z, in metres, over all predicted samples of the windows.
-fn body_rms(
-    model: Assessed<'_>,
-    dataset: &Dataset,
-    latent: &[Latent],
-    windows: &[Window],
-) -> [f64; 2] {
-    let predictions = predict(model.candidate, dataset, latent, windows);
+fn body_rms(model: Assessed<'_>, set: EncodedSet<'_>, windows: &[Window]) -> [f64; 2] {
+    let predictions = predict(model.candidate, set, windows);
     let mut squares = [0.0; 2];
     let mut count = 0;
     for (window, prediction) in windows.iter().zip(&predictions) {
         let decoded = map_samples(model.decoder, prediction);
-        let truth = dataset.jumps[window.jump]
-            .x
-            .columns(window.start + 1, window.steps);
+        let x = &set.dataset.jumps[window.jump].x;
+        let truth = x.columns(window.start + 1, window.steps);
         for (square, row) in squares.iter_mut().zip([BODY_X, BODY_Z]) {
             *square += (decoded.row(row) - truth.row(row)).norm_squared();
         }
         count += window.steps;
     }
     let rms = squares.map(|square| (square / count.max(1) as f64).sqrt());
-    [
-        rms[0] / dataset.scaling.state[BODY_X],
-        rms[1] / dataset.scaling.state[BODY_Z],
-    ]
+    let scale = &set.dataset.scaling.state;
+    [rms[0] / scale[BODY_X], rms[1] / scale[BODY_Z]]
 }
 
-fn decoder_mse(model: Assessed<'_>, dataset: &Dataset, latent: &[Latent]) -> f64 {
+fn decoder_mse(model: Assessed<'_>, set: EncodedSet<'_>) -> f64 {
     let (mut square, mut count) = (0.0, 0);
-    for (jump, samples) in dataset.jumps.iter().zip(latent) {
+    for (jump, samples) in set.dataset.jumps.iter().zip(set.latent) {
         square += (map_samples(model.decoder, &samples.z) - &jump.x).norm_squared();
         count += jump.x.len();
     }
     square / count.max(1) as f64
 }
 
-fn ddz_r2(candidate: Candidate<'_>, dataset: &Dataset, latent: &[Latent], phase: usize) -> f64 {
+fn ddz_r2(candidate: Candidate<'_>, set: EncodedSet<'_>, phase: usize) -> f64 {
     let blocks = || {
-        Latent::regression_blocks(dataset, latent, phase)
-            .map(|(variables, target)| (variables, target.transpose()))
+        let blocks = set.regression_blocks(phase);
+        blocks.map(|(variables, target)| (variables, target.transpose()))
     };
-    let mut mean = DVector::zeros(candidate.features.latent_dim());
-    let share = 1.0 / dataset.samples(Some(phase)) as f64;
-    for (_, target) in blocks() {
-        let columns = target.column_iter();
-        columns.for_each(|column| mean.axpy(share, &column, 1.0));
-    }
-    let mut sums = Determination::about(mean);
+    let (d, n) = (set.latent_dim(), set.dataset.samples(Some(phase)));
+    let mut sums = Determination::about(mean(d, n, blocks().map(|(_, target)| target)));
     let mut values = FeatureValues::default();
     for (variables, target) in blocks() {
         let theta = candidate.features.evaluate(&variables, &mut values);
@@ -176,22 +159,20 @@ fn ddz_r2(candidate: Candidate<'_>, dataset: &Dataset, latent: &[Latent], phase:
 }
 
 /// Of the samples whose torques can be the robot's, see [`is_plausible`].
-fn torque_r2(encoder: &StateMap, dataset: &Dataset, latent: &[Latent]) -> Result<f64, TrainError> {
+fn torque_r2(encoder: &StateMap, set: EncodedSet<'_>) -> Result<f64, TrainError> {
+    let dataset = set.dataset;
     let n: usize = (dataset.jumps.iter())
         .map(|jump| jump.torque_samples().count())
         .sum();
     let mut mean = DVector::zeros(JOINT_DIM);
     dataset.for_each(|jump, rates| {
         for sample in jump.torque_samples() {
-            mean.axpy(
-                1.0 / n as f64,
-                &recorded_torque(&jump.u, rates, sample),
-                1.0,
-            );
+            let torque = recorded_torque(&jump.u, rates, sample);
+            mean.axpy(1.0 / n as f64, &torque, 1.0);
         }
     })?;
     let mut sums = Determination::about(mean);
-    let mut latent = latent.iter();
+    let mut latent = set.latent.iter();
     dataset.for_each(|jump, rates| {
         let samples = latent.next().expect("invariant: one of each jump");
         let lift = lift_samples(encoder, &jump.x, &samples.u_lat);

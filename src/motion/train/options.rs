@@ -9,14 +9,14 @@ use super::closed_form::closed_form;
 use super::data_sets::Recordings;
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
+use super::joint::batch::BATCH_ROWS;
 use super::joint::{LossWeights, Schedule, Unroll, joint};
 use super::map_options::MapOptions;
 use super::metrics::{BODY_X, BODY_Z};
 use super::progress::Watch;
 use super::report::Trained;
-use super::sparse::Pruning;
 use crate::limits::table;
-use crate::model::{Library, StandardLibrary, check_name};
+use crate::model::{Library, ModelError, StandardLibrary, check_name};
 use crate::recording::PhaseRule;
 use crate::recording::phases::CHATTER_SAMPLES;
 use crate::robot::{Actuators, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame};
@@ -91,14 +91,12 @@ pub struct TrainOptions {
 }
 
 /// Settings of the joint training.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct JointOptions {
     /// Epochs, thresholding, step length.
     pub schedule: Schedule,
     /// Weights of the accelerations and of sparsity in the loss.
     pub weights: LossWeights,
-    /// Samples of a batch; each phase of a jump is resampled to a multiple.
-    pub batch_rows: usize,
     /// Value that all coefficients start at.
     pub xi_start: f64,
     /// Seeds trained at the same time; the result does not depend on it.
@@ -112,8 +110,7 @@ pub struct JointOptions {
 }
 
 /// What follows the joint step on contact data.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transfer {
     /// The published steps by Adam: decoder on whole jumps, then Xi of every phase.
     Published,
@@ -122,7 +119,7 @@ pub enum Transfer {
 }
 
 /// Settings of the encoder.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EncoderOptions {
     /// Weight of the input energy which the latent input cannot carry, against the reconstruction error in scaled
     /// units (the lift loss); 0 leaves the lift to chance.
@@ -136,7 +133,6 @@ pub struct EncoderOptions {
     /// Whether the latent basis is rotated by varimax.
     pub rotate: bool,
     /// What the encoder's rows are made of.
-    #[serde(default = "Coordinates::free")]
     pub coordinates: Coordinates,
     /// Random starting points of the search.
     pub restarts: usize,
@@ -153,35 +149,16 @@ pub enum Coordinates {
     Free,
 }
 
-impl Coordinates {
-    /// What a training did before it had the choice.
-    fn free() -> Self {
-        Self::Free
-    }
-}
-
 /// Settings of the regression for Xi.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RegressionOptions {
     /// Window of the moving average over accelerations, in samples.
     pub smoothing: usize,
-    /// Windows (samples) over which the dynamics are integrated before regression; 0 means the accelerations.
-    pub windows: Vec<usize>,
-    /// Ridges on the normalised columns.
-    pub ridges: Vec<f64>,
-    /// Prunings.
-    pub prunings: Vec<Pruning>,
     /// Of all candidates within this share of the best validation score, the one with fewest terms is taken.
     pub slack: f64,
-    /// How many candidates are pruned further, a term at a time, while their score stays within the slack.
-    pub sweeps: usize,
-    /// Weight of whole-jump rollouts against predictions of 0.1 s in the validation score.
-    pub rollout_weight: f64,
     /// Steps by which rollouts of the training jumps refine the coefficients chosen; 0 leaves the regression's.
-    #[serde(default)]
     pub refinements: usize,
     /// Largest rate in 1/s at which deviations may grow, in every phase and through their sequence; none for no bound.
-    #[serde(default)]
     pub growth_per_s: Option<f64>,
 }
 
@@ -268,10 +245,8 @@ impl TrainOptions {
             LibraryChoice::Standard(standard) => Library::standard(self.latent_dim, *standard),
             LibraryChoice::Terms(terms) => Library::from_terms(self.latent_dim, terms),
         };
-        let library = library.map_err(crate::model::ModelError::from)?;
-        library
-            .check_distinct()
-            .map_err(crate::model::ModelError::from)?;
+        let library = library.map_err(ModelError::from)?;
+        library.check_distinct().map_err(ModelError::from)?;
         Ok(library)
     }
 
@@ -282,32 +257,18 @@ impl TrainOptions {
     /// model can have.
     pub fn check(&self) -> Result<(), TrainError> {
         check_name(&self.name)?;
-        let EncoderOptions {
-            lift_weight,
-            body_weight,
-            least_std,
-            least_input_share,
-            ..
-        } = self.encoder;
-        table::LIFT_WEIGHT.check(lift_weight)?;
-        table::BODY_WEIGHT.check(body_weight)?;
-        table::MASK_STD.check(least_std)?;
-        table::MASK_INPUT_SHARE.check(least_input_share)?;
+        let (encoder, regression) = (&self.encoder, &self.regression);
+        table::LIFT_WEIGHT.check(encoder.lift_weight)?;
+        table::BODY_WEIGHT.check(encoder.body_weight)?;
+        table::MASK_STD.check(encoder.least_std)?;
+        table::MASK_INPUT_SHARE.check(encoder.least_input_share)?;
         table::SEEDS.check_count(self.n_seeds.max(1))?;
-        table::MOVING_AVERAGE.check_count(self.regression.smoothing)?;
+        table::MOVING_AVERAGE.check_count(regression.smoothing)?;
         self.joint.maps.check(self.latent_dim)?;
         self.joint.check_predictions()?;
-        table::SLACK.check(self.regression.slack)?;
-        if let Some(rate) = self.regression.growth_per_s {
+        table::SLACK.check(regression.slack)?;
+        if let Some(rate) = regression.growth_per_s {
             table::GROWTH.check(rate)?;
-        }
-        at_least_zero("rollout-weight", self.regression.rollout_weight)?;
-        for ridge in &self.regression.ridges {
-            above_zero("ridge", *ridge)?;
-        }
-        for pruning in &self.regression.prunings {
-            let (Pruning::Threshold(value) | Pruning::Elimination(value)) = pruning;
-            at_least_zero("threshold", *value)?;
         }
         self.scaling.check()?;
         if let Some((array, joint, found)) = self.actuators.as_ref().and_then(Actuators::unusable) {
@@ -315,24 +276,6 @@ impl TrainOptions {
                 option: "actuators",
                 found: format!("{array} {found} at {}", JOINT_NAMES[joint]),
                 expected: "finite numbers of at least 0",
-            });
-        }
-        let RegressionOptions {
-            windows,
-            ridges,
-            prunings,
-            ..
-        } = &self.regression;
-        if windows.is_empty() || ridges.is_empty() || prunings.is_empty() {
-            return Err(TrainError::Option {
-                option: "windows, ridges and prunings",
-                found: format!(
-                    "{}, {} and {} values",
-                    windows.len(),
-                    ridges.len(),
-                    prunings.len()
-                ),
-                expected: "at least one each",
             });
         }
         Ok(())
@@ -343,20 +286,15 @@ impl JointOptions {
     /// Complains about a window of predictions out of range; one that no batch has room for would count for nothing.
     fn check_predictions(&self) -> Result<(), TrainError> {
         table::BPTT_WEIGHT.check(self.weights.bptt)?;
-        let Unroll {
-            window,
-            stride,
-            decay,
-            ..
-        } = self.unroll;
+        let (window, stride) = (self.unroll.window, self.unroll.stride);
         table::BPTT_WINDOW.check_count(window)?;
         table::BPTT_STRIDE.check_count(stride)?;
-        table::BPTT_DECAY.check(decay)?;
+        table::BPTT_DECAY.check(self.unroll.decay)?;
         let reach = window.checked_mul(stride);
-        if self.weights.bptt > 0.0 && reach.is_none_or(|reach| reach >= self.batch_rows) {
+        if self.weights.bptt > 0.0 && reach.is_none_or(|reach| reach >= BATCH_ROWS) {
             return Err(TrainError::Option {
                 option: "bptt-window times bptt-stride",
-                found: format!("{window} x {stride} with batches of {}", self.batch_rows),
+                found: format!("{window} x {stride} with batches of {BATCH_ROWS}"),
                 expected: "fewer samples than a batch has",
             });
         }
@@ -393,7 +331,6 @@ impl Default for JointOptions {
         Self {
             schedule: Schedule::default(),
             weights: LossWeights::default(),
-            batch_rows: 100,
             xi_start: 0.0,
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             unroll: Unroll::default(),
@@ -420,43 +357,11 @@ impl Default for EncoderOptions {
 
 impl Default for RegressionOptions {
     fn default() -> Self {
-        let eliminations = [1e-3, 3e-3, 1e-2, 2e-2, 3e-2, 5e-2].map(Pruning::Elimination);
-        let thresholds = [0.0, 0.03, 0.1, 0.2].map(Pruning::Threshold);
         Self {
             smoothing: 11,
-            windows: vec![0, 25, 50],
-            ridges: vec![1e-4, 1e-3, 1e-2],
-            prunings: eliminations.into_iter().chain(thresholds).collect(),
             slack: 0.1,
-            sweeps: 3,
-            rollout_weight: 0.2,
             refinements: 10,
             growth_per_s: Some(3.0),
         }
-    }
-}
-
-fn at_least_zero(option: &'static str, value: f64) -> Result<(), TrainError> {
-    in_range(option, value, value >= 0.0, "a finite number of at least 0")
-}
-
-fn above_zero(option: &'static str, value: f64) -> Result<(), TrainError> {
-    in_range(option, value, value > 0.0, "a finite number above 0")
-}
-
-fn in_range(
-    option: &'static str,
-    value: f64,
-    inside: bool,
-    expected: &'static str,
-) -> Result<(), TrainError> {
-    if inside && value.is_finite() {
-        Ok(())
-    } else {
-        Err(TrainError::Option {
-            option,
-            found: value.to_string(),
-            expected,
-        })
     }
 }

@@ -1,14 +1,23 @@
-//! A known system for tests: two latents, a driven oscillator in contact, a falling body in flight.
+//! Data for tests: a known system of two latents, a driven oscillator in contact and a falling body in flight; shipped
+//! jumps.
 
+use std::fmt::Display;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, Vector2};
 
 use super::dataset::{Dataset, Jump, Rates, ScaleOptions};
 use super::features::Features;
-use super::latent::Latent;
+use super::growth::Growth;
+use super::judge::Judge;
+use super::knowledge::Knowledge;
+use super::latent::{EncodedSet, Latent};
+use super::options::TrainOptions;
+use super::progress::{Progress, Watch};
+use super::refine::Refiner;
 use crate::model::{Library, StandardLibrary};
-use crate::recording::PhaseRule;
+use crate::recording::{PhaseRule, shipped};
 use crate::robot::{InputRule, Robot, STATE_DIM, WrenchFrame};
 
 /// Samples between contact and flight.
@@ -16,7 +25,7 @@ const LIFT_OFF: usize = 120;
 const STEP_S: f64 = 0.002;
 
 /// `ddz` of the known system.
-pub(super) fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] {
+fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] {
     match phase {
         0 => [
             -40.0 * z[0] - 3.0 * dz[0] + 5.0 * u[0],
@@ -26,14 +35,29 @@ pub(super) fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] 
     }
 }
 
-/// Library of the terms 1, z1, z2, dz1, dz2, u1, u2, and the known system's coefficients.
-pub(super) fn known() -> (Features, Vec<DMatrix<f64>>) {
+/// Shipped jumps of the Go1, such as `train_01`.
+pub(super) fn go1(names: impl IntoIterator<Item = impl Display>) -> Dataset {
+    let names = names.into_iter().map(|name| format!("go1/{name}"));
+    let jumps: Vec<_> = names.map(|name| shipped(&name)).collect();
+    let options = TrainOptions::new("test", 4);
+    let rule = InputRule::published(Robot::by_name("go1").expect("known"));
+    let scaling = options.scaling.factors();
+    Dataset::new(&jumps[..], &rule, &options.phases, &scaling, 11).expect("jumps")
+}
+
+/// A standard library with inputs.
+pub(super) fn standard_library(latent_dim: usize, degree: u32, trigonometric: bool) -> Library {
     let standard = StandardLibrary {
-        degree: 1,
-        trigonometric: false,
+        degree,
+        trigonometric,
         inputs: true,
     };
-    let features = Features::new(&Library::standard(2, standard).expect("small library"));
+    Library::standard(latent_dim, standard).expect("small library")
+}
+
+/// Library of the terms 1, z1, z2, dz1, dz2, u1, u2, and the known system's coefficients.
+pub(super) fn known() -> (Features, Vec<DMatrix<f64>>) {
+    let features = Features::new(&standard_library(2, 1, false));
     let mut contact = DMatrix::zeros(7, 2);
     let mut flight = contact.clone();
     (contact[(1, 0)], contact[(3, 0)], contact[(5, 0)]) = (-40.0, -3.0, 5.0);
@@ -68,30 +92,41 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
             implausible: Vec::new(),
         }
     });
-    let scaling = ScaleOptions::uniform(1.0).factors();
-    (
-        Dataset {
-            jumps: jumps.collect(),
-            phases: PhaseRule::two_phase(),
-            rule: InputRule::new(
-                Robot::by_name("go1").expect("known"),
-                None,
-                WrenchFrame::World,
-            ),
-            scaling,
-            smoothing: 1,
-            files: None,
-        },
-        latent,
-    )
+    let robot = Robot::by_name("go1").expect("known");
+    let dataset = Dataset {
+        jumps: jumps.collect(),
+        phases: PhaseRule::two_phase(),
+        rule: InputRule::new(robot, None, WrenchFrame::World),
+        scaling: ScaleOptions::uniform(1.0).factors(),
+        smoothing: 1,
+        files: None,
+    };
+    (dataset, latent)
+}
+
+/// What `work` makes of a refiner by three jumps of the known system, watched by nobody.
+pub(super) fn with_refiner<T>(
+    bound_per_s: Option<f64>,
+    knowledge: &[Knowledge],
+    work: impl FnOnce(&Refiner<'_>, &mut Watch<'_>) -> T,
+) -> T {
+    let ((dataset, latent), (features, _)) = (jumps(3), known());
+    let set = EncodedSet::new(&dataset, &latent);
+    let judge = Judge::new(&features, set);
+    let refiner = Refiner {
+        knowledge,
+        growth: &Growth::of_jumps(bound_per_s, set, &features),
+        training: &judge,
+        judge: &judge,
+    };
+    let (mut nothing, cancel) = (|_: Progress| {}, AtomicBool::new(false));
+    work(&refiner, &mut Watch::new(&mut nothing, &cancel))
 }
 
 fn simulate(seed: usize) -> Latent {
     let n = 200;
-    let (mut z, mut dz) = (
-        [0.1 + 0.02 * seed as f64, -0.05],
-        [0.3, 0.2 - 0.1 * seed as f64],
-    );
+    let number = seed as f64;
+    let (mut z, mut dz) = ([0.1 + 0.02 * number, -0.05], [0.3, 0.2 - 0.1 * number]);
     let blank = DMatrix::zeros(2, n);
     let mut samples = Latent {
         z: blank.clone(),
@@ -104,15 +139,15 @@ fn simulate(seed: usize) -> Latent {
         let phase = usize::from(i >= LIFT_OFF);
         let input = |time: f64| [(9.0 * time + seed as f64).sin(), (5.0 * time).cos()];
         let start = i as f64 * STEP_S;
-        samples.z.set_column(i, &DVector::from_row_slice(&z));
-        samples.dz.set_column(i, &DVector::from_row_slice(&dz));
-        samples.ddz.set_column(
-            i,
-            &DVector::from_row_slice(&truth(phase, &z, &dz, &input(start))),
-        );
-        samples
-            .u_lat
-            .set_column(i, &DVector::from_row_slice(&input(start)));
+        let u = input(start);
+        for (rows, column) in [
+            (&mut samples.z, z),
+            (&mut samples.dz, dz),
+            (&mut samples.ddz, truth(phase, &z, &dz, &u)),
+            (&mut samples.u_lat, u),
+        ] {
+            rows.set_column(i, &Vector2::from(column));
+        }
         for k in 0..fine {
             let h = STEP_S / fine as f64;
             let acceleration = truth(phase, &z, &dz, &input(start + k as f64 * h));

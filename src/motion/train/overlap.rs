@@ -44,12 +44,8 @@ fn match_latents(
         .map(|k| (k / d, k % d))
         .map(|(i, j)| {
             let scale = energy(first, i) * energy(second, j);
-            let strength = if scale > 0.0 {
-                shared[(i, j)].abs() / scale
-            } else {
-                0.0
-            };
-            (strength, i, j)
+            let strength = shared[(i, j)].abs() / scale;
+            (if scale > 0.0 { strength } else { 0.0 }, i, j)
         })
         .collect();
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
@@ -59,10 +55,8 @@ fn match_latents(
             (partner[i], taken[j]) = (Some(j), true);
         }
     }
-    partner
-        .into_iter()
-        .map(|j| j.expect("as many coordinates on both sides"))
-        .collect()
+    let partner: Option<Vec<usize>> = partner.into_iter().collect();
+    partner.expect("as many coordinates on both sides")
 }
 
 fn overlap(library: &Library, first: &Fitted, second: &Fitted, partner: &[usize]) -> f64 {
@@ -81,22 +75,18 @@ fn overlap(library: &Library, first: &Fitted, second: &Fitted, partner: &[usize]
         either += found + b.iter().filter(|xi| **xi != 0.0).count();
     }
     let either = either - both;
-    if either == 0 {
-        1.0
-    } else {
-        both as f64 / either as f64
+    match either {
+        0 => 1.0,
+        _ => both as f64 / either as f64,
     }
 }
 
 /// For every term the one that it becomes when latent coordinate `i` is called `partner[i]`, if the library has it.
 fn renamed_terms(library: &Library, partner: &[usize]) -> Vec<Option<usize>> {
     let mut pool = library.pool().clone();
-    let known: BTreeMap<_, _> = library
-        .terms()
-        .iter()
-        .enumerate()
-        .map(|(index, term)| (term.expr(), index))
-        .collect();
+    let terms = library.terms().iter();
+    let indexed = terms.clone().enumerate();
+    let known: BTreeMap<_, _> = indexed.map(|(index, term)| (term.expr(), index)).collect();
     let replacements: Vec<_> = LatentVariable::all(library.latent_dim())
         .filter_map(|variable| {
             let renamed = match variable {
@@ -108,21 +98,15 @@ fn renamed_terms(library: &Library, partner: &[usize]) -> Vec<Option<usize>> {
             Some((library.symbol(variable)?, renamed))
         })
         .collect();
-    library
-        .terms()
-        .iter()
-        .map(|term| {
-            known
-                .get(&pool.substitute(term.expr(), &replacements))
-                .copied()
-        })
-        .collect()
+    let renamed = terms.map(|term| pool.substitute(term.expr(), &replacements));
+    renamed.map(|term| known.get(&term).copied()).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{AffineMap, StandardLibrary};
+    use crate::model::AffineMap;
+    use crate::train::oscillator::standard_library;
     use nalgebra::DVector;
 
     fn fitted(weights: DMatrix<f64>, active: &[(usize, usize)], terms: usize) -> Fitted {
@@ -146,46 +130,21 @@ mod tests {
 
     #[test]
     fn exchanged_coordinates_overlap_fully_and_other_terms_do_not() {
-        let standard = StandardLibrary {
-            degree: 2,
-            trigonometric: false,
-            inputs: true,
+        let library = standard_library(2, 2, false);
+        let with = |weights: &DMatrix<f64>, active: [(&str, usize); 3]| {
+            let row = |text| library.terms().iter().position(|term| term.text() == text);
+            let active = active.map(|(text, column)| (row(text).expect(text), column));
+            fitted(weights.clone(), &active, library.len())
         };
-        let library = Library::standard(2, standard).expect("small library");
-        let index = |text: &str| {
-            library
-                .terms()
-                .iter()
-                .position(|term| term.text() == text)
-                .expect(text)
-        };
-        let n = library.len();
         let straight = DMatrix::from_row_slice(2, 3, &[1.0, 0.1, 0.0, 0.0, 1.0, 0.0]);
         let exchanged = DMatrix::from_row_slice(2, 3, &[0.0, -1.0, 0.0, 1.0, 0.2, 0.0]);
         let covariance = DMatrix::identity(3, 3);
-        let first = fitted(
-            straight.clone(),
-            &[(index("z1"), 0), (index("u2"), 1), (index("dz1^2"), 1)],
-            n,
-        );
-        let same = fitted(
-            exchanged,
-            &[(index("z2"), 1), (index("u1"), 0), (index("dz2^2"), 0)],
-            n,
-        );
-        assert_eq!(
-            support_overlap(&library, &[&first, &same], &covariance),
-            Some(1.0)
-        );
-        let half = fitted(
-            straight,
-            &[(index("z1"), 0), (index("u2"), 0), (index("dz1^2"), 1)],
-            n,
-        );
-        assert_eq!(
-            support_overlap(&library, &[&first, &half], &covariance),
-            Some(0.5)
-        );
-        assert_eq!(support_overlap(&library, &[&first], &covariance), None);
+        let first = with(&straight, [("z1", 0), ("u2", 1), ("dz1^2", 1)]);
+        let same = with(&exchanged, [("z2", 1), ("u1", 0), ("dz2^2", 0)]);
+        let half = with(&straight, [("z1", 0), ("u2", 0), ("dz1^2", 1)]);
+        let overlap = |runs: &[&Fitted]| support_overlap(&library, runs, &covariance);
+        assert_eq!(overlap(&[&first, &same]), Some(1.0));
+        assert_eq!(overlap(&[&first, &half]), Some(0.5));
+        assert_eq!(overlap(&[&first]), None);
     }
 }

@@ -2,11 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use super::features::Features;
 use super::growth::Growth;
 use super::judge::Judge;
 use super::progress::Watch;
-use super::rollout::Candidate;
+use super::refine::Coefficients;
 use super::sparse::Regression;
 
 /// Share of the score that a term must bring to be added.
@@ -25,107 +24,78 @@ pub(super) struct Refined<'a> {
     pub regressions: &'a [Regression],
     /// Ridge of every fit.
     pub ridge: f64,
-    /// `library_dim x latent_dim` for each phase.
-    pub xi: Vec<DMatrix<f64>>,
     /// What they keep to.
     pub growth: &'a Growth,
-    /// Score of `xi`.
-    pub score: f64,
+    /// What scores them.
+    pub judge: &'a Judge<'a>,
+    /// The coefficients.
+    pub now: Coefficients,
 }
 
 impl Refined<'_> {
     /// Drops terms, the least useful to the regression first, fitting the rest of their equation again, as long as
     /// the score stays within `limit`. One attempt a term.
-    pub fn sweep(
-        &mut self,
-        features: &Features,
-        judge: &Judge<'_>,
-        limit: f64,
-        watch: &mut Watch<'_>,
-    ) {
-        let mut order = self.terms_by_use();
+    pub fn sweep(&mut self, limit: f64, watch: &mut Watch<'_>) {
+        let mut order = self.places(Regression::losses);
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         watch.stage("dropping terms that predictions do not miss", order.len());
-        for (attempt, (_, phase, row, column)) in order.into_iter().enumerate() {
+        for (attempt, place) in order.into_iter().enumerate() {
             if watch.cancelled() {
                 return;
             }
-            let mut support = self.xi[phase].map(|value| value != 0.0);
-            support[(row, column)] = false;
-            let fitted = self.regressions[phase].fit_column(column, &support, self.ridge);
-            let before = self.xi[phase].column(column).into_owned();
-            self.xi[phase].set_column(column, &fitted);
-            let candidate = Candidate {
-                features,
-                xi: &self.xi,
-            };
-            let score = judge.score_within(candidate, limit);
-            if score <= limit && self.growth.admits(&self.xi) {
-                self.score = score;
-            } else {
-                self.xi[phase].set_column(column, &before);
-            }
-            watch.done(attempt + 1, format!("score {:.4}", self.score));
+            self.attempt(place, false, limit);
+            watch.done(attempt + 1, format!("score {:.4}", self.now.score));
         }
     }
 
     /// Adds terms, those that explain most of the accelerations first, fitting their equation again, wherever the score
     /// falls by [`LEAST_GAIN`] or more. Goes round [`ROUNDS`] times, as terms explain less once others are there.
-    pub fn grow(&mut self, features: &Features, judge: &Judge<'_>, watch: &mut Watch<'_>) {
+    pub fn grow(&mut self, watch: &mut Watch<'_>) {
         watch.stage("adding terms that predictions gain by", ROUNDS * ATTEMPTS);
         for round in 0..ROUNDS {
-            let before = self.score;
-            let mut order = self.terms_by_gain();
+            let before = self.now.score;
+            let mut order = self.places(Regression::gains);
             order.sort_by(|a, b| b.0.total_cmp(&a.0));
-            for (attempt, (_, phase, row, column)) in order.into_iter().take(ATTEMPTS).enumerate() {
+            for (attempt, place) in order.into_iter().take(ATTEMPTS).enumerate() {
                 if watch.cancelled() {
                     return;
                 }
-                let mut xi = self.xi.clone();
-                let mut support = xi[phase].map(|value| value != 0.0);
-                support[(row, column)] = true;
-                let fitted = self.regressions[phase].fit_column(column, &support, self.ridge);
-                xi[phase].set_column(column, &fitted);
-                let limit = (1.0 - LEAST_GAIN) * self.score;
-                let score = judge.score_within(Candidate { features, xi: &xi }, limit);
-                if score <= limit && self.growth.admits(&xi) {
-                    self.xi = xi;
-                    self.score = score;
-                }
+                self.attempt(place, true, (1.0 - LEAST_GAIN) * self.now.score);
                 let done = round * ATTEMPTS + attempt + 1;
-                watch.done(done, format!("score {:.4}", self.score));
+                watch.done(done, format!("score {:.4}", self.now.score));
             }
-            if self.score == before {
+            if self.now.score == before {
                 return;
             }
         }
     }
 
-    /// Terms that are not active, with the share of the energy that is explained with each.
-    fn terms_by_gain(&self) -> Vec<Place> {
-        self.places(|regression, column, support| regression.gains(column, support, self.ridge))
-    }
-
-    /// Active terms, with the share of the energy that is lost without each.
-    fn terms_by_use(&self) -> Vec<Place> {
-        self.places(|regression, column, support| regression.losses(column, support, self.ridge))
+    /// Fits the equation of a term with or without it, and keeps that if the score is at most `limit`.
+    fn attempt(&mut self, (_, phase, row, column): Place, active: bool, limit: f64) {
+        let mut support = self.now.xi[phase].map(|value| value != 0.0);
+        support[(row, column)] = active;
+        let fitted = self.regressions[phase].fit_column(column, &support, self.ridge);
+        let before = self.now.xi[phase].column(column).into_owned();
+        self.now.xi[phase].set_column(column, &fitted);
+        let score = self.judge.score_within(&self.now.xi, limit);
+        if score <= limit && self.growth.admits(&self.now.xi) {
+            self.now.score = score;
+        } else {
+            self.now.xi[phase].set_column(column, &before);
+        }
     }
 
     /// What `shares` gives for each column of every phase.
     fn places(
         &self,
-        shares: impl Fn(&Regression, usize, &DMatrix<bool>) -> Vec<(usize, f64)>,
+        shares: fn(&Regression, usize, &DMatrix<bool>, f64) -> Vec<(usize, f64)>,
     ) -> Vec<Place> {
         let mut places = Vec::new();
         for (phase, regression) in self.regressions.iter().enumerate() {
-            let support = self.xi[phase].map(|value| value != 0.0);
+            let support = self.now.xi[phase].map(|value| value != 0.0);
             for column in 0..support.ncols() {
-                let found = shares(regression, column, &support);
-                places.extend(
-                    found
-                        .into_iter()
-                        .map(|(row, share)| (share, phase, row, column)),
-                );
+                let found = shares(regression, column, &support, self.ridge).into_iter();
+                places.extend(found.map(|(row, share)| (share, phase, row, column)));
             }
         }
         places

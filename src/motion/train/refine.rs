@@ -7,12 +7,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::features::Features;
 use super::growth::Growth;
 use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::progress::Watch;
-use super::rollout::{Candidate, Change};
+use super::rollout::Change;
 
 /// Weight of relative changes of the coefficients, against squared errors that start at 1 for both kinds of windows.
 pub(super) const PRIOR: f64 = 1e-3;
@@ -43,7 +42,6 @@ impl Coefficients {
 
 /// What coefficients are refined by.
 pub(super) struct Refiner<'a> {
-    pub features: &'a Features,
     pub knowledge: &'a [Knowledge],
     /// What the coefficients keep to.
     pub growth: &'a Growth,
@@ -181,9 +179,8 @@ impl Refiner<'_> {
 
     /// The same, or a number above `limit` if the score is.
     pub(super) fn score_within(&self, xi: &[DMatrix<f64>], limit: f64) -> f64 {
-        let features = self.features;
         match self.growth.admits(xi) {
-            true => self.judge.score_within(Candidate { features, xi }, limit),
+            true => self.judge.score_within(xi, limit),
             false => f64::INFINITY,
         }
     }
@@ -195,9 +192,7 @@ impl Refiner<'_> {
         weights: [f64; 2],
         part: usize,
     ) -> Option<DVector<f64>> {
-        let features = self.features;
-        let errors = (self.training).errors(Candidate { features, xi }, part)?;
-        Some(stacked(&errors, weights))
+        Some(stacked(&self.training.errors(xi, part)?, weights))
     }
 
     /// Squared errors of all parts; none if a rollout diverges.
@@ -208,10 +203,9 @@ impl Refiner<'_> {
 
     /// Weights under which the squared errors of both kinds of windows are 1; none if a rollout diverges.
     pub(super) fn weights(&self, xi: &[DMatrix<f64>]) -> Option<[f64; 2]> {
-        let features = self.features;
         let mut squares = [0.0; 2];
         for part in self.training.parts() {
-            let errors = (self.training).errors(Candidate { features, xi }, part)?;
+            let errors = self.training.errors(xi, part)?;
             for (square, errors) in squares.iter_mut().zip(&errors) {
                 *square += errors.norm_squared();
             }
@@ -232,7 +226,6 @@ impl Refiner<'_> {
             gram: DMatrix::zeros(places.len(), places.len()),
             gradient: DVector::zeros(places.len()),
         };
-        let features = self.features;
         for part in self.training.parts() {
             let residual = self.residual(xi, weights, part)?;
             let mut sensitivity = DMatrix::zeros(residual.len(), places.len());
@@ -243,8 +236,7 @@ impl Refiner<'_> {
                 };
                 let each = places.iter().zip(scales).skip(first).take(TOGETHER);
                 let changes: Vec<_> = each.map(change).collect();
-                let candidate = Candidate { features, xi };
-                let moved = (self.training).errors_changed(candidate, &changes, part)?;
+                let moved = self.training.errors_changed(xi, &changes, part)?;
                 for (column, moved) in (first..).zip(&moved) {
                     let difference = stacked(moved, weights) - &residual;
                     sensitivity.set_column(column, &(difference / STEP));
@@ -300,33 +292,14 @@ pub(super) fn relative(coefficients: &Coefficients, places: &[Place]) -> Vec<f64
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::AtomicBool;
-
     use super::*;
     use crate::train::oscillator;
-    use crate::train::progress::{Progress, Watch};
 
-    fn refined(start: Vec<DMatrix<f64>>, knowledge: &[Knowledge]) -> (f64, Coefficients) {
-        let (dataset, latent) = oscillator::jumps(3);
-        let judge = Judge::new(&dataset, &latent, 0.2);
-        let (features, _) = oscillator::known();
-        let growth = Growth::of_jumps(Some(1.0), &dataset, &latent, &features);
-        let refiner = Refiner {
-            features: &features,
-            knowledge,
-            growth: &growth,
-            training: &judge,
-            judge: &judge,
-        };
-        let before = refiner.score(&start);
-        let start = Coefficients {
-            xi: start,
-            score: before,
-        };
-        let mut nothing = |_: Progress| {};
-        let cancel = AtomicBool::new(false);
-        let mut watch = Watch::new(&mut nothing, &cancel);
-        (before, refiner.refine(start, 20, &mut watch))
+    fn refined(xi: Vec<DMatrix<f64>>, knowledge: &[Knowledge]) -> (f64, Coefficients) {
+        oscillator::with_refiner(Some(1.0), knowledge, |refiner, watch| {
+            let score = refiner.score(&xi);
+            (score, refiner.refine(Coefficients { xi, score }, 20, watch))
+        })
     }
 
     #[test]

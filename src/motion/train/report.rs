@@ -1,6 +1,6 @@
 //! What came of a training.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::joint::Losses;
 use super::metrics::SetMetrics;
@@ -17,7 +17,7 @@ pub struct Trained {
 }
 
 /// Figures of a training, as the provenance carries them too.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrainReport {
     /// Coordinates that the encoder looks at.
     pub encoded: Vec<String>,
@@ -30,14 +30,14 @@ pub struct TrainReport {
     /// Candidates tried.
     pub candidates: usize,
     /// The seeds that were tried, where there were several; the first is the one kept.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub seeds: Vec<SeedReport>,
     /// Mean over pairs of seeds of (coefficients active in both) / (active in either), latent coordinates matched.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub support_overlap: Option<f64>,
     /// How well the deviations of the training jumps from their prior are explained, one entry per part
     /// of a jump; empty without a prior.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub deviations: Vec<PartScore>,
     /// Figures on the training recordings.
     pub training: SetMetrics,
@@ -46,7 +46,7 @@ pub struct TrainReport {
 }
 
 /// How well the accelerations' deviations in one part of a jump are explained.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PartScore {
     /// Name of the part.
     pub part: String,
@@ -56,7 +56,7 @@ pub struct PartScore {
 }
 
 /// Number of coefficients that are not zero in one phase.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct PhaseTerms {
     /// Name of the phase.
     pub phase: String,
@@ -65,7 +65,7 @@ pub struct PhaseTerms {
 }
 
 /// What one seed came to.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SeedReport {
     /// The seed.
     pub seed: u64,
@@ -73,7 +73,7 @@ pub struct SeedReport {
     /// combined loss on the validation recordings.
     pub score: f64,
     /// Losses of the last epoch of the first step of a joint training.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub losses: Option<Losses>,
     /// Active terms over all phases.
     pub active: usize,

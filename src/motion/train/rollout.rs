@@ -4,9 +4,9 @@ use std::cmp::Reverse;
 
 use nalgebra::DMatrix;
 
-use super::dataset::Dataset;
+use super::dataset::{Dataset, Jump};
 use super::features::Features;
-use super::latent::Latent;
+use super::latent::EncodedSet;
 use super::stepper::{Row, Stepper};
 use crate::sim::{Restart, restart_windows};
 
@@ -57,16 +57,13 @@ pub fn restarted(dataset: &Dataset, duration_s: f64) -> Vec<Window> {
 
 /// One window a jump, from its first to its last sample.
 pub fn whole(dataset: &Dataset) -> Vec<Window> {
-    dataset
-        .jumps
-        .iter()
-        .enumerate()
-        .map(|(jump, samples)| Window {
-            jump,
-            start: 0,
-            steps: samples.len() - 1,
-        })
-        .collect()
+    let jumps = dataset.jumps.iter().enumerate();
+    let of = |(jump, samples): (usize, &Jump)| Window {
+        jump,
+        start: 0,
+        steps: samples.len() - 1,
+    };
+    jumps.map(of).collect()
 }
 
 /// Latent positions predicted in every window, `latent_dim x steps` (samples `start + 1 ..= start + steps`).
@@ -75,15 +72,12 @@ pub fn whole(dataset: &Dataset) -> Vec<Window> {
 /// recorded one of the sample a step starts from. Values beyond 1e6 are set to infinity and stay there.
 pub fn predict(
     candidate: Candidate<'_>,
-    dataset: &Dataset,
-    latent: &[Latent],
+    set: EncodedSet<'_>,
     windows: &[Window],
 ) -> Vec<DMatrix<f64>> {
     let d = candidate.features.latent_dim();
-    let mut predictions: Vec<_> = windows
-        .iter()
-        .map(|window| DMatrix::zeros(d, window.steps))
-        .collect();
+    let empty = windows.iter().map(|window| DMatrix::zeros(d, window.steps));
+    let mut predictions: Vec<_> = empty.collect();
     // The longest first, so that those which still go on are the first rows.
     let mut order: Vec<usize> = (0..windows.len()).collect();
     order.sort_by_key(|&window| Reverse(windows[window].steps));
@@ -91,7 +85,7 @@ pub fn predict(
         window: windows[window],
         change: None,
     });
-    let mut stepper = Stepper::new(candidate, dataset, latent, rows.collect());
+    let mut stepper = Stepper::new(candidate, set, rows.collect());
     let longest = order.first().map_or(0, |&window| windows[window].steps);
     for step in 0..longest {
         let going = order.partition_point(|&window| windows[window].steps > step);
@@ -111,11 +105,10 @@ pub fn predict(
 pub fn predict_changed(
     candidate: Candidate<'_>,
     changes: &[Change],
-    dataset: &Dataset,
-    latent: &[Latent],
+    set: EncodedSet<'_>,
     window: Window,
 ) -> Vec<DMatrix<f64>> {
-    let phase = &dataset.jumps[window.jump].phase[window.start..][..window.steps];
+    let phase = &set.dataset.jumps[window.jump].phase[window.start..][..window.steps];
     let first_step = |change: &Change| phase.iter().position(|&phase| phase == change.place.0);
     let mut joining: Vec<(usize, usize)> = (changes.iter().enumerate())
         .filter_map(|(number, change)| Some((first_step(change)?, number)))
@@ -125,7 +118,7 @@ pub fn predict_changed(
         window,
         change: number.map(|number| changes[number]),
     };
-    let mut stepper = Stepper::new(candidate, dataset, latent, vec![row_of(None)]);
+    let mut stepper = Stepper::new(candidate, set, vec![row_of(None)]);
     let d = candidate.features.latent_dim();
     let mut predictions = vec![DMatrix::zeros(d, window.steps); changes.len()];
     let mut rows = vec![0; changes.len()]; // of the candidate without a change until it joins
@@ -157,22 +150,20 @@ mod tests {
     use super::*;
     use crate::train::oscillator;
 
+    fn of<'a>(features: &'a Features, xi: &'a [DMatrix<f64>]) -> Candidate<'a> {
+        Candidate { features, xi }
+    }
+
     #[test]
     fn predictions_of_the_true_dynamics_follow_the_samples_through_both_phases() {
         let (dataset, latent) = oscillator::jumps(2);
         let (features, xi) = oscillator::known();
-        let candidate = Candidate {
-            features: &features,
-            xi: &xi,
-        };
+        let set = EncodedSet::new(&dataset, &latent);
         for windows in [whole(&dataset), restarted(&dataset, 0.1)] {
-            for (window, prediction) in windows
-                .iter()
-                .zip(predict(candidate, &dataset, &latent, &windows))
-            {
-                let truth = latent[window.jump]
-                    .z
-                    .columns(window.start + 1, window.steps);
+            let predictions = predict(of(&features, &xi), set, &windows);
+            for (window, prediction) in windows.iter().zip(predictions) {
+                let z = &latent[window.jump].z;
+                let truth = z.columns(window.start + 1, window.steps);
                 assert!((prediction - truth).amax() < 2e-4, "{window:?}");
             }
         }
@@ -182,49 +173,33 @@ mod tests {
     fn restarted_windows_cover_every_sample_once() {
         let (dataset, _) = oscillator::jumps(1);
         let windows = restarted(&dataset, 0.1);
-        assert_eq!(
-            windows
-                .iter()
-                .map(|window| window.steps)
-                .collect::<Vec<_>>(),
-            [50, 50, 50, 49]
-        );
-        assert_eq!(
-            windows
-                .iter()
-                .map(|window| window.start)
-                .collect::<Vec<_>>(),
-            [0, 50, 100, 150]
-        );
+        let places = windows.iter().map(|window| (window.start, window.steps));
+        assert!(places.eq([(0, 50), (50, 50), (100, 50), (150, 49)]));
     }
 
     #[test]
     fn windows_of_several_lengths_are_predicted_as_each_by_itself() {
         let (dataset, latent) = oscillator::jumps(2);
         let (features, xi) = oscillator::known();
-        let candidate = Candidate {
-            features: &features,
-            xi: &xi,
-        };
-        let of = |(jump, start, steps)| Window { jump, start, steps };
-        let windows = [(0, 110, 20), (1, 0, 199), (0, 0, 1), (1, 130, 60)].map(of);
-        let together = predict(candidate, &dataset, &latent, &windows);
+        let candidate = of(&features, &xi);
+        let window = |(jump, start, steps)| Window { jump, start, steps };
+        let windows = [(0, 110, 20), (1, 0, 199), (0, 0, 1), (1, 130, 60)].map(window);
+        let set = EncodedSet::new(&dataset, &latent);
+        let together = predict(candidate, set, &windows);
         for (window, prediction) in windows.iter().zip(&together) {
-            let alone = predict(candidate, &dataset, &latent, &[*window]);
+            let alone = predict(candidate, set, &[*window]);
             assert_eq!(prediction, &alone[0], "{window:?}");
         }
-        assert!(predict(candidate, &dataset, &latent, &[]).is_empty());
+        assert!(predict(candidate, set, &[]).is_empty());
     }
 
     #[test]
     fn changes_predict_what_the_changed_coefficients_predict() {
         let (dataset, latent) = oscillator::jumps(1);
         let (features, xi) = oscillator::known();
-        let predicted = |xi: &[DMatrix<f64>], window| {
-            let features = &features;
-            let candidate = Candidate { features, xi };
-            predict(candidate, &dataset, &latent, &[window]).remove(0)
-        };
+        let set = EncodedSet::new(&dataset, &latent);
+        let predicted =
+            |xi: &[DMatrix<f64>], window| predict(of(&features, xi), set, &[window]).remove(0);
         let changes = [((1, 0, 1), 0.3), ((0, 1, 0), -2.0), ((0, 2, 1), 0.5)];
         let changes = changes.map(|(place, by)| Change { place, by });
         for (start, phases) in [(0, [true, true]), (20, [true, false]), (150, [false, true])] {
@@ -233,11 +208,8 @@ mod tests {
                 start,
                 steps: if phases[1] { 199 - start } else { 50 },
             };
-            let candidate = Candidate {
-                features: &features,
-                xi: &xi,
-            };
-            let found = predict_changed(candidate, &changes, &dataset, &latent, window);
+            let candidate = of(&features, &xi);
+            let found = predict_changed(candidate, &changes, set, window);
             let unchanged = predicted(&xi, window);
             for (Change { place, by }, found) in changes.iter().zip(&found) {
                 let mut changed = xi.clone();
@@ -254,15 +226,8 @@ mod tests {
         let (dataset, latent) = oscillator::jumps(1);
         let (features, mut xi) = oscillator::known();
         xi[0][(1, 0)] = 1e7;
-        let prediction = &predict(
-            Candidate {
-                features: &features,
-                xi: &xi,
-            },
-            &dataset,
-            &latent,
-            &whole(&dataset),
-        )[0];
-        assert!(!prediction.iter().all(|value| value.is_finite()));
+        let set = EncodedSet::new(&dataset, &latent);
+        let predictions = predict(of(&features, &xi), set, &whole(&dataset));
+        assert!(!predictions[0].iter().all(|value| value.is_finite()));
     }
 }

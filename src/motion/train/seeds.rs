@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::assemble::{Origin, Parts, assemble};
+use super::assemble::{Origin, provenance};
 use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::jumps::learn_jumps;
@@ -11,7 +11,6 @@ use super::progress::Watch;
 use super::report::{SeedReport, Trained};
 use super::task::Task;
 use crate::model::{Library, ModelError};
-use crate::robot::Robot;
 
 /// Outcomes of the seeds so far.
 #[derive(Default)]
@@ -19,14 +18,6 @@ pub(super) struct Seeds {
     finished: Vec<(SeedReport, Fitted)>,
     /// Why the first seed without a model has none.
     failure: Option<TrainError>,
-}
-
-/// The seed of least score, and the reports of all that have a model, best first.
-struct Best {
-    fitted: Fitted,
-    reports: Vec<SeedReport>,
-    /// Overlap of the supports, see [`support_overlap`].
-    overlap: Option<f64>,
 }
 
 impl Seeds {
@@ -59,36 +50,26 @@ impl Seeds {
     pub fn into_model(
         self,
         task: Task<'_>,
-        robot: &'static Robot,
         method: &str,
         origin: &Origin,
     ) -> Result<Trained, TrainError> {
-        let best = self.best(&task.library, &task.moments.state)?;
-        let mut report = task.report(&best.fitted)?;
+        let (best, reports, overlap) = self.best(&task.library, &task.moments.state)?;
+        let mut report = task.report(&best)?;
         // A single seed without losses has nothing that the report does not say.
-        if best.reports.len() > 1 || best.reports[0].losses.is_some() {
-            (report.seeds, report.support_overlap) = (best.reports, best.overlap);
+        if reports.len() > 1 || reports[0].losses.is_some() {
+            (report.seeds, report.support_overlap) = (reports, overlap);
         }
-        let (options, training) = (task.options, &task.sets.training);
-        let jumps = match learn_jumps(training, &best.fitted.encoder)? {
-            None => None,
-            Some(learned) => {
-                report.deviations = learned.scores;
-                Some(learned.prior)
-            }
-        };
-        let parts = Parts {
-            library: task.library,
-            encoder: best.fitted.encoder,
-            decoder: best.fitted.decoder,
-            xi: best.fitted.xi,
-            jumps,
-        };
-        let model = assemble(parts, training, robot, options, method, origin, &report)?;
+        let jumps = learn_jumps(&task.training, &best.encoder)?.map(|learned| {
+            report.deviations = learned.scores;
+            learned.prior
+        });
+        let provenance = provenance(task.options, method, origin, &report);
+        let model = task.assemble(best, jumps, provenance)?;
         Ok(Trained { model, report })
     }
 
-    /// The best seed; `state_covariance` (18 x 18) is that of the training states in scaled units.
+    /// The seed of least score, the reports of all that have a model, best first, and the overlap of their supports;
+    /// `state_covariance` (18 x 18) is that of the training states in scaled units.
     ///
     /// # Errors
     /// The first seed's if none has a model, [`TrainError::Cancelled`] if none was begun.
@@ -96,18 +77,14 @@ impl Seeds {
         mut self,
         library: &Library,
         state_covariance: &DMatrix<f64>,
-    ) -> Result<Best, TrainError> {
+    ) -> Result<(Fitted, Vec<SeedReport>, Option<f64>), TrainError> {
         let fits: Vec<&Fitted> = self.finished.iter().map(|(_, fitted)| fitted).collect();
         let overlap = support_overlap(library, &fits, state_covariance);
         self.finished
             .sort_by(|(a, _), (b, _)| a.score.total_cmp(&b.score));
         let (reports, fits): (Vec<SeedReport>, Vec<Fitted>) = self.finished.into_iter().unzip();
         match fits.into_iter().next() {
-            Some(fitted) => Ok(Best {
-                fitted,
-                reports,
-                overlap,
-            }),
+            Some(fitted) => Ok((fitted, reports, overlap)),
             None => Err(self.failure.unwrap_or(TrainError::Cancelled)),
         }
     }
@@ -137,21 +114,8 @@ fn with_finite_coefficients(
 
 /// Whether another seed may do better.
 fn is_of_one_seed(error: &TrainError) -> bool {
-    match error {
-        TrainError::NoStableModel { .. } | TrainError::TermValue { .. } | TrainError::Model(_) => {
-            true
-        }
-        TrainError::NoRecording { .. }
-        | TrainError::Split { .. }
-        | TrainError::TooFewSamples { .. }
-        | TrainError::PhaseSamples { .. }
-        | TrainError::LatentDim { .. }
-        | TrainError::Option { .. }
-        | TrainError::Range(_)
-        | TrainError::Cancelled
-        | TrainError::Recording(_)
-        | TrainError::Robot(_) => false,
-    }
+    use TrainError::{Model, NoStableModel, TermValue};
+    matches!(error, NoStableModel { .. } | TermValue { .. } | Model(_))
 }
 
 #[cfg(test)]
@@ -159,8 +123,9 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
-    use crate::model::{AffineMap, StandardLibrary};
+    use crate::model::AffineMap;
     use crate::train::metrics::SetMetrics;
+    use crate::train::oscillator::standard_library;
     use crate::train::progress::Progress;
 
     fn outcome(score: f64, coefficient: f64) -> Result<(SeedReport, Fitted), TrainError> {
@@ -194,20 +159,17 @@ mod tests {
         Ok((report, fitted))
     }
 
-    fn best(outcomes: Vec<Result<(SeedReport, Fitted), TrainError>>) -> Result<Best, TrainError> {
+    fn reports(
+        outcomes: Vec<Result<(SeedReport, Fitted), TrainError>>,
+    ) -> Result<Vec<SeedReport>, TrainError> {
         let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
         let mut watch = Watch::new(&mut listener, &cancel);
         let mut seeds = Seeds::default();
         for (seed, outcome) in outcomes.into_iter().enumerate() {
             seeds.add(seed as u64, outcome, &mut watch)?;
         }
-        let standard = StandardLibrary {
-            degree: 1,
-            trigonometric: false,
-            inputs: true,
-        };
-        let library = Library::standard(2, standard).expect("small library");
-        seeds.best(&library, &DMatrix::identity(2, 2))
+        let best = seeds.best(&standard_library(2, 1, false), &DMatrix::identity(2, 2))?;
+        Ok(best.1)
     }
 
     fn unstable(candidates: usize) -> Result<(SeedReport, Fitted), TrainError> {
@@ -223,14 +185,14 @@ mod tests {
             outcome(-f64::NAN, 1.0),
             outcome(2.0, 1.0),
         ];
-        let best = best(outcomes).expect("three seeds have a model");
-        let scores: Vec<f64> = best.reports.iter().map(|report| report.score).collect();
+        let reports = reports(outcomes).expect("three seeds have a model");
+        let scores: Vec<f64> = reports.iter().map(|report| report.score).collect();
         assert_eq!(scores, [2.0, 3.0, f64::INFINITY]);
     }
 
     #[test]
     fn seeds_all_without_a_model_give_the_first_error() {
-        let error = best(vec![unstable(9), outcome(1.0, f64::INFINITY)]).err();
+        let error = reports(vec![unstable(9), outcome(1.0, f64::INFINITY)]).err();
         assert!(
             matches!(error, Some(TrainError::NoStableModel { candidates: 9 })),
             "{error:?}"
@@ -243,7 +205,7 @@ mod tests {
             requested: 9,
             active: 3,
         };
-        let error = best(vec![outcome(1.0, 1.0), Err(dimension)]).err();
+        let error = reports(vec![outcome(1.0, 1.0), Err(dimension)]).err();
         assert!(
             matches!(error, Some(TrainError::LatentDim { .. })),
             "{error:?}"

@@ -1,25 +1,43 @@
 //! Choosing Xi: many candidates, judged by what their rollouts predict on jumps that were not fitted.
 
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::dataset::Dataset;
 use super::error::TrainError;
 use super::features::Features;
 use super::growth::Growth;
 use super::judge::Judge;
 use super::knowledge::Knowledge;
-use super::latent::Latent;
+use super::latent::EncodedSet;
 use super::options::RegressionOptions;
 use super::progress::Watch;
 use super::prune::Refined;
 use super::refine::{Coefficients, Refiner};
-use super::rollout::Candidate;
 use super::sparse::{Pruning, Regression, active_terms};
 use super::weak_form::{check_terms, windowed_samples};
 
+/// Windows (samples) over which the dynamics are integrated before regression; 0 means the accelerations.
+const WINDOWS: [usize; 3] = [0, 25, 50];
+/// Ridges on the normalised columns.
+const RIDGES: [f64; 3] = [1e-4, 1e-3, 1e-2];
+/// Eliminations share the walk that drops terms one by one.
+const PRUNINGS: [Pruning; 10] = [
+    Pruning::Elimination(1e-3),
+    Pruning::Elimination(3e-3),
+    Pruning::Elimination(1e-2),
+    Pruning::Elimination(2e-2),
+    Pruning::Elimination(3e-2),
+    Pruning::Elimination(5e-2),
+    Pruning::Threshold(0.0),
+    Pruning::Threshold(0.03),
+    Pruning::Threshold(0.1),
+    Pruning::Threshold(0.2),
+];
+/// How many candidates are pruned further, a term at a time, while their score stays within the slack.
+const SWEEPS: usize = 3;
+
 /// How a candidate was fitted, and how it did.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
     /// Window of the regression in samples, 0 for accelerations.
     pub window: usize,
@@ -28,7 +46,7 @@ pub struct Choice {
     /// Pruning.
     pub pruning: Pruning,
     /// Validation score: root mean square error of the latent state in standard deviations, of 0.1 s predictions
-    /// plus `rollout_weight` times that of whole jumps.
+    /// plus 0.2 times that of whole jumps.
     pub score: f64,
     /// Active terms over all phases.
     pub active: usize,
@@ -49,16 +67,14 @@ pub struct Selected {
 #[derive(Clone, Copy, Debug)]
 pub struct Target<'a> {
     /// Jumps to fit.
-    pub dataset: &'a Dataset,
-    /// Their latent samples.
-    pub latent: &'a [Latent],
+    pub set: EncodedSet<'a>,
     /// The library.
     pub features: &'a Features,
     /// What is known of each phase.
     pub knowledge: &'a [Knowledge],
 }
 
-/// Fits all combinations of the options and takes, among those within the slack of the best, the sparsest.
+/// Fits all combinations of windows, ridges and prunings and takes, among those within the slack of the best, the sparsest.
 ///
 /// The best by `judge` sets the scale: from there on errors are relative to its own.
 ///
@@ -71,47 +87,30 @@ pub fn select(
     options: &RegressionOptions,
     watch: &mut Watch<'_>,
 ) -> Result<Selected, TrainError> {
-    let features = target.features;
-    let regressions = regressions(target, &options.windows)?;
-    let growth = &Growth::of_jumps(
-        options.growth_per_s,
-        target.dataset,
-        target.latent,
-        features,
-    );
+    let regressions = regressions(target)?;
+    let growth = &Growth::of_jumps(options.growth_per_s, target.set, target.features);
     let attempt = Attempt {
         regressions: &regressions,
-        features,
         growth,
         judge,
-        options,
     };
     let mut tried = attempt.all(watch);
     let candidates = tried.len();
     let reference = best_of(&tried)?.xi.clone();
-    let reference = Candidate {
-        features,
-        xi: &reference,
-    };
-    let training =
-        Judge::new(target.dataset, target.latent, options.rollout_weight).relative_to(reference);
-    let relative = judge.relative_to(reference);
+    let training = Judge::new(target.features, target.set).relative_to(&reference);
+    let relative = judge.relative_to(&reference);
     for fitted in tried.iter_mut().filter(|fitted| fitted.is_stable()) {
-        fitted.choice.score = relative.score(Candidate {
-            features,
-            xi: &fitted.xi,
-        });
+        fitted.choice.score = relative.score(&fitted.xi);
     }
     let limit = (1.0 + options.slack) * best_of(&tried)?.choice.score;
     let refiner = Refiner {
-        features,
         knowledge: target.knowledge,
         growth,
         training: &training,
         judge: &relative,
     };
     let mut refined = Vec::new();
-    for start in starts(tried, &options.windows, limit, options.sweeps) {
+    for start in starts(tried, limit) {
         let Fitted {
             mut xi,
             choice,
@@ -122,31 +121,28 @@ pub fn select(
             regressions: &regressions[window],
             ridge: choice.ridge,
             growth,
-            score: relative.score(Candidate { features, xi: &xi }),
-            xi,
+            judge: &relative,
+            now: Coefficients {
+                score: relative.score(&xi),
+                xi,
+            },
         };
-        if options.sweeps > 0 {
-            pruned.sweep(features, &relative, limit, watch);
-        }
-        let start = Coefficients {
-            xi: pruned.xi,
-            score: pruned.score,
-        };
-        let end = refiner.refine(start, options.refinements, watch);
+        pruned.sweep(limit, watch);
+        let end = refiner.refine(pruned.now, options.refinements, watch);
         refined.push(Fitted::of(end, &choice, window));
     }
     let best = best_of(&refined)?;
     let limit = (1.0 + options.slack) * best.choice.score;
     if options.refinements > 0 {
-        let thinned = best.thinned(&refiner, limit, watch);
+        let thinned = refiner.thin(best.coefficients(), limit, watch);
+        let thinned = Fitted::of(thinned, &best.choice, best.window);
         refined.push(thinned);
     }
-    let within = refined
-        .into_iter()
-        .filter(|fitted| fitted.choice.score <= limit);
+    let all = refined.into_iter();
+    let within = all.filter(|fitted| fitted.choice.score <= limit);
     let sparsest = within.min_by_key(|fitted| fitted.choice.active);
     let Fitted { xi, mut choice, .. } = sparsest.ok_or(TrainError::NoStableModel { candidates })?;
-    choice.score = judge.score(Candidate { features, xi: &xi });
+    choice.score = judge.score(&xi);
     Ok(Selected {
         xi,
         choice,
@@ -166,31 +162,23 @@ fn hold(growth: &Growth, regressions: &[Regression], ridge: f64, xi: &mut [DMatr
 }
 
 /// For every window the regression of every phase.
-fn regressions(target: Target<'_>, windows: &[usize]) -> Result<Vec<Vec<Regression>>, TrainError> {
-    let Target {
-        dataset,
-        latent,
-        features,
-        knowledge,
-    } = target;
-    check_terms(dataset, latent, features)?;
-    let regression = |phase: usize, window| {
-        let (theta, ddz) = windowed_samples(dataset, latent, features, phase, window);
-        Regression::new(&theta, &ddz, knowledge[phase].clone())
-    };
-    let phases = 0..dataset.phases.patterns.len();
-    let of_window = |&window: &usize| {
-        let each = phases.clone().map(|phase| regression(phase, window));
-        each.collect()
-    };
-    Ok(windows.iter().map(of_window).collect())
+fn regressions(target: Target<'_>) -> Result<[Vec<Regression>; WINDOWS.len()], TrainError> {
+    let (set, features) = (target.set, target.features);
+    check_terms(set, features)?;
+    Ok(WINDOWS.map(|window| {
+        let of_phase = |(phase, knowledge): (usize, &Knowledge)| {
+            let (theta, ddz) = windowed_samples(set, features, phase, window);
+            Regression::new(&theta, &ddz, knowledge.clone())
+        };
+        target.knowledge.iter().enumerate().map(of_phase).collect()
+    }))
 }
 
 /// A candidate that was fitted and judged.
 struct Fitted {
     xi: Vec<DMatrix<f64>>,
     choice: Choice,
-    window: usize, // index into the windows of the options
+    window: usize, // index into the windows
 }
 
 impl Fitted {
@@ -209,30 +197,26 @@ impl Fitted {
         self.choice.score.is_finite()
     }
 
-    /// Without the terms that rollouts do not miss.
-    fn thinned(&self, refiner: &Refiner<'_>, limit: f64, watch: &mut Watch<'_>) -> Self {
-        let start = Coefficients {
+    fn coefficients(&self) -> Coefficients {
+        Coefficients {
             xi: self.xi.clone(),
             score: self.choice.score,
-        };
-        Self::of(refiner.thin(start, limit, watch), &self.choice, self.window)
+        }
     }
 }
 
 /// What candidates are fitted from and judged by.
 struct Attempt<'a> {
     regressions: &'a [Vec<Regression>],
-    features: &'a Features,
     growth: &'a Growth,
     judge: &'a Judge<'a>,
-    options: &'a RegressionOptions,
 }
 
 impl Attempt<'_> {
-    /// Every combination of the options; where the library has terms that are not affine, also those without them, and
+    /// Every combination of windows, ridges and prunings; where the library has terms that are not affine, also those without them, and
     /// the best of these grown by such terms: rollouts of full libraries diverge more often than not.
     fn all(&self, watch: &mut Watch<'_>) -> Vec<Fitted> {
-        let affine = self.features.affine_terms();
+        let affine = self.judge.features.affine_terms();
         let has_nonlinear = affine.contains(&false);
         // The affine terms are still to come where full libraries diverge.
         let enough = |tried: &[Fitted]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
@@ -246,7 +230,7 @@ impl Attempt<'_> {
         tried
     }
 
-    /// Every combination of the options with the terms that are `allowed`; if cancelled, those until there are
+    /// Every such combination with the terms that are `allowed`; if cancelled, those until there are
     /// `enough`.
     fn fit_all(
         &self,
@@ -254,32 +238,28 @@ impl Attempt<'_> {
         enough: impl Fn(&[Fitted]) -> bool,
         watch: &mut Watch<'_>,
     ) -> Vec<Fitted> {
-        let (options, features) = (self.options, self.features);
         let mut tried = Vec::new();
-        watch.stage(
-            "fitting the dynamics",
-            self.regressions.len() * options.ridges.len() * options.prunings.len(),
-        );
+        let steps = WINDOWS.len() * RIDGES.len() * PRUNINGS.len();
+        watch.stage("fitting the dynamics", steps);
         for (window, phases) in self.regressions.iter().enumerate() {
-            for &ridge in &options.ridges {
+            for ridge in RIDGES {
                 if watch.cancelled() && enough(&tried) {
                     return tried;
                 }
-                let fits: Vec<Vec<DMatrix<f64>>> = phases
-                    .iter()
-                    .map(|regression| regression.fit_each(ridge, &options.prunings, allowed))
-                    .collect();
-                for (number, &pruning) in options.prunings.iter().enumerate() {
+                let each = phases.iter();
+                let fits = each.map(|regression| regression.fit_each(ridge, &PRUNINGS, allowed));
+                let fits: Vec<Vec<DMatrix<f64>>> = fits.collect();
+                for (number, pruning) in PRUNINGS.into_iter().enumerate() {
                     let mut xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
-                    let mut score = self.judge.score(Candidate { features, xi: &xi });
+                    let mut score = self.judge.score(&xi);
                     if score.is_infinite() {
                         hold(self.growth, phases, ridge, &mut xi);
-                        score = self.judge.score(Candidate { features, xi: &xi });
+                        score = self.judge.score(&xi);
                     }
                     let active = xi.iter().map(active_terms).sum();
                     watch.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
                     let choice = Choice {
-                        window: options.windows[window],
+                        window: WINDOWS[window],
                         ridge,
                         pruning,
                         score,
@@ -299,20 +279,11 @@ impl Attempt<'_> {
             regressions: &self.regressions[best.window],
             ridge: best.choice.ridge,
             growth: self.growth,
-            xi: best.xi.clone(),
-            score: best.choice.score,
+            judge: self.judge,
+            now: best.coefficients(),
         };
-        refined.grow(self.features, self.judge, watch);
-        let choice = Choice {
-            score: refined.score,
-            active: refined.xi.iter().map(active_terms).sum(),
-            ..best.choice.clone()
-        };
-        Some(Fitted {
-            xi: refined.xi,
-            choice,
-            window: best.window,
-        })
+        refined.grow(watch);
+        Some(Fitted::of(refined.now, &best.choice, best.window))
     }
 }
 
@@ -330,21 +301,18 @@ fn best_of(tried: &[Fitted]) -> Result<&Fitted, TrainError> {
     })
 }
 
-/// Candidates to prune and refine, at most `count` or one: of every window the one with the best score, then all others
+/// Candidates to prune and refine, at most [`SWEEPS`]: of every window the one with the best score, then all others
 /// within the limit, best first.
-fn starts(tried: Vec<Fitted>, windows: &[usize], limit: f64, count: usize) -> Vec<Fitted> {
-    let mut within: Vec<Fitted> = tried
-        .into_iter()
-        .filter(|fitted| fitted.choice.score <= limit)
-        .collect();
-    within.sort_by(|a, b| a.choice.score.total_cmp(&b.choice.score));
-    let mut seen = vec![false; windows.len()];
-    let rank: Vec<bool> = within
-        .iter()
-        .map(|fitted| std::mem::replace(&mut seen[fitted.window], true))
-        .collect();
-    let mut ranked: Vec<(bool, Fitted)> = rank.into_iter().zip(within).collect();
-    ranked.sort_by_key(|(later, _)| *later);
-    let first = ranked.into_iter().take(count.max(1));
-    first.map(|(_, fitted)| fitted).collect()
+fn starts(mut tried: Vec<Fitted>, limit: f64) -> impl Iterator<Item = Fitted> {
+    tried.retain(|fitted| fitted.choice.score <= limit);
+    tried.sort_by(|a, b| a.choice.score.total_cmp(&b.choice.score));
+    let mut seen = [false; WINDOWS.len()];
+    let ranked = tried.into_iter().map(|fitted| {
+        let is_later = std::mem::replace(&mut seen[fitted.window], true);
+        (is_later, fitted)
+    });
+    let mut ranked: Vec<(bool, Fitted)> = ranked.collect();
+    ranked.sort_by_key(|(is_later, _)| *is_later);
+    let first = ranked.into_iter().take(SWEEPS);
+    first.map(|(_, fitted)| fitted)
 }

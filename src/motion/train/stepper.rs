@@ -4,9 +4,8 @@
 
 use nalgebra::DMatrix;
 
-use super::dataset::Dataset;
 use super::features::{FeatureValues, Features};
-use super::latent::Latent;
+use super::latent::EncodedSet;
 use super::rollout::{Candidate, Change, Window};
 use super::vectors::{self, Loop};
 
@@ -25,8 +24,7 @@ pub(super) struct Row {
 /// RK4 over a batch of windows. What is computed for a row does not depend on the others.
 pub(super) struct Stepper<'a> {
     candidate: Candidate<'a>,
-    dataset: &'a Dataset,
-    latent: &'a [Latent],
+    set: EncodedSet<'a>,
     active: Vec<Vec<Vec<(usize, f64)>>>, // a phase and output: active terms and their coefficients
     rows: Vec<Row>,
     state: DMatrix<f64>, // z, dz
@@ -40,12 +38,7 @@ pub(super) struct Stepper<'a> {
 
 impl<'a> Stepper<'a> {
     /// A stepper at the true latent states that the windows start from.
-    pub fn new(
-        candidate: Candidate<'a>,
-        dataset: &'a Dataset,
-        latent: &'a [Latent],
-        rows: Vec<Row>,
-    ) -> Self {
+    pub fn new(candidate: Candidate<'a>, set: EncodedSet<'a>, rows: Vec<Row>) -> Self {
         let d = candidate.features.latent_dim();
         let active_of = |xi: &DMatrix<f64>| {
             let active = |column: usize| {
@@ -58,17 +51,12 @@ impl<'a> Stepper<'a> {
         };
         let state = DMatrix::from_fn(rows.len(), 2 * d, |row, i| {
             let Window { jump, start, .. } = rows[row].window;
-            let of = if i < d {
-                &latent[jump].z
-            } else {
-                &latent[jump].dz
-            };
-            of[(i % d, start)]
+            let latent = &set.latent[jump];
+            [&latent.z, &latent.dz][i / d][(i % d, start)]
         });
         let mut stepper = Self {
             candidate,
-            dataset,
-            latent,
+            set,
             active: candidate.xi.iter().map(active_of).collect(),
             rows,
             state,
@@ -143,10 +131,10 @@ impl<'a> Stepper<'a> {
             let Window { jump, start, .. } = of_window[0].window;
             let rows = first..first + of_window.len();
             first = rows.end;
-            let (sample, samples) = (start + step, &self.dataset.jumps[jump]);
+            let (sample, samples) = (start + step, &self.set.dataset.jumps[jump]);
             self.phase[rows.clone()].fill(samples.phase[sample]);
             self.step_s[rows.clone()].fill(samples.time_s[sample + 1] - samples.time_s[sample]);
-            let u = &self.latent[jump].u_lat;
+            let u = &self.set.latent[jump].u_lat;
             for i in 0..u.nrows() {
                 let (before, after) = (u[(i, sample)], u[(i, sample + 1)]);
                 let values = [before, 0.5 * (before + after), after];

@@ -1,6 +1,7 @@
 //! One training as every method sees it, checked before any map is learned.
 
-use super::data_sets::{DataSets, Recordings};
+use super::data_sets::Recordings;
+use super::dataset::Dataset;
 use super::error::TrainError;
 use super::features::Features;
 use super::frame::Frame;
@@ -8,11 +9,15 @@ use super::knowledge::Knowledge;
 use super::options::TrainOptions;
 use super::subspace::Moments;
 use crate::model::Library;
+use crate::recording::Source;
 use crate::robot::Robot;
 
 /// Data, library and options that all seeds share.
 pub(super) struct Task<'a> {
-    pub sets: DataSets,
+    /// The training recordings cut into phases, scaled.
+    pub training: Dataset,
+    /// The same of the validation recordings; may have no jump.
+    pub validation: Dataset,
     /// Of the training samples.
     pub moments: Moments,
     pub library: Library,
@@ -24,10 +29,11 @@ pub(super) struct Task<'a> {
     /// What is known of the dynamics in its coordinates, one a phase.
     pub knowledge: Vec<Knowledge>,
     pub options: &'a TrainOptions,
+    pub robot: &'static Robot,
 }
 
 impl<'a> Task<'a> {
-    /// Reads the data sets and checks them against the options.
+    /// Checks the options, reads the data sets and cuts them into phases, and checks them against the options.
     ///
     /// # Errors
     /// [`TrainError`]: options out of range, too few samples, too many latent coordinates.
@@ -36,35 +42,45 @@ impl<'a> Task<'a> {
         robot: &'static Robot,
         options: &'a TrainOptions,
     ) -> Result<Self, TrainError> {
-        let sets = DataSets::new(recordings, robot, options)?;
-        let moments = sets.training.moments();
+        options.check()?;
+        let (scaling, smoothing) = (options.scaling.factors(), options.regression.smoothing);
+        let rule = options.input_rule(robot);
+        let read = |set: Source<'_>| Dataset::new(set, &rule, &options.phases, &scaling, smoothing);
+        let training = read(recordings.training)?;
+        training.check_for_training()?;
+        let validation = read(recordings.validation)?;
+        let moments = training.moments();
         let least_std = options.encoder.least_std * options.scaling.state;
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
-        let coordinates = options.coordinates();
-        let frame = Frame::new(
-            &sets.training,
-            &active,
-            options.latent_dim,
-            coordinates,
-            robot,
-        )?;
-        if options.latent_dim == 0 || options.latent_dim > frame.dim() {
+        let (coordinates, requested) = (options.coordinates(), options.latent_dim);
+        let frame = Frame::new(&training, &active, requested, coordinates, robot)?;
+        if requested == 0 || requested > frame.dim() {
             return Err(TrainError::LatentDim {
-                requested: options.latent_dim,
+                requested,
                 active: frame.dim(),
             });
         }
         let library = options.library()?;
         let features = Features::new(&library);
         Ok(Self {
-            knowledge: Knowledge::of_phases(&sets.training, &features, &frame),
-            sets,
+            knowledge: Knowledge::of_phases(&training, &features, &frame),
+            training,
+            validation,
             moments,
             features,
             library,
             active,
             frame,
             options,
+            robot,
         })
+    }
+
+    /// The jumps that candidates are judged by.
+    pub fn judged(&self) -> &Dataset {
+        match self.validation.jumps.is_empty() {
+            true => &self.training,
+            false => &self.validation,
+        }
     }
 }

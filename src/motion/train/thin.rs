@@ -31,11 +31,8 @@ impl Refiner<'_> {
             let places = self.free_places(&thinned.xi);
             let scales = relative(&thinned, &places);
             let model = self.model(&thinned.xi, &places, &scales, weights);
-            let Some(mut about) =
-                model.and_then(|model| About::new(&thinned, places, scales, &model))
-            else {
-                break;
-            };
+            let about = model.and_then(|model| About::new(&thinned, places, scales, &model));
+            let Some(mut about) = about else { break };
             let before = about.places.len();
             let Some(fewer) = self.drop_about(&mut about, &thinned, limit) else {
                 break;
@@ -73,7 +70,8 @@ impl Refiner<'_> {
 
     /// The places that may go, those first whose loss is least.
     fn order(&self, about: &About) -> Vec<usize> {
-        let (features, d) = (self.features, self.features.latent_dim());
+        let features = self.judge.features;
+        let d = features.latent_dim();
         let inputs: Vec<_> = (2 * d..3 * d)
             .filter_map(|i| features.variable_term(i))
             .collect();
@@ -146,10 +144,9 @@ impl About {
         for (i, &(phase, term, column)) in self.places.iter().enumerate() {
             let change = self.lowest[i] * self.scales[i];
             let coefficient = &mut xi[phase][(term, column)];
-            *coefficient = if self.gone[i] {
-                0.0
-            } else {
-                *coefficient + change
+            *coefficient = match self.gone[i] {
+                true => 0.0,
+                false => *coefficient + change,
             };
         }
         xi
@@ -158,39 +155,23 @@ impl About {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::AtomicBool;
-
     use super::*;
-    use crate::train::growth::Growth;
-    use crate::train::judge::Judge;
     use crate::train::knowledge::Knowledge;
     use crate::train::oscillator;
-    use crate::train::progress::Progress;
 
     /// What is left of the known system with a few terms too many, the limit as a share of its score.
     fn left_of_too_many(limit: f64) -> Vec<DMatrix<f64>> {
-        let (dataset, latent) = oscillator::jumps(3);
-        let judge = Judge::new(&dataset, &latent, 0.2);
-        let (features, truth) = oscillator::known();
+        let (_, mut xi) = oscillator::known();
         let mut knowledge = [Knowledge::nothing(7, 2), Knowledge::nothing(7, 2)];
         knowledge[0].kept[(3, 0)] = true;
-        let growth = Growth::of_jumps(None, &dataset, &latent, &features);
-        let refiner = Refiner {
-            features: &features,
-            knowledge: &knowledge,
-            growth: &growth,
-            training: &judge,
-            judge: &judge,
-        };
-        let mut xi = truth;
         (xi[0][(2, 0)], xi[0][(4, 0)], xi[0][(4, 1)]) = (0.3, 0.02, -0.05);
         (xi[0][(5, 1)], xi[1][(1, 0)]) = (0.01, 0.02);
-        let score = refiner.score(&xi);
-        let (mut nothing, cancel) = (|_: Progress| {}, AtomicBool::new(false));
-        let mut watch = Watch::new(&mut nothing, &cancel);
-        let thinned = refiner.thin(Coefficients { xi, score }, limit * score, &mut watch);
-        assert!(thinned.score <= limit * score);
-        thinned.xi
+        oscillator::with_refiner(None, &knowledge, |refiner, watch| {
+            let score = refiner.score(&xi);
+            let thinned = refiner.thin(Coefficients { xi, score }, limit * score, watch);
+            assert!(thinned.score <= limit * score);
+            thinned.xi
+        })
     }
 
     #[test]

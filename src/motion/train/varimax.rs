@@ -36,29 +36,22 @@ pub fn varimax(loadings: &DMatrix<f64>) -> DMatrix<f64> {
 /// The first coordinate of `order_by` takes the column that weighs it most, then the next one, so that a reader
 /// meets body x as z1 and body z as z2 whenever the space holds them.
 pub fn order_and_sign(loadings: &DMatrix<f64>, order_by: &[usize]) -> (Vec<usize>, Vec<f64>) {
+    let weight = |column: usize| loadings.column(column).norm_squared();
     let mut left: Vec<usize> = (0..loadings.ncols()).collect();
     let mut order = Vec::with_capacity(left.len());
     for &coordinate in order_by {
-        let share = |column: usize| {
-            loadings[(coordinate, column)].powi(2) / loadings.column(column).norm_squared()
-        };
+        let share = |column: usize| loadings[(coordinate, column)].powi(2) / weight(column);
         let heaviest = (0..left.len()).max_by(|&a, &b| share(left[a]).total_cmp(&share(left[b])));
         if let Some(position) = heaviest.filter(|&position| share(left[position]) > 0.5) {
             order.push(left.remove(position));
         }
     }
-    left.sort_by(|&a, &b| {
-        loadings
-            .column(b)
-            .norm_squared()
-            .total_cmp(&loadings.column(a).norm_squared())
-            .then(a.cmp(&b))
-    });
+    // Stable: equals stay in their order.
+    left.sort_by(|&a, &b| weight(b).total_cmp(&weight(a)));
     order.extend(left);
-    let signs = order
-        .iter()
-        .map(|&column| loadings.column(column)[loadings.column(column).iamax()].signum())
-        .collect();
+    let columns = order.iter().map(|&column| loadings.column(column));
+    let signs = columns.map(|column| column[column.iamax()].signum());
+    let signs = signs.collect();
     (order, signs)
 }
 

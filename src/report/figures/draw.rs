@@ -1,7 +1,7 @@
 //! From a panel to marks on a plane; y grows downwards, lengths are points.
 
 use super::figure::{Figure, HeatMap, LinePlot, Panel, Role, StickPlot};
-use super::ticks::{number, padded, ticks};
+use super::ticks::{number, padded, range, ticks};
 
 /// Space left of the axes, for their numbers.
 const LEFT: f64 = 38.0;
@@ -60,16 +60,15 @@ pub(super) fn figure_size(figure: &Figure) -> (f64, f64) {
     let columns = figure.columns.min(figure.panels.len()).max(1);
     let rows = figure.panels.len().div_ceil(columns);
     let (width, height) = figure.panel_size;
-    (
-        columns as f64 * width,
-        rows as f64 * height + legend_height(figure),
-    )
+    let height = rows as f64 * height + legend_height(figure);
+    (columns as f64 * width, height)
 }
 
 fn legend_height(figure: &Figure) -> f64 {
-    match figure.legend.is_empty() {
-        true => 0.0,
-        false => LEGEND,
+    if figure.legend.is_empty() {
+        0.0
+    } else {
+        LEGEND
     }
 }
 
@@ -140,14 +139,11 @@ impl Axes {
 
 fn draw_lines(plot: &LinePlot, size: (f64, f64), x_label: &str) -> Vec<Mark> {
     let points = || plot.series.iter().flat_map(|series| &series.points);
-    let (first, last) = (points().map(|p| p.0)).fold((f64::INFINITY, f64::NEG_INFINITY), |r, x| {
-        (r.0.min(x), r.1.max(x))
-    });
+    let (first, last) = range(points().map(|point| point.0));
     let axes = Axes {
-        x: if last > first {
-            (first, last)
-        } else {
-            padded(points().map(|point| point.0))
+        x: match last > first {
+            true => (first, last),
+            false => padded(points().map(|point| point.0)),
         },
         y: padded(visible(plot)),
         size,
@@ -180,10 +176,7 @@ fn draw_lines(plot: &LinePlot, size: (f64, f64), x_label: &str) -> Vec<Mark> {
 /// Values that the range of y follows: a prediction that runs away does not flatten the record,
 /// a limit is always in sight.
 fn visible(plot: &LinePlot) -> impl Iterator<Item = f64> {
-    let recorded = plot
-        .series
-        .iter()
-        .find(|series| series.role == Role::Recorded);
+    let recorded = (plot.series.iter()).find(|series| series.role == Role::Recorded);
     let bounds = recorded.map(|series| padded(series.points.iter().filter_map(|p| p.1)));
     let follows = move |role: Role, value: f64| match (role, bounds) {
         (Role::Limit, _) | (_, None) => value,
@@ -233,10 +226,8 @@ fn draw_axes(axes: &Axes, x_label: &str, marks: &mut Vec<Mark>) {
 fn draw_heat(map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec<Mark> {
     let left = LEFT + 22.0;
     let (width, height) = (size.0 - left - RIGHT, size.1 - TOP - BOTTOM);
-    let cell = (
-        width / map.columns.len().max(1) as f64,
-        height / map.rows.len().max(1) as f64,
-    );
+    let [columns, rows] = [&map.columns, &map.rows].map(|names| names.len().max(1) as f64);
+    let cell = (width / columns, height / rows);
     let largest = map.values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     let mut marks = heat_scale(&map.title, left, largest);
     for (row, name) in map.rows.iter().enumerate() {
@@ -257,13 +248,8 @@ fn draw_heat(map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec<Mark> {
         let x = left + (column as f64 + 0.5) * cell.0;
         marks.push(Mark::Text(x, bottom + 11.0, Anchor::Middle, name.clone()));
     }
-    let label = x_label.to_owned();
-    marks.push(Mark::Text(
-        size.0 - RIGHT,
-        bottom + 22.0,
-        Anchor::End,
-        label,
-    ));
+    let (right, label) = (size.0 - RIGHT, x_label.to_owned());
+    marks.push(Mark::Text(right, bottom + 22.0, Anchor::End, label));
     marks
 }
 

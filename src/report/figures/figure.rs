@@ -53,14 +53,14 @@ impl Role {
         }
     }
 
-    /// Lengths of dashes and gaps, so that lines differ in grey print too; empty for a full line.
-    pub fn dashes(self) -> &'static [f64] {
+    /// Lengths of dashes and gaps, as SVG and PDF list them, so that lines differ in grey print too; empty for a full line.
+    pub fn dashes(self) -> &'static str {
         match self {
-            Self::Recorded => &[],
-            Self::Full => &[6.0, 2.5],
-            Self::Restarted => &[2.0, 1.6],
-            Self::Baseline => &[8.0, 2.0, 2.0, 2.0],
-            Self::SecondBaseline | Self::Limit => &[1.0, 2.0],
+            Self::Recorded => "",
+            Self::Full => "6 2.5",
+            Self::Restarted => "2 1.6",
+            Self::Baseline => "8 2 2 2",
+            Self::SecondBaseline | Self::Limit => "1 2",
         }
     }
 }
@@ -72,6 +72,15 @@ pub struct Series {
     pub role: Role,
     /// Pairs of x and y.
     pub points: Vec<(f64, Option<f64>)>,
+}
+
+impl Series {
+    /// A value of every sample over its time.
+    pub fn over(role: Role, time_s: &[f64], value: impl Fn(usize) -> Option<f64>) -> Self {
+        let times = time_s.iter().enumerate();
+        let points = times.map(|(sample, &time)| (time, value(sample))).collect();
+        Self { role, points }
+    }
 }
 
 /// Lines over one axis.
@@ -125,10 +134,16 @@ pub enum Panel {
 impl Panel {
     /// Lines over one axis, without shaded ranges.
     pub fn lines(title: impl Into<String>, series: Vec<Series>) -> Self {
+        Self::shaded(title, series, Vec::new())
+    }
+
+    /// Lines over one axis, some ranges of which are shaded.
+    pub fn shaded(title: impl Into<String>, series: Vec<Series>, shaded: Vec<(f64, f64)>) -> Self {
+        let title = title.into();
         Self::Lines(LinePlot {
-            title: title.into(),
+            title,
             series,
-            shaded: Vec::new(),
+            shaded,
         })
     }
 
@@ -164,15 +179,15 @@ pub struct Figure {
 impl Figure {
     /// Small panels over time, three side by side; the legend explains the lines.
     pub fn over_time(
-        id: String,
-        caption: String,
+        id: impl Into<String>,
+        caption: impl Into<String>,
         panels: Vec<Panel>,
         legend: &[(Role, &str)],
     ) -> Self {
         let words = |(role, words): &(Role, &str)| (*role, (*words).to_owned());
         Self {
-            id,
-            caption,
+            id: id.into(),
+            caption: caption.into(),
             x_label: "time, s".to_owned(),
             panel_size: (240.0, 150.0),
             columns: 3,

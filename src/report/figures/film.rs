@@ -28,11 +28,17 @@ pub struct Film {
     pub legend: Vec<(Role, String)>,
 }
 
-/// Points of all lines in mm, y downwards.
-fn points(sticks: &Sticks) -> Vec<String> {
-    let point = |&(forward, up): &(f64, f64)| format!("{:.0},{:.0}", 1e3 * forward, -1e3 * up);
-    let line = |line: &Vec<(f64, f64)>| line.iter().map(point).collect::<Vec<_>>().join(" ");
-    sticks.lines.iter().map(line).collect()
+/// A line in mm, y downwards.
+fn points(line: impl IntoIterator<Item = (f64, f64)>) -> String {
+    let points = line.into_iter();
+    let points = points.map(|(forward, up)| format!("{:.0},{:.0}", 1e3 * forward, -1e3 * up));
+    points.collect::<Vec<_>>().join(" ")
+}
+
+/// All lines of a robot; none where there is no robot.
+fn lines(sticks: &Option<Sticks>) -> Vec<String> {
+    let lines = sticks.iter().flat_map(|sticks| &sticks.lines);
+    lines.map(|line| points(line.iter().copied())).collect()
 }
 
 /// Middle of the trunk: forward and up, in m.
@@ -72,12 +78,10 @@ pub fn film(
         .collect();
     let lines: Vec<Vec<String>> = (sticks.iter())
         .map(|motion| {
-            let joined = |sticks: &Option<Sticks>| {
-                sticks
-                    .as_ref()
-                    .map_or(String::new(), |s| points(s).join(";"))
-            };
-            motion.iter().map(joined).collect()
+            motion
+                .iter()
+                .map(|sticks| lines(sticks).join(";"))
+                .collect()
         })
         .collect();
     let roles: Vec<Role> = motions.iter().map(|motion| motion.role).collect();
@@ -112,26 +116,12 @@ fn svg(
         left + width
     );
     for (role, motion) in roles.iter().zip(sticks) {
-        let path: Vec<String> = (motion.iter().flatten())
-            .map(|sticks| {
-                let (forward, up) = middle(sticks);
-                format!("{:.0},{:.0}", 1e3 * forward, -1e3 * up)
-            })
-            .collect();
-        let path = path.join(" ");
-        let _ = write!(
-            text,
-            "<polyline class=\"{} path\" points=\"{path}\"/>",
-            role.class()
-        );
+        let (class, path) = (role.class(), points(motion.iter().flatten().map(middle)));
+        let _ = write!(text, "<polyline class=\"{class} path\" points=\"{path}\"/>");
     }
     for (role, motion) in roles.iter().zip(sticks) {
         let _ = write!(text, "<g class=\"{}\">", role.class());
-        let now = motion
-            .get(shown)
-            .and_then(Option::as_ref)
-            .map(points)
-            .unwrap_or_default();
+        let now = motion.get(shown).map(lines).unwrap_or_default();
         for line in 0..Sticks::NAMES.len() {
             let points = now.get(line).map_or("", String::as_str);
             let _ = write!(text, "<polyline points=\"{points}\"/>");
@@ -155,13 +145,11 @@ mod tests {
             x[14] = height;
             Some(x)
         };
-        let heights: Vec<f64> = (0..201)
-            .map(|k| 0.3 - (f64::from(k) - 120.0).powi(2) / 1e5)
-            .collect();
+        let heights = (0..201).map(|k| 0.3 - (f64::from(k) - 120.0).powi(2) / 1e5);
         let recorded = Motion {
             role: Role::Recorded,
             words: "recorded".to_owned(),
-            states: heights.iter().map(|&height| state(height)).collect(),
+            states: heights.map(state).collect(),
         };
         let mut predicted = recorded.clone();
         predicted.role = Role::Full;
@@ -179,10 +167,7 @@ mod tests {
         assert_eq!(last(1), "");
         // the drawing holds the lines of the instant that it shows
         let shown = frames["lines"][0][film.shown].as_str().unwrap();
-        assert!(
-            shown
-                .split(';')
-                .all(|line| film.svg.contains(&format!("\"{line}\"")))
-        );
+        let mut lines = shown.split(';');
+        assert!(lines.all(|line| film.svg.contains(&format!("\"{line}\""))));
     }
 }

@@ -7,7 +7,6 @@
 mod csv;
 mod draw;
 mod figure;
-mod files;
 mod film;
 mod pdf;
 mod sticks;
@@ -17,9 +16,20 @@ mod ticks;
 pub use csv::csv;
 pub use draw::{Anchor, Mark, Paint, draw_panel};
 pub use figure::{Figure, HeatMap, LinePlot, Panel, Role, Series, StickPlot};
-pub use files::figure_files;
 pub use film::{Film, film};
 pub use pdf::pdf;
 pub use sticks::{Extent, Motion, Sticks, film_strip, floor_m};
 pub use svg::{panel_svg, standalone_svg};
 pub use ticks::subscript;
+
+use crate::files::EmittedFile;
+
+/// A figure as SVG, PDF and CSV, named after it.
+pub fn figure_files(figure: &Figure) -> [EmittedFile; 3] {
+    let file = |ending, contents| EmittedFile::new(format!("{}.{ending}", figure.id), contents);
+    [
+        file("svg", standalone_svg(figure)),
+        file("pdf", pdf(figure)),
+        file("csv", csv(figure)),
+    ]
+}

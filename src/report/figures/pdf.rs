@@ -73,8 +73,8 @@ fn write_mark(text: &mut String, mark: &Mark, (dx, dy): (f64, f64), height: f64)
         }
         Mark::Line(points, role) => {
             let [r, g, b] = role.colour().map(|part| f64::from(part) / 255.0);
-            let dashes: Vec<String> = role.dashes().iter().map(f64::to_string).collect();
-            let mut path = format!("[{}] 0 d 1.1 w {r:.3} {g:.3} {b:.3} RG", dashes.join(" "));
+            let dashes = role.dashes();
+            let mut path = format!("[{dashes}] 0 d 1.1 w {r:.3} {g:.3} {b:.3} RG");
             for (place, (x, y)) in points.iter().enumerate() {
                 let operator = if place == 0 { "m" } else { "l" };
                 let _ = write!(path, " {:.2} {:.2} {operator}", x + dx, up(*y));

@@ -3,6 +3,7 @@
 use nalgebra::{DVector, Vector3};
 
 use super::figure::{Figure, Panel, Role, StickPlot};
+use super::ticks::range;
 use crate::recording::Segment;
 use crate::robot::input_rule::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
@@ -73,22 +74,16 @@ pub struct Extent {
 impl Extent {
     /// The smallest part with a margin that shows all `sticks` and the floor.
     pub fn around<'a>(sticks: impl IntoIterator<Item = &'a Sticks>, floor_m: f64) -> Self {
-        let none = (f64::INFINITY, f64::NEG_INFINITY);
-        let wider = |(low, high): (f64, f64), value: f64| (low.min(value), high.max(value));
-        let (mut forward_m, mut up_m) = (none, wider(none, floor_m));
-        let points = sticks
-            .into_iter()
-            .flat_map(|sticks| sticks.lines.iter().flatten());
-        for &(forward, up) in points {
-            (forward_m, up_m) = (wider(forward_m, forward), wider(up_m, up));
-        }
+        let lines = sticks.into_iter().flat_map(|sticks| &sticks.lines);
+        let (forward, mut up): (Vec<f64>, Vec<f64>) = lines.flatten().copied().unzip();
+        up.push(floor_m);
         let margin = |(low, high): (f64, f64)| match low <= high {
             true => (low - MARGIN_M, high + MARGIN_M),
             false => (0.0, 1.0),
         };
         Self {
-            forward_m: margin(forward_m),
-            up_m: margin(up_m),
+            forward_m: margin(range(forward)),
+            up_m: margin(range(up)),
         }
     }
 }
@@ -155,10 +150,8 @@ pub fn floor_m(robot: &Robot, segment: &Segment) -> f64 {
     let lowest = |k: usize, all: bool| {
         let sticks = Sticks::of(robot, segment.x.column(k).as_slice(), 0.0);
         let feet = sticks.lines[1..].iter().zip(segment.feet[k]);
-        let down = feet
-            .filter(|(_, down)| all || *down)
-            .map(|(leg, _)| leg[2].1);
-        down.min_by(f64::total_cmp)
+        let down = feet.filter(|(_, down)| all || *down);
+        down.map(|(leg, _)| leg[2].1).min_by(f64::total_cmp)
     };
     let heights = |all: bool| (0..segment.len()).filter_map(move |k| lowest(k, all));
     let mut feet: Vec<f64> = heights(false).collect();
@@ -256,32 +249,21 @@ mod tests {
     fn a_robot_seen_along_its_heading_looks_the_same_whatever_that_is() {
         let straight = Sticks::of(go1(), standing(0.0, 0.0).as_slice(), 0.0);
         let turned = Sticks::of(go1(), standing(0.0, 1.1).as_slice(), 1.1);
-        for (a, b) in straight
-            .lines
-            .iter()
-            .flatten()
-            .zip(turned.lines.iter().flatten())
-        {
+        let points = straight.lines.iter().flatten();
+        for (a, b) in points.zip(turned.lines.iter().flatten()) {
             assert!((a.0 - b.0).abs() < 1e-12 && (a.1 - b.1).abs() < 1e-12);
         }
     }
 
     #[test]
     fn plan_starts_where_the_jump_does_and_ends_by_itself() {
-        let segment = |n: usize, step_s: f64, from_m: f64| Segment {
-            path: "plan.csv".into(),
-            first_row: 2,
-            row_stride: 1.0,
-            time_s: (0..n).map(|k| 5.0 * from_m + step_s * k as f64).collect(),
-            x: nalgebra::DMatrix::from_fn(STATE_DIM, n, |row, k| match row {
-                JOINT_DIM => from_m + step_s * k as f64,
-                _ => 0.0,
-            }),
-            dx: nalgebra::DMatrix::zeros(STATE_DIM, n),
-            ddx: nalgebra::DMatrix::zeros(STATE_DIM, n),
-            torque_nm: nalgebra::DMatrix::zeros(JOINT_DIM, n),
-            feet: vec![[true; FOOT_DIM]; n],
-            body_wrench: None,
+        let segment = |n: usize, step_s: f64, from_m: f64| {
+            let times = (0..n).map(|k| 5.0 * from_m + step_s * k as f64);
+            let mut segment = Segment::still("plan.csv", times.collect());
+            for k in 0..n {
+                segment.x[(JOINT_DIM, k)] = from_m + step_s * k as f64;
+            }
+            segment
         };
         let (plan, jump) = (segment(101, 0.01, 3.0), segment(601, 0.002, 1.0));
         let planned = Motion::planned(&plan, &jump);
@@ -316,8 +298,8 @@ mod tests {
             .collect();
         assert_eq!(plots.len(), 5);
         assert_eq!(
-            (plots[0].title.as_str(), plots[4].title.as_str()),
-            ("0.00 s", "1.00 s")
+            [0, 4].map(|frame| &plots[frame].title),
+            ["0.00 s", "1.00 s"]
         );
         assert_eq!((plots[0].sticks.len(), plots[4].sticks.len()), (2, 1));
         // the second motion is 1.5 m on at its last frame, its front hip further

@@ -48,16 +48,11 @@ fn style() -> String {
     );
     for role in Role::ALL {
         let [r, g, b] = role.colour();
-        let dashes = role.dashes().iter().map(f64::to_string);
-        let dashes: Vec<String> = dashes.collect();
-        let dashes = match dashes.is_empty() {
-            true => "none".to_owned(),
-            false => dashes.join(" "),
-        };
+        let (class, dashes) = (role.class(), role.dashes());
+        let dashes = if dashes.is_empty() { "none" } else { dashes };
         let _ = write!(
             text,
-            ".{}{{stroke:#{r:02x}{g:02x}{b:02x};stroke-dasharray:{dashes}}}",
-            role.class()
+            ".{class}{{stroke:#{r:02x}{g:02x}{b:02x};stroke-dasharray:{dashes}}}"
         );
     }
     text
@@ -91,12 +86,8 @@ fn write_mark(text: &mut String, mark: &Mark, (dx, dy): (f64, f64)) {
             let points: Vec<String> = (points.iter())
                 .map(|(x, y)| format!("{:.1},{:.1}", x + dx, y + dy))
                 .collect();
-            let points = points.join(" ");
-            write!(
-                text,
-                "<polyline class=\"{}\" points=\"{points}\"/>",
-                role.class()
-            )
+            let (class, points) = (role.class(), points.join(" "));
+            write!(text, "<polyline class=\"{class}\" points=\"{points}\"/>")
         }
         Mark::Text(x, y, anchor, words) => {
             let anchor = match anchor {

@@ -33,13 +33,16 @@ pub fn subscript(index: usize) -> String {
     index.to_string().chars().map(below).collect()
 }
 
+/// The least and the largest of some values; infinities in reverse where there is none.
+pub fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    let values = values.into_iter();
+    values.fold(none, |(low, high), value| (low.min(value), high.max(value)))
+}
+
 /// The range of values with a margin; a range around a constant.
 pub fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (low, high) = values
-        .filter(|value| value.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-            (low.min(value), high.max(value))
-        });
+    let (low, high) = range(values.filter(|value| value.is_finite()));
     if low > high {
         return (0.0, 1.0);
     }

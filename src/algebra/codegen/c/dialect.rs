@@ -1,11 +1,12 @@
 //! How C99 spells statements.
 
-use crate::codegen::code::{Argument, ConstTable, Function, MathFunction, Parameter, Role, Span};
-use crate::codegen::dialect::{Dialect, FourDialect, LaneDialect};
+use crate::codegen::code::{ConstTable, Function, MathFunction, Parameter, Role, Span};
+use crate::codegen::dialect::{Dialect, LaneDialect};
 use crate::codegen::fours::{FourBlock, Fours};
 use crate::codegen::line_wrapping::{braced, comment_lines};
 use crate::codegen::literal::Literal;
 use crate::codegen::precision::Precision;
+use crate::codegen::printer::Printer;
 use crate::codegen::requirements::assigned_in_lanes;
 use crate::ir::{LANES, QUAD, Quad};
 
@@ -19,119 +20,20 @@ pub struct CDialect {
 }
 
 /// Keywords of C and C++, and the library names that generated files use.
-const RESERVED: [&str; 107] = [
-    "auto",
-    "break",
-    "case",
-    "char",
-    "const",
-    "continue",
-    "default",
-    "do",
-    "double",
-    "else",
-    "enum",
-    "extern",
-    "float",
-    "for",
-    "goto",
-    "if",
-    "inline",
-    "int",
-    "long",
-    "register",
-    "restrict",
-    "return",
-    "short",
-    "signed",
-    "sizeof",
-    "static",
-    "struct",
-    "switch",
-    "typedef",
-    "union",
-    "unsigned",
-    "void",
-    "volatile",
-    "while",
-    "bool",
-    "true",
-    "false",
-    "catch",
-    "class",
-    "delete",
-    "explicit",
-    "export",
-    "friend",
-    "mutable",
-    "namespace",
-    "new",
-    "noexcept",
-    "nullptr",
-    "operator",
-    "private",
-    "protected",
-    "public",
-    "template",
-    "this",
-    "throw",
-    "try",
-    "typeid",
-    "typename",
-    "using",
-    "virtual",
-    "and",
-    "or",
-    "not",
-    "xor",
-    "main",
-    "sin",
-    "cos",
-    "tan",
-    "tanh",
-    "exp",
-    "log",
-    "sqrt",
-    "fabs",
-    "memcpy",
-    "size_t",
-    "uint64_t",
-    "y0",
-    "y1",
-    "yn",
-    "j0",
-    "j1",
-    "jn",
-    "gamma",
-    "signgam",
-    "abs",
-    "asm",
-    "typeof",
-    "constexpr",
-    "concept",
-    "requires",
-    "import",
-    "module",
-    "alignas",
-    "alignof",
-    "static_assert",
-    "thread_local",
-    "decltype",
-    "div",
-    "index",
-    "time",
-    "erf",
-    "I",
-    "NULL",
-    "errno",
-    "stdin",
-    "stdout",
-    "stderr",
-];
+const RESERVED: &str = "
+    auto break case char const continue default do double else enum extern float for goto if inline
+    int long register restrict return short signed sizeof static struct switch typedef union
+    unsigned void volatile while bool true false catch class delete explicit export friend mutable
+    namespace new noexcept nullptr operator private protected public template this throw try typeid
+    typename using virtual and or not xor main sin cos tan tanh exp log sqrt fabs memcpy size_t
+    uint64_t y0 y1 yn j0 j1 jn gamma signgam abs asm typeof constexpr concept requires import module
+    alignas alignof static_assert thread_local decltype div index time erf I NULL errno stdin stdout
+    stderr
+";
 
 impl Dialect for CDialect {
-    fn reserved(&self) -> &'static [&'static str] {
-        &RESERVED
+    fn reserved(&self) -> &'static str {
+        RESERVED
     }
 
     fn literal(&self, literal: Literal) -> String {
@@ -140,13 +42,9 @@ impl Dialect for CDialect {
 
     fn apply(&self, function: MathFunction, argument: &str) -> String {
         let name = match function {
-            MathFunction::Sqrt => "sqrt",
             MathFunction::Abs => "fabs",
             MathFunction::Sign => return format!("{}_sign({argument})", self.name),
-            MathFunction::Tan => "tan",
-            MathFunction::Tanh => "tanh",
-            MathFunction::Exp => "exp",
-            MathFunction::Log => "log",
+            named => named.name(),
         };
         format!("{name}{}({argument})", self.suffix())
     }
@@ -172,29 +70,12 @@ impl Dialect for CDialect {
         format!("for (size_t {variable} = 0; {variable} < {count}; ++{variable})")
     }
 
-    fn discard(&self, parameter: &str) -> String {
-        format!("(void){parameter};")
-    }
-
-    fn multiply_add(&self) -> Option<&'static str> {
-        None
-    }
-
-    fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String {
-        let passed: Vec<String> = arguments
-            .iter()
-            .map(|argument| match argument {
-                Argument::Read(span) | Argument::Write(span) => pointer(span),
-            })
-            .collect();
+    fn call(&self, callee: Option<&str>, read: &[Span], written: &[Span]) -> String {
+        let passed: Vec<String> = read.iter().chain(written).map(pointer).collect();
+        let passed = passed.join(", ");
         match callee {
-            Some(callee) => format!("{callee}({});", passed.join(", ")),
-            None => {
-                let n = arguments.first().map_or(0, |argument| match argument {
-                    Argument::Read(span) | Argument::Write(span) => span.len,
-                });
-                format!("{}_sin_cos({n}, {});", self.name, passed.join(", "))
-            }
+            Some(callee) => format!("{callee}({passed});"),
+            None => format!("{}_sin_cos({}, {passed});", self.name, read[0].len),
         }
     }
 
@@ -221,61 +102,7 @@ impl Dialect for CDialect {
         Some(self)
     }
 
-    fn fours(&self) -> Option<&dyn FourDialect> {
-        Some(self)
-    }
-
-    fn table_base(&self, prefix: &str) -> String {
-        format!("{prefix}table")
-    }
-
-    fn table(&self, table: &ConstTable) -> String {
-        let rows: Vec<String> = table
-            .entries
-            .chunks(table.cols)
-            .map(|row| {
-                let row: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
-                format!("    {}", braced(&row, "\n     "))
-            })
-            .collect();
-        let aligned = match table.is_in_lanes {
-            true => format!(" {}_ALIGNED", self.upper()),
-            false => String::new(),
-        };
-        format!(
-            "static const {}{aligned} {}[{}][{}] = {{\n{},\n}};",
-            self.real(),
-            table.name,
-            table.rows,
-            table.cols,
-            rows.join(",\n")
-        )
-    }
-
-    fn parameter(&self, parameter: &Parameter) -> String {
-        self.declared(parameter, "restrict ")
-    }
-
-    fn signature(&self, function: &Function) -> String {
-        // Without `restrict` on what lanes assign, gcc keeps in registers what it has read for them;
-        // with it, it reads tables once for each use.
-        let in_lanes = assigned_in_lanes(&function.body);
-        self.head(function, |parameter| {
-            match in_lanes.contains(&parameter.name) {
-                true => "",
-                false => "restrict ",
-            }
-        })
-    }
-
-    fn docs(&self, _lines: &[String]) -> String {
-        // The header has the documentation.
-        String::new()
-    }
-}
-
-impl FourDialect for CDialect {
-    fn block(&self, fours: &Fours, block: &FourBlock) -> Vec<(usize, String)> {
+    fn fours(&self, fours: &Fours, block: &FourBlock) -> Option<Vec<(usize, String)>> {
         let (upper, y, weights) = (self.upper(), &fours.array, &fours.weights);
         let vector = |vector: Quad| match vector {
             Quad::Row(row) => format!("{}[{row}]", fours.table.1),
@@ -307,7 +134,26 @@ impl FourDialect for CDialect {
             lines.push((1, format!("{upper}_STORE_FOUR(&{y}[{at}], {});", name(sum))));
         }
         lines.push((0, "}".to_owned()));
-        lines
+        Some(lines)
+    }
+
+    fn table_base(&self, prefix: &str) -> String {
+        format!("{prefix}table")
+    }
+
+    fn table(&self, table: &ConstTable) -> String {
+        let rows = self.rows(table, ["    {", ",\n     ", "},"]);
+        let aligned = match table.is_in_lanes {
+            true => format!(" {}_ALIGNED", self.upper()),
+            false => String::new(),
+        };
+        format!(
+            "static const {}{aligned} {}[{}][{}] = {{\n{rows}}};",
+            self.real(),
+            table.name,
+            table.values.rows(),
+            table.values.cols(),
+        )
     }
 }
 
@@ -342,6 +188,20 @@ impl CDialect {
     /// What macros begin with.
     pub fn upper(&self) -> String {
         self.name.to_ascii_uppercase()
+    }
+
+    /// The definition of a function; the header has its documentation.
+    pub fn definition(&self, function: &Function, printer: &Printer) -> String {
+        // Without `restrict` on what lanes assign, gcc keeps in registers what it has read for them;
+        // with it, it reads tables once for each use.
+        let in_lanes = assigned_in_lanes(&function.body);
+        let head = self.head(function, |parameter| {
+            match in_lanes.contains(&parameter.name) {
+                true => "",
+                false => "restrict ",
+            }
+        });
+        printer.function(&head, |unused| format!("(void){unused};"), function)
     }
 
     /// The function's name and parameters, arrays with what `qualifier` says of each.

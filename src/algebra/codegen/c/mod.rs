@@ -9,8 +9,9 @@ use super::code::{Function, MathFunction, Stmt};
 use super::dialect::Dialect;
 use super::error::CodegenError;
 use super::functions::ModelFunctions;
-use super::interface::{ModelInterface, PhaseInterface};
-use super::line_wrapping::braced;
+use super::interface::ModelInterface;
+use super::line_wrapping::{braced, tidy};
+use super::phase_text::PhaseText;
 use super::precision::Precision;
 use super::printer::Printer;
 use super::requirements::{assigned_in_lanes, calls_function, calls_kernel, has_fours};
@@ -29,8 +30,9 @@ struct Header<'a> {
     units: String,
     latent_dim: usize,
     state_dim: Option<usize>,
+    /// Prototypes, as those of the phases.
     maps: Vec<String>,
-    phases: Vec<PhaseText>,
+    phases: Vec<PhaseText<String>>,
 }
 
 #[derive(Template)]
@@ -38,48 +40,27 @@ struct Header<'a> {
 struct Source<'a> {
     banner: String,
     name: &'a str,
-    real: &'static str,
-    /// What numbers of that type end with.
-    f: &'static str,
-    latent_dim: usize,
-    n_lanes: usize,
-    kernel: Option<String>,
-    lanes: Option<String>,
-    sign: bool,
-    tables: Vec<String>,
-    maps: Vec<String>,
-    phases: Vec<PhaseText>,
-}
-
-#[derive(Template)]
-#[template(path = "c/kernel.askama", config = "../../templates/askama.toml")]
-struct Kernel<'a> {
-    name: &'a str,
     upper: String,
     real: &'static str,
     /// What numbers of that type end with.
     f: &'static str,
-    /// An unsigned integer as wide.
-    bits: &'static str,
-    /// From bit 1 to the sign.
-    to_sign: u32,
-    is_single: bool,
-    is_library: bool,
-    k: KernelText,
-}
-
-#[derive(Template)]
-#[template(path = "c/lanes.askama", config = "../../templates/askama.toml")]
-struct LaneText<'a> {
-    name: &'a str,
-    upper: String,
-    real: &'static str,
     /// Bytes of a number.
     size: usize,
+    is_single: bool,
+    is_library: bool,
+    latent_dim: usize,
+    n_lanes: usize,
+    kernel: Option<KernelText>,
+    /// Whether rows of tables are read in lanes.
+    has_lanes: bool,
     /// Whether rows of functions are added in eight lanes.
     has_rows: bool,
     /// Whether there are sums of vectors of four numbers.
     has_fours: bool,
+    sign: bool,
+    tables: Vec<String>,
+    maps: Vec<String>,
+    phases: Vec<PhaseText<String>>,
 }
 
 #[derive(Template)]
@@ -87,25 +68,6 @@ struct LaneText<'a> {
 struct CMake<'a> {
     banner: String,
     name: &'a str,
-}
-
-/// A phase in header and source.
-#[derive(Clone)]
-struct PhaseText {
-    identifier: String,
-    /// Beginning of its macros.
-    upper: String,
-    nnz: usize,
-    /// Length of the pattern's arrays, which cannot be empty in C.
-    stored: usize,
-    rows: String,
-    cols: String,
-    prototypes: Vec<String>,
-    functions: Vec<String>,
-    /// Body of the loop over the lanes of a batch.
-    lanes: Option<String>,
-    /// Whether that loop has sines, whose arguments may be beyond the kernel's limit.
-    lanes_have_angles: bool,
 }
 
 /// The C files of a model; `provenance` is the text of the first line.
@@ -128,109 +90,78 @@ pub fn emit(
         functions.sines_point_by_point();
     }
     let printer = Printer::new(&dialect);
-    let print = |function: &Function| printer.function(function);
-    let phases: Vec<PhaseText> = entries
-        .phases
-        .iter()
-        .zip(functions.phases.iter().zip(&functions.lanes))
-        .map(|(phase, (functions, lanes))| PhaseText {
-            lanes: lanes.as_ref().map(|lanes| printer.statements(lanes, 3)),
-            lanes_have_angles: lanes.as_ref().is_some_and(|lanes| calls_kernel(lanes)),
-            ..PhaseText::new(name, phase, functions, &dialect, &print)
-        })
-        .collect();
+    let print = |function: &Function| dialect.definition(function, &printer);
+    let prototype = |function: &Function| dialect.prototype(function);
+    let of_phases = || entries.phases.iter().zip(&functions.phases);
     let banner = format!("/* {provenance} */");
+    let is_single = precision == Precision::Single;
     let header = Header {
         banner: banner.clone(),
         model: &entries.name,
         upper: dialect.upper(),
-        is_single: precision == Precision::Single,
+        is_single,
         units: entries.units_in_words(),
         latent_dim: entries.latent_dim,
         state_dim: entries.state_dim,
-        maps: functions
-            .maps
-            .iter()
-            .map(|map| dialect.prototype(map))
+        maps: functions.maps.iter().map(prototype).collect(),
+        phases: of_phases()
+            .map(|(phase, functions)| {
+                let batch = batch_prototype(&dialect, &phase.identifier);
+                let functions = functions.iter().map(prototype).chain([batch]);
+                PhaseText::new(phase, functions.collect(), numbers)
+            })
             .collect(),
-        phases: phases.clone(),
     };
-    let uses_kernel = functions.all().any(|function| calls_kernel(&function.body));
-    let has = |is: fn(&[Stmt]) -> bool| functions.all().any(|function| is(&function.body));
-    let (has_rows, has_fours) = (
-        has(|body| !assigned_in_lanes(body).is_empty()),
-        has(has_fours),
-    );
-    let uses_lanes = functions.tables.iter().any(|table| table.is_in_lanes);
+    let has = |is: &dyn Fn(&[Stmt]) -> bool| functions.all().any(|function| is(&function.body));
     let source = Source {
         banner: banner.clone(),
         name,
+        upper: dialect.upper(),
         real: dialect.real(),
         f: dialect.suffix(),
+        size: precision.bits() / 8,
+        is_single,
+        is_library: sines == SineCosine::Library,
         latent_dim: entries.latent_dim,
         n_lanes: precision.lanes(),
-        kernel: uses_kernel.then(|| kernel(&dialect, sines)).transpose()?,
-        lanes: uses_lanes
-            .then(|| lanes(&dialect, has_rows, has_fours))
-            .transpose()?,
-        sign: functions
-            .all()
-            .any(|function| calls_function(&function.body, MathFunction::Sign)),
-        tables: functions
-            .tables
-            .iter()
-            .map(|table| printer.table(table))
+        kernel: has(&calls_kernel)
+            .then(|| KernelText::new(precision, &|literal| dialect.literal(literal))),
+        has_lanes: functions.tables.iter().any(|table| table.is_in_lanes),
+        has_rows: has(&|body| !assigned_in_lanes(body).is_empty()),
+        has_fours: has(&has_fours),
+        sign: has(&|body| calls_function(body, MathFunction::Sign)),
+        tables: (functions.tables.iter())
+            .map(|table| dialect.table(table))
             .collect(),
         maps: functions.maps.iter().map(print).collect(),
-        phases,
+        phases: (of_phases().zip(&functions.lanes))
+            .map(|((phase, functions), lanes)| {
+                PhaseText::new(phase, functions.iter().map(print).collect(), numbers)
+                    .with_lanes(lanes.as_deref(), &printer)
+            })
+            .collect(),
     };
     let cmake = CMake {
         banner: format!("# {provenance}"),
         name,
     };
     Ok(vec![
-        EmittedFile::new(format!("{name}.h"), finished(header.render()?)),
-        EmittedFile::new(format!("{name}.c"), finished(source.render()?)),
+        EmittedFile::new(format!("{name}.h"), tidy(&header.render()?)),
+        EmittedFile::new(format!("{name}.c"), tidy(&source.render()?)),
         EmittedFile::new(
             format!("{name}_selftest.c"),
-            finished(selftest::render(entries, &dialect, &banner)?),
+            tidy(&selftest::render(entries, &dialect, &banner)?),
         ),
-        EmittedFile::new("CMakeLists.txt", finished(cmake.render()?)),
+        EmittedFile::new("CMakeLists.txt", tidy(&cmake.render()?)),
     ])
 }
 
-impl PhaseText {
-    fn new(
-        name: &str,
-        phase: &PhaseInterface,
-        functions: &[Function; 3],
-        dialect: &CDialect,
-        print: &dyn Fn(&Function) -> String,
-    ) -> Self {
-        let numbers = |values: &[usize]| {
-            let mut texts: Vec<String> = values.iter().map(usize::to_string).collect();
-            if texts.is_empty() {
-                texts.push("0".to_owned());
-            }
-            braced(&texts, "\n    ")
-        };
-        let mut prototypes: Vec<String> = functions
-            .iter()
-            .map(|function| dialect.prototype(function))
-            .collect();
-        prototypes.push(batch_prototype(dialect, &phase.identifier));
-        Self {
-            identifier: phase.identifier.clone(),
-            upper: format!("{name}_{}", phase.identifier).to_ascii_uppercase(),
-            nnz: phase.pattern.len(),
-            stored: phase.pattern.len().max(1),
-            rows: numbers(&phase.pattern.rows),
-            cols: numbers(&phase.pattern.cols),
-            prototypes,
-            functions: functions.iter().map(print).collect(),
-            lanes: None,
-            lanes_have_angles: false,
-        }
+/// Initialiser of an array, which cannot be empty in C.
+fn numbers(values: &[usize]) -> String {
+    let texts: Vec<String> = values.iter().map(usize::to_string).collect();
+    match texts.is_empty() {
+        true => "{0}".to_owned(),
+        false => braced(&texts, "\n    "),
     }
 }
 
@@ -247,44 +178,4 @@ fn batch_prototype(dialect: &CDialect, phase: &str) -> String {
          const {real} *u_lat, {real} *ddz);",
         dialect::documentation(&docs)
     )
-}
-
-fn kernel(dialect: &CDialect, sines: SineCosine) -> Result<String, CodegenError> {
-    let name = dialect.name.as_str();
-    let (bits, to_sign) = match dialect.precision {
-        Precision::Double => ("uint64_t", 62),
-        Precision::Single => ("uint32_t", 30),
-    };
-    let kernel = Kernel {
-        name,
-        upper: dialect.upper(),
-        real: dialect.real(),
-        f: dialect.suffix(),
-        bits,
-        to_sign,
-        is_single: dialect.precision == Precision::Single,
-        is_library: sines == SineCosine::Library,
-        k: KernelText::new(dialect.precision, &|literal| dialect.literal(literal)),
-    };
-    Ok(kernel.render()?)
-}
-
-fn lanes(dialect: &CDialect, has_rows: bool, has_fours: bool) -> Result<String, CodegenError> {
-    let lanes = LaneText {
-        name: &dialect.name,
-        upper: dialect.upper(),
-        real: dialect.real(),
-        size: match dialect.precision {
-            Precision::Double => 8,
-            Precision::Single => 4,
-        },
-        has_rows,
-        has_fours,
-    };
-    Ok(lanes.render()?)
-}
-
-/// Ends with exactly one newline and has no blank lines in a row.
-fn finished(text: String) -> String {
-    super::line_wrapping::tidy(&text)
 }

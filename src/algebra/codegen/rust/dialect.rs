@@ -1,11 +1,12 @@
 //! How Rust spells statements.
 
-use crate::codegen::code::{Argument, ConstTable, Function, MathFunction, Parameter, Role, Span};
-use crate::codegen::dialect::{Dialect, FourDialect};
+use crate::codegen::code::{ConstTable, Function, MathFunction, Parameter, Role, Span};
+use crate::codegen::dialect::Dialect;
 use crate::codegen::fours::{FourBlock, Fours};
-use crate::codegen::line_wrapping::{braced, comment_lines};
+use crate::codegen::line_wrapping::comment_lines;
 use crate::codegen::literal::Literal;
 use crate::codegen::precision::Precision;
+use crate::codegen::printer::Printer;
 use crate::ir::{QUAD, Quad};
 
 /// Most terms of a sum in one function: LLVM loses sight of vectors in longer chains.
@@ -26,81 +27,37 @@ impl RustDialect {
             Precision::Single => "f32",
         }
     }
+
+    fn parameter(&self, parameter: &Parameter) -> String {
+        let (name, len, real) = (&parameter.name, parameter.len, self.real());
+        match parameter.role {
+            Role::Input => format!("{name}: &[{real}; {len}]"),
+            Role::Output | Role::InOut => format!("{name}: &mut [{real}; {len}]"),
+            Role::Scalar => format!("{name}: {real}"),
+        }
+    }
+
+    /// A function with its documentation.
+    pub fn definition(&self, function: &Function, printer: &Printer) -> String {
+        let parameters = function.parameters.iter().map(|p| self.parameter(p));
+        let parameters = parameters.collect::<Vec<_>>().join(", ");
+        let docs = documentation(&function.docs);
+        let head = format!("{docs}pub fn {}({parameters})", function.name);
+        printer.function(&head, |unused| format!("let _ = {unused};"), function)
+    }
 }
 
 /// Keywords of Rust and the names that generated crates use themselves.
-const RESERVED: [&str; 66] = [
-    "abstract",
-    "as",
-    "async",
-    "await",
-    "become",
-    "box",
-    "break",
-    "const",
-    "continue",
-    "crate",
-    "do",
-    "dyn",
-    "else",
-    "enum",
-    "extern",
-    "false",
-    "final",
-    "fn",
-    "for",
-    "gen",
-    "if",
-    "impl",
-    "in",
-    "let",
-    "loop",
-    "macro",
-    "match",
-    "mod",
-    "move",
-    "mut",
-    "override",
-    "priv",
-    "pub",
-    "ref",
-    "return",
-    "self",
-    "static",
-    "struct",
-    "super",
-    "trait",
-    "true",
-    "try",
-    "type",
-    "typeof",
-    "unsafe",
-    "unsized",
-    "use",
-    "virtual",
-    "where",
-    "while",
-    "yield",
-    "f64",
-    "f32",
-    "usize",
-    "std",
-    "core",
-    "libm",
-    "math",
-    "four",
-    "start_four",
-    "add_four",
-    "part",
-    "sin_cos",
-    "sin_cos_reduced",
-    "sign",
-    "union",
-];
+const RESERVED: &str = "
+    abstract as async await become box break const continue crate do dyn else enum extern false
+    final fn for gen if impl in let loop macro match mod move mut override priv pub ref return self
+    static struct super trait true try type typeof unsafe unsized use virtual where while yield f64
+    f32 usize std core libm math four start_four add_four part sin_cos sin_cos_reduced sign union
+";
 
 impl Dialect for RustDialect {
-    fn reserved(&self) -> &'static [&'static str] {
-        &RESERVED
+    fn reserved(&self) -> &'static str {
+        RESERVED
     }
 
     fn literal(&self, literal: Literal) -> String {
@@ -108,16 +65,7 @@ impl Dialect for RustDialect {
     }
 
     fn apply(&self, function: MathFunction, argument: &str) -> String {
-        let name = match function {
-            MathFunction::Sqrt => "sqrt",
-            MathFunction::Abs => "abs",
-            MathFunction::Sign => "sign",
-            MathFunction::Tan => "tan",
-            MathFunction::Tanh => "tanh",
-            MathFunction::Exp => "exp",
-            MathFunction::Log => "log",
-        };
-        format!("math::{name}({argument})")
+        format!("math::{}({argument})", function.name())
     }
 
     fn let_scalar(&self, name: &str, value: &str) -> String {
@@ -141,16 +89,14 @@ impl Dialect for RustDialect {
         format!("for {variable} in 0..{count}")
     }
 
-    fn discard(&self, parameter: &str) -> String {
-        format!("let _ = {parameter};")
-    }
-
     fn multiply_add(&self) -> Option<&'static str> {
         Some("math::mul_add")
     }
 
-    fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String {
-        let passed: Vec<String> = arguments.iter().map(reference).collect();
+    fn call(&self, callee: Option<&str>, read: &[Span], written: &[Span]) -> String {
+        let read = read.iter().map(|span| reference(span, "&"));
+        let written = written.iter().map(|span| reference(span, "&mut "));
+        let passed: Vec<String> = read.chain(written).collect();
         format!("{}({});", callee.unwrap_or("sin_cos"), passed.join(", "))
     }
 
@@ -171,59 +117,7 @@ impl Dialect for RustDialect {
         ]
     }
 
-    fn fours(&self) -> Option<&dyn FourDialect> {
-        Some(self)
-    }
-
-    fn table_base(&self, _prefix: &str) -> String {
-        "TABLE".to_owned()
-    }
-
-    fn table(&self, table: &ConstTable) -> String {
-        let rows: Vec<String> = table
-            .entries
-            .chunks(table.cols)
-            .map(|row| {
-                let row: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
-                let row = braced(&row, "\n     ");
-                format!("    [{}]", row.trim_matches(['{', '}']))
-            })
-            .collect();
-        let (name, real, cols, n) = (&table.name, self.real(), table.cols, table.rows);
-        let rows = rows.join(",\n");
-        match table.is_in_lanes {
-            true => {
-                format!("static {name}: &[[{real}; {cols}]; {n}] = &Aligned([\n{rows},\n]).0;")
-            }
-            false => format!("static {name}: [[{real}; {cols}]; {n}] = [\n{rows},\n];"),
-        }
-    }
-
-    fn parameter(&self, parameter: &Parameter) -> String {
-        let (name, len, real) = (&parameter.name, parameter.len, self.real());
-        match parameter.role {
-            Role::Input => format!("{name}: &[{real}; {len}]"),
-            Role::Output | Role::InOut => format!("{name}: &mut [{real}; {len}]"),
-            Role::Scalar => format!("{name}: {real}"),
-        }
-    }
-
-    fn signature(&self, function: &Function) -> String {
-        let parameters: Vec<String> = function
-            .parameters
-            .iter()
-            .map(|p| self.parameter(p))
-            .collect();
-        format!("pub fn {}({})", function.name, parameters.join(", "))
-    }
-
-    fn docs(&self, lines: &[String]) -> String {
-        documentation(lines)
-    }
-}
-
-impl FourDialect for RustDialect {
-    fn block(&self, fours: &Fours, block: &FourBlock) -> Vec<(usize, String)> {
+    fn fours(&self, fours: &Fours, block: &FourBlock) -> Option<Vec<(usize, String)>> {
         let (real, y, n_sums) = (self.real(), &fours.array, QUAD * fours.sums.len());
         let (weights, n_weights) = (&fours.weights.array, fours.weights.of);
         let vector = |vector: Quad| match vector {
@@ -270,12 +164,24 @@ impl FourDialect for RustDialect {
             lines.push((1, format!("part(&mut {y}, {by}{weights});")));
             lines.push((0, "}".to_owned()));
         }
-        lines
+        Some(lines)
+    }
+
+    fn table(&self, table: &ConstTable) -> String {
+        let rows = self.rows(table, ["    [", ",\n     ", "],"]);
+        let (name, real) = (&table.name, self.real());
+        let (n, cols) = (table.values.rows(), table.values.cols());
+        match table.is_in_lanes {
+            true => {
+                format!("static {name}: &[[{real}; {cols}]; {n}] = &Aligned([\n{rows}]).0;")
+            }
+            false => format!("static {name}: [[{real}; {cols}]; {n}] = [\n{rows}];"),
+        }
     }
 }
 
 /// A documentation comment; equations are in a text block, so that no markup applies.
-pub fn documentation(lines: &[String]) -> String {
+fn documentation(lines: &[String]) -> String {
     let mut text = String::new();
     let (equations, prose): (Vec<&String>, Vec<&String>) =
         lines.iter().partition(|line| line.starts_with("ddz"));
@@ -304,11 +210,7 @@ fn plain(line: &str) -> String {
     line.replace('[', "\\[").replace(']', "\\]")
 }
 
-fn reference(argument: &Argument) -> String {
-    let (span, by): (&Span, &str) = match argument {
-        Argument::Read(span) => (span, "&"),
-        Argument::Write(span) => (span, "&mut "),
-    };
+fn reference(span: &Span, by: &str) -> String {
     match (span.is_whole(), span.is_parameter) {
         (true, true) => span.array.to_string(),
         (true, false) => format!("{by}{}", span.array),

@@ -10,8 +10,9 @@ use super::code::Function;
 use super::dialect::Dialect;
 use super::error::CodegenError;
 use super::functions::ModelFunctions;
-use super::interface::{ModelInterface, PhaseInterface};
+use super::interface::ModelInterface;
 use super::line_wrapping::{comment_lines, tidy};
+use super::phase_text::PhaseText;
 use super::precision::Precision;
 use super::printer::Printer;
 use super::requirements::{calls_kernel, has_fours};
@@ -34,9 +35,7 @@ struct Lib<'a> {
     model: &'a str,
     real: &'static str,
     /// An unsigned integer as wide.
-    bits: &'static str,
-    /// From bit 1 to the sign.
-    to_sign: u32,
+    bits: String,
     is_single: bool,
     is_library: bool,
     units: String,
@@ -51,21 +50,7 @@ struct Lib<'a> {
     /// Whether rows of tables are read by wide registers.
     has_aligned: bool,
     maps: Vec<String>,
-    phases: Vec<PhaseText>,
-}
-
-struct PhaseText {
-    identifier: String,
-    /// Beginning of its constants.
-    upper: String,
-    nnz: usize,
-    rows: String,
-    cols: String,
-    functions: Vec<String>,
-    /// Body of the loop over the lanes of a batch.
-    lanes: Option<String>,
-    /// Whether that loop has sines, whose arguments may be beyond the kernel's limit.
-    lanes_have_angles: bool,
+    phases: Vec<PhaseText<String>>,
 }
 
 /// The crate of a model; `provenance` is the text of each file's first line.
@@ -80,24 +65,19 @@ pub fn emit(
 ) -> Result<Vec<EmittedFile>, CodegenError> {
     let name = entries.identifier.as_str();
     let dialect = RustDialect { precision };
-    let (bits, to_sign) = match precision {
-        Precision::Double => ("u64", 62),
-        Precision::Single => ("u32", 30),
-    };
     let kernel = || KernelText::new(precision, &|literal| dialect.literal(literal));
     let mut functions = ModelFunctions::new(entries, &dialect, "");
     if sines == SineCosine::Library {
         functions.sines_point_by_point();
     }
     let printer = Printer::new(&dialect);
-    let print = |function: &Function| printer.function(function);
+    let print = |function: &Function| dialect.definition(function, &printer);
     let uses_kernel = functions.all().any(|function| calls_kernel(&function.body));
     let lib = Lib {
         banner: format!("// {provenance}"),
         model: &entries.name,
         real: dialect.real(),
-        bits,
-        to_sign,
+        bits: format!("u{}", precision.bits()),
         is_single: precision == Precision::Single,
         is_library: sines == SineCosine::Library,
         units: entries.units_in_words(),
@@ -108,20 +88,15 @@ pub fn emit(
         kernel: uses_kernel.then(kernel),
         has_fours: functions.all().any(|function| has_fours(&function.body)),
         has_aligned: functions.tables.iter().any(|table| table.is_in_lanes),
-        tables: functions
-            .tables
-            .iter()
-            .map(|table| printer.table(table))
+        tables: (functions.tables.iter())
+            .map(|table| dialect.table(table))
             .collect(),
         maps: functions.maps.iter().map(print).collect(),
-        phases: entries
-            .phases
-            .iter()
+        phases: (entries.phases.iter())
             .zip(functions.phases.iter().zip(&functions.lanes))
-            .map(|(phase, (functions, lanes))| PhaseText {
-                lanes: lanes.as_ref().map(|lanes| printer.statements(lanes, 3)),
-                lanes_have_angles: lanes.as_ref().is_some_and(|lanes| calls_kernel(lanes)),
-                ..PhaseText::new(phase, functions, &print)
+            .map(|(phase, (functions, lanes))| {
+                PhaseText::new(phase, functions.iter().map(print).collect(), numbers)
+                    .with_lanes(lanes.as_deref(), &printer)
             })
             .collect(),
     };
@@ -137,25 +112,7 @@ pub fn emit(
     ])
 }
 
-impl PhaseText {
-    fn new(
-        phase: &PhaseInterface,
-        functions: &[Function; 3],
-        print: &dyn Fn(&Function) -> String,
-    ) -> Self {
-        let numbers = |values: &[usize]| {
-            let texts: Vec<String> = values.iter().map(usize::to_string).collect();
-            comment_lines(&[texts.join(", ")], 90).join("\n   ")
-        };
-        Self {
-            identifier: phase.identifier.clone(),
-            upper: phase.identifier.to_ascii_uppercase(),
-            nnz: phase.pattern.len(),
-            rows: numbers(&phase.pattern.rows),
-            cols: numbers(&phase.pattern.cols),
-            functions: functions.iter().map(print).collect(),
-            lanes: None,
-            lanes_have_angles: false,
-        }
-    }
+fn numbers(values: &[usize]) -> String {
+    let texts: Vec<String> = values.iter().map(usize::to_string).collect();
+    comment_lines(&[texts.join(", ")], 90).join("\n   ")
 }

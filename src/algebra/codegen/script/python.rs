@@ -2,20 +2,17 @@
 
 use askama::Template;
 
-use super::functions::{FunctionText, ModelText, Script, list};
-use crate::codegen::code::{Argument, ConstTable, Function, MathFunction, Parameter, Span};
+use super::functions::{FunctionText, ModelText, list, names};
+use crate::codegen::code::{ConstTable, MathFunction, Role, Span};
 use crate::codegen::dialect::Dialect;
 use crate::codegen::error::CodegenError;
-use crate::codegen::functions::ModelFunctions;
 use crate::codegen::ident::Namer;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::tidy;
-use crate::codegen::literal::Literal;
-use crate::codegen::printer::Printer;
 use crate::files::EmittedFile;
 
-/// On which numbers the functions work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Python with the elementary functions of the library on whose numbers the functions work.
+#[derive(Clone, Copy, Debug)]
 enum Library {
     /// Arrays of NumPy.
     NumPy,
@@ -23,127 +20,28 @@ enum Library {
     Casadi,
 }
 
-/// Python with the elementary functions of a library.
-#[derive(Clone, Copy, Debug)]
-struct PythonDialect {
-    library: Library,
-}
-
 /// Keywords of Python and the names that generated modules use themselves.
-const RESERVED: [&str; 49] = [
-    "False", "None", "True", "and", "as", "assert", "async", "await", "break", "class", "continue",
-    "def", "del", "elif", "else", "except", "finally", "for", "from", "global", "if", "import",
-    "in", "is", "lambda", "nonlocal", "not", "or", "pass", "raise", "return", "try", "while",
-    "with", "yield", "match", "case", "type", "np", "casadi", "range", "list", "shape", "zip",
-    "len", "float", "print", "_rows", "_sin_cos",
-];
+const RESERVED: &str = "
+    False None True and as assert async await break class continue def del elif else except finally
+    for from global if import in is lambda nonlocal not or pass raise return try while with yield
+    match case type np casadi range list shape zip len float print _rows _sin_cos
+";
 
 /// Modules that a file of the same name would hide from NumPy, CasADi and the file itself.
-const MODULES: [&str; 95] = [
-    "numpy",
-    "abc",
-    "argparse",
-    "array",
-    "ast",
-    "atexit",
-    "base64",
-    "bisect",
-    "builtins",
-    "bz2",
-    "calendar",
-    "cmath",
-    "code",
-    "codecs",
-    "collections",
-    "concurrent",
-    "contextlib",
-    "contextvars",
-    "copy",
-    "copyreg",
-    "csv",
-    "ctypes",
-    "dataclasses",
-    "datetime",
-    "decimal",
-    "dis",
-    "email",
-    "encodings",
-    "enum",
-    "errno",
-    "fnmatch",
-    "fractions",
-    "functools",
-    "gc",
-    "genericpath",
-    "getpass",
-    "glob",
-    "gzip",
-    "hashlib",
-    "heapq",
-    "hmac",
-    "html",
-    "http",
-    "importlib",
-    "inspect",
-    "io",
-    "itertools",
-    "json",
-    "keyword",
-    "linecache",
-    "locale",
-    "logging",
-    "lzma",
-    "marshal",
-    "math",
-    "mmap",
-    "multiprocessing",
-    "numbers",
-    "opcode",
-    "operator",
-    "os",
-    "pathlib",
-    "pickle",
-    "pkgutil",
-    "platform",
-    "posixpath",
-    "pprint",
-    "queue",
-    "random",
-    "re",
-    "secrets",
-    "select",
-    "selectors",
-    "shutil",
-    "signal",
-    "site",
-    "socket",
-    "stat",
-    "statistics",
-    "string",
-    "struct",
-    "subprocess",
-    "sys",
-    "sysconfig",
-    "tempfile",
-    "textwrap",
-    "threading",
-    "time",
-    "token",
-    "tokenize",
-    "traceback",
-    "types",
-    "typing",
-    "unittest",
-    "urllib",
-];
+const MODULES: &str = "
+    numpy abc argparse array ast atexit base64 bisect builtins bz2 calendar cmath code codecs
+    collections concurrent contextlib contextvars copy copyreg csv ctypes dataclasses datetime
+    decimal dis email encodings enum errno fnmatch fractions functools gc genericpath getpass glob
+    gzip hashlib heapq hmac html http importlib inspect io itertools json keyword linecache locale
+    logging lzma marshal math mmap multiprocessing numbers opcode operator os pathlib pickle pkgutil
+    platform posixpath pprint queue random re secrets select selectors shutil signal site socket
+    stat statistics string struct subprocess sys sysconfig tempfile textwrap threading time token
+    tokenize traceback types typing unittest urllib
+";
 
-impl Dialect for PythonDialect {
-    fn reserved(&self) -> &'static [&'static str] {
-        &RESERVED
-    }
-
-    fn literal(&self, literal: Literal) -> String {
-        literal.to_string()
+impl Dialect for Library {
+    fn reserved(&self) -> &'static str {
+        RESERVED
     }
 
     fn terminator(&self) -> &'static str {
@@ -159,25 +57,15 @@ impl Dialect for PythonDialect {
     }
 
     fn apply(&self, function: MathFunction, argument: &str) -> String {
-        let library = match self.library {
+        let library = match self {
             Library::NumPy => "np",
             Library::Casadi => "casadi",
         };
-        let name = match (function, self.library) {
-            (MathFunction::Sqrt, _) => "sqrt",
-            (MathFunction::Abs, Library::NumPy) => "abs",
+        let name = match (function, self) {
             (MathFunction::Abs, Library::Casadi) => "fabs",
-            (MathFunction::Sign, _) => "sign",
-            (MathFunction::Tan, _) => "tan",
-            (MathFunction::Tanh, _) => "tanh",
-            (MathFunction::Exp, _) => "exp",
-            (MathFunction::Log, _) => "log",
+            (named, _) => named.name(),
         };
         format!("{library}.{name}({argument})")
-    }
-
-    fn let_scalar(&self, name: &str, value: &str) -> String {
-        format!("{name} = {value}")
     }
 
     fn let_array(&self, name: &str, elements: &[String]) -> String {
@@ -192,60 +80,22 @@ impl Dialect for PythonDialect {
         format!("for {variable} in range({count})")
     }
 
-    fn table_base(&self, _prefix: &str) -> String {
-        "TABLE".to_owned()
-    }
-
-    fn discard(&self, _parameter: &str) -> String {
-        String::new()
-    }
-
-    fn multiply_add(&self) -> Option<&'static str> {
-        None
-    }
-
-    fn call(&self, callee: Option<&str>, arguments: &[Argument]) -> String {
-        let callee = match (callee, self.library) {
+    fn call(&self, callee: Option<&str>, read: &[Span], written: &[Span]) -> String {
+        let callee = match (callee, self) {
             (None, _) => "_sin_cos".to_owned(),
             (Some(callee), Library::NumPy) => callee.to_owned(),
             (Some(callee), Library::Casadi) => private(callee),
         };
-        let (mut read, mut written) = (Vec::new(), Vec::new());
-        for argument in arguments {
-            match argument {
-                Argument::Read(span) if span.is_whole() => read.push(span.array.to_string()),
-                Argument::Read(span) => read.push(slice(span)),
-                Argument::Write(span) => written.push(slice(span)),
-            }
-        }
-        format!("{} = {callee}({})", written.join(", "), read.join(", "))
-    }
-
-    fn sin_cos_lane(&self, _: &str, _: &[String; 2], _: [bool; 2]) -> Vec<String> {
-        // Blocks of lanes are for compilers: scripts run many points as columns.
-        Vec::new()
+        let read = list(read, |span| match span.is_whole() {
+            true => span.array.to_string(),
+            false => slice(span),
+        });
+        format!("{} = {callee}({read})", list(written, slice))
     }
 
     fn table(&self, table: &ConstTable) -> String {
-        let rows = table.entries.chunks(table.cols).map(|row| {
-            let row: Vec<String> = row.iter().map(Literal::to_string).collect();
-            let lines: Vec<String> = row.chunks(8).map(|line| line.join(", ")).collect();
-            format!("    [{}],\n", lines.join(",\n     "))
-        });
-        format!("{} = [\n{}]", table.name, rows.collect::<String>())
-    }
-
-    fn parameter(&self, parameter: &Parameter) -> String {
-        parameter.name.to_string()
-    }
-
-    fn signature(&self, function: &Function) -> String {
-        format!("def {}", function.name)
-    }
-
-    fn docs(&self, _lines: &[String]) -> String {
-        // The template places documentation.
-        String::new()
+        let rows = self.rows(table, ["    [", ",\n     ", "],"]);
+        format!("{} = [\n{rows}]", table.name)
     }
 }
 
@@ -266,15 +116,8 @@ struct NumPyModule {
     config = "../../templates/askama.toml"
 )]
 struct NumPyFunction<'a> {
-    name: &'a str,
-    parameters: String,
+    f: &'a FunctionText<'a>,
     docs: Vec<String>,
-    /// Names of the arrays, and each with its length.
-    arrays: String,
-    lengths: String,
-    created: Vec<(&'a str, usize)>,
-    body: &'a str,
-    results: String,
 }
 
 #[derive(Template)]
@@ -292,13 +135,8 @@ struct CasadiModule<'a> {
     config = "../../templates/askama.toml"
 )]
 struct CasadiFunction<'a> {
-    name: String,
-    parameters: String,
+    f: &'a FunctionText<'a>,
     docs: Vec<String>,
-    copied: Vec<&'a str>,
-    created: Vec<(&'a str, usize)>,
-    body: &'a str,
-    results: String,
 }
 
 /// The module of a model on NumPy; `provenance` is the text of the first line.
@@ -306,18 +144,9 @@ struct CasadiFunction<'a> {
 /// # Errors
 /// [`CodegenError::Template`] if a template fails.
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
-    let dialect = PythonDialect {
-        library: Library::NumPy,
-    };
-    let functions = ModelFunctions::new(entries, &dialect, "");
-    let script = Script {
-        printer: Printer::new(&dialect),
-        print: &|function, _| numpy_function(function),
-        numbers: tuple,
-    };
     let module = NumPyModule {
         banner: format!("# {provenance}"),
-        m: script.model(entries, &functions)?,
+        m: ModelText::new(entries, &Library::NumPy, &|f, _| numpy_function(f), tuple)?,
     };
     let path = format!("{}.py", stem(entries));
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
@@ -331,77 +160,46 @@ pub fn emit_casadi(
     entries: &ModelInterface,
     provenance: &str,
 ) -> Result<Vec<EmittedFile>, CodegenError> {
-    let dialect = PythonDialect {
-        library: Library::Casadi,
-    };
-    // Expressions are private functions; the functions made of them have the plain names.
-    let functions = ModelFunctions::new(entries, &dialect, "");
     let model = entries.identifier.as_str();
-    let script = Script {
-        printer: Printer::new(&dialect),
-        print: &|function, phase| casadi_function(model, function, phase),
-        numbers: tuple,
-    };
     let module_name = format!("{}_casadi", stem(entries));
     let module = CasadiModule {
         banner: format!("# {provenance}"),
         module: &module_name,
-        m: script.model(entries, &functions)?,
+        // Expressions are private functions; the functions made of them have the plain names.
+        m: ModelText::new(
+            entries,
+            &Library::Casadi,
+            &|f, phase| casadi_function(model, f, phase),
+            tuple,
+        )?,
     };
     let path = format!("{module_name}.py");
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
 }
 
 fn stem(entries: &ModelInterface) -> String {
-    let mut namer = Namer::new(&RESERVED);
-    for module in MODULES {
-        namer.mint(module);
-    }
+    let mut namer = Namer::new(&format!("{RESERVED} {MODULES}"));
     namer.mint(&entries.identifier).to_string()
 }
 
-fn numpy_function(function: &FunctionText) -> Result<String, CodegenError> {
-    let arrays = function.arrays();
-    let template = NumPyFunction {
-        name: &function.name,
-        parameters: function.parameters(),
-        docs: escaped(&function.docs),
-        arrays: list(&arrays, |(name, _)| (*name).to_owned()),
-        lengths: list(&arrays, |(name, len)| format!("({name}, {len})")),
-        created: function.created(),
-        body: &function.body,
-        results: list(&function.outputs, |output| {
-            format!("_rows({}, shape)", output.name)
-        }),
-    };
-    Ok(template.render()?)
+fn numpy_function(f: &FunctionText) -> Result<String, CodegenError> {
+    let docs = escaped(&f.docs);
+    Ok(NumPyFunction { f, docs }.render()?)
 }
 
 /// The expressions of a function, and the definition of the CasADi function made of them.
 fn casadi_function(
     model: &str,
-    function: &FunctionText,
+    f: &FunctionText,
     phase: Option<&PhaseInterface>,
 ) -> Result<(String, String), CodegenError> {
-    let copied = function.copied();
-    let template = CasadiFunction {
-        name: private(&function.name),
-        parameters: function.parameters(),
-        docs: escaped(&function.docs),
-        copied: copied.clone(),
-        created: function.created(),
-        body: &function.body,
-        results: list(&function.outputs, |output| output.name.clone()),
-    };
-    let name = &function.name;
-    let inputs = list(&function.inputs, |input| {
+    let (name, docs) = (&f.name, escaped(&f.docs));
+    let inputs = list(&f.inputs(), |input| {
         format!("(\"{}\", {})", input.name, input.len)
     });
-    let outputs = list(&function.outputs, |output| {
-        match copied.contains(&output.name.as_str()) {
-            true => format!("\"{}_next\"", output.name),
-            false => format!("\"{}\"", output.name),
-        }
+    let outputs = list(&f.outputs(), |output| match output.role {
+        Role::InOut => format!("\"{}_next\"", output.name),
+        _ => format!("\"{}\"", output.name),
     });
     let pattern = match phase {
         Some(phase) if phase.jacobian.name == *name => {
@@ -410,11 +208,11 @@ fn casadi_function(
         }
         Some(_) | None => String::new(),
     };
+    let expressions = private(name);
     let definition = format!(
-        "{name} = _function(\n    \"{model}_{name}\", {}, [{inputs}], [{outputs}]{pattern})",
-        private(name)
+        "{name} = _function(\n    \"{model}_{name}\", {expressions}, [{inputs}], [{outputs}]{pattern})"
     );
-    Ok((template.render()?, definition))
+    Ok((CasadiFunction { f, docs }.render()?, definition))
 }
 
 /// Name of the expressions of a function.

@@ -30,8 +30,9 @@ const LARGEST_DIVISOR: u64 = 2_000;
 
 /// A positive number as a product of primes to integer powers. What is left after small divisors
 /// counts as a prime.
-pub(super) fn prime_powers(value: &Rational) -> Vec<(BigInt, i32)> {
-    let mut powers: Vec<(BigInt, i32)> = Vec::new();
+pub(super) fn prime_powers(value: &Rational) -> Vec<(CanonicalForm, i32)> {
+    let form = |prime: BigUint| CanonicalForm::constant(Rational::from(BigInt::from(prime)).into());
+    let mut powers = Vec::new();
     for (part, sign) in [(value.numerator(), 1), (value.denominator(), -1)] {
         let mut rest = part.magnitude().clone();
         for divisor in (2..=LARGEST_DIVISOR).filter(|d| *d == 2 || d % 2 == 1) {
@@ -52,11 +53,11 @@ pub(super) fn prime_powers(value: &Rational) -> Vec<(BigInt, i32)> {
                 count += sign;
             }
             if count != 0 {
-                powers.push((divisor.into(), count));
+                powers.push((form(divisor), count));
             }
         }
         if rest != BigUint::from(1_u8) {
-            powers.push((rest.into(), sign));
+            powers.push((form(rest), sign));
         }
     }
     powers

@@ -94,6 +94,12 @@ impl Hash for Coefficient {
     }
 }
 
+impl From<Rational> for Coefficient {
+    fn from(value: Rational) -> Self {
+        Self::real(value, 0.0)
+    }
+}
+
 impl From<Literal> for Coefficient {
     fn from(literal: Literal) -> Self {
         Self::real(literal.value, literal.radius)
@@ -102,16 +108,16 @@ impl From<Literal> for Coefficient {
 
 impl From<Number> for Coefficient {
     fn from(number: Number) -> Self {
-        let value = match number.as_rational() {
+        match number.as_rational() {
             Some((top, bottom)) => Rational::new(top, bottom),
             None => Literal::of_f64(number.to_f64()).map_or_else(Rational::zero, |l| l.value),
-        };
-        Self::real(value, 0.0)
+        }
+        .into()
     }
 }
 
 impl Coefficient {
-    pub(super) fn real(re: Rational, radius: f64) -> Self {
+    fn real(re: Rational, radius: f64) -> Self {
         Self {
             re,
             im: Rational::zero(),
@@ -120,7 +126,7 @@ impl Coefficient {
     }
 
     pub(super) fn integer(value: i64) -> Self {
-        Self::real(Rational::from(BigInt::from(value)), 0.0)
+        Rational::from(BigInt::from(value)).into()
     }
 
     pub(super) fn complex(re: Rational, im: Rational) -> Self {
@@ -185,6 +191,11 @@ impl Coefficient {
         self.re.is_negative() || (self.re.is_zero() && self.im.is_negative())
     }
 
+    /// -1 if it is negative, else 1.
+    pub(super) fn sign(&self) -> Self {
+        Self::integer(if self.is_negative() { -1 } else { 1 })
+    }
+
     /// `|re| + |im|`: a positive factor that scales with the value.
     pub(super) fn size(&self) -> Rational {
         &self.re.abs() + &self.im.abs()
@@ -219,7 +230,7 @@ impl Coefficient {
             (true, false) => (&self.re * &other.re, &self.re * &other.im),
             (false, true) => (&self.re * &other.re, &self.im * &other.re),
             (false, false) => (
-                &(&self.re * &other.re) - &(&self.im * &other.im),
+                &(&self.re * &other.re) + &-(&self.im * &other.im),
                 &(&self.re * &other.im) + &(&self.im * &other.re),
             ),
         };

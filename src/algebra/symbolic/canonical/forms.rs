@@ -118,13 +118,8 @@ impl<'p> CanonicalForms<'p> {
     pub fn without_fractions(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
         let mut form = form.clone();
         for _ in 0..MAX_REMOVALS {
-            let numbers = form
-                .terms
-                .keys()
-                .flat_map(|monomial| &monomial.powers)
-                .map(|(atom, _)| *atom);
             // An atom is made after those in its argument.
-            let Some(atom) = numbers.filter(|atom| self.is_removable(*atom)).max() else {
+            let Some(atom) = self.fractions(&form).into_iter().max() else {
                 return Some(form);
             };
             form = self.removed(&form, atom)?;
@@ -134,9 +129,8 @@ impl<'p> CanonicalForms<'p> {
 
     /// The form times the powers of numerator and denominator of an atom that clear it.
     pub(super) fn removed(&mut self, form: &CanonicalForm, atom: u32) -> Option<CanonicalForm> {
-        let one = || CanonicalForm::constant(Coefficient::integer(1));
         let (top, bottom) = match self.atoms[atom as usize].clone() {
-            Atom::Sum(sum) => (sum, one()),
+            Atom::Sum(sum) => (sum, CanonicalForm::one()),
             Atom::Tan(argument) => {
                 let [plus, minus] = exponentials(&argument, true);
                 (
@@ -150,7 +144,7 @@ impl<'p> CanonicalForms<'p> {
             }
             Atom::Abs(base) => {
                 let sign = self.atom(Atom::Sign(base.clone()));
-                (self.product(&base, &sign)?, one())
+                (self.product(&base, &sign)?, CanonicalForm::one())
             }
             _ => return None,
         };
@@ -178,10 +172,7 @@ impl<'p> CanonicalForms<'p> {
     }
 
     pub(super) fn atom(&mut self, atom: Atom) -> CanonicalForm {
-        CanonicalForm::term(
-            Coefficient::integer(1),
-            Monomial::atom(self.number(atom), 1),
-        )
+        CanonicalForm::atom(self.number(atom))
     }
 
     pub(super) fn number(&mut self, atom: Atom) -> u32 {
@@ -265,7 +256,7 @@ impl<'p> CanonicalForms<'p> {
             Function::Sin | Function::Cos => {
                 let argument = self.argument(argument.clone());
                 let [plus, minus] = exponentials(&argument, true);
-                let half = Coefficient::complex(Rational::new(1, 2), Rational::zero());
+                let half = Coefficient::from(Rational::new(1, 2));
                 Some(match function {
                     Function::Sin => plus.minus(&minus).scaled(&Coefficient::imaginary(-1, 2)),
                     _ => plus.plus(&minus).scaled(&half),
@@ -291,7 +282,7 @@ impl<'p> CanonicalForms<'p> {
         let Some(leading) = argument.leading() else {
             return Some(CanonicalForm::default());
         };
-        let sign = Coefficient::integer(if leading.is_negative() { -1 } else { 1 });
+        let sign = leading.sign();
         let argument = argument.scaled(&sign);
         Some(self.atom(atom(argument)).scaled(&sign))
     }
@@ -413,5 +404,5 @@ pub(super) fn exponentials(argument: &CanonicalForm, is_angle: bool) -> [Canonic
         exponent,
     };
     let minus = plus.reciprocal();
-    [plus, minus].map(|monomial| CanonicalForm::term(Coefficient::integer(1), monomial))
+    [plus, minus].map(CanonicalForm::monomial)
 }

@@ -110,6 +110,18 @@ impl CanonicalForm {
         form
     }
 
+    pub(super) fn one() -> Self {
+        Self::monomial(Monomial::default())
+    }
+
+    pub(super) fn atom(atom: u32) -> Self {
+        Self::monomial(Monomial::atom(atom, 1))
+    }
+
+    pub(super) fn monomial(monomial: Monomial) -> Self {
+        Self::term(Coefficient::integer(1), monomial)
+    }
+
     /// Adds a term. A coefficient of value zero is kept as long as it has a radius.
     pub(super) fn add(&mut self, coefficient: Coefficient, monomial: Monomial) {
         let sum = match self.terms.remove(&monomial) {
@@ -162,6 +174,15 @@ impl CanonicalForm {
             (Some((monomial, coefficient)), None) => Some((coefficient, monomial)),
             _ => None,
         }
+    }
+
+    /// The form divided by size and sign of its leading coefficient, and these; nothing for zero,
+    /// or where the size is beyond the range of floats.
+    pub(super) fn normed(&self) -> Option<(Self, Coefficient, Coefficient)> {
+        let leading = self.leading()?;
+        let (size, sign) = (Coefficient::from(leading.size()), leading.sign());
+        let factor = size.reciprocal()?.times(&sign);
+        Some((self.scaled(&factor), size, sign))
     }
 
     /// The coefficient of the last monomial.

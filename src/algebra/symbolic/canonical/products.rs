@@ -4,6 +4,7 @@ use super::atoms::Atom;
 use super::coefficient::Coefficient;
 use super::forms::CanonicalForms;
 use super::polynomial::{CanonicalForm, Monomial};
+use crate::symbolic::number::power;
 
 /// Largest power of a sum that is multiplied out, and of a single term.
 const MAX_SUM_POWER: u32 = 40;
@@ -86,15 +87,14 @@ impl CanonicalForms<'_> {
                         // |x| sign(x) = x, |x| sign(x)^2 = |x|.
                         let rest = monomial.without(sign.0);
                         return Some(Some(match sign.1 % 2 {
-                            0 => (rest, CanonicalForm::constant(Coefficient::integer(1))),
+                            0 => (rest, CanonicalForm::one()),
                             _ => (rest.without(atom), base),
                         }));
                     }
                 }
                 Atom::Sign(_) if !(0..=2).contains(&power) => {
                     let rest = 2 - power.rem_euclid(2);
-                    let one = CanonicalForm::constant(Coefficient::integer(1));
-                    return Some(Some((with_power(rest), one)));
+                    return Some(Some((with_power(rest), CanonicalForm::one())));
                 }
                 Atom::Sign(base) => {
                     let shared = base.as_atom().filter(|base| monomial.power_of(*base) != 0);
@@ -103,7 +103,7 @@ impl CanonicalForms<'_> {
                         let rest = monomial.without(atom);
                         let is_over = monomial.power_of(shared) > 0;
                         return Some(Some(match power {
-                            2 => (rest, CanonicalForm::constant(Coefficient::integer(1))),
+                            2 => (rest, CanonicalForm::one()),
                             _ if !is_over => continue,
                             _ => (
                                 rest.times(&Monomial::atom(shared, -1)),
@@ -119,9 +119,8 @@ impl CanonicalForms<'_> {
     }
 
     pub(super) fn power(&mut self, base: &CanonicalForm, exponent: i32) -> Option<CanonicalForm> {
-        let one = CanonicalForm::constant(Coefficient::integer(1));
         if exponent == 0 {
-            return Some(one);
+            return Some(CanonicalForm::one());
         }
         let base = if exponent < 0 {
             self.reciprocal(base)?
@@ -137,31 +136,20 @@ impl CanonicalForms<'_> {
         if count > limit {
             return None;
         }
-        let (mut power, mut square, mut rest) = (one, base, count);
-        loop {
-            if rest % 2 == 1 {
-                power = self.product(&power, &square)?;
-            }
-            rest /= 2;
-            if rest == 0 {
-                return Some(power);
-            }
-            square = self.product(&square, &square)?;
-        }
+        power(CanonicalForm::one(), base, count.into(), |a, b| {
+            self.product(a, b)
+        })
     }
 
     pub(super) fn reciprocal(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
-        let leading = form.leading()?;
         if let Some((coefficient, monomial)) = form.as_term() {
             let reciprocal = (coefficient.reciprocal()?, monomial.reciprocal());
             return self.settled(vec![reciprocal]);
         }
         // A real factor: the sum of a real form is real, as magnitudes, signs and roots take it to be.
-        let sign = Coefficient::integer(if leading.is_negative() { -1 } else { 1 });
-        let size = Coefficient::real(leading.size(), 0.0).reciprocal()?;
-        let factor = size.times(&sign);
-        let normed = self.argument(form.scaled(&factor));
-        let atom = self.number(Atom::Sum(normed));
-        Some(CanonicalForm::term(factor, Monomial::atom(atom, -1)))
+        let (normed, size, sign) = form.normed()?;
+        let normed = self.argument(normed);
+        let atom = Monomial::atom(self.number(Atom::Sum(normed)), -1);
+        Some(CanonicalForm::term(size.reciprocal()?.times(&sign), atom))
     }
 }

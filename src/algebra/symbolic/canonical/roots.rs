@@ -15,12 +15,12 @@ impl CanonicalForms<'_> {
     pub(super) fn split(&mut self, form: &CanonicalForm) -> Option<Split> {
         let form = self.argument(form.clone());
         let scale = form.leading()?.size();
-        let inverse = Coefficient::real(scale.recip(), 0.0);
+        let inverse = Coefficient::from(scale.recip());
         let Some((coefficient, monomial)) = form.as_term() else {
             let shared = self.shared_powers(&form);
             if !shared.powers.is_empty() {
                 // sqrt(x + x^2) = sqrt(x) sqrt(1 + x) where x is positive.
-                let inverse = CanonicalForm::term(Coefficient::integer(1), shared.reciprocal());
+                let inverse = CanonicalForm::monomial(shared.reciprocal());
                 let rest = self.product(&form, &inverse)?;
                 let mut split = self.split(&rest)?;
                 for &(atom, power) in &shared.powers {
@@ -28,14 +28,10 @@ impl CanonicalForms<'_> {
                 }
                 return Some(split);
             }
-            if let Some((scale, root)) = self.square_root(&form) {
-                return Some(Split {
-                    scale,
-                    factors: vec![(self.abs(&root)?, 2)],
-                    exponent: CanonicalForm::default(),
-                });
-            }
-            let factors = vec![(form.scaled(&inverse), 1)];
+            let (scale, factors) = match self.square_root(&form) {
+                Some((scale, root)) => (scale, vec![(self.abs(&root)?, 2)]),
+                None => (scale, vec![(form.scaled(&inverse), 1)]),
+            };
             return Some(Split {
                 scale,
                 factors,
@@ -71,10 +67,8 @@ impl CanonicalForms<'_> {
         }
         let mut exponent = CanonicalForm::default();
         for (monomial, (re, im)) in &monomial.exponent {
-            exponent.add(
-                Coefficient::complex(re.clone(), im.clone()),
-                monomial.clone(),
-            );
+            let coefficient = Coefficient::complex(re.clone(), im.clone());
+            exponent.add(coefficient, monomial.clone());
         }
         Some(Split {
             scale,
@@ -91,7 +85,7 @@ impl CanonicalForms<'_> {
 
     /// The magnitude of an atom: itself if it is positive.
     fn magnitude_of(&mut self, atom: u32) -> Option<CanonicalForm> {
-        let base = CanonicalForm::term(Coefficient::integer(1), Monomial::atom(atom, 1));
+        let base = CanonicalForm::atom(atom);
         match self.atoms[atom as usize].clone() {
             Atom::Sum(sum) if self.is_positive(atom) => Some(sum),
             Atom::Sum(sum) => self.abs(&sum),
@@ -127,15 +121,13 @@ impl CanonicalForms<'_> {
         let split = self.split(form)?;
         let mut sum = split.exponent;
         for (prime, power) in prime_powers(&split.scale) {
-            let prime = CanonicalForm::constant(Coefficient::real(prime.into(), 0.0));
             let log = self.atom(Atom::Log(prime));
             sum = sum.plus(&log.scaled(&Coefficient::integer(power.into())));
         }
         for (base, power) in split.factors {
             let (base, index) = self.radicand(base);
-            let share = Rational::new(power, index);
             let log = self.atom(Atom::Log(base));
-            sum = sum.plus(&log.scaled(&Coefficient::real(share, 0.0)));
+            sum = sum.plus(&log.scaled(&Rational::new(power, index).into()));
         }
         Some(sum)
     }
@@ -145,16 +137,8 @@ impl CanonicalForms<'_> {
             return Some(CanonicalForm::default());
         }
         let split = self.split(form)?;
-        let share = Rational::new(1, index);
-        let mut root = self.exp(split.exponent.scaled(&Coefficient::real(share, 0.0)))?;
-        let primes = prime_powers(&split.scale)
-            .into_iter()
-            .map(|(prime, power)| {
-                (
-                    CanonicalForm::constant(Coefficient::real(prime.into(), 0.0)),
-                    power,
-                )
-            });
+        let mut root = self.exp(split.exponent.scaled(&Rational::new(1, index).into()))?;
+        let primes = prime_powers(&split.scale).into_iter();
         for (base, power) in primes.chain(split.factors) {
             let (base, inner) = self.radicand(base);
             let exponent = Rational::new(power, BigInt::from(index) * inner);
@@ -178,9 +162,9 @@ impl CanonicalForms<'_> {
         base: &CanonicalForm,
         exponent: &Rational,
     ) -> Option<CanonicalForm> {
-        let whole = exponent.floor().to_i32()?;
-        let rest = exponent - &Rational::from(exponent.floor());
-        let power = self.power(base, whole)?;
+        let whole = exponent.floor();
+        let power = self.power(base, whole.to_i32()?)?;
+        let rest = exponent + &Rational::from(-whole);
         if rest.is_zero() {
             return Some(power);
         }
@@ -189,18 +173,15 @@ impl CanonicalForms<'_> {
             .to_i64()
             .filter(|index| *index <= MAX_ROOT)?;
         let root = self.number(Atom::Root(base.clone(), u32::try_from(index).ok()?));
-        let root = CanonicalForm::term(
-            Coefficient::integer(1),
-            Monomial::atom(root, rest.numerator().to_i32()?),
-        );
-        self.product(&power, &root)
+        let root = Monomial::atom(root, rest.numerator().to_i32()?);
+        self.product(&power, &CanonicalForm::monomial(root))
     }
 
     /// `exp`: multiples of logarithms become powers of what they are logarithms of.
     pub(super) fn exp(&mut self, argument: CanonicalForm) -> Option<CanonicalForm> {
         let argument = self.argument(argument);
         let mut rest = CanonicalForm::default();
-        let mut product = CanonicalForm::constant(Coefficient::integer(1));
+        let mut product = CanonicalForm::one();
         for (monomial, coefficient) in &argument.terms {
             let log = match (monomial.powers.as_slice(), monomial.exponent.is_empty()) {
                 ([(atom, 1)], true) => match &self.atoms[*atom as usize] {
@@ -224,33 +205,23 @@ impl CanonicalForms<'_> {
 
     pub(super) fn abs(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
         let form = self.argument(form.clone());
-        let Some(leading) = form.leading() else {
+        if form.is_zero() {
             return Some(form);
-        };
-        let scale = Coefficient::real(leading.size(), 0.0);
-        let sign = if leading.is_negative() { -1 } else { 1 };
-        let normed = form
-            .scaled(&scale.reciprocal()?)
-            .scaled(&Coefficient::integer(sign));
-        let Some((coefficient, monomial)) = normed.as_term().filter(|(c, _)| c.is_one()) else {
+        }
+        let (normed, scale, _) = form.normed()?;
+        let Some((_, monomial)) = normed.as_term().filter(|(c, _)| c.is_one()) else {
             return Some(self.atom(Atom::Abs(normed)).scaled(&scale));
         };
-        let mut product = CanonicalForm::term(
-            coefficient.clone(),
-            Monomial {
-                powers: Vec::new(),
-                exponent: monomial.exponent.clone(),
-            },
-        );
+        let mut product = CanonicalForm::monomial(Monomial {
+            powers: Vec::new(),
+            exponent: monomial.exponent.clone(),
+        });
         for &(atom, power) in &monomial.powers {
-            let base = CanonicalForm::term(Coefficient::integer(1), Monomial::atom(atom, 1));
-            let factor = match self.is_positive(atom) || power % 2 == 0 {
-                true => self.power(&base, power)?,
-                false => {
-                    let magnitude = self.magnitude_of(atom)?;
-                    self.power(&magnitude, power)?
-                }
+            let base = match self.is_positive(atom) || power % 2 == 0 {
+                true => CanonicalForm::atom(atom),
+                false => self.magnitude_of(atom)?,
             };
+            let factor = self.power(&base, power)?;
             product = self.product(&product, &factor)?;
         }
         Some(product.scaled(&scale))
@@ -261,14 +232,12 @@ impl CanonicalForms<'_> {
         let Some(leading) = form.leading() else {
             return Some(form);
         };
-        let sign = Coefficient::integer(if leading.is_negative() { -1 } else { 1 });
         if let Some(constant) = form.as_constant()
             && constant.as_real().is_some()
         {
-            return Some(CanonicalForm::constant(sign));
+            return Some(CanonicalForm::constant(leading.sign()));
         }
-        let size = Coefficient::real(leading.size(), 0.0).reciprocal()?;
-        let normed = form.scaled(&size).scaled(&sign);
+        let (normed, _, sign) = form.normed()?;
         let powers = (normed.as_term())
             .filter(|(coefficient, _)| coefficient.is_one())
             .map(|(_, monomial)| monomial.powers.clone());
@@ -280,7 +249,7 @@ impl CanonicalForms<'_> {
             if self.positive.contains(&atom) {
                 continue;
             }
-            let base = CanonicalForm::term(Coefficient::integer(1), Monomial::atom(atom, 1));
+            let base = CanonicalForm::atom(atom);
             let (factor, power) = match self.atoms[atom as usize].clone() {
                 Atom::Sum(sum) => (self.sign(&sum)?, power),
                 Atom::Abs(inner) => (self.sign(&inner)?, 2),

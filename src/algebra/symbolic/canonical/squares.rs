@@ -23,9 +23,9 @@ impl CanonicalForms<'_> {
         let order = Order::of(form);
         let (largest, leading) = order.largest(form)?;
         let leading = leading.as_real()?.clone();
-        let monic = form.scaled(&Coefficient::real(leading.recip(), 0.0));
+        let monic = form.scaled(&leading.recip().into());
         let first = halved(&largest)?;
-        let mut root = CanonicalForm::term(Coefficient::integer(1), first.clone());
+        let mut root = CanonicalForm::monomial(first.clone());
         let smallest = form.terms.keys().map(|monomial| order.weight(monomial));
         // The smallest term of a square is that of its root squared.
         let least = 0.5 * smallest.fold(f64::INFINITY, f64::min) - 1e-9;
@@ -46,8 +46,7 @@ impl CanonicalForms<'_> {
                 return None;
             }
             last = weight;
-            let half = Coefficient::complex(Rational::new(1, 2), Rational::zero());
-            root.add(coefficient.times(&half), next);
+            root.add(coefficient.times(&Rational::new(1, 2).into()), next);
         }
         None
     }

@@ -61,12 +61,9 @@ impl Shortener<'_> {
             old.iter().find(is_same).map_or(value, |&(known, _)| known)
         };
         let is_usable = |&(value, _): &(f64, ExprId)| value.is_finite() && value != 0.0;
-        let mut forms = shorter.into_iter().map(|(_, form)| -> Summands {
-            let terms = form.into_iter();
-            terms
-                .map(|(number, expr)| (coefficient(number, expr), expr))
-                .collect()
-        });
+        let term = |(number, expr)| (coefficient(number, expr), expr);
+        let forms = shorter.into_iter();
+        let mut forms = forms.map(|(_, form)| form.into_iter().map(term).collect::<Summands>());
         forms.find(|form| form.iter().all(is_usable) && self.agrees(original, form))
     }
 
@@ -112,16 +109,11 @@ impl Shortener<'_> {
             |(number, rest): &(Number, ExprId)| *rest == ExprId::ONE || !number.abs().is_one();
         let of_term = |&(number, expr): &(Number, ExprId)| {
             let inner = match self.pool.node(expr) {
-                Node::Sum(_) => self
-                    .pool
-                    .terms_of(expr)
-                    .iter()
-                    .filter(|t| is_written(t))
-                    .count(),
-                _ => 0,
+                Node::Sum(_) => self.pool.terms_of(expr),
+                _ => Vec::new(),
             };
             let own = in_f64(number, unit).abs() != 1.0 || expr == ExprId::ONE;
-            usize::from(own) + inner
+            usize::from(own) + inner.iter().filter(|term| is_written(term)).count()
         };
         summands.iter().map(of_term).sum()
     }

@@ -13,8 +13,11 @@ use crate::symbolic::pool::ExprPool;
 
 /// Most terms that can be powers of the parts of a sum.
 const MAX_PARTS: usize = 64;
-/// Denominators of the same variables meet in a term with the logarithm of this.
+/// In a term with the logarithm of this meet terms with logarithms, denominators of the same variables,
+/// tangents of an angle and their inverses; no model has such a term.
+const OF_LOGARITHMS: i64 = -1;
 const OF_SAME_VARIABLES: i64 = -2;
+const OF_TANGENTS: i64 = -3;
 /// Relative error of coefficients that fit a power.
 const ROUNDING: f64 = 1e-13;
 
@@ -55,9 +58,14 @@ impl Shortener<'_> {
 
     /// Whether a monomial is one by which terms of [`Reach::Far`] alone meet.
     fn is_far(&mut self, monomial: ExprId) -> bool {
-        let hub = self.pool.integer(OF_SAME_VARIABLES);
-        let hub = self.pool.apply(Function::Log, hub);
+        let hub = self.meeting(OF_SAME_VARIABLES);
         monomial == ExprId::ONE || self.pool.factors_of(monomial).contains(&hub)
+    }
+
+    /// The factor by which terms of a kind meet.
+    fn meeting(&mut self, kind: i64) -> ExprId {
+        let number = self.pool.integer(kind);
+        self.pool.apply(Function::Log, number)
     }
 
     /// Pairs of summands that belong to one power of a sum: of `p*a^n`, `q*a^(n-1)*b` and `r*b^n`
@@ -144,9 +152,7 @@ impl Shortener<'_> {
         let expanded = self.pool.expand_region(normal, &mut MAX_PRODUCTS.clone());
         let mut monomials = rests(self.pool, expanded);
         if let Some((cofactor, _)) = self.pool.as_log_term(self.pool.split(expr).1) {
-            // Terms with logarithms meet in a term that no model has.
-            let minus_one = self.pool.constant(Number::MINUS_ONE);
-            let common = self.pool.apply(Function::Log, minus_one);
+            let common = self.meeting(OF_LOGARITHMS);
             monomials.push(self.pool.product(&[cofactor, common]));
         }
         monomials.extend(self.monomials_of_fraction(expr));
@@ -170,9 +176,7 @@ impl Shortener<'_> {
             let mut variables: Vec<ExprId> = (self.pool.symbols_of(base).into_iter())
                 .map(|symbol| self.pool.symbol_expr(symbol))
                 .collect();
-            // No model has this term.
-            let hub = self.pool.integer(OF_SAME_VARIABLES);
-            variables.push(self.pool.apply(Function::Log, hub));
+            variables.push(self.meeting(OF_SAME_VARIABLES));
             monomials.push(self.pool.product(&variables));
             // Terms that have a term of the numerator when they are multiplied by the denominator.
             let numerator = self.pool.product(&[expr, base]);
@@ -189,10 +193,8 @@ impl Shortener<'_> {
                     monomials.push(self.pool.div(expr, factor));
                 }
                 Some((Function::Tan, angle, _)) => {
-                    // Tangents of an angle and their inverses meet in a term that no model has.
                     let cofactor = self.pool.div(expr, factor);
-                    let minus_three = self.pool.integer(-3);
-                    let common = self.pool.apply(Function::Log, minus_three);
+                    let common = self.meeting(OF_TANGENTS);
                     let tangent = self.pool.apply(Function::Tan, angle);
                     monomials.push(self.pool.product(&[cofactor, common, tangent]));
                 }

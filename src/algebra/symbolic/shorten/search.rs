@@ -378,8 +378,7 @@ impl<'a> Shortener<'a> {
                     n_functions < 2 && pool.as_symbol(argument).is_some()
                 }
                 Node::Power(base, exponent) => {
-                    let exponent = pool.as_number(exponent).and_then(Number::as_integer);
-                    exponent.is_some() && pool.as_symbol(base).is_some()
+                    pool.as_integer(exponent).is_some() && pool.as_symbol(base).is_some()
                 }
                 Node::Number(_) | Node::Sum(_) | Node::Product(_) => false,
             })

@@ -1,5 +1,7 @@
 //! The files of the LaTeX backend.
 
+use std::fmt;
+
 use askama::Template;
 
 use crate::equations::Equations;
@@ -13,7 +15,7 @@ use crate::typeset::{
 };
 
 use super::escape::{CommentText, TexText, label};
-use super::lines;
+use super::lines::{self, Block};
 use super::math::{TexMath, TexNumber, TexSymbol};
 use super::nomenclature::{self, Entry};
 use super::table::{self, TableBlock};
@@ -58,7 +60,7 @@ pub fn emit(
     };
     let tables = table::references(&blocks);
     let coefficients = Table {
-        header: header.short(packages) + &label_list(blocks.iter().flat_map(TableBlock::labels)),
+        header: header.short(packages) + &label_list(blocks.iter().flat_map(|block| &block.labels)),
         blocks,
     };
     let nomenclature = Nomenclature {
@@ -194,33 +196,17 @@ struct System {
     introduction: String,
     /// The sentence before it, where its file holds more than the equations of motion.
     words: String,
-    label: String,
-    aligned: bool,
-    lines: Vec<String>,
-    /// Number of its equations.
-    count: usize,
-}
-
-impl System {
-    /// What `\ref` and `\eqref` can name.
-    fn labels(&self) -> String {
-        let label = &self.label;
-        match (self.aligned, self.count) {
-            (true, 2..) => format!("{label}:1 to {label}:{}", self.count),
-            (true, _) => format!("{label}:1"),
-            (false, _) => label.clone(),
-        }
-    }
+    block: Block,
 }
 
 /// Comment lines that list labels, each line after a line end.
-fn label_list(labels: impl IntoIterator<Item = String>) -> String {
+fn label_list(labels: impl IntoIterator<Item = impl fmt::Display>) -> String {
     let lines = labels.into_iter().map(|label| format!("\n%   {label}"));
     format!("\n% Labels:{}", lines.collect::<String>())
 }
 
 fn labels(systems: &[System]) -> String {
-    label_list(systems.iter().map(System::labels))
+    label_list(systems.iter().map(|system| system.block.labels()))
 }
 
 #[derive(Template)]
@@ -281,7 +267,7 @@ fn phases(
         .zip(model.phases())
         .map(|(system, phase)| {
             let label = format!("eq:{}{part}:{}", label(model.name()), label(&system.phase));
-            let block = lines::block(system, &label, options);
+            let block = lines::block(system, label, options);
             let feet = words::feet(&phase.feet);
             let tall = match options.form == Form::Cases && block.lines.len() > lines::CASES_LINES {
                 true => " Taller than a page as cases: align breaks across pages.",
@@ -291,10 +277,7 @@ fn phases(
                 comment: format!("Phase {}: {feet}.{tall}", CommentText(&system.phase)),
                 introduction: format!(r"Phase \emph{{{}}}, with {feet}:", TexText(&system.phase)),
                 words: String::new(),
-                aligned: block.aligned,
-                lines: block.lines,
-                label,
-                count: system.equations.len(),
+                block,
             }
         })
         .collect()
@@ -312,7 +295,6 @@ fn robot_equations(
         phase: "encoder".to_owned(),
         equations: robot.encoder.clone(),
     };
-    let block = lines::block(&encoder, &label, header.options);
     let introduction = match robot.negligible_weights {
         0 => "Latent coordinates:".to_owned(),
         count => format!(
@@ -327,10 +309,7 @@ fn robot_equations(
         ),
         words: introduction.clone(),
         introduction,
-        aligned: block.aligned,
-        lines: block.lines,
-        label,
-        count: robot.encoder.len(),
+        block: lines::block(&encoder, label, header.options),
     }];
     let of_phases = phases(model, &robot.systems, "-robot", header.options);
     systems.extend(of_phases.into_iter().map(|system| System {

@@ -144,25 +144,20 @@ mod tests {
     }
 
     #[test]
-    fn text_escape_has_no_line_break_so_that_comments_end_where_they_should() {
-        let text = TexText("a\r\nb\u{2028}c\u{85}d\u{0b}e\u{0}f").to_string();
-        assert_eq!(text, "a  b c d e f");
+    fn text_escape_has_no_line_break_no_ligature_and_unknown_characters_by_code_point() {
+        for (text, escaped) in [
+            ("a\r\nb\u{2028}c\u{85}d\u{0b}e\u{0}f", "a  b c d e f"),
+            ("跳 ü", "[U+8DF3] ü"),
+            ("a--b-c", "a-{}-b-c"),
+        ] {
+            assert_eq!(TexText(text).to_string(), escaped);
+        }
     }
 
     #[test]
     fn comment_text_stays_on_its_line() {
         let text = CommentText("a\r\\input{x}\nb\u{85}c\u{2028}d").to_string();
         assert_eq!(text, "a \\input{x} b c d");
-    }
-
-    #[test]
-    fn text_escape_spells_unknown_characters_by_code_point() {
-        assert_eq!(TexText("跳 ü").to_string(), "[U+8DF3] ü");
-    }
-
-    #[test]
-    fn text_escape_breaks_ligatures() {
-        assert_eq!(TexText("a--b-c").to_string(), "a-{}-b-c");
     }
 
     #[test]

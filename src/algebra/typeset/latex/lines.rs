@@ -19,14 +19,30 @@ pub(super) const CASES_LINES: usize = 30;
 /// The lines of one phase and whether they are for `align`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Block {
+    /// Stem of its labels.
+    pub label: String,
+    /// Number of its equations.
+    pub count: usize,
     /// Whether the lines belong into `align` rather than `cases`.
     pub aligned: bool,
     /// The lines with `\\` where they need it.
     pub lines: Vec<String>,
 }
 
+impl Block {
+    /// What `\ref` and `\eqref` can name.
+    pub fn labels(&self) -> String {
+        let label = &self.label;
+        match (self.aligned, self.count) {
+            (true, 2..) => format!("{label}:1 to {label}:{}", self.count),
+            (true, _) => format!("{label}:1"),
+            (false, _) => label.clone(),
+        }
+    }
+}
+
 /// Spells the equations of one phase; `label` is the stem of its labels.
-pub(super) fn block(system: &EquationSystem, label: &str, options: &PrintOptions) -> Block {
+pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptions) -> Block {
     let all = |start: Start| -> Vec<Vec<String>> {
         let equations = system.equations.iter();
         let sides = equations.map(|equation| right_sides(equation, start, options));
@@ -61,7 +77,12 @@ pub(super) fn block(system: &EquationSystem, label: &str, options: &PrintOptions
             });
         }
     }
-    Block { aligned, lines }
+    Block {
+        label,
+        count: sides.len(),
+        aligned,
+        lines,
+    }
 }
 
 /// One phase as a bare `cases` environment, for a place that is in math mode already.
@@ -71,7 +92,7 @@ pub fn tex_cases(system: &EquationSystem, width_em: f64) -> String {
         width_em: Some(width_em),
         ..PrintOptions::default()
     };
-    let lines = block(system, "", &options).lines.join("\n  ");
+    let lines = block(system, String::new(), &options).lines.join("\n  ");
     format!("\\begin{{cases}}\n  {lines}\n\\end{{cases}}")
 }
 

@@ -52,15 +52,11 @@ impl fmt::Display for TexMath<'_> {
             })
         };
         match self.math {
-            Math::Number(number) => TexNumber {
-                number,
-                numbers: self.numbers,
-            }
-            .fmt(f),
+            Math::Number(number) => TexNumber { number, numbers }.fmt(f),
             Math::Symbol(symbol) => TexSymbol(symbol).fmt(f),
             Math::Sum(terms) => TexTerms {
                 terms,
-                numbers: self.numbers,
+                numbers,
                 continues: false,
             }
             .fmt(f),
@@ -119,17 +115,17 @@ impl fmt::Display for TexTerms<'_> {
 
 impl fmt::Display for TexNumber<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let sign = if self.number.is_negative() { "-" } else { "" };
-        let digits = self.number.digits();
         match (self.numbers, self.number.exponent()) {
-            (NumberStyle::Plain, None) => write!(f, "{sign}{digits}"),
+            (NumberStyle::Plain, None) => self.number.fmt(f),
             (NumberStyle::Plain, Some(exponent)) => {
-                write!(f, r"{sign}{digits} \times 10^{{{exponent}}}")
+                let sign = if self.number.is_negative() { "-" } else { "" };
+                write!(
+                    f,
+                    r"{sign}{} \times 10^{{{exponent}}}",
+                    self.number.digits()
+                )
             }
-            (NumberStyle::Siunitx, None) => write!(f, r"\num{{{sign}{digits}}}"),
-            (NumberStyle::Siunitx, Some(exponent)) => {
-                write!(f, r"\num{{{sign}{digits}e{exponent}}}")
-            }
+            (NumberStyle::Siunitx, _) => write!(f, r"\num{{{}}}", self.number),
         }
     }
 }

@@ -22,7 +22,7 @@ pub(super) struct TableBlock {
     pub columns: String,
     /// Caption, escaped.
     pub caption: String,
-    /// Labels: its own, and for the first that of the whole.
+    /// What `\ref` can name: its own label, and for the first that of the whole.
     pub labels: Vec<String>,
     /// Row of phase names over the columns.
     pub phases: String,
@@ -34,13 +34,6 @@ pub(super) struct TableBlock {
     pub rows: Vec<String>,
     /// Whether it must break across pages.
     pub long: bool,
-}
-
-impl TableBlock {
-    /// What `\ref` can name.
-    pub fn labels(&self) -> Vec<String> {
-        self.labels.clone()
-    }
 }
 
 /// Cuts the table into blocks that fit into a column of text. Phases share a block when
@@ -229,17 +222,13 @@ impl Layout<'_> {
 
     fn cell(&self, number: &Decimal, width: &ColumnWidth) -> String {
         match self.numbers {
-            NumberStyle::Siunitx => {
-                let sign = if number.is_negative() { "-" } else { "" };
-                let power = number.exponent().map_or(String::new(), |e| format!("e{e}"));
-                format!("{sign}{}{power}", number.digits())
-            }
+            NumberStyle::Siunitx => number.to_string(),
             NumberStyle::Plain => {
                 let text = TexNumber {
                     number,
                     numbers: self.numbers,
                 };
-                let missing = width.decimals - places(number.digits()).1;
+                let missing = width.decimals - number.places().1;
                 // Points stand below each other when the missing digits take their space.
                 let point = if missing > 0 && !number.digits().contains('.') {
                     "."
@@ -270,7 +259,7 @@ impl ColumnWidth {
     fn of<'a>(numbers: impl Iterator<Item = &'a Option<Decimal>>) -> Self {
         let mut width = Self::default();
         for number in numbers.flatten() {
-            let (integers, decimals) = places(number.digits());
+            let (integers, decimals) = number.places();
             width.negative |= number.is_negative();
             width.integers = width.integers.max(integers);
             width.decimals = width.decimals.max(decimals);
@@ -304,13 +293,5 @@ impl ColumnWidth {
             format.push_str(&format!("e{sign}{}", self.exponent));
         }
         format
-    }
-}
-
-/// How many digits stand before and after the point.
-fn places(digits: &str) -> (usize, usize) {
-    match digits.split_once('.') {
-        Some((before, after)) => (before.len(), after.len()),
-        None => (digits.len(), 0),
     }
 }

@@ -2,40 +2,41 @@
 
 use crate::robot::JOINT_DIM;
 
-/// How a control step ended.
+/// How a control step ended, each with its number for interfaces without enumerations: zero solved, positive a
+/// fallback or a changed problem, negative refused input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Status {
     /// A plan whose optimality conditions were checked.
-    Solved,
+    Solved = 0,
     /// The same, but the plan leaves the joint limits somewhere: they cannot be kept from here.
-    Softened,
+    Softened = 1,
     /// The same, on a contact schedule that was changed: the feet are already in the phase that the
     /// reference enters later.
-    ContactEarly,
+    ContactEarly = 2,
     /// The same: the feet are still in the phase that the reference has left.
-    ContactLate,
+    ContactLate = 3,
     /// The same: the feet are in a phase that the model does not have, where the reference's was used,
     /// or that the reference is not near, where it was used for the first stage.
-    ContactUnknown,
+    ContactUnknown = 4,
     /// The solver's point fails the optimality conditions.
-    Inaccurate,
+    Inaccurate = 10,
     /// The constraints contradict each other.
-    Infeasible,
+    Infeasible = 11,
     /// The solver reached its iteration cap.
-    IterationCap,
+    IterationCap = 12,
     /// The solver broke down, or the linearisation is not finite.
-    NumericalFailure,
+    NumericalFailure = 13,
     /// The measurement is far from what the last plan predicts and is not believed yet.
-    MeasurementJump,
+    MeasurementJump = 14,
     /// No torques could be made from the latent input: a leg in contact is singular, or the lift's
     /// own program failed.
-    LiftFailed,
+    LiftFailed = 15,
     /// A measurement, or the time, is infinite or not a number.
-    NotFinite,
+    NotFinite = -1,
     /// A measurement has the wrong number of values.
-    WrongDimension,
+    WrongDimension = -2,
     /// No reference has been set.
-    NoReference,
+    NoReference = -3,
 }
 
 impl Status {
@@ -77,25 +78,9 @@ impl Status {
         }
     }
 
-    /// The status as a number for interfaces without enumerations: zero solved, positive a
-    /// fallback or a changed problem, negative refused input.
+    /// The status as a number.
     pub fn code(self) -> i32 {
-        match self {
-            Status::Solved => 0,
-            Status::Softened => 1,
-            Status::ContactEarly => 2,
-            Status::ContactLate => 3,
-            Status::ContactUnknown => 4,
-            Status::Inaccurate => 10,
-            Status::Infeasible => 11,
-            Status::IterationCap => 12,
-            Status::NumericalFailure => 13,
-            Status::MeasurementJump => 14,
-            Status::LiftFailed => 15,
-            Status::NotFinite => -1,
-            Status::WrongDimension => -2,
-            Status::NoReference => -3,
-        }
+        self as i32
     }
 
     /// The status in one word, as tables have it.

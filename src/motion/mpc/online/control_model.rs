@@ -153,12 +153,9 @@ impl ControlModel {
 
     /// The phase that a foot pattern selects, or none.
     pub fn phase_for(&self, feet: ContactFlags) -> Option<usize> {
-        let bits = feet
-            .iter()
-            .enumerate()
-            .map(|(foot, &down)| usize::from(down) << foot)
-            .sum::<usize>();
-        self.parts.phase_of_feet[bits]
+        let bits = feet.iter().enumerate();
+        let bits = bits.map(|(foot, &down)| usize::from(down) << foot);
+        self.parts.phase_of_feet[bits.sum::<usize>()]
     }
 
     /// `z = W_e s_x x + b_e`, or the nonlinear encoder's; `x` in SI units (18), `z` is overwritten.
@@ -252,10 +249,9 @@ impl ControlModel {
     pub fn clamp_torque(&self, torque_nm: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
         std::array::from_fn(|joint| {
             let limit = self.robot().torque_limit_nm()[joint];
-            if torque_nm[joint].is_nan() {
-                0.0
-            } else {
-                torque_nm[joint].clamp(-limit, limit)
+            match torque_nm[joint].is_nan() {
+                true => 0.0,
+                false => torque_nm[joint].clamp(-limit, limit),
             }
         })
     }
@@ -280,11 +276,8 @@ pub(super) fn add_product(matrix: &DMatrix<f64>, vector: &[f64], out: &mut [f64]
 
 /// Row `row` of `M v`.
 fn row_product(matrix: &DMatrix<f64>, row: usize, vector: &[f64]) -> f64 {
-    vector
-        .iter()
-        .enumerate()
-        .map(|(col, factor)| matrix[(row, col)] * factor)
-        .sum()
+    let terms = vector.iter().enumerate();
+    terms.map(|(col, factor)| matrix[(row, col)] * factor).sum()
 }
 
 impl ControlModelParts {
@@ -310,16 +303,11 @@ impl ControlModelParts {
             }
         }
         for phase in self.phase_of_feet.into_iter().flatten() {
-            shapes.push((
-                "phases",
-                (self.phases.len().min(phase + 1), 1),
-                (phase + 1, 1),
-            ));
+            let known = self.phases.len().min(phase + 1);
+            shapes.push(("phases", (known, 1), (phase + 1, 1)));
         }
-        match shapes
-            .into_iter()
-            .find(|(_, found, expected)| found != expected)
-        {
+        let mut shapes = shapes.into_iter();
+        match shapes.find(|(_, found, expected)| found != expected) {
             None => Ok(()),
             Some((name, found, expected)) => Err(ControlError::Shape {
                 name,

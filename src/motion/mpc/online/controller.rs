@@ -175,16 +175,11 @@ impl Controller {
         }
         let d = self.plant.latent_dim();
         let deviation = reference.deviation();
-        let state: Vec<f64> = (0..2 * d)
-            .map(|index| {
-                if index < d {
-                    1.0
-                } else {
-                    self.settings.velocity_weight
-                        * (deviation[index] / deviation[index - d]).powi(2)
-                }
-            })
-            .collect();
+        let mut state = vec![1.0; 2 * d];
+        for index in d..2 * d {
+            let ratio = deviation[index] / deviation[index - d];
+            state[index] = self.settings.velocity_weight * ratio.powi(2);
+        }
         let weights = Weights {
             state: &state,
             terminal: self.settings.terminal_weight,
@@ -219,24 +214,20 @@ impl Controller {
                 std::array::from_fn(|joint| input[joint])
             }
         };
-        Ok(std::array::from_fn(|joint| {
-            net[joint] + stance.losses_nm[joint]
-        }))
+        let losses = &stance.losses_nm;
+        Ok(std::array::from_fn(|joint| net[joint] + losses[joint]))
     }
 
     /// Planned minus reference positions at the end of every stage of the last plan, in standard
     /// deviations of the reference.
     pub fn planned_deviations(&self) -> impl Iterator<Item = f64> {
         let d = self.plant.latent_dim();
-        let deviation = self
-            .reference
-            .as_ref()
-            .map_or(&[][..], |reference| &reference.deviation()[..d]);
+        let reference = self.reference.as_ref();
+        let deviation = reference.map_or(&[][..], |reference| &reference.deviation()[..d]);
         (0..self.settings.horizon).flat_map(move |stage| {
             let pairs = self.plan.end(stage).iter().zip(self.horizon.end(stage));
-            pairs
-                .zip(deviation)
-                .map(|((planned, reference), scale)| (planned - reference) / scale)
+            let scaled = pairs.zip(deviation);
+            scaled.map(|((planned, reference), scale)| (planned - reference) / scale)
         })
     }
 
@@ -277,12 +268,8 @@ impl Controller {
         };
         let dynamics = self.dynamics.as_mut();
         let contact = self.horizon.prepare(&inputs, dynamics, time_s, feet);
-        let step = step_data(
-            &self.horizon,
-            &self.memory,
-            inputs.reference,
-            &self.input_cholesky,
-        );
+        let (horizon, memory) = (&self.horizon, &self.memory);
+        let step = step_data(horizon, memory, inputs.reference, &self.input_cholesky);
         self.engine.prepare(&step, &self.horizon);
         Some(contact)
     }

@@ -109,21 +109,15 @@ impl Engine {
         if horizon.shift() > 0 || new.contains(&true) {
             *has_gains = false;
         }
-        for (index, stage) in step
-            .stages
-            .iter()
-            .enumerate()
-            .filter(|(index, _)| new[*index])
-        {
-            program.write(
-                index,
-                &StageValues {
-                    data: stage,
-                    end: horizon.end(index),
-                    deviation: step.deviation,
-                    input_cholesky: &step.input_cholesky[stage.phase],
-                },
-            );
+        let stages = step.stages.iter().enumerate();
+        for (index, stage) in stages.filter(|(index, _)| new[*index]) {
+            let values = StageValues {
+                data: stage,
+                end: horizon.end(index),
+                deviation: step.deviation,
+                input_cholesky: &step.input_cholesky[stage.phase],
+            };
+            program.write(index, &values);
         }
         if !*has_gains {
             *has_gains = program.prepare();

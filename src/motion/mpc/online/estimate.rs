@@ -127,17 +127,11 @@ fn add_estimates(phase: &ControlPhase, evidence: &[Evidence], input: &mut [f64])
     let Some((covariance, residual)) = covariances(phase, evidence) else {
         return;
     };
-    for Evidence {
-        sample,
-        unexplained,
-        gain,
-    } in evidence
-    {
-        let Some(estimate) = correction(gain, &covariance, &residual, unexplained) else {
-            continue;
-        };
-        if estimate.iter().all(|value| value.is_finite()) {
-            for (input, estimate) in input[sample * d..].iter_mut().zip(&estimate) {
+    for item in evidence {
+        let found = correction(&item.gain, &covariance, &residual, &item.unexplained);
+        let finite = |estimate: &Vec<f64>| estimate.iter().all(|value| value.is_finite());
+        if let Some(estimate) = found.filter(finite) {
+            for (input, estimate) in input[item.sample * d..].iter_mut().zip(&estimate) {
                 *input += estimate;
             }
         }
@@ -187,11 +181,8 @@ fn correction(
 fn residual_covariance(evidence: &[Evidence], input: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let d = input.nrows();
     let count = evidence.len() as f64;
-    let mean = evidence
-        .iter()
-        .map(|item| &item.unexplained)
-        .sum::<DVector<f64>>()
-        / count;
+    let unexplained = evidence.iter().map(|item| &item.unexplained);
+    let mean = unexplained.sum::<DVector<f64>>() / count;
     let mut covariance = DMatrix::zeros(d, d);
     let mut explained = DMatrix::zeros(d, d);
     for Evidence {
@@ -203,12 +194,9 @@ fn residual_covariance(evidence: &[Evidence], input: &DMatrix<f64>) -> Option<DM
         explained += gain * input * gain.transpose() / count;
     }
     // A latent that is explained exactly has no deviation of its own: any positive scale will do.
+    let variance = |i: usize| f64::max(covariance[(i, i)], explained[(i, i)]);
     let deviation: Vec<f64> = (0..d)
-        .map(|i| {
-            f64::max(covariance[(i, i)], explained[(i, i)])
-                .sqrt()
-                .max(f64::MIN_POSITIVE)
-        })
+        .map(|i| variance(i).sqrt().max(f64::MIN_POSITIVE))
         .collect();
     let relative = DMatrix::from_fn(d, d, |row, col| {
         (covariance[(row, col)] - explained[(row, col)]) / (deviation[row] * deviation[col])
@@ -217,9 +205,8 @@ fn residual_covariance(evidence: &[Evidence], input: &DMatrix<f64>) -> Option<DM
         return None;
     }
     let mut eigen = SymmetricEigen::new(relative);
-    eigen
-        .eigenvalues
-        .apply(|value| *value = value.max(RESIDUAL_FLOOR));
+    let floor = |value: &mut f64| *value = value.max(RESIDUAL_FLOOR);
+    eigen.eigenvalues.apply(floor);
     let floored = eigen.recompose();
     Some(DMatrix::from_fn(d, d, |row, col| {
         floored[(row, col)] * deviation[row] * deviation[col]
@@ -233,15 +220,10 @@ fn acceleration(motion: &Motion<'_>, latent_dim: usize, sample: usize) -> DVecto
         motion.phase[other] == motion.phase[sample]
             && (time_s[other] - time_s[sample]).abs() <= HALF_WINDOW_S
     };
-    let mut first = (0..sample)
-        .rev()
-        .take_while(|&other| belongs(other))
-        .last()
-        .unwrap_or(sample);
-    let mut last = (sample + 1..time_s.len())
-        .take_while(|&other| belongs(other))
-        .last()
-        .unwrap_or(sample);
+    let before = (0..sample).rev().take_while(|&other| belongs(other));
+    let after = (sample + 1..time_s.len()).take_while(|&other| belongs(other));
+    let mut first = before.last().unwrap_or(sample);
+    let mut last = after.last().unwrap_or(sample);
     if first == last {
         // A lone sample of its phase: its neighbours are all there is.
         first = first.saturating_sub(1);
@@ -319,17 +301,12 @@ mod tests {
     #[test]
     fn residual_covariance_is_what_the_input_leaves() {
         // y = B u + r with B = 2, Var u = 1, Var r = 0.25, sampled on a symmetric grid.
-        let grid = [-1.0, 1.0];
-        let evidence: Vec<Evidence> = grid
-            .iter()
-            .flat_map(|u| grid.iter().map(move |r| 2.0 * u + 0.5 * r))
-            .enumerate()
-            .map(|(sample, y)| Evidence {
-                sample,
-                unexplained: DVector::from_element(1, y),
+        let evidence =
+            [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]].map(|[u, r]| Evidence {
+                sample: 0,
+                unexplained: DVector::from_element(1, 2.0 * u + 0.5 * r),
                 gain: DMatrix::from_element(1, 1, 2.0),
-            })
-            .collect();
+            });
         let residual = residual_covariance(&evidence, &DMatrix::identity(1, 1)).expect("finite");
         assert!((residual[(0, 0)] - 0.25).abs() < 1e-12, "{residual}");
     }

@@ -44,15 +44,9 @@ impl Controller {
     /// The command without a plan of this step.
     pub(super) fn fall_back(&mut self, time_s: f64, command: &mut Command) {
         let now = self.time_or_one_stage_on(time_s);
-        let stages = self
-            .settings
-            .fallback
-            .plan_stages
-            .min(self.settings.horizon);
-        let stage = now
-            .and_then(|now| self.plan.stage_at(now))
-            .filter(|&stage| stage < stages);
-        match stage {
+        let stages = (self.settings.fallback.plan_stages).min(self.settings.horizon);
+        let stage = now.and_then(|now| self.plan.stage_at(now));
+        match stage.filter(|&stage| stage < stages) {
             Some(stage) if self.write_plan(stage, command) => command.source = Source::ShiftedPlan,
             Some(_) | None => self.hold(now, self.since_last_command(time_s), command),
         }
@@ -69,10 +63,7 @@ impl Controller {
     /// Time since the last command, at most one stage, and one stage where it is not known or the clock stands still.
     fn since_last_command(&self, time_s: f64) -> f64 {
         let step_s = self.settings.step_s;
-        let passed_s = self
-            .memory
-            .command_s
-            .map_or(step_s, |last_s| time_s - last_s);
+        let passed_s = (self.memory.command_s).map_or(step_s, |last_s| time_s - last_s);
         match passed_s > 0.0 && passed_s <= step_s {
             true => passed_s,
             false => step_s,
@@ -88,10 +79,9 @@ impl Controller {
             Status::NotFinite | Status::WrongDimension | Status::MeasurementJump => 0.0,
             _ => fallback.damping_nm_s,
         };
-        self.memory
-            .feed_forward_nm
-            .iter_mut()
-            .for_each(|torque| *torque *= fade);
+        for torque in &mut self.memory.feed_forward_nm {
+            *torque *= fade;
+        }
         let torque = std::array::from_fn(|joint| {
             self.memory.feed_forward_nm[joint] - damping * self.memory.joint_velocity[joint]
         });
@@ -113,9 +103,8 @@ impl Controller {
     /// The reference's posture at a time.
     fn reference_posture(&mut self, now: f64) -> Option<[f64; JOINT_DIM]> {
         let d = self.plant.latent_dim();
-        self.reference
-            .as_ref()?
-            .state_at(now, &mut self.memory.measured);
+        let reference = self.reference.as_ref()?;
+        reference.state_at(now, &mut self.memory.measured);
         let joints = self.plant.decode_joints(&self.memory.measured[..d]);
         Some(self.plant.clamp_joints(joints))
     }

@@ -129,18 +129,11 @@ impl Horizon {
 
     /// Phases of all stages: the reference's, changed where the feet disagree.
     fn schedule(&mut self, inputs: &StageInputs<'_>, time_s: f64, feet: ContactFlags) -> Contact {
-        let StageInputs {
-            plant,
-            settings,
-            reference,
-            ..
-        } = *inputs;
+        let (plant, step_s) = (inputs.plant, inputs.settings.step_s);
         let scheduled = |time_s: f64| {
-            plant
-                .phase_for(reference.feet_at(time_s))
-                .expect("reference was checked for its phases")
+            let phase = plant.phase_for(inputs.reference.feet_at(time_s));
+            phase.expect("reference was checked for its phases")
         };
-        let step_s = settings.step_s;
         for (index, phase) in self.phases.iter_mut().enumerate() {
             *phase = scheduled(time_s + (index as f64 + 0.5) * step_s);
         }
@@ -188,20 +181,14 @@ impl Horizon {
     }
 
     fn make_reference(&mut self, inputs: &StageInputs<'_>, index: usize, start_s: f64) {
-        let StageInputs {
-            plant,
-            settings,
-            reference,
-            ..
-        } = *inputs;
+        let (plant, settings, reference) = (inputs.plant, inputs.settings, inputs.reference);
         let stage = &mut self.stages[index];
         stage.phase = self.phases[index];
         reference.state_at(start_s, &mut stage.state);
         reference.state_at(start_s + settings.step_s, &mut self.ends[index]);
         if !reference.mean_input(start_s, settings.step_s, &mut stage.input) {
-            stage
-                .input
-                .copy_from_slice(plant.phases()[stage.phase].latent_mean.as_slice());
+            let mean = &plant.phases()[stage.phase].latent_mean;
+            stage.input.copy_from_slice(mean.as_slice());
         }
         stage.losses_nm = plant.planned_losses(&stage.state, &self.ends[index], settings.step_s);
         stage.rows = reference.robot_state_at(start_s).and_then(|x| {
@@ -227,35 +214,24 @@ impl Horizon {
         index: usize,
         start_s: f64,
     ) {
-        let StageInputs {
-            settings,
-            reference,
-            plan,
-            ..
-        } = *inputs;
+        let (settings, step_s) = (inputs.settings, inputs.settings.step_s);
         let trusts_reference = match settings.drift {
-            Drift::Automatic => reference.has_input(),
+            Drift::Automatic => inputs.reference.has_input(),
             Drift::Reference => true,
             Drift::Model => false,
         };
         let point = match settings.linearisation {
             Linearisation::Reference => None,
-            Linearisation::LastPlan => plan.at(start_s),
+            Linearisation::LastPlan => inputs.plan.at(start_s),
         };
         let stage = &mut self.stages[index];
         let phase = stage.phase;
         let mut evaluate = |z: &[f64], dz: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut _| {
             dynamics.jacobian(phase, z, dz, u, ddz, jacobian);
         };
-        let end = &self.ends[index];
+        let (end, lineariser) = (&self.ends[index], &mut self.lineariser);
         if let Some((state, input)) = point {
-            self.lineariser.stage(
-                state,
-                input,
-                settings.step_s,
-                &mut evaluate,
-                &mut stage.model,
-            );
+            lineariser.stage(state, input, step_s, &mut evaluate, &mut stage.model);
             for (row, defect) in stage.defect.iter_mut().enumerate() {
                 *defect = stage.model.next[row] - end[row];
                 for (col, value) in state.iter().enumerate() {
@@ -266,31 +242,19 @@ impl Horizon {
                 }
             }
             if trusts_reference {
-                let nominal = &mut self.nominal;
-                self.lineariser.stage(
-                    &stage.state,
-                    &stage.input,
-                    settings.step_s,
-                    &mut evaluate,
-                    nominal,
-                );
+                let (state, input, nominal) = (&stage.state, &stage.input, &mut self.nominal);
+                lineariser.stage(state, input, step_s, &mut evaluate, nominal);
                 for (row, defect) in stage.defect.iter_mut().enumerate() {
-                    *defect += end[row] - self.nominal.next[row];
+                    *defect += end[row] - nominal.next[row];
                 }
             }
         } else {
-            self.lineariser.stage(
-                &stage.state,
-                &stage.input,
-                settings.step_s,
-                &mut evaluate,
-                &mut stage.model,
-            );
+            let (state, input, model) = (&stage.state, &stage.input, &mut stage.model);
+            lineariser.stage(state, input, step_s, &mut evaluate, model);
             for (row, defect) in stage.defect.iter_mut().enumerate() {
-                *defect = if trusts_reference {
-                    0.0
-                } else {
-                    stage.model.next[row] - end[row]
+                *defect = match trusts_reference {
+                    true => 0.0,
+                    false => stage.model.next[row] - end[row],
                 };
             }
         }

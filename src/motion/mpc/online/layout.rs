@@ -96,54 +96,31 @@ impl Layout {
 
     /// Rows of all stages.
     pub fn row_count(&self) -> usize {
-        self.force_row(if self.rows.friction.is_some() {
-            self.horizon
-        } else {
-            0
-        })
+        self.force_row(self.rows.friction.as_ref().map_or(0, |_| self.horizon))
     }
 
     /// Every entry of `A` that may be nonzero, as (row, column).
     pub fn pattern(&self) -> Vec<(usize, usize)> {
-        let d = self.latent_dim;
+        let (d, rows) = (self.latent_dim, &self.rows);
+        let [torques, rates, joints] = [&rows.torque, &rows.rate, &rows.joint].map(Vec::len);
         let mut entries = Vec::new();
         for stage in 0..self.horizon {
             let (input, state) = (self.input_column(stage), self.state_column(stage));
-            entries.extend(block(self.dynamics_row(stage), 2 * d, input, d));
-            entries
-                .extend((0..2 * d).map(|index| (self.dynamics_row(stage) + index, state + index)));
+            let (dynamics, rate) = (self.dynamics_row(stage), self.rate_row(stage));
+            entries.extend(block(dynamics, 2 * d, input, d));
+            entries.extend((0..2 * d).map(|index| (dynamics + index, state + index)));
             if stage > 0 {
-                entries.extend(block(
-                    self.dynamics_row(stage),
-                    2 * d,
-                    self.state_column(stage - 1),
-                    2 * d,
-                ));
-                entries.extend(block(
-                    self.rate_row(stage),
-                    self.rows.rate.len(),
-                    self.input_column(stage - 1),
-                    d,
-                ));
+                let (input, state) = (self.input_column(stage - 1), self.state_column(stage - 1));
+                entries.extend(block(dynamics, 2 * d, state, 2 * d));
+                entries.extend(block(rate, rates, input, d));
             }
-            entries.extend(block(
-                self.torque_row(stage),
-                self.rows.torque.len(),
-                input,
-                d,
-            ));
-            entries.extend(block(self.rate_row(stage), self.rows.rate.len(), input, d));
-            entries.extend(block(
-                self.joint_row(stage),
-                self.rows.joint.len(),
-                state,
-                d,
-            ));
+            entries.extend(block(self.torque_row(stage), torques, input, d));
+            entries.extend(block(rate, rates, input, d));
+            entries.extend(block(self.joint_row(stage), joints, state, d));
             if self.has_slack {
                 let slack = self.slack_column(stage);
-                entries.extend(
-                    (self.joint_row(stage)..=self.slack_row(stage)).map(|row| (row, slack)),
-                );
+                let slacked = self.joint_row(stage)..=self.slack_row(stage);
+                entries.extend(slacked.map(|row| (row, slack)));
             }
             if self.rows.friction.is_some() {
                 entries.extend(block(self.force_row(stage), 3, input, d));

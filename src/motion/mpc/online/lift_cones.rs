@@ -62,10 +62,8 @@ impl ConeLift {
         let program = self.solver.program_mut();
         // Torques as shares of their limits, the cost with a largest curvature of one.
         let scaled = |row: usize, col: usize| hessian[(row, col)] * limit[row] * limit[col];
-        let cost_scale = 1.0
-            / (0..JOINT_DIM)
-                .map(|i| scaled(i, i))
-                .fold(f64::MIN_POSITIVE, f64::max);
+        let curvatures = (0..JOINT_DIM).map(|i| scaled(i, i));
+        let cost_scale = 1.0 / curvatures.fold(f64::MIN_POSITIVE, f64::max);
         for col in 0..JOINT_DIM {
             for row in 0..=col {
                 program.p.set(row, col, cost_scale * scaled(row, col));
@@ -76,18 +74,12 @@ impl ConeLift {
         }
         for (leg, force) in problem.forces.iter().enumerate() {
             let first_row = BOUND_ROWS + 3 * leg;
-            for (number, (axis, factor)) in [(2, rules.friction), (0, 1.0), (1, 1.0)]
-                .into_iter()
-                .enumerate()
-            {
-                for joint in 0..3 {
-                    let entry =
-                        force.map_or(0.0, |map| factor * map[(axis, joint)] / rules.weight_n);
-                    program.a.set(
-                        first_row + number,
-                        3 * leg + joint,
-                        -entry * limit[3 * leg + joint],
-                    );
+            let axes = [(2, rules.friction), (0, 1.0), (1, 1.0)].into_iter();
+            for (row, (axis, factor)) in (first_row..).zip(axes) {
+                for k in 0..3 {
+                    let joint = 3 * leg + k;
+                    let entry = force.map_or(0.0, |map| factor * map[(axis, k)] / rules.weight_n);
+                    program.a.set(row, joint, -entry * limit[joint]);
                 }
             }
             // A foot in the air has the cone's axis as its slack: strictly inside.

@@ -175,20 +175,10 @@ mod tests {
         ddz[1] = -3.0 * dz[1] + (z[0] * u[1]).cos() + 2.0 * u[0];
         let slope = -(z[0] * u[1]).sin();
         let rows = [
-            -40.0 * z[0].cos(),
-            dz[0],
-            z[1],
-            0.0,
-            1.0,
-            0.0,
-            slope * u[1],
-            0.0,
-            0.0,
-            -3.0,
-            2.0,
-            slope * z[0],
+            [-40.0 * z[0].cos(), dz[0], z[1], 0.0, 1.0, 0.0],
+            [slope * u[1], 0.0, 0.0, -3.0, 2.0, slope * z[0]],
         ];
-        jacobian.copy_from(&DMatrix::from_row_slice(2, 6, &rows));
+        jacobian.copy_from(&DMatrix::from_row_slice(2, 6, &rows.concat()));
     }
 
     fn stage_at(x: &[f64], u: &[f64]) -> StageModel {
@@ -215,15 +205,12 @@ mod tests {
             };
             let difference = (moved(1.0) - moved(-1.0)) / (2.0 * delta);
             for row in 0..4 {
-                let exact = if col < 4 {
-                    stage.a[(row, col)]
-                } else {
-                    stage.b[(row, col - 4)]
+                let exact = match col < 4 {
+                    true => stage.a[(row, col)],
+                    false => stage.b[(row, col - 4)],
                 };
-                assert!(
-                    (exact - difference[row]).abs() < 1e-8,
-                    "row {row}, column {col}"
-                );
+                let off = (exact - difference[row]).abs();
+                assert!(off < 1e-8, "row {row}, column {col}");
             }
         }
     }

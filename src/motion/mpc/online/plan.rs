@@ -100,11 +100,9 @@ impl Plan {
     /// State and input that the plan has at a time, beyond its end those of its last stage; none
     /// without a plan.
     pub fn at(&self, time_s: f64) -> Option<(&[f64], &[f64])> {
-        let stage = self
-            .stage_at(time_s)?
-            .min(self.inputs.len() / self.latent_dim - 1);
-        let state = &self.states[stage * 2 * self.latent_dim..][..2 * self.latent_dim];
-        Some((state, self.input(stage)))
+        let last = self.inputs.len() / self.latent_dim - 1;
+        let stage = self.stage_at(time_s)?.min(last);
+        Some((self.start(stage), self.input(stage)))
     }
 
     /// Largest deviation of a state from the one that the plan predicts for a time, in multiples
@@ -120,19 +118,12 @@ impl Plan {
         if !(passed >= 0.0 && passed <= stages as f64) {
             return None;
         }
-        let width = 2 * self.latent_dim;
         let before = (passed as usize).min(stages - 1);
         let share = passed - before as f64;
-        let (earlier, later) = (
-            &self.states[before * width..][..width],
-            &self.states[(before + 1) * width..][..width],
-        );
-        let predicted = earlier.iter().zip(later).map(|(a, b)| a + share * (b - a));
+        let ends = self.start(before).iter().zip(self.end(before));
+        let predicted = ends.map(|(a, b)| a + share * (b - a));
         let deviations = state.iter().zip(predicted).zip(deviation);
-        Some(
-            deviations
-                .map(|((x, predicted), scale)| ((x - predicted) / scale).abs())
-                .fold(0.0, f64::max),
-        )
+        let deviations = deviations.map(|((x, at), scale)| ((x - at) / scale).abs());
+        Some(deviations.fold(0.0, f64::max))
     }
 }

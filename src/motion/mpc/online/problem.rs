@@ -103,11 +103,11 @@ impl BodyFriction {
         let weight = plant.robot().mass_kg() * GRAVITY;
         let lift = plant.lift_matrix();
         let rows = JOINT_DIM..JOINT_DIM + 3;
+        let force =
+            rows.flat_map(|row| lift.row(row).iter().map(|e| e / weight).collect::<Vec<_>>());
         Self {
             coefficient,
-            force: rows
-                .flat_map(|row| lift.row(row).iter().map(|e| e / weight).collect::<Vec<_>>())
-                .collect(),
+            force: force.collect(),
             frame: plant.input_rule().wrench_frame(),
         }
     }
@@ -116,15 +116,11 @@ impl BodyFriction {
     pub fn turned(&self, attitude_rad: [f64; 2], out: &mut [f64]) {
         let d = self.force.len() / 3;
         let rotation = to_upright(self.frame, attitude_rad);
-        for (row, (axis, factor)) in [(2, self.coefficient), (0, 1.0), (1, 1.0)]
-            .into_iter()
-            .enumerate()
-        {
+        let axes = [(2, self.coefficient), (0, 1.0), (1, 1.0)].into_iter();
+        for (row, (axis, factor)) in axes.enumerate() {
             for col in 0..d {
-                let turned: f64 = (0..3)
-                    .map(|k| rotation[axis][k] * self.force[k * d + col])
-                    .sum();
-                out[row * d + col] = factor * turned;
+                let terms = (0..3).map(|k| rotation[axis][k] * self.force[k * d + col]);
+                out[row * d + col] = factor * terms.sum::<f64>();
             }
         }
     }
@@ -168,13 +164,12 @@ impl StageRows {
                 rows
             }
         };
+        let friction = settings.body_friction;
         Self {
             torque,
             rate,
             joint: select(joint_rows(plant)),
-            friction: settings
-                .body_friction
-                .map(|coefficient| BodyFriction::new(plant, coefficient)),
+            friction: friction.map(|coefficient| BodyFriction::new(plant, coefficient)),
         }
     }
 }
@@ -195,6 +190,11 @@ pub fn pairs(rows: &[Row]) -> usize {
 }
 
 impl Row {
+    /// Whether the row constrains anything.
+    fn is_not_zero(&self) -> bool {
+        self.row.iter().any(|entry| *entry != 0.0)
+    }
+
     /// Whether another row is the other side of a limit.
     fn is_opposite(&self, other: &Row) -> bool {
         let opposite = other.row.iter().map(|entry| -entry);
@@ -227,12 +227,8 @@ impl StageRows {
     pub fn near(mut self, reference: &Reference) -> Self {
         let deviation = reference.deviation();
         self.joint.retain(|Row { row, bound, .. }| {
-            let spread = row
-                .iter()
-                .zip(deviation)
-                .map(|(r, d)| (r * d).powi(2))
-                .sum::<f64>()
-                .sqrt();
+            let squares = row.iter().zip(deviation).map(|(r, d)| (r * d).powi(2));
+            let spread = squares.sum::<f64>().sqrt();
             reference.farthest(row) + STATE_REACH * spread >= *bound
         });
         self
@@ -261,21 +257,16 @@ fn both_sides(plant: &ControlModel, limit: impl Fn(usize) -> f64, loss_share: f6
     let mut rows = Vec::new();
     for joint in 0..JOINT_DIM {
         for sign in [1.0, -1.0] {
-            let row: Vec<f64> = lift
-                .row(joint)
-                .iter()
-                .map(|entry| sign * entry / limit(joint))
-                .collect();
-            if row.iter().any(|entry| *entry != 0.0) {
-                rows.push(Row {
-                    joint,
-                    row,
-                    bound: 1.0,
-                    per_loss: loss_share * sign / limit(joint),
-                });
-            }
+            let row = lift.row(joint);
+            rows.push(Row {
+                joint,
+                row: row.iter().map(|e| sign * e / limit(joint)).collect(),
+                bound: 1.0,
+                per_loss: loss_share * sign / limit(joint),
+            });
         }
     }
+    rows.retain(Row::is_not_zero);
     rows
 }
 
@@ -286,22 +277,16 @@ pub(super) fn joint_rows(plant: &ControlModel) -> Vec<Row> {
     for (joint, (lower, upper)) in plant.robot().joint_limit_rad().iter().enumerate() {
         let half = 0.5 * (upper - lower);
         for (sign, limit) in [(1.0, upper), (-1.0, lower)] {
-            let row: Vec<f64> = decoder
-                .row(joint)
-                .iter()
-                .map(|entry| sign * entry / half)
-                .collect();
-            let bound = sign * (limit - bias[joint]) / half;
-            if row.iter().any(|entry| *entry != 0.0) {
-                rows.push(Row {
-                    joint,
-                    row,
-                    bound,
-                    per_loss: 0.0,
-                });
-            }
+            let row = decoder.row(joint);
+            rows.push(Row {
+                joint,
+                row: row.iter().map(|entry| sign * entry / half).collect(),
+                bound: sign * (limit - bias[joint]) / half,
+                per_loss: 0.0,
+            });
         }
     }
+    rows.retain(Row::is_not_zero);
     rows
 }
 

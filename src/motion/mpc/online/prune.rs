@@ -21,14 +21,14 @@ pub(super) fn needed_rows(rows: Vec<Row>, margin: f64) -> Vec<Row> {
         is_kept[index] = !is_implied(&rows, &is_kept, index, margin);
     }
     // Each round brings at least one row back, so this ends.
-    while let Some(index) = (0..rows.len())
-        .find(|&index| !is_kept[index] && !is_implied(&rows, &is_kept, index, margin))
-    {
+    let is_missing = |is_kept: &[bool], index: usize| {
+        !is_kept[index] && !is_implied(&rows, is_kept, index, margin)
+    };
+    while let Some(index) = (0..rows.len()).find(|&index| is_missing(&is_kept, index)) {
         is_kept[index] = true;
     }
-    rows.into_iter()
-        .zip(is_kept)
-        .filter_map(|(row, is_kept)| is_kept.then_some(row))
+    let rows = rows.into_iter().zip(is_kept);
+    rows.filter_map(|(row, is_kept)| is_kept.then_some(row))
         .collect()
 }
 
@@ -46,16 +46,10 @@ pub fn needed_rows_of(rows: &[(Vec<f64>, f64)], margin: f64) -> Vec<usize> {
 
 /// Whether the rows kept besides `index` imply it to within `margin`.
 fn is_implied(rows: &[Row], is_kept: &[bool], index: usize, margin: f64) -> bool {
-    let size = rows[index]
-        .row
-        .iter()
-        .map(|entry| entry.abs())
-        .fold(0.0, f64::max);
-    let relaxation = size.max(1.0) + margin;
-    let mut others: Vec<&Row> = (0..rows.len())
-        .filter(|&other| is_kept[other] && other != index)
-        .map(|other| &rows[other])
-        .collect();
+    let sizes = rows[index].row.iter().map(|entry| entry.abs());
+    let relaxation = sizes.fold(0.0, f64::max).max(1.0) + margin;
+    let others = (0..rows.len()).filter(|&other| is_kept[other] && other != index);
+    let mut others: Vec<&Row> = others.map(|other| &rows[other]).collect();
     others.push(&rows[index]);
     match maximum(&others, relaxation) {
         // The solver's own tolerance must not decide.
@@ -77,15 +71,9 @@ fn maximum(rows: &[&Row], relaxation: f64) -> Option<f64> {
         for (col, &entry) in constraint.row.iter().enumerate() {
             a.set(number, col, entry);
         }
-        b.push(
-            constraint.bound
-                + if number + 1 == rows.len() {
-                    relaxation
-                } else {
-                    0.0
-                },
-        );
+        b.push(constraint.bound);
     }
+    b[rows.len() - 1] += relaxation;
     let program = ConeProgram {
         p: SparseColumns::from_pattern(dim, dim, &[]),
         q: last.row.iter().map(|entry| -entry).collect(),
@@ -99,20 +87,11 @@ fn maximum(rows: &[&Row], relaxation: f64) -> Option<f64> {
         ..QpSettings::default()
     };
     let mut solver = QpSolver::new(program, settings).ok()?;
-    match solver.solve() {
-        Outcome::Solved => Some(
-            last.row
-                .iter()
-                .zip(solver.solution())
-                .map(|(row, value)| row * value)
-                .sum(),
-        ),
-        Outcome::Inaccurate
-        | Outcome::Infeasible
-        | Outcome::Unbounded
-        | Outcome::IterationCap
-        | Outcome::NumericalFailure => None,
+    if solver.solve() != Outcome::Solved {
+        return None;
     }
+    let terms = last.row.iter().zip(solver.solution());
+    Some(terms.map(|(row, value)| row * value).sum())
 }
 
 #[cfg(test)]
@@ -128,15 +107,15 @@ mod tests {
         }
     }
 
+    fn square() -> Vec<Row> {
+        let sides = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+        let sides = sides.iter().enumerate();
+        sides.map(|(joint, side)| row(joint, side, 1.0)).collect()
+    }
+
     #[test]
     fn row_outside_the_square_of_the_others_is_dropped_and_one_that_cuts_a_corner_stays() {
-        let square = [
-            row(0, &[1.0, 0.0], 1.0),
-            row(1, &[-1.0, 0.0], 1.0),
-            row(2, &[0.0, 1.0], 1.0),
-            row(3, &[0.0, -1.0], 1.0),
-        ];
-        let mut rows = square.to_vec();
+        let mut rows = square();
         rows.push(row(4, &[1.0, 1.0], 2.5));
         rows.push(row(5, &[1.0, 1.0], 1.5));
         rows.push(row(6, &[0.5, 0.0], 0.5));
@@ -151,11 +130,7 @@ mod tests {
 
     #[test]
     fn nearly_equal_rows_are_told_apart_only_by_a_margin_smaller_than_their_difference() {
-        let mut rows: Vec<Row> = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]
-            .iter()
-            .enumerate()
-            .map(|(joint, entries)| row(joint, entries, 1.0))
-            .collect();
+        let mut rows = square();
         rows.push(row(4, &[1.0, 0.01], 1.0));
         assert_eq!(needed_rows(rows.clone(), 1e-3).len(), 5);
         assert_eq!(needed_rows(rows, 0.02).len(), 4);
@@ -173,11 +148,7 @@ mod tests {
         let kept = needed_rows(rows.clone(), 0.02);
         assert!(kept.len() < 40, "{} rows", kept.len());
         // The kept sides' corners are their farthest points.
-        let angle = |row: &Row| {
-            row.row[1]
-                .atan2(row.row[0])
-                .rem_euclid(std::f64::consts::TAU)
-        };
+        let angle = |row: &Row| (row.row[1].atan2(row.row[0])).rem_euclid(std::f64::consts::TAU);
         let mut angles: Vec<f64> = kept.iter().map(angle).collect();
         angles.sort_by(f64::total_cmp);
         angles.push(angles[0] + std::f64::consts::TAU);

@@ -255,13 +255,10 @@ impl QpSolver {
         match self.solver.solution.status {
             SolverStatus::Solved
             | SolverStatus::AlmostSolved
-            | SolverStatus::InsufficientProgress => {
-                if accurate {
-                    Outcome::Solved
-                } else {
-                    Outcome::Inaccurate
-                }
-            }
+            | SolverStatus::InsufficientProgress => match accurate {
+                true => Outcome::Solved,
+                false => Outcome::Inaccurate,
+            },
             SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
                 Outcome::Infeasible
             }
@@ -342,9 +339,8 @@ fn larger(a: f64, b: f64) -> f64 {
 }
 
 fn norm_inf(values: &[f64]) -> f64 {
-    values
-        .iter()
-        .fold(0.0, |worst, value| larger(worst, value.abs()))
+    let sizes = values.iter().map(|value| value.abs());
+    sizes.fold(0.0, larger)
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

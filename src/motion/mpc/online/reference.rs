@@ -67,27 +67,20 @@ impl Reference {
             plant.encode(row(samples.x, sample), z);
             plant.encode_velocity(row(samples.x, sample), row(samples.dx, sample), dz);
         }
-        let mut reference = Self {
+        let states = samples.x.chunks_exact(STATE_DIM);
+        Ok(Self {
             latent_dim: d,
             deviation: deviations(&state, &still_deviations(plant)),
             state,
-            input: None,
+            input: samples.u.map(|u| project_all(plant, samples.x, u)),
             time_s: samples.time_s.to_vec(),
             feet: samples.feet.to_vec(),
-            attitude: samples
-                .x
-                .chunks_exact(STATE_DIM)
-                .map(|x| [x[15], x[16]])
-                .collect(),
+            attitude: states.map(|x| [x[15], x[16]]).collect(),
             x: match plant.is_nonlinear() {
                 true => samples.x.to_vec(),
                 false => Vec::new(),
             },
-        };
-        if let Some(u) = samples.u {
-            reference.input = Some(project_all(plant, samples.x, u));
-        }
-        Ok(reference)
+        })
     }
 
     /// Gives a trajectory that comes without its input the one that the model finds behind its
@@ -97,15 +90,12 @@ impl Reference {
         plant: &ControlModel,
         dynamics: &mut dyn LatentDynamics,
     ) {
-        let phase: Vec<usize> = self
-            .feet
-            .iter()
-            .map(|&feet| plant.phase_for(feet).expect("phases were checked"))
-            .collect();
+        let phases = self.feet.iter().map(|&feet| plant.phase_for(feet));
+        let phases = phases.map(|phase| phase.expect("phases were checked"));
         let motion = Motion {
             time_s: &self.time_s,
             state: &self.state,
-            phase: &phase,
+            phase: &phases.collect::<Vec<_>>(),
         };
         self.input = Some(estimate_input(plant, dynamics, &motion));
     }
@@ -129,10 +119,8 @@ impl Reference {
 
     /// The largest `row · z` along the trajectory.
     pub fn farthest(&self, row: &[f64]) -> f64 {
-        let products = self
-            .state
-            .chunks_exact(2 * self.latent_dim)
-            .map(|state| state.iter().zip(row).map(|(z, r)| z * r).sum::<f64>());
+        let states = self.state.chunks_exact(2 * self.latent_dim);
+        let products = states.map(|state| state.iter().zip(row).map(|(z, r)| z * r).sum::<f64>());
         products.fold(f64::NEG_INFINITY, f64::max)
     }
 
@@ -216,18 +204,14 @@ impl Reference {
     fn locate(&self, time_s: f64) -> (usize, f64) {
         // Times that differ from a sample's by rounding belong to that sample.
         let tolerance = 1e-9;
-        let after = self
-            .time_s
-            .partition_point(|&sample| sample <= time_s + tolerance);
+        let after = (self.time_s).partition_point(|&sample| sample <= time_s + tolerance);
         let before = after.saturating_sub(1);
         if before + 1 == self.time_s.len() {
             return (before, 0.0);
         }
         let span = self.time_s[before + 1] - self.time_s[before];
-        (
-            before,
-            ((time_s - self.time_s[before]) / span).clamp(0.0, 1.0),
-        )
+        let share = (time_s - self.time_s[before]) / span;
+        (before, share.clamp(0.0, 1.0))
     }
 }
 
@@ -262,17 +246,16 @@ fn still_deviations(plant: &ControlModel) -> Vec<f64> {
             plant.decoder_matrix()[(joint, latent)].abs() / (0.5 * (upper - lower))
         });
         let largest = shares.fold(0.0, f64::max);
-        if largest > 0.0 {
-            STILL_SHARE / largest
-        } else {
-            1.0
+        match largest > 0.0 {
+            true => STILL_SHARE / largest,
+            false => 1.0,
         }
     });
     let mut scale: Vec<f64> = positions.collect();
     scale.extend_from_within(..);
-    scale[d..]
-        .iter_mut()
-        .for_each(|value| *value /= STILL_TIME_S);
+    for value in &mut scale[d..] {
+        *value /= STILL_TIME_S;
+    }
     scale
 }
 
@@ -292,10 +275,9 @@ fn deviations(state: &[f64], still: &[f64]) -> Vec<f64> {
     }
     for half in deviation.chunks_exact_mut(half) {
         let largest = half.iter().copied().fold(0.0, f64::max);
-        let floor = if largest > 0.0 {
-            DEVIATION_FLOOR * largest
-        } else {
-            1.0
+        let floor = match largest > 0.0 {
+            true => DEVIATION_FLOOR * largest,
+            false => 1.0,
         };
         for value in half {
             *value = value.max(floor);
@@ -312,30 +294,20 @@ fn check(plant: &ControlModel, samples: &ReferenceSamples<'_>) -> Result<(), Con
             expected: 2,
         });
     }
-    let arrays = [
-        ("x", Some(samples.x)),
-        ("dx", Some(samples.dx)),
-        ("u", samples.u),
-    ];
-    for (name, values) in arrays {
-        let Some(values) = values else { continue };
-        if values.len() != count * STATE_DIM {
-            return Err(ControlError::ReferenceShape {
-                name,
-                found: values.len(),
-                expected: count * STATE_DIM,
-            });
-        }
-        check_finite(name, values, STATE_DIM)?;
-    }
-    if samples.feet.len() != count {
-        let (found, expected) = (samples.feet.len() * FOOT_DIM, count * FOOT_DIM);
-        return Err(ControlError::ReferenceShape {
-            name: "feet",
+    let check_len = |name, found: usize, width: usize| match count * width {
+        expected if found == expected => Ok(()),
+        expected => Err(ControlError::ReferenceShape {
+            name,
             found,
             expected,
-        });
+        }),
+    };
+    let arrays = [("x", samples.x), ("dx", samples.dx)].into_iter();
+    for (name, values) in arrays.chain(samples.u.map(|u| ("u", u))) {
+        check_len(name, values.len(), STATE_DIM)?;
+        check_finite(name, values, STATE_DIM)?;
     }
+    check_len("feet", samples.feet.len() * FOOT_DIM, FOOT_DIM)?;
     check_finite("time_s", samples.time_s, 1)?;
     for (sample, pair) in samples.time_s.windows(2).enumerate() {
         if pair[1] <= pair[0] {

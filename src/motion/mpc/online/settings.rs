@@ -192,13 +192,23 @@ impl MpcSettings {
     /// # Errors
     /// [`ControlError::Setting`] names the first one that is out of its range.
     pub fn check(&self) -> Result<(), ControlError> {
-        if self.horizon == 0 || self.horizon > MAX_HORIZON {
-            return Err(ControlError::Setting {
-                name: "horizon",
-                found: self.horizon as f64,
-                expected: "1 to 500 stages",
-            });
-        }
+        let check = |name, found, is_allowed: bool, expected| match is_allowed {
+            true => Ok(()),
+            false => Err(ControlError::Setting {
+                name,
+                found,
+                expected,
+            }),
+        };
+        let has_stages = (1..=MAX_HORIZON).contains(&self.horizon);
+        check(
+            "horizon",
+            self.horizon as f64,
+            has_stages,
+            "1 to 500 stages",
+        )?;
+        let effectiveness = self.effectiveness.as_ref();
+        let time_s = effectiveness.map_or(1.0, |effectiveness| effectiveness.time_constant_s);
         let positive = [
             ("step_s", self.step_s),
             ("input_weight", self.input_weight),
@@ -209,10 +219,7 @@ impl MpcSettings {
             ("lift_prior_weight", self.lift_prior_weight),
             ("body_friction", self.body_friction.unwrap_or(1.0)),
             ("torque_rate_nm_s", self.torque_rate_nm_s.unwrap_or(1.0)),
-            (
-                "effectiveness_time_s",
-                (self.effectiveness).map_or(1.0, |effectiveness| effectiveness.time_constant_s),
-            ),
+            ("effectiveness_time_s", time_s),
             ("qp.tolerance", self.qp.tolerance),
             ("qp.accepted_residual", self.qp.accepted_residual),
             ("qp.max_iterations", f64::from(self.qp.max_iterations)),
@@ -220,30 +227,24 @@ impl MpcSettings {
             ("fallback.jump_deviations", self.fallback.jump_deviations),
         ];
         for (name, found) in positive {
-            if !(found.is_finite() && found > 0.0) {
-                return Err(ControlError::Setting {
-                    name,
-                    found,
-                    expected: "a positive number",
-                });
-            }
+            check(
+                name,
+                found,
+                found.is_finite() && found > 0.0,
+                "a positive number",
+            )?;
         }
         let mut not_negative = vec![
             ("fallback.damping_nm_s", self.fallback.damping_nm_s),
             ("swing_turn", self.swing_turn),
         ];
-        if let Some(effectiveness) = &self.effectiveness {
+        if let Some(effectiveness) = effectiveness {
             not_negative.push(("drive_stiffness_nm_rad", effectiveness.stiffness_nm_rad));
             not_negative.push(("drive_damping_nm_s_rad", effectiveness.damping_nm_s_rad));
         }
         for (name, found) in not_negative {
-            if !(found.is_finite() && found >= 0.0) {
-                return Err(ControlError::Setting {
-                    name,
-                    found,
-                    expected: "zero or a positive number",
-                });
-            }
+            let is_allowed = found.is_finite() && found >= 0.0;
+            check(name, found, is_allowed, "zero or a positive number")?;
         }
         Ok(())
     }

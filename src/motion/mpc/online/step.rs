@@ -31,17 +31,14 @@ impl Controller {
         };
         let (z, dz) = self.memory.measured.split_at_mut(self.plant.latent_dim());
         self.plant.encode(measurement.x, z);
-        self.plant
-            .encode_velocity(measurement.x, measurement.dx, dz);
-        let normalised_innovation = self.plan.normalised_innovation(
-            measurement.time_s,
-            &self.memory.measured,
-            reference.deviation(),
-        );
+        let (x, dx) = (measurement.x, measurement.dx);
+        self.plant.encode_velocity(x, dx, dz);
+        let (measured, deviation) = (&self.memory.measured, reference.deviation());
+        let innovation = (self.plan).normalised_innovation(measurement.time_s, measured, deviation);
         let fallback = &self.settings.fallback;
-        if normalised_innovation.is_some_and(|normalised_innovation| {
-            normalised_innovation.is_nan() || normalised_innovation > fallback.jump_deviations
-        }) {
+        let is_jump =
+            |innovation: f64| innovation.is_nan() || innovation > fallback.jump_deviations;
+        if innovation.is_some_and(is_jump) {
             self.memory.disbelieved += 1;
             if self.memory.disbelieved <= fallback.jump_patience {
                 return Err(Status::MeasurementJump);
@@ -83,17 +80,14 @@ impl Controller {
             Outcome::Unbounded | Outcome::NumericalFailure => return Status::NumericalFailure,
         }
         let phase = step.stages[0].phase;
-        self.plan
-            .begin(measurement.time_s, phase, &self.memory.measured);
+        let (plan, engine) = (&mut self.plan, &self.engine);
+        plan.begin(measurement.time_s, phase, &self.memory.measured);
         for stage in 0..self.settings.horizon {
-            self.engine.input(stage, &step, self.plan.input_mut(stage));
-            let end = self.horizon.end(stage);
-            self.engine
-                .state(stage, &step, end, self.plan.end_mut(stage));
+            engine.input(stage, &step, plan.input_mut(stage));
+            engine.state(stage, &step, self.horizon.end(stage), plan.end_mut(stage));
         }
-        let is_grounded = self.plant.phases()[phase].is_grounded;
-        self.effectiveness
-            .begin(&step.stages[0].model.b, is_grounded);
+        let (by_input, planned) = (&step.stages[0].model.b, &self.plant.phases()[phase]);
+        self.effectiveness.begin(by_input, planned.is_grounded);
         command.slack = self.largest_violation();
         self.memory.stance = Some(StanceState {
             joints_rad: std::array::from_fn(|joint| measurement.x[joint]),
@@ -151,9 +145,8 @@ impl Controller {
             &self.memory.stance,
         ) {
             let error = stance.attitude_rad[1] - reference.attitude_at(time_s)[1];
-            joints = self
-                .plant
-                .turned_legs(&joints, self.settings.swing_turn * error);
+            let turn_rad = self.settings.swing_turn * error;
+            joints = self.plant.turned_legs(&joints, turn_rad);
         }
         command.joint_position_rad = self.plant.clamp_joints(joints);
         command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
@@ -186,12 +179,9 @@ impl Controller {
         if !stance.feet.contains(&true) {
             return None;
         }
-        let map = self
-            .plant
-            .input_rule()
-            .wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet)
-            .ok()?;
-        let produced = map * SVector::<f64, JOINT_DIM>::from(*net_nm);
+        let rule = self.plant.input_rule();
+        let map = rule.wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet);
+        let produced = map.ok()? * SVector::<f64, JOINT_DIM>::from(*net_nm);
         let force = SVector::<f64, 6>::from_fn(|axis, _| lifted[JOINT_DIM + axis]);
         (force.norm() > SMALL_FORCE_N).then(|| (force - produced).norm() / force.norm())
     }

@@ -216,12 +216,8 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
     }
 
     fn write_rows(&mut self, place: usize, values: &StageValues<'_>) {
-        let StageValues {
-            data,
-            end,
-            deviation,
-            input_cholesky,
-        } = *values;
+        let (data, deviation) = (values.data, values.deviation);
+        let (end, input_cholesky) = (values.end, values.input_cholesky);
         let own = data.rows.as_ref().unwrap_or(&self.rows);
         let dim = self.latent_dim;
         let (count, memory) = (self.shape.rows(), self.shape.memory());

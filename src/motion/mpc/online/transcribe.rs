@@ -151,24 +151,17 @@ impl Transcription {
         let d = self.layout.latent_dim;
         let scale = SLACK_PRICE / weights.joint_penalty;
         for stage in 0..self.layout.horizon {
-            let factor = if stage + 1 == self.layout.horizon {
-                scale * weights.terminal
-            } else {
-                scale
+            let factor = match stage + 1 == self.layout.horizon {
+                true => scale * weights.terminal,
+                false => scale,
             };
-            let (input, state) = (
-                self.layout.input_column(stage),
-                self.layout.state_column(stage),
-            );
-            for index in 0..d {
-                program
-                    .p
-                    .set(input + index, input + index, scale * weights.input);
+            let first = self.layout.input_column(stage);
+            for input in first..first + d {
+                program.p.set(input, input, scale * weights.input);
             }
-            for index in 0..2 * d {
-                program
-                    .p
-                    .set(state + index, state + index, factor * weights.state[index]);
+            let first = self.layout.state_column(stage);
+            for (state, weight) in (first..first + 2 * d).zip(weights.state) {
+                program.p.set(state, state, factor * weight);
             }
             if self.layout.has_slack {
                 program.q[self.layout.slack_column(stage)] = SLACK_PRICE;
@@ -191,10 +184,8 @@ impl Transcription {
         let scaled = &solution[self.layout.input_column(index)..][..d];
         for (row, out) in out.iter_mut().enumerate() {
             let root = &step.input_cholesky[stage.phase];
-            *out = stage.input[row]
-                + (0..=row)
-                    .map(|col| root[(row, col)] * scaled[col])
-                    .sum::<f64>();
+            let terms = (0..=row).map(|col| root[(row, col)] * scaled[col]);
+            *out = stage.input[row] + terms.sum::<f64>();
         }
     }
 
@@ -217,74 +208,41 @@ impl Transcription {
     }
 
     fn stage_positions(&self, stage: usize, a: &SparseColumns) -> StagePositions {
-        let d = self.layout.latent_dim;
+        let (layout, rows) = (&self.layout, &self.layout.rows);
+        let d = layout.latent_dim;
         let find = |row: usize, n_rows: usize, col: usize, n_cols: usize| -> Vec<usize> {
             block(row, n_rows, col, n_cols)
                 .map(|(row, col)| a.position(row, col).expect("block belongs to the pattern"))
                 .collect()
         };
-        let (input, state) = (
-            self.layout.input_column(stage),
-            self.layout.state_column(stage),
-        );
-        let before = |row: usize,
-                      n_rows: usize,
-                      col: fn(&Layout, usize) -> usize,
-                      n_cols: usize| {
-            match stage {
-                0 => Vec::new(),
-                _ => find(row, n_rows, col(&self.layout, stage - 1), n_cols),
-            }
-        };
-        let force_rows = if self.layout.rows.friction.is_some() {
-            3
-        } else {
-            0
-        };
+        let (input, state) = (layout.input_column(stage), layout.state_column(stage));
+        let (dynamics, rate) = (layout.dynamics_row(stage), layout.rate_row(stage));
+        let (torque, joint) = (layout.torque_row(stage), layout.joint_row(stage));
+        let (mut by_state, mut rate_before) = (Vec::new(), Vec::new());
+        if stage > 0 {
+            by_state = find(dynamics, 2 * d, layout.state_column(stage - 1), 2 * d);
+            rate_before = find(rate, rows.rate.len(), layout.input_column(stage - 1), d);
+        }
+        let force_rows = rows.friction.as_ref().map_or(0, |_| 3);
         StagePositions {
-            input: find(self.layout.dynamics_row(stage), 2 * d, input, d),
-            state: before(
-                self.layout.dynamics_row(stage),
-                2 * d,
-                Layout::state_column,
-                2 * d,
-            ),
-            torque: find(
-                self.layout.torque_row(stage),
-                self.layout.rows.torque.len(),
-                input,
-                d,
-            ),
-            rate: find(
-                self.layout.rate_row(stage),
-                self.layout.rows.rate.len(),
-                input,
-                d,
-            ),
-            rate_before: before(
-                self.layout.rate_row(stage),
-                self.layout.rows.rate.len(),
-                Layout::input_column,
-                d,
-            ),
-            joint: find(
-                self.layout.joint_row(stage),
-                self.layout.rows.joint.len(),
-                state,
-                d,
-            ),
-            force: find(self.layout.force_row(stage), force_rows, input, d),
+            input: find(dynamics, 2 * d, input, d),
+            state: by_state,
+            torque: find(torque, rows.torque.len(), input, d),
+            rate: find(rate, rows.rate.len(), input, d),
+            rate_before,
+            joint: find(joint, rows.joint.len(), state, d),
+            force: find(layout.force_row(stage), force_rows, input, d),
         }
     }
 
     fn write_constants(&self, a: &mut SparseColumns) {
         for stage in 0..self.layout.horizon {
+            let (row, column) = (
+                self.layout.dynamics_row(stage),
+                self.layout.state_column(stage),
+            );
             for index in 0..2 * self.layout.latent_dim {
-                a.set(
-                    self.layout.dynamics_row(stage) + index,
-                    self.layout.state_column(stage) + index,
-                    -1.0,
-                );
+                a.set(row + index, column + index, -1.0);
             }
             if self.layout.has_slack {
                 for row in self.layout.joint_row(stage)..=self.layout.slack_row(stage) {
@@ -303,10 +261,8 @@ impl Transcription {
         for row in 0..2 * d {
             let scale = 1.0 / deviation[row];
             for col in 0..d {
-                let product: f64 = (col..d)
-                    .map(|k| stage.model.b[(row, k)] * root[(k, col)])
-                    .sum();
-                values[positions.input[row * d + col]] = scale * product;
+                let terms = (col..d).map(|k| stage.model.b[(row, k)] * root[(k, col)]);
+                values[positions.input[row * d + col]] = scale * terms.sum::<f64>();
             }
             let mut right = -scale * stage.defect[row];
             for col in 0..2 * d {
@@ -343,12 +299,8 @@ impl Transcription {
             } else {
                 let earlier = &step.stages[index - 1];
                 let rows = earlier.rows.as_ref().unwrap_or(&self.layout.rows);
-                let before = scaled_row(
-                    &rows.rate[number].row,
-                    &step.input_cholesky[earlier.phase],
-                    &earlier.input,
-                    &mut self.work,
-                );
+                let (row, root) = (&rows.rate[number].row, &step.input_cholesky[earlier.phase]);
+                let before = scaled_row(row, root, &earlier.input, &mut self.work);
                 self.work.iter_mut().for_each(|entry| *entry = -*entry);
                 let positions = &self.positions[index].rate_before[number * d..][..d];
                 scatter(&self.work, positions, program.a.values_mut());
@@ -364,8 +316,7 @@ impl Transcription {
                 self.work.iter_mut().for_each(|entry| *entry = -*entry);
                 scatter(&self.work, positions, program.a.values_mut());
                 // A stage without contact has the cone's axis as its slack: strictly inside.
-                let is_free =
-                    row.iter().all(|entry| *entry == 0.0) && number == 0 && is_zero(&stage.force);
+                let is_free = number == 0 && stage.force.iter().all(|entry| *entry == 0.0);
                 program.b[self.layout.force_row(index) + number] =
                     if is_free { 1.0 } else { at_reference };
             }
@@ -379,10 +330,7 @@ impl Transcription {
             Some(next) => &next.state[..d],
             None => step.last_position,
         };
-        let rows = step.stages[index]
-            .rows
-            .as_ref()
-            .unwrap_or(&self.layout.rows);
+        let rows = (step.stages[index].rows.as_ref()).unwrap_or(&self.layout.rows);
         for (number, Row { row, bound, .. }) in rows.joint.iter().enumerate() {
             let positions = &self.positions[index].joint[number * d..][..d];
             for (col, &position) in positions.iter().enumerate() {
@@ -406,10 +354,6 @@ fn scatter(from: &[f64], positions: &[usize], values: &mut [f64]) {
     for (value, &position) in from.iter().zip(positions) {
         values[position] = *value;
     }
-}
-
-fn is_zero(values: &[f64]) -> bool {
-    values.iter().all(|value| *value == 0.0)
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

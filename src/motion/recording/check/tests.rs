@@ -1,6 +1,5 @@
 use super::*;
 use nalgebra::DMatrix;
-use std::path::PathBuf;
 
 fn go1() -> &'static Robot {
     Robot::by_name("go1").unwrap()
@@ -21,23 +20,20 @@ fn smooth(n: usize) -> Recording {
         let phase = omega * time_s[j] + f64::from(derivative) * std::f64::consts::FRAC_PI_2;
         0.2 * omega.powi(derivative as i32) * phase.sin()
     };
-    let segment = Segment {
-        path: PathBuf::from("wave.csv"),
-        first_row: 2,
-        row_stride: 1.0,
+    Recording::from(Segment {
         x: DMatrix::from_fn(STATE_DIM, n, |i, j| centre(i) + wave(j, 0)),
         dx: DMatrix::from_fn(STATE_DIM, n, |_, j| wave(j, 1)),
         ddx: DMatrix::from_fn(STATE_DIM, n, |_, j| wave(j, 2)),
         torque_nm: DMatrix::from_element(JOINT_DIM, n, 10.0),
-        feet: vec![[true; 4]; n],
-        body_wrench: None,
-        time_s,
-    };
-    Recording {
-        path: PathBuf::from("wave.csv"),
-        segments: vec![segment],
-        ignored_columns: Vec::new(),
-    }
+        ..Segment::still("wave.csv", time_s.clone())
+    })
+}
+
+/// What is found in the smooth motion after a change.
+fn found_after(n: usize, change: impl FnOnce(&mut Segment)) -> Vec<Finding> {
+    let mut recording = smooth(n);
+    change(&mut recording.segments[0]);
+    findings(&recording)
 }
 
 fn findings(recording: &Recording) -> Vec<Finding> {
@@ -51,11 +47,11 @@ fn check_smooth_motion_within_limits_finds_nothing() {
 
 #[test]
 fn check_huge_torques_are_one_finding_with_worst_row_and_bound() {
-    let mut recording = smooth(100);
-    recording.segments[0].torque_nm[(2, 40)] = 50.0;
-    recording.segments[0].torque_nm[(2, 41)] = -1e5;
-    recording.segments[0].torque_nm[(2, 42)] = 60.0;
-    let found = findings(&recording);
+    let found = found_after(100, |segment| {
+        for (sample, torque) in [(40, 50.0), (41, -1e5), (42, 60.0)] {
+            segment.torque_nm[(2, sample)] = torque;
+        }
+    });
     assert_eq!(found.len(), 1, "{found:?}");
     let finding = &found[0];
     assert_eq!(finding.kind, Implausible::Torque);
@@ -71,11 +67,11 @@ fn check_huge_torques_are_one_finding_with_worst_row_and_bound() {
 
 #[test]
 fn check_joint_outside_its_limits_is_found() {
-    let mut recording = smooth(100);
-    recording.segments[0].x.row_mut(5).fill(-0.7);
-    recording.segments[0].dx.row_mut(5).fill(0.0);
-    recording.segments[0].ddx.row_mut(5).fill(0.0);
-    let found = findings(&recording);
+    let found = found_after(100, |segment| {
+        segment.x.row_mut(5).fill(-0.7);
+        segment.dx.row_mut(5).fill(0.0);
+        segment.ddx.row_mut(5).fill(0.0);
+    });
     assert_eq!(found.len(), 1, "{found:?}");
     assert_eq!(found[0].kind, Implausible::JointAngle);
     assert_eq!(found[0].column, "fl.kn Position");
@@ -85,11 +81,7 @@ fn check_joint_outside_its_limits_is_found() {
 
 #[test]
 fn check_jump_of_a_position_is_found_at_its_row() {
-    let mut recording = smooth(100);
-    for j in 60..100 {
-        recording.segments[0].x[(17, j)] -= 6.0;
-    }
-    let found = findings(&recording);
+    let found = found_after(100, |s| (60..100).for_each(|j| s.x[(17, j)] -= 6.0));
     let jump = found.iter().find(|f| f.kind == Implausible::Jump).unwrap();
     assert_eq!((jump.first_row, jump.samples.len()), (62, 1));
     assert_eq!(jump.column, "Body angular Position z");
@@ -98,13 +90,10 @@ fn check_jump_of_a_position_is_found_at_its_row() {
 
 #[test]
 fn check_rates_that_disagree_with_differences_are_found() {
-    let mut recording = smooth(100);
-    recording.segments[0].dx.row_mut(14).scale_mut(2.0);
-    let kinds: Vec<_> = findings(&recording).iter().map(|f| f.kind).collect();
+    let found = found_after(100, |segment| segment.dx.row_mut(14).scale_mut(2.0));
+    let kinds: Vec<_> = found.iter().map(|f| f.kind).collect();
     assert!(kinds.contains(&Implausible::Velocity), "{kinds:?}");
-    let mut recording = smooth(100);
-    recording.segments[0].ddx[(3, 50)] = 4000.0;
-    let found = findings(&recording);
+    let found = found_after(100, |segment| segment.ddx[(3, 50)] = 4000.0);
     assert_eq!(found.len(), 1, "{found:?}");
     assert_eq!(found[0].kind, Implausible::Acceleration);
     assert_eq!((found[0].first_row, found[0].value), (52, 4000.0));
@@ -112,9 +101,7 @@ fn check_rates_that_disagree_with_differences_are_found() {
 
 #[test]
 fn check_speed_above_the_joints_limit_is_found() {
-    let mut recording = smooth(100);
-    recording.segments[0].dx[(2, 10)] = -25.0;
-    let found = findings(&recording);
+    let found = found_after(100, |segment| segment.dx[(2, 10)] = -25.0);
     let speed = found.iter().find(|f| f.kind == Implausible::Speed).unwrap();
     assert_eq!((speed.value, speed.first_row), (-25.0, 12));
     assert!((speed.bound + 20.06 * 1.1).abs() < 1e-12);
@@ -122,25 +109,17 @@ fn check_speed_above_the_joints_limit_is_found() {
 
 #[test]
 fn check_clipped_velocity_is_found() {
-    let mut recording = smooth(400);
-    let dx = &mut recording.segments[0].dx;
-    for j in 0..400 {
-        dx[(16, j)] = dx[(16, j)].clamp(-2.0, 1.6);
-    }
-    dx[(16, 399)] = 1.6;
-    let found = findings(&recording);
-    let clipped: Vec<_> = found
-        .iter()
-        .filter(|f| f.kind == Implausible::Clipped)
-        .collect();
-    assert!(clipped.is_empty(), "1.6 is not the extreme: {clipped:?}");
-    for j in 0..400 {
-        let dx = &mut recording.segments[0].dx;
-        dx[(16, j)] = dx[(16, j)].clamp(-1.6, 1.6);
-    }
-    let found = findings(&recording);
-    let clipped = found.iter().find(|f| f.kind == Implausible::Clipped);
-    assert_eq!(clipped.unwrap().value.abs(), 1.6);
+    let clipped = |least: f64| {
+        let found = found_after(400, |segment| {
+            let mut row = segment.dx.row_mut(16);
+            row.apply(|rate| *rate = rate.clamp(least, 1.6));
+            row[399] = 1.6;
+        });
+        let of_clips = found.into_iter().find(|f| f.kind == Implausible::Clipped);
+        of_clips.map(|clipped| clipped.value.abs())
+    };
+    assert_eq!(clipped(-2.0), None, "1.6 is not the extreme");
+    assert_eq!(clipped(-1.6), Some(1.6));
 }
 
 #[test]
@@ -162,11 +141,11 @@ fn check_sideways_velocity_may_stay_at_its_extreme_in_flight_alone() {
 
 #[test]
 fn check_lost_sample_is_found_as_a_time_step() {
-    let mut recording = smooth(100);
-    for time in &mut recording.segments[0].time_s[70..] {
-        *time += 0.002;
-    }
-    let found = findings(&recording);
+    let found = found_after(100, |segment| {
+        segment.time_s[70..]
+            .iter_mut()
+            .for_each(|time| *time += 0.002);
+    });
     assert_eq!(found[0].kind, Implausible::TimeStep);
     assert_eq!(found[0].first_row, 72);
     assert!((found[0].value - 0.004).abs() < 1e-12 && (found[0].bound - 0.002).abs() < 1e-12);

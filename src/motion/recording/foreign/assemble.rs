@@ -1,22 +1,22 @@
 //! Quantities of a log, each with its clock, to the segments of a recording.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::DMatrix;
 
-use super::attitude::{RateAxes, angle_rates, angles_of_quaternions, unwrap};
+use super::attitude::{angle_rates, angles_of_quaternions, in_world, unwrap};
 use super::elements::{QUATERNION, Quantity};
 use super::interpolate::{Between, at_times};
 use super::log::Log;
 use super::map::{ColumnMap, Frame, Origin};
-use super::signal::{Signal, Taker};
+use super::signal::{Signal, Source};
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::preprocess::differences;
 use crate::recording::segment::Recording;
 use crate::recording::segments::{DERIVED_DDX, EPOCH_S, Sample, SegmentBuilder, begins_segment};
-use crate::robot::input_rule::rotation;
-use crate::robot::{FOOT_DIM, JOINT_DIM};
+use crate::robot::FOOT_DIM;
 
 /// Largest distance between samples of a topic that is interpolated, in s.
 const MAX_GAP_S: f64 = 0.05;
@@ -43,17 +43,16 @@ pub(in crate::recording) fn assemble(
     logs: &[Log],
     map: &ColumnMap,
 ) -> Result<Assembled, RecordingError> {
-    let mut taker = Taker {
-        logs,
-        map,
-        epoch_s: 0,
+    let find = |quantity| Source::find(logs, map, quantity);
+    let epoch_s = match find(Quantity::JointPosition)? {
+        Some(source) => source.epoch_s()?,
+        None => None,
     };
-    let epoch_s = taker.epoch_of(Quantity::JointPosition)?;
-    taker.epoch_s = epoch_s.unwrap_or(0);
     let mut signals = Signals::default();
     for quantity in Quantity::ALL {
-        if let Some(signal) = taker.take(quantity)? {
-            signals.all.push((quantity, signal));
+        if let Some(source) = find(quantity)? {
+            let signal = source.take(epoch_s.unwrap_or(0))?;
+            signals.all.insert(quantity, signal);
         }
     }
     let mut notes = Vec::new();
@@ -61,10 +60,7 @@ pub(in crate::recording) fn assemble(
     signals.contacts(map, logs, path)?;
     let base = signals.base();
     let (mut times_s, first_row) = (base.times_s.clone(), base.first_row);
-    let own_clocks = signals
-        .all
-        .iter()
-        .any(|(_, signal)| signal.times_s != times_s);
+    let own_clocks = (signals.all.values()).any(|signal| signal.times_s != times_s);
     let ranges;
     if own_clocks || map.time.resample_s.is_some() {
         times_s = signals.common_times(path, map, &mut notes)?;
@@ -95,24 +91,13 @@ pub(in crate::recording) fn assemble(
 /// The quantities that the log has.
 #[derive(Default)]
 struct Signals {
-    all: Vec<(Quantity, Signal)>,
+    all: BTreeMap<Quantity, Signal>,
 }
 
 impl Signals {
-    fn get(&self, quantity: Quantity) -> Option<&Signal> {
-        let found = self.all.iter().find(|(own, _)| *own == quantity);
-        found.map(|(_, signal)| signal)
-    }
-
-    fn get_mut(&mut self, quantity: Quantity) -> Option<&mut Signal> {
-        let found = self.all.iter_mut().find(|(own, _)| *own == quantity);
-        found.map(|(_, signal)| signal)
-    }
-
     /// The quantity whose clock the recording has.
     fn base(&self) -> &Signal {
-        self.get(Quantity::JointPosition)
-            .expect("a map has the joints' positions")
+        (self.all.get(&Quantity::JointPosition)).expect("a map has the joints' positions")
     }
 
     /// Quaternions become angles, and angles do not jump by whole turns.
@@ -120,7 +105,7 @@ impl Signals {
     /// # Errors
     /// [`RecordingFault::Number`] for a quaternion whose length is far from one.
     fn angles(&mut self, path: &Path, notes: &mut Vec<String>) -> Result<(), RecordingError> {
-        let signal = self.get_mut(Quantity::Orientation);
+        let signal = self.all.get_mut(&Quantity::Orientation);
         let signal = signal.expect("a map has the orientation");
         if signal.values.nrows() == QUATERNION.len() {
             let norms = signal.values.column_iter().map(|q| q.norm());
@@ -148,7 +133,7 @@ impl Signals {
         path: &Path,
     ) -> Result<(), RecordingError> {
         let table = map.table(Quantity::Feet).expect("a map has the feet");
-        let signal = self.get_mut(Quantity::Feet);
+        let signal = self.all.get_mut(&Quantity::Feet);
         let signal = signal.expect("a map has the feet");
         let unit = table.unit.as_ref();
         let unit = unit.and_then(|unit| Quantity::Feet.dimension().factor(unit));
@@ -245,8 +230,9 @@ impl Signals {
         map: &ColumnMap,
         times_s: &[f64],
     ) -> Result<(), RecordingError> {
-        let old = self.all.clone();
-        let old = Signals { all: old };
+        let old = Signals {
+            all: self.all.clone(),
+        };
         for (quantity, signal) in &mut self.all {
             if signal.times_s.len() < 2 {
                 let (found, expected) = (signal.times_s.len(), 2);
@@ -258,8 +244,9 @@ impl Signals {
                 Quantity::JointTorque => Between::Straight,
                 _ => Between::Smooth,
             };
-            let rates = old.known_rates(*quantity, map);
-            let rates = rates.filter(|rates| rates.times_s == signal.times_s);
+            let rates = old
+                .known_rates(*quantity, map)
+                .filter(|rates| rates.times_s == signal.times_s);
             signal.values = at_times(
                 &signal.times_s,
                 &signal.values,
@@ -275,19 +262,20 @@ impl Signals {
     /// The derivatives of a quantity's very elements, if the log has them.
     fn known_rates(&self, quantity: Quantity, map: &ColumnMap) -> Option<&Signal> {
         let frame = |quantity| map.table(quantity).and_then(|table| table.frame);
-        match quantity {
-            Quantity::JointPosition => self.get(Quantity::JointVelocity),
-            Quantity::JointVelocity => self.get(Quantity::JointAcceleration),
+        let rate = match quantity {
+            Quantity::JointPosition => Quantity::JointVelocity,
+            Quantity::JointVelocity => Quantity::JointAcceleration,
             Quantity::BodyPosition if frame(Quantity::BodyVelocity) != Some(Frame::Body) => {
-                self.get(Quantity::BodyVelocity)
+                Quantity::BodyVelocity
             }
             Quantity::Orientation
                 if matches!(frame(Quantity::AngularVelocity), None | Some(Frame::Angles)) =>
             {
-                self.get(Quantity::AngularVelocity)
+                Quantity::AngularVelocity
             }
-            _ => None,
-        }
+            _ => return None,
+        };
+        self.all.get(&rate)
     }
 }
 
@@ -303,7 +291,7 @@ struct Rows<'a> {
 
 impl Rows<'_> {
     fn values(&self, quantity: Quantity) -> Option<&DMatrix<f64>> {
-        self.signals.get(quantity).map(|signal| &signal.values)
+        self.signals.all.get(&quantity).map(|signal| &signal.values)
     }
 
     /// Velocities about the body's own axes become the derivatives of position and angles.
@@ -313,21 +301,13 @@ impl Rows<'_> {
         let angles = angles.expect("a map has the orientation").clone();
         let frame = |quantity| map.table(quantity).and_then(|table| table.frame);
         if frame(Quantity::BodyVelocity) == Some(Frame::Body)
-            && let Some(signal) = self.signals.get_mut(Quantity::BodyVelocity)
+            && let Some(signal) = self.signals.all.get_mut(&Quantity::BodyVelocity)
         {
-            for i in 0..signal.values.ncols() {
-                let turn: Matrix3<f64> = rotation([angles[(0, i)], angles[(1, i)], angles[(2, i)]]);
-                let velocity = turn * signal.values.fixed_view::<3, 1>(0, i);
-                signal.values.set_column(i, &velocity);
-            }
+            signal.values = in_world(&angles, &signal.values);
         }
-        let axes = match frame(Quantity::AngularVelocity) {
-            Some(Frame::Body) => RateAxes::Body,
-            Some(Frame::World) => RateAxes::World,
-            Some(Frame::Angles) | None => return Ok(()),
-        };
-        if let Some(signal) = self.signals.get_mut(Quantity::AngularVelocity) {
-            let turned = angle_rates(&angles, &signal.values, axes);
+        let frame = frame(Quantity::AngularVelocity).unwrap_or(Frame::Angles);
+        if let Some(signal) = self.signals.all.get_mut(&Quantity::AngularVelocity) {
+            let turned = angle_rates(&angles, &signal.values, frame);
             signal.values = turned.map_err(|sample| {
                 let row = self.first_row + sample;
                 RecordingFault::Upright.at(self.path, row)
@@ -343,22 +323,26 @@ impl Rows<'_> {
             (Quantity::BodyVelocity, Quantity::BodyPosition),
             (Quantity::AngularVelocity, Quantity::Orientation),
         ] {
-            if self.values(velocity).is_some() {
-                continue;
+            if self.derive(velocity, of) {
+                let (velocity, of) = (velocity.key(), of.key());
+                self.notes
+                    .push(format!("{velocity} are differences of {of}"));
             }
-            let derived = self.differences(of);
+        }
+    }
+
+    /// Makes a quantity that the log does not have of differences of another; whether it had to be made.
+    fn derive(&mut self, quantity: Quantity, of: Quantity) -> bool {
+        let is_absent = self.values(quantity).is_none();
+        if is_absent {
             let signal = Signal {
-                values: derived,
+                values: self.differences(of),
                 times_s: Vec::new(),
                 first_row: self.first_row,
             };
-            self.signals.all.push((velocity, signal));
-            self.notes.push(format!(
-                "{} are differences of {}",
-                velocity.key(),
-                of.key()
-            ));
+            self.signals.all.insert(quantity, signal);
         }
+        is_absent
     }
 
     /// Slopes of a quantity within each range.
@@ -379,7 +363,7 @@ impl Rows<'_> {
         if table.and_then(|table| table.origin) != Some(Origin::Start) {
             return;
         }
-        let signal = self.signals.get_mut(Quantity::BodyPosition);
+        let signal = self.signals.all.get_mut(&Quantity::BodyPosition);
         let values = &mut signal.expect("a map has the body's position").values;
         for range in &self.ranges {
             for axis in 0..2 {
@@ -406,13 +390,15 @@ impl Rows<'_> {
             }
         };
         let accelerations = [
-            Quantity::JointAcceleration,
-            Quantity::BodyAcceleration,
-            Quantity::AngularAcceleration,
+            (Quantity::JointAcceleration, Quantity::JointVelocity),
+            (Quantity::BodyAcceleration, Quantity::BodyVelocity),
+            (Quantity::AngularAcceleration, Quantity::AngularVelocity),
         ];
-        let has_acceleration = accelerations.iter().any(|q| self.values(*q).is_some());
+        let has_acceleration = (accelerations.iter()).any(|(own, _)| self.values(*own).is_some());
         if has_acceleration {
-            self.derive_accelerations();
+            for (acceleration, velocity) in accelerations {
+                self.derive(acceleration, velocity);
+            }
         } else {
             (self.notes).push(DERIVED_DDX.to_owned());
         }
@@ -423,28 +409,13 @@ impl Rows<'_> {
                 ..Sample::default()
             };
             for (quantity, signal) in &self.signals.all {
-                let values = signal.values.column(i);
-                let values = values.as_slice();
-                match quantity {
-                    Quantity::JointPosition => sample.x[..JOINT_DIM].copy_from_slice(values),
-                    Quantity::JointVelocity => sample.dx[..JOINT_DIM].copy_from_slice(values),
-                    Quantity::JointAcceleration => sample.ddx[..JOINT_DIM].copy_from_slice(values),
-                    Quantity::JointTorque => sample.torque_nm.copy_from_slice(values),
-                    Quantity::BodyPosition => sample.x[POSITION].copy_from_slice(values),
-                    Quantity::Orientation => sample.x[ANGLE].copy_from_slice(values),
-                    Quantity::BodyVelocity => sample.dx[POSITION].copy_from_slice(values),
-                    Quantity::AngularVelocity => sample.dx[ANGLE].copy_from_slice(values),
-                    Quantity::BodyAcceleration => sample.ddx[POSITION].copy_from_slice(values),
-                    Quantity::AngularAcceleration => sample.ddx[ANGLE].copy_from_slice(values),
-                    Quantity::Feet => {
-                        sample.feet = std::array::from_fn(|foot| values[foot] == 1.0);
-                    }
+                for (element, value) in signal.values.column(i).iter().enumerate() {
+                    sample.set(quantity.column(element), *value);
                 }
             }
             builder.push(self.first_row + i, &sample)?;
         }
-        let used = |log: &Log| log.columns.len();
-        let columns: usize = logs.iter().map(used).sum();
+        let columns = logs.iter().map(|log| log.columns.len()).sum();
         Ok(Assembled {
             recording: Recording {
                 path: self.path.to_owned(),
@@ -454,30 +425,7 @@ impl Rows<'_> {
             notes: self.notes,
         })
     }
-
-    /// Accelerations that a log with some of them does not have are differences of velocities.
-    fn derive_accelerations(&mut self) {
-        for (acceleration, of) in [
-            (Quantity::JointAcceleration, Quantity::JointVelocity),
-            (Quantity::BodyAcceleration, Quantity::BodyVelocity),
-            (Quantity::AngularAcceleration, Quantity::AngularVelocity),
-        ] {
-            if self.values(acceleration).is_none() {
-                let signal = Signal {
-                    values: self.differences(of),
-                    times_s: Vec::new(),
-                    first_row: self.first_row,
-                };
-                self.signals.all.push((acceleration, signal));
-            }
-        }
-    }
 }
-
-/// Rows of the body's position in a state.
-const POSITION: Range<usize> = JOINT_DIM..JOINT_DIM + 3;
-/// Rows of roll, pitch and yaw.
-const ANGLE: Range<usize> = JOINT_DIM + 3..JOINT_DIM + 6;
 
 /// Stretches of increasing time.
 fn ranges_of(

@@ -3,6 +3,9 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::f64::consts::{PI, TAU};
 
+use super::map::Frame;
+use crate::robot::input_rule::rotation;
+
 /// Cosine of the pitch below which roll and yaw cannot be told apart.
 const UPRIGHT: f64 = 1e-6;
 
@@ -39,21 +42,28 @@ pub(super) fn unwrap(angles: &mut DMatrix<f64>) -> bool {
     any
 }
 
-/// Axes that an angular velocity is given in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum RateAxes {
-    Body,
-    World,
+/// Velocities in the world of velocities along the body's own axes, at these angles.
+pub(super) fn in_world(angles: &DMatrix<f64>, velocities: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = velocities.clone();
+    for (i, mut velocity) in out.column_iter_mut().enumerate() {
+        let turn: Matrix3<f64> = rotation([angles[(0, i)], angles[(1, i)], angles[(2, i)]]);
+        velocity.copy_from(&(turn * velocities.fixed_view::<3, 1>(0, i)));
+    }
+    out
 }
 
-/// Rates of roll, pitch and yaw from an angular velocity about the body's or the world's axes.
+/// Rates of roll, pitch and yaw from an angular velocity about the body's or the world's axes, or from themselves.
 ///
-/// `None` for the first sample at which the trunk points straight up or down.
+/// # Errors
+/// The first sample at which the trunk points straight up or down.
 pub(super) fn angle_rates(
     angles: &DMatrix<f64>,
     angular: &DMatrix<f64>,
-    axes: RateAxes,
+    frame: Frame,
 ) -> Result<DMatrix<f64>, usize> {
+    if frame == Frame::Angles {
+        return Ok(angular.clone());
+    }
     let mut out = DMatrix::zeros(3, angular.ncols());
     for i in 0..angular.ncols() {
         let [roll, pitch, yaw] = [angles[(0, i)], angles[(1, i)], angles[(2, i)]];
@@ -62,35 +72,24 @@ pub(super) fn angle_rates(
         if c_p.abs() < UPRIGHT {
             return Err(i);
         }
-        let map = match axes {
-            RateAxes::Body => {
+        // Columns of the matrices one below the other.
+        let map = match frame {
+            Frame::Body => {
                 let (s_r, c_r) = roll.sin_cos();
                 let tangent = s_p / c_p;
-                Matrix3::new(
-                    1.0,
-                    s_r * tangent,
-                    c_r * tangent, //
-                    0.0,
-                    c_r,
-                    -s_r, //
-                    0.0,
-                    s_r / c_p,
-                    c_r / c_p,
-                )
+                Matrix3::from([
+                    [1.0, 0.0, 0.0],
+                    [s_r * tangent, c_r, s_r / c_p],
+                    [c_r * tangent, -s_r, c_r / c_p],
+                ])
             }
-            RateAxes::World => {
+            Frame::World | Frame::Angles => {
                 let (s_y, c_y) = yaw.sin_cos();
-                Matrix3::new(
-                    c_y / c_p,
-                    s_y / c_p,
-                    0.0, //
-                    -s_y,
-                    c_y,
-                    0.0, //
-                    c_y * s_p / c_p,
-                    s_y * s_p / c_p,
-                    1.0,
-                )
+                Matrix3::from([
+                    [c_y / c_p, -s_y, c_y * s_p / c_p],
+                    [s_y / c_p, c_y, s_y * s_p / c_p],
+                    [0.0, 0.0, 1.0],
+                ])
             }
         };
         out.set_column(i, &(map * omega));
@@ -100,8 +99,9 @@ pub(super) fn angle_rates(
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::UnitQuaternion;
+
     use super::*;
-    use crate::robot::input_rule::rotation;
 
     const ATTITUDES: [[f64; 3]; 4] = [
         [0.1, -0.2, 0.3],
@@ -110,29 +110,13 @@ mod tests {
         [3.0, 0.4, 0.0],
     ];
 
-    /// Half-angle products in the order z, y, x.
-    fn quaternion([roll, pitch, yaw]: [f64; 3]) -> [f64; 4] {
-        let of = |axis: usize, angle: f64| {
-            let mut q = [(angle / 2.0).cos(), 0.0, 0.0, 0.0];
-            q[axis] = (angle / 2.0).sin();
-            q
-        };
-        let times = |a: [f64; 4], b: [f64; 4]| {
-            [
-                a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-                a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-                a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-                a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-            ]
-        };
-        times(times(of(3, yaw), of(2, pitch)), of(1, roll))
-    }
-
     #[test]
     fn angles_of_quaternions_of_either_sign_and_any_length_are_those_of_the_rotation() {
         for angles in ATTITUDES {
             for scale in [1.0, -1.0, 0.4] {
-                let q = quaternion(angles).map(|part| scale * part);
+                let [roll, pitch, yaw] = angles;
+                let q = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+                let q = [q.w, q.i, q.j, q.k].map(|part| scale * part);
                 let found = angles_of_quaternions(&DMatrix::from_column_slice(4, 1, &q));
                 let error = (&found - DMatrix::from_column_slice(3, 1, &angles)).amax();
                 assert!(error < 1e-14, "{angles:?} {found}");
@@ -147,20 +131,20 @@ mod tests {
             let turned = |h: f64| rotation(std::array::from_fn(|i| angles[i] + h * rates[i]));
             let (h, r) = (1e-6, rotation(angles));
             let derivative = (turned(h) - turned(-h)) / (2.0 * h);
-            for (axes, spin) in [
-                (RateAxes::Body, r.transpose() * derivative),
-                (RateAxes::World, derivative * r.transpose()),
+            for (frame, spin) in [
+                (Frame::Body, r.transpose() * derivative),
+                (Frame::World, derivative * r.transpose()),
             ] {
                 let omega = [spin[(2, 1)], spin[(0, 2)], spin[(1, 0)]];
                 let column = |values: &[f64; 3]| DMatrix::from_column_slice(3, 1, values);
-                let found = angle_rates(&column(&angles), &column(&omega), axes).unwrap();
+                let found = angle_rates(&column(&angles), &column(&omega), frame).unwrap();
                 let error = (&found - column(&rates)).amax();
-                assert!(error < 1e-8, "{axes:?} {angles:?}: {found}");
+                assert!(error < 1e-8, "{frame:?} {angles:?}: {found}");
             }
         }
         let upright = DMatrix::from_column_slice(3, 1, &[0.0, PI / 2.0, 0.0]);
         assert_eq!(
-            angle_rates(&upright, &DMatrix::zeros(3, 1), RateAxes::Body),
+            angle_rates(&upright, &DMatrix::zeros(3, 1), Frame::Body),
             Err(0)
         );
     }
@@ -170,12 +154,8 @@ mod tests {
         let mut angles = DMatrix::from_row_slice(1, 5, &[3.0, 3.1, -3.1, -3.0, 3.1]);
         assert!(unwrap(&mut angles));
         let expected = [3.0, 3.1, TAU - 3.1, TAU - 3.0, 3.1];
-        assert!(
-            angles
-                .iter()
-                .zip(expected)
-                .all(|(a, b)| (a - b).abs() < 1e-14)
-        );
+        let errors = angles.iter().zip(expected).map(|(a, b)| (a - b).abs());
+        assert!(errors.fold(0.0, f64::max) < 1e-14);
         assert!(!unwrap(&mut angles));
     }
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::map::Name;
+use crate::recording::columns::folded;
 use crate::recording::instant::Instant;
 
 /// One file or topic.
@@ -35,6 +36,16 @@ pub(in crate::recording) struct Channel {
     pub refused: Option<(usize, String)>,
 }
 
+impl Channel {
+    /// A column of this name without values.
+    pub fn named(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            ..Self::default()
+        }
+    }
+}
+
 impl Log {
     /// Number of samples.
     pub fn len(&self) -> usize {
@@ -51,9 +62,8 @@ impl Log {
                 let find = |same: &dyn Fn(&str) -> bool| {
                     self.columns.iter().position(|channel| same(&channel.name))
                 };
-                let folded = crate::recording::columns::folded(text);
-                find(&|name| name == text)
-                    .or_else(|| find(&|name| crate::recording::columns::folded(name) == folded))
+                let text_folded = folded(text);
+                find(&|name| name == text).or_else(|| find(&|name| folded(name) == text_folded))
             }
         }
     }

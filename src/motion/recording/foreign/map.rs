@@ -133,41 +133,31 @@ pub struct Table {
     /// Columns: names, numbers from 1, ranges such as `"4..6"`, or one pattern.
     pub columns: Columns,
     /// The file or topic that they are in; the only one unless given.
-    #[serde(default, alias = "topic")]
+    #[serde(alias = "topic")]
     pub file: Option<String>,
     /// Column of a clock of their own.
-    #[serde(default)]
     pub time: Option<Name>,
     /// Unit of that clock.
-    #[serde(default)]
     pub time_unit: Option<String>,
     /// Added to the clock, in s.
     #[serde(default)]
     pub time_offset_s: f64,
     /// Unit; SI unless given.
-    #[serde(default)]
     pub unit: Option<String>,
     /// 1 or -1: for all, for each column, or by the names of elements.
-    #[serde(default)]
     pub sign: Option<Factors>,
     /// Added after sign and unit, in SI units: for all, for each column, or by the names of elements.
-    #[serde(default)]
     pub offset: Option<Factors>,
     /// What each column is; romc's order unless given.
-    #[serde(default)]
     pub order: Option<Words>,
     /// Axes of velocities: `world` (unless given) or `body`; of angular velocities also `angles`, rates of
     /// roll, pitch and yaw (unless given).
-    #[serde(default)]
     pub frame: Option<Frame>,
     /// `start`: x and y count from the first sample.
-    #[serde(default)]
     pub origin: Option<Origin>,
     /// Force from which a foot is on the ground, in the table's unit; absent for flags.
-    #[serde(default)]
     pub threshold: Option<f64>,
     /// Force below which it is in the air again; the threshold unless given.
-    #[serde(default)]
     pub release: Option<f64>,
 }
 
@@ -242,10 +232,8 @@ impl ColumnMap {
     /// [`RecordingFault::MapSyntax`] with line, key and what was expected; [`RecordingFault::Map`] for
     /// a key that does not apply to its table.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
-        let text = std::fs::read_to_string(path).map_err(|source| match source.kind() {
-            std::io::ErrorKind::NotFound => RecordingFault::Missing.of(path),
-            _ => RecordingFault::io("read", source).of(path),
-        })?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| RecordingFault::unreadable("read", source).of(path))?;
         Self::parse(&path.display().to_string(), &text)
     }
 
@@ -294,9 +282,26 @@ impl ColumnMap {
         out
     }
 
+    /// The fault of a key in the table of a quantity.
+    pub(super) fn fault_in(
+        &self,
+        quantity: Quantity,
+        key: &str,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> RecordingError {
+        self.fault(&format!("{}.{key}", quantity.key()), found, expected)
+    }
+
     /// The fault of a key.
-    pub(super) fn fault(&self, key: &str, found: String, expected: String) -> RecordingError {
+    pub(super) fn fault(
+        &self,
+        key: &str,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> RecordingError {
         let place = crate::files::Place::Entry(format!("`{key}`").into());
+        let (found, expected) = (found.into(), expected.into());
         RecordingError::new(&self.file, place, RecordingFault::Map { found, expected })
     }
 }
@@ -318,7 +323,10 @@ impl Table {
                 Name::Number(number) => out.push(Name::Number(*number)),
                 Name::Text(text) => match range(text) {
                     Some(numbers) => out.extend(numbers.map(Name::Number)),
-                    None => out.extend(pattern(text, names, quantity).map(Name::Text)),
+                    None => {
+                        let texts = pattern(text, names, quantity);
+                        out.extend(texts.into_iter().map(Name::Text));
+                    }
                 },
             }
         }
@@ -332,47 +340,32 @@ pub(super) fn range(text: &str) -> Option<std::ops::RangeInclusive<usize>> {
     Some(first.trim().parse().ok()?..=last.trim().parse().ok()?)
 }
 
-/// The names that a pattern stands for: `{leg}`, `{joint}`, `{axis}` for the words of `names`, `{0}` and `{1}`
+/// The names that a pattern stands for: `{leg}` and `{joint}`, or `{axis}` for the words of `names`, or `{0}` or `{1}`
 /// for numbers that count from 0 or 1; the name itself if it is no pattern.
-fn pattern<'a>(
-    text: &'a str,
-    names: &'a Names,
-    quantity: Quantity,
-) -> Box<dyn Iterator<Item = String> + 'a> {
-    let has = |mark: &str| text.contains(mark);
-    if has("{leg}") || has("{joint}") {
-        let joints = if has("{joint}") {
-            &names.joints[..]
-        } else {
-            &names.joints[..1]
+fn pattern(text: &str, names: &Names, quantity: Quantity) -> Vec<String> {
+    let numbers = |first: usize| {
+        let count = quantity.elements().len();
+        (first..first + count).map(|i| i.to_string()).collect()
+    };
+    let marks: [Vec<(&str, Vec<String>)>; 4] = [
+        vec![
+            ("{leg}", names.legs.to_vec()),
+            ("{joint}", names.joints.to_vec()),
+        ],
+        vec![("{axis}", names.axes.to_vec())],
+        vec![("{0}", numbers(0))],
+        vec![("{1}", numbers(1))],
+    ];
+    let has = |(mark, _): &(&str, Vec<String>)| text.contains(mark);
+    let used = marks.into_iter().find(|marks| marks.iter().any(has));
+    let mut out = vec![text.to_owned()];
+    for (mark, words) in used.into_iter().flatten().filter(has) {
+        let filled = |text: &String| -> Vec<String> {
+            words.iter().map(|word| text.replace(mark, word)).collect()
         };
-        let legs = if has("{leg}") {
-            &names.legs[..]
-        } else {
-            &names.legs[..1]
-        };
-        return Box::new(legs.iter().flat_map(move |leg| {
-            let of_joint =
-                move |joint: &String| text.replace("{leg}", leg).replace("{joint}", joint);
-            joints.iter().map(of_joint)
-        }));
+        out = out.iter().flat_map(filled).collect();
     }
-    if has("{axis}") {
-        return Box::new(
-            names
-                .axes
-                .iter()
-                .map(move |axis| text.replace("{axis}", axis)),
-        );
-    }
-    for (mark, first) in [("{0}", 0), ("{1}", 1)] {
-        if has(mark) {
-            let count = quantity.elements().len();
-            let numbered = move |i: usize| text.replace(mark, &(i + first).to_string());
-            return Box::new((0..count).map(numbered));
-        }
-    }
-    Box::new(std::iter::once(text.to_owned()))
+    out
 }
 
 #[cfg(test)]

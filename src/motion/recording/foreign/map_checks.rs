@@ -14,16 +14,13 @@ impl ColumnMap {
         for quantity in Quantity::ALL {
             let Some(table) = self.table(quantity) else {
                 if quantity.is_required() {
-                    let found = "no such table".to_owned();
                     let expected = format!("the columns of {}", quantity.column(0).name());
-                    return Err(self.fault(quantity.key(), found, expected));
+                    return Err(self.fault(quantity.key(), "no such table", expected));
                 }
                 continue;
             };
-            let refuse = |key: &str, expected: &str| {
-                let key = format!("{}.{key}", quantity.key());
-                Err(self.fault(&key, "a value".to_owned(), expected.to_owned()))
-            };
+            let refuse =
+                |key: &str, expected: &str| Err(self.fault_in(quantity, key, "a value", expected));
             let angular = quantity == Quantity::AngularVelocity;
             let velocity = quantity == Quantity::BodyVelocity;
             match table.frame {
@@ -50,8 +47,8 @@ impl ColumnMap {
         }
         let time = &self.time;
         if time.column.is_some() && time.sample_time_s.is_some() {
-            let (found, expected) = ("a column too", "either a column or `sample_time_s`");
-            return Err(self.fault("time.sample_time_s", found.into(), expected.into()));
+            let expected = "either a column or `sample_time_s`";
+            return Err(self.fault("time.sample_time_s", "a column too", expected));
         }
         for (key, value) in [
             ("time.sample_time_s", time.sample_time_s),
@@ -59,7 +56,7 @@ impl ColumnMap {
             ("time.max_gap_s", time.max_gap_s),
         ] {
             if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
-                return Err(self.fault(key, value.to_string(), "more than 0 s".to_owned()));
+                return Err(self.fault(key, value.to_string(), "more than 0 s"));
             }
         }
         Ok(())
@@ -80,8 +77,8 @@ impl ColumnMap {
             ("offset", factors(&table.offset)),
         ] {
             if let Some(value) = values.into_iter().find(|value| !value.is_finite()) {
-                let key = format!("{}.{key}", quantity.key());
-                return Err(self.fault(&key, value.to_string(), "a finite number".to_owned()));
+                let expected = "a finite number";
+                return Err(self.fault_in(quantity, key, value.to_string(), expected));
             }
         }
         Ok(())
@@ -89,18 +86,15 @@ impl ColumnMap {
 
     /// No column of a table twice, and no range that no log could have.
     fn require_distinct(&self, quantity: Quantity, table: &Table) -> Result<(), RecordingError> {
-        let refuse = |found: String, expected: String| {
-            let key = format!("{}.columns", quantity.key());
-            Err(self.fault(&key, found, expected))
+        let refuse = |found: String, expected: &str| {
+            Err(self.fault_in(quantity, "columns", found, expected))
         };
         for entry in table.entries() {
             let Name::Text(text) = entry else { continue };
             if range(text).is_some_and(|all| all.end().saturating_sub(*all.start()) >= MAX_COLUMNS)
             {
-                return refuse(
-                    format!("{text:?}"),
-                    format!("at most {MAX_COLUMNS} columns"),
-                );
+                let expected = format!("at most {MAX_COLUMNS} columns");
+                return refuse(format!("{text:?}"), &expected);
             }
         }
         let columns = table.columns(&self.names, quantity);
@@ -110,6 +104,6 @@ impl ColumnMap {
             Some(Name::Text(name)) => format!("{name:?}"),
             Some(Name::Number(number)) => number.to_string(),
         };
-        refuse(format!("{name} twice"), "each column once".to_owned())
+        refuse(format!("{name} twice"), "each column once")
     }
 }

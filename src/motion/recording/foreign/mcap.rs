@@ -22,10 +22,8 @@ const LARGEST_CHUNK: u64 = 1 << 30;
 /// # Errors
 /// [`RecordingFault::Mcap`] for a damaged file, [`RecordingFault::NoTopic`] if nothing can be read.
 pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, RecordingError> {
-    let bytes = std::fs::read(path).map_err(|source| match source.kind() {
-        std::io::ErrorKind::NotFound => RecordingFault::Missing.of(path),
-        _ => RecordingFault::io("read", source).of(path),
-    })?;
+    let bytes = std::fs::read(path)
+        .map_err(|source| RecordingFault::unreadable("read", source).of(path))?;
     let fault = |error: mcap::McapError| RecordingFault::Mcap(error.to_string()).of(path);
     let mut topics = Topics::new(path);
     for record in LinearReader::new(&bytes).map_err(fault)? {
@@ -126,45 +124,39 @@ impl<'a> Topics<'a> {
         if self.open.contains_key(&topic.id) {
             return;
         }
+        match self.opened(topic) {
+            Err(fault) => self.refused.push((topic.topic.clone(), fault)),
+            Ok(open) => _ = self.open.insert(topic.id, open),
+        }
+    }
+
+    fn opened(&self, topic: &Topic) -> Result<Open, MessageFault> {
         let schema = self.schemas.get(&topic.schema_id);
         let encoding = schema.map_or("", |(header, _)| &header.encoding);
         let layout = match (&topic.message_encoding[..], encoding) {
-            ("cdr", "ros2msg") => Ok(Layout::Ros2),
-            ("ros1", "ros1msg") => Ok(Layout::Ros1),
-            (message, schema) => Err(MessageFault::Encoding(format!("{message} with {schema}"))),
-        };
-        let definition = |(header, text): &(SchemaHeader, Vec<u8>)| {
-            Definition::parse(&header.name, &String::from_utf8_lossy(text))
-        };
-        let read = layout.and_then(|layout| {
-            let definition = schema.map(definition).transpose()?;
-            definition
-                .map(|definition| (layout, definition))
-                .ok_or_else(|| MessageFault::Undefined(topic.topic.clone()))
-        });
-        match read {
-            Err(fault) => self.refused.push((topic.topic.clone(), fault)),
-            Ok((layout, definition)) => {
-                let log = Log {
-                    path: self.path.to_owned(),
-                    name: topic.topic.clone(),
-                    clock: None,
-                    columns: vec![Channel {
-                        name: "log_time".to_owned(),
-                        ..Channel::default()
-                    }],
-                    is_named: true,
-                    first_row: 1,
-                };
-                let open = Open {
-                    log,
-                    definition,
-                    layout,
-                    fault: None,
-                };
-                self.open.insert(topic.id, open);
+            ("cdr", "ros2msg") => Layout::Ros2,
+            ("ros1", "ros1msg") => Layout::Ros1,
+            (message, schema) => {
+                return Err(MessageFault::Encoding(format!("{message} with {schema}")));
             }
-        }
+        };
+        let undefined = || MessageFault::Undefined(topic.topic.clone());
+        let (header, text) = schema.ok_or_else(undefined)?;
+        let definition = Definition::parse(&header.name, &String::from_utf8_lossy(text))?;
+        let log = Log {
+            path: self.path.to_owned(),
+            name: topic.topic.clone(),
+            clock: None,
+            columns: vec![Channel::named("log_time")],
+            is_named: true,
+            first_row: 1,
+        };
+        Ok(Open {
+            log,
+            definition,
+            layout,
+            fault: None,
+        })
     }
 
     /// The topics that are tables.
@@ -202,10 +194,7 @@ impl Open {
             .definition
             .visit(self.layout, message, is_first, |name, value| {
                 if is_first {
-                    columns.push(Channel {
-                        name: name.to_owned(),
-                        ..Channel::default()
-                    });
+                    columns.push(Channel::named(name));
                 }
                 match (columns.get_mut(place), value) {
                     (None, _) => fits = false,

@@ -5,7 +5,7 @@ use std::io::{Seek, Write};
 
 use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, UnitQuaternion, Vector3};
 
 use crate::recording::segment::Segment;
 use crate::robot::input_rule::rotation;
@@ -49,7 +49,7 @@ pub const INPUT_TOPIC: &str = "/inputs";
 pub fn write_mcap(
     destination: impl Write + Seek,
     segment: &Segment,
-    inputs: Option<&nalgebra::DMatrix<f64>>,
+    inputs: Option<&DMatrix<f64>>,
 ) -> Result<(), mcap::McapError> {
     let options = WriteOptions::new()
         .compression(None)
@@ -65,47 +65,31 @@ pub fn write_mcap(
     let body_text = format!("{ODOMETRY}{GEOMETRY}{HEADER}");
     let body = writer.add_schema("nav_msgs/msg/Odometry", "ros2msg", body_text.as_bytes())?;
     let mut topic = |schema, topic| writer.add_channel(schema, topic, "cdr", &BTreeMap::new());
-    let channels = [
+    let [joints, odom, contacts] = [
         topic(joint, JOINT_TOPIC)?,
         topic(body, BODY_TOPIC)?,
         topic(joint, FEET_TOPIC)?,
     ];
-    let input_channel = match inputs {
-        Some(_) => Some(topic(joint, INPUT_TOPIC)?),
-        None => None,
-    };
+    let with_topic = |inputs| Ok::<_, mcap::McapError>((topic(joint, INPUT_TOPIC)?, inputs));
+    let inputs = inputs.map(with_topic).transpose()?;
     let names = JOINT_NAMES.map(str::to_owned);
     let feet = Leg::ALL.map(|leg| leg.to_string());
     let input_names = Robot::input_names();
     for sample in 0..segment.len() {
         let time_ns = (1e9 * segment.time_s[sample]).round() as i64;
-        let rows = |m: &nalgebra::DMatrix<f64>| -> Vec<f64> {
-            m.column(sample).iter().take(JOINT_DIM).copied().collect()
-        };
+        let stamped = || Message::stamped(time_ns);
+        let rows = |m: &DMatrix<f64>| m.column(sample).as_slice()[..JOINT_DIM].to_vec();
+        let [q, dq, tau] = [&segment.x, &segment.dx, &segment.torque_nm].map(rows);
         let contact = segment.feet[sample].map(|down| f64::from(u8::from(down)));
         let mut messages = vec![
-            (
-                channels[0],
-                Message::stamped(time_ns, "world").joint_state(
-                    &names,
-                    &rows(&segment.x),
-                    &rows(&segment.dx),
-                    &rows(&segment.torque_nm),
-                ),
-            ),
-            (channels[1], odometry(segment, sample, time_ns)),
-            (
-                channels[2],
-                Message::stamped(time_ns, "world").joint_state(&feet, &contact, &[], &[]),
-            ),
+            (joints, stamped().joint_state(&names, &q, &dq, &tau)),
+            (odom, odometry(segment, sample, time_ns)),
+            (contacts, stamped().joint_state(&feet, &contact, &[], &[])),
         ];
-        if let (Some(channel), Some(inputs)) = (input_channel, inputs) {
-            let values: Vec<f64> = inputs.column(sample).iter().copied().collect();
-            let message = Message::stamped(time_ns, "world");
-            messages.push((
-                channel,
-                message.joint_state(&input_names, &[], &[], &values),
-            ));
+        if let Some((channel, inputs)) = inputs {
+            let values = inputs.column(sample);
+            let message = stamped().joint_state(&input_names, &[], &[], values.as_slice());
+            messages.push((channel, message));
         }
         for (channel_id, message) in messages {
             let log_time = u64::try_from(time_ns).unwrap_or(0);
@@ -125,7 +109,7 @@ pub fn write_mcap(
 /// Pose in the world, velocities in the trunk's axes, as `nav_msgs/Odometry` has them.
 fn odometry(segment: &Segment, sample: usize, time_ns: i64) -> Message {
     const BODY: usize = JOINT_DIM;
-    let of = |m: &nalgebra::DMatrix<f64>, first: usize| -> Vector3<f64> {
+    let of = |m: &DMatrix<f64>, first: usize| -> Vector3<f64> {
         m.fixed_view::<3, 1>(first, sample).into_owned()
     };
     let angles = of(&segment.x, BODY + 3);
@@ -140,7 +124,7 @@ fn odometry(segment: &Segment, sample: usize, time_ns: i64) -> Message {
         c_r * rates[1] + s_r * c_p * rates[2],
         -s_r * rates[1] + c_r * c_p * rates[2],
     ];
-    let mut message = Message::stamped(time_ns, "world");
+    let mut message = Message::stamped(time_ns);
     message.text("base");
     message.numbers(of(&segment.x, BODY).as_slice());
     message.numbers(&[q.i, q.j, q.k, q.w]);
@@ -157,8 +141,8 @@ struct Message {
 }
 
 impl Message {
-    /// With header, time and frame.
-    fn stamped(time_ns: i64, frame: &str) -> Self {
+    /// With header: time, and the world as frame.
+    fn stamped(time_ns: i64) -> Self {
         let mut message = Self {
             bytes: vec![0, 1, 0, 0],
         };
@@ -166,7 +150,7 @@ impl Message {
         message.put(4, &seconds.to_le_bytes());
         let nanoseconds = time_ns.rem_euclid(1_000_000_000) as u32;
         message.put(4, &nanoseconds.to_le_bytes());
-        message.text(frame);
+        message.text("world");
         message
     }
 

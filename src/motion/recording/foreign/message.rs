@@ -179,10 +179,9 @@ impl Definition {
             let is_list = field.count != Count::One;
             let is_named = field.count == Count::Any && !matches!(field.kind, Kind::Message(_));
             if field.kind == Kind::Text && is_list && field.name.starts_with("name") {
-                names.clear();
-                for _ in 0..count {
-                    names.push(cursor.text()?);
-                }
+                names = (0..count)
+                    .map(|_| cursor.text())
+                    .collect::<Result<_, _>>()?;
                 continue;
             }
             for entry in 0..count {
@@ -193,46 +192,38 @@ impl Definition {
                     }
                     path.push_str(&field.name);
                     if is_list {
-                        match names
-                            .get(entry)
-                            .filter(|_| is_named && names.len() == count)
-                        {
-                            Some(name) => path.push_str(&format!("[{name}]")),
-                            None => path.push_str(&format!("[{entry}]")),
-                        }
+                        let own = names.get(entry);
+                        let own = own.filter(|_| is_named && names.len() == count);
+                        let entry = own.map_or(entry.to_string(), String::clone);
+                        path.push_str(&format!("[{entry}]"));
                     }
                 }
-                let mut skip = |_: &str, _: Value| {};
-                let visit: &mut dyn FnMut(&str, Value) = if count > MOST_ENTRIES {
-                    &mut skip
-                } else {
-                    &mut *visit
-                };
-                match field.kind {
-                    Kind::Message(part) => self.message(part, cursor, named, path, visit)?,
+                let value = match field.kind {
+                    Kind::Message(part) => {
+                        let mut skip = |_: &str, _: Value| {};
+                        let visit = match count > MOST_ENTRIES {
+                            true => &mut skip,
+                            false => &mut *visit,
+                        };
+                        self.message(part, cursor, named, path, visit)?;
+                        continue;
+                    }
                     Kind::Text => {
                         cursor.text()?;
+                        continue;
                     }
-                    Kind::Time => {
-                        let seconds = cursor.signed(4)?;
-                        let nanoseconds = cursor.unsigned(4)? as u32;
-                        visit(path, Value::Time(seconds, nanoseconds));
-                    }
-                    Kind::Bool => {
-                        let value = if cursor.unsigned(1)? == 0 { 0.0 } else { 1.0 };
-                        visit(path, Value::Number(value));
-                    }
-                    Kind::Unsigned(size) => {
-                        visit(path, Value::Number(cursor.unsigned(size)? as f64));
-                    }
-                    Kind::Signed(size) => visit(path, Value::Number(cursor.signed(size)? as f64)),
+                    Kind::Time => Value::Time(cursor.signed(4)?, cursor.unsigned(4)? as u32),
+                    Kind::Bool => Value::Number(f64::from(u8::from(cursor.unsigned(1)? != 0))),
+                    Kind::Unsigned(size) => Value::Number(cursor.unsigned(size)? as f64),
+                    Kind::Signed(size) => Value::Number(cursor.signed(size)? as f64),
                     Kind::Float(4) => {
                         let bits = cursor.unsigned(4)? as u32;
-                        visit(path, Value::Number(f64::from(f32::from_bits(bits))));
+                        Value::Number(f64::from(f32::from_bits(bits)))
                     }
-                    Kind::Float(_) => {
-                        visit(path, Value::Number(f64::from_bits(cursor.unsigned(8)?)));
-                    }
+                    Kind::Float(_) => Value::Number(f64::from_bits(cursor.unsigned(8)?)),
+                };
+                if count <= MOST_ENTRIES {
+                    visit(path, value);
                 }
             }
         }

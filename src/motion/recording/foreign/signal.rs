@@ -20,150 +20,151 @@ pub(super) struct Signal {
     pub first_row: usize,
 }
 
-/// Takes quantities out of logs as a map says.
-pub(super) struct Taker<'a> {
-    pub logs: &'a [Log],
-    pub map: &'a ColumnMap,
-    /// Whole seconds that all clocks count from.
-    pub epoch_s: i64,
+/// A quantity's table in a map, and the log that it speaks of.
+pub(super) struct Source<'a> {
+    map: &'a ColumnMap,
+    quantity: Quantity,
+    table: &'a Table,
+    log: &'a Log,
 }
 
-impl<'a> Taker<'a> {
-    /// A quantity of the map; `None` if the map does not have it.
-    pub fn take(&self, quantity: Quantity) -> Result<Option<Signal>, RecordingError> {
-        let Some(table) = self.map.table(quantity) else {
+impl<'a> Source<'a> {
+    /// Where a quantity stands; `None` if the map does not have it.
+    pub fn find(
+        logs: &'a [Log],
+        map: &'a ColumnMap,
+        quantity: Quantity,
+    ) -> Result<Option<Self>, RecordingError> {
+        let Some(table) = map.table(quantity) else {
             return Ok(None);
         };
-        let log = self.log(table, quantity)?;
-        let columns = self.columns(table, quantity, log)?;
-        let elements = elements_of(quantity, columns.len());
-        let order = self.order(table, quantity, &elements, columns.len())?;
-        let factor = self.unit(table, quantity)?;
-        let signs = self.numbers(&table.sign, quantity, "sign", &elements, &order, 1.0)?;
-        let offsets = self.numbers(&table.offset, quantity, "offset", &elements, &order, 0.0)?;
+        let found = match &table.file {
+            Some(name) => logs.iter().find(|log| log.name == *name),
+            None if logs.len() == 1 => logs.first(),
+            None => logs.iter().find(|log| log.name.is_empty()),
+        };
+        let log = found.ok_or_else(|| {
+            let names: Vec<String> = logs.iter().map(|l| format!("`{}`", l.name)).collect();
+            let expected = format!("one of {}", names.join(", "));
+            let found = (table.file.as_ref()).map_or("nothing".to_owned(), |f| format!("`{f}`"));
+            map.fault_in(quantity, "file", found, expected)
+        })?;
+        Ok(Some(Self {
+            map,
+            quantity,
+            table,
+            log,
+        }))
+    }
+
+    /// The quantity, its times in s from `epoch_s`, the whole seconds that all clocks count from.
+    pub fn take(&self, epoch_s: i64) -> Result<Signal, RecordingError> {
+        let columns = self.columns()?;
+        let elements = match self.is_quaternion(columns.len()) {
+            true => QUATERNION.map(str::to_owned).to_vec(),
+            false => self.quantity.elements(),
+        };
+        let order = self.order(&elements, columns.len())?;
+        let dimension = self.quantity.dimension();
+        let key = format!("{}.unit", self.quantity.key());
+        let factor = self.factor(&key, dimension, self.table.unit.as_ref())?;
+        let signs = self.numbers(&self.table.sign, "sign", &elements, &order, 1.0)?;
+        let offsets = self.numbers(&self.table.offset, "offset", &elements, &order, 0.0)?;
         if let Some(wrong) = signs.iter().find(|sign| sign.abs() != 1.0) {
-            let key = format!("{}.sign", quantity.key());
-            return Err(self
-                .map
-                .fault(&key, wrong.to_string(), "1 or -1".to_owned()));
+            return Err(self.fault("sign", wrong.to_string(), "1 or -1"));
         }
-        let times = self.times(table, quantity, log)?;
-        let kept = self.kept(log, &columns, times.column);
+        let times = self.times()?;
+        let kept = self.kept(&columns, times.column);
         for column in columns.iter().copied().chain(times.column) {
-            self.require_numbers(log, column, &kept)?;
+            self.require_numbers(column, &kept)?;
         }
         let mut values = DMatrix::zeros(elements.len(), kept.len());
         for (place, &column) in columns.iter().enumerate() {
             let (scale, offset) = (signs[place] * factor, offsets[place]);
-            let raw = &log.columns[column].values;
+            let raw = &self.log.columns[column].values;
             for (sample, &row) in kept.iter().enumerate() {
                 values[(order[place], sample)] = scale * raw[row] + offset;
             }
         }
-        Ok(Some(Signal {
+        Ok(Signal {
             values,
-            times_s: kept.iter().map(|row| times.at(*row)).collect(),
-            first_row: log.first_row,
-        }))
-    }
-
-    /// First instant of a quantity's clock where that counts from an epoch, in whole seconds.
-    pub fn epoch_of(&self, quantity: Quantity) -> Result<Option<i64>, RecordingError> {
-        let Some(table) = self.map.table(quantity) else {
-            return Ok(None);
-        };
-        let log = self.log(table, quantity)?;
-        let times = self.times(table, quantity, log)?;
-        let first = times.instants.and_then(|instants| instants.first());
-        Ok(first.map(|instant| instant.whole.div_euclid(times.per_second)))
-    }
-
-    /// The file or topic of a table.
-    pub fn log(&self, table: &Table, quantity: Quantity) -> Result<&'a Log, RecordingError> {
-        let found = match &table.file {
-            Some(name) => self.logs.iter().find(|log| log.name == *name),
-            None if self.logs.len() == 1 => self.logs.first(),
-            None => self.logs.iter().find(|log| log.name.is_empty()),
-        };
-        found.ok_or_else(|| {
-            let names: Vec<String> = self.logs.iter().map(|l| format!("`{}`", l.name)).collect();
-            let expected = format!("one of {}", names.join(", "));
-            let found = (table.file.as_ref()).map_or("nothing".to_owned(), |f| format!("`{f}`"));
-            self.map
-                .fault(&format!("{}.file", quantity.key()), found, expected)
+            times_s: kept.iter().map(|row| times.at(*row, epoch_s)).collect(),
+            first_row: self.log.first_row,
         })
     }
 
-    fn columns(
-        &self,
-        table: &Table,
-        quantity: Quantity,
-        log: &Log,
-    ) -> Result<Vec<usize>, RecordingError> {
-        let names = table.columns(&self.map.names, quantity);
-        let key = format!("{}.columns", quantity.key());
-        let mut out = Vec::new();
-        for name in &names {
-            out.push(self.column(&key, name, log)?);
-        }
-        let expected = quantity.elements().len();
-        let fits = match quantity {
-            Quantity::Orientation => [expected, QUATERNION.len()].contains(&out.len()),
-            _ => out.len() == expected,
-        };
-        if !fits {
-            let found = format!("{} columns", out.len());
-            let expected = match quantity {
-                Quantity::Orientation => "3 (angles) or 4 (a quaternion)".to_owned(),
-                _ => expected.to_string(),
-            };
-            return Err(self.map.fault(&key, found, expected));
-        }
-        Ok(out)
+    /// First instant of the clock where that counts from an epoch, in whole seconds.
+    pub fn epoch_s(&self) -> Result<Option<i64>, RecordingError> {
+        let times = self.times()?;
+        let instants = times.channel.and_then(|channel| channel.instants.as_ref());
+        let first = instants.and_then(|instants| instants.first());
+        Ok(first.map(|instant| instant.whole.div_euclid(times.per_second)))
     }
 
-    fn column(&self, key: &str, name: &Name, log: &Log) -> Result<usize, RecordingError> {
+    /// The fault of a key of the table.
+    fn fault(
+        &self,
+        key: &str,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> RecordingError {
+        self.map.fault_in(self.quantity, key, found, expected)
+    }
+
+    /// Whether so many columns are a quaternion.
+    fn is_quaternion(&self, columns: usize) -> bool {
+        self.quantity == Quantity::Orientation && columns == QUATERNION.len()
+    }
+
+    fn columns(&self) -> Result<Vec<usize>, RecordingError> {
+        let names = self.table.columns(&self.map.names, self.quantity);
+        let key = format!("{}.columns", self.quantity.key());
+        let columns = names.iter().map(|name| self.column(&key, name));
+        let columns = columns.collect::<Result<Vec<_>, _>>()?;
+        let expected = self.quantity.elements().len();
+        if columns.len() == expected || self.is_quaternion(columns.len()) {
+            return Ok(columns);
+        }
+        let expected = match self.quantity {
+            Quantity::Orientation => "3 (angles) or 4 (a quaternion)".to_owned(),
+            _ => expected.to_string(),
+        };
+        Err(self.fault("columns", format!("{} columns", columns.len()), expected))
+    }
+
+    /// The column of a name that stands under this key.
+    fn column(&self, key: &str, name: &Name) -> Result<usize, RecordingError> {
+        let log = self.log;
         log.column(name).ok_or_else(|| {
             let found = match name {
                 Name::Number(number) => format!("column {number}"),
                 Name::Text(text) => format!("`{text}`"),
             };
-            let place = log.path.display();
-            let expected = match log.name.is_empty() {
-                true => format!("a column of {place}, which has {}", log.summary()),
-                false => format!(
-                    "a column of `{}` ({place}), which has {}",
-                    log.name,
-                    log.summary()
-                ),
+            let place = match (log.name.is_empty(), log.path.display()) {
+                (true, path) => path.to_string(),
+                (false, path) => format!("`{}` ({path})", log.name),
             };
+            let expected = format!("a column of {place}, which has {}", log.summary());
             self.map.fault(key, found, expected)
         })
     }
 
     /// For each column the element that it is.
-    fn order(
-        &self,
-        table: &Table,
-        quantity: Quantity,
-        elements: &[String],
-        columns: usize,
-    ) -> Result<Vec<usize>, RecordingError> {
-        let key = format!("{}.order", quantity.key());
-        let Some(words) = &table.order else {
-            if quantity == Quantity::Orientation && columns == QUATERNION.len() {
-                let found = "a quaternion without order".to_owned();
-                return Err(self.map.fault(&key, found, "`wxyz` or `xyzw`".to_owned()));
+    fn order(&self, elements: &[String], columns: usize) -> Result<Vec<usize>, RecordingError> {
+        let words = match &self.table.order {
+            None if self.is_quaternion(columns) => {
+                return Err(self.fault("order", "a quaternion without order", "`wxyz` or `xyzw`"));
             }
-            return Ok((0..columns).collect());
+            None => return Ok((0..columns).collect()),
+            Some(Words::One(text)) => text.split_whitespace().map(str::to_owned).collect(),
+            Some(Words::Many(words)) => words.clone(),
         };
-        let words: Vec<String> = match words {
-            Words::One(text) => text.split_whitespace().map(str::to_owned).collect(),
-            Words::Many(words) => words.clone(),
-        };
-        let fault = |found| {
-            let expected = format!("each of {} once", elements.join(" "));
-            self.map.fault(&key, found, expected)
+        let fault = |found: String| {
+            self.fault(
+                "order",
+                found,
+                format!("each of {} once", elements.join(" ")),
+            )
         };
         let order = ordered(&words, elements).map_err(fault)?;
         match order.len() == columns {
@@ -172,18 +173,17 @@ impl<'a> Taker<'a> {
         }
     }
 
-    fn unit(&self, table: &Table, quantity: Quantity) -> Result<f64, RecordingError> {
-        let Some(unit) = &table.unit else {
-            return Ok(1.0);
-        };
-        let dimension = quantity.dimension();
+    /// The factor to SI of a unit that stands under this key; 1 without one.
+    fn factor(
+        &self,
+        key: &str,
+        dimension: Dimension,
+        unit: Option<&String>,
+    ) -> Result<f64, RecordingError> {
+        let Some(unit) = unit else { return Ok(1.0) };
         dimension.factor(unit).ok_or_else(|| {
             let expected = format!("one of {}", dimension.names());
-            self.map.fault(
-                &format!("{}.unit", quantity.key()),
-                format!("`{unit}`"),
-                expected,
-            )
+            self.map.fault(key, format!("`{unit}`"), expected)
         })
     }
 
@@ -191,32 +191,26 @@ impl<'a> Taker<'a> {
     fn numbers(
         &self,
         factors: &Option<Factors>,
-        quantity: Quantity,
         key: &str,
         elements: &[String],
         order: &[usize],
         default: f64,
     ) -> Result<Vec<f64>, RecordingError> {
-        let fault = |found, expected| {
-            let key = format!("{}.{key}", quantity.key());
-            Err(self.map.fault(&key, found, expected))
-        };
         match factors {
             None => Ok(vec![default; order.len()]),
             Some(Factors::All(value)) => Ok(vec![*value; order.len()]),
             Some(Factors::Each(values)) if values.len() == order.len() => Ok(values.clone()),
             Some(Factors::Each(values)) => {
-                fault(format!("{} numbers", values.len()), order.len().to_string())
+                let found = format!("{} numbers", values.len());
+                Err(self.fault(key, found, order.len().to_string()))
             }
             Some(Factors::Named(named_values)) => {
                 let mut of_element = vec![default; elements.len()];
                 for (word, value) in named_values {
                     let found = named(word, elements);
                     if found.is_empty() {
-                        return fault(
-                            format!("`{word}`"),
-                            format!("one of {}", elements.join(" ")),
-                        );
+                        let expected = format!("one of {}", elements.join(" "));
+                        return Err(self.fault(key, format!("`{word}`"), expected));
                     }
                     found
                         .into_iter()
@@ -228,22 +222,18 @@ impl<'a> Taker<'a> {
     }
 
     /// The samples that a quantity has: all, or those without blanks where the map allows blanks.
-    fn kept(&self, log: &Log, columns: &[usize], time: Option<usize>) -> Vec<usize> {
+    fn kept(&self, columns: &[usize], time: Option<usize>) -> Vec<usize> {
         let blank = |row: usize| {
             let mut used = columns.iter().copied().chain(time);
-            used.any(|column| log.columns[column].values[row].is_nan())
+            used.any(|column| self.log.columns[column].values[row].is_nan())
         };
-        (0..log.len())
+        (0..self.log.len())
             .filter(|row| !self.map.text.blank || !blank(*row))
             .collect()
     }
 
-    fn require_numbers(
-        &self,
-        log: &Log,
-        column: usize,
-        kept: &[usize],
-    ) -> Result<(), RecordingError> {
+    fn require_numbers(&self, column: usize, kept: &[usize]) -> Result<(), RecordingError> {
+        let log = self.log;
         let channel: &Channel = &log.columns[column];
         let name = match channel.name.is_empty() {
             true => (column + 1).to_string(),
@@ -265,89 +255,59 @@ impl<'a> Taker<'a> {
         Err(fault.in_cell(&log.path, log.first_row + row, &name))
     }
 
-    fn times<'b>(
-        &self,
-        table: &Table,
-        quantity: Quantity,
-        log: &'b Log,
-    ) -> Result<Times<'b>, RecordingError> {
-        let time = &self.map.time;
-        let (key, name, unit) = match &table.time {
+    fn times(&self) -> Result<Times<'a>, RecordingError> {
+        let (time, table) = (&self.map.time, self.table);
+        let (key, name, own_unit) = match &table.time {
             Some(name) => {
-                let key = format!("{}.time", quantity.key());
-                (
-                    key,
-                    Some(name),
-                    table.time_unit.as_ref().or(time.unit.as_ref()),
-                )
+                let key = format!("{}.time", self.quantity.key());
+                (key, Some(name), table.time_unit.as_ref())
             }
-            None => (
-                "time.column".to_owned(),
-                time.column.as_ref(),
-                time.unit.as_ref(),
-            ),
+            None => ("time.column".to_owned(), time.column.as_ref(), None),
         };
-        let offset_s = table.time_offset_s;
-        let (column, step_s) = match (name, log.clock, time.sample_time_s) {
-            (Some(name), _, _) => (Some(self.column(&key, name, log)?), 1.0),
+        let (column, step_s) = match (name, self.log.clock, time.sample_time_s) {
+            (Some(name), _, _) => (Some(self.column(&key, name)?), 1.0),
             (None, _, Some(step_s)) => (None, step_s),
             (None, Some(clock), None) => (Some(clock), 1.0),
             (None, None, None) => {
-                let expected = "a column, or `sample_time_s`".to_owned();
-                return Err(self.map.fault("time", "no clock".to_owned(), expected));
+                let expected = "a column, or `sample_time_s`";
+                return Err(self.map.fault("time", "no clock", expected));
             }
         };
-        let is_text_clock = name.is_some();
-        let factor = match unit.filter(|_| is_text_clock) {
-            None => 1.0,
-            Some(unit) => Dimension::Time.factor(unit).ok_or_else(|| {
-                let expected = format!("one of {}", Dimension::Time.names());
-                self.map.fault("time.unit", format!("`{unit}`"), expected)
-            })?,
-        };
-        let channel = column.map(|column| &log.columns[column]);
+        let unit = own_unit.or(time.unit.as_ref()).filter(|_| name.is_some());
+        let factor = self.factor("time.unit", Dimension::Time, unit)?;
         Ok(Times {
             column,
-            values: channel.map(|channel| &channel.values[..]),
-            instants: channel.and_then(|channel| channel.instants.as_deref()),
+            channel: column.map(|column| &self.log.columns[column]),
             factor: factor * step_s,
             per_second: (1.0 / factor).round().max(1.0) as i64,
-            epoch_s: self.epoch_s,
-            offset_s,
+            offset_s: table.time_offset_s,
         })
     }
-}
-
-/// Elements of a quantity that stands in so many columns.
-fn elements_of(quantity: Quantity, columns: usize) -> Vec<String> {
-    if quantity == Quantity::Orientation && columns == QUATERNION.len() {
-        return QUATERNION.map(str::to_owned).to_vec();
-    }
-    quantity.elements()
 }
 
 /// The clock of a log.
 struct Times<'a> {
     column: Option<usize>,
-    values: Option<&'a [f64]>,
-    instants: Option<&'a [Instant]>,
+    channel: Option<&'a Channel>,
     /// Seconds of one unit, or from sample to sample without a clock.
     factor: f64,
     per_second: i64,
-    epoch_s: i64,
     offset_s: f64,
 }
 
 impl Times<'_> {
     /// Time of a row, in s from the common epoch.
-    fn at(&self, row: usize) -> f64 {
-        let time = match (self.instants, self.values) {
-            (Some(instants), _) => {
-                let whole = self.epoch_s.saturating_mul(self.per_second);
+    fn at(&self, row: usize, epoch_s: i64) -> f64 {
+        let time = match self.channel {
+            None => row as f64,
+            Some(Channel {
+                instants: Some(instants),
+                ..
+            }) => {
+                let whole = epoch_s.saturating_mul(self.per_second);
                 instants[row].since(Instant { whole, rest: 0.0 })
             }
-            (None, Some(values)) => values[row],
-            (None, None) => row as f64,
+            Some(channel) => channel.values[row],
         };
         time * self.factor + self.offset_s
     }

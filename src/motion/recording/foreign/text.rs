@@ -1,18 +1,13 @@
 //! Text files as logs: any separator, with or without header.
 
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-
-use flate2::bufread::MultiGzDecoder;
 
 use super::log::{Channel, Log};
 use super::map::{ColumnMap, Delimiter, TextFormat};
-use crate::recording::csv::GZIP_MAGIC;
 use crate::recording::error::{RecordingError, RecordingFault, shortened};
 use crate::recording::instant::Instant;
-use crate::recording::lines::{Lines, split_cells};
-use crate::recording::number::{DecimalMark, NumberReader};
+use crate::recording::lines::{self, Lines};
+use crate::recording::number::NumberReader;
 use crate::recording::table::MAX_ROWS;
 
 /// Numbers from which a column is kept as times: beyond, one number does not hold a microsecond.
@@ -63,18 +58,7 @@ pub(in crate::recording) fn read_text(
     name: String,
     format: &TextFormat,
 ) -> Result<Log, RecordingError> {
-    let file = File::open(path).map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => RecordingFault::Missing.of(path),
-        _ => RecordingFault::io("open", source).of(path),
-    })?;
-    let mut source = BufReader::new(file);
-    let start = (source.fill_buf()).map_err(|e| RecordingFault::io("read", e).of(path))?;
-    let compressed = start.starts_with(&GZIP_MAGIC);
-    let source: Box<dyn Read> = match compressed {
-        true => Box::new(MultiGzDecoder::new(source)),
-        false => Box::new(source),
-    };
-    let mut lines = Lines::new(path, BufReader::new(source), compressed);
+    let mut lines = Lines::open(path)?;
     let mut sheet: Option<Sheet> = None;
     while let Some((row, line)) = lines.next_row()? {
         if row <= format.skip || line.trim().is_empty() {
@@ -118,19 +102,15 @@ impl Sheet {
         // NumPy and MATLAB write headers as comments.
         let header = line.trim_start().trim_start_matches(['#', '%']);
         let delimiter = format.delimiter.unwrap_or_else(|| delimiter_of(header));
-        let mark = match delimiter {
-            Delimiter::Comma => DecimalMark::Point,
-            Delimiter::Tab | Delimiter::Blank | Delimiter::Semicolon => DecimalMark::Unknown,
-        };
-        let mut numbers = NumberReader::new(mark);
-        let cells = cells(header, delimiter);
+        let numbers = || NumberReader::new(character(delimiter));
+        let (cells, mut reader) = (cells(header, delimiter), numbers());
         let is_value = |cell: &String| {
-            cell.is_empty() || numbers.parse(cell).is_some() || Instant::from_iso(cell).is_some()
+            cell.is_empty() || reader.parse(cell).is_some() || Instant::from_iso(cell).is_some()
         };
         let is_named = format.header.unwrap_or_else(|| !cells.iter().all(is_value));
         let mut sheet = Self {
             delimiter,
-            numbers: NumberReader::new(mark),
+            numbers: numbers(),
             columns: vec![Channel::default(); cells.len()],
             is_named,
             first_row: if is_named { row + 1 } else { row },
@@ -185,23 +165,19 @@ impl Channel {
             None if cell.is_empty() => f64::NAN,
             None if cell.eq_ignore_ascii_case("true") => 1.0,
             None if cell.eq_ignore_ascii_case("false") => 0.0,
-            None => match Instant::from_iso(cell) {
-                Some(instant) => {
-                    self.push_instant(instant);
-                    return;
+            None => {
+                if let Some(instant) = Instant::from_iso(cell) {
+                    return self.push_instant(instant);
                 }
-                None => {
-                    self.refused
-                        .get_or_insert_with(|| (sample, shortened(cell)));
-                    f64::NAN
-                }
-            },
+                self.refused
+                    .get_or_insert_with(|| (sample, shortened(cell)));
+                f64::NAN
+            }
         };
         if self.instants.is_some() || value.abs() >= LARGE {
             let exact = Instant::from_decimal(cell).or_else(|| Instant::of(value));
             if let Some(instant) = exact {
-                self.push_instant(instant);
-                return;
+                return self.push_instant(instant);
             }
         }
         self.values.push(value);
@@ -216,14 +192,10 @@ impl Channel {
 
     /// Adds a time; earlier values become times as well.
     pub fn push_instant(&mut self, instant: Instant) {
-        let values = &self.values;
-        let earlier = || {
-            values
-                .iter()
-                .map(|v| Instant::of(*v).unwrap_or(instant))
-                .collect()
-        };
-        self.instants.get_or_insert_with(earlier).push(instant);
+        let earlier = |value: &f64| Instant::of(*value).unwrap_or(instant);
+        self.instants
+            .get_or_insert_with(|| self.values.iter().map(earlier).collect())
+            .push(instant);
         self.values.push(instant.value());
     }
 }
@@ -237,21 +209,21 @@ fn delimiter_of(line: &str) -> Delimiter {
     }
 }
 
-fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
-    let separator = match delimiter {
-        Delimiter::Blank => return line.split_whitespace().map(str::to_owned).collect(),
+fn character(delimiter: Delimiter) -> char {
+    match delimiter {
+        Delimiter::Blank => ' ',
         Delimiter::Tab => '\t',
         Delimiter::Comma => ',',
         Delimiter::Semicolon => ';',
-    };
-    let mut out = Vec::new();
-    let split: Result<(), std::convert::Infallible> = split_cells(line, separator, |cell| {
-        out.push(cell.to_owned());
-        Ok(())
-    });
-    match split {
-        Ok(()) => out,
-        Err(never) => match never {},
+    }
+}
+
+fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
+    match delimiter {
+        Delimiter::Blank => line.split_whitespace().map(str::to_owned).collect(),
+        _ => lines::cells(line, character(delimiter))
+            .map(str::to_owned)
+            .collect(),
     }
 }
 

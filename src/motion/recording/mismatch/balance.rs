@@ -3,8 +3,8 @@
 use nalgebra::{Rotation3, Unit, Vector3};
 
 use super::weight_n;
-use crate::recording::preprocess::differences;
-use crate::recording::preprocess::median;
+use crate::recording::preprocess::{differences, median};
+use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{BODY_NAMES, FOOT_DIM, JOINT_DIM, Leg, Robot};
@@ -67,14 +67,11 @@ impl Sums {
             .map(|sample| self.add_forces(segment, robot, sample))
             .collect();
         let is_grounded = |sample: usize| segment.feet[sample].contains(&true);
-        let mut start = 0;
-        while start + 1 < segment.len() {
-            let grounded = is_grounded(start);
-            let after = start + 1..segment.len();
-            let end = start + after.take_while(|&s| is_grounded(s) == grounded).count();
+        for run in stretches(0..segment.len(), |a, b| is_grounded(a) == is_grounded(b)) {
+            let (start, end) = (run.start, run.end - 1);
             let time_s = segment.time_s[end] - segment.time_s[start];
             let dv = segment.dx[(HEIGHT, end)] - segment.dx[(HEIGHT, start)];
-            if grounded {
+            if is_grounded(start) {
                 let between = (start..end).map(|s| {
                     let step_s = segment.time_s[s + 1] - segment.time_s[s];
                     0.5 * step_s * (forces[s].z + forces[s + 1].z)
@@ -86,7 +83,6 @@ impl Sums {
                 self.flight.0 += dv;
                 self.flight.1 += time_s;
             }
-            start = end + 1;
         }
     }
 

@@ -6,6 +6,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use crate::recording::preprocess::median;
+use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
@@ -92,11 +93,10 @@ const PLACES: [Reading; 6] = [
 /// The reading of the body's place under which feet on the ground stay best where they are, and their root mean square
 /// then, m.
 pub(super) fn best_other_place(recording: &Recording, robot: &Robot) -> Option<(f64, Reading)> {
-    let judged = PLACES.into_iter().filter_map(|reading| {
+    best(PLACES.into_iter().map(|reading| {
         let slip = Slip::read(recording, robot, &reading);
-        Some((slip.rms_m()?, reading))
-    });
-    (judged.filter(|(rms_m, _)| rms_m.is_finite())).min_by(|one, other| one.0.total_cmp(&other.0))
+        (slip.rms_m(), reading)
+    }))
 }
 
 /// The reading under which feet on the ground stay best in place against each other, and their root mean square then,
@@ -115,8 +115,14 @@ pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option
     let of_signs =
         (SIGNS.into_iter()).map(|reading| (Slip::read(recording, robot, &reading), reading));
     let readings = of_orders.chain(of_signs);
-    let judged = readings.filter_map(|(slip, reading)| Some((slip.relative_rms_m()?, reading)));
-    (judged.filter(|(rms_m, _)| rms_m.is_finite())).min_by(|one, other| one.0.total_cmp(&other.0))
+    best(readings.map(|(slip, reading)| (slip.relative_rms_m(), reading)))
+}
+
+/// The reading with the least of these figures.
+fn best(judged: impl Iterator<Item = (Option<f64>, Reading)>) -> Option<(f64, Reading)> {
+    let known = judged.filter_map(|(rms_m, reading)| Some((rms_m?, reading)));
+    let finite = known.filter(|(rms_m, _)| rms_m.is_finite());
+    finite.min_by(|one, other| one.0.total_cmp(&other.0))
 }
 
 /// All orders of the legs.
@@ -255,15 +261,13 @@ fn stances(segment: &Segment) -> Vec<(Leg, Range<usize>)> {
     let samples_in = |time_s: f64| (time_s / step_s).round() as usize;
     let mut out = Vec::new();
     for leg in Leg::ALL {
-        let down = |sample: &usize| segment.feet[*sample][leg.index()];
-        let mut start = 0;
-        while start < segment.len() {
-            let count = (start..segment.len()).take_while(down).count();
-            if count >= samples_in(LEAST_STANCE_S).max(2) {
+        let down = |sample: usize| segment.feet[sample][leg.index()];
+        for stretch in stretches(0..segment.len(), |a, b| down(a) == down(b)) {
+            let count = stretch.len();
+            if down(stretch.start) && count >= samples_in(LEAST_STANCE_S).max(2) {
                 let edge = samples_in(EDGE_S).min(count / 8);
-                out.push((leg, start + edge..start + count - edge));
+                out.push((leg, stretch.start + edge..stretch.end - edge));
             }
-            start += count + 1;
         }
     }
     out

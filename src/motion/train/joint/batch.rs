@@ -1,13 +1,15 @@
 //! Batches of consecutive samples, with what the losses need of them computed once.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
+use crate::recording::Source;
 use crate::recording::preprocess::prepare;
-use crate::recording::{PhaseRule, Source};
-use crate::robot::InputRule;
-use crate::train::dataset::Scaling;
+use crate::train::dataset::{Dataset, scaled};
 use crate::train::error::TrainError;
 use crate::train::smooth::moving_average;
+
+/// Samples of a batch; every phase of a jump is resampled to a multiple (section IV-C4).
+pub const BATCH_ROWS: usize = 100;
 
 /// Consecutive samples of one phase, rows are samples, scaled units.
 #[derive(Clone, Debug)]
@@ -61,39 +63,21 @@ impl Batch {
     }
 }
 
-/// How recordings become batches.
-#[derive(Clone, Debug)]
-pub struct BatchOptions<'a> {
-    /// Which foot patterns form which phase.
-    pub phases: &'a PhaseRule,
-    /// Factors from SI to scaled units.
-    pub scaling: &'a Scaling,
-    /// Rows of a batch; every phase of a jump is resampled to a multiple (section IV-C4).
-    pub rows: usize,
-    /// Window of the moving average over accelerations, 1 for none.
-    pub smoothing: usize,
-}
-
-/// Batches of all phases of all recordings, in their order.
+/// Batches of all phases of all recordings, in their order, with the phases, inputs, units and smoothing of `dataset`.
 ///
 /// # Errors
 /// [`TrainError::Recording`] for what cannot be resampled or turned into inputs.
-pub fn batches(
-    recordings: &Source<'_>,
-    rule: &InputRule,
-    options: &BatchOptions<'_>,
-) -> Result<Vec<Batch>, TrainError> {
+pub fn batches(recordings: &Source<'_>, dataset: &Dataset) -> Result<Vec<Batch>, TrainError> {
     let mut out = Vec::new();
+    let state = |columns| scaled(columns, &dataset.scaling.state).transpose();
     recordings.for_each(|recording| {
-        for part in prepare(recording, options.phases, options.rows)? {
+        for part in prepare(recording, &dataset.phases, BATCH_ROWS)? {
             let samples = &part.samples;
-            let u = rows(&samples.input(rule)?, &options.scaling.input);
-            let x = rows(&samples.x, &options.scaling.state);
-            let dx = rows(&samples.dx, &options.scaling.state);
-            let smooth = moving_average(&samples.ddx, options.smoothing);
-            let ddx = rows(&smooth, &options.scaling.state);
-            for start in (0..samples.len()).step_by(options.rows) {
-                let cut = |all: &DMatrix<f64>| all.rows(start, options.rows).into_owned();
+            let u = scaled(samples.input(&dataset.rule)?, &dataset.scaling.input).transpose();
+            let (x, dx) = (state(samples.x.clone()), state(samples.dx.clone()));
+            let ddx = state(moving_average(&samples.ddx, dataset.smoothing));
+            for start in (0..samples.len()).step_by(BATCH_ROWS) {
+                let cut = |all: &DMatrix<f64>| all.rows(start, BATCH_ROWS).into_owned();
                 let blocks = [cut(&x), cut(&dx), cut(&ddx), cut(&u)];
                 out.push(Batch::new(part.span.phase, blocks, samples.mean_step_s()));
             }
@@ -101,13 +85,4 @@ pub fn batches(
         Ok::<_, TrainError>(())
     })?;
     Ok(out)
-}
-
-/// Samples as rows, every coordinate times its factor.
-fn rows(columns: &DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
-    let mut transposed = columns.transpose();
-    for (mut column, factor) in transposed.column_iter_mut().zip(factors.iter()) {
-        column *= *factor;
-    }
-    transposed
 }

@@ -39,13 +39,8 @@ pub fn encoder(
 ) -> Result<StateMap, ModelError> {
     let factors = DMatrix::from_diagonal(&frame.factors);
     let offset = -frame.factors.component_mul(&frame.mean);
-    let turn = &basis.turn * frame.latent;
-    between(
-        "encoder",
-        network,
-        (&factors, &offset),
-        (&turn, &basis.shift),
-    )
+    let (before, turn) = ((&factors, &offset), &basis.turn * frame.latent);
+    between("encoder", network, before, (&turn, &basis.shift))
 }
 
 /// The decoder from latent coordinates in `basis` to scaled states.

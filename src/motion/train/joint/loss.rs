@@ -1,10 +1,10 @@
 //! The losses (16) to (20) with the lift loss and the window (41), and their exact gradient.
 
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::batch::Batch;
-use super::multiply::{Columns, add_product, add_transposed};
+use super::multiply::{Columns, add_transposed, product};
 use super::network::Network;
 use super::parameters::Parameters;
 use super::schedule::Schedule;
@@ -12,7 +12,7 @@ use super::unroll::{Adjoints, Unroll, Window};
 use crate::train::features::{FeatureValues, Features};
 
 /// Weights of the terms of the loss (equation 20).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LossWeights {
     /// Of the latent accelerations (17).
     pub ddz: f64,
@@ -23,7 +23,6 @@ pub struct LossWeights {
     /// Of the share of the input's energy that the latent input cannot carry.
     pub lift: f64,
     /// Of predictions over a window (41).
-    #[serde(default)]
     pub bptt: f64,
 }
 
@@ -41,7 +40,7 @@ impl Default for LossWeights {
 }
 
 /// Values of the terms, unweighted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Losses {
     /// Mean square of `x - x_dec` (16), with coordinate weights if there are any.
     pub decoder: f64,
@@ -54,7 +53,6 @@ pub struct Losses {
     /// `||u - W_e^T u_lat||^2 / ||u||^2`.
     pub lift: f64,
     /// Mean square of `z - z_pred` over a window (41); 0 unless it has a weight.
-    #[serde(default)]
     pub bptt: f64,
 }
 
@@ -209,8 +207,7 @@ impl<'a> JointLoss<'a> {
         let xi = &parameters.xi[batch.phase];
         let variables = self.maps.encode(at);
         let theta = self.features.evaluate(&variables, &mut self.values);
-        let mut predicted = DMatrix::zeros(n, d);
-        add_product(&mut predicted, 1.0, &theta, xi);
+        let predicted = product(&theta, xi);
         let mut residual = self.maps.residual(at, &predicted);
         let ddz = residual.norm_squared() / (n * d) as f64;
         residual *= 2.0 * weights.ddz / (n * d) as f64;
@@ -242,8 +239,7 @@ impl<'a> JointLoss<'a> {
         let xi = &at.parameters.xi[at.batch.phase];
         let onto_xi = &mut self.gradient.xi[at.batch.phase];
         add_transposed(onto_xi, 1.0, Columns::all(theta), Columns::all(adjoint));
-        let mut onto_theta = DMatrix::zeros(theta.nrows(), theta.ncols());
-        add_product(&mut onto_theta, 1.0, adjoint, &xi.transpose());
+        let onto_theta = product(adjoint, &xi.transpose());
         let mut onto_variables = DMatrix::zeros(variables.nrows(), variables.ncols());
         self.features
             .backward(&onto_theta, &mut self.values, &mut onto_variables);
@@ -284,10 +280,11 @@ mod tests {
     use nalgebra::DVector;
 
     use super::*;
-    use crate::model::{Activation, Library, StandardLibrary};
+    use crate::model::Activation;
     use crate::train::joint::linear::LinearMaps;
     use crate::train::joint::nonlinear::NonlinearMaps;
     use crate::train::joint::parameters::Frame;
+    use crate::train::oscillator::standard_library;
     use crate::train::random::Random;
 
     const WEIGHTS: LossWeights = LossWeights {
@@ -300,8 +297,7 @@ mod tests {
 
     /// Library, batch of phase 1 of 2, and moved random parameters with layers of `widths`.
     fn setup(widths: (&[usize], &[usize]), phi: Activation) -> (Features, Batch, Parameters) {
-        let library = Library::standard(3, StandardLibrary::default()).expect("small library");
-        let features = Features::new(&library);
+        let features = Features::new(&standard_library(3, 1, true));
         let mut random = Random::new(11);
         let blocks = std::array::from_fn(|_| random.matrix(30, 7, 0.8));
         let shape = (features.library_dim(), 2, 0.1);
@@ -435,13 +431,8 @@ mod tests {
         assert!((a - b).abs() < 1e-9 * b && (losses.lift - reference.lift).abs() < 1e-9);
         let (mut found, mut expected) = (found.gradient().clone(), expected.gradient().clone());
         for (found, expected) in all(&mut found).into_iter().zip(all(&mut expected)) {
-            let close = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9 * b.abs().max(1.0);
-            assert!(
-                found
-                    .iter()
-                    .zip(expected.iter())
-                    .all(|(a, b)| close((a, b)))
-            );
+            let mut each = found.iter().zip(expected.iter());
+            assert!(each.all(|(a, b)| (a - b).abs() < 1e-9 * b.abs().max(1.0)));
         }
     }
 }

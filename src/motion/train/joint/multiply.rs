@@ -48,6 +48,13 @@ pub fn product_into(out: &mut DMatrix<f64>, start: usize, a: Columns<'_>, b: &DM
     vectors::run(AddProduct { out, scale, a, b });
 }
 
+/// `a b`.
+pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut product = DMatrix::zeros(a.nrows(), b.ncols());
+    add_product(&mut product, 1.0, a, b);
+    product
+}
+
 /// `out += scale a b`.
 pub fn add_product(out: &mut DMatrix<f64>, scale: f64, a: &DMatrix<f64>, b: &DMatrix<f64>) {
     let (out, a) = (out.as_mut_slice(), Columns::all(a));
@@ -147,23 +154,15 @@ mod tests {
             add_product(&mut sum, -2.0, &a, &b);
             assert!((sum + &plain).amax() < 1e-13);
             let mut gram = DMatrix::from_element(inner, 2, 1.0);
-            add_transposed(
-                &mut gram,
-                3.0,
-                Columns::all(&a),
-                Columns::some(&plain, 1, 2),
-            );
+            let two = Columns::some(&plain, 1, 2);
+            add_transposed(&mut gram, 3.0, Columns::all(&a), two);
             let expected = a.transpose() * plain.columns(1, 2) * 3.0;
             assert!((gram.add_scalar(-1.0) - expected).amax() < 1e-12);
             let mut wide = DMatrix::from_element(37, 9, 5.0);
             product_into(&mut wide, 3, Columns::all(&a), &b);
             assert!((wide.columns(3, 4) - &plain).amax() < 1e-13);
-            assert!(
-                wide.columns(0, 3)
-                    .iter()
-                    .chain(wide.columns(7, 2).iter())
-                    .all(|v| *v == 5.0)
-            );
+            let (before, after) = (wide.columns(0, 3), wide.columns(7, 2));
+            assert!(before.iter().chain(&after).all(|v| *v == 5.0));
         }
     }
 }

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::batch::Batch;
 use super::loss::{At, DecoderLoss, LossWeights, Losses, Maps, XiLoss, l1_subgradient};
-use super::multiply::{Columns, add_product, add_transposed};
+use super::multiply::{Columns, add_transposed, product};
 use super::network::{Jacobians, Tape};
 use super::parameters::{Frame, Parameters};
 use super::projection::InputProjections;
@@ -143,17 +143,12 @@ impl Maps for NonlinearMaps {
         }
         let onto_inputs = onto_variables.columns(2 * d, d).into_owned();
         let total = batch.input_moment.trace().max(f64::MIN_POSITIVE);
-        let Encoded {
-            jacobians,
-            rows,
-            projections,
-            ..
-        } = &self.encoded;
-        let lift = at.weights.lift / total;
-        let mut onto_rows = projections.adjoint(rows, &batch.u, &onto_inputs, lift);
+        let encoded = &self.encoded;
+        let (projections, lift) = (&encoded.projections, at.weights.lift / total);
+        let mut onto_rows = projections.adjoint(&encoded.rows, &batch.u, &onto_inputs, lift);
         self.frame.scale_jacobian(&mut onto_rows);
         let (tape, own) = (&self.encoder_tape, &mut gradient.encoder);
-        let at_affine = encoder.jacobian_adjoint(tape, jacobians, &onto_rows, own);
+        let at_affine = encoder.jacobian_adjoint(tape, &encoded.jacobians, &onto_rows, own);
         encoder.backward(tape, onto_stack * self.frame.latent, &at_affine, own);
         1.0 - projections.carried / total
     }
@@ -164,7 +159,7 @@ impl Maps for NonlinearMaps {
         let states = frame.enter(batch).rows(0, n).into_owned();
         let z = parameters.encoder.forward(states, n, &mut tape);
         Box::new(move |decoder, gradient| {
-            gradient.blocks_mut().for_each(|block| block.fill(0.0));
+            gradient.clear();
             let mut leaving = decoder.forward(z.clone(), n, &mut tape);
             let (mut loss, share) = (0.0, 1.0 / leaving.len() as f64);
             for (i, mut column) in leaving.column_iter_mut().enumerate() {
@@ -234,25 +229,24 @@ impl XiSamples {
 
     fn evaluate(&self, xi: &DMatrix<f64>, weights: LossWeights) -> (Losses, DMatrix<f64>) {
         let (n, d) = self.ddz.shape();
-        let mut predicted = DMatrix::zeros(n, d);
-        add_product(&mut predicted, 1.0, &self.theta, xi);
-        let mut product = DMatrix::zeros(n, d);
+        let predicted = product(&self.theta, xi);
+        let mut decoded = DMatrix::zeros(n, d);
         for a in 0..d {
             for b in 0..d {
-                let mut column = product.column_mut(a);
+                let mut column = decoded.column_mut(a);
                 column += self.gram[a * d + b].component_mul(&predicted.column(b));
             }
         }
         let (latent_scale, real_scale) = (1.0 / (n * d) as f64, 1.0 / (n * self.state_dim) as f64);
         let residual = &predicted - &self.ddz;
-        let square = predicted.dot(&product) - 2.0 * predicted.dot(&self.cross) + self.energy;
+        let square = predicted.dot(&decoded) - 2.0 * predicted.dot(&self.cross) + self.energy;
         let mut losses = Losses {
             ddz: latent_scale * residual.norm_squared(),
             ddx: real_scale * square,
             ..Losses::default()
         };
         let adjoint = residual * (2.0 * weights.ddz * latent_scale)
-            + (product - &self.cross) * (2.0 * weights.ddx * real_scale);
+            + (decoded - &self.cross) * (2.0 * weights.ddx * real_scale);
         let mut gradient = DMatrix::zeros(xi.nrows(), d);
         let (theta, adjoint) = (Columns::all(&self.theta), Columns::all(&adjoint));
         add_transposed(&mut gradient, 1.0, theta, adjoint);

@@ -42,9 +42,8 @@ impl Parameters {
 
     /// Sets every number to zero.
     pub fn clear(&mut self) {
-        let maps = self.encoder.blocks_mut().chain(self.decoder.blocks_mut());
-        maps.chain(self.xi.iter_mut().map(|xi| xi.as_mut_slice()))
-            .for_each(|block| block.fill(0.0));
+        self.maps_mut().for_each(|block| block.fill(0.0));
+        self.xi.iter_mut().for_each(|xi| xi.fill(0.0));
     }
 
     /// Weights and biases of encoder and decoder as slices, in a fixed order.

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Sender, channel};
 
 use nalgebra::{DMatrix, DVector};
 
-use super::batch::{Batch, BatchOptions, batches};
+use super::batch::{Batch, batches};
 use super::fold::{self, LatentBasis};
 use super::linear::{LinearMaps, mask_rows};
 use super::loss::{JointLoss, LossWeights, Losses, Maps};
@@ -20,8 +20,10 @@ use crate::train::data_sets::Recordings;
 use crate::train::dataset::Quantity;
 use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
-use crate::train::latent::{Latent, fit_affine, least_squares_decoder, map_samples, mean_jacobian};
-use crate::train::options::{JointOptions, TrainOptions, Transfer};
+use crate::train::latent::{
+    EncodedSet, Latent, fit_affine, least_squares_decoder, map_samples, mean_jacobian,
+};
+use crate::train::options::{TrainOptions, Transfer};
 use crate::train::progress::Watch;
 use crate::train::random::Random;
 use crate::train::report::{SeedReport, Trained};
@@ -45,15 +47,8 @@ pub fn joint(
     watch: &mut Watch<'_>,
 ) -> Result<Trained, TrainError> {
     let task = Task::new(recordings.clone(), robot, options)?;
-    let scaling = options.scaling.factors();
-    let rule = options.input_rule(robot);
-    let batch_options = BatchOptions {
-        phases: &options.phases,
-        scaling: &scaling,
-        rows: options.joint.batch_rows,
-        smoothing: options.regression.smoothing,
-    };
-    let training = batches(&recordings.training, &rule, &batch_options)?;
+    let cut = |set| batches(set, &task.training);
+    let training = cut(&recordings.training)?;
     let trainer = Trainer {
         task: &task,
         batches: &training,
@@ -61,7 +56,7 @@ pub fn joint(
     };
     let runs = trainer.run_seeds(watch);
 
-    let validation = batches(&recordings.validation, &rule, &batch_options)?;
+    let validation = cut(&recordings.validation)?;
     let judged = if validation.is_empty() {
         &training
     } else {
@@ -74,7 +69,7 @@ pub fn joint(
         let outcome = outcome.map_err(|error| trainer.explained(error, seed));
         seeds.add(seed, outcome, watch)?;
     }
-    seeds.into_model(task, robot, "joint", origin)
+    seeds.into_model(task, "joint", origin)
 }
 
 /// Units in which the maps see the states: for linear maps and as published those of the samples, else centred and in
@@ -86,7 +81,7 @@ fn frame(task: &Task<'_>) -> Frame {
     if options.joint.maps.is_linear() || options.joint.transfer == Transfer::Published {
         return plain;
     }
-    let x = task.sets.training.gather(Quantity::X, None);
+    let x = task.training.gather(Quantity::X, None);
     let least = options.encoder.least_std * options.scaling.state;
     let spread: DVector<f64> = x
         .column_variance()
@@ -118,61 +113,44 @@ impl Trainer<'_> {
     /// Trains all seeds on the threads of the options, in rounds, none of which begins after a cancellation; results
     /// are in the order of the seeds.
     fn run_seeds(&self, watch: &mut Watch<'_>) -> Vec<Run> {
-        let JointOptions {
-            threads,
-            ref schedule,
-            ..
-        } = self.task.options.joint;
-        let seeds = self.task.options.seeds();
-        watch.stage(
-            "training encoder, decoder and dynamics",
-            seeds.len() * schedule.total(),
-        );
-        let cancel = watch.cancel_flag();
+        let options = &self.task.options.joint;
+        let (threads, epochs) = (options.threads.max(1), options.schedule.total());
+        let (seeds, cancel) = (self.task.options.seeds(), watch.cancel_flag());
+        let steps = seeds.len() * epochs;
+        watch.stage("training encoder, decoder and dynamics", steps);
         let mut runs = Vec::new();
-        for (round, group) in seeds.chunks(threads.max(1)).enumerate() {
+        for (round, group) in seeds.chunks(threads).enumerate() {
             if watch.cancelled() {
                 break;
             }
-            let done_before = round * threads.max(1) * schedule.total();
             let (sender, receiver) = channel();
             std::thread::scope(|scope| {
-                let workers: Vec<_> = group
-                    .iter()
-                    .map(|&seed| {
-                        let sender = sender.clone();
-                        scope.spawn(move || self.run_seed(seed, cancel, &sender))
-                    })
-                    .collect();
+                let started = group.iter().map(|&seed| {
+                    let sender = sender.clone();
+                    scope.spawn(move || self.run_seed(seed, cancel, &sender))
+                });
+                let workers: Vec<_> = started.collect();
                 drop(sender);
                 for (done, text) in receiver.iter().enumerate() {
-                    watch.done(done_before + done + 1, text);
+                    watch.done(round * threads * epochs + done + 1, text);
                 }
-                runs.extend(
-                    workers
-                        .into_iter()
-                        .map(|worker| worker.join().expect("a seed does not panic")),
-                );
+                for worker in workers {
+                    runs.push(worker.join().expect("a seed does not panic"));
+                }
             });
         }
         runs
     }
 
     fn run_seed(&self, seed: u64, cancel: &AtomicBool, news: &Sender<String>) -> Run {
-        let JointOptions {
-            schedule,
-            unroll,
-            transfer,
-            xi_start,
-            maps,
-            ..
-        } = &self.task.options.joint;
+        let options = &self.task.options.joint;
+        let (schedule, published) = (&options.schedule, self.is_published());
         let weights = LossWeights {
             lift: self.task.options.encoder.lift_weight,
-            ..self.task.options.joint.weights
+            ..options.weights
         };
         let mut parameters = self.start(seed);
-        let mut loss = self.loss(weights, &parameters).with_unroll(*unroll);
+        let mut loss = self.loss(weights, &parameters).with_unroll(options.unroll);
         let mut listener = |epoch: usize, losses: &Losses, active: usize| {
             // Nobody listens any more if the training is being dropped; that ends soon by itself.
             let _ = news.send(format!(
@@ -185,17 +163,17 @@ impl Trainer<'_> {
         let all: Vec<&Batch> = self.batches.iter().collect();
         let of_phase = |phase: usize| all.iter().copied().filter(move |b| b.phase == phase);
         // The published first step sees contact only. A network says nothing about states that it was not trained on.
-        let first = match maps.is_linear() || *transfer == Transfer::Published {
+        let first = match self.is_linear() || published {
             true => of_phase(0).collect(),
             false => all.clone(),
         };
         let losses = train_together(&mut parameters, &first, &mut loss, schedule, &mut listener);
         let mut quiet = |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
-        if *transfer == Transfer::Published {
+        if published {
             train_decoder(&mut parameters, &all, &loss, schedule, &mut quiet);
             for phase in 0..parameters.xi.len() {
                 let own: Vec<&Batch> = of_phase(phase).collect();
-                parameters.xi[phase].fill(*xi_start);
+                parameters.xi[phase].fill(options.xi_start);
                 train_xi(
                     &mut parameters,
                     phase,
@@ -227,33 +205,30 @@ impl Trainer<'_> {
         self.task.options.joint.maps.is_linear()
     }
 
+    fn is_published(&self) -> bool {
+        self.task.options.joint.transfer == Transfer::Published
+    }
+
     /// Coordinates that the encoder may use.
     fn mask(&self) -> Vec<bool> {
-        self.frame
-            .factors
-            .iter()
-            .map(|factor| *factor != 0.0)
-            .collect()
+        let factors = self.frame.factors.iter();
+        factors.map(|factor| *factor != 0.0).collect()
     }
 
     /// Where a seed starts: random maps, and for linear ones `b_e = 0` as published or `-W_e mean(x)`.
     fn start(&self, seed: u64) -> Parameters {
-        let JointOptions {
-            xi_start,
-            maps,
-            transfer,
-            ..
-        } = &self.task.options.joint;
-        let (d, training) = (self.task.options.latent_dim, &self.task.sets.training);
+        let options = &self.task.options.joint;
+        let (maps, training) = (&options.maps, &self.task.training);
+        let d = self.task.options.latent_dim;
         let encoder = [&[STATE_DIM], &maps.encoder_layers[..], &[d]].concat();
         let decoder = [&[d], &maps.decoder_layers[..], &[STATE_DIM]].concat();
-        let phases = training.phases.patterns.len();
-        let shape = (self.task.features.library_dim(), phases, *xi_start);
+        let (terms, phases) = (&self.task.features, training.phases.patterns.len());
+        let shape = (terms.library_dim(), phases, options.xi_start);
         let widths = (&encoder[..], &decoder[..]);
         let mut start = Parameters::random(widths, maps.activation, shape, &mut Random::new(seed));
         if self.is_linear() {
             let encoder = &mut start.encoder.layers[0];
-            if *transfer == Transfer::Chosen {
+            if !self.is_published() {
                 let mean = training.gather(Quantity::X, Some(0)).column_mean();
                 encoder.bias = -(encoder.weights.tr_mul(&mean));
                 start.decoder.layers[0].bias = mean;
@@ -270,20 +245,17 @@ impl Trainer<'_> {
         judged: &[Batch],
         watch: &mut Watch<'_>,
     ) -> Result<(SeedReport, Fitted), TrainError> {
-        let (fitted, score) = match self.task.options.joint.transfer {
-            Transfer::Published => {
-                let score = self.published_score(&run.parameters, judged);
-                (self.published(run.parameters)?, score)
-            }
-            Transfer::Chosen => {
-                let maps = match self.is_linear() {
-                    true => self.linear_maps(&run.parameters)?,
-                    false => self.nonlinear_maps(&run.parameters)?,
-                };
-                let fitted = self.task.fit_dynamics(maps, watch)?;
-                let score = fitted.score();
-                (fitted, score)
-            }
+        let (fitted, score) = if self.is_published() {
+            let score = self.published_score(&run.parameters, judged);
+            (self.published(run.parameters)?, score)
+        } else {
+            let maps = match self.is_linear() {
+                true => self.linear_maps(&run.parameters)?,
+                false => self.nonlinear_maps(&run.parameters)?,
+            };
+            let fitted = self.task.fit_dynamics(maps, watch)?;
+            let score = fitted.score();
+            (fitted, score)
         };
         let report = (self.task).seed_report(&fitted, (run.seed, score), Some(run.losses))?;
         Ok((report, fitted))
@@ -293,10 +265,8 @@ impl Trainer<'_> {
     fn published_score(&self, parameters: &Parameters, judged: &[Batch]) -> f64 {
         let weights = self.task.options.joint.weights;
         let mut loss = self.loss(weights, parameters);
-        let total: f64 = judged
-            .iter()
-            .map(|batch| loss.evaluate(parameters, batch).total(&weights))
-            .sum();
+        let mut of = |batch| loss.evaluate(parameters, batch).total(&weights);
+        let total: f64 = judged.iter().map(&mut of).sum();
         total / judged.len().max(1) as f64
     }
 
@@ -304,7 +274,7 @@ impl Trainer<'_> {
     fn published(&self, parameters: Parameters) -> Result<Fitted, TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
         let (encoder, decoder) = self.state_maps(&parameters, &plain)?;
-        let x = self.task.sets.training.gather(Quantity::X, None);
+        let x = self.task.training.gather(Quantity::X, None);
         Ok(Fitted {
             weights: mean_jacobian(&encoder, &x),
             encoder,
@@ -321,9 +291,7 @@ impl Trainer<'_> {
         parameters: &Parameters,
         basis: &LatentBasis,
     ) -> Result<(StateMap, StateMap), TrainError> {
-        let Parameters {
-            encoder, decoder, ..
-        } = parameters;
+        let (encoder, decoder) = (&parameters.encoder, &parameters.decoder);
         if !self.is_linear() {
             let encoder = fold::encoder(encoder, &self.frame, basis)?;
             return Ok((encoder, fold::decoder(decoder, &self.frame, basis)?));
@@ -339,19 +307,17 @@ impl Trainer<'_> {
     /// The encoder over the learned row space, and its least-squares decoder.
     fn linear_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
         let learned = parameters.encoder.layers[0].weights.clone().qr().q();
-        let basis = self
-            .task
-            .frame
-            .nearest(&learned, self.task.options.latent_dim);
-        let encoder = self.task.encoder_over(&basis)?.into();
-        let decoder = least_squares_decoder(&self.task.sets.training, &encoder)?.into();
+        let (task, d) = (self.task, self.task.options.latent_dim);
+        let basis = task.frame.nearest(&learned, d);
+        let encoder = task.encoder_over(&basis)?.into();
+        let decoder = least_squares_decoder(&task.training, &encoder)?.into();
         Ok((encoder, decoder))
     }
 
     /// The learned networks in the canonical latent basis, the decoder's last layer by least squares.
     fn nonlinear_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
-        let x = self.task.sets.training.gather(Quantity::X, None);
+        let x = self.task.training.gather(Quantity::X, None);
         let basis = self.basis(&self.state_maps(parameters, &plain)?.0, &x);
         let (encoder, decoder) = self.state_maps(parameters, &basis)?;
         let decoder = with_fitted_last_layer(&decoder, &x, &map_samples(&encoder, &x))?;
@@ -389,12 +355,12 @@ impl Trainer<'_> {
         if !matches!(error, TrainError::Model(ModelError::NonFinite { .. })) {
             return error;
         }
-        let training = &self.task.sets.training;
+        let training = &self.task.training;
         let terms_at_start = || {
             let plain = LatentBasis::unchanged(self.task.options.latent_dim);
             let encoder = self.state_maps(&self.start(seed), &plain)?.0;
             let latent = Latent::of(training, &encoder)?;
-            check_terms(training, &latent, &self.task.features)
+            check_terms(EncodedSet::new(training, &latent), &self.task.features)
         };
         terms_at_start().err().unwrap_or(error)
     }

@@ -1,13 +1,12 @@
 //! Epochs of a transfer step, and the coefficients that sequential thresholding leaves.
 
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 
 use super::adam::Adam;
 use super::loss::LossWeights;
 
 /// Epochs, thresholding and step length.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     /// Epochs with the L1 term and thresholding.
     pub epochs: usize,

@@ -134,12 +134,13 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use super::*;
-    use crate::model::{Activation, Library, StandardLibrary};
+    use crate::model::Activation;
     use crate::train::features::Features;
     use crate::train::joint::linear::{LinearMaps, mask_rows};
     use crate::train::joint::loss::{LossWeights, Maps};
     use crate::train::joint::nonlinear::NonlinearMaps;
     use crate::train::joint::parameters::Frame;
+    use crate::train::oscillator::standard_library;
     use crate::train::random::Random;
 
     const WEIGHTS: LossWeights = LossWeights {
@@ -154,12 +155,7 @@ mod tests {
 
     /// Linear maps for the linear activation, else networks with a hidden layer; two phases.
     fn setup(kind: Activation) -> (Features, Vec<Batch>, Parameters) {
-        let standard = StandardLibrary {
-            degree: 1,
-            trigonometric: true,
-            inputs: true,
-        };
-        let features = Features::new(&Library::standard(2, standard).expect("small library"));
+        let features = Features::new(&standard_library(2, 1, true));
         let mut random = Random::new(21);
         let batch = |i: usize| {
             let blocks = std::array::from_fn(|_| random.matrix(40, 6, 0.5));

@@ -23,7 +23,7 @@ pub enum Integrator {
 }
 
 /// Shape of the window.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unroll {
     /// Steps predicted from every sample.
     pub window: usize,
@@ -210,49 +210,37 @@ impl Unroll {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Library, StandardLibrary};
+    use crate::train::oscillator::standard_library;
     use crate::train::random::Random;
 
-    const STEP_S: f64 = 0.1;
-
     fn setup() -> (Features, DMatrix<f64>, DMatrix<f64>) {
-        let standard = StandardLibrary {
-            degree: 2,
-            trigonometric: true,
-            inputs: true,
-        };
-        let features = Features::new(&Library::standard(2, standard).expect("small library"));
+        let features = Features::new(&standard_library(2, 2, true));
         let mut random = Random::new(8);
         let xi = random.matrix(features.library_dim(), 2, 0.4);
         (features, random.matrix(20, 6, 0.8), xi)
     }
 
-    fn loss(
+    /// The loss for this time between samples, and its gradients by the variables and by Xi times 0.3.
+    fn evaluate(
         unroll: &Unroll,
         features: &Features,
-        variables: &DMatrix<f64>,
-        xi: &DMatrix<f64>,
-    ) -> f64 {
+        (variables, xi): (&DMatrix<f64>, &DMatrix<f64>),
+        step_s: f64,
+    ) -> (f64, [DMatrix<f64>; 2]) {
         let samples = Window {
             variables,
             xi,
-            step_s: STEP_S,
+            step_s,
         };
-        let (mut a, mut b) = (DMatrix::zeros(20, 6), xi.clone());
-        unroll.evaluate(
-            features,
-            samples,
-            1.0,
-            &mut Adjoints {
-                variables: &mut a,
-                xi: &mut b,
-            },
-        )
+        let mut gradients = [variables, xi].map(|matrix| matrix.map(|_| 0.0));
+        let [variables, xi] = &mut gradients;
+        let loss = unroll.evaluate(features, samples, 0.3, &mut Adjoints { variables, xi });
+        (loss, gradients)
     }
 
     #[test]
     fn gradient_agrees_with_finite_differences_for_every_integrator() {
-        let (features, mut variables, mut xi) = setup();
+        let (features, variables, xi) = setup();
         for integrator in [Integrator::Euler, Integrator::Rk2, Integrator::Rk4] {
             let unroll = Unroll {
                 window: 3,
@@ -260,39 +248,18 @@ mod tests {
                 decay: 0.7,
                 integrator,
             };
-            let (mut to_variables, mut to_xi) = (DMatrix::zeros(20, 6), xi.map(|_| 0.0));
-            let samples = Window {
-                variables: &variables,
-                xi: &xi,
-                step_s: STEP_S,
-            };
-            let mut adjoints = Adjoints {
-                variables: &mut to_variables,
-                xi: &mut to_xi,
-            };
-            unroll.evaluate(&features, samples, 0.3, &mut adjoints);
-            let agree = |above: f64, below: f64, exact: f64| {
-                let difference = 0.3 * (above - below) / 2e-6;
-                let close = (difference - exact).abs() < 1e-6 * exact.abs().max(0.1);
-                assert!(close, "{integrator:?}: {difference} {exact}");
-            };
-            for i in 0..variables.len() {
-                let kept = variables[i];
-                variables[i] = kept + 1e-6;
-                let above = loss(&unroll, &features, &variables, &xi);
-                variables[i] = kept - 1e-6;
-                let below = loss(&unroll, &features, &variables, &xi);
-                variables[i] = kept;
-                agree(above, below, to_variables[i]);
-            }
-            for i in 0..xi.len() {
-                let kept = xi[i];
-                xi[i] = kept + 1e-6;
-                let above = loss(&unroll, &features, &variables, &xi);
-                xi[i] = kept - 1e-6;
-                let below = loss(&unroll, &features, &variables, &xi);
-                xi[i] = kept;
-                agree(above, below, to_xi[i]);
+            let (_, exact) = evaluate(&unroll, &features, (&variables, &xi), 0.1);
+            for (of, exact) in exact.iter().enumerate() {
+                for (i, exact) in exact.iter().enumerate() {
+                    let at = |step: f64| {
+                        let mut moved = [variables.clone(), xi.clone()];
+                        moved[of][i] += step;
+                        evaluate(&unroll, &features, (&moved[0], &moved[1]), 0.1).0
+                    };
+                    let difference = 0.3 * (at(1e-6) - at(-1e-6)) / 2e-6;
+                    let close = (difference - exact).abs() < 1e-6 * exact.abs().max(0.1);
+                    assert!(close, "{integrator:?}: {difference} {exact}");
+                }
             }
         }
     }
@@ -300,20 +267,9 @@ mod tests {
     #[test]
     fn loss_of_the_true_model_falls_with_the_order_of_the_integrator() {
         // ddz = -z has z = cos t: the library's row of z1 has coefficient -1.
-        let standard = StandardLibrary {
-            degree: 1,
-            trigonometric: false,
-            inputs: true,
-        };
-        let library = Library::standard(1, standard).expect("small library");
-        let features = Features::new(&library);
-        let row = library
-            .terms()
-            .iter()
-            .position(|term| term.text() == "z1")
-            .expect("z1");
-        let mut xi = DMatrix::zeros(library.len(), 1);
-        xi[(row, 0)] = -1.0;
+        let features = Features::new(&standard_library(1, 1, false));
+        let mut xi = DMatrix::zeros(features.library_dim(), 1);
+        xi[(features.variable_term(0).expect("z1"), 0)] = -1.0;
         let variables = DMatrix::from_fn(60, 3, |i, column| {
             let t = i as f64 * 0.02;
             [t.cos(), -t.sin(), 0.0][column]
@@ -325,21 +281,7 @@ mod tests {
                 decay: 1.0,
                 integrator,
             };
-            let samples = Window {
-                variables: &variables,
-                xi: &xi,
-                step_s: 0.02,
-            };
-            let (mut a, mut b) = (variables.clone(), xi.clone());
-            unroll.evaluate(
-                &features,
-                samples,
-                1.0,
-                &mut Adjoints {
-                    variables: &mut a,
-                    xi: &mut b,
-                },
-            )
+            evaluate(&unroll, &features, (&variables, &xi), 0.02).0
         };
         let [euler, rk2, rk4] = [Integrator::Euler, Integrator::Rk2, Integrator::Rk4].map(loss);
         assert!(
@@ -357,6 +299,7 @@ mod tests {
             stride: 5,
             ..Unroll::default()
         };
-        assert_eq!(loss(&unroll, &features, &variables, &xi), 0.0);
+        let (loss, gradients) = evaluate(&unroll, &features, (&variables, &xi), 0.1);
+        assert_eq!((loss, gradients.map(|g| g.amax())), (0.0, [0.0; 2]));
     }
 }

@@ -73,7 +73,7 @@ struct PriorTables([DMatrix<f64>; 4]);
 
 impl Fit<'_> {
     fn prior(&self, jumps: &[&Sampled]) -> PriorTables {
-        let regression = GoalRegression::of_goals(jumps.iter().map(|jump| &jump.goal), self.goal);
+        let regression = GoalRegression::of(jumps.iter().copied(), self.goal);
         let table = |pick: &dyn Fn(&PartNodes) -> DMatrix<f64>| {
             let values = jumps.iter().map(|jump| pick(&jump.parts[self.part]));
             let values: Vec<DMatrix<f64>> = values.collect();

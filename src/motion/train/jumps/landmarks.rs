@@ -85,12 +85,11 @@ fn cut(training: &Dataset, jump: &Jump, rising: impl Fn(usize) -> bool) -> Optio
         return None;
     }
     let thrust = 1 + (0..in_air.start).rev().find(|&sample| !rising(sample))?;
-    let feet = |phase: usize| feet_of(training, phase);
     let landmark = |name: &str, phase: usize| {
         Some(Landmark {
             name: name.to_owned(),
             phase,
-            feet: feet(phase)?,
+            feet: feet_of(training, phase)?,
         })
     };
     let (mut kind, mut borders) = (Vec::new(), Vec::new());
@@ -129,17 +128,12 @@ fn cut(training: &Dataset, jump: &Jump, rising: impl Fn(usize) -> bool) -> Optio
 
 /// The cut at these borders; none with a part of too few samples.
 fn finished(jump: &Jump, kind: Vec<Landmark>, borders: Vec<usize>) -> Option<Cut> {
-    if borders
-        .windows(2)
-        .any(|pair| pair[1] < pair[0] + LEAST_SAMPLES)
-    {
-        return None;
-    }
-    let times_s = borders.iter().map(|&sample| jump.time_s[sample]).collect();
-    Some(Cut {
+    let mut parts = borders.windows(2);
+    let long_enough = parts.all(|pair| pair[1] >= pair[0] + LEAST_SAMPLES);
+    long_enough.then(|| Cut {
         kind,
+        times_s: borders.iter().map(|&sample| jump.time_s[sample]).collect(),
         borders,
-        times_s,
     })
 }
 
@@ -152,19 +146,8 @@ fn feet_of(training: &Dataset, phase: usize) -> Option<ContactFlags> {
 
 /// The parts that most jumps have.
 pub fn commonest_kind(cuts: &[Option<Cut>]) -> Option<Vec<Landmark>> {
-    let kinds = cuts.iter().flatten().map(|cut| &cut.kind);
-    let count = |kind: &Vec<Landmark>| {
-        cuts.iter()
-            .flatten()
-            .filter(|cut| cut.kind == *kind)
-            .count()
-    };
-    // The first of those that are equally common.
-    let mut best: Option<&Vec<Landmark>> = None;
-    for kind in kinds {
-        if best.is_none_or(|best| count(kind) > count(best)) {
-            best = Some(kind);
-        }
-    }
-    best.cloned()
+    let kinds = || cuts.iter().flatten().map(|cut| &cut.kind);
+    let count = |kind: &&Vec<Landmark>| kinds().filter(|other| other == kind).count();
+    // `max_by_key` takes the last of equals: reversed, the first is taken.
+    kinds().rev().max_by_key(count).cloned()
 }

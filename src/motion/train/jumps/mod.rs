@@ -18,7 +18,7 @@ use super::latent::Latent;
 use super::metrics::{BODY_X, BODY_Z};
 use super::report::PartScore;
 use crate::model::{GOAL_DIM, GoalRange, JumpPart, JumpPrior, StateMap};
-use deviations::{Deviations, fit_deviations};
+use deviations::fit_deviations;
 use landmarks::{Cut, Landmark, commonest_kind};
 use nodes::{PartNodes, intervals, sample};
 use regression::GoalRegression;
@@ -130,14 +130,10 @@ fn part_of(
     let durations: Vec<f64> = all.iter().map(|nodes| nodes.duration_s).collect();
     let least = durations.iter().copied().fold(f64::INFINITY, f64::min);
     let most = durations.iter().copied().fold(0.0, f64::max);
-    let Deviations {
-        xi,
-        acceleration_std,
-        ddz_r2,
-    } = fit_deviations(sampled, goal, part, translation);
+    let deviations = fit_deviations(sampled, goal, part, translation);
     let score = PartScore {
         part: landmark.name.clone(),
-        ddz_r2,
+        ddz_r2: deviations.ddz_r2,
     };
     let part = JumpPart {
         name: landmark.name.clone(),
@@ -148,9 +144,9 @@ fn part_of(
         z: table(|nodes| &nodes.z),
         dz: table(|nodes| &nodes.dz),
         u_lat: table(|nodes| &nodes.u_lat),
-        xi: Some(xi.map(rounded)),
+        xi: Some(deviations.xi.map(rounded)),
         input_covariance: input_covariance(&all).map(rounded),
-        acceleration_std: acceleration_std.map(rounded),
+        acceleration_std: deviations.acceleration_std.map(rounded),
     };
     (part, score)
 }

@@ -16,18 +16,12 @@ pub struct GoalRegression {
 
 impl GoalRegression {
     /// The regression over the goals of these jumps.
-    pub fn of(sampled: &[Sampled], goal: &[GoalRange; GOAL_DIM]) -> Self {
-        Self::of_goals(sampled.iter().map(|jump| &jump.goal), goal)
-    }
-
-    /// The same by the goals alone.
-    pub fn of_goals<'a>(
-        goals: impl Iterator<Item = &'a [f64; GOAL_DIM]>,
+    pub fn of<'a>(
+        jumps: impl IntoIterator<Item = &'a Sampled>,
         goal: &[GoalRange; GOAL_DIM],
     ) -> Self {
-        let columns: Vec<DVector<f64>> = goals
-            .map(|of| DVector::from_column_slice(&GoalRange::features(goal, of)))
-            .collect();
+        let features = |jump: &Sampled| GoalRange::features(goal, &jump.goal).to_vec().into();
+        let columns: Vec<DVector<f64>> = jumps.into_iter().map(features).collect();
         let phi = DMatrix::from_columns(&columns);
         let ridge = DVector::from_fn(FEATURE_DIM, |k, _| if k == 0 { 0.0 } else { RIDGE });
         let gram = &phi * phi.transpose() + DMatrix::from_diagonal(&ridge);

@@ -1,24 +1,19 @@
 //! Landmarks, prior and deviations of the shipped recordings.
 
-use std::path::Path;
-
 use nalgebra::DMatrix;
 
 use super::*;
 use crate::model::{AffineMap, FEATURE_DIM};
-use crate::robot::{InputRule, Robot, STATE_DIM};
-use crate::train::TrainOptions;
+use crate::robot::STATE_DIM;
+use crate::train::oscillator::go1;
 
 fn training() -> Dataset {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/recordings/go1");
-    let jumps: Vec<_> = (1..=8)
-        .map(|k| crate::recording::read(&folder.join(format!("train_{k:02}.csv.gz"))))
-        .collect::<Result<_, _>>()
-        .expect("shipped recordings");
-    let options = TrainOptions::new("test", 4);
-    let rule = InputRule::published(Robot::by_name("go1").unwrap());
-    let scaling = options.scaling.factors();
-    Dataset::new(&jumps[..], &rule, &options.phases, &scaling, 11).expect("jumps")
+    go1((1..=8).map(|k| format!("train_{k:02}")))
+}
+
+fn learned(training: &Dataset) -> LearnedJumps {
+    let learned = learn_jumps(training, &encoder()).unwrap();
+    learned.expect("jumps of one kind")
 }
 
 /// An encoder of the body's x and z and the front right thigh and knee.
@@ -32,11 +27,7 @@ fn encoder() -> StateMap {
 
 #[test]
 fn jumps_are_cut_into_crouch_thrust_flight_and_landing() {
-    let training = training();
-    let prior = learn_jumps(&training, &encoder())
-        .unwrap()
-        .expect("jumps of one kind")
-        .prior;
+    let prior = learned(&training()).prior;
     let names: Vec<&str> = prior.parts.iter().map(|part| part.name.as_str()).collect();
     assert_eq!(names, ["crouch", "thrust", "flight", "landing"]);
     assert_eq!(prior.parts[2].feet, [false; 4]);
@@ -54,10 +45,7 @@ fn jumps_are_cut_into_crouch_thrust_flight_and_landing() {
 #[test]
 fn prior_at_the_goal_of_a_jump_is_nearer_to_it_than_the_mean_jump() {
     let training = training();
-    let prior = learn_jumps(&training, &encoder())
-        .unwrap()
-        .expect("jumps of one kind")
-        .prior;
+    let prior = learned(&training).prior;
     let latent = Latent::of(&training, &encoder()).unwrap();
     let last = prior.parts.last().unwrap();
     let error = |features: &dyn Fn(usize) -> [f64; FEATURE_DIM]| -> f64 {
@@ -75,10 +63,7 @@ fn prior_at_the_goal_of_a_jump_is_nearer_to_it_than_the_mean_jump() {
 
 #[test]
 fn deviations_know_nothing_of_where_the_robot_stands() {
-    let prior = learn_jumps(&training(), &encoder())
-        .unwrap()
-        .expect("jumps of one kind")
-        .prior;
+    let prior = learned(&training()).prior;
     for part in &prior.parts {
         let xi = part.xi.as_ref().unwrap();
         assert!(xi.row(0).amax() < 1e-9 * xi.amax(), "{}", part.name);
@@ -96,8 +81,7 @@ fn too_few_jumps_have_no_prior() {
 #[test]
 fn score_of_deviations_falls_when_inputs_belong_to_other_jumps() {
     let score = |training: &Dataset| -> f64 {
-        let learned = learn_jumps(training, &encoder()).unwrap();
-        let scores = learned.expect("jumps of one kind").scores;
+        let scores = learned(training).scores;
         let thrust = scores.iter().find(|score| score.part == "thrust");
         thrust.expect("a thrust").ddz_r2
     };

@@ -246,47 +246,18 @@ mod tests {
 
     #[test]
     fn settings_out_of_range_make_no_controller_and_say_which() {
-        let base = Settings::default();
-        let bad = [
-            (
-                "horizon",
-                Settings {
-                    horizon: -1,
-                    ..base
-                },
-            ),
-            ("horizon", Settings { horizon: 0, ..base }),
-            ("lift", Settings { lift: 2, ..base }),
-            (
-                "linearisation",
-                Settings {
-                    linearisation: -1,
-                    ..base
-                },
-            ),
-            (
-                "max_iterations",
-                Settings {
-                    max_iterations: -3,
-                    ..base
-                },
-            ),
-            (
-                "step_s",
-                Settings {
-                    step_s: f64::NAN,
-                    ..base
-                },
-            ),
-            (
-                "body_friction",
-                Settings {
-                    body_friction: -0.6,
-                    ..base
-                },
-            ),
+        let bad: [(&str, fn(&mut Settings)); 7] = [
+            ("horizon", |settings| settings.horizon = -1),
+            ("horizon", |settings| settings.horizon = 0),
+            ("lift", |settings| settings.lift = 2),
+            ("linearisation", |settings| settings.linearisation = -1),
+            ("max_iterations", |settings| settings.max_iterations = -3),
+            ("step_s", |settings| settings.step_s = f64::NAN),
+            ("body_friction", |settings| settings.body_friction = -0.6),
         ];
-        for (name, settings) in bad {
+        for (name, change) in bad {
+            let mut settings = Settings::default();
+            change(&mut settings);
             let found = Handle::<4>::create(Some(&settings), |settings| {
                 settings.check()?;
                 panic!("{name} was accepted");
@@ -302,54 +273,28 @@ mod tests {
         let mut handle = handle(false);
         assert_eq!(handle.set_reference(&stand.reference()), 0);
         let sound = stand.reference();
+        let RawReference {
+            time_s, x, u, feet, ..
+        } = sound;
+        let with = |time_s, x, u, feet| RawReference {
+            time_s,
+            x,
+            u,
+            feet,
+            ..sound
+        };
         let mut nan = stand.x.clone();
         nan[20] = f64::NAN;
         let mut repeated = stand.time_s.clone();
         repeated[7] = repeated[6];
         let faults = [
-            (BAD_POINTER, RawReference { x: None, ..sound }),
-            (
-                BAD_POINTER,
-                RawReference {
-                    feet: None,
-                    ..sound
-                },
-            ),
-            (
-                BAD_POINTER,
-                RawReference {
-                    u: Some(None),
-                    ..sound
-                },
-            ),
-            (
-                -1,
-                RawReference {
-                    x: Some(&nan),
-                    ..sound
-                },
-            ),
-            (
-                -2,
-                RawReference {
-                    x: Some(&stand.x[1..]),
-                    ..sound
-                },
-            ),
-            (
-                -2,
-                RawReference {
-                    time_s: Some(&[]),
-                    ..sound
-                },
-            ),
-            (
-                TIME_ORDER,
-                RawReference {
-                    time_s: Some(&repeated),
-                    ..sound
-                },
-            ),
+            (BAD_POINTER, with(time_s, None, u, feet)),
+            (BAD_POINTER, with(time_s, x, u, None)),
+            (BAD_POINTER, with(time_s, x, Some(None), feet)),
+            (-1, with(time_s, Some(&nan), u, feet)),
+            (-2, with(time_s, Some(&stand.x[1..]), u, feet)),
+            (-2, with(Some(&[]), x, u, feet)),
+            (TIME_ORDER, with(Some(&repeated), x, u, feet)),
         ];
         for (expected, reference) in faults {
             assert_eq!(handle.set_reference(&reference), expected, "{}", message());
@@ -367,18 +312,13 @@ mod tests {
         assert_eq!(handle.step(&stand.measurement(), &mut command), -3);
         assert_eq!(handle.set_reference(&stand.reference()), 0);
         let sound = stand.measurement();
-        let no_state = RawMeasurement { x: None, ..sound };
+        let [mut no_state, mut no_feet, mut not_finite] = [sound; 3];
+        no_state.x = None;
         assert_eq!(handle.step(&no_state, &mut command), BAD_POINTER);
         assert!(command.torque.iter().all(|torque| torque.abs() <= 23.7));
-        let no_feet = RawMeasurement {
-            feet: None,
-            ..sound
-        };
+        no_feet.feet = None;
         assert_eq!(handle.step(&no_feet, &mut command), BAD_POINTER);
-        let not_finite = RawMeasurement {
-            time_s: f64::NAN,
-            ..sound
-        };
+        not_finite.time_s = f64::NAN;
         assert_eq!(handle.step(&not_finite, &mut command), -1);
         assert_eq!(handle.step(&sound, &mut command), 0);
         handle.reset();

@@ -4,6 +4,7 @@ use super::super::elements::Quantity;
 use super::super::log::{Channel, Log};
 use super::super::units::Dimension;
 use super::names::{Reading, is_time, read, unit};
+use crate::recording::preprocess::median;
 use crate::robot::JOINT_DIM;
 
 /// The columns of one quantity.
@@ -63,14 +64,11 @@ pub(super) fn groups(logs: &[Log]) -> Vec<Group> {
                 true => 4,
                 false => quantity.elements().len(),
             };
-            let of = |element| {
-                members
-                    .iter()
-                    .find(|(_, reading)| reading.element == element)
+            let column = |element| {
+                let mut found = members.iter().filter(|(_, own)| own.element == element);
+                found.next().map(|(column, _)| *column)
             };
-            let columns: Option<Vec<usize>> = (0..count)
-                .map(|element| of(element).map(|found| found.0))
-                .collect();
+            let columns: Option<Vec<usize>> = (0..count).map(column).collect();
             let group = Group {
                 quantity,
                 log: *log,
@@ -135,12 +133,7 @@ pub(super) fn clock(logs: &[Log], groups: &[Group]) -> Option<Clock> {
     const UNITS: [&str; 4] = ["s", "ms", "us", "ns"];
     let factor = |unit: &str| Dimension::Time.factor(unit).unwrap_or(1.0);
     let told = unit(&channel.name, &["ms", "us", "ns", "s"]);
-    let told = told.filter(|unit| is_possible(channel, factor(unit)));
-    let unit = told.or_else(|| {
-        UNITS
-            .into_iter()
-            .find(|unit| is_possible(channel, factor(unit)))
-    })?;
+    let unit = (told.into_iter().chain(UNITS)).find(|unit| is_possible(channel, factor(unit)))?;
     Some(Clock {
         name: channel.name.clone(),
         unit,
@@ -156,13 +149,10 @@ fn is_possible(channel: &Channel, factor: f64) -> bool {
 /// Typical distance of samples in a column that counts upwards, else nothing.
 fn mean_step(channel: &Channel) -> Option<f64> {
     let steps: Vec<f64> = match &channel.instants {
-        Some(instants) => instants
-            .windows(2)
+        Some(instants) => (instants.windows(2))
             .map(|pair| pair[1].since(pair[0]))
             .collect(),
-        None => channel
-            .values
-            .windows(2)
+        None => (channel.values.windows(2))
             .map(|pair| pair[1] - pair[0])
             .collect(),
     };
@@ -171,10 +161,7 @@ fn mean_step(channel: &Channel) -> Option<f64> {
         .iter()
         .filter(|step| step.is_nan() || **step <= 0.0)
         .count();
-    let mut sorted: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
-    if sorted.is_empty() || back * 50 > steps.len() {
-        return None;
-    }
-    sorted.sort_by(f64::total_cmp);
-    Some(sorted[sorted.len() / 2])
+    let forward: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
+    let counts = !forward.is_empty() && back * 50 <= steps.len();
+    counts.then(|| median(forward.into_iter()))
 }

@@ -1,10 +1,12 @@
 //! What the numbers say: a velocity is the derivative of its position in one unit, sign and frame only.
 
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::DMatrix;
 
-use super::super::attitude::{RateAxes, angle_rates};
+use super::super::attitude::{angle_rates, in_world};
+use super::super::map::Frame;
+use crate::recording::check::quantile;
 use crate::recording::preprocess::differences;
-use crate::robot::input_rule::rotation;
+use crate::recording::segment::stretches;
 
 /// Share of a derivative that a velocity must leave unexplained at most to be evidence.
 const UNEXPLAINED: f64 = 0.5;
@@ -22,15 +24,10 @@ pub(super) struct Scale {
 /// Slopes without the samples at which time jumps.
 pub(super) fn slopes(times_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(rows.nrows(), rows.ncols());
-    let mut start = 0;
-    for end in 1..=times_s.len() {
-        if end < times_s.len() && times_s[end] > times_s[end - 1] {
-            continue;
-        }
-        let own = rows.columns(start, end - start).into_owned();
-        let of = differences(&times_s[start..end], &own);
-        out.columns_mut(start, end - start).copy_from(&of);
-        start = end;
+    for range in stretches(0..times_s.len(), |before, at| times_s[at] > times_s[before]) {
+        let own = rows.columns(range.start, range.len()).into_owned();
+        let of = differences(&times_s[range.clone()], &own);
+        out.columns_mut(range.start, range.len()).copy_from(&of);
     }
     out
 }
@@ -58,28 +55,15 @@ pub(super) fn scale(
     (best.1 < UNEXPLAINED).then_some(best)
 }
 
-/// Axes of the trunk's velocities.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Axes {
-    Angles,
-    World,
-    Body,
-}
-
 /// Unit and axes of an angular velocity that is the rate of these angles.
 pub(super) fn angular(
     angles: &DMatrix<f64>,
     rates: &DMatrix<f64>,
     raw: &DMatrix<f64>,
     units: &[(&'static str, f64)],
-) -> Option<(Scale, Axes)> {
-    let turned = |axes: Axes| match axes {
-        Axes::Angles => Some(raw.clone()),
-        Axes::Body => angle_rates(angles, raw, RateAxes::Body).ok(),
-        Axes::World => angle_rates(angles, raw, RateAxes::World).ok(),
-    };
-    best([Axes::Angles, Axes::Body, Axes::World], |axes| {
-        scale(rates, &turned(axes)?, units)
+) -> Option<(Scale, Frame)> {
+    best([Frame::Angles, Frame::Body, Frame::World], |frame| {
+        scale(rates, &angle_rates(angles, raw, frame).ok()?, units)
     })
 }
 
@@ -89,40 +73,31 @@ pub(super) fn linear(
     rates: &DMatrix<f64>,
     raw: &DMatrix<f64>,
     units: &[(&'static str, f64)],
-) -> Option<(Scale, Axes)> {
-    let turned = |axes: Axes| match (axes, angles) {
-        (Axes::Body, Some(angles)) if angles.ncols() == raw.ncols() => {
-            let mut out = raw.clone();
-            for i in 0..raw.ncols() {
-                let turn: Matrix3<f64> = rotation([angles[(0, i)], angles[(1, i)], angles[(2, i)]]);
-                out.set_column(i, &(turn * raw.fixed_view::<3, 1>(0, i)));
-            }
-            Some(out)
+) -> Option<(Scale, Frame)> {
+    best([Frame::World, Frame::Body], |frame| match frame {
+        Frame::World => scale(rates, raw, units),
+        Frame::Body => {
+            let angles = angles.filter(|angles| angles.ncols() == raw.ncols())?;
+            scale(rates, &in_world(angles, raw), units)
         }
-        (Axes::Body, _) | (Axes::Angles, _) => None,
-        (Axes::World, _) => Some(raw.clone()),
-    };
-    best([Axes::World, Axes::Body], |axes| {
-        scale(rates, &turned(axes)?, units)
+        Frame::Angles => None,
     })
 }
 
 /// The first choice that explains nearly as much as the best.
 fn best<const N: usize>(
-    choices: [Axes; N],
-    explain: impl Fn(Axes) -> Option<(Scale, f64)>,
-) -> Option<(Scale, Axes)> {
-    let found: Vec<(Axes, Scale, f64)> = choices
-        .into_iter()
-        .filter_map(|axes| explain(axes).map(|(scale, left)| (axes, scale, left)))
-        .collect();
+    choices: [Frame; N],
+    explain: impl Fn(Frame) -> Option<(Scale, f64)>,
+) -> Option<(Scale, Frame)> {
+    let found = choices.into_iter();
+    let found = found.filter_map(|frame| explain(frame).map(|(scale, left)| (frame, scale, left)));
+    let found: Vec<(Frame, Scale, f64)> = found.collect();
     let least = found
         .iter()
         .map(|choice| choice.2)
         .fold(f64::INFINITY, f64::min);
-    let first = found
-        .into_iter()
-        .find(|choice| choice.2 <= AS_GOOD * least + 1e-12)?;
+    let is_as_good = |choice: &(Frame, Scale, f64)| choice.2 <= AS_GOOD * least + 1e-12;
+    let first = found.into_iter().find(is_as_good)?;
     Some((first.1, first.0))
 }
 
@@ -140,8 +115,5 @@ pub(super) fn real_is_last(quaternions: &DMatrix<f64>) -> bool {
 
 /// The largest value, the 99th percentile of absolute values, so that single spikes do not count.
 pub(super) fn reach(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.map(f64::abs).collect();
-    sorted.sort_by(f64::total_cmp);
-    let place = (0.99 * (sorted.len() as f64 - 1.0)).max(0.0) as usize;
-    sorted.get(place).copied().unwrap_or_default()
+    quantile(values.map(f64::abs), 0.99)
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::super::assemble::assemble;
 use super::super::elements::Quantity;
 use super::super::log::Log;
-use super::super::map::{ColumnMap, TextFormat};
+use super::super::map::{ColumnMap, Name, TextFormat};
 use super::super::mcap::read_mcap;
 use super::super::text::read_text;
 use crate::recording::error::{RecordingError, RecordingFault};
@@ -80,22 +80,15 @@ pub(super) fn raw(logs: &[Log], group: &Group) -> nalgebra::DMatrix<f64> {
 pub(super) fn times_s(logs: &[Log], log: usize, clock: Option<&Clock>) -> Option<Vec<f64>> {
     let log = &logs[log];
     let clock = clock?;
-    let column = match log.clock {
-        Some(column) => column,
-        None => log.column(&super::super::map::Name::Text(clock.name.clone()))?,
+    let (column, factor) = match log.clock {
+        Some(column) => (column, 1.0),
+        None => (log.column(&Name::Text(clock.name.clone()))?, clock.factor),
     };
     let channel = &log.columns[column];
-    let factor = if log.clock.is_some() {
-        1.0
-    } else {
-        clock.factor
-    };
     Some(match &channel.instants {
-        Some(instants) => {
-            let start = instants[0];
-            let since = instants.iter().map(|instant| instant.since(start));
-            since.map(|time| factor * time).collect()
-        }
+        Some(instants) => (instants.iter())
+            .map(|instant| factor * instant.since(instants[0]))
+            .collect(),
         None => channel.values.iter().map(|time| factor * time).collect(),
     })
 }

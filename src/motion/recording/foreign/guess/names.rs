@@ -52,8 +52,9 @@ pub(super) fn words(name: &str) -> Vec<String> {
     out
 }
 
-fn is_one(word: &str, of: &[&str]) -> bool {
-    of.contains(&word)
+/// Whether a word is one of some with blanks between them.
+fn is_one(word: &str, of: &str) -> bool {
+    of.split(' ').any(|known| known == word)
 }
 
 /// Whether a name is one of a clock.
@@ -63,22 +64,12 @@ pub(super) fn is_time(name: &str) -> bool {
 
 /// The unit that a name carries, such as `q_deg`, `time (ms)`.
 pub(super) fn unit(name: &str, units: &[&'static str]) -> Option<&'static str> {
-    let words = words(name);
+    let (words, low) = (words(name), name.to_lowercase());
     // A single letter is rather an axis than a unit, unless in brackets.
     let found = units.iter().find(|unit| {
-        let bracketed = ["(", "[", "/"].iter().any(|open| {
-            let close = if *open == "(" {
-                ")"
-            } else if *open == "[" {
-                "]"
-            } else {
-                ""
-            };
-            !close.is_empty()
-                && name
-                    .to_lowercase()
-                    .contains(&format!("{open}{unit}{close}"))
-        });
+        let bracketed = [format!("({unit})"), format!("[{unit}]")]
+            .iter()
+            .any(|unit| low.contains(unit));
         bracketed || (unit.len() > 1 && words.iter().skip(1).any(|word| word == *unit))
     });
     found.copied()
@@ -90,12 +81,12 @@ pub(super) fn read(name: &str) -> Option<Reading> {
     join_pairs(&mut words);
     split_compact(&mut words);
     greek_angles(&mut words);
-    let place = |table: &[&[&str]]| {
+    let place = |table: &[&str]| {
         let of = |word: &String| table.iter().position(|known| is_one(word, known));
         words.iter().find_map(of)
     };
-    let has = |known: &[&str]| words.iter().any(|word| is_one(word, known));
-    if has(&["covariance"]) {
+    let has = |known: &str| words.iter().any(|word| is_one(word, known));
+    if has("covariance") {
         return None;
     }
     let (leg, joint) = (place(&LEGS), joint(&words));
@@ -103,11 +94,11 @@ pub(super) fn read(name: &str) -> Option<Reading> {
         .iter()
         .rev()
         .find_map(|word| word.parse::<usize>().ok());
-    let axis = place(&[&["x", "roll"], &["y", "pitch"], &["z", "yaw"]]);
+    let axis = place(&["x roll", "y pitch", "z yaw"]);
     let family: Vec<&str> = (words.iter().map(String::as_str))
         .filter(|word| {
             !LEGS.iter().chain(&JOINTS).any(|known| is_one(word, known))
-                && !is_one(word, &["x", "y", "z", "w", "roll", "pitch", "yaw", "hip"])
+                && !is_one(word, "x y z w roll pitch yaw hip")
                 && word.parse::<usize>().is_err()
         })
         .collect();
@@ -119,32 +110,28 @@ pub(super) fn read(name: &str) -> Option<Reading> {
             is_counted,
             family: family.join(" "),
             is_wanted: has(WANTED),
-            is_bare_hip: joint == Some(0) && has(&["hip"]) && !has(&["x", "roll", "aa"]),
+            is_bare_hip: joint == Some(0) && has("hip") && !has("x roll aa"),
         })
     };
-    let kind = if has(TORQUE) {
-        Quantity::JointTorque
-    } else if has(ACCELERATION) {
-        Quantity::JointAcceleration
-    } else if has(VELOCITY) {
-        Quantity::JointVelocity
-    } else {
-        Quantity::JointPosition
-    };
+    let kinds = [
+        (TORQUE, Quantity::JointTorque),
+        (ACCELERATION, Quantity::JointAcceleration),
+        (VELOCITY, Quantity::JointVelocity),
+    ];
+    let kind = kinds.into_iter().find(|(known, _)| has(known));
+    let kind = kind.map_or(Quantity::JointPosition, |(_, kind)| kind);
     if let (Some(number), [list, _]) = (number, &words[..])
-        && let Some((quantity, element, is_quaternion)) = generalised(list, number)
+        && let Some((quantity, element, is_quaternion)) = in_list(list, number)
     {
-        let is_counted = is_one(quantity.key(), &["joint.position", "joint.velocity"]);
+        let is_counted = matches!(
+            quantity,
+            Quantity::JointPosition | Quantity::JointVelocity | Quantity::Feet
+        );
         return reading(quantity, element, is_quaternion, is_counted);
     }
-    if let ([list, _], Some(number @ 0..4)) = (&words[..], number)
-        && list == "c"
-    {
-        return reading(Quantity::Feet, number, false, true);
-    }
-    if has(FEET) || (has(&["force", "forces"]) && axis.is_none()) {
+    if has(FEET) || (has("force forces") && axis.is_none()) {
         let element = leg.or(number.filter(|n| *n < 4));
-        let is_place = axis.is_some_and(|axis| axis != 2 || has(&["position", "pos", "velocity"]));
+        let is_place = axis.is_some_and(|axis| axis != 2 || has("position pos velocity"));
         return match element {
             Some(element) if !is_place => reading(Quantity::Feet, element, false, leg.is_none()),
             Some(_) | None => None,
@@ -155,16 +142,13 @@ pub(super) fn read(name: &str) -> Option<Reading> {
         return reading(kind, 3 * leg + joint, false, false);
     }
     if let (Some(leg @ 0..4), Some(joint @ 0..3)) =
-        (after(&words, &["leg"]), after(&words, &["joint", "motor"]))
+        (after(&words, "leg"), after(&words, "joint motor"))
     {
         return reading(kind, 3 * leg + joint, false, true);
     }
     let in_array = number.filter(|number| *number < 12);
-    let of_body = has(&[
-        "imu", "body", "base", "trunk", "com", "torso", "pose", "odom", "twist",
-    ]);
-    let of_axes =
-        has(QUATERNION) && !has(&["q"]) || has(ANGULAR) || has(&["gyro", "gyroscope", "omega"]);
+    let of_body = has("imu body base trunk com torso pose odom twist");
+    let of_axes = has(QUATERNION) && !has("q") || has(ANGULAR) || has("gyro gyroscope omega");
     if let Some(number) = in_array
         && axis.is_none()
         && !of_body
@@ -177,13 +161,13 @@ pub(super) fn read(name: &str) -> Option<Reading> {
 }
 
 /// The number behind a word.
-fn after(words: &[String], known: &[&str]) -> Option<usize> {
+fn after(words: &[String], known: &str) -> Option<usize> {
     let pair = words.windows(2).find(|pair| is_one(&pair[0], known))?;
     pair[1].parse().ok()
 }
 
-/// An element of MuJoCo's lists of a floating robot: place, quaternion, joints.
-fn generalised(list: &str, number: usize) -> Option<(Quantity, usize, bool)> {
+/// An element of MuJoCo's lists of a floating robot: place, quaternion, joints; or of a list `c` of contacts.
+fn in_list(list: &str, number: usize) -> Option<(Quantity, usize, bool)> {
     Some(match (list, number) {
         ("qpos", 0..3) => (Quantity::BodyPosition, number, false),
         ("qpos", 3..7) => (Quantity::Orientation, number - 3, true),
@@ -191,6 +175,7 @@ fn generalised(list: &str, number: usize) -> Option<(Quantity, usize, bool)> {
         ("qvel", 0..3) => (Quantity::BodyVelocity, number, false),
         ("qvel", 3..6) => (Quantity::AngularVelocity, number - 3, false),
         ("qvel", 6..18) => (Quantity::JointVelocity, number - 6, false),
+        ("c", 0..4) => (Quantity::Feet, number, false),
         _ => return None,
     })
 }
@@ -214,14 +199,14 @@ fn body(
     kind: Quantity,
     reading: impl Fn(Quantity, usize, bool, bool) -> Option<Reading>,
 ) -> Option<Reading> {
-    let has = |known: &[&str]| words.iter().any(|word| is_one(word, known));
-    let by_angle = has(&["roll", "pitch", "yaw", "rpy", "euler"]);
+    let has = |known: &str| words.iter().any(|word| is_one(word, known));
+    let by_angle = has("roll pitch yaw rpy euler");
     let counted = axis.is_none();
-    let is_real = has(&["w"]) && has(QUATERNION);
+    let is_real = has("w") && has(QUATERNION);
     if is_real && !by_angle {
         return reading(Quantity::Orientation, 0, true, false);
     }
-    if has(&["quat", "quaternion"]) {
+    if has("quat quaternion") {
         return match (axis, number) {
             (Some(axis), _) => reading(Quantity::Orientation, axis + 1, true, false),
             (None, Some(number)) if number < 4 => {
@@ -240,10 +225,10 @@ fn body(
         (true, _) if rate => Quantity::AngularVelocity,
         (true, _) if by_angle => Quantity::Orientation,
         // `Body angular Position x`; a bare `orientation.x` is one of a quaternion.
-        (true, _) if has(&["position", "pos", "angle", "angular"]) => Quantity::Orientation,
+        (true, _) if has("position pos angle angular") => Quantity::Orientation,
         (true, _) => return reading(Quantity::Orientation, element + 1, true, counted),
         (false, _) if rate => Quantity::BodyVelocity,
-        (false, _) if has(&["q"]) => {
+        (false, _) if has("q") => {
             return reading(Quantity::Orientation, element + 1, true, counted);
         }
         (false, _) if has(PLACE) || words.len() == 1 => Quantity::BodyPosition,
@@ -258,7 +243,7 @@ fn join_pairs(words: &mut Vec<String>) {
     let mut i = 0;
     while i + 1 < words.len() {
         let pair = format!("{}{}", words[i], words[i + 1]);
-        let is_split = is_one(&pair, &["com", "dq", "ddq"]);
+        let is_split = is_one(&pair, "com dq ddq");
         if (pair.len() > 3 && known(&pair)) || is_split {
             words[i] = pair;
             words.remove(i + 1);
@@ -281,7 +266,7 @@ fn split_compact(words: &mut Vec<String>) {
             }
         }
         let (what, axis) = word.split_at_checked(word.len().saturating_sub(1))?;
-        let axis_known = is_one(axis, &["x", "y", "z"]) || (what == "q" && axis == "w");
+        let axis_known = is_one(axis, "x y z") || (what == "q" && axis == "w");
         let whole = match what {
             "v" | "vel" | "dp" => "velocity",
             "w" | "omega" | "gyro" => "omega",

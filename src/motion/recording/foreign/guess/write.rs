@@ -1,5 +1,6 @@
 //! The guessed map as text, each line with what it rests on.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -8,9 +9,10 @@ use nalgebra::DMatrix;
 use super::super::attitude::angles_of_quaternions;
 use super::super::elements::Quantity;
 use super::super::log::Log;
+use super::super::map::Frame;
 use super::super::units::Dimension;
 use super::columns::{Clock, Group};
-use super::evidence::{Axes, Scale, angular, linear, reach, real_is_last, scale, slopes};
+use super::evidence::{Scale, angular, linear, reach, real_is_last, scale, slopes};
 use super::first_map::{raw, times_s};
 use super::names::unit;
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot};
@@ -20,7 +22,6 @@ const ANGLE: [(&str, f64); 3] = [
     ("deg", std::f64::consts::PI / 180.0),
     ("rpm", std::f64::consts::PI / 30.0),
 ];
-const LENGTH: [(&str, f64); 3] = [("m", 1.0), ("mm", 1e-3), ("cm", 1e-2)];
 /// Largest joint angle in rad, at the 99th percentile.
 const ANGLE_RAD: f64 = 5.0;
 /// Share of the largest force at which a foot counts as down.
@@ -28,15 +29,12 @@ const FOOT_SHARE: f64 = 0.1;
 /// Share of the largest force below which the least is that of a foot in the air.
 const RESTING: f64 = 0.3;
 
-/// The lines of a table.
-struct Lines {
-    quantity: Quantity,
-    lines: Vec<String>,
-}
+/// The lines of tables.
+type Lines = BTreeMap<Quantity, Vec<String>>;
 
 /// A map in the making.
 pub(super) struct Draft {
-    tables: Vec<Lines>,
+    tables: Lines,
     time: Vec<String>,
 }
 
@@ -47,11 +45,7 @@ impl Draft {
             groups,
             clock,
         };
-        let mut draft = Self {
-            tables: Vec::new(),
-            time: Vec::new(),
-        };
-        draft.time = match clock {
+        let time = match clock {
             None => vec![
                 "# sample_time_s = 0.001   # no column counts time: the distance of samples"
                     .to_owned(),
@@ -64,50 +58,29 @@ impl Draft {
                 format!("unit = \"{}\"", clock.unit),
             ],
         };
-        let joints = source.joint_scales(robot);
-        let trunk = source.trunk();
+        let mut scales = source.trunk();
+        let mut tables = Lines::new();
+        let order = source.joint_scales(robot, &mut scales);
         for group in groups {
-            let mut lines = Vec::new();
-            if logs.len() > 1 {
-                lines.push(format!("file = {}", quoted(&logs[group.log].name)));
-            }
-            let columns: Vec<String> = (group.columns.iter())
-                .map(|column| quoted(&logs[group.log].columns[*column].name))
-                .collect();
-            let rows: Vec<String> = columns
-                .chunks(if columns.len() == 4 { 4 } else { 3 })
-                .map(|row| row.join(", "))
-                .collect();
-            match rows.len() {
-                1 => lines.push(format!("columns = [{}]", rows[0])),
-                _ => lines.push(format!("columns = [\n    {},\n]", rows.join(",\n    "))),
-            }
-            match group.quantity {
-                Quantity::JointAcceleration if !source.is_acceleration(group, &trunk) => continue,
-                Quantity::JointPosition
-                | Quantity::JointVelocity
-                | Quantity::JointTorque
-                | Quantity::JointAcceleration => lines.extend(joints.lines(group)),
-                Quantity::BodyPosition
-                | Quantity::Orientation
-                | Quantity::BodyVelocity
-                | Quantity::AngularVelocity => lines.extend(trunk.lines(group)),
-                Quantity::Feet => lines.extend(source.feet(group)),
-                Quantity::BodyAcceleration | Quantity::AngularAcceleration => {
-                    if !source.is_acceleration(group, &trunk) {
-                        continue;
-                    }
-                }
-            }
             let quantity = group.quantity;
-            draft.tables.push(Lines { quantity, lines });
+            if !source.is_sound(group, &scales) {
+                continue;
+            }
+            let mut lines = source.columns(group);
+            match quantity {
+                Quantity::Feet => lines.extend(source.feet(group)),
+                _ if quantity.is_of_joints() => lines.extend(order_line(order, group)),
+                _ => {}
+            }
+            lines.extend(scales.get(&quantity).into_iter().flatten().cloned());
+            tables.insert(quantity, lines);
         }
-        draft
+        Self { tables, time }
     }
 
     /// Whether a quantity was found.
     pub fn has(&self, quantity: Quantity) -> bool {
-        self.tables.iter().any(|table| table.quantity == quantity)
+        self.tables.contains_key(&quantity)
     }
 
     /// The map.
@@ -117,9 +90,9 @@ impl Draft {
             path.file_name().unwrap_or_default().to_string_lossy(),
             self.time.join("\n")
         );
-        for table in &self.tables {
-            let lines = table.lines.join("\n");
-            let _ = write!(text, "\n[{}]\n{lines}\n", table.quantity.key());
+        for (quantity, lines) in &self.tables {
+            let lines = lines.join("\n");
+            let _ = write!(text, "\n[{}]\n{lines}\n", quantity.key());
         }
         for key in missing {
             let _ = write!(
@@ -143,37 +116,20 @@ struct Source<'a> {
     clock: Option<&'a Clock>,
 }
 
-/// Units and signs of the joints' quantities.
-#[derive(Default)]
-struct JointScales {
-    of: Vec<(Quantity, &'static str, String)>,
-    signs: Vec<(Quantity, Vec<f64>)>,
-    order: Option<&'static str>,
-    is_counted: bool,
+/// The order of a quantity of joints whose columns are counted.
+fn order_line(order: Option<&str>, group: &Group) -> Option<String> {
+    match order {
+        Some(order) => Some(format!(
+            "order = \"{order}\"   # knees are bent throughout, hips are not"
+        )),
+        None => group.is_counted.then(|| {
+            "order = \"fr.* fl.* rr.* rl.*\"   # assumed: the columns are only counted".to_owned()
+        }),
+    }
 }
 
-impl JointScales {
-    fn lines(&self, group: &Group) -> Vec<String> {
-        let mut lines = Vec::new();
-        if let Some(order) = self.order {
-            lines.push(format!(
-                "order = \"{order}\"   # knees are bent throughout, hips are not"
-            ));
-        } else if group.is_counted {
-            lines.push(
-                "order = \"fr.* fl.* rr.* rl.*\"   # assumed: the columns are only counted"
-                    .to_owned(),
-            );
-        }
-        if let Some((_, unit, why)) = self.of.iter().find(|(own, ..)| *own == group.quantity) {
-            lines.push(format!("unit = \"{unit}\"{why}"));
-        }
-        let signs = self.signs.iter().find(|(own, _)| *own == group.quantity);
-        if let Some((_, signs)) = signs {
-            lines.extend(sign_line(signs));
-        }
-        lines
-    }
+fn unit_line(unit: &str, why: &str) -> String {
+    format!("unit = \"{unit}\"{why}")
 }
 
 /// The signs of joints, if any is negative.
@@ -190,20 +146,6 @@ fn sign_line(signs: &[f64]) -> Option<String> {
         .map(|i| format!("\"{}\" = -1", JOINT_NAMES[*i]));
     let names: Vec<String> = names.collect();
     Some(format!("sign = {{ {} }}", names.join(", ")))
-}
-
-/// Units and axes of the trunk's quantities.
-#[derive(Default)]
-struct Trunk {
-    lines: Vec<(Quantity, Vec<String>)>,
-    angles: Option<DMatrix<f64>>,
-}
-
-impl Trunk {
-    fn lines(&self, group: &Group) -> Vec<String> {
-        let own = self.lines.iter().find(|(own, _)| *own == group.quantity);
-        own.map(|(_, lines)| lines.clone()).unwrap_or_default()
-    }
 }
 
 impl Source<'_> {
@@ -224,26 +166,44 @@ impl Source<'_> {
         Some((raw(self.logs, group), times))
     }
 
-    fn joint_scales(&self, robot: &Robot) -> JointScales {
-        let mut out = JointScales::default();
-        let Some(group) = self.group(Quantity::JointPosition) else {
-            return out;
-        };
+    /// The file and the columns of a group.
+    fn columns(&self, group: &Group) -> Vec<String> {
+        let log = &self.logs[group.log];
+        let mut lines = Vec::new();
+        if self.logs.len() > 1 {
+            lines.push(format!("file = {}", quoted(&log.name)));
+        }
+        let names = group.columns.iter();
+        let names: Vec<String> = names.map(|at| quoted(&log.columns[*at].name)).collect();
+        let rows: Vec<String> = names
+            .chunks(if names.len() == 4 { 4 } else { 3 })
+            .map(|row| row.join(", "))
+            .collect();
+        lines.push(match &rows[..] {
+            [row] => format!("columns = [{row}]"),
+            _ => format!("columns = [\n    {},\n]", rows.join(",\n    ")),
+        });
+        lines
+    }
+
+    /// Adds units and signs of the joints' quantities; the order of their columns, if it is not that of the legs.
+    fn joint_scales(&self, robot: &Robot, lines: &mut Lines) -> Option<&'static str> {
+        let group = self.group(Quantity::JointPosition)?;
         let mut position = raw(self.logs, group);
-        out.is_counted = group.is_counted;
         let told = self.told(group, &["mrad", "rad", "deg"]);
         let in_degrees = reach(position.iter().copied()) > ANGLE_RAD;
         let unit = told.unwrap_or(if in_degrees { "deg" } else { "rad" });
+        let by_size = "   # by their size";
         let why = if told.is_none() && in_degrees {
-            "   # by their size"
+            by_size
         } else {
             ""
         };
-        out.of.push((Quantity::JointPosition, unit, why.to_owned()));
+        let said = unit_line(unit, why);
         position *= Dimension::Angle.factor(unit).unwrap_or(1.0);
-        let mut element: Vec<usize> = (0..JOINT_DIM).collect();
+        let (mut order, mut element) = (None, Vec::from_iter(0..JOINT_DIM));
         if group.is_counted && grouped_by_joint(&position) {
-            out.order = Some("*.hx *.hy *.kn");
+            order = Some("*.hx *.hy *.kn");
             element = (0..JOINT_DIM).map(|i| 3 * (i % 4) + i / 4).collect();
         }
         let in_order = |rows: &DMatrix<f64>| {
@@ -255,27 +215,25 @@ impl Source<'_> {
         };
         position = in_order(&position);
         let mut signs = vec![1.0; JOINT_DIM];
-        for kind in 0..JOINT_DIM / 4 {
-            let rows: Vec<usize> = (0..4).map(|leg| 3 * leg + kind).collect();
-            for row in rows {
-                let (low, high) = robot.joint_limit_rad()[row];
-                let inside = |sign: f64| {
-                    let values = position.row(row);
-                    let margin = 0.1;
-                    values
-                        .iter()
-                        .filter(|v| (low - margin..=high + margin).contains(&(sign * **v)))
-                        .count()
-                };
-                if inside(-1.0) > 2 * inside(1.0) {
-                    signs[row] = -1.0;
-                }
+        for (row, (low, high)) in robot.joint_limit_rad().iter().enumerate() {
+            let inside = |sign: f64| {
+                let range = low - 0.1..=high + 0.1;
+                let values = position.row(row);
+                values
+                    .iter()
+                    .filter(|v| range.contains(&(sign * **v)))
+                    .count()
+            };
+            if inside(-1.0) > 2 * inside(1.0) {
+                signs[row] = -1.0;
             }
         }
         for row in 0..JOINT_DIM {
             position.row_mut(row).scale_mut(signs[row]);
         }
-        out.signs.push((Quantity::JointPosition, signs.clone()));
+        let all =
+            |unit: String, signs: &[f64]| [unit].into_iter().chain(sign_line(signs)).collect();
+        lines.insert(Quantity::JointPosition, all(said, &signs));
         let velocity = self.beside(Quantity::JointVelocity, group);
         if let Some((velocity, times)) = &velocity {
             let velocity = in_order(velocity);
@@ -295,16 +253,11 @@ impl Source<'_> {
             let most = most.max_by_key(|unit| units.iter().filter(|own| own == &unit).count());
             let unit = most.filter(|_| !units.is_empty()).unwrap_or(unit);
             let why = "   # by the change of the positions";
-            out.of.push((Quantity::JointVelocity, unit, why.to_owned()));
-            out.signs.push((Quantity::JointVelocity, own));
+            lines.insert(Quantity::JointVelocity, all(unit_line(unit, why), &own));
         }
         if let Some(group) = self.group(Quantity::JointTorque) {
             let mut torque = in_order(&raw(self.logs, group));
-            let large = reach(torque.iter().copied()) > 1000.0;
-            if large {
-                let why = "   # by their size".to_owned();
-                out.of.push((Quantity::JointTorque, "N mm", why));
-            }
+            let is_large = reach(torque.iter().copied()) > 1000.0;
             for row in 0..JOINT_DIM {
                 torque.row_mut(row).scale_mut(signs[row]);
             }
@@ -313,17 +266,20 @@ impl Source<'_> {
             if knees < 0.0 {
                 signs.iter_mut().for_each(|sign| *sign = -*sign);
             }
-            out.signs.push((Quantity::JointTorque, signs));
+            let unit = is_large.then(|| unit_line("N mm", by_size));
+            let all = unit.into_iter().chain(sign_line(&signs)).collect();
+            lines.insert(Quantity::JointTorque, all);
         }
-        out
+        order
     }
 
-    fn trunk(&self) -> Trunk {
-        let mut out = Trunk::default();
+    /// Units and axes of the trunk's quantities.
+    fn trunk(&self) -> Lines {
+        let (mut out, mut angles) = (Lines::new(), None);
         if let Some(group) = self.group(Quantity::Orientation) {
             let values = raw(self.logs, group);
             let mut lines = Vec::new();
-            let angles = match group.is_quaternion {
+            let found = match group.is_quaternion {
                 true => {
                     let last = group.is_counted && real_is_last(&values);
                     lines.push(match (group.is_counted, last) {
@@ -341,25 +297,22 @@ impl Source<'_> {
                     // No robot that jumps pitches by more than a quarter turn.
                     let steep = reach(values.row(1).iter().copied()) > 1.6;
                     let unit = told.unwrap_or(if steep { "deg" } else { "rad" });
-                    lines.push(format!("unit = \"{unit}\""));
+                    lines.push(unit_line(unit, ""));
                     values * if unit == "deg" { ANGLE[1].1 } else { 1.0 }
                 }
             };
-            out.lines.push((Quantity::Orientation, lines));
+            out.insert(Quantity::Orientation, lines);
             if let Some((raw, times)) = self.beside(Quantity::AngularVelocity, group) {
-                let mut own = angles.clone();
+                let mut own = found.clone();
                 super::super::attitude::unwrap(&mut own);
                 let rates = slopes(&times, &own);
-                let found = angular(&own, &rates, &raw, &ANGLE[..2]);
-                let lines = match found {
-                    None => vec![
-                        "# frame = \"body\"   # unknown: it does not follow the angles".to_owned(),
-                    ],
-                    Some((scale, axes)) => velocity_lines(scale, axes, "the angles"),
-                };
-                out.lines.push((Quantity::AngularVelocity, lines));
+                let scale = angular(&own, &rates, &raw, &ANGLE[..2]);
+                out.insert(
+                    Quantity::AngularVelocity,
+                    velocity_lines(scale, "the angles"),
+                );
             }
-            out.angles = Some(angles);
+            angles = Some(found);
         }
         if let Some(group) = self.group(Quantity::BodyPosition) {
             let values = raw(self.logs, group);
@@ -370,20 +323,16 @@ impl Source<'_> {
                 4.0.. => "cm",
                 _ => "m",
             });
-            let line = format!("unit = \"{unit}\"   # z reaches {height:.3}");
-            out.lines.push((Quantity::BodyPosition, vec![line]));
-            let factor = LENGTH.iter().find(|(name, _)| *name == unit);
-            let factor = factor.map_or(1.0, |(_, factor)| *factor);
+            let line = unit_line(unit, &format!("   # z reaches {height:.3}"));
+            out.insert(Quantity::BodyPosition, vec![line]);
+            let factor = Dimension::Length.factor(unit).unwrap_or(1.0);
             if let Some((raw, times)) = self.beside(Quantity::BodyVelocity, group) {
                 let rates = slopes(&times, &(values * factor));
-                let lines = match linear(out.angles.as_ref(), &rates, &raw, &LENGTH) {
-                    None => vec![
-                        "# frame = \"body\"   # unknown: it does not follow the position"
-                            .to_owned(),
-                    ],
-                    Some((scale, axes)) => velocity_lines(scale, axes, "the position"),
-                };
-                out.lines.push((Quantity::BodyVelocity, lines));
+                let scale = linear(angles.as_ref(), &rates, &raw, Dimension::Length.units());
+                out.insert(
+                    Quantity::BodyVelocity,
+                    velocity_lines(scale, "the position"),
+                );
             }
         }
         out
@@ -410,22 +359,23 @@ impl Source<'_> {
         lines
     }
 
-    /// Whether a column called acceleration is one: the derivative of its velocity, not what an IMU feels.
-    fn is_acceleration(&self, group: &Group, trunk: &Trunk) -> bool {
+    /// Whether a group is what it is called: an acceleration has to be the derivative of its velocity, not what an IMU
+    /// feels.
+    fn is_sound(&self, group: &Group, scales: &Lines) -> bool {
         let velocity = match group.quantity {
             Quantity::JointAcceleration => Quantity::JointVelocity,
             Quantity::BodyAcceleration => Quantity::BodyVelocity,
-            _ => Quantity::AngularVelocity,
+            Quantity::AngularAcceleration => Quantity::AngularVelocity,
+            _ => return true,
         };
-        let plain = |line: &String| !line.contains("frame");
-        let of_velocity = trunk.lines.iter().find(|(own, _)| *own == velocity);
+        let mut of_velocity = scales.get(&velocity).into_iter().flatten();
+        let has_frame = of_velocity.any(|line| line.contains("frame"));
         let Some((velocity, times)) = self.beside(velocity, group) else {
             return false;
         };
         let rates = slopes(&times, &velocity);
         let same = scale(&rates, &raw(self.logs, group), &[("", 1.0)]);
-        let sound = of_velocity.is_none_or(|(_, lines)| lines.iter().all(plain));
-        sound && same.is_some_and(|(scale, left)| scale.sign > 0.0 && left < 0.1)
+        !has_frame && same.is_some_and(|(scale, left)| scale.sign > 0.0 && left < 0.1)
     }
 }
 
@@ -441,18 +391,23 @@ fn rest_force(values: &DMatrix<f64>) -> f64 {
 }
 
 /// Unit, sign and axes of a velocity of the trunk.
-fn velocity_lines(scale: Scale, axes: Axes, of: &str) -> Vec<String> {
-    let mut lines = vec![format!(
-        "unit = \"{}\"   # by the change of {of}",
-        scale.unit
+fn velocity_lines(found: Option<(Scale, Frame)>, of: &str) -> Vec<String> {
+    let Some((scale, axes)) = found else {
+        return vec![format!(
+            "# frame = \"body\"   # unknown: it does not follow {of}"
+        )];
+    };
+    let mut lines = vec![unit_line(
+        scale.unit,
+        &format!("   # by the change of {of}"),
     )];
     if scale.sign < 0.0 {
         lines.push("sign = -1".to_owned());
     }
     match axes {
-        Axes::Body => lines.push("frame = \"body\"".to_owned()),
-        Axes::World if of == "the angles" => lines.push("frame = \"world\"".to_owned()),
-        Axes::World | Axes::Angles => {}
+        Frame::Body => lines.push("frame = \"body\"".to_owned()),
+        Frame::World if of == "the angles" => lines.push("frame = \"world\"".to_owned()),
+        Frame::World | Frame::Angles => {}
     }
     lines
 }

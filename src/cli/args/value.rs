@@ -1,7 +1,10 @@
-//! Parsers of numbers by their ranges.
+//! Parsers of numbers by their ranges, and of names.
+
+use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 
 use super::train::Finite;
 use crate::limits::Range;
+use crate::robot::{Robot, WrenchFrame};
 
 /// A whole number in a range.
 pub(super) fn count(range: &'static Range) -> impl Fn(&str) -> Result<usize, String> + Clone {
@@ -16,6 +19,33 @@ pub(super) fn real(range: &'static Range) -> impl Fn(&str) -> Result<f64, String
 /// As [`real`], as settings hold it.
 pub(super) fn finite(range: &'static Range) -> impl Fn(&str) -> Result<Finite, String> + Clone {
     |text| range.parse::<f64>(text)?.try_into()
+}
+
+/// Takes any text and offers the names of romc's own robots to shells.
+#[derive(Clone, Debug)]
+pub struct RobotParser;
+
+impl TypedValueParser for RobotParser {
+    type Value = String;
+
+    fn parse_ref(
+        &self,
+        command: &clap::Command,
+        argument: Option<&clap::Arg>,
+        value: &std::ffi::OsStr,
+    ) -> Result<String, clap::Error> {
+        StringValueParser::new().parse_ref(command, argument, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        let names = Robot::known_names();
+        Some(Box::new(names.into_iter().map(PossibleValue::new)))
+    }
+}
+
+/// Reads `body` or `world`.
+pub fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
+    WrenchFrame::by_name(text).ok_or_else(|| format!("found `{text}`, expected `world` or `body`"))
 }
 
 #[cfg(test)]
@@ -71,18 +101,18 @@ mod tests {
         let mut met = BTreeSet::new();
         for command in Arguments::command().get_subcommands() {
             let name = command.get_name();
-            for flag in command
+            let flags = command
                 .get_arguments()
-                .filter_map(|argument| argument.get_long())
-            {
+                .filter_map(|argument| argument.get_long());
+            for flag in flags.filter(|flag| !WITHOUT.contains(flag)) {
+                let takes_one_of = |values: [&str; 3]| {
+                    let mut values = values.into_iter();
+                    values.any(|value| !refuses(name, flag, value))
+                };
                 let takes_numbers = refuses(name, flag, "words")
-                    && ["1", "0.5", "3"]
-                        .iter()
-                        .any(|value| !refuses(name, flag, value))
-                    && !["1%", "1..2", "x=1"]
-                        .iter()
-                        .any(|value| !refuses(name, flag, value));
-                if !takes_numbers || WITHOUT.contains(&flag) {
+                    && takes_one_of(["1", "0.5", "3"])
+                    && !takes_one_of(["1%", "1..2", "x=1"]);
+                if !takes_numbers {
                     continue;
                 }
                 let range = range(name, flag);
@@ -90,22 +120,12 @@ mod tests {
                 met.insert(range.name());
                 let [least, most] = range.ends();
                 assert!(!refuses(name, flag, &most.to_string()), "--{flag}={most}");
-                let beyond = if range.is_whole() {
-                    most + 1.0
-                } else {
-                    most * (1.0 + 1e-9)
+                let outside = match range.is_whole() {
+                    true => [least - 1.0, most + 1.0],
+                    false => [least - 1e-9 * most, most * (1.0 + 1e-9)],
                 };
-                let below = if range.is_whole() {
-                    least - 1.0
-                } else {
-                    least - 1e-9 * most
-                };
-                for value in [
-                    beyond.to_string(),
-                    below.to_string(),
-                    "NaN".into(),
-                    "1e300".into(),
-                ] {
+                for value in outside.into_iter().chain([f64::NAN, 1e300]) {
+                    let value = value.to_string();
                     assert!(refuses(name, flag, &value), "--{flag}={value} of {name}");
                 }
             }
