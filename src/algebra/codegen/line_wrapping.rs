@@ -35,9 +35,16 @@ pub fn wrapped(paragraph: &str, width: usize, indent: &str) -> Vec<String> {
 
 /// The text without trailing spaces or several blank lines in a row, ending with one newline.
 pub fn tidy(text: &str) -> String {
-    let mut lines: Vec<&str> = text.lines().map(str::trim_end).collect();
-    lines.dedup_by(|next, line| next.is_empty() && line.is_empty());
-    lines.join("\n").trim_matches('\n').to_owned() + "\n"
+    // Line by line into one buffer: a file has up to ten megabytes.
+    let mut tidied = String::with_capacity(text.len() + 1);
+    for line in text.lines().map(str::trim_end) {
+        if !line.is_empty() || !(tidied.is_empty() || tidied.ends_with("\n\n")) {
+            tidied.push_str(line);
+            tidied.push('\n');
+        }
+    }
+    tidied.truncate(tidied.trim_end_matches('\n').len() + 1);
+    tidied
 }
 
 #[cfg(test)]
@@ -48,5 +55,17 @@ mod tests {
     fn comment_lines_keep_paragraphs_and_indent_what_continues() {
         let lines = comment_lines(&["one two three".to_owned(), "four".to_owned()], 9);
         assert_eq!(lines, ["one two", "  three", "four"]);
+    }
+
+    #[test]
+    fn tidy_text_has_no_trailing_spaces_no_two_blank_lines_and_one_newline_at_its_end() {
+        for (text, tidied) in [
+            ("", ""),
+            ("\n \n", ""),
+            ("a", "a\n"),
+            ("\n\na  \n\n \nb\n\n\n", "a\n\nb\n"),
+        ] {
+            assert_eq!(tidy(text), tidied, "{text:?}");
+        }
     }
 }
