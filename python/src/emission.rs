@@ -12,7 +12,7 @@ use romc::files::{EmittedFile, Overwrite};
 use romc::limits::table;
 use romc::typeset::latex::tex_cases;
 use romc::typeset::words;
-use romc::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Typeset, TypesetError};
+use romc::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Typeset};
 
 use crate::errors::{choice, count_within, python_error, within};
 use crate::model::Model;
@@ -146,7 +146,6 @@ pub fn equations(
         let equations = emission.equations(model)?;
         let print = &emission.options.print;
         let typeset = Typeset::new(&equations, &print.symbols, print.rounding);
-        let typeset = typeset.map_err(TypesetError::from)?;
         let width_em = print.width_em.unwrap_or(NOTEBOOK_EM);
         let phases = typeset.systems.iter().zip(equations.phases());
         let phases = phases

@@ -3,9 +3,9 @@
 use crate::equations::{Equations, PhaseEquations, Unit};
 
 use super::decimal::{Decimal, Rounding};
-use super::expression::{UnknownSymbol, terms};
+use super::expression::terms;
 use super::rounder::{Rounder, RoundingReport};
-use super::symbols::{Quantity, SymbolTable};
+use super::symbols::SymbolTable;
 use super::tree::{Math, Signed, Symbol};
 
 /// The equations of one phase, ready for a printer.
@@ -43,7 +43,7 @@ pub struct CoefficientTable {
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoefficientRow {
     /// The term.
-    pub term: Signed,
+    pub term: Math,
     /// Unit of the term, for equations in physical units; that of a coefficient is the column's over this.
     pub unit: Option<Unit>,
     /// The printed coefficient, or nothing where the term is not active.
@@ -64,18 +64,11 @@ pub struct Typeset {
 impl Typeset {
     /// Lays out the equations of each phase, terms in their order, coefficients rounded by
     /// `rounding`.
-    ///
-    /// # Errors
-    /// [`UnknownSymbol`] if a candidate term uses a variable that the latent model has not.
-    pub fn new(
-        system: &Equations<'_>,
-        symbols: &SymbolTable,
-        rounding: Rounding,
-    ) -> Result<Self, UnknownSymbol> {
+    pub fn new(system: &Equations<'_>, symbols: &SymbolTable, rounding: Rounding) -> Self {
         let mut layout = Layout {
             system,
             symbols,
-            terms: terms(system, symbols)?,
+            terms: terms(system, symbols),
             rounder: Rounder::new(rounding, coefficients(system)),
         };
         let systems = system
@@ -84,11 +77,11 @@ impl Typeset {
             .map(|phase| layout.system(phase))
             .collect();
         let table = layout.table();
-        Ok(Self {
+        Self {
             systems,
             table,
-            rounding: layout.rounder.into_report(),
-        })
+            rounding: layout.rounder.report,
+        }
     }
 }
 
@@ -109,10 +102,6 @@ struct Layout<'a> {
 }
 
 impl Layout<'_> {
-    fn acceleration(&self, output: usize) -> Symbol {
-        self.symbols.symbol(Quantity::Acceleration, output + 1)
-    }
-
     fn system(&mut self, phase: &PhaseEquations) -> EquationSystem {
         let equations = (0..self.system.latent_dim())
             .map(|output| self.equation(phase, output))
@@ -124,7 +113,7 @@ impl Layout<'_> {
     }
 
     fn equation(&mut self, phase: &PhaseEquations, output: usize) -> Equation {
-        let left = self.acceleration(output);
+        let left = self.symbols.acceleration(output);
         let texts = self.system.terms();
         let summands = phase.ddz[output].iter().map(|summand| {
             let term = summand.term;
@@ -145,7 +134,7 @@ impl Layout<'_> {
             .collect();
         let cell = |value: f64| Some(self.rounder.round(value)).filter(|cell| !cell.is_zero());
         let row = |(row, term): (usize, &Signed)| CoefficientRow {
-            term: term.clone(),
+            term: term.clone().into_math(),
             unit: self.unit_of_term(row),
             coefficients: (columns.iter())
                 .map(|&(phase, output)| cell(xi[phase][(row, output)]))
@@ -160,7 +149,12 @@ impl Layout<'_> {
                 .filter(|row| row.coefficients.iter().any(Option::is_some))
                 .collect(),
             columns: (columns.iter())
-                .map(|&(phase, output)| (phases[phase].name.clone(), self.acceleration(output)))
+                .map(|&(phase, output)| {
+                    (
+                        phases[phase].name.clone(),
+                        self.symbols.acceleration(output),
+                    )
+                })
                 .collect(),
             units,
         }

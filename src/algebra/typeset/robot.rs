@@ -4,14 +4,14 @@
 use nalgebra::DVector;
 
 use crate::equations::Equations;
-use crate::model::AffineMap;
+use crate::model::{AffineMap, LatentVariable};
 
 use super::decimal::{Decimal, Rounding};
 use super::equations::{Equation, EquationSystem, coefficients};
-use super::error::RobotTypesetError;
+use super::error::TypesetError;
 use super::expression::terms;
 use super::rounder::{Rounder, RoundingReport};
-use super::symbols::{Quantity, SymbolTable, glyph};
+use super::symbols::{SymbolTable, glyph};
 use super::tree::{Glyph, Math, Signed, Symbol};
 
 /// Weights below this share of their row's largest are left out of the printed encoder.
@@ -36,13 +36,12 @@ impl RobotTypeset {
     /// scaling or names of its state.
     ///
     /// # Errors
-    /// [`RobotTypesetError`] if a candidate term uses a variable that the latent model has not,
-    /// or a coefficient is too large for a float in SI units.
+    /// [`TypesetError::NotFinite`] if a coefficient is too large for a float in SI units.
     pub fn new(
         system: &Equations<'_>,
         symbols: &SymbolTable,
         rounding: Rounding,
-    ) -> Result<Option<Self>, RobotTypesetError> {
+    ) -> Result<Option<Self>, TypesetError> {
         let model = system.model();
         let (Some(state), Ok(map), Ok(decoder), Ok(factors)) = (
             model.state(),
@@ -54,7 +53,7 @@ impl RobotTypeset {
         };
         let decoder = decoder.weights();
         let coordinates = coordinate_symbols(&state.names);
-        let terms = terms(system, symbols)?;
+        let terms = terms(system, symbols);
         let (encoder, negligible_weights) = encoder(map, &factors, symbols, &coordinates)?;
         let mut rounder = Rounder::new(rounding, coefficients(system));
         let mut systems = Vec::new();
@@ -72,7 +71,7 @@ impl RobotTypeset {
                         let sum = decoder.row(row).transpose().dot(&xi.row(term).transpose());
                         Ok((finite(sum / factors[row], &output, text)?, text, math))
                     })
-                    .collect::<Result<Vec<_>, RobotTypesetError>>()?;
+                    .collect::<Result<Vec<_>, TypesetError>>()?;
                 let left = Symbol {
                     dots: 2,
                     ..symbol.clone()
@@ -89,7 +88,7 @@ impl RobotTypeset {
             encoder,
             negligible_weights,
             systems,
-            rounding: rounder.into_report(),
+            rounding: rounder.report,
         }))
     }
 }
@@ -100,7 +99,7 @@ fn encoder(
     factors: &DVector<f64>,
     symbols: &SymbolTable,
     coordinates: &[Symbol],
-) -> Result<(Vec<Equation>, usize), RobotTypesetError> {
+) -> Result<(Vec<Equation>, usize), TypesetError> {
     let one = Signed::plus(Math::Number(Decimal::integer(1)));
     let terms: Vec<Signed> = coordinates
         .iter()
@@ -135,7 +134,7 @@ fn encoder(
             .zip(&terms)
             .filter(|(weight, _)| is_printed(**weight))
             .map(|(weight, term)| (*weight, "", term));
-        let left = symbols.symbol(Quantity::Position, row + 1);
+        let left = symbols.symbol(LatentVariable::Z(row));
         equations.push(Equation {
             is_approximate: absent > 0,
             ..rounder.equation(left, ("encoder", ""), bias.chain(entries))
@@ -145,11 +144,11 @@ fn encoder(
 }
 
 /// `value`, unless folding it with weights and scale factors left the range of floats.
-fn finite(value: f64, output: &str, term: &str) -> Result<f64, RobotTypesetError> {
+fn finite(value: f64, output: &str, term: &str) -> Result<f64, TypesetError> {
     if value.is_finite() {
         return Ok(value);
     }
-    Err(RobotTypesetError::NotFinite {
+    Err(TypesetError::NotFinite {
         output: output.to_owned(),
         term: term.to_owned(),
         value,
@@ -198,27 +197,20 @@ mod tests {
         let found = |text: &str| {
             let model = crate::artifact::read_from_bytes("huge.json", text.as_bytes())
                 .expect("all numbers are finite");
-            RobotTypeset::new(
-                &Equations::of(&model),
-                &SymbolTable::default(),
-                Rounding::Exact,
-            )
+            let (equations, symbols) = (Equations::of(&model), SymbolTable::default());
+            let refused = RobotTypeset::new(&equations, &symbols, Rounding::Exact);
+            refused.expect_err("too large").to_string()
         };
         assert_eq!(
             found(text),
-            Err(RobotTypesetError::NotFinite {
-                output: "dd(a)".to_owned(),
-                term: "z1".to_owned(),
-                value: f64::INFINITY
-            })
+            "robot coordinates, dd(a): the coefficient of \"z1\" is inf in SI units"
         );
         let large_weight = text
             .replace("1e308", "1.0")
             .replace("[[1.0, 0.0]]", "[[1e308, 0.0]]");
         let large_weight = large_weight.replace("\"state\": 0.5", "\"state\": 2.5");
-        let message = found(&large_weight).expect_err("too large").to_string();
         assert_eq!(
-            message,
+            found(&large_weight),
             "robot coordinates, z1: the coefficient of \"q_a\" is inf in SI units"
         );
     }

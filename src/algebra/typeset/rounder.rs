@@ -2,7 +2,7 @@
 
 use super::decimal::{Decimal, Rounding};
 use super::equations::Equation;
-use super::expression::{Leading, with_coefficient};
+use super::expression::with_coefficient;
 use super::tree::{Signed, Symbol};
 
 /// A coefficient's place in the model.
@@ -40,7 +40,7 @@ pub(super) struct Rounder {
     rounding: Rounding,
     /// Whether whole numbers are printed as such, and one is left out before a term.
     is_exact: bool,
-    report: RoundingReport,
+    pub(super) report: RoundingReport,
 }
 
 /// Share of the coefficients that need every decimal from which a model counts as rounded to them.
@@ -123,21 +123,13 @@ impl Rounder {
             }
             report.largest_relative = report.largest_relative.max(error / coefficient.abs());
             // Only a true one: a rounded 1.00 says how well it is known.
-            let leading = if coefficient.abs() == 1.0 && self.is_exact {
-                Leading::Omitted
-            } else {
-                Leading::Printed
-            };
-            terms.push(with_coefficient(&printed, leading, term.clone()));
+            let is_omitted = coefficient.abs() == 1.0 && self.is_exact;
+            terms.push(with_coefficient(&printed, is_omitted, term.clone()));
         }
         Equation {
             left,
             terms,
             is_approximate: false,
         }
-    }
-
-    pub(super) fn into_report(self) -> RoundingReport {
-        self.report
     }
 }

@@ -4,7 +4,7 @@ use crate::typeset::{
     EQUALS, Equation, EquationSystem, Form, PrintOptions, break_lines, symbol_width,
 };
 
-use super::math::{TexMath, TexSymbol, TexTerms};
+use super::math::{tex, tex_symbol, tex_terms};
 
 /// Longest line unless chosen, in em.
 pub(super) const WIDTH_EM: f64 = 30.5;
@@ -109,8 +109,7 @@ enum Start {
 fn right_sides(equation: &Equation, start: Start, options: &PrintOptions) -> Vec<String> {
     let numbers = options.numbers;
     if equation.terms.is_empty() {
-        let math = &equation.right();
-        return vec![TexMath { math, numbers }.to_string()];
+        return vec![tex(&equation.right(), numbers)];
     }
     let width = options.width_em.unwrap_or(WIDTH_EM);
     let (available, first, continued) = match start {
@@ -118,15 +117,8 @@ fn right_sides(equation: &Equation, start: Start, options: &PrintOptions) -> Vec
         Start::Aligned(left) => (width, left + EQUALS, left + INDENT),
     };
     let lines = break_lines(&equation.terms, available, first, continued).into_iter();
-    let side = |(line, terms)| TexTerms {
-        terms,
-        numbers,
-        continues: line > 0,
-    };
-    lines
-        .enumerate()
-        .map(|line| side(line).to_string())
-        .collect()
+    let side = |(line, terms)| tex_terms(terms, numbers, line > 0);
+    lines.enumerate().map(side).collect()
 }
 
 /// One line of `cases`; `ends` tells whether its equation and the phase end with it.
@@ -141,7 +133,7 @@ fn cases_line(
     // `cases` sets its lines in text style, in which fractions shrink.
     let style = if is_tall { r"\displaystyle " } else { "" };
     let start = match line {
-        0 => format!("{} {} ", TexSymbol(&equation.left), relation(equation)),
+        0 => format!("{} {} ", tex_symbol(&equation.left), relation(equation)),
         _ => r"\qquad ".to_owned(),
     };
     let end = match ends {
@@ -169,7 +161,7 @@ fn align_line(
     label: &str,
 ) -> String {
     let start = match line {
-        0 => format!("{} &{} ", TexSymbol(&equation.left), relation(equation)),
+        0 => format!("{} &{} ", tex_symbol(&equation.left), relation(equation)),
         _ => r"&\qquad ".to_owned(),
     };
     let end = match ends {
