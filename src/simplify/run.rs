@@ -163,7 +163,7 @@ impl<'a> PhaseProblem<'a> {
         phase: usize,
     ) -> Result<Self, SimplifyError> {
         let theta = domain.theta(phase, samples, workspace.library())?;
-        let recorded = samples.map_or(0, |samples| samples.phases[phase].len());
+        let recorded = samples.map_or(0, |samples| samples.phases[phase].ncols());
         Ok(Self {
             name: &equations.phases()[phase].name,
             workspace,

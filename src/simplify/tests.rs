@@ -368,13 +368,9 @@ fn bound_of_dropped_independent_terms_is_reached_at_a_corner() {
 #[test]
 fn domain_around_samples_has_their_extremes_and_margin() {
     let model = single(&[("z1", 1.0)]);
-    let row = |values: [f64; 3]| DMatrix::from_row_slice(1, 3, &values);
+    let points = [1.0, 0.0, -1.0, 3.0, 0.0, 1.0, 2.0, 0.0, 0.0];
     let samples = Samples {
-        phases: vec![PhaseSamples {
-            z: row([1.0, 3.0, 2.0]),
-            dz: row([0.0, 0.0, 0.0]),
-            u_lat: row([-1.0, 1.0, 0.0]),
-        }],
+        phases: vec![DMatrix::from_column_slice(3, 3, &points)],
     };
     let domain = Domain::around(&model, &samples, 0.1).expect("a box");
     let ranges = domain.phase(0).expect("samples");

@@ -11,6 +11,7 @@
 //! Substituted, `dd Z_i = 1/sigma_i sum_k xi_ki theta_k(sigma Z, sigma dZ, upsilon U)`, numeric factors taken out of
 //! every term and into its coefficient.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
@@ -151,8 +152,15 @@ impl Equations<'_> {
                 ddz: ddz.collect::<Result<_, _>>()?,
             });
         }
-        let units = units(model, &scales)?;
-        Ok(self.converted(in_metres(model, &scales)?, pool, terms, phases, units))
+        Ok(Equations {
+            model: Cow::Owned(in_metres(model, &scales)?),
+            pool,
+            terms,
+            phases,
+            steps: self.steps.clone(),
+            latent_units: Some(units(model, &scales)?),
+            scaled: Some(Box::new(self.clone().into_owned())),
+        })
     }
 
     /// Terms of scaled variables, and the numeric factor that went out of each.

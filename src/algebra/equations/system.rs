@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use super::exact::ExactStep;
 use super::physical::LatentUnits;
 use crate::model::{
-    CandidateTerm, FeetRule, LatentVariable, Library, ModelError, Phase, ReducedModel, TermId,
+    CandidateTerm, FeetRule, LatentVariable, Library, ModelError, Phase, ReducedModel,
 };
 use crate::symbolic::{ExprId, ExprPool, SymbolId};
 
@@ -45,14 +45,14 @@ pub struct PhaseEquations {
 /// scale factors belong to it.
 #[derive(Clone)]
 pub struct Equations<'a> {
-    model: Cow<'a, ReducedModel>,
+    pub(super) model: Cow<'a, ReducedModel>,
     pub(super) pool: ExprPool,
     pub(super) terms: Vec<CandidateTerm>,
     pub(super) phases: Vec<PhaseEquations>,
     pub(super) steps: Vec<ExactStep>,
     pub(super) latent_units: Option<LatentUnits>,
     /// What equations in physical units were made from.
-    scaled: Option<Box<Equations<'static>>>,
+    pub(super) scaled: Option<Box<Equations<'static>>>,
 }
 
 impl<'a> Equations<'a> {
@@ -75,7 +75,12 @@ impl<'a> Equations<'a> {
             name: phase.name.clone(),
             feet: phase.feet.clone(),
             ddz: (0..model.latent_dim())
-                .map(|o| summands(phase, o))
+                .map(|output| {
+                    let active = phase.active_terms(output);
+                    active
+                        .map(|(term, coefficient)| Summand { coefficient, term })
+                        .collect()
+                })
                 .collect(),
         });
         Self {
@@ -114,26 +119,6 @@ impl<'a> Equations<'a> {
         let builder = self.model.clone().into_owned().into_builder();
         let builder = builder.library(Library::from_terms(self.latent_dim(), &texts)?);
         Ok(Cow::Owned(builder.phases(phases.collect()).build()?))
-    }
-
-    /// The same equations over a converted model, pool and terms.
-    pub(super) fn converted(
-        &self,
-        model: ReducedModel,
-        pool: ExprPool,
-        terms: Vec<CandidateTerm>,
-        phases: Vec<PhaseEquations>,
-        units: LatentUnits,
-    ) -> Equations<'static> {
-        Equations {
-            model: Cow::Owned(model),
-            pool,
-            terms,
-            phases,
-            steps: self.steps.clone(),
-            latent_units: Some(units),
-            scaled: Some(Box::new(self.clone().into_owned())),
-        }
     }
 
     /// The same equations with a model of their own.
@@ -257,12 +242,4 @@ impl PhaseEquations {
     pub fn active_count(&self) -> usize {
         self.ddz.iter().map(Vec::len).sum()
     }
-}
-
-fn summands(phase: &Phase, output: usize) -> Vec<Summand> {
-    let summand = |(term, coefficient): (TermId, f64)| Summand {
-        coefficient,
-        term: term.index(),
-    };
-    phase.active_terms(output).map(summand).collect()
 }

@@ -125,20 +125,6 @@ impl ReducedModel {
         self.encoder_map()?.apply_acceleration(&x, &dx, &ddx)
     }
 
-    /// `ddx = (J_D ddz + dJ_D/dt dz) / s_x` at the latent state `z`, SI units.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::decode`].
-    pub fn decode_acceleration(
-        &self,
-        z: &DVector<f64>,
-        dz: &DVector<f64>,
-        ddz: &DVector<f64>,
-    ) -> Result<DVector<f64>, ModelError> {
-        let scaled = self.decoder_map()?.apply_acceleration(z, dz, ddz)?;
-        Ok(scaled.component_div(&self.state_factors()?))
-    }
-
     pub(super) fn scaled_state(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         let factors = self.state_factors()?;
         ModelError::check_dimension("robot state", x.len(), factors.len())?;

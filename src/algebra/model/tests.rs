@@ -250,7 +250,7 @@ fn active_terms_come_in_library_order_without_zeros() {
         .unwrap();
     let phase = &model.phases()[0];
     assert_eq!(phase.active_count(), 3);
-    let rows = |output| -> Vec<usize> { phase.support(output).iter().map(|t| t.index()).collect() };
+    let rows = |output| -> Vec<usize> { phase.active_terms(output).map(|(row, _)| row).collect() };
     assert_eq!((rows(0), rows(1)), (vec![1, 2], vec![0]));
     let terms = model.active_terms(0, 0).unwrap();
     let texts: Vec<(f64, &str)> = terms.iter().map(|&(c, t)| (c, t.text())).collect();
