@@ -29,6 +29,7 @@ const RULES: f64 = 0.5;
 
 /// Why equations cannot be in physical units.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum PhysicalError {
     /// The model lacks a part, or has nonlinear maps.
     #[error(
@@ -40,19 +41,13 @@ pub enum PhysicalError {
         "model `{model}`: physical units need `{part}` with names and units, which the model does not have"
     )]
     NoUnits {
-        /// Name of the model.
         model: String,
         /// Key of the model file.
         part: &'static str,
     },
     /// A row of the encoder has no weight, or a coefficient overflows.
     #[error("model `{model}`: {place} has no finite value in physical units")]
-    NotFinite {
-        /// Name of the model.
-        model: String,
-        /// Row or coefficient.
-        place: String,
-    },
+    NotFinite { model: String, place: String },
 }
 
 /// Units of latent coordinates and inputs, and the input maps in them.

@@ -68,13 +68,36 @@ pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptio
     let is_spaced = count > sides.len();
     let mut lines = Vec::with_capacity(count);
     for (place, (equation, of_equation)) in system.equations.iter().zip(&sides).enumerate() {
-        let label = format!("{label}:{}", place + 1);
+        let is_tall = equation.is_tall();
+        let (style, mark) = match (aligned, is_tall) {
+            (true, _) => ("", "&"),
+            // `cases` sets its lines in text style, in which fractions shrink.
+            (false, true) => (r"\displaystyle ", ""),
+            (false, false) => ("", ""),
+        };
+        let relation = if equation.is_approximate {
+            r"\approx"
+        } else {
+            "="
+        };
+        let label = format!(r" \label{{{label}:{}}}", place + 1);
         for (line, side) in of_equation.iter().enumerate() {
+            let start = match line {
+                0 => format!("{} {mark}{relation} ", tex_symbol(&equation.left)),
+                _ => format!(r"{mark}\qquad "),
+            };
+            // whether the equation and the phase end with this line
             let ends = [line + 1 == of_equation.len(), place + 1 == sides.len()];
-            lines.push(match aligned {
-                true => align_line(equation, line, side, ends, &label),
-                false => cases_line(equation, line, side, ends, is_spaced),
-            });
+            let end = match (aligned, ends) {
+                (true, [false, _]) => r" \notag \\",
+                (true, [true, true]) => &label,
+                (true, [true, false]) => &format!(r"{label} \\"),
+                (false, [true, true]) => "",
+                (false, [true, false]) if is_tall || is_spaced => r" \\[1ex]",
+                (false, [false, _]) if is_tall => r" \\[0.5ex]",
+                (false, _) => r" \\",
+            };
+            lines.push(format!("{style}{start}{side}{end}"));
         }
     }
     Block {
@@ -119,55 +142,4 @@ fn right_sides(equation: &Equation, start: Start, options: &PrintOptions) -> Vec
     let lines = break_lines(&equation.terms, available, first, continued).into_iter();
     let side = |(line, terms)| tex_terms(terms, numbers, line > 0);
     lines.enumerate().map(side).collect()
-}
-
-/// One line of `cases`; `ends` tells whether its equation and the phase end with it.
-fn cases_line(
-    equation: &Equation,
-    line: usize,
-    side: &str,
-    ends: [bool; 2],
-    is_spaced: bool,
-) -> String {
-    let is_tall = equation.is_tall();
-    // `cases` sets its lines in text style, in which fractions shrink.
-    let style = if is_tall { r"\displaystyle " } else { "" };
-    let start = match line {
-        0 => format!("{} {} ", tex_symbol(&equation.left), relation(equation)),
-        _ => r"\qquad ".to_owned(),
-    };
-    let end = match ends {
-        [true, true] => "",
-        [true, false] if is_tall || is_spaced => r" \\[1ex]",
-        [false, _] if is_tall => r" \\[0.5ex]",
-        [_, _] => r" \\",
-    };
-    format!("{style}{start}{side}{end}")
-}
-
-fn relation(equation: &Equation) -> &'static str {
-    match equation.is_approximate {
-        true => r"\approx",
-        false => "=",
-    }
-}
-
-/// One line of `align`; the last of an equation has its label.
-fn align_line(
-    equation: &Equation,
-    line: usize,
-    side: &str,
-    ends: [bool; 2],
-    label: &str,
-) -> String {
-    let start = match line {
-        0 => format!("{} &{} ", tex_symbol(&equation.left), relation(equation)),
-        _ => r"&\qquad ".to_owned(),
-    };
-    let end = match ends {
-        [false, _] => r" \notag \\".to_owned(),
-        [true, true] => format!(r" \label{{{label}}}"),
-        [true, false] => format!(r" \label{{{label}}} \\"),
-    };
-    format!("{start}{side}{end}")
 }
