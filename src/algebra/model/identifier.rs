@@ -201,7 +201,12 @@ mod tests {
             identifier: word.to_owned(),
             owner: TAKEN[list].0,
         };
-        let identifier = || "a_".to_owned();
+        let reserved = Reserved {
+            identifier: "a__".to_owned(),
+        };
+        let end = || End {
+            identifier: "a_".to_owned(),
+        };
         let long = "a".repeat(41);
         for (name, expected) in [
             ("", Empty),
@@ -214,36 +219,11 @@ mod tests {
             ("../x", character(2, '/')),
             ("2d", Start { found: '2' }),
             ("_x", Start { found: '_' }),
-            (
-                "a-_",
-                Reserved {
-                    identifier: identifier() + "_",
-                },
-            ),
-            (
-                "a_",
-                End {
-                    identifier: identifier(),
-                },
-            ),
-            (
-                "a-",
-                End {
-                    identifier: identifier(),
-                },
-            ),
-            (
-                "a.",
-                End {
-                    identifier: identifier(),
-                },
-            ),
-            (
-                "a ",
-                End {
-                    identifier: identifier(),
-                },
-            ),
+            ("a-_", reserved),
+            ("a_", end()),
+            ("a-", end()),
+            ("a.", end()),
+            ("a ", end()),
             ("double", keyword("double", "C")),
             ("template", keyword("template", "C++")),
             ("and-eq", keyword("and_eq", "C++")),

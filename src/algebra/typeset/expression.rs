@@ -16,11 +16,15 @@ pub fn expression(pool: &ExprPool, expr: ExprId, symbols: &SymbolTable) -> Signe
     Layout { pool, symbols }.signed(expr)
 }
 
-/// Lays out all terms of equations.
-pub(super) fn terms(equations: &Equations<'_>, symbols: &SymbolTable) -> Vec<Signed> {
+/// Lays out all terms of equations, each with its text.
+pub(super) fn terms<'e>(
+    equations: &'e Equations<'_>,
+    symbols: &SymbolTable,
+) -> Vec<(&'e str, Signed)> {
+    let layout = |expr| expression(equations.pool(), expr, symbols);
     let terms = equations.terms().iter();
     terms
-        .map(|term| expression(equations.pool(), term.expr(), symbols))
+        .map(|term| (term.text(), layout(term.expr())))
         .collect()
 }
 

@@ -1,7 +1,7 @@
 //! The model in robot coordinates: what the latent coordinates are made of, and the
 //! accelerations of the robot that the latent dynamics mean.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::equations::Equations;
 use crate::model::{AffineMap, LatentVariable};
@@ -57,32 +57,22 @@ impl RobotTypeset {
         let (encoder, negligible_weights) = encoder(map, &factors, symbols, &coordinates)?;
         let mut rounder = Rounder::new(rounding, coefficients(system));
         let mut systems = Vec::new();
+        let outputs: Vec<(Symbol, String)> = (coordinates.iter().zip(&state.names))
+            .map(|(symbol, name)| {
+                let symbol = symbol.clone();
+                (Symbol { dots: 2, ..symbol }, format!("dd({name})"))
+            })
+            .collect();
         for (index, phase) in system.phases().iter().enumerate() {
-            let xi = &system.coefficients(index);
-            let mut equations = Vec::with_capacity(coordinates.len());
-            for (row, symbol) in coordinates.iter().enumerate() {
-                let output = format!("dd({})", state.names[row]);
-                let texts = system.terms().iter().map(|term| term.text());
-                let entries = terms
-                    .iter()
-                    .zip(texts)
-                    .enumerate()
-                    .map(|(term, (math, text))| {
-                        let sum = decoder.row(row).transpose().dot(&xi.row(term).transpose());
-                        Ok((finite(sum / factors[row], &output, text)?, text, math))
-                    })
-                    .collect::<Result<Vec<_>, TypesetError>>()?;
-                let left = Symbol {
-                    dots: 2,
-                    ..symbol.clone()
-                };
-                let place = (phase.name.as_str(), output.as_str());
-                equations.push(rounder.equation(left, place, entries.into_iter()));
+            let xi = system.coefficients(index);
+            let mut ddq = DMatrix::zeros(terms.len(), outputs.len());
+            for (row, (_, output)) in outputs.iter().enumerate() {
+                for (term, (text, _)) in terms.iter().enumerate() {
+                    let sum = decoder.row(row).transpose().dot(&xi.row(term).transpose());
+                    ddq[(term, row)] = finite(sum / factors[row], output, text)?;
+                }
             }
-            systems.push(EquationSystem {
-                phase: phase.name.clone(),
-                equations,
-            });
+            systems.push(rounder.system(&phase.name, &outputs, &terms, &ddq));
         }
         Ok(Some(Self {
             encoder,

@@ -1,7 +1,9 @@
 //! Coefficients before terms, with a record of what rounding changed.
 
+use nalgebra::DMatrix;
+
 use super::decimal::{Decimal, Rounding};
-use super::equations::Equation;
+use super::equations::{Equation, EquationSystem};
 use super::expression::with_coefficient;
 use super::tree::{Signed, Symbol};
 
@@ -88,6 +90,27 @@ impl Rounder {
         match is_adaptive && self.is_exact && coefficient.fract() == 0.0 {
             true => Decimal::rounded(coefficient, Rounding::Exact),
             false => Decimal::rounded(coefficient, self.rounding),
+        }
+    }
+
+    /// The equations of one phase out of `xi`, a row a term, a column an output, which has a symbol and
+    /// a name for the record.
+    pub(super) fn system(
+        &mut self,
+        phase: &str,
+        outputs: &[(Symbol, String)],
+        terms: &[(&str, Signed)],
+        xi: &DMatrix<f64>,
+    ) -> EquationSystem {
+        let equations = outputs.iter().zip(xi.column_iter());
+        let equations = equations.map(|((left, output), column)| {
+            let entries = column.iter().zip(terms);
+            let entries = entries.map(|(xi, (text, term))| (*xi, *text, term));
+            self.equation(left.clone(), (phase, output), entries)
+        });
+        EquationSystem {
+            equations: equations.collect(),
+            phase: phase.to_owned(),
         }
     }
 

@@ -165,20 +165,15 @@ impl Layout<'_> {
 
     /// Phase names, each over its columns, and the rules below them.
     fn phase_heads(&self) -> (String, String) {
-        let mut names = String::new();
-        let mut rules = String::new();
-        let mut start = 0;
-        while start < self.columns.len() {
-            let name = &self.table.columns[self.columns[start]].0;
-            let end = self.columns[start..]
-                .iter()
-                .position(|&column| self.table.columns[column].0 != *name)
-                .map_or(self.columns.len(), |length| start + length);
-            let span = end - start;
-            let name = tex_text(name);
+        let phase = |column: &usize| &self.table.columns[*column].0;
+        let (mut names, mut rules) = (String::new(), String::new());
+        let mut start = 2;
+        for columns in self.columns.chunk_by(|a, b| phase(a) == phase(b)) {
+            let (span, name) = (columns.len(), tex_text(phase(&columns[0])));
+            let end = start + span - 1;
             names.push_str(&format!(r" & \multicolumn{{{span}}}{{c}}{{{name}}}"));
-            rules.push_str(&format!(r"\cmidrule(lr){{{}-{}}}", start + 2, end + 1));
-            start = end;
+            rules.push_str(&format!(r"\cmidrule(lr){{{start}-{end}}}"));
+            start = end + 1;
         }
         (format!(r"{} \\", names.trim_start()), rules)
     }
